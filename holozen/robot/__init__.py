@@ -1,0 +1,1 @@
+"""xacro and URDF files -> a checked RobotModel."""

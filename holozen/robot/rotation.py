@@ -1,0 +1,67 @@
+"""Rotations as 3x3 matrices, roll pitch yaw, and quaternions x, y, z, w. Angles in radians."""
+
+from collections.abc import Sequence
+from itertools import permutations
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Quaternion = tuple[float, float, float, float]
+
+
+def matrix_of(rpy: Sequence[float]) -> Array:
+    """URDF's rotation: roll about the fixed x, then pitch about the fixed y, then yaw about the fixed z, so
+    Rz Ry Rx.
+    """
+    cr, cp, cy = np.cos(rpy)
+    sr, sp, sy = np.sin(rpy)
+    return np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+
+
+def quaternion_of(matrix: Array) -> Quaternion:
+    """The unit quaternion of a rotation matrix, with w >= 0."""
+    # Each row is 4 times one component times all four. The row with the largest square loses no digits
+    # (S. W. Shepperd, "Quaternion from rotation matrix", Journal of Guidance and Control 1, 1978).
+    (a, b, c), (d, e, f), (g, h, i) = matrix.tolist()
+    rows = np.array(
+        [
+            [1 + a - e - i, b + d, c + g, h - f],
+            [b + d, 1 - a + e - i, f + h, c - g],
+            [c + g, f + h, 1 - a - e + i, d - b],
+            [h - f, c - g, d - b, 1 + a + e + i],
+        ]
+    )
+    row = rows[np.argmax(np.diag(rows))]
+    row = row / (np.linalg.norm(row) * (-1 if row[3] < 0 else 1))
+    x, y, z, w = row.tolist()
+    return x, y, z, w
+
+
+def principal(inertia: Array) -> tuple[Array, Array]:
+    """Principal moments (3,) of a symmetric 3x3 tensor, and the rotation whose columns are their axes.
+
+    Of the 24 right-handed ways to name the axes it takes the one next to x, y, z: a tensor that is diagonal
+    already keeps its order and gets the identity.
+    """
+    noise = 1e-12 * np.trace(inertia)
+    moments, axes = np.linalg.eigh(np.where(np.abs(inertia) > noise, inertia, 0.0))
+    order = list(max(permutations(range(3)), key=lambda order: np.abs(np.diag(axes[:, list(order)])).sum()))
+    moments, axes = moments[order], axes[:, order]
+    axes = axes * np.where(np.diag(axes) < 0, -1.0, 1.0)
+    if np.linalg.det(axes) < 0:
+        axes[:, np.argmin(np.diag(axes))] *= -1
+    return moments, axes
+
+
+def triple(values: Any) -> tuple[float, float, float]:
+    """Three plain floats, as engines want them."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z

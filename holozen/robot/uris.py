@@ -1,0 +1,83 @@
+"""From what a robot file calls a mesh to the file on this machine."""
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from itertools import islice, takewhile
+from pathlib import Path
+from urllib.parse import unquote
+
+from holozen.robot.errors import RobotError
+from holozen.robot.packages import find_package, local_packages, nearest_robot_folder
+
+MOST_FOLDERS = 5000  # searched for a lost mesh in one package; keeps it short where a home folder passes for one
+
+_URI = re.compile(r"(?:([A-Za-z][A-Za-z0-9+.-]+)://)?(.*)", re.DOTALL)
+_ABSOLUTE = re.compile(r"/|[A-Za-z]:[/\\]")  # also of a Windows machine
+
+
+def resolve_uri(uri: str, start: Path, given: Mapping[str, Path] = {}) -> Path:
+    """The existing file that `uri` names, as an absolute path.
+
+    `uri` is `package://NAME/...`, `model://NAME/...`, `file:///...`, an absolute path, or a path relative to
+    the folder of the robot file `start` or to its package; percent-encoded or not. An absolute path that does
+    not exist here comes from another machine: its file name is searched in the given packages, in the robot's
+    own and in the ones next to it, and the match that shares most of the path's end is taken.
+
+    Raises RobotError that says where it looked.
+    """
+    scheme, rest = _split(uri)
+    places = list(dict.fromkeys(_places(scheme, rest, start, given)))
+    found = next((place for place in places if os.path.isfile(place)), None)
+    if found is None and not scheme and _ABSOLUTE.match(rest):
+        found = _by_file_name(unquote(rest), start, given)
+    if found is None:
+        raise RobotError(f"no such file {uri[:200]!r}; looked for {' and '.join(str(place) for place in places)}")
+    return Path(os.path.abspath(found))
+
+
+def _split(uri: str) -> tuple[str, str]:
+    """The scheme, empty for a file, and what follows it."""
+    match = _URI.fullmatch(uri.strip())
+    assert match is not None, "the pattern takes any text"
+    scheme, rest = (match[1] or "").lower(), match[2]
+    if scheme not in ("", "file", "package", "model"):
+        raise RobotError(f"{uri[:200]!r} is not fetched; write package://NAME/FILE, file:///FILE or a relative path")
+    return scheme.replace("file", ""), rest.removeprefix("localhost") if scheme == "file" else rest
+
+
+def _places(scheme: str, rest: str, start: Path, given: Mapping[str, Path]) -> Iterator[Path]:
+    # The text as it stands first: a file's name may really have a % in it.
+    for text in dict.fromkeys((rest, unquote(rest))):
+        if scheme:
+            name, _, inside = text.partition("/")
+            yield find_package(name, start, given) / inside.lstrip("/")
+        elif _ABSOLUTE.match(text):
+            yield Path(text)
+        else:
+            yield from (folder / text for folder in _own_folders(start))
+
+
+def _own_folders(start: Path) -> list[Path]:
+    """The folder of the robot file, and the robot's package if that is another."""
+    folder = Path(os.path.abspath(start if os.path.isdir(start) else start.parent))
+    return list(dict.fromkeys((folder, nearest_robot_folder(start) or folder)))
+
+
+def _by_file_name(lost: str, start: Path, given: Mapping[str, Path]) -> Path | None:
+    parts = re.split(r"[/\\]+", lost)
+    roots = dict.fromkeys((*given.values(), *_own_folders(start), *local_packages(start).values()))
+    matches = [path for root in roots for path in _files_called(parts[-1], root)]
+    return max(matches, key=lambda path: _shared_end(path, parts), default=None)
+
+
+def _files_called(name: str, root: Path) -> Iterator[Path]:
+    for folder, children, files in islice(os.walk(root), MOST_FOLDERS):
+        children[:] = sorted(child for child in children if not child.startswith("."))
+        if name in files:
+            yield Path(folder, name)
+
+
+def _shared_end(path: Path, parts: list[str]) -> int:
+    pairs = zip(reversed(path.parts), reversed(parts), strict=False)
+    return sum(1 for _ in takewhile(lambda pair: pair[0] == pair[1], pairs))

@@ -1,0 +1,328 @@
+"""A URDF becomes a checked RobotModel, or one line that names file, line and element."""
+
+import math
+import sys
+from pathlib import Path
+
+import pytest
+
+from holozen.robot.errors import RobotError
+from holozen.robot.model import Inertial, Limits, Link, Pose, RobotModel, Shape, load, parse
+
+REPO = Path(__file__).parents[3]
+ORIGIN = Path("somewhere/robot.urdf")
+
+TWO_LINKS = '<link name="base"/><link name="wheel"/>'
+JOINT = '<joint name="j" type="continuous"><parent link="base"/><child link="wheel"/>{}</joint>'
+
+
+def robot(body: str) -> RobotModel:
+    return parse(f'<robot name="r">\n{body}\n</robot>', ORIGIN)
+
+
+def refusal(body: str) -> str:
+    with pytest.raises(RobotError) as error:
+        robot(body)
+    told = str(error.value)
+    assert "\n" not in told
+    return told
+
+
+def inertial(mass: str = "1", inertia: str = 'ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"') -> str:
+    return f'<link name="a"><inertial><mass value="{mass}"/><inertia {inertia}/></inertial></link>'
+
+
+def collision(geometry: str) -> str:
+    return f'<link name="a"><collision><geometry>{geometry}</geometry></collision></link>'
+
+
+def test_links_joints_and_root_are_read() -> None:
+    model = robot(
+        '<link name="base"><inertial><origin xyz="0 0 0.28" rpy="0.1 0 0"/><mass value="0.28"/>'
+        '<inertia ixx="1" ixy="0.1" ixz="0.2" iyy="2" iyz="0.3" izz="3"/></inertial></link>'
+        '<joint name="j" type="revolute"><origin xyz="0 0.68 0.18" rpy="0 0 1.5"/><parent link="base"/>'
+        '<child link="wheel"/><axis xyz="0 3 4"/><limit effort="5" velocity="6" lower="-1" upper="2"/>'
+        "</joint>"
+        '<link name="wheel"/>'
+    )
+    assert (model.name, model.root, list(model.links), model.warnings) == ("r", "base", ["base", "wheel"], ())
+    expected = Inertial(Pose((0, 0, 0.28), (0.1, 0, 0)), 0.28, (1, 0.1, 0.2, 2, 0.3, 3))
+    assert model.links["base"] == Link("base", expected, (), ())
+    joint = model.joints["j"]
+    assert (joint.kind, joint.parent, joint.child) == ("revolute", "base", "wheel")
+    assert joint.pose == Pose((0, 0.68, 0.18), (0, 0, 1.5))
+    assert joint.axis == pytest.approx((0, 0.6, 0.8))
+    assert joint.limits == Limits(5, 6, -1, 2)
+
+
+@pytest.mark.parametrize("kind", ["continuous", "revolute", "prismatic", "fixed", "floating", "planar"])
+def test_each_kind_of_joint_is_known(kind: str) -> None:
+    assert robot(TWO_LINKS + JOINT.format("").replace("continuous", kind)).joints["j"].kind == kind
+
+
+def test_what_a_joint_leaves_out_takes_the_urdf_default() -> None:
+    joint = robot(TWO_LINKS + JOINT.format("")).joints["j"]
+    assert (joint.pose, joint.axis, joint.limits) == (Pose(), (1, 0, 0), Limits())
+    joint = robot(TWO_LINKS + JOINT.format('<limit effort="5" velocity="5" lower="0" upper="0"/>')).joints[
+        "j"
+    ]
+    assert (joint.limits.lower, joint.limits.upper) == (-math.inf, math.inf)
+
+
+def test_a_fixed_joint_may_have_an_axis_without_direction() -> None:
+    body = TWO_LINKS + JOINT.format('<axis xyz="0 0 0"/>')
+    assert robot(body.replace("continuous", "fixed")).joints["j"].axis == (1, 0, 0)
+    assert "<axis> of <joint name='j'> has no direction" in refusal(body)
+
+
+def test_each_kind_of_shape_keeps_its_size_in_metres(tmp_path: Path) -> None:
+    (tmp_path / "base.dae").touch()
+    shapes = {
+        '<box size="1 2  3"/>': Shape("box", (1, 2, 3), Pose()),
+        '<cylinder length="0.13" radius="0.14"/>': Shape("cylinder", (0.14, 0.13), Pose()),
+        '<sphere radius="0.5"/>': Shape("sphere", (0.5,), Pose()),
+        '<mesh filename="base.dae" scale="0.01  0.01 -0.01"/>': Shape(
+            "mesh", (0.01, 0.01, -0.01), Pose(), tmp_path / "base.dae"
+        ),
+        '<mesh filename="base.dae"/>': Shape("mesh", (1, 1, 1), Pose(), tmp_path / "base.dae"),
+    }
+    for text, shape in shapes.items():
+        model = parse(f'<robot name="r">{collision(text)}</robot>', tmp_path / "robot.urdf")
+        assert model.links["a"].collisions == (shape,)
+        assert model.warnings == ()
+
+
+def test_visuals_and_collisions_have_their_own_pose() -> None:
+    box = '<origin xyz="0 0 {}"/><geometry><box size="1 1 1"/></geometry>'
+    link = f'<link name="a"><visual>{box.format(1)}</visual><collision>{box.format(2)}</collision></link>'
+    parts = robot(link).links["a"]
+    assert [shape.pose.xyz for shape in (*parts.visuals, *parts.collisions)] == [(0, 0, 1), (0, 0, 2)]
+
+
+def test_loose_attributes_crlf_and_comments_are_accepted() -> None:
+    text = (
+        '<?xml version="1.0" encoding="ISO-8859-1" ?>\r\n<!DOCTYPE robot>\r\n<robot name ="r" >\r\n'
+        '<!-- Räder --><link\tname = "a">\r\n<inertial><mass value ="  2 "/>'
+        '<inertia ixx="1" iyy="1" izz="1"/></inertial></link>\r\n</robot>\r\n'
+    )
+    link = parse(text, ORIGIN).links["a"]
+    assert link.inertial is not None and link.inertial.mass == 2
+
+
+def test_joints_of_a_transmission_are_no_joints_of_the_robot() -> None:
+    assert robot('<link name="a"/><transmission><joint name="j"/></transmission>').joints == {}
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        ("", "line 1: <robot name='r'> has no <link>; a robot has at least one"),
+        ("<link/>", "line 2: <link> of <robot name='r'> has no name"),
+        ('<link name="a"/>\n<link name="a"/>', "line 3: <link name='a'> is there twice"),
+        (TWO_LINKS + JOINT.format("") + "\n" + JOINT.format(""), "line 3: <joint name='j'> is there twice"),
+        ('<link name="a"/><link name="b"/>', "<robot name='r'> has 2 root links: a, b"),
+        ('<link name="base"/>' + JOINT.format(""), "names the child link 'wheel'; the links there are: base"),
+        (
+            '<link name="wheel"/>' + JOINT.format(""),
+            "names the parent link 'base'; the links there are: wheel",
+        ),
+        (
+            TWO_LINKS + JOINT.format("").replace("continuous", "hinge"),
+            "unknown type 'hinge'; known are continuous",
+        ),
+        (TWO_LINKS + JOINT.format("").replace('type="continuous"', ""), "<joint name='j'> has no type"),
+        (
+            TWO_LINKS + JOINT.format("").replace('<child link="wheel"/>', ""),
+            "<joint name='j'> has no <child>",
+        ),
+        (
+            TWO_LINKS + JOINT.format("").replace("<parent link", "<parent lnk"),
+            "<parent> of <joint name='j'> has no link",
+        ),
+        (TWO_LINKS + JOINT.format('<origin rpy="0 1"/>'), "rpy='0 1' has 2 numbers instead of 3"),
+        (TWO_LINKS + JOINT.format('<origin xyz="0, 1, 2"/>'), "xyz: '0,' is no finite number"),
+        (TWO_LINKS + JOINT.format('<origin xyz=""/>'), "<origin> of <joint name='j'> has no xyz"),
+        (
+            TWO_LINKS + JOINT.format('<limit lower="2" upper="1"/>').replace("continuous", "revolute"),
+            "above upper=1",
+        ),
+        (TWO_LINKS + JOINT.format('<limit effort="abc"/>'), "effort: 'abc' is no finite number"),
+        (inertial(mass="-1"), "<mass> of <link name='a'> value: -1.0 kg is below zero"),
+        (inertial(mass="nan"), "'nan' is no finite number"),
+        (inertial(mass="inf"), "'inf' is no finite number"),
+        (inertial(mass="1e999"), "'1e999' is no finite number"),
+        (inertial(mass="1_0"), "'1_0' is no finite number"),
+        (inertial(mass="1e300"), "'1e300' is beyond 1e+06"),
+        (inertial(mass=""), "<mass> of <link name='a'> has no value"),
+        (inertial(mass="${mass}"), "'${mass}' is no finite number"),
+        (inertial(inertia='ixx="-1" iyy="1" izz="1"'), "a moment of inertia is never below zero"),
+        (inertial(inertia='ixx="abc"'), "ixx: 'abc' is no finite number"),
+        ('<link name="a"><inertial/></link>', "<inertial> of <link name='a'> has no <mass>"),
+        ('<link name="a"><visual/></link>', "<visual> of <link name='a'> has no <geometry>"),
+        (collision(""), "holds nothing; it has to hold <box>, <cylinder>, <sphere> or <mesh>"),
+        (collision("<cone/>"), "holds <cone>; it has to hold"),
+        (
+            collision('<box size="1 1 0"/>'),
+            "has the size (1.0, 1.0, 0.0) m; each number has to be 1e-06 or more",
+        ),
+        (collision('<cylinder radius="-1" length="1"/>'), "has the size (-1.0, 1.0) m"),
+        (collision('<sphere radius="0"/>'), "<sphere> of <link name='a'> has the size (0.0,) m"),
+        (collision('<mesh filename="x" scale="0 1 1"/>'), "has the scale (0.0, 1.0, 1.0)"),
+        (collision('<mesh filename="x" scale="0.01"/>'), "scale='0.01' has 1 numbers instead of 3"),
+        (collision("<mesh/>"), "<mesh> of <link name='a'> has no filename"),
+    ],
+)
+def test_a_mistake_is_refused_with_file_line_and_element(body: str, told: str) -> None:
+    line = refusal(body)
+    assert line.startswith(f"{ORIGIN}, line ") and told in line
+
+
+def joined(*pairs: str) -> str:
+    """Links a, b, c and a fixed joint for each pair of letters, parent and child, one a line."""
+    links = "".join(f'<link name="{name}"/>' for name in "abc")
+    joint = '\n<joint name="{0}" type="fixed"><parent link="{0[0]}"/><child link="{0[1]}"/></joint>'
+    return links + "".join(joint.format(pair) for pair in pairs)
+
+
+def test_a_circle_of_joints_is_refused_also_beside_a_sound_tree() -> None:
+    assert "has joints that go in a circle through the links a, b, c;" in refusal(joined("ab", "bc", "ca"))
+    assert "has joints that go in a circle through the links b, c;" in refusal(joined("bc", "cb"))
+    assert "has joints that go in a circle through the links c;" in refusal(joined("ab", "cc"))
+
+
+def test_a_link_with_two_parents_is_refused() -> None:
+    told = f"{ORIGIN}, line 5: <joint name='bc'> has the child link 'c', which joint 'ac' has already"
+    assert refusal(joined("ab", "ac", "bc")) == told
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("", ": the file is empty"),
+        (" \r\n", ": the file is empty"),
+        (
+            "<robot name='r'>\n<link name='a'>\n</robot>",
+            ", line 3: broken XML: mismatched tag; <link name='a'> of ",
+        ),
+        ("<robot name='r'>\n<link", ", line 2: broken XML: unclosed token; <robot name='r'> of "),
+        ("<robot name='r' name='s'/>", ", line 1: broken XML: duplicate attribute"),
+        ("just text", ", line 1: broken XML: syntax error"),
+        ("<sdf version='1.6'/>", ", line 1: <sdf> is no <robot>"),
+        ("<robot><link name='a'/></robot>", ", line 1: <robot> has no name"),
+        (
+            "<!DOCTYPE r [\n<!ENTITY a SYSTEM 'file:///etc/passwd'>]><robot/>",
+            ", line 2: the entity 'a' is declared",
+        ),
+        (
+            "<!DOCTYPE r [<!ENTITY a 'x'><!ENTITY b '&a;&a;'>]><robot>&b;</robot>",
+            "the entity 'a' is declared",
+        ),
+        ("<robot name='r'>&a;</robot>", "broken XML: undefined entity"),
+        ("<robot name='\ud800'/>", "<robot name='?'> has no <link>"),
+    ],
+)
+def test_what_is_no_robot_is_refused_with_its_line(text: str, told: str) -> None:
+    with pytest.raises(RobotError) as error:
+        parse(text, ORIGIN)
+    assert str(error.value).startswith(f"{ORIGIN}{told}" if told[0] in ",:" else str(ORIGIN))
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("inertia", "possible"),
+    [
+        ('ixx="0" iyy="0" izz="0"', False),
+        ('ixx="1" iyy="1" ivz="1"', False),
+        ('ixx="1" iyy="1" izz="1" ixy="5"', False),
+        ('ixx="1" iyy="1" izz="1" ixz="-5"', False),
+        ('ixx="1" iyy="1" izz="1" iyz="5"', False),
+        ('ixx="1e-9" iyy="1e-9" izz="1e-9"', True),
+        ('ixx="2" iyy="2" izz="2" ixy="1" ixz="-1" iyz="0.5"', True),
+    ],
+)
+def test_an_inertia_that_no_body_has_makes_a_point_mass_and_is_told(inertia: str, possible: bool) -> None:
+    model = robot(inertial(inertia=inertia))
+    part = model.links["a"].inertial
+    assert part is not None and part.mass == 1
+    assert any(part.inertia) == possible
+    told = f"{ORIGIN}, line 2: <inertia> of <link name='a'> is zero or not positive definite"
+    assert [warning.startswith(told) for warning in model.warnings] == ([] if possible else [True])
+
+
+def test_a_mass_of_zero_is_told() -> None:
+    (warning,) = robot(inertial(mass="0")).warnings
+    assert warning.startswith(f"{ORIGIN}, line 2: <inertial> of <link name='a'> has no mass")
+
+
+def test_a_missing_mesh_is_a_warning_that_names_file_line_and_element() -> None:
+    model = robot(
+        '<link name="a">\n<visual><geometry><mesh filename="package://holo/gone.dae"/></geometry></visual>\n'
+        '<collision><geometry><mesh filename="gone.stl"/></geometry></collision></link>'
+    )
+    visual, hit = model.warnings
+    assert visual.startswith(f"{ORIGIN}, line 3: <mesh> of <link name='a'> (visual) is left out: ")
+    assert hit.startswith(
+        f"{ORIGIN}, line 4: <mesh> of <link name='a'> (collision) is left out: no such file 'gone.stl'"
+    )
+    assert model.links["a"].visuals[0].path is None
+
+
+def test_a_revolute_joint_without_limit_is_a_warning() -> None:
+    model = robot(TWO_LINKS + JOINT.format("").replace("continuous", "revolute"))
+    assert model.warnings == (
+        f"{ORIGIN}, line 2: <joint name='j'> is revolute and has no <limit>; it is taken as unlimited",
+    )
+
+
+def test_four_hundred_links_in_a_row_and_deep_nesting_are_read() -> None:
+    links = "".join(f'<link name="l{i}"/>' for i in range(400))
+    joint = '<joint name="j{0}" type="fixed"><parent link="l{0}"/><child link="l{1}"/></joint>'
+    model = robot(links + "".join(joint.format(i, i + 1) for i in range(399)))
+    assert model.root == "l0" and len(model.joints) == 399
+    deep = sys.getrecursionlimit() * 10
+    assert robot('<link name="a"/><gazebo>' + "<x>" * deep + "</x>" * deep + "</gazebo>").root == "a"
+
+
+def test_a_xacro_file_is_loaded_and_its_lines_are_those_of_the_expanded_text(tmp_path: Path) -> None:
+    path = tmp_path / "robot.xacro"
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    path.write_text(f'{head}<xacro:arg name="m" default="1"/><link name="{{}}"/></robot>'.format("$(arg m)"))
+    assert load(path).root == "1"
+    assert load(path, {"m": "b"}).root == "b"
+    for name in ("robot.xacro", "robot.urdf"):
+        (tmp_path / name).write_text(f'{head}<xacro:property name="x" value="1"/></robot>')
+        with pytest.raises(
+            RobotError, match=rf"{name} \(as `holozen xacro` prints it\), line \d+: <robot name"
+        ):
+            load(tmp_path / name)
+
+
+def test_packages_are_given_to_xacro_and_to_meshes(tmp_path: Path) -> None:
+    (tmp_path / "else").mkdir()
+    (tmp_path / "else" / "base.dae").touch()
+    path = tmp_path / "robot.urdf"
+    mesh = collision('<mesh filename="package://p/base.dae"/>')
+    path.write_text(f'<robot name="r">{mesh}</robot>')
+    (shape,) = load(path, packages={"p": tmp_path / "else"}).links["a"].collisions
+    assert shape.path == tmp_path / "else" / "base.dae"
+
+
+def test_hb_bot_is_read_as_the_lesson_describes_it() -> None:
+    model = load(REPO / "urdf" / "hb_bot.urdf.xacro")
+    assert model.warnings == ()
+    assert (model.name, model.root, len(model.links)) == ("hb_bot", "footprint_link", 5)
+    base = model.links["base_link"]
+    assert base.inertial == Inertial(
+        Pose((0, 0, 0.28)), 0.28, (0.01166666666667, 0, 0, 0.01166666666667, 0, 0.01166666666667)
+    )
+    (visual,) = base.visuals
+    assert visual.size == (0.01, 0.01, 0.01)
+    wheels = [joint for joint in model.joints.values() if joint.kind == "continuous"]
+    assert [joint.pose.xyz for joint in wheels] == [
+        (0, 0.68, 0.18),
+        (-0.58, -0.36, 0.18),
+        (0.58, -0.36, 0.18),
+    ]
+    assert {joint.axis for joint in wheels} == {(0, 1, 0)}
+    assert {joint.limits for joint in wheels} == {Limits(effort=5, velocity=5)}
+    assert model.planar_move is not None and model.planar_move.command_topic == "cmd_vel"

@@ -1,0 +1,140 @@
+"""The planar_move plugin is read in the spelling of ROS 1, of ROS 2, and mixed."""
+
+from pathlib import Path
+
+import pytest
+
+from holozen.robot.errors import RobotError
+from holozen.robot.model import RobotModel, parse
+from holozen.robot.plugins import PlanarMove
+
+ORIGIN = Path("somewhere/robot.urdf")
+
+
+def robot(*gazebo: str) -> RobotModel:
+    body = "".join(f"<gazebo>{text}</gazebo>\n" for text in gazebo)
+    return parse(f'<robot name="r">\n<link name="base"/>\n{body}</robot>', ORIGIN)
+
+
+def plugin(tags: str, filename: str = "libgazebo_ros_planar_move.so") -> str:
+    return f'<plugin name="drive" filename="{filename}">{tags}</plugin>'
+
+
+def drive(tags: str) -> PlanarMove:
+    model = robot(plugin(tags))
+    assert model.planar_move is not None and model.warnings == ()
+    return model.planar_move
+
+
+def test_a_robot_without_plugin_has_no_drive() -> None:
+    model = robot("<material>Gazebo/Black</material>")
+    assert model.planar_move is None and model.warnings == ()
+
+
+def test_without_tags_gazebos_defaults_hold_with_the_watchdog_on() -> None:
+    assert drive("") == PlanarMove(
+        "cmd_vel", "odom", "odom", 20.0, "base", 0.5, True, True, (1e-5, 1e-5, 1e-3)
+    )
+
+
+def test_ros_1_tags_are_read() -> None:
+    tags = (
+        "<robotNamespace>/</robotNamespace><commandTopic>/drive</commandTopic><odometryTopic>where</odometryTopic>"
+        "<odometryFrame>/map</odometryFrame><odometryRate>50.0</odometryRate><robotBaseFrame>base</robotBaseFrame>"
+        "<cmdTimeout>0.25</cmdTimeout><broadcastTransform>false</broadcastTransform>"
+    )
+    assert drive(tags) == PlanarMove("drive", "where", "map", 50.0, "base", 0.25, True, False)
+
+
+def test_ros_2_tags_are_read() -> None:
+    tags = (
+        "<ros><namespace>/demo</namespace><remapping>cmd_vel:=drive</remapping>"
+        "<remapping>odom:=/where</remapping></ros><update_rate>100</update_rate><publish_rate>10</publish_rate>"
+        "<publish_odom>true</publish_odom><publish_odom_tf>0</publish_odom_tf>"
+        "<odometry_frame>map</odometry_frame><robot_base_frame>base</robot_base_frame>"
+        "<covariance_x>0.1</covariance_x><covariance_y>0.2</covariance_y><covariance_yaw>0.3</covariance_yaw>"
+    )
+    expected = PlanarMove("demo/drive", "where", "map", 10.0, "base", 0.5, True, False, (0.1, 0.2, 0.3))
+    assert drive(tags) == expected
+
+
+def test_both_spellings_may_be_mixed_and_spaced() -> None:
+    tags = (
+        "<ros><remapping> cmd_vel := /drive </remapping></ros><command_topic>cmd_vel</command_topic>"
+        "<odometryFrame> map\n</odometryFrame><odometry_rate>30</odometry_rate><publishRate>10</publishRate>"
+    )
+    assert drive(tags) == PlanarMove("drive", "odom", "map", 30.0, "base")
+
+
+def test_a_namespace_stands_before_relative_topics_only() -> None:
+    tags = "<robotNamespace>a/b/</robotNamespace><commandTopic>//cmd_vel</commandTopic>"
+    assert (drive(tags).command_topic, drive(tags).odometry_topic) == ("cmd_vel", "a/b/odom")
+
+
+def test_of_two_equal_tags_the_first_counts_and_an_empty_one_says_nothing() -> None:
+    tags = "<odometryRate>30</odometryRate><odometryRate>40</odometryRate><odometryFrame> </odometryFrame>"
+    assert (drive(tags).odometry_rate, drive(tags).odometry_frame) == (30, "odom")
+
+
+def test_a_negative_timeout_switches_the_watchdog_off() -> None:
+    assert drive("<cmdTimeout>-1</cmdTimeout>").command_timeout == -1
+    assert drive("<cmd_timeout>-0.2</cmd_timeout>").command_timeout == -1
+
+
+def test_a_base_frame_that_is_no_link_is_told_and_the_root_is_taken() -> None:
+    model = robot(plugin("<robotBaseFrame>chasis</robotBaseFrame>"))
+    assert model.planar_move is not None and model.planar_move.robot_base_frame == "base"
+    told = "<plugin name='drive'> names the base frame 'chasis', which is no link; 'base' is used"
+    assert model.warnings == (f"{ORIGIN}, line 3: {told}",)
+
+
+def test_every_other_plugin_is_named_also_inside_a_sensor() -> None:
+    control = plugin("", "libgazebo_ros_control.so")
+    sensor = f'<sensor name="s">{plugin("", "libgazebo_ros_camera.so").replace("drive", "eye")}</sensor>'
+    model = robot(control, sensor, plugin(""), "<plugin/>")
+    assert model.planar_move is not None
+    assert [warning.partition(": ")[2] for warning in model.warnings] == [
+        "<plugin name='drive'> (libgazebo_ros_control.so) is not known here and does nothing",
+        "<plugin name='eye'> (libgazebo_ros_camera.so) is not known here and does nothing",
+        "<plugin> of <robot name='r'> (no filename) is not known here and does nothing",
+    ]
+
+
+@pytest.mark.parametrize("filename", ["gazebo_ros_planar_move", "/opt/ros/lib/libgazebo_ros_planar_move.so"])
+def test_the_plugin_is_known_by_its_file_name(filename: str) -> None:
+    assert robot(plugin("", filename)).planar_move is not None
+
+
+def test_a_second_planar_move_is_told_and_the_first_drives() -> None:
+    model = robot(plugin("<odometryRate>1</odometryRate>"), plugin("<odometryRate>2</odometryRate>"))
+    assert model.planar_move is not None and model.planar_move.odometry_rate == 1
+    assert "line 4: <plugin name='drive'> is a second planar_move" in model.warnings[0]
+
+
+@pytest.mark.parametrize(
+    ("tags", "told"),
+    [
+        (
+            "<odometryRate>0</odometryRate>",
+            "<odometryRate> of <plugin name='drive'> is '0'; it has to be a number above 0",
+        ),
+        ("<odometryRate>-5</odometryRate>", "is '-5'; it has to be a number above 0"),
+        ("<publish_rate>nan</publish_rate>", "<publish_rate> of <plugin name='drive'> is 'nan'"),
+        ("<odometryRate>fast</odometryRate>", "is 'fast'"),
+        (
+            "<cmdTimeout>0</cmdTimeout>",
+            "<cmdTimeout> of <plugin name='drive'> is '0'; it has to be a number above 0",
+        ),
+        ("<cmdTimeout>inf</cmdTimeout>", "is 'inf'"),
+        ("<covariance_x>-1</covariance_x>", "is '-1'; it has to be a number not below 0"),
+        ("<publish_odom>perhaps</publish_odom>", "is 'perhaps'; it has to be true or false"),
+        ("<commandTopic>*</commandTopic>", "<commandTopic> of <plugin name='drive'> makes the topic '*'"),
+        ("<commandTopic>@holozen/x</commandTopic>", "makes the topic '@holozen/x'"),
+        ("<robotNamespace>a b</robotNamespace>", "makes the topic 'a b/cmd_vel'"),
+        ("<ros><remapping>odom:=**</remapping></ros>", "makes the topic '**'"),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused_with_its_tag(tags: str, told: str) -> None:
+    with pytest.raises(RobotError) as error:
+        robot(plugin(tags))
+    assert str(error.value).startswith(f"{ORIGIN}, line 3: ") and told in str(error.value)
