@@ -1,0 +1,72 @@
+"""Bytes <-> messages, by the Zenoh Encoding that travels with them."""
+
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, TypeVar
+
+import msgspec
+
+from holozen.messages import Message, not_finite
+
+M = TypeVar("M", bound=Message)
+
+WIRES = {"json": "application/json", "msgpack": "application/msgpack"}
+"""What `--wire` may name, and the Encoding it writes."""
+
+# Encodings that say nothing of the content; our default is JSON, which is what people put by hand.
+_JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
+
+_encode_json = msgspec.json.Encoder().encode
+_encode_msgpack = msgspec.msgpack.Encoder().encode
+
+
+class CodecError(ValueError):
+    """Bytes that are no such message, or a message that has no bytes. The text is one line."""
+
+
+def encode(message: Message, wire: str = "json") -> bytes:
+    """The bytes of `message`. A NaN or an infinity raises CodecError: JSON would turn it into a null."""
+    payload = _encode_json(message) if wire == "json" else _encode_msgpack(message)
+    # No message has a null of its own, so only a payload with one needs the slow look.
+    if (wire != "json" or b"null" in payload) and (bad := not_finite(message)):
+        raise CodecError(f"{type(message).__name__}.{bad} is not a finite number")
+    return payload
+
+
+def decode(payload: bytes, encoding: str, types: tuple[type[M], ...]) -> M:
+    """The message in `payload`, of the first of `types` that fits. Raises CodecError with the reason."""
+    decoders: list[Callable[[bytes], M]] = [_decoder(kind, _format(encoding)) for kind in types]
+    try:
+        return decoders[0](payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as first:
+        for decoder in decoders[1:]:
+            try:
+                return decoder(payload)
+            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+                continue
+        raise CodecError(f"not a {types[0].__name__}: {first}") from None
+
+
+def convert(value: Any, kind: type[M]) -> M:
+    """A message from plain dicts, lists and numbers (what JSON or YAML gave). Raises CodecError with the reason."""
+    try:
+        return msgspec.convert(value, kind, strict=False)
+    except msgspec.ValidationError as error:
+        raise CodecError(f"not a {kind.__name__}: {error}") from None
+
+
+@lru_cache(maxsize=64)
+def _decoder(kind: type[M], form: str) -> Any:
+    module = msgspec.json if form == "json" else msgspec.msgpack
+    return module.Decoder(kind).decode
+
+
+@lru_cache(maxsize=64)
+def _format(encoding: str) -> str:
+    """`json` or `msgpack`. An Encoding may carry a schema after a semicolon."""
+    name = encoding.partition(";")[0]
+    if name in _JSON:
+        return "json"
+    if name == WIRES["msgpack"]:
+        return "msgpack"
+    raise CodecError(f"encoding {name!r} is not understood; known: {', '.join(WIRES.values())}")

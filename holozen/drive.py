@@ -1,0 +1,46 @@
+"""Kinematics of a planar base, as pure functions. Metres, radians, seconds; x forward, y left, z up."""
+
+import math
+from dataclasses import dataclass
+
+from holozen.limits import Planar
+
+
+@dataclass(frozen=True, slots=True)
+class Wheel:
+    """A wheel that rolls on the ground: centre (x, y) and axle direction (ax, ay) in the body frame, radius in m."""
+
+    joint: str
+    x: float
+    y: float
+    ax: float
+    ay: float
+    radius: float
+
+
+def to_world(velocity: Planar, yaw: float, dt: float) -> tuple[float, float]:
+    """The world-frame velocity (m/s) that moves a body at `yaw` for one step of `dt` seconds.
+
+    The heading of the middle of the step is used, so that a turning body follows its arc and not a polygon beside it.
+    """
+    x, y, turn = velocity
+    heading = yaw + turn * dt / 2
+    cosine, sine = math.cos(heading), math.sin(heading)
+    return x * cosine - y * sine, x * sine + y * cosine
+
+
+def to_body(vx: float, vy: float, yaw: float) -> tuple[float, float]:
+    """A world-frame velocity (m/s) seen from a body at `yaw`."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return vx * cosine + vy * sine, vy * cosine - vx * sine
+
+
+def wheel_rate(velocity: Planar, wheel: Wheel) -> float:
+    """The rate (rad/s) at which a wheel that does not slip along its rolling direction turns about its axle.
+
+    The rolling direction is axle x up; the speed of the wheel's centre along it, over the radius. The rollers of an
+    omni wheel take what is along the axle. Source: Siegwart, Introduction to Autonomous Mobile Robots, 3.2.3.
+    """
+    x, y, turn = velocity
+    vx, vy = x - turn * wheel.y, y + turn * wheel.x
+    return (vx * wheel.ay - vy * wheel.ax) / wheel.radius

@@ -1,0 +1,33 @@
+"""Limits on speed and on change of speed, as pure functions. Metres, radians, seconds."""
+
+import math
+
+Planar = tuple[float, float, float]
+"""A planar velocity in the body frame: forward (m/s), left (m/s), counter-clockwise (rad/s)."""
+
+STOP: Planar = (0.0, 0.0, 0.0)
+
+
+def clamp(value: float, limit: float) -> float:
+    """`value`, brought within [-limit, limit]."""
+    return max(-limit, min(limit, value))
+
+
+def clamp_speed(velocity: Planar, linear: float, angular: float) -> Planar:
+    """`velocity` with its speed at most `linear` m/s in the same direction, its turn at most `angular` rad/s."""
+    x, y, turn = velocity
+    speed = math.hypot(x, y)
+    scale = linear / speed if speed > linear else 1.0
+    return x * scale, y * scale, clamp(turn, angular)
+
+
+def ramp(now: Planar, wanted: Planar, linear: float, angular: float, dt: float) -> Planar:
+    """The velocity `dt` seconds on from `now` towards `wanted`, at most `linear` m/s^2 and `angular` rad/s^2."""
+    dx, dy, dturn = (w - n for w, n in zip(wanted, now, strict=True))
+    dx, dy, dturn = clamp_speed((dx, dy, dturn), linear * dt, angular * dt)
+    return now[0] + dx, now[1] + dy, now[2] + dturn
+
+
+def wrap(angle: float) -> float:
+    """`angle` in radians, brought into [-pi, pi]."""
+    return math.remainder(angle, math.tau)

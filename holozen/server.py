@@ -1,0 +1,80 @@
+"""The answering side of a request: typed requests, typed replies, errors with a reason."""
+
+import json
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from holozen.errors import ServiceError
+from holozen.tell import say
+
+if TYPE_CHECKING:
+    from holozen.messages import Message
+
+MAX_REQUEST_BYTES = 16_000_000  # a robot's URDF fits many times; more is refused unread
+
+
+def reason(payload: bytes) -> str:
+    """The text of an error reply: ours are `{"error": text}`, a stranger's are shown as they are."""
+    text = payload.decode(errors="replace")
+    try:
+        return str(json.loads(text)["error"])
+    except (ValueError, TypeError, KeyError):
+        return text or "the service answered with an error and no reason"
+
+
+class Server:
+    """A service. Requests wait until `answer_pending` is called, or until the thread of `start` takes them."""
+
+    def __init__(
+        self, queryable: Any, key: str, request: "type[Message]", answer: Callable[[Any], Any], wire: str
+    ) -> None:
+        from holozen import codec
+
+        self._queryable, self._key, self._request, self._answer, self._wire = queryable, key, request, answer, wire
+        self._codec = codec
+
+    def answer_pending(self) -> None:
+        """Answer the requests that wait; returns at once when there are none."""
+        while (query := self._queryable.try_recv()) is not None:
+            self._reply(query)
+
+    def start(self) -> None:
+        """Answer from a thread of its own, until the bus is closed."""
+        threading.Thread(target=self._serve, daemon=True).start()
+
+    def close(self) -> None:
+        """Stop answering."""
+        self._queryable.undeclare()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                query = self._queryable.recv()
+            except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+                return
+            self._reply(query)
+
+    def _reply(self, query: Any) -> None:
+        with query:
+            try:
+                reply = self._codec.encode(self._answer(self._read(query)), self._wire)
+                query.reply(self._key, reply, encoding=self._codec.WIRES[self._wire])
+            except (ServiceError, self._codec.CodecError) as error:
+                _refuse(query, str(error))
+            except Exception as error:
+                say(f"{self._key}: {type(error).__name__}: {error}")
+                _refuse(query, f"{self._key}: internal error, see the server's log")
+
+    def _read(self, query: Any) -> Any:
+        """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`)."""
+        if query.payload is None:
+            values = dict(query.parameters)
+            return self._codec.convert(values, self._request)
+        if len(query.payload) > MAX_REQUEST_BYTES:
+            raise ServiceError(f"request of {len(query.payload)} bytes; at most {MAX_REQUEST_BYTES} are read")
+        return self._codec.decode(bytes(query.payload), str(query.encoding), (self._request,))
+
+
+def _refuse(query: Any, text: str) -> None:
+    query.reply_err(json.dumps({"error": text}), encoding="application/json")

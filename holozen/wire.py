@@ -1,0 +1,89 @@
+"""The one table of what goes over the wire: key, type, who writes, who reads, rate, silence rule.
+
+README, tests, the command line and the services read it from here.
+"""
+
+import re
+from dataclasses import dataclass
+
+from holozen import messages as m
+
+COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stands
+MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded at all
+MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a TwistStamped is refused
+
+PRIORITIES = {"teleop": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
+"""Zenoh priority of each command source. Anyone else has DATA, as a plain `zenoh put`."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """A key with a stream of messages. `rate` in Hz; `silence` in seconds: when readers call it stale."""
+
+    key: str
+    types: tuple[type[m.Message], ...]
+    writers: tuple[str, ...]
+    readers: tuple[str, ...]
+    rate: float
+    silence: float
+    rule: str
+
+    @property
+    def type(self) -> type[m.Message]:
+        """The type that is written by default; the others are accepted too."""
+        return self.types[0]
+
+
+@dataclass(frozen=True, slots=True)
+class Service:
+    """A key that answers a request with one reply, or with an error that says why."""
+
+    key: str
+    request: type[m.Message]
+    reply: type[m.Message]
+    server: str
+    does: str
+
+
+TOPICS = (
+    Topic("cmd_vel", (m.Twist, m.TwistStamped), ("teleop", "controller"), ("sim",), 20.0, COMMAND_SILENCE,
+          "0.5 s without a fresh one: the robot stands"),
+    Topic("odom", (m.Odometry,), ("sim",), ("teleop", "controller", "pose_service"), 50.0, 0.2,
+          "0.2 s: shown as stale, the controller stops"),
+    Topic("cmd_vel_status", (m.CommandStatus,), ("sim",), ("teleop", "controller"), 10.0, 1.0, ""),
+    Topic("joint_states", (m.JointState,), ("sim",), (), 50.0, 0.2, ""),
+    Topic("tf", (m.TFMessage,), ("sim",), (), 50.0, 0.2, ""),
+    Topic("clock", (m.Clock,), ("sim",), (), 50.0, 0.2, ""),
+)  # fmt: skip
+
+SERVICES = (
+    Service("next_goal", m.NextGoalRequest, m.NextGoalReply, "pose_service", "the goal with a number, in odom"),
+    Service("get_pose", m.GetPoseRequest, m.GetPoseReply, "pose_service", "a robot's last odom and its age"),
+    Service("resume", m.TriggerRequest, m.TriggerReply, "sim", "lets the sources drive that a higher one overruled"),
+)
+
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
+
+
+def robot_name(text: str) -> str:
+    """`text` if it may name a robot, else ValueError. Zenoh would take `*`, which drives every robot."""
+    if not _NAME.fullmatch(text):
+        raise ValueError(f"robot name {text!r}: use a letter, then up to 63 letters, digits, '_' or '-' (such as Fred)")
+    return text
+
+
+def key_for(key: str, robot: str = "") -> str:
+    """The key of a robot's topic or service: `cmd_vel` for the robot at the root, else `Fred/cmd_vel`."""
+    return f"{robot}/{key}" if robot else key
+
+
+def topic(key: str) -> Topic | None:
+    """The table's row for a key, with or without a robot's name before it."""
+    last = key.rpartition("/")[2]
+    return next((row for row in TOPICS if row.key == last), None)
+
+
+def service(key: str) -> Service | None:
+    """The table's row for a service key, with or without a robot's name before it."""
+    last = key.rpartition("/")[2]
+    return next((row for row in SERVICES if row.key == last), None)
