@@ -1,0 +1,68 @@
+"""Go to a goal: errors, velocities and legs as pure functions. Metres, radians, seconds, odom frame."""
+
+import math
+from dataclasses import dataclass
+
+from holozen.drive import to_body
+from holozen.limits import Planar, clamp_speed, ramp, wrap
+
+Pose = tuple[float, float, float]
+"""x, y in metres and theta in radians."""
+
+
+@dataclass(frozen=True)
+class Gains:
+    """How eager the controller is. `linear`, `angular` in 1/s; speeds and accelerations in m, rad and s."""
+
+    linear: float = 1.5
+    angular: float = 2.0
+    max_speed: float = 0.5
+    max_turn: float = 1.0
+    max_acceleration: float = 1.0
+    max_turn_acceleration: float = 3.0
+    tolerance: float = 0.01  # m
+    angle_tolerance: float = 0.02  # rad
+
+
+def error(pose: Pose, goal: Pose) -> Planar:
+    """The goal seen from the body: forward, left, and the angle still to turn within [-pi, pi]."""
+    x, y = to_body(goal[0] - pose[0], goal[1] - pose[1], pose[2])
+    return x, y, wrap(goal[2] - pose[2])
+
+
+def arrived(left: Planar, gains: Gains) -> bool:
+    """Whether an error is within the tolerances."""
+    return math.hypot(left[0], left[1]) <= gains.tolerance and abs(left[2]) <= gains.angle_tolerance
+
+
+def velocity(left: Planar, now: Planar, gains: Gains, dt: float) -> Planar:
+    """The velocity to command `dt` seconds after `now` was commanded: proportional to the error, within the limits."""
+    x, y, turn = left
+    wanted = (gains.linear * x, gains.linear * y, gains.angular * turn)
+    wanted = clamp_speed(wanted, gains.max_speed, gains.max_turn)
+    return ramp(now, wanted, gains.max_acceleration, gains.max_turn_acceleration, dt)
+
+
+@dataclass
+class Leg:
+    """One goal's way: from where, since when (s, the odom's clock), and the worst distance from the straight line."""
+
+    start: Pose
+    goal: Pose
+    began: float
+    ended: float = 0.0
+    path_error: float = 0.0
+
+    def see(self, pose: Pose, time: float) -> None:
+        """Take account of where the robot was at `time`."""
+        self.ended = time
+        self.path_error = max(self.path_error, distance_to_line(pose, self.start, self.goal))
+
+
+def distance_to_line(point: Pose, start: Pose, end: Pose) -> float:
+    """The distance in metres of a point from the segment between two others."""
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    length2 = dx * dx + dy * dy
+    along = ((point[0] - start[0]) * dx + (point[1] - start[1]) * dy) / length2 if length2 else 0.0
+    along = max(0.0, min(1.0, along))
+    return math.hypot(point[0] - start[0] - along * dx, point[1] - start[1] - along * dy)

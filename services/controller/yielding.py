@@ -1,0 +1,22 @@
+"""Manners: the controller lets go when somebody else drives, and takes the robot again only when told."""
+
+from holozen.messages import CommandStatus
+
+
+class Manners:
+    """Reads cmd_vel_status. `source` is how the sim calls this controller."""
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._resumed = 0
+        self.yielded_to = ""  # empty while this controller may drive
+
+    def see(self, status: CommandStatus) -> None:
+        """Take account of the newest status. A sim that was started again forgets who drove; this does not."""
+        if status.resumed > self._resumed:
+            self.yielded_to = ""
+        self._resumed = status.resumed
+        if status.obeyed and status.obeyed != self._source:
+            self.yielded_to = status.obeyed
+        elif status.held and not self.yielded_to:
+            self.yielded_to = "somebody before"

@@ -1,0 +1,1 @@
+"""odom -> get_pose, next_goal."""

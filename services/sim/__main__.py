@@ -1,0 +1,55 @@
+"""The simulator: robots with planar drives in a world, on Zenoh keys."""
+
+import argparse
+import sys
+from pathlib import Path
+
+from holozen import connection, data, flags
+from holozen.bus import Bus, BusError
+from holozen.process import stop_event
+from holozen.robot.model import RobotError
+from holozen.tell import say
+
+from . import intake, worldfile
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="holozen sim", description="Simulate robots in a world.")
+    add = parser.add_argument
+    add("--world", type=Path, default=data.find("worlds", "gazebo.world"), help="an SDF file (default: gazebo.world)")
+    add("--robot", type=flags.robot_file, action="append", metavar="FILE[=NAME]",
+        help="a xacro or URDF file, and the robot's name (default: hb_bot at the root of the keys)")  # fmt: skip
+    add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR", help="for $(find NAME)")
+    add("--rtf", type=flags.number(0, 1000), help="real-time factor; 0: as fast as it goes (default: the world's)")
+    add("--max-linear", type=flags.number(0.01, 50, "m/s"), default=intake.MAX_LINEAR, metavar="M/S",
+        help="faster commands are clamped (default: %(default)s)")  # fmt: skip
+    add("--max-angular", type=flags.number(0.01, 100, "rad/s"), default=intake.MAX_ANGULAR, metavar="RAD/S",
+        help="(default: %(default)s)")  # fmt: skip
+    connection.add_arguments(parser)
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    args = parser().parse_args(argv)
+    stop = stop_event()
+    try:
+        spec = worldfile.load(args.world)
+        with Bus("sim", connection.from_arguments(args), lasting=True) as bus:
+            # The engine takes the longest to load, and a wrong flag should not wait for it.
+            from .loop import Loop
+            from .spawn import spawn_all
+            from .world import World
+
+            world = World(spec)
+            vehicles = spawn_all(bus, world, args)
+            for warning in spec.warnings:
+                say(f"sim: {warning}")
+            Loop(bus, world, vehicles, spec.rtf if args.rtf is None else args.rtf).run(stop)
+    except (BusError, RobotError, worldfile.WorldError) as error:
+        say(f"sim: {error}")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,56 @@
+"""The loop: hear, move, step, tell, at the pace of the clock."""
+
+import threading
+import time
+
+from holozen.bus import Bus, Publisher
+from holozen.messages import Clock, Time
+from holozen.wire import COMMAND_SILENCE
+
+from .pace import Pace
+from .reports import Schedule
+from .vehicle import Vehicle
+from .world import World
+
+CLOCK_RATE = 50.0  # Hz of sim time
+LOOK = 0.02  # s; how often requests and commands are heard while no step is due
+
+
+class Loop:
+    """Runs one world with its vehicles at `rtf` times real time (0: as fast as it goes)."""
+
+    def __init__(self, bus: Bus, world: World, vehicles: list[Vehicle], rtf: float) -> None:
+        self._world, self._vehicles, self._rtf = world, vehicles, rtf
+        self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
+        self._clock_due = Schedule(CLOCK_RATE)
+        self._heard = time.monotonic()
+
+    def run(self, stop: threading.Event, steps: int | None = None) -> None:
+        """Step until `stop` is set, or `steps` were made."""
+        pace = Pace(self._world.spec.step, self._rtf, time.monotonic())
+        last = None if steps is None else self._world.steps + steps
+        while not stop.is_set() and self._world.steps != last:
+            now = time.monotonic()
+            self._hear(now)
+            if (left := pace.left(now)) > 0:
+                stop.wait(min(left, LOOK))
+            else:
+                self._step(now)
+                pace.stepped(now)
+
+    def _hear(self, now: float) -> None:
+        stalled = now - self._heard > COMMAND_SILENCE
+        self._heard = now
+        clocks = (time.time(), self._world.time)
+        for vehicle in self._vehicles:
+            vehicle.hear(now, clocks, stalled)
+
+    def _step(self, now: float) -> None:
+        world, dt = self._world, self._world.spec.step
+        for vehicle in self._vehicles:
+            vehicle.move(now, dt)
+        world.step()
+        for vehicle in self._vehicles:
+            vehicle.tell(world.time, dt)
+        if self._clock_due.due(world.time):
+            self._clock.put(Clock(Time.of(world.time)))

@@ -1,0 +1,42 @@
+"""The joints of a planar base: they turn for the eye, as wheels that roll without slipping would."""
+
+import math
+
+from holozen.drive import Wheel, wheel_rate
+from holozen.limits import Planar
+from holozen.robot.model import RobotModel
+from holozen.robot.rigid import joint_axes
+
+FLAT = 0.1  # an axle steeper than this (sine of its angle to the ground) is no wheel's
+
+
+class Wheels:
+    """Angles (rad) and rates (rad/s) of the moving joints, in the order of `names`. What is no wheel stays at 0."""
+
+    def __init__(self, model: RobotModel) -> None:
+        axes = joint_axes(model)
+        self.names = list(axes)
+        self._wheels = [_wheel(model, name) for name in self.names]
+        self.angles = [0.0] * len(self.names)
+        self.rates = [0.0] * len(self.names)
+
+    def roll(self, velocity: Planar, dt: float) -> None:
+        """Turn on for `dt` seconds at the body-frame `velocity`."""
+        self.rates = [wheel_rate(velocity, wheel) if wheel else 0.0 for wheel in self._wheels]
+        self.angles = [angle + rate * dt for angle, rate in zip(self.angles, self.rates, strict=True)]
+
+
+def _wheel(model: RobotModel, name: str) -> Wheel | None:
+    joint, axis = model.joints[name], joint_axes(model)[name]
+    radius = _radius(model, joint.child)
+    length = math.hypot(axis.direction[0], axis.direction[1])
+    if joint.kind != "continuous" or not radius or abs(axis.direction[2]) > FLAT:
+        return None
+    ax, ay = axis.direction[0] / length, axis.direction[1] / length
+    return Wheel(name, axis.xyz[0], axis.xyz[1], ax, ay, radius)
+
+
+def _radius(model: RobotModel, link: str) -> float:
+    """The radius in metres of a link's first round collision shape; 0 if it has none."""
+    round_shapes = (shape for shape in model.links[link].collisions if shape.kind in ("cylinder", "sphere"))
+    return next((shape.size[0] for shape in round_shapes), 0.0)

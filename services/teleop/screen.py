@@ -1,0 +1,72 @@
+"""The full-screen application: layout, bindings, style."""
+
+from collections.abc import Callable
+
+from prompt_toolkit.application import Application
+from prompt_toolkit.formatted_text import StyleAndTextTuples
+from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
+from prompt_toolkit.keys import Keys
+from prompt_toolkit.layout import Layout, Window
+from prompt_toolkit.layout.controls import FormattedTextControl
+from prompt_toolkit.styles import Style
+
+from .keymap import MOVES, QUIT
+
+STYLE = Style.from_dict(
+    {
+        "title": "bold reverse",
+        "driving": "bold",
+        "good": "ansigreen",
+        "warning": "bold ansired",
+    }
+)
+
+# Bytes that a terminal sends on its own; they are nobody's key press.
+NOT_KEYS = (
+    Keys.CPRResponse,
+    Keys.Vt100MouseEvent,
+    Keys.WindowsMouseEvent,
+    Keys.ScrollUp,
+    Keys.ScrollDown,
+    Keys.Ignore,
+)
+
+
+def application(draw: Callable[[], StyleAndTextTuples], press: Callable[[str], None]) -> Application[None]:
+    """The application; `draw` gives its text, `press` is called with each key. Pasted text presses nothing."""
+    window = Window(FormattedTextControl(draw, show_cursor=False), wrap_lines=False)
+    return Application(
+        layout=Layout(window),
+        key_bindings=bindings(press),
+        style=STYLE,
+        full_screen=True,
+        enable_page_navigation_bindings=False,
+    )
+
+
+def bindings(press: Callable[[str], None]) -> KeyBindings:
+    """Every key goes to `press`; Ctrl-C ends the application."""
+    keys = KeyBindings()
+
+    @keys.add(Keys.Any)
+    def _(event: KeyPressEvent) -> None:
+        press(event.key_sequence[0].key)
+
+    for name in (key for key in MOVES if len(key) > 1):
+
+        @keys.add(name, eager=True)
+        def _(event: KeyPressEvent, name: str = name) -> None:
+            press(name)
+
+    for ignored in (*NOT_KEYS, Keys.BracketedPaste):
+
+        @keys.add(ignored, eager=True)
+        def _(event: KeyPressEvent) -> None:
+            pass
+
+    @keys.add(QUIT, eager=True)
+    @keys.add(Keys.SIGINT, eager=True)
+    def _(event: KeyPressEvent) -> None:
+        event.app.exit()
+
+    return keys
