@@ -1,0 +1,76 @@
+"""The command line. A verb's module is imported when the verb is named, so that each starts as fast as it can."""
+
+import importlib
+import os
+import sys
+from types import ModuleType
+
+VERBS = {
+    "up": "start the sim, the controller, the pose service, and the teleop in this terminal",
+    "sim": "simulate robots",
+    "teleop": "drive a robot from the keyboard",
+    "controller": "drive a robot to the goals of next_goal",
+    "pose-service": "answer next_goal and get_pose",
+    "router": "run a Zenoh router",
+    "xacro": "expand a xacro file",
+    "topic": "list, info, echo, hz, pub",
+    "service": "list, call",
+    "node": "list",
+}
+SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-service": "pose_service"}
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run one verb; returns the exit code (0 good, 1 failed, 2 wrong usage)."""
+    words = sys.argv[1:] if argv is None else argv
+    if not words or words[0] in ("-h", "--help"):
+        print(_help())
+        return 0 if words else 2
+    if words[0] in ("-V", "--version"):
+        from importlib.metadata import version
+
+        print(version("holozen"))
+        return 0
+    if words[0] not in VERBS:
+        print(f"holozen: no verb {words[0]!r}; there are {', '.join(VERBS)}", file=sys.stderr)
+        return 2
+    return _run(words[0], words[1:])
+
+
+def _run(verb: str, words: list[str]) -> int:
+    from holozen.errors import BusError
+
+    try:
+        return int(_module(verb).main(words))
+    except BusError as error:
+        print(f"holozen {verb}: {error}", file=sys.stderr)
+        return 1
+    except BrokenPipeError:
+        # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        return 130
+
+
+def _module(verb: str) -> ModuleType:
+    """The verb's module. Services are `holozen.sim` when installed and `services.sim` in the bare source tree."""
+    if verb not in SERVICES:
+        return importlib.import_module(f"holozen.cli.{verb}")
+    name = SERVICES[verb]
+    try:
+        return importlib.import_module(f"holozen.{name}.__main__")
+    except ModuleNotFoundError as error:
+        if error.name == f"holozen.{name}":
+            return importlib.import_module(f"services.{name}.__main__")
+        if error.name in ("pybullet", "prompt_toolkit", "numpy", "xacro"):
+            print(f"holozen {verb} needs {error.name}; run: pip install 'holozen[{verb}]'", file=sys.stderr)
+            raise SystemExit(1) from None
+        raise
+
+
+def _help() -> str:
+    rows = "\n".join(f"  {verb:<13} {text}" for verb, text in VERBS.items())
+    return (
+        f"usage: holozen VERB ...\n\nDrive and simulate holonomic robots over Zenoh.\n\n{rows}\n\nEach verb has --help."
+    )

@@ -1,0 +1,98 @@
+"""`holozen topic pub`: write checked messages to a key."""
+
+import argparse
+import json
+import sys
+import threading
+import time
+from typing import Any
+
+from holozen import codec, connection, wire
+from holozen.bus import Bus, Publisher
+from holozen.messages import Message, Twist, TwistStamped, not_finite
+from holozen.process import stop_event
+from holozen.tell import say
+
+LARGEST = 1_000_000  # bytes of a value
+PATIENCE = 3.0  # s until somebody has to subscribe
+
+
+def pub(args: argparse.Namespace) -> int:
+    """Publish a value once, some times, or until interrupted; a robot that it moved is stopped at the end."""
+    row = wire.topic(args.key)
+    if row is None:
+        known = ", ".join(topic.key for topic in wire.TOPICS)
+        say(f"holozen topic pub: {args.key!r} has no known type; known keys: {known}, each also as ROBOT/key")
+        return 1
+    try:
+        message = read_message(args.value, row.types)
+    except ValueError as error:
+        say(f"holozen topic pub {args.key}: refused: {error}")
+        return 1
+    stop = stop_event()
+    with Bus("topic_pub", connection.from_arguments(args), patience=PATIENCE) as bus:
+        publisher: Publisher[Message] = bus.publisher(args.key, type(message))
+        if not _matched(publisher, stop):
+            say(f"nobody subscribes to {args.key}")
+            if args.once:
+                return 1
+        try:
+            _publish(publisher, message, args, row.rate, stop)
+        finally:
+            if isinstance(message, Twist | TwistStamped) and not args.once:
+                publisher.put(type(message)())
+    return 0
+
+
+def read_message(text: str, kinds: tuple[type[Message], ...]) -> Message:
+    """The message that `text` (JSON or YAML, or - for standard input) describes. Raises ValueError with the reason."""
+    if text == "-":
+        text = sys.stdin.read(LARGEST + 1)
+    if len(text) > LARGEST:
+        raise ValueError(f"the value is longer than {LARGEST} bytes")
+    value = _plain(text)
+    errors = []
+    for kind in kinds:
+        try:
+            message = codec.convert(value, kind)
+        except codec.CodecError as error:
+            errors.append(str(error))
+            continue
+        if bad := not_finite(message):
+            raise ValueError(f"{bad} is not a finite number")
+        return message
+    raise ValueError(errors[0])
+
+
+def _plain(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        import yaml
+
+        try:
+            return yaml.safe_load(text)
+        except yaml.YAMLError as error:
+            raise ValueError(f"neither JSON nor YAML: {' '.join(str(error).split())}") from None
+
+
+def _matched(publisher: Publisher[Message], stop: threading.Event) -> bool:
+    deadline = time.monotonic() + PATIENCE
+    while not publisher.matched:
+        if time.monotonic() > deadline or stop.wait(0.005):
+            return False
+    return True
+
+
+def _publish(
+    publisher: Publisher[Message], message: Message, args: argparse.Namespace, rate: float, stop: threading.Event
+) -> None:
+    left = 1 if args.once else args.times
+    due = time.monotonic()
+    while not stop.is_set():
+        publisher.put(message)
+        left = left and left - 1
+        if left == 0:
+            return
+        due += 1 / (args.rate or rate)
+        stop.wait(max(0.0, due - time.monotonic()))

@@ -1,0 +1,24 @@
+"""`holozen router`: a Zenoh router, the meeting point of processes on several machines or in containers."""
+
+import argparse
+
+from holozen import connection
+from holozen.bus import Bus
+from holozen.process import stop_event
+from holozen.tell import say
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="holozen router", description="Run a Zenoh router.")
+    connection.add_arguments(parser)
+    parser.set_defaults(mode="router")
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    where = connection.from_arguments(parser().parse_args(argv))._replace(mode="router")
+    stop = stop_event()
+    with Bus("router", where, lasting=True):
+        say(f"router: listens at {', '.join(where.listen or (connection.DOOR,))}")
+        stop.wait()
+    return 0

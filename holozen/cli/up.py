@@ -1,0 +1,125 @@
+"""`holozen up`: the main job in one command, every part a process of its own."""
+
+import argparse
+import ctypes
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from typing import IO
+
+from holozen import connection
+from holozen.process import stop_event
+from holozen.tell import say
+
+GRACE = 1.2  # s for the commanding processes to stop the robot; the sim comes after them
+SIM_GRACE = 0.5  # s
+LOOK = 0.05  # s
+LAST_LINES = 20
+_PR_SET_PDEATHSIG = 1  # prctl(2)
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="holozen up",
+        description="Start the sim, the controller, the pose service, and the teleop if there is a terminal.",
+    )
+    for flag in ("--world", "--robot", "--rtf"):
+        parser.add_argument(flag, help=f"as for `holozen sim {flag}`")
+    for flag in ("--shape", "--size", "--goals"):
+        parser.add_argument(flag, help=f"as for `holozen pose-service {flag}`")
+    parser.add_argument("--laps", default="0", help="as for `holozen controller --laps` (default: 0, for ever)")
+    connection.add_arguments(parser)
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    args = parser().parse_args(argv)
+    stop = stop_event()
+    has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+    if not has_terminal:
+        say("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
+    with tempfile.TemporaryFile("w+", errors="replace") as log:
+        team = Team(connection.from_arguments(args).arguments(), log if has_terminal else None)
+        try:
+            team.start("sim", _flags(args, "world", "robot", "rtf"))
+            team.start("pose-service", _flags(args, "shape", "size", "goals"))
+            team.start("controller", ["--laps", args.laps])
+            if has_terminal:
+                team.start("teleop", [])
+            failed = team.watch(stop)
+        finally:
+            team.end()
+            _tell_last(log)
+    return 1 if failed else 0
+
+
+class Team:
+    """The processes of one `up`. Their words go to `log`, or where ours go if that is None."""
+
+    def __init__(self, where: list[str], log: IO[str] | None) -> None:
+        self._where, self._log = where, log
+        self._running: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, verb: str, flags: list[str]) -> None:
+        """Start a verb. The teleop keeps the terminal; the others get no signals from it."""
+        in_terminal = verb == "teleop"
+        self._running[verb] = subprocess.Popen(
+            [sys.executable, "-m", "holozen", verb, *flags, *self._where],
+            stdin=None if in_terminal else subprocess.DEVNULL,
+            stdout=None if in_terminal else self._log,
+            stderr=None if in_terminal else self._log,
+            start_new_session=not in_terminal,
+            preexec_fn=_die_with_parent,
+        )
+
+    def watch(self, stop: threading.Event) -> bool:
+        """Wait until told to stop, the teleop was quit, one failed, or all are done. Whether one failed."""
+        while self._running and not stop.wait(LOOK):
+            for verb, process in list(self._running.items()):
+                code = process.poll()
+                if code is None:
+                    continue
+                del self._running[verb]
+                if code > 0:
+                    say(f"up: {verb} failed with exit code {code}; ending the others")
+                if code < 0:
+                    say(f"up: {verb} was ended by signal {-code}; `holozen {verb}` starts it again")
+                if code > 0 or verb == "teleop":
+                    return code > 0
+        return False
+
+    def end(self) -> None:
+        """End what runs: first who commands the robot, then the sim."""
+        sim = self._running.pop("sim", None)
+        _end(list(self._running.values()), GRACE)
+        _end([sim] if sim else [], SIM_GRACE)
+
+
+def _end(processes: list[subprocess.Popen[bytes]], grace: float) -> None:
+    for process in processes:
+        process.send_signal(signal.SIGTERM)
+    deadline = time.monotonic() + grace
+    for process in processes:
+        try:
+            process.wait(max(0.0, deadline - time.monotonic()))
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+def _die_with_parent() -> None:
+    """Have the kernel end this process when `up` is killed, so that nothing is left behind."""
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
+
+
+def _flags(args: argparse.Namespace, *names: str) -> list[str]:
+    return [word for name in names if getattr(args, name) for word in (f"--{name}", getattr(args, name))]
+
+
+def _tell_last(log: IO[str]) -> None:
+    log.seek(0)
+    for line in log.readlines()[-LAST_LINES:]:
+        say(line.rstrip())

@@ -1,0 +1,1 @@
+"""Fixtures that start real services and wait for conditions, as a pytest plugin."""
