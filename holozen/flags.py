@@ -3,7 +3,10 @@
 import argparse
 import math
 from collections.abc import Callable
-from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
@@ -21,6 +24,17 @@ def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
     return parse
 
 
+def count(low: int = 0) -> Callable[[str], int]:
+    """A parser for a whole number from `low` up."""
+
+    def parse(text: str) -> int:
+        if not text.isdecimal() or int(text) < low:
+            raise argparse.ArgumentTypeError(f"{text!r}: use a whole number from {low} up")
+        return int(text)
+
+    return parse
+
+
 def robot(text: str) -> str:
     """A parser for a robot's name; an empty one is the robot at the root."""
     from holozen.wire import robot_name
@@ -31,16 +45,20 @@ def robot(text: str) -> str:
         raise argparse.ArgumentTypeError(str(error)) from None
 
 
-def package(text: str) -> tuple[str, Path]:
+def package(text: str) -> "tuple[str, Path]":
     """A parser for NAME=DIR, a package and its folder."""
+    from pathlib import Path
+
     name, equals, folder = text.partition("=")
     if not (name and equals and folder):
         raise argparse.ArgumentTypeError(f"{text!r}: write NAME=DIR, such as holo=~/ws/src/holo")
     return name, Path(folder).expanduser()
 
 
-def robot_file(text: str) -> tuple[Path, str]:
+def robot_file(text: str) -> "tuple[Path, str]":
     """A parser for FILE or FILE=NAME, a robot's file and its name."""
+    from pathlib import Path
+
     path, equals, name = text.rpartition("=")
     if not equals or Path(text).exists():
         return Path(text), ""

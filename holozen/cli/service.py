@@ -7,6 +7,7 @@ from holozen import codec, connection, wire
 from holozen.bus import Bus
 from holozen.cli.pub import read_message
 from holozen.cli.show import decode, lines
+from holozen.flags import number
 from holozen.tell import say
 
 
@@ -19,7 +20,9 @@ def parser() -> argparse.ArgumentParser:
         epilog="""example: holozen service call next_goal '{"request_goal": 0}'""")  # fmt: skip
     add.add_argument("key")
     add.add_argument("request", nargs="?", default="{}", help="JSON or YAML (default: all zeros)")
-    add.add_argument("--timeout", type=float, default=5.0, metavar="S", help="seconds to wait (default: 5)")
+    add.add_argument(
+        "--timeout", type=number(0.01, 1e6, "s"), default=5.0, metavar="S", help="seconds to wait (default: 5)"
+    )
     add.add_argument("--json", action="store_true", help="the reply as one JSON object")
     for sub in verbs.choices.values():
         connection.add_arguments(sub)

@@ -5,6 +5,7 @@ import json
 
 from holozen import connection
 from holozen.bus import Bus
+from holozen.flags import count, number
 from holozen.graph import on_key
 from holozen.tell import say
 
@@ -34,21 +35,25 @@ def _info_arguments(parser: argparse.ArgumentParser) -> None:
 def _echo_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("key", help="a key or key expression, such as odom or */odom")
     parser.add_argument("--once", action="store_true", help="end after the first message")
-    parser.add_argument("--timeout", type=float, metavar="S", help="end with exit code 1 after S seconds without any")
+    parser.add_argument(
+        "--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="end with exit code 1 after S seconds without any"
+    )
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
 
 
 def _hz_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("key")
-    parser.add_argument("-w", "--window", type=int, default=1000, metavar="N", help="average over the last N")
+    parser.add_argument("-w", "--window", type=count(2), default=1000, metavar="N", help="average over the last N")
 
 
 def _pub_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("key")
     parser.add_argument("value", help="JSON or YAML; - reads it from standard input")
-    parser.add_argument("-r", "--rate", type=float, metavar="HZ", help="(default: the topic's own rate)")
+    parser.add_argument(
+        "-r", "--rate", type=number(0.01, 10_000, "Hz"), metavar="HZ", help="(default: the topic's own rate)"
+    )
     parser.add_argument("-1", "--once", action="store_true", help="publish once, as soon as somebody subscribes")
-    parser.add_argument("-t", "--times", type=int, metavar="N", help="publish N times")
+    parser.add_argument("-t", "--times", type=count(1), metavar="N", help="publish N times")
 
 
 VERBS = {
@@ -75,7 +80,8 @@ def list_topics(args: argparse.Namespace) -> int:
     """Print each key that somebody reads or writes, once."""
     with _bus("list", args) as bus:
         endpoints = bus.graph().settled(bus.connected)
-    topics = sorted({(e.key, e.type) for e in endpoints if e.kind in ("pub", "sub") and not e.type.startswith("any/")})
+    ends = [e for e in endpoints if e.kind in ("pub", "sub") and "*" not in e.key]
+    topics = sorted({(e.key, e.type) for e in ends if not e.type.startswith("any/")})
     for key, kind in topics:
         print(f"{key} [{kind}]" if args.show_types else key)
     if not topics:

@@ -94,18 +94,19 @@ class Team:
     def end(self) -> None:
         """End what runs: first who commands the robot, then the sim."""
         sim = self._running.pop("sim", None)
-        _end(list(self._running.values()), GRACE)
-        _end([sim] if sim else [], SIM_GRACE)
+        _end(self._running, GRACE)
+        _end({"sim": sim} if sim else {}, SIM_GRACE)
 
 
-def _end(processes: list[subprocess.Popen[bytes]], grace: float) -> None:
-    for process in processes:
+def _end(running: dict[str, subprocess.Popen[bytes]], grace: float) -> None:
+    for process in running.values():
         process.send_signal(signal.SIGTERM)
     deadline = time.monotonic() + grace
-    for process in processes:
+    for verb, process in running.items():
         try:
             process.wait(max(0.0, deadline - time.monotonic()))
         except subprocess.TimeoutExpired:
+            say(f"up: {verb} did not end within {grace} s and was killed")
             process.kill()
             process.wait()
 

@@ -20,7 +20,7 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="holozen controller", description="Drive a robot to the goals of next_goal.")
     parser.add_argument("robot", nargs="?", default="", type=flags.robot, help="its name; none: the one at the root")
     parser.add_argument("--resume", action="store_true", help="let the controller drive again, and end")
-    parser.add_argument("--laps", type=int, default=1, help="times round the list; 0: for ever (default: 1)")
+    parser.add_argument("--laps", type=flags.count(), default=1, help="times round the list; 0: for ever (default: 1)")
     add = parser.add_argument
     add("--max-speed", type=flags.number(0.01, 10, "m/s"), default=default.max_speed, help="m/s (default: 0.5)")
     add("--max-turn", type=flags.number(0.01, 20, "rad/s"), default=default.max_turn, help="rad/s (default: 1)")

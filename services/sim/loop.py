@@ -14,6 +14,7 @@ from .world import World
 
 CLOCK_RATE = 50.0  # Hz of sim time
 LOOK = 0.02  # s; how often requests and commands are heard while no step is due
+DISTRUST = 0.1  # s after a stall in which commands may still be old ones, from the network's buffers
 
 
 class Loop:
@@ -24,6 +25,7 @@ class Loop:
         self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
         self._clock_due = Schedule(CLOCK_RATE)
         self._heard = time.monotonic()
+        self._trust_from = 0.0
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:
         """Step until `stop` is set, or `steps` were made."""
@@ -39,11 +41,12 @@ class Loop:
                 pace.stepped(now)
 
     def _hear(self, now: float) -> None:
-        stalled = now - self._heard > COMMAND_SILENCE
+        if now - self._heard > COMMAND_SILENCE:
+            self._trust_from = now + DISTRUST
         self._heard = now
         clocks = (time.time(), self._world.time)
         for vehicle in self._vehicles:
-            vehicle.hear(now, clocks, stalled)
+            vehicle.hear(now, clocks, trusted=now >= self._trust_from)
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

@@ -51,15 +51,15 @@ class Vehicle:
         self._odom_due, self._joints_due = Schedule(drive.odometry_rate), Schedule(JOINT_RATE)
         self._status_due = Schedule(STATUS_RATE)
 
-    def hear(self, now: float, clocks: tuple[float, ...], stalled: bool) -> None:
-        """Take what waits. After a stall the commands are of unknown age, and are dropped."""
+    def hear(self, now: float, clocks: tuple[float, ...], trusted: bool) -> None:
+        """Take what waits. Commands that are not `trusted` are of unknown age, and are dropped."""
         self._now = now
         late = 0
         while (received := self._commands.try_recv()) is not None:
-            if stalled:
-                late += 1
-            else:
+            if trusted:
                 self._intake.take(received, now, clocks)
+            else:
+                late += 1
         if late:
             self._intake.drop(late, now)
         self._resume.answer_pending()
