@@ -37,8 +37,9 @@ OPEN_STEP = 500  # ms between two looks at the signals while a client waits for 
 class Bus:
     """A node on the wire. Use it in `with`: an open session keeps a Python process from ending.
 
-    `wire` is "json" or "msgpack". `patience` is how many seconds a client waits for its router (None: for ever).
-    `lasting` is for what runs long: it stands in the graph, and keeps the meeting point open when its holder is gone.
+    `wire` is "json" or "msgpack", by default as the connection says. `patience` is how many seconds a client waits for
+    its router (None: for ever). `lasting` is for what runs long: it stands in the graph, and keeps the meeting point
+    open when its holder is gone.
     """
 
     def __init__(
@@ -46,12 +47,12 @@ class Bus:
         node: str,
         connection: Connection | None = None,
         *,
-        wire: str = "json",
+        wire: str = "",
         patience: float | None = None,
         lasting: bool = False,
     ) -> None:
         connection = connection or Connection()
-        self.node, self.wire = node, wire
+        self.node, self.wire = node, wire or connection.wire
         self.session = _open(connection, patience)
         self.id = str(self.session.zid())
         self.source = f"{node}@{self.id[:6]}"  # how others name the sender of our samples
@@ -223,13 +224,9 @@ def _config(connection: Connection) -> zenoh.Config:
 
 def _open_door(endpoint: str) -> Callable[[], None] | None:
     """A session that only listens at `endpoint`: how to close it, or None if another process was faster."""
-    settings = Connection(connect=(), listen=()).settings()
-    settings |= {"listen/endpoints": f'["{endpoint}"]', "listen/exit_on_failure": "true"}
-    config = zenoh.Config()
-    for path, value in settings.items():
-        config.insert_json5(path, value)
+    cfg = (("listen/endpoints", f'["{endpoint}"]'), ("listen/exit_on_failure", "true"))
     try:
-        session = zenoh.open(config)
+        session = zenoh.open(_config(Connection(connect=(), listen=(), cfg=cfg)))
     except zenoh.ZError:
         return None
     return lambda: _close(session)

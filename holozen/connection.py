@@ -14,13 +14,17 @@ _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 
 
 
 class Connection(NamedTuple):
-    """Zenoh's flags as given. `listen` and `connect` of None mean the loopback default, [] means none."""
+    """Zenoh's flags as given, and how messages are written.
+
+    `listen` and `connect` of None mean the loopback default, empty ones mean none.
+    """
 
     mode: str = "peer"
     connect: tuple[str, ...] | None = None
     listen: tuple[str, ...] | None = None
     config: str | None = None
     cfg: tuple[tuple[str, str], ...] = ()
+    wire: str = "json"
 
     @property
     def door(self) -> str | None:
@@ -49,6 +53,7 @@ class Connection(NamedTuple):
             for endpoint in endpoints or ():
                 flags += [name, endpoint]
         flags += ["--config", self.config] if self.config else []
+        flags += ["--wire", self.wire] if self.wire != "json" else []
         for path, value in self.cfg:
             flags += ["--cfg", f"{path}:{value}"]
         return flags
@@ -87,6 +92,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--connect", action="append", metavar="ENDPOINT", help="connect there, e.g. tcp/10.0.0.2:7447")
     group.add_argument("--listen", action="append", metavar="ENDPOINT", help="listen there, e.g. tcp/0.0.0.0:7447")
     group.add_argument("--config", metavar="FILE", help="a Zenoh configuration file (JSON5 or YAML)")
+    group.add_argument("--wire", choices=("json", "msgpack"), default="json", help="how messages are written")
     group.add_argument("--cfg", action="append", type=_pair, default=[], metavar="PATH:VALUE", help="one setting of it")
 
 
@@ -98,6 +104,7 @@ def from_arguments(args: argparse.Namespace) -> Connection:
         listen=None if args.listen is None else tuple(args.listen),
         config=args.config,
         cfg=tuple(args.cfg),
+        wire=args.wire,
     )
 
 

@@ -35,6 +35,11 @@ def count(low: int = 0) -> Callable[[str], int]:
     return parse
 
 
+def key(text: str) -> str:
+    """A parser for a key; ROS's leading slash is taken off, which no Zenoh key has."""
+    return text.removeprefix("/")
+
+
 def robot(text: str) -> str:
     """A parser for a robot's name; an empty one is the robot at the root."""
     from holozen.wire import robot_name

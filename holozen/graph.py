@@ -26,7 +26,7 @@ def token(endpoint: Endpoint) -> str:
     """The token's key for an endpoint."""
     start = f"@holozen/{endpoint.session}/{endpoint.node}/{endpoint.kind}"
     # A token's key must name one thing, also where the endpoint reads many keys.
-    key = endpoint.key.replace("*", "%2A")
+    key = endpoint.key.replace("*", "%2A").replace("$", "%24")
     return start if endpoint.kind == "node" else f"{start}/{endpoint.type}/{key}"
 
 
@@ -36,7 +36,9 @@ def parse(text: str) -> Endpoint | None:
     if len(parts) == 4 and parts[0] == "@holozen" and parts[3] == "node":
         return Endpoint("", "node", "", parts[2], parts[1])
     if len(parts) == 8 and parts[0] == "@holozen" and parts[3] in KINDS:
-        return Endpoint(parts[7].replace("%2A", "*"), parts[3], "/".join(parts[4:7]), parts[2], parts[1])
+        return Endpoint(
+            parts[7].replace("%2A", "*").replace("%24", "$"), parts[3], "/".join(parts[4:7]), parts[2], parts[1]
+        )
     return None
 
 

@@ -7,7 +7,7 @@ from holozen import codec, connection, wire
 from holozen.bus import Bus
 from holozen.cli.pub import read_message
 from holozen.cli.show import decode, lines
-from holozen.flags import number
+from holozen.flags import key, number
 from holozen.tell import say
 
 
@@ -18,7 +18,7 @@ def parser() -> argparse.ArgumentParser:
     add.add_argument("-t", "--show-types", action="store_true", help="with their types")
     add = verbs.add_parser("call", help="call a service and print its reply",
         epilog="""example: holozen service call next_goal '{"request_goal": 0}'""")  # fmt: skip
-    add.add_argument("key")
+    add.add_argument("key", type=key)
     add.add_argument("request", nargs="?", default="{}", help="JSON or YAML (default: all zeros)")
     add.add_argument(
         "--timeout", type=number(0.01, 1e6, "s"), default=5.0, metavar="S", help="seconds to wait (default: 5)"
@@ -39,8 +39,8 @@ def list_services(args: argparse.Namespace) -> int:
     with _bus(args) as bus:
         endpoints = bus.graph().settled(bus.connected)
     found = sorted({(e.key, e.type) for e in endpoints if e.kind == "srv"})
-    for key, kind in found:
-        print(f"{key} [{kind}]" if args.show_types else key)
+    for name, kind in found:
+        print(f"{name} [{kind}]" if args.show_types else name)
     if not found:
         say("no services: nobody is there; `holozen up` starts some")
     return 0

@@ -5,7 +5,7 @@ import json
 
 from holozen import connection
 from holozen.bus import Bus
-from holozen.flags import count, number
+from holozen.flags import count, key, number
 from holozen.graph import on_key
 from holozen.tell import say
 
@@ -29,11 +29,11 @@ def _list_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _info_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("key")
+    parser.add_argument("key", type=key)
 
 
 def _echo_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("key", help="a key or key expression, such as odom or */odom")
+    parser.add_argument("key", type=key, help="a key or key expression, such as odom or */odom")
     parser.add_argument("--once", action="store_true", help="end after the first message")
     parser.add_argument(
         "--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="end with exit code 1 after S seconds without any"
@@ -42,12 +42,12 @@ def _echo_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _hz_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("key")
+    parser.add_argument("key", type=key)
     parser.add_argument("-w", "--window", type=count(2), default=1000, metavar="N", help="average over the last N")
 
 
 def _pub_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("key")
+    parser.add_argument("key", type=key)
     parser.add_argument("value", help="JSON or YAML; - reads it from standard input")
     parser.add_argument(
         "-r", "--rate", type=number(0.01, 10_000, "Hz"), metavar="HZ", help="(default: the topic's own rate)"
@@ -82,8 +82,8 @@ def list_topics(args: argparse.Namespace) -> int:
         endpoints = bus.graph().settled(bus.connected)
     ends = [e for e in endpoints if e.kind in ("pub", "sub") and "*" not in e.key]
     topics = sorted({(e.key, e.type) for e in ends if not e.type.startswith("any/")})
-    for key, kind in topics:
-        print(f"{key} [{kind}]" if args.show_types else key)
+    for name, kind in topics:
+        print(f"{name} [{kind}]" if args.show_types else name)
     if not topics:
         say("no topics: nobody is there; `holozen up` starts a robot")
     return 0

@@ -10,7 +10,7 @@ import threading
 import time
 from typing import IO
 
-from holozen import connection
+from holozen import connection, flags
 from holozen.process import stop_event
 from holozen.tell import say
 
@@ -26,7 +26,8 @@ def parser() -> argparse.ArgumentParser:
         prog="holozen up",
         description="Start the sim, the controller, the pose service, and the teleop if there is a terminal.",
     )
-    for flag in ("--world", "--robot", "--rtf"):
+    parser.add_argument("--robot", type=flags.robot_file, metavar="FILE[=NAME]", help="as for `holozen sim --robot`")
+    for flag in ("--world", "--rtf"):
         parser.add_argument(flag, help=f"as for `holozen sim {flag}`")
     for flag in ("--shape", "--size", "--goals"):
         parser.add_argument(flag, help=f"as for `holozen pose-service {flag}`")
@@ -44,11 +45,13 @@ def main(argv: list[str]) -> int:
     with tempfile.TemporaryFile("w+", errors="replace") as log:
         team = Team(connection.from_arguments(args).arguments(), log if has_terminal else None)
         try:
-            team.start("sim", _flags(args, "world", "robot", "rtf"))
+            robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
+            team.start("sim", [*robot, *_flags(args, "world", "rtf")])
             team.start("pose-service", _flags(args, "shape", "size", "goals"))
-            team.start("controller", ["--laps", args.laps])
+            name = [args.robot[1]] if args.robot and args.robot[1] else []
+            team.start("controller", [*name, "--laps", args.laps])
             if has_terminal:
-                team.start("teleop", [])
+                team.start("teleop", name)
             failed = team.watch(stop)
         finally:
             team.end()
@@ -63,11 +66,11 @@ class Team:
         self._where, self._log = where, log
         self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, verb: str, flags: list[str]) -> None:
+    def start(self, verb: str, words: list[str]) -> None:
         """Start a verb. The teleop keeps the terminal; the others get no signals from it."""
         in_terminal = verb == "teleop"
         self._running[verb] = subprocess.Popen(
-            [sys.executable, "-m", "holozen", verb, *flags, *self._where],
+            [sys.executable, "-m", "holozen", verb, *words, *self._where],
             stdin=None if in_terminal else subprocess.DEVNULL,
             stdout=None if in_terminal else self._log,
             stderr=None if in_terminal else self._log,
