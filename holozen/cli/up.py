@@ -1,14 +1,16 @@
 """`holozen up`: the main job in one command, every part a process of its own."""
 
 import argparse
+import contextlib
 import ctypes
 import signal
 import subprocess
 import sys
 import tempfile
+import termios
 import threading
 import time
-from typing import IO
+from typing import IO, Any
 
 from holozen import connection, flags
 from holozen.process import stop_event
@@ -42,6 +44,7 @@ def main(argv: list[str]) -> int:
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     if not has_terminal:
         say("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
+    terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
     with tempfile.TemporaryFile("w+", errors="replace") as log:
         team = Team(connection.from_arguments(args).arguments(), log if has_terminal else None)
         try:
@@ -55,6 +58,8 @@ def main(argv: list[str]) -> int:
             failed = team.watch(stop)
         finally:
             team.end()
+            if has_terminal:
+                _restore(terminal)
             _tell_last(log)
     return 1 if failed else 0
 
@@ -87,12 +92,19 @@ class Team:
                     continue
                 del self._running[verb]
                 if code > 0:
-                    say(f"up: {verb} failed with exit code {code}; ending the others")
+                    self._say(f"up: {verb} failed with exit code {code}; ending the others")
                 if code < 0:
-                    say(f"up: {verb} was ended by signal {-code}; `holozen {verb}` starts it again")
+                    self._say(f"up: {verb} was ended by signal {-code}; `holozen {verb}` starts it again")
                 if code > 0 or verb == "teleop":
                     return code > 0
         return False
+
+    def _say(self, text: str) -> None:
+        """Tell a person, later if the terminal belongs to the teleop now."""
+        if self._log:
+            self._log.write(f"{text}\n")
+        else:
+            say(text)
 
     def end(self) -> None:
         """End what runs: first who commands the robot, then the sim."""
@@ -121,6 +133,13 @@ def _die_with_parent() -> None:
 
 def _flags(args: argparse.Namespace, *names: str) -> list[str]:
     return [word for name in names if getattr(args, name) for word in (f"--{name}", getattr(args, name))]
+
+
+def _restore(terminal: list[Any]) -> None:
+    """Leave the terminal as it was, also after a teleop that was killed: main screen, cursor, no paste brackets."""
+    with contextlib.suppress(OSError, termios.error):
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, terminal)
+        print("\x1b[?1049l\x1b[?25h\x1b[?2004l", end="", flush=True)
 
 
 def _tell_last(log: IO[str]) -> None:
