@@ -17,7 +17,7 @@ from holozen import graph
 from holozen.connection import Connection
 from holozen.errors import BusError, NoReply, ServiceError
 from holozen.publisher import Publisher
-from holozen.readers import PRIORITIES, Latest, Sample, Subscription
+from holozen.readers import Latest, Sample, Subscription
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -31,6 +31,7 @@ M = TypeVar("M", bound="Message")
 R = TypeVar("R", bound="Message")
 
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
+TIMEOUT = b"Timeout"  # what Zenoh itself replies for a service that says nothing
 OPEN_STEP = 500  # ms between two looks at the signals while a client waits for its router
 
 
@@ -79,9 +80,11 @@ class Bus:
         closer.join(CLOSE_LIMIT)
 
     def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
-        """Show a node or an endpoint in the graph for as long as the session lives (or until `undeclare`)."""
+        """Show a node or an endpoint in the graph while the session lives (or until `undeclare`). Raises BusError."""
         endpoint = graph.Endpoint(key, kind, type_name, self.node, self.id)
-        self._tokens.append(self.session.liveliness().declare_token(graph.token(endpoint)))
+        with _one_line(f"key {key!r}"):
+            _ = kind == "node" or zenoh.KeyExpr(key)  # the token's own error would name the token
+            self._tokens.append(self.session.liveliness().declare_token(graph.token(endpoint)))
         return self._tokens[-1]
 
     def publisher(self, key: str, kind: type[M], priority: str = "DATA") -> Publisher[M]:
@@ -139,8 +142,9 @@ class Bus:
                 replies = self.session.get(key, payload=payload, encoding=encoding, timeout=left)
             for reply in replies:
                 if reply.ok:
-                    return _sample(reply.ok)
-                raise ServiceError(reason(bytes(reply.err.payload)))
+                    return Sample.of(reply.ok)
+                if (refusal := bytes(reply.err.payload)) != TIMEOUT:
+                    raise ServiceError(reason(refusal))
             time.sleep(min(0.01, max(left, 0)))
         raise NoReply(f"no reply from {key!r} within {timeout:g} s; `holozen service list` shows who serves")
 
@@ -163,30 +167,18 @@ class Tap:
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""
         sample = self._subscriber.try_recv()
-        return sample and _sample(sample, self._limit)
+        return sample and Sample.of(sample, self._limit)
 
     def recv(self) -> Sample:
         """The next sample; waits for it. Raises BusError once the bus or this tap is closed."""
         try:
-            return _sample(self._subscriber.recv(), self._limit)
+            return Sample.of(self._subscriber.recv(), self._limit)
         except zenoh.ZError:
             raise BusError("closed") from None
 
     def close(self) -> None:
         """Stop listening."""
         self._subscriber.undeclare()
-
-
-def _sample(sample: Any, limit: int = 0) -> Sample:
-    size = len(sample.payload)
-    return Sample(
-        key=str(sample.key_expr),
-        payload=b"" if limit and size > limit else bytes(sample.payload),
-        encoding=str(sample.encoding),
-        priority=PRIORITIES[int(sample.priority) - 1],
-        source=bytes(sample.attachment).decode(errors="replace")[:80] if sample.attachment else "",
-        size=size,
-    )
 
 
 def _token_change(sample: Any) -> tuple[str, bool] | None:
@@ -210,12 +202,13 @@ def _open(connection: Connection, patience: float | None) -> Any:
 
 
 def _config(connection: Connection) -> zenoh.Config:
-    with _one_line("Zenoh configuration"):
+    with _one_line(f"Zenoh configuration {connection.config}"):
         config = zenoh.Config.from_file(connection.config) if connection.config else zenoh.Config()
     settings = connection.settings()
     if connection.mode == "client":
         # Short tries, so that signals are seen in between. After the first success Zenoh reconnects for ever.
-        settings = {"connect/timeout_ms": str(OPEN_STEP), "connect/exit_on_failure": "true"} | settings
+        short = {"connect/timeout_ms": str(OPEN_STEP), "connect/exit_on_failure": "true"}
+        settings |= short | dict(connection.cfg)
     for path, value in settings.items():
         with _one_line(f"Zenoh setting {path}:{value}"):
             config.insert_json5(path, value)
@@ -246,5 +239,5 @@ def _one_line(what: str) -> Iterator[None]:
 
 
 def _first_words(error: Exception) -> str:
-    """Zenoh's reason without the source files it comes from."""
-    return str(error).partition(" at /")[0].strip().rstrip(".")
+    """Zenoh's reason in one line, without the source files it comes from."""
+    return " ".join(str(error).partition(" at /")[0].replace("\\n", " ").split()).rstrip(".")

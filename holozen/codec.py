@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 import msgspec
 
 from holozen.messages import Message, not_finite
+from holozen.tell import printable
 
 M = TypeVar("M", bound=Message)
 
@@ -15,6 +16,8 @@ WIRES = {"json": "application/json", "msgpack": "application/msgpack"}
 
 # Encodings that say nothing of the content; our default is JSON, which is what people put by hand.
 _JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
+
+LONGEST = 200  # characters of a reason
 
 _encode_json = msgspec.json.Encoder().encode
 _encode_msgpack = msgspec.msgpack.Encoder().encode
@@ -44,7 +47,7 @@ def decode(payload: bytes, encoding: str, types: tuple[type[M], ...]) -> M:
                 return decoder(payload)
             except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
                 continue
-        raise CodecError(f"not a {types[0].__name__}: {first}") from None
+        raise CodecError(_told(types[0], first)) from None
 
 
 def convert(value: Any, kind: type[M]) -> M:
@@ -52,7 +55,13 @@ def convert(value: Any, kind: type[M]) -> M:
     try:
         return msgspec.convert(value, kind, strict=False)
     except msgspec.ValidationError as error:
-        raise CodecError(f"not a {kind.__name__}: {error}") from None
+        raise CodecError(_told(kind, error)) from None
+
+
+def _told(kind: type[Message], error: Exception) -> str:
+    """One line; a field's name in it came over the wire and may be anything."""
+    text = printable(str(error))
+    return f"not a {kind.__name__}: {text if len(text) <= LONGEST else text[:LONGEST] + ' ...'}"
 
 
 @lru_cache(maxsize=64)
@@ -69,4 +78,4 @@ def _format(encoding: str) -> str:
         return "json"
     if name == WIRES["msgpack"]:
         return "msgpack"
-    raise CodecError(f"encoding {name!r} is not understood; known: {', '.join(WIRES.values())}")
+    raise CodecError(f"encoding {name[:80]!r} is not understood; known: {', '.join(WIRES.values())}")

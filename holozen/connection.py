@@ -43,7 +43,8 @@ class Connection(NamedTuple):
         if self.mode == "router":
             values["listen/exit_on_failure"] = True  # a router that nobody can reach is none
         if self.config:
-            values = {k: v for k, v in values.items() if k.endswith("/endpoints")}
+            # The file decides; a mode of "peer" cannot be told from none given.
+            values = {k: v for k, v in values.items() if k.endswith("/endpoints") or (k == "mode" and v != "peer")}
         return {path: json.dumps(value) for path, value in values.items()} | dict(self.cfg)
 
     def arguments(self) -> list[str]:

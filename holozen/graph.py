@@ -26,7 +26,7 @@ def token(endpoint: Endpoint) -> str:
     """The token's key for an endpoint."""
     start = f"@holozen/{endpoint.session}/{endpoint.node}/{endpoint.kind}"
     # A token's key must name one thing, also where the endpoint reads many keys.
-    key = endpoint.key.replace("*", "%2A").replace("$", "%24")
+    key = endpoint.key.replace("%", "%25").replace("*", "%2A").replace("$", "%24")
     return start if endpoint.kind == "node" else f"{start}/{endpoint.type}/{key}"
 
 
@@ -36,9 +36,8 @@ def parse(text: str) -> Endpoint | None:
     if len(parts) == 4 and parts[0] == "@holozen" and parts[3] == "node":
         return Endpoint("", "node", "", parts[2], parts[1])
     if len(parts) == 8 and parts[0] == "@holozen" and parts[3] in KINDS:
-        return Endpoint(
-            parts[7].replace("%2A", "*").replace("%24", "$"), parts[3], "/".join(parts[4:7]), parts[2], parts[1]
-        )
+        key = parts[7].replace("%24", "$").replace("%2A", "*").replace("%25", "%")
+        return Endpoint(key, parts[3], "/".join(parts[4:7]), parts[2], parts[1])
     return None
 
 
@@ -49,12 +48,16 @@ def on_key(endpoints: Iterable[Endpoint], key: str, kind: str) -> list[Endpoint]
 
 def includes(expression: str, key: str) -> bool:
     """Whether a key expression with whole-chunk wildcards (`*`, `**`) includes a key."""
-    first, _, rest = expression.partition("/")
+    return _includes(expression.split("/"), key.split("/"))
+
+
+def _includes(pattern: list[str], chunks: list[str]) -> bool:
+    if not pattern:
+        return not chunks
+    first, *rest = pattern
     if first == "**":
-        chunks = key.split("/")
-        return not rest or any(includes(rest, "/".join(chunks[i:])) for i in range(len(chunks)))
-    head, _, tail = key.partition("/")
-    return first in ("*", head) and (includes(rest, tail) if rest and tail else rest == tail)
+        return any(_includes(rest, chunks[i:]) for i in range(len(chunks) + 1))
+    return bool(chunks) and first in ("*", chunks[0]) and _includes(rest, chunks[1:])
 
 
 class Graph:

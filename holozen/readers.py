@@ -28,6 +28,19 @@ class Sample(NamedTuple):
     source: str
     size: int
 
+    @classmethod
+    def of(cls, sample: Any, limit: int = 0) -> "Sample":
+        """Zenoh's sample as ours. A payload over `limit` bytes is left out (0: none is)."""
+        size = len(sample.payload)
+        return cls(
+            key=str(sample.key_expr),
+            payload=b"" if limit and size > limit else bytes(sample.payload),
+            encoding=str(sample.encoding),
+            priority=PRIORITIES[int(sample.priority) - 1],
+            source=bytes(sample.attachment).decode(errors="replace")[:80] if sample.attachment else "",
+            size=size,
+        )
+
 
 class Samples(Protocol):
     """A stream of samples, such as bus.Tap."""

@@ -19,7 +19,7 @@ def reason(payload: bytes) -> str:
     text = payload.decode(errors="replace")
     try:
         return str(json.loads(text)["error"])
-    except (ValueError, TypeError, KeyError):
+    except (ValueError, TypeError, KeyError, RecursionError):
         return text or "the service answered with an error and no reason"
 
 

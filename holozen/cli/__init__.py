@@ -17,6 +17,7 @@ VERBS = {
     "service": "list, call",
     "node": "list",
 }
+EXTRAS = ("numpy", "prompt_toolkit", "pybullet", "xacro")  # what only some verbs need
 SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-service": "pose_service"}
 
 
@@ -39,11 +40,17 @@ def main(argv: list[str] | None = None) -> int:
 
 def _run(verb: str, words: list[str]) -> int:
     from holozen.errors import BusError
+    from holozen.tell import say
 
     try:
         return int(_module(verb).main(words))
     except BusError as error:
-        print(f"holozen {verb}: {error}", file=sys.stderr)
+        say(f"holozen {verb}: {error}")
+        return 1
+    except ModuleNotFoundError as error:  # some verbs import what they need late
+        if error.name not in EXTRAS:
+            raise
+        say(f"holozen {verb} needs {error.name}; run: pip install 'holozen[{verb}]'")
         return 1
     except BrokenPipeError:
         # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
@@ -61,12 +68,9 @@ def _module(verb: str) -> ModuleType:
     try:
         return importlib.import_module(f"holozen.{name}.__main__")
     except ModuleNotFoundError as error:
-        if error.name == f"holozen.{name}":
-            return importlib.import_module(f"services.{name}.__main__")
-        if error.name in ("pybullet", "prompt_toolkit", "numpy", "xacro"):
-            print(f"holozen {verb} needs {error.name}; run: pip install 'holozen[{verb}]'", file=sys.stderr)
-            raise SystemExit(1) from None
-        raise
+        if error.name != f"holozen.{name}":
+            raise
+        return importlib.import_module(f"services.{name}.__main__")
 
 
 def _help() -> str:

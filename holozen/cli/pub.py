@@ -67,13 +67,23 @@ def read_message(text: str, kinds: tuple[type[Message], ...]) -> Message:
 def _plain(text: str) -> Any:
     try:
         return json.loads(text)
-    except ValueError:
-        import yaml
+    except RecursionError:
+        raise ValueError("the value is nested too deeply") from None
+    except ValueError as error:
+        return _yaml(text, error)
 
-        try:
-            return yaml.safe_load(text)
-        except yaml.YAMLError as error:
-            raise ValueError(f"neither JSON nor YAML: {' '.join(str(error).split())}") from None
+
+def _yaml(text: str, why_no_json: ValueError) -> Any:
+    try:
+        import yaml
+    except ModuleNotFoundError:
+        raise ValueError(f"no JSON: {why_no_json}; to write YAML: pip install pyyaml") from None
+    try:
+        return yaml.safe_load(text)
+    except RecursionError:
+        raise ValueError("the value is nested too deeply") from None
+    except yaml.YAMLError as error:
+        raise ValueError(f"neither JSON nor YAML: {' '.join(str(error).split())}") from None
 
 
 def _matched(publisher: Publisher[Message], stop: threading.Event) -> bool:

@@ -13,8 +13,8 @@ def decode(payload: bytes, encoding: str) -> Any:
         import msgspec
 
         try:
-            return msgspec.msgpack.decode(payload)
-        except msgspec.DecodeError:
+            return _plain(msgspec.msgpack.decode(payload))
+        except (msgspec.DecodeError, RecursionError):
             return _hex(payload, encoding)
     try:
         text = payload.decode()
@@ -27,13 +27,20 @@ def decode(payload: bytes, encoding: str) -> Any:
 
 
 def lines(value: Any, indent: str = "") -> list[str]:
-    """`value` as indented lines of `name: value`."""
+    """`value` as indented lines of `name: value`; on one line if it is nested too deeply for that."""
+    try:
+        return _lines(value, indent)
+    except RecursionError:
+        return [json.dumps(value)]
+
+
+def _lines(value: Any, indent: str) -> list[str]:
     if isinstance(value, dict):
         return [line for name, inner in value.items() for line in _named(name, inner, indent)] or [f"{indent}{{}}"]
     if isinstance(value, list) and not _is_flat(value):
         rows = []
         for inner in value:
-            first, *rest = lines(inner, indent + "  ")
+            first, *rest = _lines(inner, indent + "  ")
             rows += [f"{indent}- {first.strip()}", *rest]
         return rows
     return [f"{indent}{_scalar(value)}"]
@@ -41,8 +48,8 @@ def lines(value: Any, indent: str = "") -> list[str]:
 
 def _named(name: str, value: Any, indent: str) -> list[str]:
     if isinstance(value, dict | list) and value and not _is_flat(value):
-        return [f"{indent}{name}:", *lines(value, indent + "  ")]
-    return [f"{indent}{name}: {_scalar(value)}"]
+        return [f"{indent}{_scalar(name)}:", *_lines(value, indent + "  ")]
+    return [f"{indent}{_scalar(name)}: {_scalar(value)}"]
 
 
 def _is_flat(value: Any) -> bool:
@@ -57,6 +64,17 @@ def _scalar(value: Any) -> str:
     if isinstance(value, str):
         return value if value.isprintable() and value else json.dumps(value)
     return json.dumps(value)
+
+
+def _plain(value: Any) -> Any:
+    """`value` with bytes, times and keys that JSON does not know as text."""
+    if isinstance(value, dict):
+        return {key if isinstance(key, str) else str(_plain(key)): _plain(inner) for key, inner in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(inner) for inner in value]
+    if isinstance(value, bytes):
+        return value.hex(" ")
+    return value if value is None or isinstance(value, bool | int | float | str) else str(value)
 
 
 def _hex(payload: bytes, encoding: str) -> str:

@@ -2,9 +2,7 @@
 
 
 class RobotError(ValueError):
-    """A robot cannot be used as it is written. One line: file, line, what is wrong, what is allowed, what to
-    do.
-    """
+    """A robot cannot be used as it is written. One line: where, what is wrong, what is allowed, what to do."""
 
 
 def listed(names: list[str], most: int = 12) -> str:

@@ -23,10 +23,10 @@ Part = TypeVar("Part", Link, Joint)
 
 @dataclass(frozen=True, slots=True)
 class RobotModel:
-    """A tree of links from `root`, in the order of the file. `planar_move` is None for a robot without that
-    plugin.
+    """A tree of links from `root`, in the order of the file.
 
-    Each of `warnings` is a line that names file, line, element and what was done instead.
+    `planar_move` is None for a robot without that plugin. Each of `warnings` is a line that names file, line,
+    element and what was done instead.
     """
 
     name: str

@@ -9,9 +9,7 @@ from holozen.robot.tag import Vector
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A frame in its parent frame: metres, and radians of roll, pitch, yaw about the parent's fixed x, y, z
-    axes.
-    """
+    """A frame in its parent frame: metres, and radians of roll, pitch, yaw about the parent's fixed x, y, z."""
 
     xyz: Vector = (0.0, 0.0, 0.0)
     rpy: Vector = (0.0, 0.0, 0.0)

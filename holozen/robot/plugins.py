@@ -15,9 +15,9 @@ _KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
 
 @dataclass(frozen=True, slots=True)
 class PlanarMove:
-    """Gazebo's planar_move: a Twist moves the whole robot over the plane. The defaults are Gazebo's, but the
-    timeout.
+    """Gazebo's planar_move: a Twist moves the whole robot over the plane.
 
+    All defaults but the timeout are Gazebo's.
     Topics have their namespace before them and no slash at the front. `odometry_rate` in Hz of sim time.
     `robot_base_frame` names a link, the child frame of odometry. `command_timeout` in seconds; -1 switches it
     off. `covariance` is the variance of x and y in m^2 and of yaw in rad^2.
@@ -35,9 +35,7 @@ class PlanarMove:
 
 
 def read_plugins(robot: Tag, links: Mapping[str, object], root: str, source: Source) -> PlanarMove | None:
-    """The planar_move plugin of a `<robot>`, if it has one; every other plugin is warned of. Raises
-    RobotError.
-    """
+    """The planar_move plugin of a `<robot>`, if it has one; other plugins make warnings. Raises RobotError."""
     drive: PlanarMove | None = None
     for plugin in _plugins(robot):
         filename = plugin.attributes.get("filename", "").strip()

@@ -45,9 +45,7 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A joint at zero in the root frame: its origin in metres and the unit vector it turns about or slides
-    along.
-    """
+    """A joint at zero in the root frame: its origin in metres and the unit vector it turns about or slides on."""
 
     xyz: Vector
     direction: Vector
@@ -98,10 +96,9 @@ def joint_axes(model: RobotModel) -> dict[str, Axis]:
 
 
 def lump(model: RobotModel) -> Body:
-    """All links as one body, as Gazebo lumps links over fixed joints; a link without mass only lends its
-    shapes.
+    """All links as one body, as Gazebo lumps links over fixed joints.
 
-    Raises RobotError for a robot without mass.
+    A link without mass only lends its shapes. Raises RobotError for a robot without mass.
     """
     frames = link_frames(model)
     links = [(frames[link.name], link.inertial) for link in model.links.values() if link.inertial]

@@ -12,9 +12,7 @@ Quaternion = tuple[float, float, float, float]
 
 
 def matrix_of(rpy: Sequence[float]) -> Array:
-    """URDF's rotation: roll about the fixed x, then pitch about the fixed y, then yaw about the fixed z, so
-    Rz Ry Rx.
-    """
+    """URDF's rotation: roll about the fixed x, then pitch about y, then yaw about z, so Rz Ry Rx."""
     cr, cp, cy = np.cos(rpy)
     sr, sp, sy = np.sin(rpy)
     return np.array(
@@ -56,8 +54,7 @@ def principal(inertia: Array) -> tuple[Array, Array]:
     order = list(max(permutations(range(3)), key=lambda order: np.abs(np.diag(axes[:, list(order)])).sum()))
     moments, axes = moments[order], axes[:, order]
     axes = axes * np.where(np.diag(axes) < 0, -1.0, 1.0)
-    if np.linalg.det(axes) < 0:
-        axes[:, np.argmin(np.diag(axes))] *= -1
+    axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])  # right-handed, whatever the signs
     return moments, axes
 
 

@@ -101,7 +101,7 @@ def _shape(tag: Tag, source: Source) -> Shape:
         raise geometry.wrong(f"holds {found}; it has to hold <box>, <cylinder>, <sphere> or <mesh>")
     shape = known[0]
     if shape.name == "mesh":
-        return Shape("mesh", _scale(shape), _pose(tag), _mesh(shape, source))
+        return Shape("mesh", _scale(shape), _pose(tag), _mesh(shape, tag.name, source))
     return Shape(shape.name, _size(shape), _pose(tag))
 
 
@@ -120,13 +120,12 @@ def _scale(tag: Tag) -> Vector:
     return scale
 
 
-def _mesh(tag: Tag, source: Source) -> Path | None:
+def _mesh(tag: Tag, use: str, source: Source) -> Path | None:
     uri = tag.word("filename")
     try:
         return resolve_uri(uri, source.origin, source.packages)
     except RobotError as error:
-        kind = tag.parent.parent.name if tag.parent and tag.parent.parent else "shape"
-        source.warn(tag, f"({kind}) is left out: {error}")
+        source.warn(tag, f"({use}) is left out: {error}")
         return None
 
 

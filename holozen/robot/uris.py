@@ -52,9 +52,7 @@ def _places(scheme: str, rest: str, start: Path, given: Mapping[str, Path]) -> I
         if scheme:
             name, _, inside = text.partition("/")
             yield find_package(name, start, given) / inside.lstrip("/")
-        elif _ABSOLUTE.match(text):
-            yield Path(text)
-        else:
+        else:  # joined to a folder, an absolute path stays what it is
             yield from (folder / text for folder in _own_folders(start))
 
 

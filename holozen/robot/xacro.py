@@ -16,8 +16,7 @@ _XACRO_ELEMENT = re.compile(r"<xacro:\w")
 
 
 def expand(path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}) -> str:
-    """The URDF text of a robot file, as the xacro library prints it; a file without xacro in it is not
-    changed.
+    """The URDF text of a robot file, as the xacro library prints it; a file without xacro is not changed.
 
     `args` are the values of `xacro:arg`, `packages` the folders of `--package NAME=DIR`. The file is trusted:
     xacro evaluates Python expressions and reads files, so never expand what came over the wire.
@@ -39,9 +38,7 @@ def read_text(path: Path) -> str:
 
 
 def is_xacro(path: Path, text: str) -> bool:
-    """Whether a robot file has to be expanded: by its name, or since xacro elements occur in a file called
-    .urdf.
-    """
+    """Whether a robot file has to be expanded: by its name, or since it has xacro elements all the same."""
     return path.name.endswith(".xacro") or _XACRO_ELEMENT.search(text) is not None
 
 
@@ -99,7 +96,7 @@ def _reason(cause: Exception, suffix: str) -> str:
     if isinstance(cause, OSError):
         return f"{cause.strerror}: {cause.filename}"
     if isinstance(cause, RecursionError):
-        return "a macro, a property or an include calls itself without end"
+        return "a macro, a property or an include calls itself without end, or elements are nested too deep"
     if type(cause).__name__ == "ArgException":
         return f"$(arg {cause}) has no value; give one with {cause}:=VALUE or a default in <xacro:arg>"
     told = str(cause) if not isinstance(cause, KeyError) else f"there is no {cause}"

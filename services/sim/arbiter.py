@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from holozen.limits import STOP, Planar
+from holozen.wire import COMMAND_SILENCE
 
 AUTOPILOT = 5  # the rank of DATA_LOW; from here on down a source never takes a robot that others have driven
 OVERRULED = "overruled: {driver} drives"
@@ -24,7 +25,7 @@ class Arbiter:
 
     A source that was overruled is held: it moves the robot again only after `resume`. So is every autopilot once
     anyone above it drove. `timeout` is the silence in seconds after which a source is no longer obeyed; below
-    zero a source is obeyed until another one speaks.
+    zero a silent source is obeyed until another one speaks.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -37,13 +38,13 @@ class Arbiter:
     def offer(self, source: str, rank: int, velocity: Planar, now: float) -> str:
         """Hear a command at time `now`. Returns why it is not obeyed, or an empty text."""
         driver = self.driver(now)
-        if driver and source != driver.source and rank >= driver.rank:
+        if driver and source != driver.source and rank >= driver.rank and not self._silent(driver, now):
             if rank > driver.rank:
                 self._hold(source)
             return OVERRULED.format(driver=driver.source)
         if source in self._held or (rank >= AUTOPILOT and rank > self._highest):
             return HELD
-        if driver and source != driver.source:
+        if driver and source != driver.source and rank < driver.rank:
             self._hold(driver.source)
         self._driver = Driver(source, rank, velocity, now)
         self._highest = min(self._highest, rank)
@@ -63,8 +64,8 @@ class Arbiter:
 
     @property
     def held(self) -> bool:
-        """Whether a source waits for `resume`, or would have to."""
-        return bool(self._held) or self._highest < AUTOPILOT
+        """Whether every autopilot waits for `resume`: a source above them drove."""
+        return self._highest < AUTOPILOT
 
     def resume(self, now: float) -> str:
         """Let every source drive again. Returns why not, if somebody above an autopilot moves the robot at `now`."""
@@ -76,6 +77,10 @@ class Arbiter:
         self._highest = AUTOPILOT + 1
         self.resumed += 1
         return ""
+
+    def _silent(self, driver: Driver, now: float) -> bool:
+        # Without a timeout the word of a dead source holds on, but it must not keep others from stopping the robot.
+        return now - driver.heard > (self.timeout if self.timeout >= 0 else COMMAND_SILENCE)
 
     def _hold(self, source: str) -> None:
         if len(self._held) < 1000:  # names come over the wire

@@ -7,6 +7,7 @@ from pathlib import Path
 
 STEP = 1 / 240  # s
 GRAVITY = (0.0, 0.0, -9.8)  # m/s^2; Gazebo's default
+STRONGEST = 100.0  # m/s^2; ten times ours
 SHORTEST, LONGEST = 1e-4, 0.02  # s; outside of this the physics engine is hopeless or unstable
 
 
@@ -34,6 +35,8 @@ def load(path: Path) -> WorldSpec:
         raise WorldError(f"world {path}: {error.strerror or error}") from None
     except ET.ParseError as error:
         raise WorldError(f"world {path}: broken XML: {error}") from None
+    except (LookupError, ValueError) as error:  # an encoding that Python does not know, or expat does not
+        raise WorldError(f"world {path}: {error}; save it as UTF-8") from None
     world = root.find("world")
     if root.tag != "sdf" or world is None:
         raise WorldError(f"world {path}: it holds no <sdf><world>, its root is <{root.tag}>")
@@ -48,14 +51,13 @@ def _world(world: ET.Element, path: Path) -> WorldSpec:
     if not 0 <= rtf <= 1000:
         raise WorldError(f"world {path}: real_time_factor {rtf:g}; use 0 (as fast as it goes) to 1000")
     parts = [(_part_name(part), part) for part in [*world.iter("include"), *world.findall("model")]]
-    ground = any("plane" in name or part.find(".//plane") is not None for name, part in parts)
-    unknown = [n for n, p in parts if n not in ("sun", "ground_plane") and p.find(".//plane") is None]
+    unknown = [name for name, part in parts if name != "sun" and not _is_ground(name, part)]
     return WorldSpec(
         name=world.get("name", "default"),
         step=step,
         gravity=_gravity(world, path),
         rtf=rtf,
-        ground=ground,
+        ground=any(_is_ground(name, part) for name, part in parts),
         warnings=tuple(
             f"world {path}: model {name!r} is left out; only a ground plane is simulated" for name in unknown
         ),
@@ -68,6 +70,10 @@ def _part_name(part: ET.Element) -> str:
     return (part.findtext("uri") or "").strip().removeprefix("model://")
 
 
+def _is_ground(name: str, part: ET.Element) -> bool:
+    return name.endswith("_plane") or part.find(".//plane") is not None
+
+
 def _gravity(world: ET.Element, path: Path) -> tuple[float, float, float]:
     text = world.findtext("gravity", world.findtext("physics/gravity"))
     if text is None:
@@ -75,6 +81,8 @@ def _gravity(world: ET.Element, path: Path) -> tuple[float, float, float]:
     values = [_finite(part, "gravity", path) for part in text.split()]
     if len(values) != 3:
         raise WorldError(f"world {path}: gravity {text!r}; write three numbers, such as '0 0 -9.8'")
+    if max(map(abs, values)) > STRONGEST:
+        raise WorldError(f"world {path}: gravity {text!r}; use at most {STRONGEST:g} m/s^2 along each axis")
     return values[0], values[1], values[2]
 
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from prompt_toolkit.application import Application
 from prompt_toolkit.formatted_text import StyleAndTextTuples
+from prompt_toolkit.input.ansi_escape_sequences import ANSI_SEQUENCES
 from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
 from prompt_toolkit.keys import Keys
 from prompt_toolkit.layout import Layout, Window
@@ -20,6 +21,9 @@ STYLE = Style.from_dict(
         "warning": "bold ansired",
     }
 )
+
+# A terminal that was told to by the program before us says when it gets and loses the focus; ESC, [ and I otherwise.
+ANSI_SEQUENCES["\x1b[I"] = ANSI_SEQUENCES["\x1b[O"] = Keys.Ignore
 
 # Bytes that a terminal sends on its own; they are nobody's key press.
 NOT_KEYS = (

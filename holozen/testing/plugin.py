@@ -1,0 +1,32 @@
+"""The fixtures. pytest finds them by this package's entry point; no import is needed in a test."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from holozen.testing.process import wait_for as wait
+from holozen.testing.terminal import Terminal
+from holozen.testing.wire import Wire
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    """A place to meet that no other test uses. What was started in it ends with the test.
+
+    To share one among the tests of a file, write a fixture with `scope="module"` that does the same.
+    """
+    with Wire() as wire:
+        yield wire
+
+
+@pytest.fixture
+def terminal(wire: Wire) -> Callable[..., Terminal]:
+    """`terminal("teleop", "--speed", "0.3")`: a holozen verb in a pseudo-terminal, on this test's wire."""
+    return wire.terminal
+
+
+@pytest.fixture
+def wait_for() -> Callable[..., Any]:
+    """`wait_for(lambda: odom.count > 3, within=5)`: wait for a condition and not for a time."""
+    return wait

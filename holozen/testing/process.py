@@ -1,0 +1,129 @@
+"""Processes of a test: what they write is kept, and they end with it."""
+
+import os
+import signal
+import subprocess
+import tempfile
+import time
+from collections.abc import Callable, Mapping, Sequence
+from typing import IO, Self, TypeVar
+
+T = TypeVar("T")
+
+EVERY = 0.005  # s between two looks
+GRACE = 3.0  # s from SIGTERM to SIGKILL
+
+
+def wait_for(condition: Callable[[], T], within: float = 10.0, what: str | Callable[[], str] = "a condition") -> T:
+    """Wait until `condition()` is true, and return what it gave. AssertionError after `within` seconds.
+
+    `what` says in the error what was waited for; as a function it is asked only then.
+    """
+    deadline = time.monotonic() + within
+    while not (value := condition()):
+        if time.monotonic() > deadline:
+            words = what if isinstance(what, str) else what()
+            raise AssertionError(f"waited {within:g} s in vain for {words}; the last look gave {value!r}")
+        time.sleep(EVERY)
+    return value
+
+
+class Process:
+    """A running program, the leader of its own session. `out` and `err` are what it has written so far.
+
+    `stdin`, `stdout` and `stderr` are as for subprocess.Popen; by default the first is empty and the others are kept.
+    """
+
+    def __init__(
+        self,
+        words: Sequence[str],
+        *,
+        env: Mapping[str, str] | None = None,
+        stdin: int | IO[bytes] = subprocess.DEVNULL,
+        stdout: int | IO[bytes] | None = None,
+        stderr: int | IO[bytes] | None = None,
+    ) -> None:
+        self.words = list(words)
+        # Files and not pipes: a process that writes much never waits for its reader.
+        self._out, self._err = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115
+        self._popen = subprocess.Popen(
+            self.words,
+            stdin=stdin,
+            stdout=self._out if stdout is None else stdout,
+            stderr=self._err if stderr is None else stderr,
+            env={**os.environ, **(env or {})},
+            start_new_session=True,
+        )
+        self.pid = self._popen.pid
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def __repr__(self) -> str:
+        return f"<{' '.join(self.words)}: {'runs' if self.returncode is None else f'exit code {self.returncode}'}>"
+
+    @property
+    def out(self) -> str:
+        """Standard output so far."""
+        return _content(self._out)
+
+    @property
+    def err(self) -> str:
+        """Standard error so far."""
+        return _content(self._err)
+
+    @property
+    def returncode(self) -> int | None:
+        """The exit code, -N after signal N, None while it runs."""
+        return self._popen.poll()
+
+    def wait_for_line(self, text: str, within: float = 20.0) -> str:
+        """The first line of its output or errors that holds `text`. AssertionError if it ends without one."""
+
+        def look() -> str | None:
+            ended = self.returncode is not None
+            found = next((line for line in f"{self.out}\n{self.err}".splitlines() if text in line), None)
+            if ended and found is None:
+                raise AssertionError(f"{self} ended without {text!r}; it wrote:\n{self.out}{self.err}")
+            return found
+
+        return wait_for(look, within, lambda: f"{text!r} from {self}, which wrote:\n{self.out}{self.err}") or ""
+
+    def wait(self, within: float = 10.0) -> int:
+        """Wait for its end; the exit code. AssertionError if it runs on."""
+        try:
+            return self._popen.wait(within)
+        except subprocess.TimeoutExpired:
+            raise AssertionError(f"{self} still runs after {within:g} s; it wrote:\n{self.out}{self.err}") from None
+
+    def signal(self, number: int) -> None:
+        """Send it a signal."""
+        self._popen.send_signal(number)
+
+    def terminate(self, within: float = 10.0) -> int:
+        """SIGTERM, and wait for its end; the exit code."""
+        self.signal(signal.SIGTERM)
+        return self.wait(within)
+
+    def kill(self) -> int:
+        """SIGKILL, and wait for its end; the exit code."""
+        self.signal(signal.SIGKILL)
+        return self.wait()
+
+    def close(self) -> None:
+        """End it, kindly if it listens, and forget what it wrote."""
+        self.signal(signal.SIGTERM)
+        self.signal(signal.SIGCONT)  # in case a test has stopped it
+        try:
+            self._popen.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            self.kill()
+        self._out.close()
+        self._err.close()
+
+
+def _content(file: IO[bytes]) -> str:
+    return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0).decode(errors="replace")

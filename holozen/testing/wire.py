@@ -1,0 +1,74 @@
+"""A place of their own for the processes of a test."""
+
+import contextlib
+import random
+import socket
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any, Self
+
+from holozen.connection import Connection
+from holozen.testing.process import Process
+from holozen.testing.terminal import Terminal
+
+if TYPE_CHECKING:
+    from holozen.bus import Bus
+
+
+class Wire:
+    """A loopback port where the processes and the buses of one test meet, and nobody else.
+
+    `connection` is for `holozen.bus.Bus`, `flags` for any holozen verb, `endpoint` for any Zenoh tool.
+    """
+
+    def __init__(self) -> None:
+        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.connection = Connection(connect=(self.endpoint,), listen=(self.endpoint,))
+        self.flags = self.connection.arguments()
+        self._ends = contextlib.ExitStack()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def start(self, verb: str, *words: str, **options: Any) -> Process:
+        """Start `holozen VERB WORDS...` here. Options are those of Process."""
+        process = self._ends.enter_context(Process(command(verb, *words, *self.flags), **options))
+        self._ends.callback(lambda: print(f"--- {process}\n{process.out}{process.err}"))  # pytest shows it on failure
+        return process
+
+    def terminal(self, verb: str, *words: str, **options: Any) -> Terminal:
+        """Start `holozen VERB WORDS...` here, in a pseudo-terminal. Options are those of Terminal."""
+        return self._ends.enter_context(Terminal(command(verb, *words, *self.flags), **options))
+
+    def run(self, verb: str, *words: str, given: str = "", within: float = 30.0) -> subprocess.CompletedProcess[str]:
+        """Run `holozen VERB WORDS...` here to its end, with `given` as its standard input."""
+        return subprocess.run(
+            command(verb, *words, *self.flags), input=given, capture_output=True, text=True, timeout=within
+        )
+
+    def bus(self, node: str = "test", **options: Any) -> "Bus":
+        """A bus here, closed with the test. Options are those of holozen.bus.Bus."""
+        from holozen.bus import Bus
+
+        return self._ends.enter_context(Bus(node, self.connection, **options))
+
+    def close(self) -> None:
+        """End all that was started here, the last first."""
+        self._ends.close()
+
+
+def command(verb: str, *words: str) -> list[str]:
+    """The words that start `holozen VERB WORDS...` with this Python."""
+    return [sys.executable, "-m", "holozen", verb, *words]
+
+
+def free_port() -> int:
+    """A free TCP port on loopback, below those that the kernel gives to whoever asks for any."""
+    while True:
+        port = random.randint(10_000, 32_000)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
