@@ -91,12 +91,12 @@ class Bus:
         """A writer of `kind` on `key`."""
         from holozen import codec
 
-        self.announce("pub", kind.ROS, key)
+        token = self.announce("pub", kind.ROS, key)
         publisher = self.session.declare_publisher(
             key, encoding=codec.WIRES[self.wire], priority=getattr(zenoh.Priority, priority), express=True
         )
         writer: Publisher[M] = Publisher(publisher, self.wire, self.source)
-        writer.answers = self.session.declare_queryable(key, writer.answer)
+        writer.ends += [self.session.declare_queryable(key, writer.answer), token]
         return writer
 
     def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> "Subscription[M]":
@@ -124,13 +124,16 @@ class Bus:
     def call(self, key: str, request: "Message", reply: type[R], timeout: float = 5.0) -> R:
         """Ask a service and wait for its reply, and for the service itself, for at most `timeout` seconds.
 
-        Raises ServiceError with the service's own reason, or when nobody answered.
+        Raises ServiceError with the service's own reason, when nobody answered, or for a reply that is none.
         """
         from holozen import codec
 
         payload = codec.encode(request, self.wire)
         answer = self.call_bytes(key, payload, codec.WIRES[self.wire], timeout)
-        return codec.decode(answer.payload, answer.encoding, (reply,))
+        try:
+            return codec.decode(answer.payload, answer.encoding, (reply,))
+        except codec.CodecError as error:
+            raise ServiceError(f"the reply of {key!r} is {error}") from None
 
     def call_bytes(self, key: str, payload: bytes, encoding: str, timeout: float) -> Sample:
         """`call` without types."""
@@ -162,17 +165,18 @@ class Tap:
     """Raw samples, the newest of them if there were too many to read."""
 
     def __init__(self, subscriber: Any, limit: int = 0) -> None:
-        self._subscriber, self._limit = subscriber, limit
+        # Reading from the handler leaves the subscriber free to be undeclared meanwhile.
+        self._subscriber, self._samples, self._limit = subscriber, subscriber.handler, limit
 
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""
-        sample = self._subscriber.try_recv()
+        sample = self._samples.try_recv()
         return sample and Sample.of(sample, self._limit)
 
     def recv(self) -> Sample:
         """The next sample; waits for it. Raises BusError once the bus or this tap is closed."""
         try:
-            return Sample.of(self._subscriber.recv(), self._limit)
+            return Sample.of(self._samples.recv(), self._limit)
         except zenoh.ZError:
             raise BusError("closed") from None
 

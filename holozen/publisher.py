@@ -14,7 +14,7 @@ class Publisher(Generic[M]):
     def __init__(self, publisher: Any, wire: str, source: str) -> None:
         from holozen import codec
 
-        self.answers: Any = None  # the queryable behind `answer`, once it is declared
+        self.ends = [publisher]  # what stands on the wire for this publisher
         self._publisher, self._wire, self._source = publisher, wire, source.encode()
         self._encode, self._encoding = codec.encode, codec.WIRES[wire]
         self._last: bytes | None = None
@@ -37,5 +37,5 @@ class Publisher(Generic[M]):
 
     def close(self) -> None:
         """Stop writing and answering; nothing of this key stays."""
-        self.answers.undeclare()
-        self._publisher.undeclare()
+        for end in self.ends:
+            end.undeclare()

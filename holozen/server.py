@@ -31,12 +31,13 @@ class Server:
     ) -> None:
         from holozen import codec
 
-        self._queryable, self._key, self._request, self._answer, self._wire = queryable, key, request, answer, wire
-        self._codec = codec
+        # Reading from the handler leaves the queryable free to be undeclared meanwhile.
+        self._queryable, self._queries = queryable, queryable.handler
+        self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
     def answer_pending(self) -> None:
         """Answer the requests that wait; returns at once when there are none."""
-        while (query := self._queryable.try_recv()) is not None:
+        while (query := self._queries.try_recv()) is not None:
             self._reply(query)
 
     def start(self) -> None:
@@ -50,7 +51,7 @@ class Server:
     def _serve(self) -> None:
         while True:
             try:
-                query = self._queryable.recv()
+                query = self._queries.recv()
             except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
                 return
             self._reply(query)

@@ -23,7 +23,18 @@ SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-
 
 def main(argv: list[str] | None = None) -> int:
     """Run one verb; returns the exit code (0 good, 1 failed, 2 wrong usage)."""
-    words = sys.argv[1:] if argv is None else argv
+    try:
+        try:
+            return _main(sys.argv[1:] if argv is None else argv)
+        finally:
+            sys.stdout.flush()  # a reader that is gone shows here, and not at the interpreter's end
+    except BrokenPipeError:
+        # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _main(words: list[str]) -> int:
     if not words or words[0] in ("-h", "--help"):
         print(_help())
         return 0 if words else 2
@@ -52,10 +63,6 @@ def _run(verb: str, words: list[str]) -> int:
             raise
         say(f"holozen {verb} needs {error.name}; run: pip install 'holozen[{verb}]'")
         return 1
-    except BrokenPipeError:
-        # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
     except KeyboardInterrupt:
         return 130
 

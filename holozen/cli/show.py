@@ -14,7 +14,7 @@ def decode(payload: bytes, encoding: str) -> Any:
 
         try:
             return _plain(msgspec.msgpack.decode(payload))
-        except (msgspec.DecodeError, RecursionError):
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
             return _hex(payload, encoding)
     try:
         text = payload.decode()

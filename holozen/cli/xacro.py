@@ -25,11 +25,11 @@ def main(argv: list[str]) -> int:
         text = expand(args.file, dict(map(_pair, args.args)), dict(args.package))
         if args.output:
             args.output.write_text(text)
-        else:
-            sys.stdout.write(text)
     except (RobotError, OSError) as error:
         say(f"holozen xacro: {error}")
         return 1
+    if not args.output:
+        sys.stdout.write(text)
     return 0
 
 

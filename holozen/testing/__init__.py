@@ -3,9 +3,10 @@
     def test_the_robot_stands_after_half_a_second_of_silence(wire, wait_for):
         wire.start("sim")
         with wire.bus("my_test") as bus:
-            odom = bus.latest("odom", Odometry)
-            bus.publisher("cmd_vel", Twist).put(Twist.planar(x=0.3))
-            wait_for(lambda: odom.count and odom.read()[0].twist.twist.linear.x > 0.2)
+            odom, commands = bus.latest("odom", Odometry), bus.publisher("cmd_vel", Twist)
+            wait_for(lambda: odom.count)
+            commands.put(Twist.planar(x=0.3))
+            wait_for(lambda: odom.read()[0].twist.twist.linear.x > 0.2)
             wait_for(lambda: abs(odom.read()[0].twist.twist.linear.x) < 0.01)
 
 The fixtures are in `holozen.testing.plugin`. Nothing heavy is imported here: pytest loads this in every run.

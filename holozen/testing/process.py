@@ -46,6 +46,7 @@ class Process:
         self.words = list(words)
         # Files and not pipes: a process that writes much never waits for its reader.
         self._out, self._err = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115
+        self._ended: tuple[str, str] | None = None
         self._popen = subprocess.Popen(
             self.words,
             stdin=stdin,
@@ -68,12 +69,12 @@ class Process:
     @property
     def out(self) -> str:
         """Standard output so far."""
-        return _content(self._out)
+        return self._ended[0] if self._ended else _content(self._out)
 
     @property
     def err(self) -> str:
         """Standard error so far."""
-        return _content(self._err)
+        return self._ended[1] if self._ended else _content(self._err)
 
     @property
     def returncode(self) -> int | None:
@@ -114,13 +115,14 @@ class Process:
         return self.wait()
 
     def close(self) -> None:
-        """End it, kindly if it listens, and forget what it wrote."""
+        """End it, kindly if it listens; `out` and `err` stay."""
         self.signal(signal.SIGTERM)
         self.signal(signal.SIGCONT)  # in case a test has stopped it
         try:
             self._popen.wait(GRACE)
         except subprocess.TimeoutExpired:
             self.kill()
+        self._ended = self.out, self.err
         self._out.close()
         self._err.close()
 

@@ -22,7 +22,8 @@ class Wire:
     """
 
     def __init__(self) -> None:
-        self.endpoint = f"tcp/127.0.0.1:{free_port()}"
+        self.port = free_port()
+        self.endpoint = f"tcp/127.0.0.1:{self.port}"
         self.connection = Connection(connect=(self.endpoint,), listen=(self.endpoint,))
         self.flags = self.connection.arguments()
         self._ends = contextlib.ExitStack()

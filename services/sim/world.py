@@ -111,7 +111,9 @@ class PlanarBody:
         (_, _, falling), (roll, pitch, _) = engine.getBaseVelocity(self._body, self._world)
         vx, vy = to_world(velocity, _yaw(rotation), dt)
         turn = velocity[2]
-        linear = (vx - turn * centre[1], vy + turn * centre[0], falling)
+        # The centre goes round the root; as with the heading, the middle of the step keeps it on its circle.
+        cx, cy = to_world((centre[0], centre[1], turn), 0.0, dt)
+        linear = (vx - turn * cy, vy + turn * cx, falling)
         engine.resetBaseVelocity(self._body, linear, (roll, pitch, turn), self._world)
 
     def pose(self) -> tuple[Vector, Rotation]:
@@ -123,7 +125,8 @@ class PlanarBody:
         """The root frame's planar velocity during the last step of `dt` seconds, as seen from the body's heading."""
         _, rotation, centre = self._root()
         (vx, vy, _), (_, _, turn) = engine.getBaseVelocity(self._body, self._world)
-        x, y = to_body(vx + turn * centre[1], vy - turn * centre[0], _yaw(rotation) - turn * dt / 2)
+        cx, cy = to_world((centre[0], centre[1], -turn), 0.0, dt)
+        x, y = to_body(vx + turn * cy, vy - turn * cx, _yaw(rotation) - turn * dt / 2)
         return x, y, turn
 
     def _root(self) -> tuple[Vector, Rotation, Vector]:

@@ -4,7 +4,10 @@ import math
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from holozen.robot.errors import RobotError
 from holozen.robot.model import Inertial, Limits, Link, Pose, RobotModel, Shape, load, parse
@@ -41,7 +44,7 @@ def test_links_joints_and_root_are_read() -> None:
         '<link name="base"><inertial><origin xyz="0 0 0.28" rpy="0.1 0 0"/><mass value="0.28"/>'
         '<inertia ixx="1" ixy="0.1" ixz="0.2" iyy="2" iyz="0.3" izz="3"/></inertial></link>'
         '<joint name="j" type="revolute"><origin xyz="0 0.68 0.18" rpy="0 0 1.5"/><parent link="base"/>'
-        '<child link="wheel"/><axis xyz="0 3 4"/><limit effort="5" velocity="6" lower="-1" upper="2"/>'
+        '<child link="wheel"/><axis xyz="2 3 6"/><limit effort="5" velocity="6" lower="-1" upper="2"/>'
         "</joint>"
         '<link name="wheel"/>'
     )
@@ -51,7 +54,7 @@ def test_links_joints_and_root_are_read() -> None:
     joint = model.joints["j"]
     assert (joint.kind, joint.parent, joint.child) == ("revolute", "base", "wheel")
     assert joint.pose == Pose((0, 0.68, 0.18), (0, 0, 1.5))
-    assert joint.axis == pytest.approx((0, 0.6, 0.8))
+    assert joint.axis == pytest.approx((2 / 7, 3 / 7, 6 / 7))
     assert joint.limits == Limits(5, 6, -1, 2)
 
 
@@ -63,15 +66,14 @@ def test_each_kind_of_joint_is_known(kind: str) -> None:
 def test_what_a_joint_leaves_out_takes_the_urdf_default() -> None:
     joint = robot(TWO_LINKS + JOINT.format("")).joints["j"]
     assert (joint.pose, joint.axis, joint.limits) == (Pose(), (1, 0, 0), Limits())
-    joint = robot(TWO_LINKS + JOINT.format('<limit effort="5" velocity="5" lower="0" upper="0"/>')).joints[
-        "j"
-    ]
+    joint = robot(TWO_LINKS + JOINT.format('<limit effort="5" velocity="5" lower="0" upper="0"/>')).joints["j"]
     assert (joint.limits.lower, joint.limits.upper) == (-math.inf, math.inf)
 
 
 def test_a_fixed_joint_may_have_an_axis_without_direction() -> None:
     body = TWO_LINKS + JOINT.format('<axis xyz="0 0 0"/>')
-    assert robot(body.replace("continuous", "fixed")).joints["j"].axis == (1, 0, 0)
+    for kind in ("fixed", "floating"):
+        assert robot(body.replace("continuous", kind)).joints["j"].axis == (1, 0, 0)
     assert "<axis> of <joint name='j'> has no direction" in refusal(body)
 
 
@@ -249,6 +251,14 @@ def test_an_inertia_that_no_body_has_makes_a_point_mass_and_is_told(inertia: str
     assert [warning.startswith(told) for warning in model.warnings] == ([] if possible else [True])
 
 
+def test_a_long_value_is_cut_and_an_error_outside_all_elements_stands_alone() -> None:
+    assert f"value: '{'9' * 77}...' is no finite number" in refusal(inertial(mass="9" * 300 + "x"))
+    assert f"value: '{'9' * 79}x' is no finite number" in refusal(inertial(mass="9" * 79 + "x"))
+    with pytest.raises(RobotError) as error:
+        parse("just text", ORIGIN)
+    assert str(error.value) == f"{ORIGIN}, line 1: broken XML: syntax error"
+
+
 def test_a_mass_of_zero_is_told() -> None:
     (warning,) = robot(inertial(mass="0")).warnings
     assert warning.startswith(f"{ORIGIN}, line 2: <inertial> of <link name='a'> has no mass")
@@ -267,11 +277,31 @@ def test_a_missing_mesh_is_a_warning_that_names_file_line_and_element() -> None:
     assert model.links["a"].visuals[0].path is None
 
 
-def test_a_revolute_joint_without_limit_is_a_warning() -> None:
-    model = robot(TWO_LINKS + JOINT.format("").replace("continuous", "revolute"))
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+def test_a_joint_that_needs_a_limit_and_has_none_is_a_warning(kind: str) -> None:
+    model = robot(TWO_LINKS + JOINT.format("").replace("continuous", kind))
     assert model.warnings == (
-        f"{ORIGIN}, line 2: <joint name='j'> is revolute and has no <limit>; it is taken as unlimited",
+        f"{ORIGIN}, line 2: <joint name='j'> is {kind} and has no <limit>; it is taken as unlimited",
     )
+
+
+def test_a_bound_that_a_limit_leaves_out_is_zero() -> None:
+    joint = JOINT.format('<axis/><limit lower="-1e16"/>').replace("continuous", "revolute")
+    assert robot(TWO_LINKS + joint).joints["j"].limits == Limits(math.inf, math.inf, -1e16, 0)
+    assert robot(TWO_LINKS + joint.replace("lower", "upper").replace("-", "")).joints["j"].limits.lower == 0
+    assert robot(TWO_LINKS + joint.replace("-1e16", "0")).joints["j"].limits.upper == 0
+    assert robot(TWO_LINKS + joint).joints["j"].axis == (1, 0, 0)
+
+
+@given(st.lists(st.floats(-2, 2), min_size=6, max_size=6))
+def test_an_inertia_is_kept_exactly_when_all_its_principal_moments_are_above_zero(entries: list[float]) -> None:
+    xx, xy, xz, yy, yz, zz = entries
+    xx, yy, zz = abs(xx), abs(yy), abs(zz)
+    least = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])[0]
+    assume(abs(least) > 1e-6)
+    text = f'ixx="{xx}" ixy="{xy}" ixz="{xz}" iyy="{yy}" iyz="{yz}" izz="{zz}"'
+    part = robot(inertial(inertia=text)).links["a"].inertial
+    assert part is not None and any(part.inertia) == (least > 0)
 
 
 def test_four_hundred_links_in_a_row_and_deep_nesting_are_read() -> None:
@@ -291,9 +321,7 @@ def test_a_xacro_file_is_loaded_and_its_lines_are_those_of_the_expanded_text(tmp
     assert load(path, {"m": "b"}).root == "b"
     for name in ("robot.xacro", "robot.urdf"):
         (tmp_path / name).write_text(f'{head}<xacro:property name="x" value="1"/></robot>')
-        with pytest.raises(
-            RobotError, match=rf"{name} \(as `holozen xacro` prints it\), line \d+: <robot name"
-        ):
+        with pytest.raises(RobotError, match=rf"{name} \(as `holozen xacro` prints it\), line \d+: <robot name"):
             load(tmp_path / name)
 
 

@@ -83,14 +83,17 @@ def test_without_any_package_xml_the_nearest_folder_with_urdf_in_it_is_the_packa
     assert find_named("holo", start) is None
 
 
+def test_a_start_that_does_not_exist_yet_has_its_folders_searched_all_the_same(home: Path) -> None:
+    folder = package(home / "holo", "holo")
+    assert find_package("holo", folder / "gone" / "robot.urdf") == folder
+
+
 def test_a_folder_may_be_the_start(home: Path) -> None:
     folder = package(home / "holo", "holo")
     assert find_package("holo", folder) == folder
 
 
-def test_a_relative_start_is_seen_from_the_working_folder(
-    home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_relative_start_is_seen_from_the_working_folder(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     robot_file(package(home / "holo", "holo"))
     monkeypatch.chdir(home / "holo" / "urdf")
     assert find_package("holo", Path("hb_bot.urdf.xacro")) == home / "holo"
@@ -124,7 +127,7 @@ def test_a_missing_package_is_named_with_those_found_and_the_places_searched(
 def test_of_many_packages_found_the_first_dozen_are_named(home: Path) -> None:
     for i in range(14):
         package(home / f"p{i:02}", f"p{i:02}")
-    with pytest.raises(RobotError, match="packages found: p00, .*p11 and 2 more; looked in"):
+    with pytest.raises(RobotError, match=r"packages found: p00, .*p11 and 2 more; looked in"):
         find_package("hollo", home)
 
 

@@ -32,9 +32,7 @@ def test_a_robot_without_plugin_has_no_drive() -> None:
 
 
 def test_without_tags_gazebos_defaults_hold_with_the_watchdog_on() -> None:
-    assert drive("") == PlanarMove(
-        "cmd_vel", "odom", "odom", 20.0, "base", 0.5, True, True, (1e-5, 1e-5, 1e-3)
-    )
+    assert drive("") == PlanarMove("cmd_vel", "odom", "odom", 20.0, "base", 0.5, True, True, (1e-5, 1e-5, 1e-3))
 
 
 def test_ros_1_tags_are_read() -> None:
@@ -69,6 +67,29 @@ def test_both_spellings_may_be_mixed_and_spaced() -> None:
 def test_a_namespace_stands_before_relative_topics_only() -> None:
     tags = "<robotNamespace>a/b/</robotNamespace><commandTopic>//cmd_vel</commandTopic>"
     assert (drive(tags).command_topic, drive(tags).odometry_topic) == ("cmd_vel", "a/b/odom")
+
+
+def test_a_topic_is_remapped_by_its_default_name_and_by_its_own() -> None:
+    assert drive("<ros><remapping>/cmd_vel:=go/</remapping></ros>").command_topic == "go"
+    own = "<commandTopic>/drive</commandTopic><ros><remapping>drive:=go</remapping><remapping>x:=y</remapping></ros>"
+    assert drive(own).command_topic == "go"
+    assert drive("<ros><remapping>cmd_vel:=</remapping></ros>").command_topic == "cmd_vel"
+
+
+@pytest.mark.parametrize(
+    ("tags", "expected"),
+    [
+        ("<command_timeout>2</command_timeout>", PlanarMove(robot_base_frame="base", command_timeout=2)),
+        ("<publishOdometry>FALSE</publishOdometry>", PlanarMove(robot_base_frame="base", publish_odom=False)),
+        ("<publish_odometry_tf>0</publish_odometry_tf>", PlanarMove(robot_base_frame="base", publish_odom_tf=False)),
+        ("<publish_odom>1</publish_odom>", PlanarMove(robot_base_frame="base")),
+        ("<odometryFrame>/</odometryFrame>", PlanarMove(robot_base_frame="base")),
+        ("<robotBaseFrame>/base</robotBaseFrame>", PlanarMove(robot_base_frame="base")),
+        ("<covariance_y>0</covariance_y>", PlanarMove(robot_base_frame="base", covariance=(1e-5, 0, 1e-3))),
+    ],
+)
+def test_spellings_that_people_use_are_understood(tags: str, expected: PlanarMove) -> None:
+    assert drive(tags) == expected
 
 
 def test_of_two_equal_tags_the_first_counts_and_an_empty_one_says_nothing() -> None:
@@ -106,9 +127,12 @@ def test_the_plugin_is_known_by_its_file_name(filename: str) -> None:
 
 
 def test_a_second_planar_move_is_told_and_the_first_drives() -> None:
-    model = robot(plugin("<odometryRate>1</odometryRate>"), plugin("<odometryRate>2</odometryRate>"))
-    assert model.planar_move is not None and model.planar_move.odometry_rate == 1
-    assert "line 4: <plugin name='drive'> is a second planar_move" in model.warnings[0]
+    first, second = (plugin(f"<odometryRate>{rate}</odometryRate>") for rate in (1, 2))
+    for gazebo in ((first, second), (first + second,), (f"<a>{first}</a>{second}",), (f"<a>{first}{second}</a>",)):
+        model = robot(*gazebo)
+        assert model.planar_move is not None and model.planar_move.odometry_rate == 1
+        (warning,) = model.warnings
+        assert warning.endswith("<plugin name='drive'> is a second planar_move; only the first one drives")
 
 
 @pytest.mark.parametrize(

@@ -44,9 +44,7 @@ def inertial_of_points(masses: Array, points: Array, rpy: tuple[float, float, fl
     turn = matrix_of(rpy)
     inertia = turn.T @ tensor_of_points(masses, points) @ turn
     centre = masses @ points / masses.sum()
-    xx, xy, xz, yy, yz, zz = (
-        float(inertia[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-    )
+    xx, xy, xz, yy, yz, zz = (float(inertia[i, j]) for i, j in ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2)))
     return Inertial(Pose(triple(centre), rpy), float(masses.sum()), (xx, xy, xz, yy, yz, zz))
 
 
@@ -55,9 +53,7 @@ def model_of(links: list[Link], joints: list[Joint]) -> RobotModel:
     return RobotModel("r", links[0].name, named_links, named_joints, None, ())
 
 
-def fixed(
-    parent: str, child: str, pose: Pose, kind: str = "fixed", axis: Sequence[float] = (1, 0, 0)
-) -> Joint:
+def fixed(parent: str, child: str, pose: Pose, kind: str = "fixed", axis: Sequence[float] = (1, 0, 0)) -> Joint:
     return Joint(f"{child}_joint", kind, parent, child, pose, triple(axis), Limits())
 
 
@@ -68,9 +64,7 @@ def test_a_lumped_robot_equals_the_cloud_of_its_points(size: int, seed: int) -> 
     turns, places = [np.eye(3)], [np.zeros(3)]
     for i in range(size):
         masses, points = random.uniform(0.1, 2, 8), random.uniform(-1, 1, (8, 3))
-        links.append(
-            Link(f"l{i}", inertial_of_points(masses, points, triple(random.uniform(-4, 4, 3))), (), ())
-        )
+        links.append(Link(f"l{i}", inertial_of_points(masses, points, triple(random.uniform(-4, 4, 3))), (), ()))
         if i > 0:
             above, pose = int(random.integers(i)), Pose(*(triple(random.uniform(-3, 3, 3)) for _ in range(2)))
             joints.append(fixed(f"l{above}", f"l{i}", pose))
@@ -117,9 +111,7 @@ def test_links_without_mass_lend_their_shapes_and_nothing_else() -> None:
 @pytest.mark.parametrize("mass", [None, 0.0, 1e-9])
 def test_a_robot_without_mass_is_refused(mass: float | None) -> None:
     inertial = None if mass is None else Inertial(Pose(), mass, (0, 0, 0, 0, 0, 0))
-    with pytest.raises(
-        RobotError, match=r"robot 'r' has a mass of .* kg; give a link an <inertial> with a <mass> of"
-    ):
+    with pytest.raises(RobotError, match=r"robot 'r' has a mass of .* kg; give a link an <inertial> with a <mass> of"):
         lump(model_of([Link("a", inertial, (), ())], []))
 
 
@@ -135,15 +127,16 @@ def test_frames_add_up_from_the_root_to_the_leaves() -> None:
 
 
 def test_the_axis_of_a_joint_is_told_in_the_root_frame() -> None:
-    links = [Link(name, None, (), ()) for name in "abcd"]
+    links = [Link(name, None, (), ()) for name in "abcde"]
     turned = Pose((1, 0, 0), (0, 0, math.pi / 2))
     joints = [
         fixed("a", "b", turned, "continuous", (0, 1, 0)),
         fixed("b", "c", turned, "prismatic", (1, 0, 0)),
         fixed("a", "d", turned),
+        fixed("a", "e", turned, "revolute", (0, 0, 1)),
     ]
     axes = joint_axes(model_of(links, joints))
-    assert list(axes) == ["b_joint", "c_joint"]
+    assert list(axes) == ["b_joint", "c_joint", "e_joint"]
     assert axes["b_joint"].xyz == pytest.approx((1, 0, 0))
     assert axes["b_joint"].direction == pytest.approx((-1, 0, 0))
     assert axes["c_joint"].direction == pytest.approx((-1, 0, 0))
@@ -152,9 +145,7 @@ def test_the_axis_of_a_joint_is_told_in_the_root_frame() -> None:
 def test_hb_bot_weighs_what_its_links_weigh_and_its_axles_point_outwards() -> None:
     model = load(REPO / "urdf" / "hb_bot.urdf.xacro")
     body = lump(model)
-    assert body.mass == pytest.approx(
-        sum(link.inertial.mass for link in model.links.values() if link.inertial)
-    )
+    assert body.mass == pytest.approx(sum(link.inertial.mass for link in model.links.values() if link.inertial))
     axes = joint_axes(model)
     assert len(axes) == 3 and len(body.collisions) == 4
     for axis in axes.values():

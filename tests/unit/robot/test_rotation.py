@@ -51,9 +51,7 @@ def test_a_quaternion_turns_vectors_as_its_matrix_does(
 
 
 def test_a_yaw_of_ninety_degrees_has_the_quaternion_everybody_knows() -> None:
-    assert quaternion_of(matrix_of((0, 0, math.pi / 2))) == pytest.approx(
-        (0, 0, math.sqrt(0.5), math.sqrt(0.5))
-    )
+    assert quaternion_of(matrix_of((0, 0, math.pi / 2))) == pytest.approx((0, 0, math.sqrt(0.5), math.sqrt(0.5)))
 
 
 @given(angles, st.tuples(*[st.floats(1e-4, 10)] * 3))
@@ -65,6 +63,7 @@ def test_principal_axes_turn_the_moments_back_into_the_tensor(
     np.testing.assert_allclose(axes @ np.diag(moments) @ axes.T, tensor, atol=1e-9)
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1)
+    assert (np.diag(axes)[:2] >= 0).all()
     np.testing.assert_allclose(np.sort(moments), np.sort(diagonal), atol=1e-9)
 
 

@@ -38,9 +38,7 @@ def start(home: Path) -> Path:
         ("file://meshes/base.dae", "holo/meshes/base.dae"),
     ],
 )
-def test_a_mesh_is_found_by_package_and_by_relative_path(
-    start: Path, home: Path, uri: str, file: str
-) -> None:
+def test_a_mesh_is_found_by_package_and_by_relative_path(start: Path, home: Path, uri: str, file: str) -> None:
     assert resolve_uri(uri, start) == home / file
 
 
@@ -74,9 +72,7 @@ def test_a_path_of_another_machine_is_found_again_by_its_file_name(start: Path, 
     assert resolve_uri(uri, start) == home / "wheels" / "meshes" / "wheel.stl"
 
 
-def test_of_several_files_with_that_name_the_one_that_shares_most_of_the_path_is_taken(
-    start: Path, home: Path
-) -> None:
+def test_of_several_files_with_that_name_the_one_that_shares_most_of_the_path_is_taken(start: Path, home: Path) -> None:
     for folder in ("a/visual", "b/collision", "c/visual"):
         (home / "holo" / folder).mkdir(parents=True)
         (home / "holo" / folder / "arm.stl").touch()
@@ -98,9 +94,7 @@ def test_a_missing_file_is_told_with_the_places_it_was_looked_for(start: Path, h
     assert str(error.value) == expected
 
 
-@pytest.mark.parametrize(
-    "uri", ["", "package://holo", "meshes", "package://holo/%00", "x" * 5000, "~/base.dae"]
-)
+@pytest.mark.parametrize("uri", ["", "package://holo", "meshes", "package://holo/%00", "x" * 5000, "~/base.dae"])
 def test_what_is_no_file_is_told(start: Path, uri: str) -> None:
     with pytest.raises(RobotError, match="no such file"):
         resolve_uri(uri, start)

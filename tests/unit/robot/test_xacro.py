@@ -62,9 +62,7 @@ def test_a_byte_order_mark_and_crlf_are_accepted(folder: Path) -> None:
 @pytest.mark.parametrize("package", ["holo", "hb_task_1b"])
 def test_find_means_the_tree_of_the_file_whatever_the_package_is_called(folder: Path, package: str) -> None:
     write(folder, '<material name="black"/>', "materials.xacro")
-    body = (
-        f'<xacro:include filename="$(find {package})/urdf/materials.xacro"/><link name="$(find {package})"/>'
-    )
+    body = f'<xacro:include filename="$(find {package})/urdf/materials.xacro"/><link name="$(find {package})"/>'
     expanded = expand(write(folder, body))
     assert '<material name="black"/>' in expanded
     assert f'name="{folder.parent}"' in expanded
@@ -112,10 +110,7 @@ def test_broken_xml_is_told_with_its_line(folder: Path) -> None:
 def test_broken_xml_in_an_include_is_told_with_that_file_and_its_line(folder: Path) -> None:
     inner = write(folder, "<link", "inner.xacro")
     path = write(folder, '<xacro:include filename="inner.xacro"/>')
-    assert (
-        failure(path)
-        == f"{inner}, line 3: broken XML: not well-formed (invalid token) (included from {path})"
-    )
+    assert failure(path) == f"{inner}, line 3: broken XML: not well-formed (invalid token) (included from {path})"
 
 
 def test_a_bad_expression_is_told_with_the_chain_of_macros_and_includes(folder: Path) -> None:
@@ -167,13 +162,28 @@ def test_every_other_failure_is_one_line_with_the_file(folder: Path, body: str, 
     assert len(line) < 1500
 
 
+def test_an_unknown_macro_is_told_without_anything_around_it(folder: Path) -> None:
+    assert failure(write(folder, "<xacro:wheel/>")) == f"{folder}/robot.urdf.xacro: unknown macro name: xacro:wheel"
+
+
+def test_a_long_chain_is_cut(folder: Path) -> None:
+    macros = '<xacro:macro name="m0"><a b="${nope}"/></xacro:macro>' + "".join(
+        f'<xacro:macro name="m{i}"><xacro:m{i - 1}/></xacro:macro>' for i in range(1, 8)
+    )
+    short, long = (failure(write(folder, f"{macros}<xacro:m{top}/>")) for top in (5, 7))
+    assert "'m0'" in short and "'m5'" in short and "more" not in short
+    assert "'m5'" in long and "'m6'" not in long and long.endswith("and 2 more)")
+
+
+def test_a_missing_library_is_told_with_the_way_to_get_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "xacro", None)
+    assert failure(write(folder, "")) == "the xacro library is missing; install it with: pip install xacro"
+
+
 def test_a_file_that_cannot_be_read_is_told(folder: Path) -> None:
     assert failure(folder / "gone.urdf") == f"{folder}/gone.urdf: No such file or directory"
     assert failure(folder) == f"{folder}: Is a directory"
     (folder / "latin.urdf").write_bytes(b"<robot>\xe9</robot>")
-    assert (
-        failure(folder / "latin.urdf")
-        == f"{folder}/latin.urdf: byte 7 is not UTF-8 text; save the file as UTF-8"
-    )
+    assert failure(folder / "latin.urdf") == f"{folder}/latin.urdf: byte 7 is not UTF-8 text; save the file as UTF-8"
     (folder / "empty.xacro").touch()
     assert failure(folder / "empty.xacro") == f"{folder}/empty.xacro, line 1: broken XML: no element found"
