@@ -39,8 +39,8 @@ class Bus:
     """A node on the wire. Use it in `with`: an open session keeps a Python process from ending.
 
     `wire` is "json" or "msgpack", by default as the connection says. `patience` is how many seconds a client waits for
-    its router (None: for ever). `lasting` is for what runs long: it stands in the graph, and keeps the meeting point
-    open when its holder is gone.
+    its router (None: for ever, or until `stop`). `lasting` is for what runs long: it stands in the graph, and keeps
+    the meeting point open when its holder is gone.
     """
 
     def __init__(
@@ -51,20 +51,21 @@ class Bus:
         wire: str = "",
         patience: float | None = None,
         lasting: bool = False,
+        stop: threading.Event | None = None,
     ) -> None:
         connection = connection or Connection()
         self.node, self.wire = node, wire or connection.wire
-        self.session = _open(connection, patience)
+        self.session = _open(connection, patience, stop)
         self.id = str(self.session.zid())
         self.source = f"{node}@{self.id[:6]}"  # how others name the sender of our samples
-        self._tokens: list[Any] = []
+        self._readers: set[Tap | Server] = set()  # they live until the bus is closed
         self._closing = threading.Event()
-        if lasting:
-            self.announce("node")
+        self._door: threading.Thread | None = None
+        self._token = self.announce("node") if lasting else None
         if lasting and connection.door:
             from holozen import door
 
-            door.keep(connection.door, self._closing, _open_door)
+            self._door = door.keep(connection.door, self._closing, _open_door)
 
     def __enter__(self) -> Self:
         return self
@@ -77,15 +78,18 @@ class Bus:
         self._closing.set()
         closer = threading.Thread(target=_close, args=(self.session,), daemon=True)
         closer.start()
-        closer.join(CLOSE_LIMIT)
+        deadline = time.monotonic() + CLOSE_LIMIT
+        # An interpreter that ends while a thread is inside Zenoh aborts.
+        for thread in (closer, self._door, *(reader.thread for reader in self._readers)):
+            if thread and thread is not threading.current_thread():
+                thread.join(max(0.0, deadline - time.monotonic()))
 
     def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
-        """Show a node or an endpoint in the graph while the session lives (or until `undeclare`). Raises BusError."""
+        """Show a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
         endpoint = graph.Endpoint(key, kind, type_name, self.node, self.id)
         with _one_line(f"key {key!r}"):
             _ = kind == "node" or zenoh.KeyExpr(key)  # the token's own error would name the token
-            self._tokens.append(self.session.liveliness().declare_token(graph.token(endpoint)))
-        return self._tokens[-1]
+            return self.session.liveliness().declare_token(graph.token(endpoint))
 
     def publisher(self, key: str, kind: type[M], priority: str = "DATA") -> Publisher[M]:
         """A writer of `kind` on `key`."""
@@ -101,8 +105,9 @@ class Bus:
 
     def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> "Subscription[M]":
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused."""
-        self.announce("sub", kinds[0].ROS, key)
-        return Subscription(self.tap(key, depth, limit), kinds)
+        tap = self.tap(key, depth, limit)
+        tap.ends.append(self.announce("sub", kinds[0].ROS, key))
+        return Subscription(tap, kinds)
 
     def latest(self, key: str, kind: type[M]) -> "Latest[M]":
         """The newest message on `key`, with its age."""
@@ -111,15 +116,20 @@ class Bus:
     def tap(self, key: str, depth: int = 1024, limit: int = 0) -> "Tap":
         """A reader of bytes on any key expression. Raises BusError for one that is none."""
         with _one_line(f"key {key!r}"):
-            return Tap(self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth)), limit)
+            tap = Tap(self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth)), limit)
+        self._readers.add(tap)
+        return tap
 
     def serve(self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R]) -> "Server":
         """Answer requests on `key`. The caller asks for the work: `answer_pending()` in a loop, or `start()`."""
         from holozen.server import Server
 
-        self.announce("srv", reply.ROS, key)
+        token = self.announce("srv", reply.ROS, key)
         queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(64), complete=True)
-        return Server(queryable, key, request, answer, self.wire)
+        server = Server(queryable, key, request, answer, self.wire)
+        server.ends.append(token)
+        self._readers.add(server)
+        return server
 
     def call(self, key: str, request: "Message", reply: type[R], timeout: float = 5.0) -> R:
         """Ask a service and wait for its reply, and for the service itself, for at most `timeout` seconds.
@@ -145,7 +155,7 @@ class Bus:
                 replies = self.session.get(key, payload=payload, encoding=encoding, timeout=left)
             for reply in replies:
                 if reply.ok:
-                    return Sample.of(reply.ok)
+                    return Sample(reply.ok)
                 if (refusal := bytes(reply.err.payload)) != TIMEOUT:
                     raise ServiceError(reason(refusal))
             time.sleep(min(0.01, max(left, 0)))
@@ -166,32 +176,40 @@ class Tap:
 
     def __init__(self, subscriber: Any, limit: int = 0) -> None:
         # Reading from the handler leaves the subscriber free to be undeclared meanwhile.
-        self._subscriber, self._samples, self._limit = subscriber, subscriber.handler, limit
+        self.ends = [subscriber]  # what stands on the wire for this reader
+        self._samples, self._limit = subscriber.handler, limit
+        self.thread: threading.Thread | None = None  # the one that waits in `recv`
 
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""
         sample = self._samples.try_recv()
-        return sample and Sample.of(sample, self._limit)
+        return sample and Sample(sample, self._limit)
 
     def recv(self) -> Sample:
         """The next sample; waits for it. Raises BusError once the bus or this tap is closed."""
+        self.thread = threading.current_thread()
         try:
-            return Sample.of(self._samples.recv(), self._limit)
+            return Sample(self._samples.recv(), self._limit)
         except zenoh.ZError:
             raise BusError("closed") from None
 
     def close(self) -> None:
         """Stop listening."""
-        self._subscriber.undeclare()
+        for end in self.ends:
+            end.undeclare()
 
 
 def _token_change(sample: Any) -> tuple[str, bool] | None:
     return sample and (str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
 
 
-def _open(connection: Connection, patience: float | None) -> Any:
-    """A peer opens at once and connects when it can. A client has nothing without its router, and waits for it."""
+def _open(connection: Connection, patience: float | None, stop: threading.Event | None) -> Any:
+    """A peer opens at once and connects when it can. A client has nothing without its router, and waits for it.
+
+    Ends the process, in peace, when `stop` is set meanwhile.
+    """
     deadline = None if patience is None else time.monotonic() + patience
+    stop = stop or threading.Event()
     told = connection.mode != "client" or patience is not None
     while True:
         try:
@@ -202,7 +220,8 @@ def _open(connection: Connection, patience: float | None) -> Any:
         if not told:
             print(f"waiting for a Zenoh router at {', '.join(connection.connect or ())}", file=sys.stderr, flush=True)
             told = True
-        time.sleep(0.05)
+        if stop.wait(0.05):
+            raise SystemExit(0)
 
 
 def _config(connection: Connection) -> zenoh.Config:

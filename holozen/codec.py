@@ -1,7 +1,7 @@
 """Bytes <-> messages, by the Zenoh Encoding that travels with them."""
 
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, TypeVar
 
 import msgspec
@@ -29,7 +29,10 @@ class CodecError(ValueError):
 
 def encode(message: Message, wire: str = "json") -> bytes:
     """The bytes of `message`. A NaN or an infinity raises CodecError: JSON would turn it into a null."""
-    payload = _encode_json(message) if wire == "json" else _encode_msgpack(message)
+    try:
+        payload = _encode_json(message) if wire == "json" else _encode_msgpack(message)
+    except UnicodeEncodeError as error:
+        raise CodecError(f"{type(message).__name__}: a text that is not Unicode: {error.reason}") from None
     # No message has a null of its own, so only a payload with one needs the slow look.
     if (wire != "json" or b"null" in payload) and (bad := not_finite(message)):
         raise CodecError(f"{type(message).__name__}.{bad} is not a finite number")
@@ -38,24 +41,23 @@ def encode(message: Message, wire: str = "json") -> bytes:
 
 def decode(payload: bytes, encoding: str, types: tuple[type[M], ...]) -> M:
     """The message in `payload`, of the first of `types` that fits. Raises CodecError with the reason."""
-    decoders: list[Callable[[bytes], M]] = [_decoder(kind, _format(encoding)) for kind in types]
-    try:
-        return decoders[0](payload)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as first:
-        for decoder in decoders[1:]:
-            try:
-                return decoder(payload)
-            except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-                continue
-        raise CodecError(_told(types[0], first)) from None
+    return _first(types, _decoders(types, encoding), payload)
 
 
-def convert(value: Any, kind: type[M]) -> M:
-    """A message from plain dicts, lists and numbers (what JSON or YAML gave). Raises CodecError with the reason."""
-    try:
-        return msgspec.convert(value, kind, strict=False)
-    except msgspec.ValidationError as error:
-        raise CodecError(_told(kind, error)) from None
+def convert(value: Any, types: tuple[type[M], ...]) -> M:
+    """`decode` for plain dicts, lists and numbers (what JSON or YAML gave)."""
+    return _first(types, tuple(partial(msgspec.convert, type=kind, strict=False) for kind in types), value)
+
+
+def _first(types: tuple[type[M], ...], makers: tuple[Callable[[Any], M], ...], value: Any) -> M:
+    reasons = []
+    for kind, make in zip(types, makers, strict=True):
+        try:
+            return make(value)
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            reasons.append(_told(kind, error))
+    # What has a header was meant as the stamped type.
+    raise CodecError(next((reason for reason in reasons if "field `header`" not in reason), reasons[0]))
 
 
 def _told(kind: type[Message], error: Exception) -> str:
@@ -65,12 +67,11 @@ def _told(kind: type[Message], error: Exception) -> str:
 
 
 @lru_cache(maxsize=64)
-def _decoder(kind: type[M], form: str) -> Any:
-    module = msgspec.json if form == "json" else msgspec.msgpack
-    return module.Decoder(kind).decode
+def _decoders(types: tuple[type[M], ...], encoding: str) -> tuple[Callable[[bytes], M], ...]:
+    module = msgspec.json if _format(encoding) == "json" else msgspec.msgpack
+    return tuple(module.Decoder(kind).decode for kind in types)
 
 
-@lru_cache(maxsize=64)
 def _format(encoding: str) -> str:
     """`json` or `msgpack`. An Encoding may carry a schema after a semicolon."""
     name = encoding.partition(";")[0]

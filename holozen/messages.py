@@ -29,7 +29,7 @@ class Time(Message):
     """Seconds and nanoseconds since the clock's start. A zero time means "no stamp"."""
 
     ROS: ClassVar[str] = "builtin_interfaces/msg/Time"
-    sec: int = 0
+    sec: Annotated[int, Meta(ge=-(2**31), lt=2**31)] = 0
     nanosec: Annotated[int, Meta(ge=0, lt=1_000_000_000)] = 0
 
     @classmethod
@@ -91,10 +91,10 @@ class Twist(Message):
         """Forward and left in m/s, counter-clockwise in rad/s."""
         return cls(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn))
 
-    def is_zero(self) -> bool:
-        """Whether this is a stop."""
+    def is_slow(self, limit: float = 0.0) -> bool:
+        """Whether no component is above `limit` in m/s or rad/s; by default, whether this is a stop."""
         vectors = (self.linear, self.angular)
-        return not any(v.x or v.y or v.z for v in vectors)
+        return all(max(abs(v.x), abs(v.y), abs(v.z)) <= limit for v in vectors)
 
 
 class TwistStamped(Message):

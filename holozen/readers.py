@@ -1,5 +1,6 @@
 """Readers of a key: all waiting messages (`Subscription`), or the newest with its age (`Latest`)."""
 
+import math
 import threading
 import time
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
@@ -14,32 +15,37 @@ M = TypeVar("M", bound="Message")
 PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
 """Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
 
+SLOWEST = 5.0  # s; nothing is waited for longer than this before it is called stale
 
-class Sample(NamedTuple):
-    """What arrived. `priority` is the Zenoh priority's name, `source` who says to have sent it, `size` in bytes.
 
-    `payload` is empty where `size` is over the reader's limit.
+class Sample:
+    """What arrived. `payload` is empty where `size`, in bytes, is over the reader's limit (0: there is none).
+
+    Most readers want no more than the payload, so the rest is looked up in Zenoh's sample when it is asked for.
     """
 
-    key: str
-    payload: bytes
-    encoding: str
-    priority: str
-    source: str
-    size: int
+    __slots__ = ("_sample", "encoding", "payload", "size")
 
-    @classmethod
-    def of(cls, sample: Any, limit: int = 0) -> "Sample":
-        """Zenoh's sample as ours. A payload over `limit` bytes is left out (0: none is)."""
-        size = len(sample.payload)
-        return cls(
-            key=str(sample.key_expr),
-            payload=b"" if limit and size > limit else bytes(sample.payload),
-            encoding=str(sample.encoding),
-            priority=PRIORITIES[int(sample.priority) - 1],
-            source=bytes(sample.attachment).decode(errors="replace")[:80] if sample.attachment else "",
-            size=size,
-        )
+    def __init__(self, sample: Any, limit: int = 0) -> None:
+        payload = sample.payload
+        self._sample, self.encoding, self.size = sample, str(sample.encoding), len(payload)
+        self.payload = b"" if limit and self.size > limit else bytes(payload)
+
+    @property
+    def key(self) -> str:
+        """The key it came on."""
+        return str(self._sample.key_expr)
+
+    @property
+    def priority(self) -> str:
+        """The name of its Zenoh priority."""
+        return PRIORITIES[int(self._sample.priority) - 1]
+
+    @property
+    def source(self) -> str:
+        """Who says to have sent it; empty if nobody does."""
+        told = self._sample.attachment
+        return bytes(told).decode(errors="replace")[:80] if told else ""
 
 
 class Samples(Protocol):
@@ -89,22 +95,54 @@ class Subscription(Generic[M]):
             return Received(sample, None, str(error))
 
 
+class Arrivals(Generic[M]):
+    """The newest of a stream of messages, when it came, and how often they come. Times in seconds."""
+
+    def __init__(self) -> None:
+        self.newest: M | None = None
+        self.count = 0
+        self._at = -math.inf
+        self._gaps = (0.0, 0.0)  # the last two; one hiccup is no rate
+
+    def see(self, message: M, now: float) -> None:
+        """A message came."""
+        self._gaps = (self._gaps[1], now - self._at if self.count else 0.0)
+        self.newest, self._at = message, now
+        self.count += 1
+
+    def age(self, now: float) -> float:
+        """Seconds since the newest came; infinite before the first."""
+        return now - self._at
+
+    def patience(self, silence: float) -> float:
+        """The age from which the newest is stale: `silence`, or three periods of a stream that is slower than that."""
+        return max(silence, min(3 * min(self._gaps), SLOWEST))
+
+
 class Latest(Generic[M]):
     """The newest message of a key and when it arrived, kept by a thread that does nothing else."""
 
     def __init__(self, subscription: Subscription[M]) -> None:
         self._subscription = subscription
         self._newer = threading.Condition()
-        self._value: M | None = None
-        self._arrived = -float("inf")
-        self.count = 0  # messages since the start
+        self._arrivals: Arrivals[M] = Arrivals()
         self.bad = 0  # samples that were no such message
         threading.Thread(target=self._keep, daemon=True).start()
+
+    @property
+    def count(self) -> int:
+        """How many messages have come."""
+        return self._arrivals.count
 
     def read(self) -> tuple[M | None, float]:
         """The newest message (None before the first) and its age in seconds since it arrived."""
         with self._newer:
-            return self._value, time.monotonic() - self._arrived
+            return self._arrivals.newest, self._arrivals.age(time.monotonic())
+
+    def patience(self, silence: float) -> float:
+        """The age from which the newest is stale, see Arrivals."""
+        with self._newer:
+            return self._arrivals.patience(silence)
 
     def wait(self, after: int, timeout: float) -> bool:
         """Wait until more than `after` messages have come, at most `timeout` seconds; whether they have."""
@@ -125,6 +163,5 @@ class Latest(Generic[M]):
                 if received.message is None:
                     self.bad += 1
                     continue
-                self._value, self._arrived = received.message, time.monotonic()
-                self.count += 1
+                self._arrivals.see(received.message, time.monotonic())
                 self._newer.notify_all()

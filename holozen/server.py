@@ -31,8 +31,10 @@ class Server:
     ) -> None:
         from holozen import codec
 
+        self.ends = [queryable]  # what stands on the wire for this service
         # Reading from the handler leaves the queryable free to be undeclared meanwhile.
-        self._queryable, self._queries = queryable, queryable.handler
+        self._queries = queryable.handler
+        self.thread: threading.Thread | None = None  # the one of `start`
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
     def answer_pending(self) -> None:
@@ -42,11 +44,13 @@ class Server:
 
     def start(self) -> None:
         """Answer from a thread of its own, until the bus is closed."""
-        threading.Thread(target=self._serve, daemon=True).start()
+        self.thread = threading.Thread(target=self._serve, daemon=True)
+        self.thread.start()
 
     def close(self) -> None:
         """Stop answering."""
-        self._queryable.undeclare()
+        for end in self.ends:
+            end.undeclare()
 
     def _serve(self) -> None:
         while True:
@@ -58,6 +62,8 @@ class Server:
 
     def _reply(self, query: Any) -> None:
         with query:
+            if str(query.key_expr) != self._key:
+                return  # a wildcard looks around; it asks nobody to do anything
             try:
                 reply = self._codec.encode(self._answer(self._read(query)), self._wire)
                 query.reply(self._key, reply, encoding=self._codec.WIRES[self._wire])
@@ -71,7 +77,7 @@ class Server:
         """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`)."""
         if query.payload is None:
             values = dict(query.parameters)
-            return self._codec.convert(values, self._request)
+            return self._codec.convert(values, (self._request,))
         if len(query.payload) > MAX_REQUEST_BYTES:
             raise ServiceError(f"request of {len(query.payload)} bytes; at most {MAX_REQUEST_BYTES} are read")
         return self._codec.decode(bytes(query.payload), str(query.encoding), (self._request,))

@@ -62,6 +62,23 @@ SERVICES = (
     Service("resume", m.TriggerRequest, m.TriggerReply, "sim", "lets the sources drive that a higher one overruled"),
 )
 
+
+def table() -> str:
+    """The table as Markdown, for the README (`scripts/wire-table` puts it there)."""
+    topics = [_topic_row(row) for row in TOPICS]
+    services = [f"| `{row.key}` | {row.reply.ROS} | {row.server} | {row.does} |" for row in SERVICES]
+    heads = ("| key | type | who -> who | rate | silence rule |", "| service | type | server | what it does |")
+    return "\n".join([heads[0], "|---|---|---|---|---|", *topics, "", heads[1], "|---|---|---|---|", *services])
+
+
+def _topic_row(row: Topic) -> str:
+    types = row.type.ROS + "".join(f" ({other.__name__} accepted)" for other in row.types[1:])
+    # A plain tool may write a command as well as read anything.
+    writers = [*row.writers, "anyone"] if row.key == "cmd_vel" else row.writers
+    ends = f"{', '.join(writers)} -> {', '.join(row.readers) or 'anyone'}"
+    return f"| `{row.key}` | {types} | {ends} | {row.rate:g} Hz | {row.rule} |"
+
+
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 

@@ -9,17 +9,21 @@ from typing import Any
 
 from holozen import codec, connection, wire
 from holozen.bus import Bus, Publisher
-from holozen.messages import Message, Twist, TwistStamped, not_finite
+from holozen.messages import Message, Twist, TwistStamped
 from holozen.process import stop_event
 from holozen.tell import say
 
 LARGEST = 1_000_000  # bytes of a value
+STOPS, STOP_EVERY = 5, 0.02  # s
 PATIENCE = 3.0  # s until somebody has to subscribe
 
 
 def pub(args: argparse.Namespace) -> int:
     """Publish a value once, some times, or until interrupted; a robot that it moved is stopped at the end."""
     row = wire.topic(args.key)
+    if set(args.key) & set("*$?#"):
+        say(f"holozen topic pub: {args.key!r}: write to one key; a wildcard would move every robot")
+        return 1
     if row is None:
         known = ", ".join(topic.key for topic in wire.TOPICS)
         say(f"holozen topic pub: {args.key!r} has no known type; known keys: {known}, each also as ROBOT/key")
@@ -40,7 +44,7 @@ def pub(args: argparse.Namespace) -> int:
             _publish(publisher, message, args, row.rate, stop)
         finally:
             if isinstance(message, Twist | TwistStamped) and not args.once:
-                publisher.put(type(message)())
+                _stop_robot(publisher, message)
     return 0
 
 
@@ -50,18 +54,9 @@ def read_message(text: str, kinds: tuple[type[Message], ...]) -> Message:
         text = sys.stdin.read(LARGEST + 1)
     if len(text) > LARGEST:
         raise ValueError(f"the value is longer than {LARGEST} bytes")
-    value = _plain(text)
-    errors = []
-    for kind in kinds:
-        try:
-            message = codec.convert(value, kind)
-        except codec.CodecError as error:
-            errors.append(str(error))
-            continue
-        if bad := not_finite(message):
-            raise ValueError(f"{bad} is not a finite number")
-        return message
-    raise ValueError(errors[0])
+    message = codec.convert(_plain(text), kinds)
+    codec.encode(message)  # what cannot be sent is told now
+    return message
 
 
 def _plain(text: str) -> Any:
@@ -99,10 +94,16 @@ def _publish(
 ) -> None:
     left = 1 if args.once else args.times
     due = time.monotonic()
-    while not stop.is_set():
+    while not stop.is_set() and left != 0:
         publisher.put(message)
         left = left and left - 1
-        if left == 0:
-            return
         due += 1 / (args.rate or rate)
-        stop.wait(max(0.0, due - time.monotonic()))
+        if not args.once:  # the last one counts for a period too
+            stop.wait(max(0.0, due - time.monotonic()))
+
+
+def _stop_robot(publisher: Publisher[Message], message: Message) -> None:
+    """Send stops, more than one: a congested link drops some."""
+    for _ in range(STOPS):
+        publisher.put(type(message)())
+        time.sleep(STOP_EVERY)

@@ -4,7 +4,7 @@ import argparse
 
 from holozen import connection
 from holozen.bus import Bus
-from holozen.process import stop_event
+from holozen.process import stop_event, wait_for_end
 from holozen.tell import say
 
 
@@ -20,5 +20,5 @@ def main(argv: list[str]) -> int:
     stop = stop_event()
     with Bus("router", where, lasting=True):
         say(f"router: listens at {', '.join(where.listen or (connection.DOOR,))}")
-        stop.wait()
+        wait_for_end(stop)
     return 0

@@ -117,7 +117,7 @@ def echo(args: argparse.Namespace) -> int:
 
     with _bus("echo", args) as bus:
         tap = bus.tap(args.key)
-        bus.announce("sub", "any/msg/Any", args.key)
+        tap.ends.append(bus.announce("sub", "any/msg/Any", args.key))
         say_so = partial(say, f"waiting for {args.key}; nothing came yet")
         late = threading.Timer(args.timeout or 1.0, tap.close if args.timeout else say_so)
         late.daemon = True

@@ -46,7 +46,7 @@ def main(argv: list[str] | None = None) -> int:
 def follow(args: argparse.Namespace, where: connection.Connection) -> int:
     """Drive `args.laps` laps, and say after each how well."""
     stop, laps = stop_event(), 0
-    with Bus("controller", where, lasting=True) as bus:
+    with Bus("controller", where, lasting=True, stop=stop) as bus:
         follower = Follower(bus, args.robot, _gains(args), stop, lambda text: say(f"controller: {text}"))
         try:
             while not stop.is_set() and (laps < args.laps or not args.laps):

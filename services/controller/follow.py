@@ -1,6 +1,7 @@
 """Follows goals: asks for one after another, drives there, and reports each leg."""
 
 import threading
+import time
 from collections.abc import Callable
 
 from holozen.bus import Bus, NoReply, Publisher, ServiceError
@@ -13,6 +14,9 @@ from .yielding import Manners
 
 PERIOD = 0.05  # s of the odom's clock between two commands
 PATIENCE = 0.5  # s between two tries to reach a service
+STOP_FOR, STOP_EVERY = 1.0, 0.05  # s; how long and how often a stop is repeated
+RESTS = 0.01  # m/s and rad/s; slower than this is standing
+FARTHEST = 1e6  # m; what is farther is no goal and no pose
 
 
 class Follower:
@@ -43,16 +47,24 @@ class Follower:
         return legs
 
     def halt(self) -> None:
-        """Command a stop, if this controller moves the robot."""
-        if self._now != STOP:
+        """Stop the robot if this controller moves it: zeros until odom shows rest, at most a second."""
+        ends = time.monotonic() + STOP_FOR
+        while self._now != STOP:
+            count = self._odom.count
             self._commands.put(Twist())
-            self._now = STOP
+            newer = self._odom.wait(count, STOP_EVERY)
+            odom = self._odom.read()[0]
+            if time.monotonic() > ends or (newer and odom and odom.twist.twist.is_slow(RESTS)):
+                self._now = STOP
 
     def _ask(self, number: int) -> NextGoalReply | None:
         """Goal `number` of the list; waits for the service. None when told to stop meanwhile."""
         while not self._stop.is_set():
             try:
-                return self._bus.call("next_goal", NextGoalRequest(number), NextGoalReply, PATIENCE)
+                goal = self._bus.call("next_goal", NextGoalRequest(number), NextGoalReply, PATIENCE)
+                if max(abs(goal.x_goal), abs(goal.y_goal), abs(goal.theta_goal)) <= FARTHEST:
+                    return goal
+                self._tell(f"goal {number} is more than {FARTHEST:g} m away; waiting for another")
             except NoReply as silence:
                 self._tell(f"waiting for goal {number}: {silence}")
             except ServiceError as failure:
@@ -71,23 +83,24 @@ class Follower:
             if odom is None:
                 leg = None if self._manners.yielded_to else leg  # where the other one left it, a new leg begins
                 continue
-            time, pose = odom.header.stamp.seconds(), _pose(odom)
-            if leg is None or time < before:  # the first odom, or those of a sim that was started again
-                leg, before = Leg(pose, goal, time), time - PERIOD
-            leg.see(pose, time)
+            stamp, pose = odom.header.stamp.seconds(), _pose(odom)
+            if leg is None or stamp < before:  # the first odom, or those of a sim that was started again
+                leg, before = Leg(pose, goal, stamp), stamp - PERIOD
+            leg.see(pose, stamp)
             left = error(pose, goal)
-            if arrived(left, self._gains):
+            if arrived(left, self._now, self._gains):
                 self.halt()
                 return leg
-            if time - before >= PERIOD - 1e-6:
-                self._command(velocity(left, self._now, self._gains, min(time - before, 2 * PERIOD)))
-                before = time
+            if stamp - before >= PERIOD - 1e-6:
+                self._command(velocity(left, self._now, self._gains, min(stamp - before, 2 * PERIOD)))
+                before = stamp
         return None
 
     def _next_odom(self) -> Odometry | None:
         """The next odom, if this controller may act on it; else the robot is let go."""
         count = self._odom.count
-        fresh = self._odom.wait(count, self._silence)
+        fresh = self._odom.wait(count, self._odom.patience(self._silence))
+        odom, _ = self._odom.read()
         status, _ = self._status.read()
         if status:
             self._manners.see(status)
@@ -97,9 +110,12 @@ class Follower:
         elif not fresh:
             self.halt()
             self._tell("waiting for odom: it is stale or was never heard")
+        elif odom is None or not all(abs(value) <= FARTHEST for value in _pose(odom)):
+            self.halt()
+            self._tell(f"waiting for odom: its pose is more than {FARTHEST:g} m away")
         else:
             self._tell("")
-            return self._odom.read()[0]
+            return odom
         return None
 
     def _command(self, planar: Planar) -> None:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from holozen.drive import to_body
 from holozen.limits import Planar, clamp_speed, ramp, wrap
 
+CREEP, TURN_CREEP = 0.05, 0.1  # m/s, rad/s; slower than this an arrival needs no braking
+
 Pose = tuple[float, float, float]
 """x, y in metres and theta in radians."""
 
@@ -30,17 +32,23 @@ def error(pose: Pose, goal: Pose) -> Planar:
     return x, y, wrap(goal[2] - pose[2])
 
 
-def arrived(left: Planar, gains: Gains) -> bool:
-    """Whether an error is within the tolerances."""
-    return math.hypot(left[0], left[1]) <= gains.tolerance and abs(left[2]) <= gains.angle_tolerance
+def arrived(left: Planar, now: Planar, gains: Gains) -> bool:
+    """Whether the error is within the tolerances and the velocity last commanded is as good as none."""
+    close = math.hypot(left[0], left[1]) <= gains.tolerance and abs(left[2]) <= gains.angle_tolerance
+    return close and math.hypot(now[0], now[1]) <= CREEP and abs(now[2]) <= TURN_CREEP
 
 
 def velocity(left: Planar, now: Planar, gains: Gains, dt: float) -> Planar:
-    """The velocity to command `dt` seconds after `now` was commanded: proportional to the error, within the limits."""
+    """The velocity to command `dt` seconds after `now` was commanded.
+
+    Proportional to the error, within the limits, and never faster than what half of the acceleration stops in the way
+    that is left: v^2 = 2 a s.
+    """
     x, y, turn = left
     wanted = (gains.linear * x, gains.linear * y, gains.angular * turn)
-    wanted = clamp_speed(wanted, gains.max_speed, gains.max_turn)
-    return ramp(now, wanted, gains.max_acceleration, gains.max_turn_acceleration, dt)
+    speed = min(gains.max_speed, math.sqrt(gains.max_acceleration * math.hypot(x, y)))
+    spin = min(gains.max_turn, math.sqrt(gains.max_turn_acceleration * abs(turn)))
+    return ramp(now, clamp_speed(wanted, speed, spin), gains.max_acceleration, gains.max_turn_acceleration, dt)
 
 
 @dataclass

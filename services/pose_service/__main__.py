@@ -8,7 +8,7 @@ from holozen import connection
 from holozen.bus import Bus, BusError, ServiceError
 from holozen.flags import number
 from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest, Odometry
-from holozen.process import stop_event
+from holozen.process import stop_event, wait_for_end
 from holozen.tell import say
 
 from .shapes import SHAPES, Goal, GoalsError, read_goals
@@ -40,12 +40,12 @@ def main(argv: list[str] | None = None) -> int:
     stop = stop_event()
     try:
         goals = read_goals(args.goals) if args.goals else SHAPES[args.shape](args.size)
-        with Bus("pose_service", connection.from_arguments(args), lasting=True) as bus:
+        with Bus("pose_service", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             tracker = Tracker(bus.subscribe("**/odom", Odometry, depth=256))
             bus.serve("get_pose", GetPoseRequest, GetPoseReply, tracker.get_pose).start()
             bus.serve("next_goal", NextGoalRequest, NextGoalReply, lambda request: next_goal(goals, request)).start()
             say(f"pose_service: {len(goals)} goals from {args.goals or args.shape}")
-            stop.wait()
+            wait_for_end(stop)
     except (BusError, GoalsError) as error:
         say(f"pose_service: {error}")
         return 1

@@ -8,6 +8,7 @@ Goal = tuple[float, float, float]
 Point = tuple[float, float]
 
 INFINITY_POINTS = 24
+FARTHEST = 1e6  # m, rad
 
 
 class GoalsError(ValueError):
@@ -82,6 +83,6 @@ def _goal(line: str, where: str) -> Goal:
         values = [float(part) for part in _content(line)]
     except ValueError:
         values = []
-    if len(values) not in (2, 3) or not all(map(math.isfinite, values)):
+    if len(values) not in (2, 3) or not all(abs(value) <= FARTHEST for value in values):
         raise GoalsError(f"goals {where}: {line.strip()!r}; write x y theta in metres and radians, such as 1.0 0 1.57")
     return values[0], values[1], values[2] if len(values) == 3 else 0.0

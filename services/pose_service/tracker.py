@@ -5,7 +5,7 @@ import time
 
 from holozen.errors import BusError, ServiceError
 from holozen.messages import GetPoseReply, GetPoseRequest, Odometry
-from holozen.readers import Subscription
+from holozen.readers import Arrivals, Subscription
 from holozen.wire import key_for, robot_name, topic
 
 
@@ -17,7 +17,7 @@ class Tracker:
         assert row is not None
         self._silence = row.silence
         self._odoms = odoms
-        self._last: dict[str, tuple[Odometry, float]] = {}
+        self._last: dict[str, Arrivals[Odometry]] = {}
         threading.Thread(target=self._follow, daemon=True).start()
 
     def get_pose(self, request: GetPoseRequest) -> GetPoseReply:
@@ -26,13 +26,13 @@ class Tracker:
             key = key_for("odom", robot_name(request.name) if request.name else "")
         except ValueError as error:
             raise ServiceError(str(error)) from None
-        odom, arrived = self._last.get(key, (None, 0.0))
-        if odom is None:
+        arrivals = self._last.get(key)
+        if arrivals is None or arrivals.newest is None:
             raise ServiceError(f"no {key} has been heard; robots heard: {self._names() or 'none'}")
-        age = time.monotonic() - arrived
-        if age > self._silence:
+        age = arrivals.age(time.monotonic())
+        if age > arrivals.patience(self._silence):
             raise ServiceError(f"{key} is stale: the last one came {age:.1f} s ago; does the sim run?")
-        return GetPoseReply(odom, age)
+        return GetPoseReply(arrivals.newest, age)
 
     def _names(self) -> str:
         return ", ".join(sorted(key.removesuffix("odom").rstrip("/") or "'' (at the root)" for key in self._last))
@@ -44,4 +44,6 @@ class Tracker:
             except BusError:
                 return
             if received.message is not None and received.sample.key.count("/") < 2:
-                self._last = self._last | {received.sample.key: (received.message, time.monotonic())}
+                arrivals = self._last.get(received.sample.key) or Arrivals()
+                arrivals.see(received.message, time.monotonic())
+                self._last = self._last | {received.sample.key: arrivals}

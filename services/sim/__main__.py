@@ -34,7 +34,7 @@ def main(argv: list[str] | None = None) -> int:
     stop = stop_event()
     try:
         spec = worldfile.load(args.world)
-        with Bus("sim", connection.from_arguments(args), lasting=True) as bus:
+        with Bus("sim", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             # The engine takes the longest to load, and a wrong flag should not wait for it.
             from .loop import Loop
             from .spawn import spawn_all

@@ -3,16 +3,19 @@
 from dataclasses import dataclass
 
 from holozen.limits import STOP, Planar
+from holozen.readers import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
 
-AUTOPILOT = 5  # the rank of DATA_LOW; from here on down a source never takes a robot that others have driven
+PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # nobody stands above a person: stronger priorities count as this one
+AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here on down a source never takes a robot that others have driven
+MOST_HELD = 1000  # names come over the wire; with so many held, every new one is held too
 OVERRULED = "overruled: {driver} drives"
 HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
 
 
 @dataclass(slots=True)
 class Driver:
-    """The source that is obeyed, since when silent, and what it last said. Rank 0 is the highest priority."""
+    """The source that is obeyed, when its last command came at the earliest, and what it said. Rank 0 is highest."""
 
     source: str
     rank: int
@@ -23,9 +26,10 @@ class Driver:
 class Arbiter:
     """Chooses among the sources of one robot.
 
-    A source that was overruled is held: it moves the robot again only after `resume`. So is every autopilot once
-    anyone above it drove. `timeout` is the silence in seconds after which a source is no longer obeyed; below
-    zero a silent source is obeyed until another one speaks.
+    Among equals the one that drives goes on driving, but each of them may stop the robot. A source that a higher one
+    overruled, or that another one stopped, is held: it moves the robot again only after `resume`. So is every
+    autopilot once anyone above it drove. `timeout` is the silence in seconds after which a source is no longer
+    obeyed; below zero a silent source is obeyed until another one speaks.
     """
 
     def __init__(self, timeout: float) -> None:
@@ -35,18 +39,21 @@ class Arbiter:
         self._held: set[str] = set()
         self._highest = AUTOPILOT + 1  # the best rank that drove since the last resume
 
-    def offer(self, source: str, rank: int, velocity: Planar, now: float) -> str:
-        """Hear a command at time `now`. Returns why it is not obeyed, or an empty text."""
+    def offer(self, source: str, rank: int, velocity: Planar, now: float, heard: float | None = None) -> str:
+        """Take a command at time `now` that came at `heard` at the earliest. Returns why it is not obeyed, or ""."""
+        rank = max(rank, PERSON)
         driver = self.driver(now)
-        if driver and source != driver.source and rank >= driver.rank and not self._silent(driver, now):
-            if rank > driver.rank:
+        other = driver if driver and driver.source != source else None
+        stops = velocity == STOP and other is not None and rank <= other.rank
+        if other and rank >= other.rank and not stops and now - other.heard <= COMMAND_SILENCE:
+            if rank > other.rank:
                 self._hold(source)
-            return OVERRULED.format(driver=driver.source)
-        if source in self._held or (rank >= AUTOPILOT and rank > self._highest):
+            return OVERRULED.format(driver=other.source)
+        if not stops and (self._is_held(source) or (rank >= AUTOPILOT and rank > self._highest)):
             return HELD
-        if driver and source != driver.source and rank < driver.rank:
-            self._hold(driver.source)
-        self._driver = Driver(source, rank, velocity, now)
+        if other and (stops or rank < other.rank):
+            self._hold(other.source)
+        self._driver = Driver(source, rank, velocity, now if heard is None else heard)
         self._highest = min(self._highest, rank)
         return ""
 
@@ -78,10 +85,9 @@ class Arbiter:
         self.resumed += 1
         return ""
 
-    def _silent(self, driver: Driver, now: float) -> bool:
-        # Without a timeout the word of a dead source holds on, but it must not keep others from stopping the robot.
-        return now - driver.heard > (self.timeout if self.timeout >= 0 else COMMAND_SILENCE)
+    def _is_held(self, source: str) -> bool:
+        return source in self._held or len(self._held) >= MOST_HELD
 
     def _hold(self, source: str) -> None:
-        if len(self._held) < 1000:  # names come over the wire
+        if len(self._held) < MOST_HELD:
             self._held.add(source)

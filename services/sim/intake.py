@@ -4,11 +4,11 @@ import math
 from collections import Counter
 from collections.abc import Callable
 
-from holozen.limits import Planar, clamp_speed
+from holozen.limits import STOP, Planar, clamp_speed
 from holozen.messages import CommandStatus, Twist, TwistStamped, not_finite
 from holozen.readers import PRIORITIES, Received
 from holozen.tell import say
-from holozen.wire import MAX_STAMP_AGE
+from holozen.wire import COMMAND_SILENCE, MAX_STAMP_AGE
 
 from .arbiter import Arbiter
 
@@ -31,24 +31,37 @@ class Intake:
         self._told = -math.inf
         self._untold = 0
 
-    def take(self, received: Received[Twist | TwistStamped], now: float, clocks: tuple[float, ...]) -> None:
-        """Judge one sample at `now` (s, monotonic). `clocks`: the times in seconds that a stamp may be measured by."""
+    def take(
+        self,
+        received: Received[Twist | TwistStamped],
+        now: float,
+        clocks: tuple[float, ...],
+        heard: float | None = None,
+    ) -> None:
+        """Judge one sample at `now` (s, monotonic) that came at `heard` at the earliest (by default now).
+
+        `clocks` are the times in seconds that a stamp may be measured by.
+        """
+        heard = now if heard is None else heard
         sample, message = received.sample, received.message
         source = sample.source or f"anonymous ({sample.priority})"
+        if sample.key != self._key:
+            return self._refuse("wildcard", f"a command for {sample.key!r}; name one robot", source, now)
         if message is None:
             kind = "oversized" if received.error.startswith("oversized") else "malformed"
             return self._refuse(kind, received.error, source, now)
         twist = message.twist if isinstance(message, TwistStamped) else message
         if bad := not_finite(twist):
             return self._refuse("not finite", f"{bad} is not a finite number", source, now)
-        if isinstance(message, TwistStamped) and (late := _staleness(message, clocks)):
-            return self._refuse("stale", f"stamp is {late:.1f} s off; at most {MAX_STAMP_AGE} s", source, now)
+        if isinstance(message, TwistStamped):
+            age = _age(message, clocks)
+            if abs(age) > MAX_STAMP_AGE:
+                return self._refuse("stale", f"stamp is {age:.1f} s old; at most {MAX_STAMP_AGE} s", source, now)
+            heard = min(heard, now - age)
         velocity = (twist.linear.x, twist.linear.y, twist.angular.z)
-        self._obey(velocity, source, PRIORITIES.index(sample.priority), now)
-
-    def drop(self, count: int, now: float) -> None:
-        """Count samples that waited too long to be trusted."""
-        self._refuse("late", f"{count} commands waited while the sim stood still", "the queue", now, count)
+        if now - heard > COMMAND_SILENCE and velocity != STOP:
+            return self._refuse("late", f"it waited up to {now - heard:.1f} s for the sim", source, now)
+        self._obey(velocity, source, PRIORITIES.index(sample.priority), now, heard)
 
     def status(self, now: float) -> CommandStatus:
         """Who drives, and the counts so far."""
@@ -63,30 +76,27 @@ class Intake:
             last_refusal=self._last,
         )
 
-    def _obey(self, velocity: Planar, source: str, rank: int, now: float) -> None:
+    def _obey(self, velocity: Planar, source: str, rank: int, now: float, heard: float) -> None:
         limited = clamp_speed(velocity, self._linear, self._angular)
-        if reason := self.arbiter.offer(source, rank, limited, now):
+        if reason := self.arbiter.offer(source, rank, limited, now, heard):
             return self._refuse(reason.partition(":")[0], reason, source, now)
         self._accepted += 1
         if limited != velocity:
             text = f"over the limits of {self._linear:g} m/s and {self._angular:g} rad/s, clamped: {velocity}"
             self._refuse("clamped", text, source, now)
 
-    def _refuse(self, kind: str, reason: str, source: str, now: float, count: int = 1) -> None:
-        self._refused[kind] += count
+    def _refuse(self, kind: str, reason: str, source: str, now: float) -> None:
+        self._refused[kind] += 1
         self._last = f"{source}: {reason}"[:300]
-        self._untold += count
+        self._untold += 1
         if now - self._told < TELL_EVERY:
             return
-        more = f" (and {self._untold - count} more)" if self._untold > count else ""
+        more = f" (and {self._untold - 1} more)" if self._untold > 1 else ""
         self._say(f"{self._key}: from {self._last}{more}")
         self._told, self._untold = now, 0
 
 
-def _staleness(message: TwistStamped, clocks: tuple[float, ...]) -> float:
-    """How far in seconds the stamp is from the nearest clock, if that is too far; else 0. No stamp is a fresh one."""
+def _age(message: TwistStamped, clocks: tuple[float, ...]) -> float:
+    """The age in seconds of a stamp by the clock that is nearest to it; 0 without a stamp."""
     stamp = message.header.stamp.seconds()
-    if not stamp:
-        return 0.0
-    off = min(abs(now - stamp) for now in clocks)
-    return off if off > MAX_STAMP_AGE else 0.0
+    return min((now - stamp for now in clocks), key=abs) if stamp else 0.0

@@ -1,11 +1,11 @@
 """The loop: hear, move, step, tell, at the pace of the clock."""
 
+import math
 import threading
 import time
 
 from holozen.bus import Bus, Publisher
 from holozen.messages import Clock, Time
-from holozen.wire import COMMAND_SILENCE
 
 from .pace import Pace
 from .reports import Schedule
@@ -14,7 +14,8 @@ from .world import World
 
 CLOCK_RATE = 50.0  # Hz of sim time
 LOOK = 0.02  # s; how often requests and commands are heard while no step is due
-DISTRUST = 0.1  # s after a stall in which commands may still be old ones, from the network's buffers
+STALL = 0.1  # s without hearing; commands may have waited as long
+DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring old commands
 
 
 class Loop:
@@ -24,8 +25,8 @@ class Loop:
         self._world, self._vehicles, self._rtf = world, vehicles, rtf
         self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
         self._clock_due = Schedule(CLOCK_RATE)
-        self._heard = time.monotonic()
-        self._trust_from = 0.0
+        self._heard = self._before_stall = -math.inf  # what waits at the start may be of any age
+        self._trusts_from = 0.0
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:
         """Step until `stop` is set, or `steps` were made."""
@@ -41,12 +42,13 @@ class Loop:
                 pace.stepped(now)
 
     def _hear(self, now: float) -> None:
-        if now - self._heard > COMMAND_SILENCE:
-            self._trust_from = now + DISTRUST
+        if now - self._heard > STALL:
+            self._before_stall, self._trusts_from = self._heard, now + DISTRUST
+        since = self._heard if now >= self._trusts_from else self._before_stall
         self._heard = now
         clocks = (time.time(), self._world.time)
         for vehicle in self._vehicles:
-            vehicle.hear(now, clocks, trusted=now >= self._trust_from)
+            vehicle.hear(now, clocks, since)
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

@@ -6,7 +6,8 @@ from pathlib import Path
 
 from holozen import data
 from holozen.bus import Bus
-from holozen.robot.model import RobotError, load
+from holozen.graph import Graph, on_key
+from holozen.robot.model import PlanarMove, RobotError, RobotModel, load
 from holozen.robot.rigid import Body, PlacedShape, lump
 from holozen.tell import say
 from holozen.wire import key_for
@@ -26,16 +27,24 @@ def spawn_all(bus: Bus, world: World, args: argparse.Namespace) -> list[Vehicle]
     for name in names:
         if names.count(name) > 1:
             raise RobotError(f"{names.count(name)} robots are called {name!r}; give each a name: --robot FILE=NAME")
-    vehicles, y = [], 0.0
+    vehicles: list[Vehicle] = []
+    others, y = bus.graph(), 0.0
     for path, name in robots:
-        vehicle, reach = _spawn(bus, world, args, path, name, y)
-        vehicles.append(vehicle)
-        y += 2 * reach + GAP
+        model, drive, body = _read(path, dict(args.package))
+        _check_alone(others, key_for(drive.odometry_topic, name))
+        reach = max(map(_reach, body.collisions))
+        y += reach if vehicles else 0.0
+        command = key_for(drive.command_topic, name)
+        intake = Intake(command, Arbiter(drive.command_timeout), args.max_linear, args.max_angular)
+        vehicles.append(Vehicle(bus, name, model, drive, world.add(body, (0.0, y, 0.0)), intake))
+        say(f"sim: {name or model.name} listens on {command}")
+        y += reach + GAP
     return vehicles
 
 
-def _spawn(bus: Bus, world: World, args: argparse.Namespace, path: Path, name: str, y: float) -> tuple[Vehicle, float]:
-    model = load(path, packages=dict(args.package))
+def _read(path: Path, packages: dict[str, Path]) -> tuple[RobotModel, PlanarMove, Body]:
+    """A robot's file, checked. Raises RobotError."""
+    model = load(path, packages=packages)
     for warning in model.warnings:
         say(f"sim: {warning}")
     drive = model.planar_move
@@ -43,12 +52,18 @@ def _spawn(bus: Bus, world: World, args: argparse.Namespace, path: Path, name: s
         raise RobotError(f"{path}: no planar_move plugin, so nothing drives it; other drives are not simulated yet")
     body = lump(model)
     _check_collisions(path, body)
-    intake = Intake(
-        key_for(drive.command_topic, name), Arbiter(drive.command_timeout), args.max_linear, args.max_angular
-    )
-    vehicle = Vehicle(bus, name, model, drive, world.add(body, (0.0, y, 0.0)), intake)
-    say(f"sim: {name or model.name} listens on {key_for(drive.command_topic, name)}")
-    return vehicle, max(map(_reach, body.collisions))
+    for topic, known in ((drive.command_topic, "cmd_vel"), (drive.odometry_topic, "odom")):
+        if topic.rpartition("/")[2] != known:
+            say(f"sim: {path}: topic {topic!r}: the teleop and the controller use {known!r}")
+    return model, drive, body
+
+
+def _check_alone(others: Graph, key: str) -> None:
+    """Two sims on the same keys would each get the other's commands. Raises RobotError."""
+    for other in on_key(others.endpoints(), key, "pub"):
+        raise RobotError(
+            f"{key} is published by {other.node} ({other.session[:6]}) already; end that one, or use --robot FILE=NAME"
+        )
 
 
 def _check_collisions(path: Path, body: Body) -> None:
@@ -56,7 +71,7 @@ def _check_collisions(path: Path, body: Body) -> None:
     left_out = {part.link for part in body.collisions if part.shape.kind not in SHAPES}
     if left_out:
         say(f"sim: {path}: collision meshes are left out: {', '.join(sorted(left_out))}")
-    if all(part.link in left_out for part in body.collisions):
+    if all(part.shape.kind not in SHAPES for part in body.collisions):
         raise RobotError(f"{path}: no collision shape to stand on; give a link a <box>, <cylinder> or <sphere>")
 
 

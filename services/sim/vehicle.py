@@ -40,28 +40,23 @@ class Vehicle:
         self._rolled = 0.0  # sim time up to which the wheels have turned
         self._now = 0.0
         command = key_for(drive.command_topic, robot)
+        place = command.rpartition("/")[0]  # a namespace in the robot's file is as good as a name
         self._commands: Subscription[Twist | TwistStamped] = bus.subscribe(
             command, Twist, TwistStamped, limit=MAX_COMMAND_BYTES
         )
-        self._resume = bus.serve(key_for("resume", robot), TriggerRequest, TriggerReply, self._on_resume)
+        self._resume = bus.serve(key_for("resume", place), TriggerRequest, TriggerReply, self._on_resume)
         self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, robot), Odometry)
-        self._joints: Publisher[JointState] = bus.publisher(key_for("joint_states", robot), JointState)
-        self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", robot), TFMessage)
+        self._joints: Publisher[JointState] = bus.publisher(key_for("joint_states", place), JointState)
+        self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", place), TFMessage)
         self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
         self._odom_due, self._joints_due = Schedule(drive.odometry_rate), Schedule(JOINT_RATE)
         self._status_due = Schedule(STATUS_RATE)
 
-    def hear(self, now: float, clocks: tuple[float, ...], trusted: bool) -> None:
-        """Take what waits. Commands that are not `trusted` are of unknown age, and are dropped."""
+    def hear(self, now: float, clocks: tuple[float, ...], since: float) -> None:
+        """Take what waits at `now`; it came after `since`. `clocks` are those of stamps. All in seconds."""
         self._now = now
-        late = 0
         while (received := self._commands.try_recv()) is not None:
-            if trusted:
-                self._intake.take(received, now, clocks)
-            else:
-                late += 1
-        if late:
-            self._intake.drop(late, now)
+            self._intake.take(received, now, clocks, since)
         self._resume.answer_pending()
         if self._status_due.due(now):
             self._status.put(self._intake.status(now))

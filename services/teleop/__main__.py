@@ -79,7 +79,7 @@ def fly(cockpit: "Cockpit") -> int:
         except Exception as error:
             _fail(app, error)
 
-    app = application(draw, press)
+    app = application(draw, press, cockpit.let_go)
     try:
         asyncio.run(_run(app, cockpit))
     except Exception as error:

@@ -1,6 +1,5 @@
 """Joins pilot and bus: publishes what the keys say, reads what the screen shows."""
 
-import math
 import time
 
 from holozen.bus import Bus, Publisher, ServiceError
@@ -22,7 +21,8 @@ from .pilot import Pilot
 from .view import State
 
 RESTS = 0.01  # m/s and rad/s; slower than this is standing
-RESUME_TIMEOUT = 0.3  # s; the keys wait while the sim is asked
+STALL = 0.25  # s without a tick; longer pauses make old keys of new ones
+RESUME_TIMEOUT = 0.2  # s; the keys wait while the sim is asked
 
 
 class Cockpit:
@@ -41,18 +41,26 @@ class Cockpit:
         self._due = 0.0
         self._sent: Twist | None = None
         self._note = ""
+        self._ticked = time.monotonic()  # when the keys were last known to be live
+        self._handing = False  # over to others, as soon as the robot rests
 
     def press(self, key: str) -> None:
         """Take a key, and publish at once what it changes."""
         self._note = ""
-        if key == RESUME:
-            return self._hand_over()
-        self.pilot.press(key, time.monotonic())
+        now = time.monotonic()
+        if now - self._ticked > STALL:  # it was typed while nothing was shown and nothing was sent
+            return self.let_go()
+        self._handing = key == RESUME
+        if self._handing:
+            return self.let_go()
+        self.pilot.press(key, now)
         self._publish()
 
     def tick(self) -> None:
         """Publish what is due: a stop when the key timed out, else what is repeated."""
-        now = time.monotonic()
+        now = self._ticked = time.monotonic()
+        if self._handing and not self.pilot.engaged:
+            self._hand_over()
         repeats = self.pilot.settings.repeat_rate > 0 or self.pilot.stopping_since() is not None
         if self.pilot.expire(now) or (repeats and now >= self._due):
             self._publish()
@@ -83,7 +91,7 @@ class Cockpit:
             command=(sent.linear.x, sent.linear.y, sent.angular.z) if sent else None,
             measured=(twist.linear.x, twist.linear.y, twist.angular.z),
             odom_age=age,
-            stale=age > self._silence,
+            stale=age > self._odom.patience(self._silence),
             listeners=[endpoint.node for endpoint in on_key(self._graph.endpoints(), self._key, "sub")],
             obeyed=status.obeyed,
             held=status.held,
@@ -106,12 +114,11 @@ class Cockpit:
         odom, age = self._odom.read()
         if since is None or odom is None or time.monotonic() - age <= since:
             return False
-        twist = odom.twist.twist
-        return math.hypot(twist.linear.x, twist.linear.y) < RESTS and abs(twist.angular.z) < RESTS
+        return odom.twist.twist.is_slow(RESTS)
 
     def _hand_over(self) -> None:
-        """Let go, and tell the sim that overruled sources may drive again."""
-        self.halt()
+        """Tell the sim that overruled sources may drive again."""
+        self._handing = False
         try:
             key = key_for("resume", self._robot)
             self._note = self._bus.call(key, TriggerRequest(), TriggerReply, RESUME_TIMEOUT).message

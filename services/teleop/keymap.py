@@ -32,4 +32,4 @@ HELP = """\
    m  ,  .              M  <  >            any other key: stop
 
  q/z both speeds +-10 %   w/x only speed   e/c only turn
- r hands over to the controller            Ctrl-C quits"""
+ r lets the controller drive again         Ctrl-C quits"""

@@ -55,10 +55,6 @@ class Pilot:
         self.direction = STILL
         self._stopping = now
 
-    def release(self) -> None:
-        """Be silent at once: somebody else is to drive."""
-        self.direction, self._stopping = STILL, None
-
     def expire(self, now: float) -> bool:
         """Stop if no key came for `key_timeout`. Whether that just happened."""
         timeout = self.settings.key_timeout

@@ -1,5 +1,7 @@
 """The full-screen application: layout, bindings, style."""
 
+import math
+import time
 from collections.abc import Callable
 
 from prompt_toolkit.application import Application
@@ -25,6 +27,9 @@ STYLE = Style.from_dict(
 # A terminal that was told to by the program before us says when it gets and loses the focus; ESC, [ and I otherwise.
 ANSI_SEQUENCES["\x1b[I"] = ANSI_SEQUENCES["\x1b[O"] = Keys.Ignore
 
+ESCAPE_WAIT = 0.05  # s until an Escape is one, and not the start of an arrow key
+BURST = 0.05  # s in which what follows an Escape belongs to it
+
 # Bytes that a terminal sends on its own; they are nobody's key press.
 NOT_KEYS = (
     Keys.CPRResponse,
@@ -36,24 +41,37 @@ NOT_KEYS = (
 )
 
 
-def application(draw: Callable[[], StyleAndTextTuples], press: Callable[[str], None]) -> Application[None]:
+def application(
+    draw: Callable[[], StyleAndTextTuples], press: Callable[[str], None], leave: Callable[[], None]
+) -> Application[None]:
     """The application; `draw` gives its text, `press` is called with each key. Pasted text presses nothing."""
     window = Window(FormattedTextControl(draw, show_cursor=False), wrap_lines=False)
-    return Application(
+    app: Application[None] = Application(
         layout=Layout(window),
-        key_bindings=bindings(press),
+        key_bindings=bindings(press, leave),
         style=STYLE,
         full_screen=True,
         enable_page_navigation_bindings=False,
     )
+    app.ttimeoutlen = ESCAPE_WAIT
+    return app
 
 
-def bindings(press: Callable[[str], None]) -> KeyBindings:
-    """Every key goes to `press`; Ctrl-C ends the application."""
+def bindings(press: Callable[[str], None], leave: Callable[[], None]) -> KeyBindings:
+    """Every key goes to `press`; Ctrl-C calls `leave` and ends the application."""
     keys = KeyBindings()
+    escaped = -math.inf
 
     @keys.add(Keys.Any)
     def _(event: KeyPressEvent) -> None:
+        # The letters of an escape sequence that is not known here are nobody's keys: Escape alone counts, as a stop.
+        if time.monotonic() - escaped > BURST:
+            press(event.key_sequence[0].key)
+
+    @keys.add(Keys.Escape)
+    def _(event: KeyPressEvent) -> None:
+        nonlocal escaped
+        escaped = time.monotonic()
         press(event.key_sequence[0].key)
 
     for name in (key for key in MOVES if len(key) > 1):
@@ -71,6 +89,7 @@ def bindings(press: Callable[[str], None]) -> KeyBindings:
     @keys.add(QUIT, eager=True)
     @keys.add(Keys.SIGINT, eager=True)
     def _(event: KeyPressEvent) -> None:
+        leave()
         event.app.exit()
 
     return keys

@@ -31,7 +31,7 @@ class State:
 def render(state: State) -> Fragments:
     """The screen: keys, velocities, and who is there."""
     return [
-        ("class:title", f" holozen teleop  {state.robot or 'the robot at the root'}\n\n"),
+        ("class:title", f" holozen teleop {state.robot or 'the robot at the root'}\n\n"),
         ("", f"{HELP}\n\n"),
         ("", f" speed {state.speed:.3f} m/s   turn {state.turn:.3f} rad/s\n\n"),
         *_velocities(state),
@@ -76,4 +76,4 @@ def _driver(state: State) -> Fragments:
         return [("class:good", " driver    you\n")]
     if state.obeyed:
         return [("", f" driver    {state.obeyed}\n")]
-    return [("", " driver    nobody" + ("; r hands over to the controller\n" if state.held else "\n"))]
+    return [("", " driver    nobody" + ("; r lets the controller drive again\n" if state.held else "\n"))]
