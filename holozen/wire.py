@@ -12,7 +12,7 @@ COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stands
 MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded at all
 MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a TwistStamped is refused
 
-PRIORITIES = {"teleop": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
+PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
 """Zenoh priority of each command source. Anyone else has DATA, as a plain `zenoh put`."""
 
 

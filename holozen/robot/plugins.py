@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 from holozen.robot.tag import Tag, number
 from holozen.robot.urdf import Source
+from holozen.wire import COMMAND_SILENCE
 
 PLANAR_MOVE = re.compile(r"(.*/)?(lib)?gazebo_ros_planar_move(\.so)?")
-COMMAND_TIMEOUT = 0.5  # s without a fresh command until the robot stands, where the tag does not say
 
 _KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
 
@@ -28,7 +28,7 @@ class PlanarMove:
     odometry_frame: str = "odom"
     odometry_rate: float = 20.0
     robot_base_frame: str = ""
-    command_timeout: float = COMMAND_TIMEOUT
+    command_timeout: float = COMMAND_SILENCE
     publish_odom: bool = True
     publish_odom_tf: bool = True
     covariance: tuple[float, float, float] = (1e-5, 1e-5, 1e-3)
@@ -107,7 +107,7 @@ class _Settings:
     def timeout(self, *names: str) -> float:
         """Seconds, or -1 for a watchdog that is off."""
         value = number(self.word(*names) or "")
-        return -1.0 if value is not None and value < 0 else self.number(COMMAND_TIMEOUT, *names, zero=False)
+        return -1.0 if value is not None and value < 0 else self.number(COMMAND_SILENCE, *names, zero=False)
 
     def flag(self, *names: str) -> bool:
         """True unless the file says otherwise."""

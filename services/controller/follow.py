@@ -7,7 +7,7 @@ from collections.abc import Callable
 from holozen.bus import Bus, NoReply, Publisher, ServiceError
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, Twist
-from holozen.wire import PRIORITIES, key_for, topic
+from holozen.wire import PRIORITY_OF, key_for, topic
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
 from .yielding import Manners
@@ -28,7 +28,7 @@ class Follower:
         self._bus, self._gains, self._stop, self._say, self._silence = bus, gains, stop, say, row.silence
         self._odom = bus.latest(key_for("odom", robot), Odometry)
         self._status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
-        self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITIES["controller"])
+        self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._manners = Manners(bus.source)
         self._now: Planar = STOP
         self._told = ""

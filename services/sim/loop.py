@@ -1,6 +1,5 @@
 """The loop: hear, move, step, tell, at the pace of the clock."""
 
-import math
 import threading
 import time
 
@@ -25,7 +24,7 @@ class Loop:
         self._world, self._vehicles, self._rtf = world, vehicles, rtf
         self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
         self._clock_due = Schedule(CLOCK_RATE)
-        self._heard = self._before_stall = -math.inf  # what waits at the start may be of any age
+        self._heard = self._before_stall = time.monotonic()
         self._trusts_from = 0.0
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:

@@ -14,7 +14,7 @@ from holozen.messages import (
     Twist,
     TwistStamped,
 )
-from holozen.wire import PRIORITIES, key_for, topic
+from holozen.wire import PRIORITY_OF, key_for, topic
 
 from .keymap import RESUME
 from .pilot import Pilot
@@ -34,7 +34,7 @@ class Cockpit:
         self.pilot, self._bus, self._robot, self._stamped, self._silence = pilot, bus, robot, stamped, row.silence
         self._key = key_for("cmd_vel", robot)
         kind: type[Twist] | type[TwistStamped] = Twist if stamped is None else TwistStamped
-        self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self._key, kind, PRIORITIES["teleop"])
+        self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self._key, kind, PRIORITY_OF["teleop"])
         self._odom = bus.latest(key_for("odom", robot), Odometry)
         self._status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._graph = bus.graph()
