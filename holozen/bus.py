@@ -17,7 +17,7 @@ from holozen import graph
 from holozen.connection import Connection
 from holozen.errors import BusError, NoReply, ServiceError
 from holozen.publisher import Publisher
-from holozen.readers import Latest, Sample, Subscription
+from holozen.readers import Latest, Sample, Subscription, Tap
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -113,7 +113,7 @@ class Bus:
         """The newest message on `key`, with its age."""
         return Latest(self.subscribe(key, kind, depth=1))
 
-    def tap(self, key: str, depth: int = 1024, limit: int = 0) -> "Tap":
+    def tap(self, key: str, depth: int = 1024, limit: int = 0) -> Tap:
         """A reader of bytes on any key expression. Raises BusError for one that is none."""
         with _one_line(f"key {key!r}"):
             tap = Tap(self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth)), limit)
@@ -169,34 +169,6 @@ class Bus:
     def connected(self) -> bool:
         """Whether this session has a link to any other."""
         return bool(self.session.info.peers_zid() or self.session.info.routers_zid())
-
-
-class Tap:
-    """Raw samples, the newest of them if there were too many to read."""
-
-    def __init__(self, subscriber: Any, limit: int = 0) -> None:
-        # Reading from the handler leaves the subscriber free to be undeclared meanwhile.
-        self.ends = [subscriber]  # what stands on the wire for this reader
-        self._samples, self._limit = subscriber.handler, limit
-        self.thread: threading.Thread | None = None  # the one that waits in `recv`
-
-    def try_recv(self) -> Sample | None:
-        """The next waiting sample, or None."""
-        sample = self._samples.try_recv()
-        return sample and Sample(sample, self._limit)
-
-    def recv(self) -> Sample:
-        """The next sample; waits for it. Raises BusError once the bus or this tap is closed."""
-        self.thread = threading.current_thread()
-        try:
-            return Sample(self._samples.recv(), self._limit)
-        except zenoh.ZError:
-            raise BusError("closed") from None
-
-    def close(self) -> None:
-        """Stop listening."""
-        for end in self.ends:
-            end.undeclare()
 
 
 def _token_change(sample: Any) -> tuple[str, bool] | None:

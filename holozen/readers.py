@@ -3,7 +3,7 @@
 import math
 import threading
 import time
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from holozen.errors import BusError
 
@@ -48,12 +48,33 @@ class Sample:
         return bytes(told).decode(errors="replace")[:80] if told else ""
 
 
-class Samples(Protocol):
-    """A stream of samples, such as bus.Tap."""
+class Tap:
+    """Raw samples, the newest of them if there were too many to read."""
 
-    def try_recv(self) -> Sample | None: ...
-    def recv(self) -> Sample: ...
-    def close(self) -> None: ...
+    def __init__(self, subscriber: Any, limit: int = 0) -> None:
+        # Reading from the handler leaves the subscriber free to be undeclared meanwhile.
+        self.ends = [subscriber]  # what stands on the wire for this reader
+        self._samples, self._limit = subscriber.handler, limit
+        self.thread: threading.Thread | None = None  # the one that waits in `recv`
+
+    def try_recv(self) -> Sample | None:
+        """The next waiting sample, or None."""
+        sample = self._samples.try_recv()
+        return sample and Sample(sample, self._limit)
+
+    def recv(self) -> Sample:
+        """The next sample; waits for it. Raises BusError once the bus or this tap is closed."""
+        self.thread = threading.current_thread()
+        try:
+            sample = self._samples.recv()
+        except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+            raise BusError("closed") from None
+        return Sample(sample, self._limit)
+
+    def close(self) -> None:
+        """Stop listening."""
+        for end in self.ends:
+            end.undeclare()
 
 
 class Received(NamedTuple, Generic[M]):
@@ -67,7 +88,7 @@ class Received(NamedTuple, Generic[M]):
 class Subscription(Generic[M]):
     """Messages in the order they came, the newest of them if there were too many."""
 
-    def __init__(self, samples: Samples, kinds: tuple[type[M], ...]) -> None:
+    def __init__(self, samples: Tap, kinds: tuple[type[M], ...]) -> None:
         from holozen import codec
 
         self._samples, self._kinds = samples, kinds
