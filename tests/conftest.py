@@ -1,0 +1,72 @@
+"""Parts of the machine that a test needs: in CI they are installed if missing, elsewhere the test is skipped.
+
+    @pytest.mark.needs("ip", "unshare")
+
+In CI (CI=true) every skip is a failure: a test that did not run has shown nothing.
+"""
+
+import os
+import shutil
+import subprocess
+from collections.abc import Generator
+from typing import Any
+
+import pytest
+
+PACKAGES = {
+    "docker": "docker.io",
+    "docker-compose": "docker-compose",
+    "ip": "iproute2",
+    "ss": "iproute2",
+    "unshare": "util-linux",
+}
+"""Debian's package of each command that a test may need."""
+
+IN_CI = os.environ.get("CI") == "true"
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    needed = [command for marker in item.iter_markers("needs") for command in marker.args]
+    for unknown in set(needed) - set(PACKAGES):
+        raise pytest.UsageError(f"needs({unknown!r}): not in PACKAGES of {__file__}")
+    if IN_CI:
+        _install(_packages(needed))
+    if packages := _packages(needed):
+        missing = ", ".join(command for command in needed if not shutil.which(command))
+        pytest.skip(f"needs {missing}; on Debian: apt install {' '.join(packages)}")
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport() -> Generator[None, Any, Any]:
+    return _no_skip((yield))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report() -> Generator[None, Any, Any]:
+    return _no_skip((yield))
+
+
+def _no_skip(report: Any) -> Any:
+    if IN_CI and report.outcome == "skipped" and not hasattr(report, "wasxfail"):
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else report.longrepr
+        report.outcome, report.longrepr = "failed", f"in CI nothing may be skipped: {reason}"
+    return report
+
+
+def _packages(commands: list[str]) -> list[str]:
+    """The packages of those commands that are not there."""
+    return sorted({PACKAGES[command] for command in commands if not shutil.which(command)})
+
+
+def _install(packages: list[str]) -> None:
+    """Try it; the test says what is missing if that fails."""
+    if not packages or not shutil.which("apt-get"):
+        return
+    quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
+    for words in (["update"], ["install", "--yes", *packages]):
+        subprocess.run(["apt-get", *words], env=quiet, stdin=subprocess.DEVNULL, capture_output=True, timeout=600)

@@ -1,0 +1,1 @@
+"""The real image in real containers, and a person at a real terminal."""

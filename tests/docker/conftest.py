@@ -1,0 +1,59 @@
+"""The image, built once; containers of it, started once a file."""
+
+import os
+import subprocess
+from collections.abc import Iterator
+from uuid import uuid4
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.testing import wait_for
+
+from .stack import ROOT, Stack, Watcher, docker, run
+
+BASE = ROOT.parent / "shared" / "base-image"  # makes the base image where no registry can be reached
+
+
+@pytest.fixture(scope="session")
+def engine() -> None:
+    """A Docker engine that answers, with the base image where we have to make it."""
+    if not _answers() and os.environ.get("CI") == "true":
+        subprocess.run(["service", "docker", "start"], stdin=subprocess.DEVNULL, capture_output=True)
+        wait_for(_answers, within=30, what="the Docker engine")
+    if not _answers():
+        pytest.skip("needs a running Docker engine that this user may use: `docker info` fails")
+    if os.access(BASE, os.X_OK):
+        run(str(BASE), within=500)
+
+
+@pytest.fixture(scope="session")
+def image(engine: None) -> Iterator[str]:
+    """The name of an image built from this tree by docker-compose; it is removed afterwards."""
+    name = f"holozen-test:{uuid4().hex[:8]}"
+    stack = Stack(name)
+    stack.compose("build")
+    yield name
+    docker("rmi", name)
+
+
+@pytest.fixture(scope="module")
+def stack(image: str) -> Iterator[Stack]:
+    """Healthy containers of all services but the teleop, for the tests of a file."""
+    stack = Stack(image)
+    try:
+        stack.up()
+        yield stack
+    finally:
+        print(*(docker("logs", container) for container in stack.containers()), sep="\n")  # pytest shows it on failure
+        stack.down()
+
+
+@pytest.fixture
+def watcher(stack: Stack) -> Iterator[Watcher]:
+    with Bus("test", stack.connection, patience=10) as bus:
+        yield Watcher(bus)
+
+
+def _answers() -> bool:
+    return subprocess.run(["docker", "info"], capture_output=True).returncode == 0

@@ -1,0 +1,119 @@
+"""One run of docker-compose.yml under a name and on a port of its own, as seen from outside."""
+
+import json
+import os
+import re
+import subprocess
+from pathlib import Path
+from typing import Any
+from uuid import uuid4
+
+from holozen.bus import Bus
+from holozen.connection import Connection
+from holozen.messages import CommandStatus, Odometry
+from holozen.testing import wait_for
+from holozen.testing.wire import free_port
+
+ROOT = Path(__file__).resolve().parents[2]
+SERVICES = ("router", "sim", "pose_service", "controller")
+
+
+class Stack:
+    """Containers and a network called `name`, the router on `port` of this machine's loopback."""
+
+    def __init__(self, image: str) -> None:
+        self.name, self.port = f"holozen-test-{uuid4().hex[:8]}", free_port()
+        self.env = {"HOLOZEN_IMAGE": image, "HOLOZEN_PORT": str(self.port)}
+        self.connection = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.port}",))
+
+    def words(self, *words: str) -> list[str]:
+        """The words of a compose command about this stack."""
+        return ["docker-compose", "-f", str(ROOT / "docker-compose.yml"), "-p", self.name, *words]
+
+    def compose(self, *words: str) -> str:
+        """Run a compose command to its end; what it printed."""
+        return run(*self.words(*words), env=self.env)
+
+    def up(self) -> None:
+        """Start everything and wait until each healthcheck is content."""
+        self.compose("up", "-d")
+        wait_for(lambda: set(self.healths().values()) == {"healthy"}, within=60, what="healthy containers")
+
+    def down(self) -> None:
+        """End and remove all that `up` made, one-off containers too."""
+        self.compose("down", "--volumes", "--remove-orphans", "--timeout", "10")
+
+    def container(self, service: str) -> str:
+        """The id of a service's container, running or not."""
+        return self._ids(f"label=com.docker.compose.service={service}", "label=com.docker.compose.oneoff=False")[0]
+
+    def containers(self) -> list[str]:
+        """The ids of all containers, one-off ones too."""
+        return self._ids()
+
+    def inspect(self, service: str) -> dict[str, Any]:
+        """What the engine knows of a service's container."""
+        found: dict[str, Any] = json.loads(docker("inspect", self.container(service)))[0]
+        return found
+
+    def healths(self) -> dict[str, str]:
+        return {service: self.inspect(service)["State"]["Health"]["Status"] for service in SERVICES}
+
+    def starts(self, *services: str) -> dict[str, str]:
+        """When each of these started, so that one sees who was started again."""
+        return {service: self.inspect(service)["State"]["StartedAt"] for service in services}
+
+    def logs(self, *services: str) -> str:
+        return "\n".join(docker("logs", self.container(service)) for service in services or SERVICES)
+
+    def complaints(self) -> list[str]:
+        """Lines of the logs that nobody wants to see."""
+        return [line for line in self.logs().splitlines() if re.search(r"Traceback|Error|ERROR|WARN|panicked", line)]
+
+    def execute(self, service: str, *words: str) -> str:
+        """Run a command in a service's container; what it printed."""
+        return docker("exec", self.container(service), *words)
+
+    def _ids(self, *filters: str) -> list[str]:
+        words = [word for f in (f"label=com.docker.compose.project={self.name}", *filters) for word in ("--filter", f)]
+        return docker("ps", "--all", "--quiet", "--no-trunc", *words).split()
+
+
+class Watcher:
+    """Odom and cmd_vel_status, as they reach this machine through the router's published port."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._odom, self._status = bus.latest("odom", Odometry), bus.latest("cmd_vel_status", CommandStatus)
+
+    def odom(self) -> Odometry:
+        """An odom that came after this call."""
+        assert self._odom.wait(self._odom.count, 30), "no odom within 30 s"
+        return self._odom.read()[0] or Odometry()
+
+    def status(self) -> CommandStatus:
+        """A status that came after this call."""
+        assert self._status.wait(self._status.count, 30), "no cmd_vel_status within 30 s"
+        return self._status.read()[0] or CommandStatus()
+
+    def moves(self) -> bool:
+        """Whether the robot moves."""
+        twist = self.odom().twist.twist
+        return max(map(abs, (twist.linear.x, twist.linear.y, twist.angular.z))) > 0.01
+
+    def driven_by(self, node: str) -> bool:
+        return self.status().obeyed.startswith(f"{node}@") and self.moves()
+
+
+def docker(*words: str) -> str:
+    """Run a docker command; what it printed, errors too."""
+    return run("docker", *words)
+
+
+def run(*words: str, env: dict[str, str] | None = None, within: float = 300) -> str:
+    """Run a command to its end; what it printed, errors too. AssertionError if it fails."""
+    done = subprocess.run(
+        words, env={**os.environ, **(env or {})}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, text=True, timeout=within,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{' '.join(words)}: exit code {done.returncode}\n{done.stdout}"
+    return done.stdout

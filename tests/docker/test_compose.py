@@ -1,0 +1,142 @@
+"""docker-compose up: who may reach what, a robot that drives its shape, and a person who takes it over."""
+
+import json
+import sys
+from typing import Any
+
+import pytest
+
+from holozen.testing import Terminal, wait_for
+
+from .stack import SERVICES, Stack, Watcher, docker, run
+
+pytestmark = [pytest.mark.needs("docker", "docker-compose", "ss"), pytest.mark.timeout(900)]
+
+LISTENS = "0A"  # a TCP state in /proc/net/tcp
+DOCKERS_DNS = "0B00007F"  # 127.0.0.11
+
+
+def holozen(stack: Stack, *words: str) -> str:
+    """What a holozen command on this machine prints when it joins by the published port."""
+    return run(sys.executable, "-m", "holozen", *words, *stack.connection.arguments(), within=60)
+
+
+def odom(stack: Stack) -> Any:
+    return json.loads(holozen(stack, "topic", "echo", "odom", "--once", "--json"))
+
+
+def listeners(stack: Stack, service: str) -> set[tuple[str, int]]:
+    """The (protocol, port) pairs that a service's container listens on."""
+    found: set[tuple[str, int]] = set()
+    for protocol in ("tcp", "tcp6", "udp", "udp6"):
+        for row in stack.execute(service, "cat", f"/proc/net/{protocol}").splitlines()[1:]:
+            _, local, _, state, *_ = row.split()
+            address, port = local.split(":")
+            if address != DOCKERS_DNS and (state == LISTENS or protocol.startswith("udp")):
+                found.add((protocol, int(port, 16)))
+    return found
+
+
+def test_only_the_router_is_published_and_only_on_loopback(stack: Stack) -> None:
+    bound = {service: stack.inspect(service)["NetworkSettings"]["Ports"] for service in SERVICES}
+    here = [{"HostIp": "127.0.0.1", "HostPort": str(stack.port)}]
+    assert bound == {"router": {"7447/tcp": here}, "sim": {}, "pose_service": {}, "controller": {}}
+    rows = run("ss", "--listening", "--tcp", "--numeric", "--no-header", f"sport = :{stack.port}").splitlines()
+    assert [row.split()[3] for row in rows] == [f"127.0.0.1:{stack.port}"]
+
+
+def test_only_the_router_listens(stack: Stack) -> None:
+    found = {service: listeners(stack, service) for service in SERVICES}
+    assert found == {"router": {("tcp", 7447)}, "sim": set(), "pose_service": set(), "controller": set()}
+
+
+@pytest.mark.parametrize("service", SERVICES)
+def test_a_process_may_nothing_but_its_work(stack: Stack, service: str) -> None:
+    status = dict(line.split(":\t", 1) for line in stack.execute(service, "cat", "/proc/1/status").splitlines())
+    assert int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0
+    assert status["NoNewPrivs"] == "1"
+    assert "0" not in status["Uid"].split()
+    assert "Read-only" in stack.execute(service, "sh", "-c", "touch /tmp/x 2>&1 || true")
+
+
+def test_from_this_machine_one_sees_the_robot_move(stack: Stack, watcher: Watcher) -> None:
+    wait_for(watcher.moves, what="a robot that moves")
+    assert odom(stack)["pose"]["pose"]["position"] != odom(stack)["pose"]["pose"]["position"]
+
+
+def test_the_controller_drives_its_shape(stack: Stack) -> None:
+    corners = ("(1.00, 0.00, 90 deg)", "(1.00, 1.00, 180 deg)", "(0.00, 1.00, -90 deg)", "(0.00, 0.00, 0 deg)")
+    wait_for(lambda: all(f": {c} in" in stack.logs("controller") for c in corners), within=60, what="four corners")
+
+
+def test_a_person_takes_over_from_a_terminal_and_hands_back(stack: Stack, watcher: Watcher) -> None:
+    everybody = stack.containers()
+    with Terminal(stack.words("run", "--rm", "teleop"), env=stack.env) as terminal:
+        terminal.wait_for_text("driver    controller", within=60)
+
+        def driven() -> bool:
+            terminal.type("i")  # with each status, as a held key
+            return watcher.driven_by("teleop") and watcher.odom().twist.twist.linear.x > 0.4
+
+        wait_for(driven, what="the teleop to drive")
+        terminal.wait_for_text("driver    you")
+        terminal.type("\x03")
+        assert terminal.process.wait(20) == 0
+        assert terminal.modes() == terminal.modes_before
+        assert "Traceback" not in terminal.raw
+    wait_for(lambda: not watcher.moves() and not watcher.status().obeyed, what="a robot that stands, nobody's")
+    assert watcher.status().held
+    assert stack.containers() == everybody
+    holozen(stack, "controller", "--resume")
+    wait_for(lambda: watcher.driven_by("controller"), what="the controller to go on")
+
+
+def test_a_teleop_without_a_terminal_says_so(stack: Stack) -> None:
+    with pytest.raises(AssertionError, match=r"exit code 2\n(.*\n)*teleop: needs a terminal"):
+        stack.compose("run", "--rm", "-T", "teleop")
+
+
+def test_a_sim_that_is_killed_is_started_again_and_the_others_carry_on(stack: Stack, watcher: Watcher) -> None:
+    others = stack.starts("router", "pose_service", "controller")
+    before = stack.starts("sim")
+    docker("exec", stack.container("sim"), "sh", "-c", "kill -9 -1 || true")  # all in this container but its init
+    wait_for(lambda: stack.starts("sim") != before, what="another sim")
+    wait_for(lambda: watcher.driven_by("controller"), within=30, what="the controller to drive")
+    assert stack.starts(*others) == others
+
+
+def test_a_sim_that_was_killed_by_docker_stays_down_until_it_is_started(stack: Stack, watcher: Watcher) -> None:
+    others = stack.starts("router", "pose_service", "controller")
+    docker("kill", stack.container("sim"))
+    wait_for(lambda: "waiting for odom" in stack.logs("controller").splitlines()[-1], what="a controller that waits")
+    assert not stack.inspect("sim")["State"]["Running"]
+    stack.compose("start", "sim")
+    wait_for(lambda: watcher.driven_by("controller"), within=30, what="the controller to drive")
+    assert stack.starts(*others) == others
+
+
+def test_a_healthcheck_fails_where_its_process_is_gone(stack: Stack, watcher: Watcher) -> None:
+    gone = ("sim", "pose_service", "controller")
+    checks = {service: stack.inspect(service)["Config"]["Healthcheck"]["Test"][1] for service in SERVICES}
+    with pytest.raises(AssertionError, match="exit code 1"):
+        stack.execute("sim", "sh", "-c", checks["router"])
+    stack.compose("stop", *gone)
+    for service in gone:
+        with pytest.raises(AssertionError, match="exit code 1"):
+            stack.execute("router", "sh", "-c", checks[service])
+    stack.compose("start", *gone)
+    wait_for(lambda: watcher.driven_by("controller"), within=30, what="the controller to drive")
+
+
+def test_when_the_router_is_started_again_everybody_comes_back(stack: Stack, watcher: Watcher) -> None:
+    others = stack.starts("sim", "pose_service", "controller")
+    stack.compose("restart", "router")
+    wait_for(lambda: watcher.driven_by("controller"), within=30, what="the controller to drive")
+    wait_for(lambda: holozen(stack, "node", "list").split() == sorted(SERVICES), what="all nodes in the graph")
+    assert json.loads(holozen(stack, "service", "call", "next_goal", '{"request_goal": 1}', "--json"))["x_goal"] == 1
+    assert stack.starts(*others) == others
+    wait_for(lambda: set(stack.healths().values()) == {"healthy"}, within=60, what="healthy containers")
+
+
+def test_the_logs_hold_no_errors_after_all_this(stack: Stack) -> None:
+    assert stack.complaints() == []

@@ -1,0 +1,61 @@
+"""What is in the image, and what is not."""
+
+from collections.abc import Callable
+
+import pytest
+
+from .stack import docker
+
+pytestmark = [pytest.mark.needs("docker", "docker-compose"), pytest.mark.timeout(900)]
+
+LARGEST = 600e6  # bytes; 484e6 with the stand-in base, most of it the engine
+
+# Prints the modules of every process that have no byte code on disk.
+UNCOMPILED = """
+import importlib.util, os, sys
+import holozen.cli.up, holozen.cli.topic, holozen.cli.node, holozen.cli.service, holozen.robot.xacro, xacro
+import holozen.sim.__main__, holozen.sim.loop, holozen.sim.spawn, holozen.teleop.__main__, holozen.teleop.screen
+import holozen.teleop.cockpit, holozen.controller.__main__, holozen.pose_service.__main__
+files = {getattr(module, "__file__", None) or "" for module in list(sys.modules.values())}
+print(*[f for f in files if f.endswith(".py") and not os.path.exists(importlib.util.cache_from_source(f))])
+"""
+
+
+def inside(image: str, *words: str) -> str:
+    """What a command prints in a new container, as compose would start it."""
+    return docker("run", "--rm", "--read-only", "--network=none", "--entrypoint", words[0], image, *words[1:]).strip()
+
+
+def test_the_user_is_not_root_and_owns_nothing_of_the_program(image: str) -> None:
+    assert inside(image, "id", "-u") == "10001"
+    assert inside(image, "find", "/holozen", "/opt/venv", "-writable", "!", "-type", "l") == ""
+
+
+def test_the_tree_holds_what_runs_and_nothing_else(image: str) -> None:
+    wanted = {"holozen", "services", "urdf", "meshes", "worlds"}
+    wanted |= {"LICENSE", "README.md", "pyproject.toml", "requirements.lock"}
+    assert set(inside(image, "ls", "-A", "/holozen").split()) == wanted
+
+
+def test_the_package_is_installed_and_not_linked_to_the_tree(image: str) -> None:
+    where = inside(image, "python", "-I", "-c", "import holozen.sim; print(holozen.sim.__file__)")
+    assert where == "/opt/venv/lib/python3.11/site-packages/holozen/sim/__init__.py"
+
+
+def test_nothing_is_compiled_anew_at_each_start(image: str) -> None:
+    assert inside(image, "python", "-I", "-c", UNCOMPILED) == ""
+
+
+@pytest.mark.parametrize("service", ["sim", "teleop", "controller", "pose_service"])
+def test_a_service_runs_from_the_tree_too(image: str, service: str) -> None:
+    assert "usage" in inside(image, "python", "-m", f"services.{service}", "--help")
+
+
+def test_without_words_the_image_says_what_it_can_do(image: str) -> None:
+    assert "usage: holozen VERB" in docker("run", "--rm", "--network=none", image)
+
+
+def test_the_image_is_not_larger_than_it_has_to_be(image: str, record_property: Callable[[str, object], None]) -> None:
+    size = int(docker("image", "inspect", "--format", "{{.Size}}", image))
+    record_property("image_bytes", size)
+    assert size < LARGEST

@@ -1,0 +1,104 @@
+"""The command line names its verbs, and whatever fails is one line and an exit code."""
+
+import importlib
+import os
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from holozen import cli
+from holozen.errors import BusError
+
+
+@pytest.mark.parametrize("flag", ["-h", "--help"])
+def test_help_lists_every_verb(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([flag]) == 0
+    told = capsys.readouterr().out
+    assert all(f"\n  {verb} " in told for verb in cli.VERBS)
+
+
+def test_no_verb_shows_the_help_and_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 2
+    assert "usage: holozen VERB" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("flag", ["-V", "--version"])
+def test_the_version_is_the_one_that_is_installed(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([flag]) == 0
+    assert capsys.readouterr().out == f"{version('holozen')}\n"
+
+
+def test_an_unknown_verb_is_named_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["drive"]) == 2
+    out, told = capsys.readouterr()
+    assert out == ""
+    assert told == f"holozen: no verb 'drive'; there are {', '.join(cli.VERBS)}\n"
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        cli.main([verb, "--help"])
+    assert end.value.code == 0
+    assert capsys.readouterr().out.startswith(f"usage: holozen {verb} ")
+
+
+@pytest.mark.parametrize("verb", cli.VERBS)
+def test_every_verb_refuses_a_flag_that_it_does_not_have(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        cli.main([verb, "--no-such-flag"])
+    assert end.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def failing(monkeypatch: pytest.MonkeyPatch, failure: BaseException) -> None:
+    def main(_argv: list[str]) -> int:
+        raise failure
+
+    monkeypatch.setattr(importlib.import_module("holozen.cli.node"), "main", main)
+
+
+def test_a_failure_of_the_bus_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    failing(monkeypatch, BusError("cannot open\nZenoh"))
+    assert cli.main(["node", "list"]) == 1
+    assert capsys.readouterr().err == "holozen node: cannot open?Zenoh\n"
+
+
+@pytest.mark.parametrize("name", ["pybullet", "prompt_toolkit", "numpy", "xacro"])
+def test_what_is_not_installed_is_named_with_its_extra(
+    name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    failing(monkeypatch, ModuleNotFoundError(name=name))
+    assert cli.main(["node", "list"]) == 1
+    assert capsys.readouterr().err == f"holozen node needs {name}; run: pip install 'holozen[node]'\n"
+
+
+def test_a_module_of_ours_that_is_missing_is_a_bug_and_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, ModuleNotFoundError(name="holozen.nonsense"))
+    with pytest.raises(ModuleNotFoundError):
+        cli.main(["node", "list"])
+
+
+def test_an_interrupt_is_exit_code_130(monkeypatch: pytest.MonkeyPatch) -> None:
+    failing(monkeypatch, KeyboardInterrupt())
+    assert cli.main(["node", "list"]) == 130
+
+
+@pytest.mark.parametrize("links", [1, 1000])  # less and more than one buffer
+def test_a_reader_that_has_seen_enough_is_no_failure(links: int, tmp_path: Path) -> None:
+    path = tmp_path / "robot.xacro"
+    path.write_text(f"<robot name='r'>{'<link/>' * links}</robot>")
+    reading, writing = os.pipe()
+    os.close(reading)
+    words = [sys.executable, "-m", "holozen", "xacro", str(path)]
+    with open(writing, "wb") as pipe:
+        done = subprocess.run(words, stdout=pipe, stderr=subprocess.PIPE, timeout=60)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize("verb", cli.SERVICES)
+def test_a_service_is_found_in_the_tree(verb: str) -> None:
+    assert cli._module(verb).__name__ == f"services.{cli.SERVICES[verb]}.__main__"

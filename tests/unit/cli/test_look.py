@@ -1,0 +1,158 @@
+"""The verbs that look: topic list, info and echo, service list and call, node list, against real publishers."""
+
+import json
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from holozen.bus import Bus, Publisher, ServiceError
+from holozen.cli import main
+from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, Twist
+from holozen.testing import Wire
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def goal(request: NextGoalRequest) -> NextGoalReply:
+    if request.request_goal > 3:
+        raise ServiceError("goal 4: the list holds goals 0 to 3")
+    return NextGoalReply(float(request.request_goal), 2.5)
+
+
+@pytest.fixture
+def sim(wire: Wire) -> Iterator[Bus]:
+    """A node that writes Fred/odom, reads cmd_vel and serves next_goal."""
+    bus = wire.bus("sim", lasting=True)
+    odom: Publisher[Odometry] = bus.publisher("Fred/odom", Odometry)
+    bus.subscribe("cmd_vel", Twist)
+    bus.serve("next_goal", NextGoalRequest, NextGoalReply, goal).start()
+    done = threading.Event()
+
+    def tell() -> None:
+        while not done.wait(0.01):
+            odom.put(Odometry(child_frame_id="base"))
+
+    with ThreadPoolExecutor() as pool:
+        pool.submit(tell)
+        yield bus
+        done.set()
+
+
+@pytest.fixture
+def run(wire: Wire, capsys: pytest.CaptureFixture[str]) -> Run:
+    """Run a verb; exit code, output and errors."""
+
+    def run(*words: str) -> tuple[int, str, str]:
+        code = main([*words, *wire.flags])
+        return (code, *capsys.readouterr())
+
+    return run
+
+
+def test_topics_are_listed_once_with_their_types(sim: Bus, run: Run) -> None:
+    sim.subscribe("Fred/odom", Odometry)
+    sim.subscribe("**/odom", Odometry)
+    assert run("topic", "list") == (0, "Fred/odom\ncmd_vel\n", "")
+    assert run("topic", "list", "-t")[1] == "Fred/odom [nav_msgs/msg/Odometry]\ncmd_vel [geometry_msgs/msg/Twist]\n"
+
+
+def test_info_shows_type_writers_and_readers_also_those_of_an_expression(sim: Bus, run: Run, wire: Wire) -> None:
+    reader = wire.bus("pose_service")
+    reader.subscribe("**/odom", Odometry)
+    code, out, err = run("topic", "info", "/Fred/odom")
+    assert (code, err) == (0, "")
+    assert out.splitlines() == [
+        "Type: nav_msgs/msg/Odometry",
+        "Publisher count: 1",
+        f"  sim ({sim.id[:6]})",
+        "Subscription count: 1",
+        f"  pose_service ({reader.id[:6]})",
+    ]
+
+
+def test_info_of_an_unknown_key_names_those_known(sim: Bus, run: Run) -> None:
+    code, out, err = run("topic", "info", "odmo")
+    assert (code, out) == (1, "")
+    assert err == "holozen topic: unknown key 'odmo'; known: Fred/odom, cmd_vel\n"
+
+
+def test_echo_shows_a_message_of_a_key_or_an_expression(sim: Bus, run: Run) -> None:
+    code, out, _ = run("topic", "echo", "Fred/odom", "--once")
+    assert code == 0
+    assert "child_frame_id: base\n" in out
+    assert out.endswith("---\n")
+    assert json.loads(run("topic", "echo", "*/odom", "--once", "--json")[1])["child_frame_id"] == "base"
+
+
+def test_echo_of_a_silent_key_ends_with_its_timeout(sim: Bus, run: Run) -> None:
+    assert run("topic", "echo", "odom", "--timeout", "0.1") == (
+        1, "", "holozen topic: nothing came on odom within 0.1 s\n",
+    )  # fmt: skip
+
+
+def test_echo_of_a_wrong_key_is_one_line(run: Run) -> None:
+    code, out, err = run("topic", "echo", "a//b")
+    assert (code, out) == (1, "")
+    assert err.startswith("holozen topic: key 'a//b': ")
+    assert err.count("\n") == 1
+
+
+def test_services_are_listed_and_called(sim: Bus, run: Run) -> None:
+    assert run("service", "list") == (0, "next_goal\n", "")
+    assert run("service", "list", "-t")[1] == "next_goal [holozen/srv/NextGoal]\n"
+    assert run("service", "call", "next_goal", "request_goal: 2") == (
+        0, "x_goal: 2.0\ny_goal: 2.5\ntheta_goal: 0.0\nend_of_list: 0\n", "",
+    )  # fmt: skip
+    assert json.loads(run("service", "call", "next_goal", "--json")[1])["y_goal"] == 2.5
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("next_goal", "request_goal: 4"), "holozen service: goal 4: the list holds goals 0 to 3\n"),
+        (("next_goal", "{gaol: 4}"), "holozen service call next_goal: refused: not a NextGoalRequest: Object contains"),
+        (("get_pose", "--timeout", "0.05"), "holozen service: no reply from 'get_pose' within 0.05 s"),
+        (("nonsense",), "holozen service call: 'nonsense' has no known type; known: next_goal, get_pose, resume\n"),
+    ],
+)
+def test_a_call_that_fails_is_one_line(sim: Bus, run: Run, words: tuple[str, ...], told: str) -> None:
+    code, out, err = run("service", "call", *words)
+    assert (code, out) == (1, "")
+    assert err.startswith(told)
+    assert err.count("\n") == 1
+
+
+def test_nodes_are_listed(sim: Bus, run: Run, wire: Wire) -> None:
+    wire.bus("teleop", lasting=True)
+    wire.bus("topic_echo")
+    assert run("node", "list") == (0, "sim\nteleop\n", "")
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("topic", "list"), "no topics: nobody is there; `holozen up` starts a robot\n"),
+        (("service", "list"), "no services: nobody is there; `holozen up` starts some\n"),
+        (("node", "list"), "no nodes: nobody is there; `holozen up` starts some\n"),
+    ],
+)
+def test_where_nobody_is_the_lists_are_empty_and_say_so(run: Run, words: tuple[str, ...], told: str) -> None:
+    assert run(*words) == (0, "", told)
+
+
+def test_publishing_what_is_no_message_never_reaches_the_wire(run: Run) -> None:
+    for value in ('{"linear":{"x":NaN}}', '{"linaer":{}}', "[]"):
+        code, out, err = run("topic", "pub", "cmd_vel", value)
+        assert (code, out) == (1, "")
+        assert err.startswith("holozen topic pub cmd_vel: refused: ")
+        assert err.count("\n") == 1
+    assert "has no known type; known keys: cmd_vel, odom" in run("topic", "pub", "nonsense", "{}")[2]
+
+
+@pytest.mark.parametrize("key", ["*/cmd_vel", "**/cmd_vel", "a$*/cmd_vel", "cmd_vel?x"])
+def test_a_wildcard_is_not_published_to(run: Run, key: str) -> None:
+    code, out, err = run("topic", "pub", key, "{}")
+    assert (code, out) == (1, "")
+    assert err == f"holozen topic pub: {key!r}: write to one key; a wildcard would move every robot\n"

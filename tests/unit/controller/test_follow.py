@@ -1,0 +1,193 @@
+"""The follower on a real bus, with a robot that moves exactly as it is told."""
+
+import math
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import pytest
+
+from holozen.bus import Bus, Publisher, ServiceError, Subscription
+from holozen.drive import to_world
+from holozen.limits import STOP, Planar
+from holozen.messages import (
+    CommandStatus,
+    Header,
+    NextGoalReply,
+    NextGoalRequest,
+    Odometry,
+    Point,
+    Pose,
+    PoseWithCovariance,
+    Quaternion,
+    Time,
+    Twist,
+)  # fmt: skip
+from holozen.testing import Wire, wait_for
+from services.controller.follow import Follower
+from services.controller.goto import Gains, Leg
+
+QUICK = Gains(max_speed=10, max_turn=20, max_acceleration=100, max_turn_acceleration=100, linear=5, angular=5)
+STEP = 0.01  # s of the robot's clock between two odoms
+GOALS = [(0.5, 0.0, 1.0), (0.5, 0.5, 0.0)]
+
+
+class Robot:
+    """An ideal robot whose clock runs as fast as its thread does."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus, self.moving = bus, threading.Event()
+        self.commands: Subscription[Twist] = bus.subscribe("cmd_vel", Twist)
+        self.heard: list[Twist] = []
+        self.pose = (0.0, 0.0, 0.0)
+        self._odom: Publisher[Odometry] = bus.publisher("odom", Odometry)
+        self._status: Publisher[CommandStatus] = bus.publisher("cmd_vel_status", CommandStatus)
+        self._velocity: Planar = STOP
+        self._time = 0.0
+
+    def status(self, **fields: object) -> None:
+        self._status.put(CommandStatus(**fields))  # type: ignore[arg-type]
+
+    def live(self, end: threading.Event) -> None:
+        """Hear, move and tell until the end; pauses while `moving` is not set."""
+        while not end.wait(STEP / 10):
+            if self.moving.is_set():
+                self._step()
+
+    def _step(self) -> None:
+        for received in iter(self.commands.try_recv, None):
+            assert received.message is not None
+            self.heard.append(received.message)
+            linear, angular = received.message.linear, received.message.angular
+            self._velocity = (linear.x, linear.y, angular.z)
+        x, y, yaw = self.pose
+        vx, vy = to_world(self._velocity, yaw, STEP)
+        self.pose = x + vx * STEP, y + vy * STEP, yaw + self._velocity[2] * STEP
+        self._time += STEP
+        turned = Quaternion(0, 0, math.sin(self.pose[2] / 2), math.cos(self.pose[2] / 2))
+        pose = PoseWithCovariance(Pose(Point(self.pose[0], self.pose[1]), turned))
+        self._odom.put(Odometry(Header(Time.of(self._time)), pose=pose))
+
+
+class Case:
+    """A follower, its robot, what it said, and how to run it in a thread."""
+
+    def __init__(self, wire: Wire, pool: ThreadPoolExecutor, end: threading.Event) -> None:
+        self.robot, self.stop, self.said = Robot(wire.bus("sim")), threading.Event(), list[str]()
+        self.bus = wire.bus("controller")
+        self.follower = Follower(self.bus, "", QUICK, self.stop, self.said.append)
+        self._pool = pool
+        pool.submit(self.robot.live, end)
+        self.robot.moving.set()
+
+    def lap(self) -> "Future[list[Leg]]":
+        return self._pool.submit(self.follower.lap)
+
+    def goals(self, last: int = len(GOALS) - 1, fail: Callable[[int], str] = lambda _: "") -> None:
+        """Serve GOALS; `fail` may say why a goal is refused."""
+
+        def next_goal(request: NextGoalRequest) -> NextGoalReply:
+            if reason := fail(request.request_goal):
+                raise ServiceError(reason)
+            return NextGoalReply(*GOALS[request.request_goal], int(request.request_goal == last))
+
+        self.robot.bus.serve("next_goal", NextGoalRequest, NextGoalReply, next_goal).start()
+
+
+@pytest.fixture
+def case(wire: Wire) -> Iterator[Case]:
+    end = threading.Event()
+    with ThreadPoolExecutor() as pool:
+        case = Case(wire, pool, end)
+        try:
+            yield case
+        finally:
+            case.stop.set()
+            end.set()
+
+
+def test_a_lap_visits_every_goal_and_ends_standing(case: Case) -> None:
+    case.goals()
+    legs = case.lap().result(30)
+    assert [leg.goal for leg in legs] == GOALS
+    wait_for(lambda: case.robot.heard[-1] == Twist())
+    assert case.robot.pose == pytest.approx(GOALS[-1], abs=0.03)
+    assert legs[0].began < legs[0].ended <= legs[1].began < legs[1].ended
+    assert all(leg.path_error < 0.1 for leg in legs)
+
+
+def test_commands_have_the_priority_of_an_autopilot(case: Case) -> None:
+    samples = case.robot.bus.tap("cmd_vel")
+    case.goals()
+    case.lap().result(30)
+    assert samples.recv().priority == "DATA_LOW"
+
+
+def test_it_waits_for_the_service_and_says_so_once(case: Case) -> None:
+    lap = case.lap()
+    wait_for(lambda: case.said)
+    assert "waiting for goal 0: no reply from 'next_goal' within 0.5 s" in case.said[0]
+    case.goals()
+    assert len(lap.result(30)) == 2
+    assert case.said[1:] == ["goes on"]
+
+
+def test_a_first_goal_that_is_refused_is_asked_for_again(case: Case) -> None:
+    reasons = iter(["the list is being read"])
+    case.goals(fail=lambda _: next(reasons, ""))
+    assert len(case.lap().result(30)) == 2
+    assert case.said == ["goal 0: the list is being read", "goes on"]
+
+
+def test_a_list_that_got_shorter_ends_the_lap(case: Case) -> None:
+    case.goals(last=99, fail=lambda number: "the list holds goals 0 to 0" if number else "")
+    assert [leg.goal for leg in case.lap().result(30)] == GOALS[:1]
+    assert case.said == ["goal 1: the list holds goals 0 to 0"]
+
+
+def test_without_odom_it_says_so_and_moves_nothing(case: Case) -> None:
+    case.robot.moving.clear()
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.said)
+    assert case.said == ["waiting for odom: it is stale or was never heard"]
+    assert case.robot.commands.try_recv() is None
+    case.robot.moving.set()
+    assert len(lap.result(30)) == 2
+
+
+def test_when_odom_goes_stale_it_stops_the_robot_once(case: Case) -> None:
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.robot.heard)
+    case.robot.moving.clear()
+    wait_for(lambda: "waiting for odom: it is stale or was never heard" in case.said)
+    *_, last = [received.message for received in iter(case.robot.commands.try_recv, None)]
+    assert last == Twist()
+    case.robot.moving.set()
+    assert len(lap.result(30)) == 2
+
+
+def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) -> None:
+    case.robot.status(obeyed="teleop@9", held=True)
+    wait_for(lambda: case.follower._status.count)
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.said)
+    assert "yields to teleop@9; `holozen controller --resume` or the teleop's r resumes" in case.said
+    assert case.robot.heard == []
+    case.robot.status(resumed=1)
+    assert len(lap.result(30)) == 2
+    assert "goes on" in case.said
+
+
+def test_told_to_stop_it_ends_its_lap_and_halts_the_robot(case: Case) -> None:
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.robot.heard)
+    case.stop.set()
+    assert len(lap.result(30)) < 2
+    case.follower.halt()
+    wait_for(lambda: case.robot.heard[-1] == Twist())
+    case.follower.halt()
+    assert case.robot.heard.count(Twist()) == 1

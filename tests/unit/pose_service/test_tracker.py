@@ -1,0 +1,103 @@
+"""The tracker tells the last odom of a robot, or why it has none."""
+
+import re
+
+import pytest
+
+from holozen.bus import Bus, Publisher
+from holozen.errors import ServiceError
+from holozen.messages import GetPoseReply, GetPoseRequest, Odometry
+from holozen.testing import Wire, wait_for
+from holozen.wire import TOPICS
+from services.pose_service.tracker import Tracker
+
+SILENCE = next(row.silence for row in TOPICS if row.key == "odom")
+
+
+class Robots:
+    """A tracker, and robots that tell their odom to it."""
+
+    def __init__(self, wire: Wire) -> None:
+        self.sim, listener = wire.bus("sim"), wire.bus("pose_service")
+        self.tracker = Tracker(listener.subscribe("**/odom", Odometry, depth=256))
+        self._wait: dict[str, Publisher[Odometry]] = {}
+
+    def tell(self, key: str, x: float = 0.0) -> None:
+        """One odom of the robot with this key."""
+        odom = Odometry()
+        odom.pose.pose.position.x = x
+        if key not in self._wait:
+            self._wait[key] = self.sim.publisher(key, Odometry)
+            wait_for(lambda: self._wait[key].matched)
+        self._wait[key].put(odom)
+
+    def refusal(self, name: str) -> str:
+        with pytest.raises(ServiceError) as error:
+            self.tracker.get_pose(GetPoseRequest(name))
+        return str(error.value)
+
+    def heard(self, name: str, x: float) -> GetPoseReply | None:
+        """The reply, if it is fresh and of the odom with this x."""
+        try:
+            reply = self.tracker.get_pose(GetPoseRequest(name))
+        except ServiceError:
+            return None
+        return reply if reply.odom.pose.pose.position.x == x else None
+
+
+@pytest.fixture
+def robots(wire: Wire) -> Robots:
+    return Robots(wire)
+
+
+def told_until_heard(robots: Robots, name: str, x: float) -> GetPoseReply | None:
+    """Have a robot tell its odom until the tracker has it."""
+    key = f"{name}/odom" if name else "odom"
+
+    def heard() -> GetPoseReply | None:
+        robots.tell(key, x)
+        return robots.heard(name, x)
+
+    return wait_for(heard)
+
+
+def test_the_last_odom_of_each_robot_is_told_with_its_age(robots: Robots) -> None:
+    for name, x in (("", 1.0), ("Fred", 2.0), ("Fred", 3.0), ("", 1.5)):
+        reply = told_until_heard(robots, name, x)
+        assert reply is not None
+        assert 0 <= reply.age <= SILENCE
+
+
+def test_a_robot_that_was_never_heard_is_named_with_those_that_were(robots: Robots) -> None:
+    assert robots.refusal("") == "no odom has been heard; robots heard: none"
+    told_until_heard(robots, "", 1.0)
+    told_until_heard(robots, "Ann", 1.0)
+    assert robots.refusal("Fred") == "no Fred/odom has been heard; robots heard: '' (at the root), Ann"
+
+
+@pytest.mark.parametrize("name", ["*", "a/b", "**", "9", "x" * 65])
+def test_a_name_that_no_robot_may_have_is_refused(robots: Robots, name: str) -> None:
+    assert robots.refusal(name).startswith(f"robot name {name!r}: use a letter")
+
+
+def test_odom_that_is_too_old_is_refused_with_its_age(robots: Robots) -> None:
+    told_until_heard(robots, "Fred", 1.0)
+    wait_for(lambda: not robots.heard("Fred", 1.0))
+    told = re.fullmatch(r"Fred/odom is stale: the last one came (.*) s ago; does the sim run\?", robots.refusal("Fred"))
+    assert told is not None
+    assert float(told[1]) >= SILENCE
+
+
+def test_what_is_no_odom_of_a_robot_is_left_out(robots: Robots) -> None:
+    robots.tell("a/b/odom")
+    robots.sim.session.put("Ann/odom", b"nonsense")
+    told_until_heard(robots, "Fred", 1.0)  # which came after the others
+    assert robots.refusal("Ann") == "no Ann/odom has been heard; robots heard: Fred"
+
+
+def test_the_thread_ends_with_the_bus(wire: Wire) -> None:
+    bus: Bus = wire.bus("pose_service")
+    tracker = Tracker(bus.subscribe("**/odom", Odometry))
+    bus.close()
+    with pytest.raises(ServiceError, match="no odom has been heard"):
+        tracker.get_pose(GetPoseRequest())

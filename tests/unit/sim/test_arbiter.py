@@ -1,0 +1,335 @@
+"""Who drives: each rule of the wire's priorities as a sentence, and all of them against any sequence of commands."""
+
+import math
+
+import pytest
+from hypothesis import settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
+
+from holozen.limits import STOP, Planar
+from holozen.readers import PRIORITIES
+from services.sim.arbiter import AUTOPILOT, HELD, MOST_HELD, Arbiter, Driver
+
+FORWARD: Planar = (0.3, 0.0, 0.0)
+LEFT: Planar = (0.0, 0.3, 0.0)
+PERSON, SCRIPT, CONTROLLER, BACKGROUND = (
+    PRIORITIES.index(name) for name in ("INTERACTIVE_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
+)
+
+
+@pytest.fixture
+def arbiter() -> Arbiter:
+    return Arbiter(timeout=0.5)
+
+
+def drives(arbiter: Arbiter, now: float) -> str:
+    driver = arbiter.driver(now)
+    return driver.source if driver else ""
+
+
+def test_an_autopilot_is_what_sends_with_low_priority() -> None:
+    assert AUTOPILOT == CONTROLLER
+
+
+def test_nobody_stands_above_a_person(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.offer("hurry", PRIORITIES.index("REAL_TIME"), LEFT, 1.1) == "overruled: teleop drives"
+    assert arbiter.offer("hurry", PRIORITIES.index("REAL_TIME"), LEFT, 2.0) == ""
+    assert arbiter.offer("teleop", PERSON, STOP, 2.1) == ""
+    assert arbiter.velocity(2.1) == STOP
+
+
+def test_without_a_command_the_robot_stands(arbiter: Arbiter) -> None:
+    assert arbiter.velocity(0) == STOP
+    assert arbiter.driver(0) is None
+    assert not arbiter.held
+
+
+def test_a_command_is_obeyed_at_once(arbiter: Arbiter) -> None:
+    assert arbiter.offer("teleop", PERSON, FORWARD, 1.0) == ""
+    assert arbiter.velocity(1.0) == FORWARD
+
+
+def test_a_stop_is_obeyed_at_once(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.offer("teleop", PERSON, STOP, 1.01) == ""
+    assert arbiter.velocity(1.01) == STOP
+
+
+def test_after_half_a_second_of_silence_the_robot_stands(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.velocity(1.5) == FORWARD
+    assert arbiter.velocity(1.5 + 1e-6) == STOP
+    assert arbiter.driver(1.5 + 1e-6) is None
+
+
+def test_a_fresh_command_keeps_the_robot_going(arbiter: Arbiter) -> None:
+    for now in (1.0, 1.4, 1.8):
+        arbiter.offer("teleop", PERSON, FORWARD, now)
+    assert arbiter.velocity(2.2) == FORWARD
+
+
+@pytest.mark.parametrize(("low", "high"), [(CONTROLLER, SCRIPT), (CONTROLLER, PERSON), (SCRIPT, PERSON)])
+def test_a_higher_source_takes_the_robot_while_the_lower_one_drives(arbiter: Arbiter, low: int, high: int) -> None:
+    arbiter.offer("low", low, FORWARD, 1.0)
+    assert arbiter.offer("high", high, LEFT, 1.1) == ""
+    assert arbiter.velocity(1.1) == LEFT
+    assert arbiter.offer("low", low, FORWARD, 1.2) == "overruled: high drives"
+    assert arbiter.velocity(1.2) == LEFT
+
+
+@pytest.mark.parametrize("rank", [PERSON, SCRIPT, CONTROLLER])
+def test_among_equals_the_one_that_drives_goes_on_while_it_is_fresh(arbiter: Arbiter, rank: int) -> None:
+    arbiter.offer("first", rank, FORWARD, 1.0)
+    assert arbiter.offer("second", rank, LEFT, 1.1) == "overruled: first drives"
+    assert arbiter.velocity(1.1) == FORWARD
+    assert arbiter.offer("second", rank, LEFT, 1.6) == ""
+    assert arbiter.velocity(1.6) == LEFT
+
+
+@pytest.mark.parametrize(("rank", "stopper"), [(PERSON, PERSON), (SCRIPT, SCRIPT), (CONTROLLER, CONTROLLER),
+                                                (SCRIPT, PERSON)])  # fmt: skip
+def test_an_equal_or_higher_source_may_stop_the_robot_and_it_stays_stopped(
+    arbiter: Arbiter, rank: int, stopper: int
+) -> None:
+    arbiter.offer("first", rank, FORWARD, 1.0)
+    assert arbiter.offer("second", stopper, STOP, 1.1) == ""
+    assert arbiter.velocity(1.1) == STOP
+    for now in (1.2, 9.0):
+        assert arbiter.offer("first", rank, FORWARD, now)
+        assert arbiter.velocity(now) == STOP
+    assert arbiter.resume(9.1) == ""
+    assert arbiter.offer("first", rank, FORWARD, 9.2) == ""
+
+
+@pytest.mark.parametrize("low", [SCRIPT, CONTROLLER])
+def test_a_lower_source_may_not_even_stop_the_robot(arbiter: Arbiter, low: int) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.offer("low", low, STOP, 1.1) == "overruled: teleop drives"
+    assert arbiter.velocity(1.1) == FORWARD
+
+
+def test_a_held_source_may_stop_the_robot_but_not_drive_it(arbiter: Arbiter) -> None:
+    arbiter.offer("script", SCRIPT, FORWARD, 1.0)
+    arbiter.offer("teleop", PERSON, STOP, 1.1)
+    arbiter.offer("another script", SCRIPT, FORWARD, 2.0)
+    for now in (2.1, 2.2):  # a stop is repeated
+        assert arbiter.offer("script", SCRIPT, STOP, now) == ""
+        assert arbiter.velocity(now) == STOP
+    assert arbiter.offer("script", SCRIPT, FORWARD, 2.3) == HELD
+
+
+def test_a_command_is_as_old_as_it_may_have_waited(arbiter: Arbiter) -> None:
+    assert arbiter.offer("teleop", PERSON, FORWARD, now=1.0, heard=0.7) == ""
+    assert arbiter.velocity(1.2) == FORWARD
+    assert arbiter.velocity(1.2 + 1e-6) == STOP
+
+
+def test_a_stop_of_any_age_stops_the_robot(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.offer("teleop", PERSON, STOP, now=1.1, heard=-math.inf) == ""
+    assert arbiter.velocity(1.1) == STOP
+
+
+@pytest.mark.parametrize("low", [SCRIPT, CONTROLLER])
+def test_an_overruled_source_does_not_get_the_robot_back_by_waiting(arbiter: Arbiter, low: int) -> None:
+    arbiter.offer("low", low, FORWARD, 1.0)
+    arbiter.offer("teleop", PERSON, LEFT, 1.1)
+    for now in (2.0, 60.0, 3600.0):
+        assert arbiter.offer("low", low, FORWARD, now) == HELD
+        assert arbiter.velocity(now) == STOP
+    assert arbiter.held
+
+
+def test_a_script_that_spoke_while_a_person_drove_is_held_too(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, LEFT, 1.0)
+    arbiter.offer("script", SCRIPT, FORWARD, 1.1)
+    assert arbiter.offer("script", SCRIPT, FORWARD, 5.0) == HELD
+
+
+def test_a_script_that_is_started_after_the_person_let_go_is_obeyed(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, LEFT, 1.0)
+    assert arbiter.offer("script", SCRIPT, FORWARD, 2.0) == ""
+
+
+@pytest.mark.parametrize("above", [PERSON, SCRIPT])
+def test_no_autopilot_takes_a_robot_that_others_drove_not_even_a_new_one(arbiter: Arbiter, above: int) -> None:
+    arbiter.offer("teleop", above, LEFT, 1.0)
+    assert arbiter.held
+    assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == HELD
+    assert arbiter.velocity(9.0) == STOP
+
+
+def test_the_autopilot_itself_may_fall_silent_and_go_on(arbiter: Arbiter) -> None:
+    arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
+    assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == ""
+    assert arbiter.offer("another controller", CONTROLLER, FORWARD, 19.0) == ""
+    assert not arbiter.held
+
+
+def test_a_source_below_the_autopilot_neither_drives_nor_makes_it_yield(arbiter: Arbiter) -> None:
+    arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
+    assert arbiter.offer("recorder", BACKGROUND, LEFT, 1.1) == "overruled: controller drives"
+    assert arbiter.offer("recorder", BACKGROUND, LEFT, 9.0) == HELD
+    assert not arbiter.held
+
+
+def test_after_resume_whoever_was_held_drives_again(arbiter: Arbiter) -> None:
+    arbiter.offer("script", SCRIPT, FORWARD, 1.0)
+    arbiter.offer("teleop", PERSON, STOP, 1.1)
+    assert arbiter.resume(1.2) == ""
+    assert not arbiter.held
+    assert arbiter.resumed == 1
+    assert arbiter.offer("controller", CONTROLLER, FORWARD, 1.3) == ""
+    assert arbiter.offer("script", SCRIPT, LEFT, 1.4) == ""
+
+
+def test_resume_is_refused_while_a_person_moves_the_robot(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.resume(1.1) == "teleop drives; stop first"
+    assert arbiter.resumed == 0
+    assert arbiter.offer("controller", CONTROLLER, LEFT, 2.0) == HELD
+    assert arbiter.resume(2.1) == ""
+
+
+def test_resume_leaves_an_autopilot_that_drives_at_the_wheel(arbiter: Arbiter) -> None:
+    arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
+    assert arbiter.resume(1.1) == ""
+    assert drives(arbiter, 1.1) == "controller"
+    assert arbiter.velocity(1.1) == FORWARD
+
+
+def test_a_timeout_of_zero_obeys_for_one_moment(arbiter: Arbiter) -> None:
+    arbiter = Arbiter(timeout=0)
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.velocity(1.0) == FORWARD
+    assert arbiter.velocity(1.0 + 1e-9) == STOP
+
+
+class TestWithoutATimeout:
+    """`cmdTimeout` -1, as in Gazebo: a silent source is obeyed until another one speaks."""
+
+    @pytest.fixture
+    def arbiter(self) -> Arbiter:
+        return Arbiter(timeout=-1)
+
+    def test_a_silent_source_is_obeyed_for_ever(self, arbiter: Arbiter) -> None:
+        arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+        assert arbiter.velocity(1e6) == FORWARD
+
+    def test_a_second_teleop_can_stop_what_a_dead_one_left_driving(self, arbiter: Arbiter) -> None:
+        arbiter.offer("dead teleop", PERSON, FORWARD, 1.0)
+        assert arbiter.offer("teleop", PERSON, STOP, 1.1) == ""
+        assert arbiter.velocity(9.0) == STOP
+
+    def test_a_second_teleop_can_drive_what_a_dead_one_left_driving(self, arbiter: Arbiter) -> None:
+        arbiter.offer("dead teleop", PERSON, FORWARD, 1.0)
+        assert arbiter.offer("teleop", PERSON, LEFT, 1.4) == "overruled: dead teleop drives"
+        assert arbiter.offer("teleop", PERSON, LEFT, 2.0) == ""
+        assert arbiter.velocity(2.0) == LEFT
+
+    def test_a_person_is_not_locked_out_by_who_took_the_robot_while_they_were_silent(self, arbiter: Arbiter) -> None:
+        arbiter.offer("teleop", PERSON, STOP, 1.0)
+        assert arbiter.offer("script", SCRIPT, FORWARD, 9.0) == ""
+        assert arbiter.offer("teleop", PERSON, STOP, 9.1) == ""
+        assert arbiter.velocity(9.1) == STOP
+
+    def test_an_autopilot_waits_for_resume_all_the_same(self, arbiter: Arbiter) -> None:
+        arbiter.offer("teleop", PERSON, STOP, 1.0)
+        assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == HELD
+        assert arbiter.resume(9.1) == ""
+        assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.2) == ""
+
+
+def test_a_flood_of_names_takes_bounded_memory_and_lets_nobody_through(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    for number in range(MOST_HELD + 10):
+        arbiter.offer(f"script {number}", SCRIPT, FORWARD, 1.1)
+    assert len(arbiter._held) <= MOST_HELD
+    for number in (0, MOST_HELD + 5, MOST_HELD + 500):
+        assert arbiter.offer(f"script {number}", SCRIPT, FORWARD, 9.0) == HELD
+
+
+SOURCES = {"teleop": PERSON, "second teleop": PERSON, "script": SCRIPT, "another script": SCRIPT,
+           "controller": CONTROLLER, "second controller": CONTROLLER, "recorder": BACKGROUND}  # fmt: skip
+
+
+class Robot(RuleBasedStateMachine):
+    """Any commands from any sources, pauses and resumes, beside what each source was told."""
+
+    timeout = 0.5
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.arbiter = Arbiter(self.timeout)
+        self.now = 0.0
+        self.heard = dict.fromkeys(SOURCES, -1000000000.0)  # when each was last obeyed
+        self.said: dict[str, Planar] = {}  # and what it had said
+        self.lost: set[str] = set()  # sources that were overruled by a higher one since the last resume
+
+    @rule(seconds=st.sampled_from([0.05, 0.3, 0.5, 0.500001, 10.0]))
+    def wait(self, seconds: float) -> None:
+        self.now += seconds
+
+    @rule(source=st.sampled_from(sorted(SOURCES)), velocity=st.sampled_from([STOP, FORWARD, LEFT]))
+    def speak(self, source: str, velocity: Planar) -> None:
+        before = self.arbiter.driver(self.now)
+        refused = self.arbiter.offer(source, SOURCES[source], velocity, self.now)
+        after = self.arbiter.driver(self.now)
+        if not refused:
+            assert after is not None
+            assert (after.source, after.velocity, after.heard) == (source, velocity, self.now)
+            assert source not in self.lost or velocity == STOP
+            self.heard[source], self.said[source] = self.now, velocity
+        else:
+            assert after == before
+        if before and before.source != source:
+            self.speak_against(before, source, velocity, bool(refused))
+        elif before:
+            assert bool(refused) == (source in self.lost and velocity != STOP)
+
+    def speak_against(self, driver: Driver, source: str, velocity: Planar, refused: bool) -> None:
+        """While another one drives: the higher one wins, and an equal one may stop."""
+        rank = SOURCES[source]
+        stops = velocity == STOP and rank <= driver.rank
+        assert refused == (not stops and (rank >= driver.rank or source in self.lost))
+        if stops or rank != driver.rank:
+            self.lost.add(driver.source if rank <= driver.rank else source)
+
+    @rule()
+    def resume(self) -> None:
+        driver = self.arbiter.driver(self.now)
+        refused = self.arbiter.resume(self.now)
+        assert bool(refused) == bool(driver and driver.rank < AUTOPILOT and driver.velocity != STOP)
+        if not refused:
+            self.lost.clear()
+            assert not self.arbiter.held
+
+    @invariant()
+    def the_robot_does_what_its_one_driver_said_last(self) -> None:
+        driver = self.arbiter.driver(self.now)
+        if driver is None:
+            assert self.arbiter.velocity(self.now) == STOP
+        else:
+            assert driver.rank == SOURCES[driver.source]
+            assert self.arbiter.velocity(self.now) == self.said[driver.source]
+            assert driver.source not in self.lost or driver.velocity == STOP
+
+    @invariant()
+    def nobody_drives_after_the_timeout(self) -> None:
+        driver = self.arbiter.driver(self.now)
+        assert driver is None or self.now - self.heard[driver.source] <= self.timeout
+
+    @precondition(lambda self: self.arbiter.held)
+    @rule(source=st.sampled_from(["controller", "second controller", "recorder"]))
+    def an_autopilot_asks_in_vain_while_it_is_held(self, source: str) -> None:
+        driver = self.arbiter.driver(self.now)
+        assert self.arbiter.offer(source, SOURCES[source], FORWARD, self.now)
+        assert self.arbiter.driver(self.now) == driver
+        if driver:
+            self.lost.add(source)
+
+
+TestAnySequence = Robot.TestCase
+TestAnySequence.settings = settings(deadline=None, max_examples=150, stateful_step_count=30)

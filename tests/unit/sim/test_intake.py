@@ -1,0 +1,211 @@
+"""Commands are checked, limited, counted, and told at most once a second."""
+
+import math
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holozen.limits import STOP
+from holozen.messages import Header, Time, Twist, TwistStamped, Vector3
+from holozen.readers import PRIORITIES, Received, Sample
+from holozen.wire import MAX_STAMP_AGE
+from services.sim.arbiter import Arbiter
+from services.sim.intake import TELL_EVERY, Intake
+
+CLOCKS = (1000.0, 5.0)  # the day's and the sim's
+
+
+class Judge:
+    """An intake of one robot and what it told."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+        self.intake = Intake("Fred/cmd_vel", Arbiter(0.5), linear=2.0, angular=3.0, say=self.told.append)
+
+    def take(
+        self, message: Twist | TwistStamped | None, now: float = 10.0, error: str = "", priority: str = "DATA",
+        source: str = "me@1", key: str = "Fred/cmd_vel", waited: float = 0.0,
+    ) -> None:  # fmt: skip
+        rank = PRIORITIES.index(priority) + 1
+        sent = SimpleNamespace(key_expr=key, payload=b"", encoding="", priority=rank, attachment=source.encode())
+        self.intake.take(Received(Sample(sent), message, error), now, CLOCKS, now - waited)
+
+    def velocity(self, now: float = 10.0) -> tuple[float, float, float]:
+        return self.intake.arbiter.velocity(now)
+
+
+@pytest.fixture
+def judge() -> Judge:
+    return Judge()
+
+
+def stamped(seconds: float, x: float = 1.0) -> TwistStamped:
+    return TwistStamped(Header(Time.of(seconds)), Twist.planar(x))
+
+
+def test_a_good_command_drives_and_is_counted(judge: Judge) -> None:
+    judge.take(Twist.planar(1, -0.5, 2), priority="INTERACTIVE_HIGH", source="teleop@9")
+    assert judge.velocity() == (1, -0.5, 2)
+    status = judge.intake.status(10.0)
+    assert (status.obeyed, status.priority, status.accepted) == ("teleop@9", "INTERACTIVE_HIGH", 1)
+    assert (status.refused, status.last_refusal, judge.told) == ({}, "", [])
+
+
+def test_the_status_of_a_silent_robot_names_nobody(judge: Judge) -> None:
+    judge.take(Twist.planar(1))
+    status = judge.intake.status(10.6)
+    assert (status.obeyed, status.priority, status.held) == ("", "", True)
+    assert judge.intake.arbiter.resume(10.6) == ""
+    status = judge.intake.status(10.6)
+    assert (status.held, status.resumed) == (False, 1)
+
+
+def test_what_a_planar_base_cannot_do_is_left_out(judge: Judge) -> None:
+    judge.take(Twist(Vector3(1, 0, 5), Vector3(5, 5, 1)))
+    assert judge.velocity() == (1, 0, 1)
+
+
+def test_a_faster_command_is_clamped_in_its_direction_and_told(judge: Judge) -> None:
+    judge.take(Twist.planar(30, 40, -50))
+    assert judge.velocity() == pytest.approx((1.2, 1.6, -3))
+    status = judge.intake.status(10.0)
+    assert (status.accepted, status.refused) == (1, {"clamped": 1})
+    assert judge.told == [
+        "Fred/cmd_vel: from me@1: over the limits of 2 m/s and 3 rad/s, clamped: (30, 40, -50)"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [Twist, TwistStamped])
+@pytest.mark.parametrize("part", ["linear", "angular"])
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_not_finite_never_drives(
+    judge: Judge, kind: type[Twist | TwistStamped], part: str, axis: str, bad: float
+) -> None:
+    twist = Twist()
+    setattr(getattr(twist, part), axis, bad)
+    judge.take(twist if kind is Twist else TwistStamped(twist=twist))
+    assert judge.velocity() == STOP
+    assert judge.intake.status(10.0).refused == {"not finite": 1}
+    assert judge.told == [f"Fred/cmd_vel: from me@1: {part}.{axis} is not a finite number"]
+
+
+@pytest.mark.parametrize(
+    ("error", "kind"),
+    [("not a Twist: Input data was truncated", "malformed"), ("oversized: 70000 bytes", "oversized")],
+)
+def test_what_is_no_message_is_counted_by_its_kind(judge: Judge, error: str, kind: str) -> None:
+    judge.take(None, error=error)
+    status = judge.intake.status(10.0)
+    assert status.refused == {kind: 1}
+    assert status.last_refusal == f"me@1: {error}"
+    assert status.accepted == 0
+
+
+@pytest.mark.parametrize(
+    ("stamp", "age"),
+    [(1000.0, 0.0), (999.6, 0.0), (1000.4, 0.0), (5.0, 0.0), (5.4, 0.0), (999.4, 0.6), (1000.6, -0.6), (7.0, -2.0)],
+)
+def test_a_stamp_may_be_off_by_half_a_second_by_the_clock_it_is_nearest_to(
+    judge: Judge, stamp: float, age: float
+) -> None:
+    judge.take(stamped(stamp))
+    if age:
+        assert judge.velocity() == STOP
+        assert judge.told == [f"Fred/cmd_vel: from me@1: stamp is {age} s old; at most {MAX_STAMP_AGE} s"]
+        assert judge.intake.status(10.0).refused == {"stale": 1}
+    else:
+        assert judge.velocity() == (1, 0, 0)
+        assert judge.told == []
+
+
+def test_a_stamp_makes_a_command_older_but_never_younger(judge: Judge) -> None:
+    judge.take(stamped(999.7))
+    assert judge.velocity(10.1) == (1, 0, 0)
+    assert judge.velocity(10.3) == STOP  # half a second after its stamp
+    judge.take(stamped(1000.3), now=20.0)
+    assert judge.velocity(20.4) == (1, 0, 0)
+    assert judge.velocity(20.6) == STOP
+
+
+def test_a_command_that_may_have_waited_too_long_is_refused_but_a_stop_is_not(judge: Judge) -> None:
+    judge.take(Twist.planar(1), waited=0.4)
+    assert judge.velocity() == (1, 0, 0)
+    judge.take(Twist.planar(2), waited=0.6)
+    assert judge.velocity() == (1, 0, 0)
+    assert judge.told == ["Fred/cmd_vel: from me@1: it waited up to 0.6 s for the sim"]
+    judge.take(Twist(), waited=math.inf)
+    assert judge.velocity() == STOP
+    assert judge.intake.status(10.0).refused == {"late": 1}
+
+
+@pytest.mark.parametrize("key", ["*/cmd_vel", "**", "Ann/cmd_vel"])
+def test_a_command_for_every_robot_is_for_none(judge: Judge, key: str) -> None:
+    judge.take(Twist.planar(1), key=key)
+    assert judge.velocity() == STOP
+    assert judge.intake.status(10.0).refused == {"wildcard": 1}
+    assert judge.told == [f"Fred/cmd_vel: from me@1: a command for {key!r}; name one robot"]
+
+
+def test_no_stamp_is_a_fresh_one(judge: Judge) -> None:
+    judge.take(stamped(0.0))
+    assert judge.velocity() == (1, 0, 0)
+
+
+def test_an_overruled_and_a_held_source_are_counted_apart(judge: Judge) -> None:
+    judge.take(Twist.planar(1), now=1.0, priority="INTERACTIVE_HIGH", source="teleop@9")
+    judge.take(Twist.planar(2), now=1.1)
+    judge.take(Twist.planar(2), now=9.0)
+    assert judge.intake.status(9.0).refused == {"overruled": 1, "held": 1}
+    assert judge.velocity(9.0) == STOP
+
+
+def test_a_source_without_a_name_is_called_by_its_priority(judge: Judge) -> None:
+    judge.take(Twist.planar(1), source="")
+    assert judge.intake.status(10.0).obeyed == "anonymous (DATA)"
+
+
+def test_refusals_are_told_once_a_second_with_the_number_of_the_others(judge: Judge) -> None:
+    for now in (1.0, 1.2, 1.4, 1.0 + TELL_EVERY, 2.1):
+        judge.take(None, now, error="not a Twist")
+    assert judge.told == [
+        "Fred/cmd_vel: from me@1: not a Twist",
+        "Fred/cmd_vel: from me@1: not a Twist (and 2 more)",
+    ]
+    judge.take(None, now=3.5, error="not a Twist")
+    assert judge.told[2] == "Fred/cmd_vel: from me@1: not a Twist (and 1 more)"
+    assert judge.intake.status(3.5).refused == {"malformed": 6}
+
+
+def test_a_long_reason_is_cut(judge: Judge) -> None:
+    judge.take(None, error="x" * 5000)
+    assert len(judge.intake.status(10.0).last_refusal) == 300
+
+
+numbers = st.floats() | st.sampled_from([1e308, -1e308])
+twists = st.builds(Twist, st.builds(Vector3, numbers, numbers, numbers), st.builds(Vector3, numbers, numbers, numbers))
+commands: st.SearchStrategy[Twist | TwistStamped] = twists | st.builds(
+    TwistStamped, st.builds(Header, st.builds(Time, st.integers(-(2**63), 2**63), st.integers(0, 999_999_999))), twists
+)
+
+
+@given(st.lists(commands, max_size=5))
+def test_whatever_comes_the_engine_gets_finite_velocities_within_the_limits(given: list[Twist | TwistStamped]) -> None:
+    judge = Judge()
+    for message in given:
+        judge.take(message)
+    x, y, turn = judge.velocity()
+    assert math.hypot(x, y) <= 2 * (1 + 1e-9)
+    assert abs(turn) <= 3
+    status = judge.intake.status(10.0)
+    refused = sum(status.refused.values()) - status.refused.get("clamped", 0)
+    assert status.accepted + refused == len(given)
+
+
+def test_by_default_it_is_told_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+    judge = Judge()
+    judge.intake = Intake("cmd_vel", Arbiter(0.5), 1, 1)
+    judge.take(Twist(), key="*")
+    assert capsys.readouterr().err == "cmd_vel: from me@1: a command for '*'; name one robot\n"

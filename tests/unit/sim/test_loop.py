@@ -1,0 +1,241 @@
+"""The loop with a real engine and a real bus: commands in, odometry out, at the pace that was asked for."""
+
+import threading
+import time
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing, contextmanager
+from functools import partial
+from itertools import pairwise
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+import zenoh
+
+from holozen.bus import Publisher, ServiceError, Subscription
+from holozen.limits import STOP
+from holozen.messages import (
+    Clock,
+    CommandStatus,
+    JointState,
+    Odometry,
+    TFMessage,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+)  # fmt: skip
+from holozen.robot.model import PlanarMove, load
+from holozen.robot.rigid import lump
+from holozen.testing import Wire, wait_for
+from holozen.wire import MAX_COMMAND_BYTES, PRIORITY_OF
+from services.sim import loop as loop_module
+from services.sim.arbiter import Arbiter
+from services.sim.intake import Intake
+from services.sim.loop import DISTRUST, Loop
+from services.sim.vehicle import Vehicle
+from services.sim.world import World
+from services.sim.worldfile import WorldSpec
+
+MODEL = load(Path(__file__).parents[3] / "urdf" / "hb_bot.urdf.xacro")
+BODY = lump(MODEL)
+assert MODEL.planar_move is not None
+DRIVE = MODEL.planar_move
+FORWARD = (0.5, 0.0, 0.0)
+
+
+class Sim:
+    """One hb_bot called Fred, at the origin of a world with ground."""
+
+    def __init__(self, wire: Wire, world: World, rtf: float = 0.0, drive: PlanarMove = DRIVE) -> None:
+        self.world, self.bus = world, wire.bus("sim")
+        self.arbiter = Arbiter(drive.command_timeout)
+        intake = Intake("Fred/cmd_vel", self.arbiter, 5.0, 10.0)
+        self.vehicle = Vehicle(self.bus, "Fred", MODEL, drive, world.add(BODY, (0, 0, 0)), intake)
+        self.loop = Loop(self.bus, world, [self.vehicle], rtf)
+
+    def run(self, steps: int) -> None:
+        self.loop.run(threading.Event(), steps)
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """The loop in a thread of its own."""
+        stop = threading.Event()
+        with ThreadPoolExecutor() as pool:
+            done = pool.submit(self.loop.run, stop)
+            try:
+                yield
+            finally:
+                stop.set()
+        done.result()
+
+    def all(self, subscription: Subscription[Odometry]) -> list[Odometry]:
+        return [received.message for received in iter(subscription.try_recv, None) if received.message]
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    with closing(World(WorldSpec(ground=True))) as world:
+        yield world
+
+
+@pytest.fixture
+def sim(wire: Wire, world: World) -> Sim:
+    return Sim(wire, world)
+
+
+def test_a_run_ends_after_its_steps_or_when_it_is_told_to(sim: Sim) -> None:
+    sim.run(100)
+    sim.run(20)
+    assert sim.world.steps == 120
+    stopped = threading.Event()
+    stopped.set()
+    sim.loop.run(stopped)
+    assert sim.world.steps == 120
+
+
+def test_odometry_comes_at_its_rate_of_sim_time_with_the_frames_of_the_robot(sim: Sim) -> None:
+    odom = sim.bus.subscribe("Fred/odom", Odometry, depth=1000)
+    sim.run(480)
+    told = sim.all(odom)
+    assert len(told) == 2 * DRIVE.odometry_rate + 1
+    stamps = [message.header.stamp.seconds() for message in told]
+    assert stamps[-1] == pytest.approx(2.0)
+    assert all(later - earlier <= 1 / 50 + 1 / 240 + 1e-9 for earlier, later in pairwise(stamps))
+    assert (told[0].header.frame_id, told[0].child_frame_id) == ("Fred/odom", "Fred/footprint_link")
+    assert told[-1].pose.pose.position.z == pytest.approx(-0.04, abs=1e-3)
+
+
+def test_a_command_moves_the_robot_and_its_joints_and_is_told(sim: Sim) -> None:
+    odom = sim.bus.subscribe("Fred/odom", Odometry, depth=1000)
+    joints = sim.bus.subscribe("Fred/joint_states", JointState, depth=1000)
+    sim.arbiter.timeout = -1
+    sim.arbiter.offer("me", 0, FORWARD, 0.0)
+    sim.run(480)
+    last = sim.all(odom)[-1]
+    assert last.pose.pose.position.x == pytest.approx(1.0, abs=1e-3)
+    assert last.twist.twist.linear.x == pytest.approx(0.5, abs=1e-6)
+    (*_, wheels) = [received.message for received in iter(joints.try_recv, None)]
+    assert wheels is not None
+    angles = dict(zip(wheels.name, wheels.position, strict=True))
+    assert angles["front_wheel_joint"] == pytest.approx(1.0 / 0.14, abs=0.05)
+    assert wheels.velocity[0] == pytest.approx(0.5 / 0.14)
+
+
+def test_transforms_and_clock_are_told(sim: Sim) -> None:
+    tf = sim.bus.subscribe("Fred/tf", TFMessage, depth=1000)
+    clock = sim.bus.subscribe("clock", Clock, depth=1000)
+    sim.run(240)
+    transforms = [t for received in iter(tf.try_recv, None) if received.message for t in received.message.transforms]
+    children = {t.child_frame_id for t in transforms}
+    assert {"Fred/footprint_link", "Fred/base_link", "Fred/front_wheel_link"} <= children
+    ticks = [received.message for received in iter(clock.try_recv, None) if received.message]
+    assert len(ticks) == 51
+    assert ticks[-1].clock.seconds() == pytest.approx(1.0)
+
+
+def test_odom_and_its_transform_can_be_switched_off(wire: Wire, world: World) -> None:
+    sim = Sim(wire, world, drive=PlanarMove(publish_odom=False, publish_odom_tf=False))
+    odom = sim.bus.subscribe("Fred/odom", Odometry, depth=1000)
+    tf = sim.bus.subscribe("Fred/tf", TFMessage, depth=1000)
+    sim.run(240)
+    assert sim.all(odom) == []
+    frames = {t.header.frame_id for r in iter(tf.try_recv, None) if r.message for t in r.message.transforms}
+    assert "Fred/odom" not in frames
+
+
+def test_a_command_from_another_process_drives_and_its_silence_stops(wire: Wire, world: World) -> None:
+    sim = Sim(wire, world, rtf=1.0)
+    me = wire.bus("me")
+    odom = me.latest("Fred/odom", Odometry)
+    commands: Publisher[Twist] = me.publisher("Fred/cmd_vel", Twist)
+
+    def speed() -> float:
+        message = odom.read()[0]
+        return message.twist.twist.linear.x if message else 0.0
+
+    with sim.running():
+        wait_for(lambda: commands.matched and odom.count)
+        commands.put(Twist.planar(0.5))
+        wait_for(lambda: speed() == pytest.approx(0.5, abs=1e-3))
+        wait_for(lambda: speed() == pytest.approx(0, abs=1e-3))
+    assert 0.24 < sim.vehicle.body.pose()[0][0] < 0.5  # half a second of it, and the way of late steps
+
+
+def test_what_is_wrong_never_reaches_the_engine_and_is_counted(wire: Wire, world: World) -> None:
+    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+    status = me.latest("Fred/cmd_vel_status", CommandStatus)
+    commands: Publisher[Twist] = me.publisher("Fred/cmd_vel", Twist)
+    bad = {
+        b"[]": "malformed",
+        b"\xff": "malformed",
+        b'{"linaer": {}}': "malformed",
+        b'{"linear":{"x":1e999}}': "malformed",
+        b" " * (MAX_COMMAND_BYTES + 1): "oversized",
+    }
+
+    def refused(kind: str) -> int:
+        told = status.read()[0]
+        return told.refused.get(kind, 0) if told else 0
+
+    with sim.running():
+        wait_for(lambda: commands.matched)
+        for payload, kind in bad.items():
+            before = refused(kind)
+            me.session.put("Fred/cmd_vel", payload, congestion_control=zenoh.CongestionControl.BLOCK)
+            wait_for(partial(lambda kind, before: refused(kind) > before, kind, before))
+    assert sim.vehicle.body.pose()[0][:2] == pytest.approx((0, 0), abs=1e-4)
+
+
+def test_the_priority_is_read_off_the_sample(wire: Wire, world: World) -> None:
+    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+    status = me.latest("Fred/cmd_vel_status", CommandStatus)
+    commands: Publisher[Twist] = me.publisher("Fred/cmd_vel", Twist, PRIORITY_OF["controller"])
+    with sim.running():
+        wait_for(lambda: commands.matched)
+        commands.put(Twist.planar(0.1))
+        wait_for(lambda: (told := status.read()[0]) and told.obeyed)
+    told = status.read()[0]
+    assert told is not None
+    assert (told.obeyed, told.priority, told.held) == (me.source, "DATA_LOW", False)
+
+
+def test_resume_is_a_service_between_the_steps(wire: Wire, world: World) -> None:
+    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+    with sim.running():
+        assert me.call("Fred/resume", TriggerRequest(), TriggerReply).success
+        sim.arbiter.timeout = -1
+        sim.arbiter.offer("teleop@1", 1, FORWARD, 0.0)
+        with pytest.raises(ServiceError, match=r"^teleop@1 drives; stop first$"):
+            me.call("Fred/resume", TriggerRequest(), TriggerReply)
+    assert sim.arbiter.resumed == 1
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """The loop's monotonic clock, which a test moves on by hand. Ask for it before the sim."""
+    now = [100.0]
+    monkeypatch.setattr(loop_module, "time", SimpleNamespace(monotonic=lambda: now[0], time=time.time))
+    return now
+
+
+def test_commands_that_waited_through_a_stall_are_refused(clock: list[float], sim: Sim) -> None:
+    """The sim stood still and goes on: what waits may be of any age since it last heard."""
+    commands: Publisher[Twist] = sim.bus.publisher("Fred/cmd_vel", Twist)
+    for pause, refused in ((0.05, False), (0.45, False), (0.6, True), (DISTRUST / 2, True), (DISTRUST, False)):
+        clock[0] += pause
+        commands.put(Twist.planar(pause))
+        sim.run(1)
+        driver = sim.arbiter.driver(clock[0])
+        assert (driver is None or driver.velocity[0] != pause) == refused, pause
+    assert sim.vehicle._intake.status(clock[0]).refused == {"late": 2}
+
+
+def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: Sim) -> None:
+    commands: Publisher[Twist] = sim.bus.publisher("Fred/cmd_vel", Twist)
+    sim.arbiter.timeout = -1
+    sim.arbiter.offer(sim.bus.source, 4, FORWARD, clock[0])
+    clock[0] += 60
+    commands.put(Twist())
+    sim.run(1)
+    assert sim.arbiter.velocity(clock[0]) == STOP

@@ -1,0 +1,208 @@
+"""The real engine, headless: robots stand on the ground, follow their closed-form arcs, and bump into things."""
+
+import math
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+import pytest
+
+from holozen.limits import STOP, Planar
+from holozen.messages import Quaternion
+from holozen.robot.model import load
+from holozen.robot.parts import Pose, Shape
+from holozen.robot.rigid import Body, PlacedShape, lump
+from services.sim.world import PlanarBody, World
+from services.sim.worldfile import WorldSpec
+
+REPO = Path(__file__).parents[3]
+HB_BOT = lump(load(REPO / "urdf" / "hb_bot.urdf.xacro"))
+DT = 1 / 240
+GROUND = WorldSpec(ground=True)
+Vector = tuple[float, float, float]
+HALF = math.sqrt(0.5)
+
+
+def shape(kind: str, size: tuple[float, ...], z: float, rotation: tuple[float, ...] = (0, 0, 0, 1)) -> PlacedShape:
+    x, y, s, c = rotation
+    return PlacedShape("base", Shape(kind, size, Pose()), (0, 0, z), (x, y, s, c))
+
+
+def body(
+    *shapes: PlacedShape, centre: Vector = (0, 0, 0.1), tilt: float = 0.0, inertia: Vector = (0.1, 0.1, 0.1)
+) -> Body:
+    """One kilogram; the principal axes are tilted about x by `tilt`."""
+    return Body(1.0, centre, inertia, (math.sin(tilt / 2), 0, 0, math.cos(tilt / 2)), shapes)
+
+
+BOX = shape("box", (1, 1, 0.4), 0.2)
+OFF_CENTRE = body(BOX, centre=(0.2, -0.1, 0.1))
+TILTED = body(BOX, centre=(0.1, 0.0, 0.1), tilt=0.8, inertia=(0.1, 0.15, 0.2))
+BODIES = {"hb_bot": HB_BOT, "off-centre": OFF_CENTRE, "tilted principal axes": TILTED}
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    with closing(World(GROUND)) as world:
+        yield world
+
+
+def run(world: World, *driven: tuple[PlanarBody, Planar], seconds: float) -> None:
+    for _ in range(round(seconds / DT)):
+        for base, velocity in driven:
+            base.drive(velocity, DT)
+        world.step()
+
+
+def pose(base: PlanarBody) -> Vector:
+    (x, y, _), rotation = base.pose()
+    return x, y, Quaternion(*rotation).yaw()
+
+
+def arc(velocity: Planar, seconds: float) -> tuple[float, float]:
+    """Where a body at the origin is after driving `velocity` for a time."""
+    x, y, turn = velocity
+    if not turn:
+        return x * seconds, y * seconds
+    s, c = math.sin(turn * seconds), math.cos(turn * seconds)
+    return (x * s + y * (c - 1)) / turn, (x * (1 - c) + y * s) / turn
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("velocity", [(0.5, 0, 0), (0, -0.5, 0), (0, 0, 2), (0.5, 0.3, 1), (-1, 0.5, -3)], ids=str)
+def test_a_driven_robot_follows_its_closed_form_arc(world: World, name: str, velocity: Planar) -> None:
+    base = world.add(BODIES[name], (0, 0, 0))
+    run(world, (base, STOP), seconds=2)  # until it has settled
+    start_x, start_y, _ = pose(base)
+    start = world.time
+    within = 1e-4 if name == "hb_bot" else 2e-4  # a base that leans on one edge wobbles a little
+    for _ in range(10):
+        run(world, (base, velocity), seconds=0.5)
+        x, y, yaw = pose(base)
+        turned = velocity[2] * (world.time - start)
+        assert math.dist((x - start_x, y - start_y), arc(velocity, world.time - start)) < within
+        assert math.remainder(yaw - turned, math.tau) == pytest.approx(0, abs=2e-4)
+
+
+@pytest.mark.parametrize("name", ["hb_bot", "off-centre"])
+def test_the_measured_velocity_is_the_commanded_one_as_the_body_sees_it(world: World, name: str) -> None:
+    base = world.add(BODIES[name], (0, 0, 0))
+    run(world, (base, STOP), seconds=2)
+    velocity = (0.5, 0.3, 1.0)
+    for _ in range(10):
+        run(world, (base, velocity), seconds=0.4)
+        assert base.velocity(DT) == pytest.approx(velocity, abs=1e-4)
+
+
+def test_hb_bot_settles_level_where_its_wheels_touch_the_ground(world: World) -> None:
+    base = world.add(HB_BOT, (0, 0, 0))
+    run(world, (base, STOP), seconds=2)
+    (x, y, z), rotation = base.pose()
+    assert (x, y) == pytest.approx((0, 0), abs=1e-5)
+    assert z == pytest.approx(-0.04, abs=1e-4)
+    assert rotation == pytest.approx((0, 0, 0, 1), abs=1e-5)
+
+
+@pytest.mark.parametrize(
+    "part",
+    [
+        shape("box", (1, 0.8, 0.4), 0.2),
+        shape("box", (0.4, 1, 0.8), 0.2, (0, HALF, 0, HALF)),
+        shape("cylinder", (0.3, 0.2), 0.1),
+        shape("cylinder", (0.14, 1.0), 0.14, (HALF, 0, 0, HALF)),
+        shape("sphere", (0.1,), 0.1),
+    ],
+    ids=["box", "box on its side", "cylinder", "lying cylinder", "sphere"],
+)
+def test_shapes_rest_on_the_ground_by_their_sizes(world: World, part: PlacedShape) -> None:
+    base = world.add(body(part), (1, 2, 0.3))
+    run(world, (base, STOP), seconds=2)
+    assert base.pose()[0] == pytest.approx((1, 2, 0), abs=1e-3)
+
+
+def test_a_shape_of_many_rests_on_the_lowest_and_a_mesh_is_left_out(world: World) -> None:
+    low, mesh = shape("sphere", (0.2,), 0.0), shape("mesh", (1, 1, 1), -5)
+    base = world.add(body(BOX, mesh, low), (0, 0, 0.5))
+    run(world, (base, STOP), seconds=2)
+    assert base.pose()[0][2] == pytest.approx(0.2, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_a_robot_starts_upright_where_it_is_put(world: World, name: str) -> None:
+    position, rotation = world.add(BODIES[name], (1, 2, 3)).pose()
+    assert position == pytest.approx((1, 2, 3), abs=1e-6)
+    assert rotation == pytest.approx((0, 0, 0, 1), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["hb_bot", "off-centre"])
+def test_a_driven_robot_falls_as_anything_does(name: str) -> None:
+    with closing(World(WorldSpec(gravity=(0, 0, -2), ground=False))) as world:
+        base = world.add(BODIES[name], (0, 0, 0))
+        run(world, (base, (0.5, 0, 1)), seconds=1)
+        fallen = -2 * DT * DT * 240 * 241 / 2  # the sum over the steps
+        assert base.pose()[0][2] == pytest.approx(fallen, abs=1e-3)
+
+
+def test_a_robot_whose_centre_of_mass_is_beyond_its_base_tips_over(world: World) -> None:
+    base = world.add(body(BOX, centre=(0.7, 0, 0.1)), (0, 0, 0))
+    run(world, (base, STOP), seconds=1)
+    x, y, *_ = base.pose()[1]
+    assert 1 - 2 * (x * x + y * y) < 0.5  # its z axis has come down by more than 60 degrees
+
+
+def test_a_robot_that_is_no_longer_driven_is_stopped_by_the_next_command(world: World) -> None:
+    base = world.add(HB_BOT, (0, 0, 0))
+    run(world, (base, (0.5, 0, 1)), seconds=1)
+    run(world, (base, STOP), seconds=DT)
+    assert base.velocity(DT) == pytest.approx(STOP, abs=1e-6)
+    before = pose(base)
+    run(world, (base, STOP), seconds=1)
+    assert pose(base) == pytest.approx(before, abs=1e-6)
+
+
+def test_a_robot_pushes_what_is_not_driven(world: World) -> None:
+    pusher, pushed = world.add(HB_BOT, (0, 0, 0)), world.add(HB_BOT, (1.7, 0, 0))
+    run(world, (pusher, (0.5, 0, 0)), seconds=2)
+    assert pose(pushed)[0] > 1.75
+    assert pose(pushed)[0] - pose(pusher)[0] > 1.0
+
+
+def test_two_worlds_know_nothing_of_each_other(world: World) -> None:
+    with closing(World(GROUND)) as other:
+        here, there = world.add(HB_BOT, (0, 0, 0)), other.add(HB_BOT, (0, 0, 0))
+        run(world, (here, (0.5, 0, 0)), seconds=1)
+        assert pose(here)[0] == pytest.approx(0.5, abs=1e-4)
+        assert there.pose()[0] == pytest.approx((0, 0, 0), abs=1e-6)
+
+
+def test_the_same_commands_end_in_the_same_bits() -> None:
+    ends = []
+    for _ in range(2):
+        with closing(World(GROUND)) as world:
+            base = world.add(HB_BOT, (0, 0, 0))
+            run(world, (base, (0.5, 0.3, 1)), seconds=2)
+            ends.append((base.pose(), base.velocity(DT)))
+    assert ends[0] == ends[1]
+
+
+def test_time_is_counted_in_steps(world: World) -> None:
+    for _ in range(1000):
+        world.step()
+    assert (world.steps, world.time) == (1000, 1000 * world.spec.step)
+
+
+def test_the_step_of_the_world_is_the_engines() -> None:
+    with closing(World(WorldSpec(step=0.01, ground=False, gravity=(0, 0, 0)))) as world:
+        base = world.add(HB_BOT, (0, 0, 0))
+        for _ in range(10):
+            base.drive((1, 0, 0), 0.01)
+            world.step()
+        assert pose(base)[0] == pytest.approx(0.1, abs=1e-6)
+
+
+def test_loading_the_engine_prints_nothing_and_leaves_standard_error_open() -> None:
+    words = [sys.executable, "-c", "import services.sim.world, sys; print('still here', file=sys.stderr)"]
+    done = subprocess.run(words, capture_output=True, text=True, cwd=REPO, timeout=60)
+    assert (done.stdout, done.stderr) == ("", "still here\n")

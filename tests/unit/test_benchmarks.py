@@ -1,0 +1,58 @@
+"""The benchmarks run and tell their figures. How fast anything is depends on the machine, and is not tested."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+CASES = {
+    "latency": {
+        "flat out": ["holozen", "raw zenoh", "ratio"],
+        "paced at 50 Hz": ["holozen", "raw zenoh", "ratio"],
+    },
+    "startup": {
+        "first line, odom at 500 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
+        "first line, odom at 50 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
+        "up to first odom": ["holozen"],
+    },
+    "sim_loop": {
+        "idle": ["holozen", "bare engine", "engine with our body", "ratio"],
+        "driving": ["holozen", "bare engine", "engine with our body", "ratio"],
+    },
+}
+
+
+def run(name: str, *words: str) -> str:
+    """What a quick run prints. It starts elsewhere, as somebody would who is not at the root of the tree."""
+    command = [sys.executable, str(ROOT / "benchmarks" / f"{name}.py"), "--quick", *words]
+    done = subprocess.run(command, cwd="/", capture_output=True, text=True, timeout=120, check=False)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_the_table_and_the_json_tell_every_side_of_every_case(name: str, tmp_path: Path) -> None:
+    lines = run(name, "--json", str(tmp_path / "figures.json")).splitlines()
+    for case, sides in CASES[name].items():
+        told = [line for line in lines if line.startswith(f"{case}  ")]
+        assert [line.removeprefix(case).strip().partition("  ")[0] for line in told] == sides
+    assert any(line.startswith("aim: ") for line in lines)
+    found = json.loads((tmp_path / "figures.json").read_text())
+    assert found["benchmark"] == name
+    in_json = {case["case"]: [*case["sides"], *(["ratio"] if "ratio" in case else [])] for case in found["cases"]}
+    assert in_json == CASES[name]
+    for figures in (figures for case in found["cases"] for figures in case["sides"].values()):
+        low, high = figures["spread"]
+        assert 0 < low <= high
+        assert 0 < figures["p50"] <= figures["p99"]
+
+
+def test_the_profile_tells_where_a_step_of_the_sim_goes(tmp_path: Path) -> None:
+    lines = run("sim_loop", "--profile", "--json", str(tmp_path / "figures.json")).splitlines()
+    shares = json.loads((tmp_path / "figures.json").read_text())["profile"]
+    for part in ("step: the engine", "move: read the body, set its velocity", "all of it"):
+        assert any(line.endswith(f"us/step  {part}") for line in lines)
+        assert 0 < shares[part] <= shares["all of it"]

@@ -1,0 +1,320 @@
+"""Real sessions on loopback: what is said arrives, what is wrong is one line, and everything ends."""
+
+import os
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen.bus import Bus, BusError, NoReply, Publisher, ServiceError
+from holozen.connection import Connection
+from holozen.door import is_free
+from holozen.graph import Endpoint
+from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
+from holozen.testing import Wire, wait_for
+
+
+@pytest.fixture
+def pair(wire: Wire) -> tuple[Bus, Bus]:
+    """Two buses that have found each other."""
+    first, second = wire.bus("first"), wire.bus("second")
+    wait_for(lambda: first.connected() and second.connected())
+    return first, second
+
+
+def refusal(use: Callable[[], object]) -> str:
+    with pytest.raises(BusError) as error:
+        use()
+    told = str(error.value)
+    assert told.isprintable()
+    assert ".rs" not in told
+    return told
+
+
+def after_all(writer: Bus, reader: Bus) -> Callable[[], object]:
+    """A function that waits until all that `writer` has put so far is with `reader`."""
+    end, numbers = reader.tap("end"), count()
+
+    def arrived(mark: bytes) -> bool:
+        writer.session.put("end", mark)
+        return mark in [sample.payload for sample in iter(end.try_recv, None)]
+
+    return lambda: wait_for(partial(arrived, b"%d" % next(numbers)))
+
+
+def test_alone_nobody_is_connected(wire: Wire) -> None:
+    assert not wire.bus().connected()
+
+
+def test_a_plain_put_of_any_zenoh_tool_is_read(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    commands = reader.subscribe("cmd_vel", Twist, TwistStamped)
+    after_all(writer, reader)()
+    writer.session.put("cmd_vel", b'{"linear": {"x": 0.3}}')
+    received = commands.recv()
+    assert received.message == Twist.planar(0.3)
+    assert (received.sample.priority, received.sample.source) == ("DATA", "")
+
+
+def test_a_source_of_any_bytes_is_read_as_a_short_text(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    tap = reader.tap("cmd_vel")
+    after_all(writer, reader)()
+    writer.session.put("cmd_vel", b"{}", attachment=b"\xff" * 1000)
+    assert tap.recv().source == "�" * 80
+
+
+def test_the_newest_are_kept_when_too_many_came(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    commands = reader.subscribe("cmd_vel", Twist, depth=3)
+    wait = after_all(writer, reader)
+    wait()
+    publisher: Publisher[Twist] = writer.publisher("cmd_vel", Twist)
+    for x in range(10):
+        publisher.put(Twist.planar(float(x)))
+    wait()
+    found = iter(commands.try_recv, None)
+    assert [received.message for received in found] == [Twist.planar(float(x)) for x in (7, 8, 9)]
+
+
+def test_a_payload_over_the_limit_is_not_even_copied(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    commands = reader.subscribe("cmd_vel", Twist, limit=100)
+    after_all(writer, reader)()
+    for size in (100, 101):
+        writer.session.put("cmd_vel", b"{}" + b" " * (size - 2))
+    full, over = commands.recv(), commands.recv()
+    assert full.message == Twist()
+    assert (over.error, over.sample.payload, over.sample.size) == ("oversized: 101 bytes", b"", 101)
+
+
+def test_the_latest_message_of_a_key_is_kept(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    odom = reader.latest("odom", Odometry)
+    assert odom.read()[0] is None
+    publisher: Publisher[Odometry] = writer.publisher("odom", Odometry)
+    wait_for(lambda: publisher.matched)
+    for name in ("first", "second"):
+        publisher.put(Odometry(child_frame_id=name))
+    wait_for(lambda: odom.read()[0] == Odometry(child_frame_id="second"))
+    assert odom.wait(after=0, timeout=0)
+
+
+@pytest.mark.parametrize("read", ["tap", "subscribe"])
+def test_a_reader_that_waits_can_be_closed(wire: Wire, read: str) -> None:
+    bus = wire.bus()
+    reader: Any = bus.tap("odom") if read == "tap" else bus.subscribe("odom", Odometry)
+    with ThreadPoolExecutor() as pool:
+        waiting = pool.submit(reader.recv)
+        wait_for(waiting.running)
+        reader.close()
+        with pytest.raises(BusError):
+            waiting.result(10)
+
+
+def test_a_latest_can_be_closed_and_its_thread_ends(wire: Wire) -> None:
+    bus, before = wire.bus(), set(threading.enumerate())
+    odom = bus.latest("odom", Odometry)
+    (thread,) = set(threading.enumerate()) - before
+    odom.close()
+    thread.join(10)
+    assert not thread.is_alive()
+
+
+def test_a_closed_bus_ends_its_readers_and_may_be_closed_again(wire: Wire) -> None:
+    bus = wire.bus()
+    tap = bus.tap("odom")
+    bus.close()
+    bus.close()
+    with pytest.raises(BusError):
+        tap.recv()
+    assert "session closed" in refusal(lambda: bus.tap("odom"))
+
+
+WRONG_KEYS = ["", "/odom", "odom/", "a//b", "a?b", "a#b", "a$b", "**/**"]
+
+
+@pytest.mark.parametrize("key", WRONG_KEYS)
+def test_a_wrong_key_is_named_whatever_it_was_for(wire: Wire, key: str) -> None:
+    bus = wire.bus()
+    uses: list[Callable[[], object]] = [
+        lambda: bus.tap(key),
+        lambda: bus.subscribe(key, Twist),
+        lambda: bus.latest(key, Twist),
+        lambda: bus.publisher(key, Twist),
+        lambda: bus.serve(key, TriggerRequest, TriggerReply, lambda _: TriggerReply()),
+        lambda: bus.call(key, TriggerRequest(), TriggerReply),
+    ]
+    for use in uses if "?" not in key else uses[:-1]:  # one may call with parameters
+        assert f" {key!r}: Invalid Key Expr `{key}`" in refusal(use)
+
+
+def test_a_wrong_key_leaves_nothing_in_the_graph(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    refusal(lambda: writer.publisher("a$b", Twist))
+    writer.publisher("odom", Odometry)
+    graph = reader.graph()
+    wait_for(graph.endpoints)
+    assert [endpoint.key for endpoint in graph.endpoints()] == ["odom"]
+
+
+def test_a_service_that_is_not_there_yet_is_waited_for(wire: Wire) -> None:
+    server, caller = wire.bus("server"), wire.bus("caller")
+    asking = threading.Event()
+    with ThreadPoolExecutor() as pool:
+
+        def call() -> TriggerReply:
+            asking.set()
+            return caller.call("resume", TriggerRequest(), TriggerReply, 10)
+
+        reply = pool.submit(call)
+        assert asking.wait(10)
+        server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply()).start()
+        assert reply.result() == TriggerReply()
+
+
+def test_a_service_that_is_not_there_is_named_with_the_time_it_had(wire: Wire) -> None:
+    with pytest.raises(
+        NoReply, match=r"^no reply from 'resume' within 0\.05 s; `holozen service list` shows who serves$"
+    ):
+        wire.bus().call("resume", TriggerRequest(), TriggerReply, timeout=0.05)
+
+
+def test_a_service_that_is_there_but_silent_is_no_refusal(pair: tuple[Bus, Bus]) -> None:
+    """The controller asks a service again that did not answer, and gives up at one that refused."""
+    server, caller = pair
+    server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())  # and nobody looks
+    with pytest.raises(NoReply, match=r"within 0\.1 s"):
+        caller.call("resume", TriggerRequest(), TriggerReply, timeout=0.1)
+
+
+def test_a_reply_that_is_none_is_an_error_of_the_service(wire: Wire) -> None:
+    bus = wire.bus()
+    bus.serve("next_goal", NextGoalRequest, TriggerReply, lambda _: TriggerReply()).start()
+    with pytest.raises(ServiceError, match=r"^the reply of 'next_goal' is not a NextGoalReply: .*`success`"):
+        bus.call("next_goal", NextGoalRequest(), NextGoalReply)
+
+
+def test_the_graph_shows_who_reads_writes_and_serves(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    writer.publisher("Fred/odom", Odometry)
+    writer.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())
+    reader.subscribe("**/odom", Odometry)
+    expected = {
+        Endpoint("Fred/odom", "pub", "nav_msgs/msg/Odometry", "first", writer.id),
+        Endpoint("resume", "srv", "std_srvs/srv/Trigger", "first", writer.id),
+        Endpoint("**/odom", "sub", "nav_msgs/msg/Odometry", "second", reader.id),
+    }
+    graph = reader.graph()
+    wait_for(lambda: set(graph.endpoints()) == expected)
+    writer.close()
+    wait_for(lambda: {endpoint.node for endpoint in graph.endpoints()} == {"second"})
+
+
+def test_only_what_runs_long_is_a_node(wire: Wire) -> None:
+    lasting = wire.bus("sim", lasting=True)
+    wire.bus("topic_echo")
+    graph = wire.bus("me").graph()
+    wait_for(graph.endpoints)
+    assert graph.endpoints() == [Endpoint("", "node", "", "sim", lasting.id)]
+
+
+def test_when_the_holder_of_the_door_goes_another_opens_it_and_late_joiners_get_in(wire: Wire) -> None:
+    holder, heir = wire.bus("holder", lasting=True), wire.bus("heir", lasting=True)
+    wait_for(heir.connected)
+    holder.close()
+    wait_for(lambda: not heir.connected())
+    wait_for(lambda: not is_free(wire.endpoint))
+    late = wire.bus("late")
+    wait_for(late.connected)
+
+
+def test_what_does_not_run_long_leaves_the_door_shut(wire: Wire) -> None:
+    holder, visitor = wire.bus("holder"), wire.bus("visitor")
+    wait_for(visitor.connected)
+    before = set(threading.enumerate())
+    holder.close()
+    assert is_free(wire.endpoint)
+    assert set(threading.enumerate()) <= before
+
+
+def sockets() -> set[tuple[str, str]]:
+    """(protocol, local address) of this process's sockets that wait for anybody."""
+    mine = set()
+    for entry in os.scandir("/proc/self/fd"):
+        try:
+            mine.add(os.readlink(entry.path))
+        except FileNotFoundError:  # the one of the listing itself
+            continue
+    found = set()
+    for protocol in ("tcp", "tcp6", "udp", "udp6"):
+        for line in Path("/proc/self/net", protocol).read_text().splitlines()[1:]:
+            _, local, _, state, *_, inode = line.split()[:10]
+            waits = state == "0A" or protocol.startswith("udp")
+            if waits and f"socket:[{inode}]" in mine:
+                found.add((protocol, local.partition(":")[0]))
+    return found
+
+
+def test_a_bus_listens_on_loopback_only(wire: Wire) -> None:
+    wire.bus(lasting=True)
+    assert sockets() == {("tcp", "0100007F")}  # 127.0.0.1, as the kernel writes it
+
+
+@pytest.mark.parametrize(
+    ("connection", "told"),
+    [
+        (Connection(config="no/such.json5"), "Zenoh configuration no/such.json5: No such file or directory"),
+        (Connection(connect=("nonsense",)), 'Zenoh setting connect/endpoints:["nonsense"]: '),
+        (Connection(connect=("pigeon/127.0.0.1:1",)), "cannot open Zenoh: Unicast not supported for pigeon"),
+        (Connection(cfg=(("no/such", "1"),)), "Zenoh setting no/such:1: "),
+        (Connection(cfg=(("mode", "["),)), "Zenoh setting mode:[: "),
+        (Connection("router", listen=("tcp/192.0.2.1:7447",)), "cannot open Zenoh: Can not create a new TCP listener"),
+        (Connection("client", connect=()), "cannot open Zenoh: No peer specified"),
+    ],
+)
+def test_a_wrong_connection_is_one_line(wire: Wire, connection: Connection, told: str) -> None:
+    listening = connection._replace(listen=connection.listen or (wire.endpoint,))
+    assert refusal(lambda: Bus("test", listening, patience=0)).startswith(told)
+
+
+@pytest.mark.parametrize("text", ["{mode: ", "{nosuch: 1}", "{mode: 'king'}"])
+def test_a_wrong_configuration_file_is_one_line_that_names_it(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "zenoh.json5"
+    path.write_text(text)
+    assert refusal(lambda: Bus("test", Connection(config=str(path)))).startswith(f"Zenoh configuration {path}: ")
+
+
+def test_a_configuration_file_is_read(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "zenoh.json5"
+    path.write_text(f'{{scouting: {{multicast: {{enabled: false}}}}, connect: {{endpoints: ["{wire.endpoint}"]}}}}')
+    wire.bus("door")
+    with Bus("test", Connection(config=str(path), listen=("tcp/127.0.0.1:0",))) as bus:
+        wait_for(bus.connected)
+
+
+def test_a_client_without_its_router_gives_up_after_its_patience(wire: Wire) -> None:
+    told = refusal(lambda: Bus("test", Connection("client", connect=(wire.endpoint,)), patience=0))
+    assert told.startswith("cannot open Zenoh: Unable to connect to any of ")
+    assert wire.endpoint in told
+
+
+def test_a_client_that_waits_ends_in_peace_when_it_is_told_to(wire: Wire) -> None:
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(SystemExit) as end:
+        Bus("test", Connection("client", connect=(wire.endpoint,)), stop=stop)
+    assert end.value.code == 0
+
+
+def test_a_client_waits_for_its_router_and_says_so(wire: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+    with ThreadPoolExecutor() as pool:
+        client = pool.submit(Bus, "client", Connection("client", connect=(wire.endpoint,)))
+        wait_for(lambda: wire.endpoint in capsys.readouterr().err)
+        with Bus("router", Connection("router", listen=(wire.endpoint,))), client.result(10) as bus:
+            wait_for(bus.connected)

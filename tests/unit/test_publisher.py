@@ -1,0 +1,75 @@
+"""A publisher writes messages, and gives the last one to whoever asks."""
+
+import math
+
+import pytest
+
+from holozen.bus import Bus, Publisher
+from holozen.codec import WIRES, CodecError
+from holozen.messages import Odometry, Twist, Vector3
+from holozen.testing import Wire, wait_for
+
+
+def last(bus: Bus, key: str) -> list[tuple[bytes, str]]:
+    replies = bus.session.get(key, timeout=10)
+    return [(bytes(reply.ok.payload), str(reply.ok.encoding)) for reply in replies if reply.ok]
+
+
+@pytest.mark.parametrize("name", WIRES)
+def test_what_is_put_arrives_with_encoding_priority_and_source(wire: Wire, name: str) -> None:
+    writer, reader = wire.bus("writer", wire=name), wire.bus("reader")
+    subscription = reader.subscribe("cmd_vel", Twist)
+    publisher: Publisher[Twist] = writer.publisher("cmd_vel", Twist, "DATA_LOW")
+    wait_for(lambda: publisher.matched)
+    publisher.put(Twist.planar(0.5))
+    received = subscription.recv()
+    assert received.message == Twist.planar(0.5)
+    sample = received.sample
+    assert (sample.key, sample.encoding) == ("cmd_vel", WIRES[name])
+    assert (sample.priority, sample.source) == ("DATA_LOW", writer.source)
+    assert writer.source.startswith("writer@")
+
+
+def test_nobody_matches_until_somebody_subscribes(wire: Wire) -> None:
+    publisher: Publisher[Twist] = wire.bus("writer").publisher("cmd_vel", Twist)
+    assert not publisher.matched
+    reader = wire.bus("reader").subscribe("cmd_vel", Twist)
+    wait_for(lambda: publisher.matched)
+    reader.close()
+    wait_for(lambda: not publisher.matched)
+
+
+def test_a_get_is_answered_with_the_last_message(wire: Wire) -> None:
+    writer, reader = wire.bus("writer"), wire.bus("reader")
+    publisher: Publisher[Odometry] = writer.publisher("odom", Odometry)
+    assert last(writer, "odom") == []
+    publisher.put(Odometry(child_frame_id="first"))
+    publisher.put(Odometry(child_frame_id="second"))
+    ((payload, encoding),) = wait_for(lambda: last(reader, "odom"))
+    assert b'"second"' in payload
+    assert encoding == "application/json"
+
+
+def test_a_number_that_is_not_finite_is_neither_sent_nor_remembered(wire: Wire) -> None:
+    bus = wire.bus()
+    subscription = bus.subscribe("cmd_vel", Twist)
+    publisher: Publisher[Twist] = bus.publisher("cmd_vel", Twist)
+    publisher.put(Twist.planar(1))
+    with pytest.raises(CodecError, match=r"^Twist\.linear\.y is not a finite number$"):
+        publisher.put(Twist(Vector3(y=math.nan)))
+    publisher.put(Twist.planar(2))
+    assert [subscription.recv().message for _ in range(2)] == [Twist.planar(1), Twist.planar(2)]
+    with pytest.raises(CodecError):
+        publisher.put(Twist(Vector3(y=math.inf)))
+    assert b'"x":2' in last(bus, "cmd_vel")[0][0]
+
+
+def test_a_closed_publisher_leaves_nothing_of_its_key(wire: Wire) -> None:
+    writer, reader = wire.bus("writer"), wire.bus("reader")
+    graph = reader.graph()
+    publisher: Publisher[Twist] = writer.publisher("cmd_vel", Twist)
+    publisher.put(Twist())
+    wait_for(graph.endpoints)
+    publisher.close()
+    wait_for(lambda: not graph.endpoints())
+    assert last(writer, "cmd_vel") == []

@@ -1,0 +1,162 @@
+"""Requests are typed, and every failure is a reply that says why."""
+
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+
+from holozen.bus import Bus, NoReply, ServiceError
+from holozen.codec import WIRES
+from holozen.messages import NextGoalReply, NextGoalRequest, TriggerReply, TriggerRequest
+from holozen.server import MAX_REQUEST_BYTES, reason
+from holozen.testing import Wire, wait_for
+
+
+def goal(request: NextGoalRequest) -> NextGoalReply:
+    if request.request_goal < 0:
+        raise ServiceError("goal -1: there is none\nat all")
+    return NextGoalReply(x_goal=10 / request.request_goal)
+
+
+@pytest.fixture
+def caller(wire: Wire) -> Bus:
+    """A bus beside one that serves next_goal."""
+    server, caller = wire.bus("server"), wire.bus("caller")
+    server.serve("next_goal", NextGoalRequest, NextGoalReply, goal).start()
+    return caller
+
+
+def failure(caller: Bus, payload: bytes, encoding: str = "application/json") -> str:
+    with pytest.raises(ServiceError) as error:
+        caller.call_bytes("next_goal", payload, encoding, 10)
+    assert not isinstance(error.value, NoReply)
+    return str(error.value)
+
+
+def test_a_request_gets_its_reply(caller: Bus) -> None:
+    assert caller.call("next_goal", NextGoalRequest(4), NextGoalReply) == NextGoalReply(2.5)
+    assert caller.call("next_goal", NextGoalRequest(5), NextGoalReply) == NextGoalReply(2.0)
+
+
+@pytest.mark.parametrize("name", WIRES)
+def test_a_server_speaks_its_wire_and_understands_the_others(wire: Wire, name: str) -> None:
+    wire.bus("server", wire=name).serve("next_goal", NextGoalRequest, NextGoalReply, goal).start()
+    for other in WIRES:
+        caller = wire.bus("caller", wire=other)
+        assert caller.call("next_goal", NextGoalRequest(4), NextGoalReply) == NextGoalReply(2.5)
+    assert caller.call_bytes("next_goal", b'{"request_goal": 1}', "", 10).encoding == WIRES[name]
+
+
+def test_a_refusal_arrives_in_the_words_of_the_service(caller: Bus) -> None:
+    with pytest.raises(ServiceError, match=r"^goal -1: there is none\nat all$"):
+        caller.call("next_goal", NextGoalRequest(-1), NextGoalReply)
+
+
+def test_a_handler_that_breaks_tells_its_own_log_and_not_the_caller(
+    caller: Bus, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(ServiceError, match=r"^next_goal: internal error, see the server's log$"):
+        caller.call("next_goal", NextGoalRequest(0), NextGoalReply)
+    assert capsys.readouterr().err == "next_goal: ZeroDivisionError: division by zero\n"
+    assert caller.call("next_goal", NextGoalRequest(1), NextGoalReply) == NextGoalReply(10)
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding", "told"),
+    [
+        (b'{"request_gaol": 1}', "application/json", "contains unknown field `request_gaol`"),
+        (b"[]", "application/json", "not a NextGoalRequest: Expected `object`, got `array`"),
+        (b"{}", "image/png", "encoding 'image/png' is not understood"),
+    ],
+)
+def test_a_request_that_is_none_is_refused_with_the_reason(
+    caller: Bus, payload: bytes, encoding: str, told: str
+) -> None:
+    assert told in failure(caller, payload, encoding)
+
+
+def test_a_request_that_is_too_large_is_not_read(caller: Bus) -> None:
+    size = MAX_REQUEST_BYTES + 1
+    assert failure(caller, b"x" * size) == f"request of {size} bytes; at most {MAX_REQUEST_BYTES} are read"
+
+
+def selected(caller: Bus, selector: str) -> str:
+    def ask() -> str:
+        (reply,) = list(caller.session.get(selector, timeout=10)) or (None,)
+        end = reply and (reply.ok or reply.err)
+        return bytes(end.payload).decode() if end else ""
+
+    return str(wait_for(ask))
+
+
+def test_a_get_without_payload_asks_by_its_parameters(caller: Bus) -> None:
+    assert '"x_goal":2.5' in selected(caller, "next_goal?request_goal=4")
+    assert "`int`" in selected(caller, "next_goal?request_goal=four")
+    assert "unknown field `gaol`" in selected(caller, "next_goal?gaol=4")
+
+
+def test_a_look_around_by_a_wildcard_asks_nobody_to_do_anything(wire: Wire) -> None:
+    asked = []
+
+    def resume(request: TriggerRequest) -> TriggerReply:
+        asked.append(request)
+        return TriggerReply()
+
+    server, caller = wire.bus("sim"), wire.bus("caller")
+    for key in ("resume", "Fred/resume"):
+        server.serve(key, TriggerRequest, TriggerReply, resume).start()
+    assert caller.call("resume", TriggerRequest(), TriggerReply).success
+    for key in ("**", "*", "*/resume", "Fred/*"):
+        assert list(caller.session.get(key, timeout=10)) == []
+    assert len(asked) == 1
+
+
+def test_requests_wait_until_the_server_looks(wire: Wire) -> None:
+    """The sim answers between two steps."""
+    asked = []
+
+    def resume(request: TriggerRequest) -> TriggerReply:
+        asked.append(request)
+        return TriggerReply()
+
+    server_bus, caller = wire.bus("sim"), wire.bus("caller")
+    server = server_bus.serve("resume", TriggerRequest, TriggerReply, resume)
+    server.answer_pending()  # nothing waits
+    with ThreadPoolExecutor() as pool:
+        reply = pool.submit(caller.call, "resume", TriggerRequest(), TriggerReply, 10)
+
+        def answered() -> bool:
+            server.answer_pending()
+            return reply.done()
+
+        wait_for(answered)
+    assert reply.result() == TriggerReply()
+    assert asked == [TriggerRequest()]
+
+
+def test_a_closed_server_answers_no_more(wire: Wire) -> None:
+    bus = wire.bus("server")
+    server = bus.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())
+    server.start()
+    assert bus.call("resume", TriggerRequest(), TriggerReply).success
+    server.close()
+    with pytest.raises(NoReply):
+        bus.call("resume", TriggerRequest(), TriggerReply, timeout=0.05)
+
+
+@pytest.mark.parametrize(
+    ("payload", "text"),
+    [
+        (b'{"error": "no such goal"}', "no such goal"),
+        (b'{"error": 7}', "7"),
+        (b"plain words", "plain words"),
+        (b'"error"', '"error"'),
+        (b'["error"]', '["error"]'),
+        (b"{}", "{}"),
+        (b"", "the service answered with an error and no reason"),
+        (b"\xff", "�"),
+        (b"[" * 50_000, "[" * 50_000),
+    ],
+    ids=lambda value: str(value[:12]),
+)
+def test_the_reason_of_ours_and_of_strangers_is_shown(payload: bytes, text: str) -> None:
+    assert reason(payload) == text

@@ -1,0 +1,85 @@
+"""The table of the wire is consistent, and only names that Zenoh takes literally name a robot."""
+
+import string
+
+import pytest
+import zenoh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holozen import wire
+from holozen.readers import PRIORITIES
+
+LETTERS = string.ascii_letters
+
+
+@pytest.mark.parametrize("name", ["F", "Fred", "hb_bot", "robot-2", "x" * 64, "Z9_-"])
+def test_a_letter_then_letters_digits_underscores_and_dashes_name_a_robot(name: str) -> None:
+    assert wire.robot_name(name) == name
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["", "*", "**", "$*", "a/b", "a/", "/a", "Fred\n", "\nFred", "Fr ed", "9lives", "_x", "-x", "x" * 65, "é", "a.b",
+     "a?b", "a#b", "@a", "\u0661", "F\0"],
+)  # fmt: skip
+def test_any_other_name_is_refused_and_quoted_in_one_line(name: str) -> None:
+    with pytest.raises(ValueError) as error:
+        wire.robot_name(name)
+    assert repr(name) in str(error.value)
+    assert "\n" not in str(error.value)
+    assert "such as Fred" in str(error.value)
+
+
+@given(st.text(LETTERS + string.digits + "_-*$/@?#\n .", min_size=1, max_size=70))
+def test_a_robot_that_may_have_its_name_is_reached_by_no_other_key(name: str) -> None:
+    try:
+        key = wire.key_for("cmd_vel", wire.robot_name(name))
+    except ValueError:
+        return
+    assert not zenoh.KeyExpr(key).includes(zenoh.KeyExpr("*/cmd_vel"))
+    assert zenoh.KeyExpr("*/cmd_vel").includes(zenoh.KeyExpr(key))
+
+
+def test_the_robot_at_the_root_has_the_bare_key_and_a_named_one_its_own() -> None:
+    assert wire.key_for("cmd_vel") == "cmd_vel"
+    assert wire.key_for("cmd_vel", "Fred") == "Fred/cmd_vel"
+
+
+def test_a_row_is_found_with_and_without_a_robots_name() -> None:
+    assert wire.topic("odom") is wire.topic("Fred/odom") is wire.TOPICS[1]
+    assert wire.service("next_goal") is wire.service("Fred/next_goal") is wire.SERVICES[0]
+    assert wire.topic("next_goal") is None
+    assert wire.service("odom") is None
+    assert wire.topic("modo") is None
+
+
+def test_each_key_is_in_the_table_once() -> None:
+    keys = [row.key for row in (*wire.TOPICS, *wire.SERVICES)]
+    assert len(keys) == len(set(keys))
+
+
+@pytest.mark.parametrize("row", wire.TOPICS, ids=lambda row: str(row.key))
+def test_each_topic_has_a_type_a_writer_and_a_rate_that_outruns_its_silence(row: wire.Topic) -> None:
+    assert row.type is row.types[0]
+    assert row.writers
+    assert not set(row.writers) & set(row.readers)
+    assert row.rate * row.silence > 2  # one lost message is no silence
+
+
+def test_the_rules_name_their_own_numbers() -> None:
+    for key in ("cmd_vel", "odom"):
+        row = wire.topic(key)
+        assert row is not None
+        assert row.rule.startswith(f"{row.silence:g} s")
+    assert wire.TOPICS[0].silence == wire.COMMAND_SILENCE == 0.5
+
+
+def test_a_person_beats_a_script_and_a_script_the_controller() -> None:
+    ranks = [PRIORITIES.index(name) for name in (wire.PRIORITY_OF["teleop"], "DATA", wire.PRIORITY_OF["controller"])]
+    assert ranks == sorted(set(ranks))
+    assert tuple(wire.PRIORITY_OF) == wire.TOPICS[0].writers
+
+
+def test_the_priorities_are_counted_as_zenoh_counts_them() -> None:
+    assert [int(getattr(zenoh.Priority, name)) for name in PRIORITIES] == list(range(1, 8))

@@ -1,0 +1,202 @@
+"""The wheel in clean environments: everything is in it, under one name, and each verb runs or says why not.
+
+Nothing is downloaded: what the lock file already brought is lent to the new environments by path.
+"""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import sysconfig
+import zipfile
+from importlib.metadata import distribution, requires, version
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen.cli import VERBS
+from holozen.messages import Odometry
+from holozen.testing import Process, Terminal, Wire, wait_for
+
+REPO = Path(__file__).parents[2]
+NEEDED = ("eclipse-zenoh", "msgspec")
+CLEAN = {"PYTHONPATH": ""}
+
+
+def run(*words: str | Path, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    env = {**os.environ, **CLEAN}
+    return subprocess.run(list(map(str, words)), capture_output=True, text=True, timeout=120, env=env, cwd=cwd)
+
+
+def good(*words: str | Path, cwd: Path | None = None) -> str:
+    done = run(*words, cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, built from the source distribution, built from a copy of what the repo holds."""
+    source, dist = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("dist")
+    listed = run("git", "ls-files", "--cached", "--others", "--exclude-standard", "-z", cwd=REPO)
+    if listed.returncode:
+        pytest.skip("not a git checkout")
+    for name in filter(None, listed.stdout.split("\0")):
+        if (REPO / name).is_file():
+            (source / name).parent.mkdir(parents=True, exist_ok=True)
+            (source / name).write_bytes((REPO / name).read_bytes())
+    good(sys.executable, "-m", "build", "--no-isolation", "--outdir", dist, source)
+    (sdist,) = dist.glob("*.tar.gz")
+    assert sdist.stat().st_size < 2_000_000
+    (wheel,) = dist.glob("*.whl")
+    return wheel
+
+
+def environment(folder: Path, wheel: Path, lent: Path) -> Path:
+    """A new environment with the wheel in it, and the libraries in the folder `lent`."""
+    good(sys.executable, "-m", "venv", "--without-pip", folder)
+    (packages,) = folder.glob("lib/python*/site-packages")
+    before = set(os.listdir(packages))
+    good(sys.executable, "-m", "pip", "--python", folder, "install", "--no-deps", "--no-index", "--quiet", wheel)
+    assert {name for name in set(os.listdir(packages)) - before if not name.endswith(".dist-info")} == {"holozen"}
+    (packages / "lent.pth").write_text(f"{lent}\n")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with every extra."""
+    return environment(tmp_path_factory.mktemp("full") / "venv", wheel, Path(sysconfig.get_path("purelib")))
+
+
+@pytest.fixture(scope="module")
+def bare(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with what holozen needs without any extra."""
+    lent = tmp_path_factory.mktemp("lent")
+    for name in NEEDED:
+        files = distribution(name).files or []
+        for top in {file.parts[0] for file in files if file.parts[0] not in ("..", "__pycache__")}:
+            (lent / top).symlink_to(Path(str(distribution(name).locate_file(top))))
+    return environment(tmp_path_factory.mktemp("bare") / "venv", wheel, lent)
+
+
+def holozen(environment: Path) -> Path:
+    return environment / "bin" / "holozen"
+
+
+def answer(environment: Path, code: str) -> Any:
+    return json.loads(good(environment / "bin" / "python", "-I", "-c", f"import json; {code}", cwd=environment))
+
+
+def test_the_needed_libraries_are_those_that_are_declared() -> None:
+    declared = [line for line in requires("holozen") or [] if "extra ==" not in line]
+    assert sorted(re.split("[<>=!~ ]", line)[0] for line in declared) == sorted(NEEDED)
+
+
+def test_the_wheel_holds_one_package_and_nothing_of_the_tests(wheel: Path) -> None:
+    names = zipfile.ZipFile(wheel).namelist()
+    assert {name.partition("/")[0] for name in names if ".dist-info" not in name} == {"holozen"}
+    assert not [name for name in names if name.endswith((".pyc", ".orig")) or "tests" in name]
+
+
+def test_every_file_of_the_library_and_the_services_is_in_the_wheel(wheel: Path) -> None:
+    names = set(zipfile.ZipFile(wheel).namelist())
+    for top, there in (("holozen", "holozen"), ("services", "holozen"), *((d, f"holozen/{d}") for d in DATA)):
+        files = [path for path in (REPO / top).rglob("*") if path.is_file() and "__pycache__" not in path.parts]
+        assert {f"{there}/{path.relative_to(REPO / top).as_posix()}" for path in files} <= names
+
+
+DATA = ("meshes", "urdf", "worlds")
+
+
+def test_there_is_no_package_called_services(full: Path) -> None:
+    code = (
+        "from importlib.util import find_spec as f; print(json.dumps([f('services') is None, f('holozen.sim').origin]))"
+    )
+    none, origin = answer(full, code)
+    assert none is True
+    assert origin.startswith(str(full))
+
+
+def test_it_is_typed(full: Path) -> None:
+    (package,) = full.glob("lib/python*/site-packages/holozen")
+    assert (package / "py.typed").exists()
+
+
+def test_help_and_version_are_told_without_any_extra(bare: Path) -> None:
+    assert "usage: holozen VERB" in good(holozen(bare), "--help")
+    assert good(holozen(bare), "--version") == f"{version('holozen')}\n"
+
+
+@pytest.mark.parametrize("verb", [verb for verb in VERBS if verb != "xacro"])
+def test_every_verb_has_help_without_any_extra(bare: Path, verb: str) -> None:
+    assert f"usage: holozen {verb}" in good(holozen(bare), verb, "--help")
+
+
+def test_data_files_are_found_inside_the_package(full: Path) -> None:
+    for name in ("'urdf', 'hb_bot.urdf.xacro'", "'meshes', 'base.dae'", "'worlds', 'gazebo.world'"):
+        path = Path(answer(full, f"from holozen import data; print(json.dumps(str(data.find({name}))))"))
+        assert path.is_file()
+        assert full in path.parents
+
+
+def test_the_robot_is_expanded_with_the_meshes_beside_it(full: Path) -> None:
+    (robot,) = full.glob("lib/python*/site-packages/holozen/urdf/hb_bot.urdf.xacro")
+    text = good(holozen(full), "xacro", robot)
+    assert f"{robot.parents[1]}/meshes/wheel.stl" in text
+
+
+def test_the_sim_starts_from_the_wheel_and_publishes_odom(full: Path, wire: Wire) -> None:
+    odom = wire.bus().latest("odom", Odometry)
+    with Process([str(holozen(full)), "sim", *wire.flags], env=CLEAN) as sim:
+        wait_for(lambda: odom.count > 3, within=20, what=lambda: sim.err)
+        assert sim.terminate() == 0
+        assert sim.err == "sim: hb_bot listens on cmd_vel\n"
+
+
+def test_the_sim_without_its_extra_says_which_one(bare: Path, wire: Wire) -> None:
+    done = run(holozen(bare), "sim", *wire.flags)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert re.fullmatch(r"holozen sim needs (numpy|pybullet|xacro); run: pip install 'holozen\[sim\]'\n", done.stderr)
+
+
+def test_the_teleop_without_its_extra_says_which_one(bare: Path, wire: Wire) -> None:
+    with Terminal([str(holozen(bare)), "teleop", *wire.flags], env=CLEAN) as terminal:
+        assert terminal.process.wait(20) == 1
+        wait_for(lambda: "holozen teleop needs prompt_toolkit; run: pip install 'holozen[teleop]'" in terminal.raw)
+        assert "Traceback" not in terminal.raw
+
+
+def test_xacro_without_its_extra_says_what_to_install(bare: Path) -> None:
+    (robot,) = bare.glob("lib/python*/site-packages/holozen/urdf/hb_bot.urdf.xacro")
+    done = run(holozen(bare), "xacro", robot)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "pip install" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_what_needs_no_extra_runs_without_any(bare: Path, wire: Wire) -> None:
+    with Process([str(holozen(bare)), "pose-service", *wire.flags], env=CLEAN) as service:
+        service.wait_for_line("4 goals from square")
+        words = ["service", "call", "next_goal", '{"request_goal": 3}', "--json", *wire.flags]
+        reply = json.loads(good(holozen(bare), *words))
+        assert service.terminate() == 0
+    assert (reply["x_goal"], reply["end_of_list"]) == (0.0, 1)
+
+
+def test_yaml_without_its_library_says_what_to_install(bare: Path, wire: Wire) -> None:
+    done = run(holozen(bare), "topic", "pub", "cmd_vel", "linear: {x: 1}", *wire.flags)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "pip install pyyaml" in done.stderr
+    assert done.stderr.count("\n") == 1
+
+
+def test_pytest_finds_the_fixtures_by_the_entry_point(full: Path, tmp_path: Path) -> None:
+    test = tmp_path / "test_mine.py"
+    test.write_text(
+        "def test_mine(wire, wait_for):\n    bus = wire.bus('me', lasting=True)\n    wait_for(bus.graph().endpoints)\n"
+    )
+    told = good(full / "bin" / "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", test, cwd=tmp_path)
+    assert "1 passed" in told
