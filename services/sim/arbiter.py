@@ -44,7 +44,7 @@ class Arbiter:
         rank = max(rank, PERSON)
         driver = self.driver(now)
         other = driver if driver and driver.source != source else None
-        stops = velocity == STOP and other is not None and rank <= other.rank
+        stops = velocity == STOP and driver is not None and rank <= driver.rank
         if other and rank >= other.rank and not stops and now - other.heard <= COMMAND_SILENCE:
             if rank > other.rank:
                 self._hold(source)
