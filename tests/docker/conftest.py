@@ -27,7 +27,7 @@ def engine() -> None:
         run(str(BASE), within=500)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="package")
 def image(engine: None) -> Iterator[str]:
     """The name of an image built from this tree by docker-compose; it is removed afterwards."""
     name = f"holozen-test:{uuid4().hex[:8]}"
