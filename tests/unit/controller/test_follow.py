@@ -22,12 +22,13 @@ from holozen.messages import (
     Quaternion,
     Time,
     Twist,
+    TwistWithCovariance,
 )  # fmt: skip
 from holozen.testing import Wire, wait_for
 from services.controller.follow import Follower
 from services.controller.goto import Gains, Leg
 
-QUICK = Gains(max_speed=10, max_turn=20, max_acceleration=100, max_turn_acceleration=100, linear=5, angular=5)
+QUICK = Gains(max_speed=2, max_turn=5, max_acceleration=10, max_turn_acceleration=20, linear=3, angular=3)
 STEP = 0.01  # s of the robot's clock between two odoms
 GOALS = [(0.5, 0.0, 1.0), (0.5, 0.5, 0.0)]
 
@@ -36,7 +37,7 @@ class Robot:
     """An ideal robot whose clock runs as fast as its thread does."""
 
     def __init__(self, bus: Bus) -> None:
-        self.bus, self.moving = bus, threading.Event()
+        self.bus, self.moving, self.slips = bus, threading.Event(), threading.Event()
         self.commands: Subscription[Twist] = bus.subscribe("cmd_vel", Twist)
         self.heard: list[Twist] = []
         self.pose = (0.0, 0.0, 0.0)
@@ -45,8 +46,10 @@ class Robot:
         self._velocity: Planar = STOP
         self._time = 0.0
 
-    def status(self, **fields: object) -> None:
+    def status(self, **fields: object) -> bool:
+        """Tell who drives; whether anybody listens."""
         self._status.put(CommandStatus(**fields))  # type: ignore[arg-type]
+        return self._status.matched
 
     def live(self, end: threading.Event) -> None:
         """Hear, move and tell until the end; pauses while `moving` is not set."""
@@ -59,14 +62,15 @@ class Robot:
             assert received.message is not None
             self.heard.append(received.message)
             linear, angular = received.message.linear, received.message.angular
-            self._velocity = (linear.x, linear.y, angular.z)
+            self._velocity = (0.1, 0.0, 0.0) if self.slips.is_set() else (linear.x, linear.y, angular.z)
         x, y, yaw = self.pose
         vx, vy = to_world(self._velocity, yaw, STEP)
         self.pose = x + vx * STEP, y + vy * STEP, yaw + self._velocity[2] * STEP
         self._time += STEP
         turned = Quaternion(0, 0, math.sin(self.pose[2] / 2), math.cos(self.pose[2] / 2))
         pose = PoseWithCovariance(Pose(Point(self.pose[0], self.pose[1]), turned))
-        self._odom.put(Odometry(Header(Time.of(self._time)), pose=pose))
+        twist = TwistWithCovariance(Twist.planar(*self._velocity))
+        self._odom.put(Odometry(Header(Time.of(self._time)), pose=pose, twist=twist))
 
 
 class Case:
@@ -113,7 +117,7 @@ def test_a_lap_visits_every_goal_and_ends_standing(case: Case) -> None:
     wait_for(lambda: case.robot.heard[-1] == Twist())
     assert case.robot.pose == pytest.approx(GOALS[-1], abs=0.03)
     assert legs[0].began < legs[0].ended <= legs[1].began < legs[1].ended
-    assert all(leg.path_error < 0.1 for leg in legs)
+    assert all(leg.path_error < 0.3 for leg in legs)
 
 
 def test_commands_have_the_priority_of_an_autopilot(case: Case) -> None:
@@ -169,8 +173,7 @@ def test_when_odom_goes_stale_it_stops_the_robot_once(case: Case) -> None:
 
 
 def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) -> None:
-    case.robot.status(obeyed="teleop@9", held=True)
-    wait_for(lambda: case.follower._status.count)
+    wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.follower._status.count)
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.said)
@@ -179,6 +182,41 @@ def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) 
     case.robot.status(resumed=1)
     assert len(lap.result(30)) == 2
     assert "goes on" in case.said
+
+
+def test_a_goal_beyond_any_floor_is_not_driven_to(case: Case) -> None:
+    def next_goal(_request: NextGoalRequest) -> NextGoalReply:
+        return NextGoalReply(2e6)
+
+    case.robot.bus.serve("next_goal", NextGoalRequest, NextGoalReply, next_goal).start()
+    lap = case.lap()
+    wait_for(lambda: case.said)
+    assert case.said == ["goal 0 is more than 1e+06 m away; waiting for another"]
+    case.stop.set()
+    assert lap.result(30) == []
+    assert case.robot.heard == []
+
+
+def test_a_pose_beyond_any_floor_is_not_believed(case: Case) -> None:
+    case.robot.pose = (-2e6, 0.0, 0.0)
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.said)
+    assert case.said == ["waiting for odom: its pose is more than 1e+06 m away"]
+    assert case.robot.heard == []
+    case.robot.pose = (0.0, 0.0, 0.0)
+    assert len(lap.result(30)) == 2
+
+
+def test_a_stop_is_repeated_until_the_robot_rests(case: Case) -> None:
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.robot.heard)
+    case.robot.slips.set()  # a robot that goes on whatever it is told
+    case.stop.set()
+    lap.result(30)
+    case.follower.halt()
+    assert case.robot.heard.count(Twist()) > 3
 
 
 def test_told_to_stop_it_ends_its_lap_and_halts_the_robot(case: Case) -> None:

@@ -1,0 +1,1 @@
+"""Real processes on loopback Zenoh, real physics, real pseudo-terminals."""

@@ -1,0 +1,92 @@
+"""A sim shared by the tests of a file, and a robot that stands and obeys anybody."""
+
+import contextlib
+import json
+import sys
+from collections.abc import Iterator
+
+import pytest
+import zenoh
+
+from holozen.errors import ServiceError
+from holozen.testing import Process, Wire, wait_for
+
+from .robots import Robot
+
+
+@pytest.fixture(scope="module")
+def town() -> Iterator[Wire]:
+    """A wire for all tests of a file."""
+    with Wire() as wire:
+        yield wire
+
+
+@pytest.fixture(scope="module")
+def sim(town: Wire) -> Process:
+    """A sim with hb_bot at the root, for all tests of a file."""
+    return start_sim(town)
+
+
+@pytest.fixture(scope="module")
+def only_robot(town: Wire, sim: Process) -> Robot:
+    return Robot(town.bus())
+
+
+@pytest.fixture
+def robot(only_robot: Robot) -> Robot:
+    """The file's robot: it stands, and whoever drove before is forgotten."""
+
+    def handed_over() -> bool:
+        with contextlib.suppress(ServiceError):
+            return bool(only_robot.resume())
+        return False
+
+    only_robot.stands()
+    wait_for(handed_over, what="the robot to be handed over")
+    return only_robot
+
+
+def start_sim(wire: Wire, *flags: str) -> Process:
+    """A sim that listens."""
+    sim = wire.start("sim", *flags)
+    sim.wait_for_line("listens on")
+    return sim
+
+
+# A subscriber as Zenoh makes it by default, with a queue that blocks when it is full; nobody reads it.
+DEAF = """
+import sys, time, zenoh
+config = zenoh.Config()
+for path, value in (("mode", '"client"'), ("connect/endpoints", sys.argv[1]), ("scouting/multicast/enabled", "false")):
+    config.insert_json5(path, value)
+session = zenoh.open(config)  # kept: one that nobody holds is closed
+subscriber = session.declare_subscriber(sys.argv[2])
+print("deaf", flush=True)
+time.sleep(3600)
+"""
+
+
+def deaf(wire: Wire, key: str) -> Process:
+    """A stranger that subscribes to a key and never reads."""
+    process = Process([sys.executable, "-c", DEAF, json.dumps([wire.endpoint]), key])
+    process.wait_for_line("deaf")
+    return process
+
+
+@pytest.fixture
+def stranger(town: Wire) -> Iterator[zenoh.Session]:
+    """A plain Zenoh session that knows nothing of holozen."""
+    with zenoh.open(stranger_config(town)) as session:
+        yield session
+
+
+def stranger_config(wire: Wire) -> zenoh.Config:
+    config = zenoh.Config()
+    endpoints = json.dumps([wire.endpoint])
+    for path, value in (
+        ("mode", '"client"'),
+        ("connect/endpoints", endpoints),
+        ("scouting/multicast/enabled", "false"),
+    ):
+        config.insert_json5(path, value)
+    return config

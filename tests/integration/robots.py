@@ -1,0 +1,156 @@
+"""A robot as a test sees it: what it tells, and a hand on its keys."""
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from holozen.bus import Bus, Subscription
+from holozen.messages import CommandStatus, Message, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
+from holozen.readers import Received
+from holozen.testing import wait_for
+from holozen.wire import key_for
+
+RESTS = 1e-6  # m/s and rad/s
+
+
+class Record:
+    """Everything that came on a key since this began, in order."""
+
+    def __init__(self, subscription: Subscription[Any]) -> None:
+        self._subscription = subscription
+        self._received: list[Received[Any]] = []
+
+    def all(self) -> list[Received[Any]]:
+        while (received := self._subscription.try_recv()) is not None:
+            self._received.append(received)
+        return self._received
+
+    def messages(self) -> list[Any]:
+        return [received.message for received in self.all() if received.message is not None]
+
+    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = 10.0) -> Any:
+        """The first message from now on that is as wanted; waits for it."""
+        seen = len(self.messages())
+        return wait_for(lambda: next((m for m in self.messages()[seen:] if wanted(m)), None), within, "such a message")
+
+
+def record(bus: Bus, key: str, *kinds: type[Message]) -> Record:
+    return Record(bus.subscribe(key, *kinds, depth=50_000))
+
+
+class Robot:
+    """One robot: its odom, its status and the commands on its keys, and a publisher of commands."""
+
+    def __init__(self, bus: Bus, name: str = "", priority: str = "DATA") -> None:
+        self.bus, self.name = bus, name
+        self.odom = record(bus, key_for("odom", name), Odometry)
+        self.commands = record(bus, key_for("cmd_vel", name), Twist, TwistStamped)
+        self._status = record(bus, key_for("cmd_vel_status", name), CommandStatus)
+        self._publisher = bus.publisher(key_for("cmd_vel", name), Twist, priority)
+        self.newest()
+
+    def newest(self) -> Odometry:
+        """An odom that was told after this call."""
+        odom: Odometry = self.odom.next()
+        return odom
+
+    def status(self) -> CommandStatus:
+        """A status that was told after this call."""
+        status: CommandStatus = self._status.next()
+        return status
+
+    def status_when(self, wanted: Callable[[CommandStatus], object]) -> CommandStatus:
+        status: CommandStatus = self._status.next(wanted)
+        return status
+
+    def put(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
+        """One command."""
+        self._publisher.put(Twist.planar(x, y, turn))
+
+    def drive(
+        self, x: float = 0.0, y: float = 0.0, turn: float = 0.0, until: Callable[[Odometry], object] | None = None
+    ) -> list[Odometry]:
+        """Command with every odom, until one is as wanted (default: until the robot moves so). The odoms meanwhile."""
+        wanted = until or (lambda odom: moves(odom, x, y, turn))
+        begin = seen = len(self.odom.messages())
+        self.put(x, y, turn)
+
+        def look() -> bool:
+            nonlocal seen
+            new = self.odom.messages()[seen:]
+            seen += len(new)
+            if new:
+                self.put(x, y, turn)
+            return any(wanted(odom) for odom in new)
+
+        wait_for(look, 20, lambda: f"the robot to be driven as told; its status: {self._last_status()}")
+        odoms: list[Odometry] = self.odom.messages()[begin:seen]
+        return odoms
+
+    def stands(self) -> Odometry:
+        """Wait until the robot rests; the odom that shows it."""
+        odom: Odometry = self.odom.next(rests)
+        return odom
+
+    def told_to_stop(self) -> None:
+        """Wait until the last thing anybody said on cmd_vel is a stop."""
+
+        def stopped() -> bool:
+            commands = self.commands.messages()
+            return bool(commands) and not any(planar(commands[-1]))
+
+        wait_for(stopped, what="a stop to be the last command")
+
+    def stop(self) -> Odometry:
+        self.put()
+        return self.stands()
+
+    def pass_time(self, seconds: float) -> Odometry:
+        """Let that much sim time pass."""
+        end = time_of(self.newest()) + seconds
+        odom: Odometry = self.odom.next(lambda odom: time_of(odom) >= end, within=20 + 2 * seconds)
+        return odom
+
+    def resume(self) -> str:
+        """Let everybody drive again. Raises ServiceError if the sim refuses."""
+        return self.bus.call(key_for("resume", self.name), TriggerRequest(), TriggerReply).message
+
+    def _last_status(self) -> Any:
+        messages = self._status.messages()
+        return messages[-1] if messages else None
+
+
+def time_of(odom: Odometry) -> float:
+    return odom.header.stamp.seconds()
+
+
+def place(odom: Odometry) -> tuple[float, float, float]:
+    """x, y in metres and yaw in radians."""
+    pose = odom.pose.pose
+    return pose.position.x, pose.position.y, pose.orientation.yaw()
+
+
+def speeds(odom: Odometry) -> tuple[float, float, float]:
+    twist = odom.twist.twist
+    return twist.linear.x, twist.linear.y, twist.angular.z
+
+
+def rests(odom: Odometry) -> bool:
+    return max(map(abs, speeds(odom))) < RESTS
+
+
+def moves(odom: Odometry, x: float, y: float, turn: float, tolerance: float = 1e-3) -> bool:
+    """Whether the body-frame velocity is as given."""
+    return all(abs(a - b) < tolerance for a, b in zip(speeds(odom), (x, y, turn), strict=True))
+
+
+def distance(one: Odometry, other: Odometry) -> float:
+    """Metres between two odoms, in the plane."""
+    a, b = place(one), place(other)
+    return math.hypot(a[0] - b[0], a[1] - b[1])
+
+
+def planar(command: Twist | TwistStamped) -> tuple[float, float, float, float]:
+    """A command as forward, left, up (m/s) and counter-clockwise (rad/s)."""
+    twist = command.twist if isinstance(command, TwistStamped) else command
+    return twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.z

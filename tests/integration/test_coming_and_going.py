@@ -1,0 +1,202 @@
+"""Processes die and come back; the others carry on, and whoever comes late gets in."""
+
+import contextlib
+import json
+import signal
+import subprocess
+import sys
+import time
+from typing import Any
+
+import pytest
+import zenoh
+
+from holozen.errors import BusError
+from holozen.messages import Odometry, Twist
+from holozen.testing import Process, Wire, wait_for
+
+from .conftest import start_sim, stranger_config
+from .robots import Robot, moves, place
+
+
+def test_a_sim_killed_while_driving_and_started_again_is_driven_on(wire: Wire) -> None:
+    sim = start_sim(wire)
+    robot = Robot(wire.bus())
+    terminal = wire.terminal("teleop", "--key-timeout", "0")
+    terminal.wait_for_text("listening")
+    terminal.type("i")
+    robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
+    sim.kill()
+    terminal.wait_for_text("ODOM IS STALE")
+    assert terminal.process.returncode is None
+    start_sim(wire)
+    robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
+    terminal.wait_for_text("measured  x +0.500")
+    terminal.type("k")
+    robot.stands()
+
+
+def test_a_robot_starts_anew_with_its_sim(wire: Wire) -> None:
+    sim = start_sim(wire)
+    robot = Robot(wire.bus())
+    robot.drive(1.0, until=lambda odom: place(odom)[0] > 0.3)
+    sim.kill()
+    start_sim(wire)
+    assert place(robot.newest()) == pytest.approx((0, 0, 0), abs=1e-3)
+
+
+def holder(wire: Wire) -> int:
+    """The process that listens at the wire's port."""
+    shown = subprocess.run(["ss", "-ltnpH", f"sport = :{wire.port}"], capture_output=True, text=True, check=True)
+    return int(shown.stdout.partition("pid=")[2].partition(",")[0] or 0)
+
+
+def stranger_reads_odom(wire: Wire) -> Any:
+    """A plain Zenoh client that comes now: the odom it gets, None if it cannot get in."""
+    with contextlib.suppress(zenoh.ZError), zenoh.open(stranger_config(wire)) as session:
+        return next((json.loads(bytes(r.ok.payload)) for r in session.get("odom", timeout=1) if r.ok), None)
+    return None
+
+
+@pytest.mark.needs("ss")
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM], ids=lambda n: n.name)
+def test_a_late_client_gets_in_after_the_holder_of_the_door_is_gone(wire: Wire, number: int) -> None:
+    door = wire.start("pose-service")
+    door.wait_for_line("goals")
+    start_sim(wire)
+    other = wire.start("pose-service")
+    other.wait_for_line("goals")
+    assert holder(wire) == door.pid
+    assert stranger_reads_odom(wire)
+    door.signal(number)
+    door.wait()
+    assert wait_for(lambda: stranger_reads_odom(wire), what="a late client to get in")
+    assert holder(wire) not in (0, door.pid)
+
+
+@pytest.mark.needs("ss")
+def test_the_door_is_taken_over_again_and_again(wire: Wire) -> None:
+    processes = {p.pid: p for p in (start_sim(wire), *(wire.start("pose-service") for _ in range(3)))}
+    for process in list(processes.values())[1:]:
+        process.wait_for_line("goals")
+    for left in (3, 2, 1):
+        processes.pop(wait_for(lambda: holder(wire))).kill()
+        wait_for(lambda: holder(wire) in processes, what="another to hold the door")
+        nodes = wait_for(lambda: sorted(wire.run("node", "list").stdout.split()))
+        assert len(nodes) == left
+
+
+def test_a_late_process_of_ours_gets_in_after_the_holder_is_gone(wire: Wire) -> None:
+    door = wire.start("pose-service")
+    door.wait_for_line("goals")
+    start_sim(wire)
+    door.kill()
+    assert wire.run("topic", "echo", "odom", "--once", "--timeout", "10").returncode == 0
+
+
+def test_those_who_met_through_a_holder_talk_on_when_it_is_gone(wire: Wire) -> None:
+    """Gossip made a link of their own."""
+    door = wire.start("pose-service")
+    door.wait_for_line("goals")
+    start_sim(wire)
+    robot = Robot(wire.bus())
+    robot.drive(0.3)
+    door.kill()
+    robot.drive(-0.3)
+
+
+# A bus with what a robot has. It ends by an exception, or after a flood on a peer, given by its pid, that hangs.
+USER = """
+import os, signal, sys
+from holozen.bus import Bus
+from holozen.connection import Connection
+from holozen.messages import Odometry, Twist
+where = Connection(connect=(sys.argv[1],), listen=(sys.argv[1],))
+with Bus("user", where, lasting=True) as bus:
+    odom = bus.latest("odom", Odometry)
+    commands = bus.publisher("cmd_vel", Twist)
+    odom.wait(0, 10)
+    print("ready", flush=True)
+    if sys.argv[2] == "raise":
+        raise RuntimeError("on purpose")
+    os.kill(int(sys.argv[2]), signal.SIGSTOP)
+    for _ in range(100_000):
+        commands.put(Twist())
+print("left", flush=True)
+"""
+
+
+def user(wire: Wire, ends: str) -> Process:
+    return Process([sys.executable, "-c", USER, wire.endpoint, ends])
+
+
+def test_a_process_with_an_open_bus_ends_after_an_exception(wire: Wire) -> None:
+    start_sim(wire)
+    with user(wire, "raise") as process:
+        assert process.wait() == 1
+        assert "RuntimeError: on purpose" in process.err
+        assert process.out == "ready\n"
+
+
+def test_a_process_whose_peer_hangs_under_a_flood_leaves_all_the_same(wire: Wire) -> None:
+    """Zenoh itself waits 10 s for such a peer."""
+    sim = start_sim(wire)
+    with user(wire, str(sim.pid)) as process:
+        process.wait_for_line("left", within=30)
+        assert process.wait(within=3) == 0
+
+
+def test_a_bus_whose_peer_hangs_closes_at_once(wire: Wire) -> None:
+    sim = start_sim(wire)
+    bus = wire.bus()
+    odom, commands = bus.latest("odom", Odometry), bus.publisher("cmd_vel", Twist)
+    odom.wait(0, 10)
+    sim.signal(signal.SIGSTOP)
+    for _ in range(20_000):
+        commands.put(Twist())
+    begin = time.monotonic()
+    bus.close()
+    assert time.monotonic() - begin < 1.0
+    with pytest.raises(BusError):
+        bus.tap("odom").recv()
+
+
+def test_every_service_ends_on_each_signal_though_nobody_is_there(wire: Wire) -> None:
+    for verb in ("sim", "pose-service", "controller", "router"):
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            with Wire() as alone:
+                process = alone.start(verb)
+                process.wait_for_line(
+                    {"sim": "listens", "pose-service": "goals", "router": "router"}.get(verb, "goal 0")
+                )
+                process.signal(number)
+                assert process.wait(within=5) == 0, (verb, number)
+                assert "Traceback" not in process.err
+
+
+def test_a_service_with_its_words_cut_off_ends_quietly(wire: Wire) -> None:
+    """Nobody reads its standard error any more."""
+    tail = subprocess.Popen(["true"], stdin=subprocess.PIPE)
+    tail.wait()
+    assert tail.stdin is not None
+    with tail.stdin, Process([sys.executable, "-m", "holozen", "sim", *wire.flags], stderr=tail.stdin) as sim:
+        robot = Robot(wire.bus())
+        robot.bus.session.put("cmd_vel", b"[]")
+        robot.status_when(lambda status: status.refused)
+        assert sim.terminate() == 0
+
+
+def test_who_is_gone_answers_no_get_with_its_last_command(wire: Wire) -> None:
+    start_sim(wire)
+    terminal = wire.terminal("teleop", "--key-timeout", "0")
+    terminal.wait_for_text("listening")
+    terminal.type("i")
+
+    with zenoh.open(stranger_config(wire)) as session:
+
+        def last_commands() -> list[Any]:
+            return [json.loads(bytes(reply.ok.payload)) for reply in session.get("cmd_vel", timeout=2) if reply.ok]
+
+        assert wait_for(last_commands)[0]["linear"]["x"] == 0.5
+        terminal.process.terminate()
+        wait_for(lambda: last_commands() == [])

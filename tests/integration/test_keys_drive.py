@@ -1,0 +1,178 @@
+"""Keys in a pseudo-terminal become commands on the wire, and the robot moves."""
+
+from collections.abc import Iterator
+
+import pytest
+
+from holozen.messages import TwistStamped
+from holozen.testing import Terminal, Wire, wait_for
+
+from .robots import Record, Robot, distance, moves, place, planar, rests, time_of
+
+V, W = 0.4, 0.8  # m/s, rad/s
+ESCAPE = "\x1b"
+UP, DOWN, LEFT, RIGHT = (f"{ESCAPE}[{letter}" for letter in "ABDC")
+SHIFT_LEFT, SHIFT_RIGHT = f"{ESCAPE}[1;2D", f"{ESCAPE}[1;2C"
+
+# The meaning of each key in teleop_twist_keyboard: forward, left, up, counter-clockwise.
+MEANINGS = [
+    ("u", (V, 0, 0, W)), ("i", (V, 0, 0, 0)), ("o", (V, 0, 0, -W)),
+    ("j", (0, 0, 0, W)), ("l", (0, 0, 0, -W)),
+    ("m", (-V, 0, 0, -W)), (",", (-V, 0, 0, 0)), (".", (-V, 0, 0, W)),
+    ("U", (V, V, 0, 0)), ("I", (V, 0, 0, 0)), ("O", (V, -V, 0, 0)),
+    ("J", (0, V, 0, 0)), ("L", (0, -V, 0, 0)),
+    ("M", (-V, V, 0, 0)), ("<", (-V, 0, 0, 0)), (">", (-V, -V, 0, 0)),
+    ("t", (0, 0, V, 0)), ("b", (0, 0, -V, 0)),
+    (UP, (V, 0, 0, 0)), (DOWN, (-V, 0, 0, 0)), (LEFT, (0, 0, 0, W)), (RIGHT, (0, 0, 0, -W)),
+    (SHIFT_LEFT, (0, V, 0, 0)), (SHIFT_RIGHT, (0, -V, 0, 0)),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def shared_teleop(town: Wire, only_robot: Robot) -> Iterator[Terminal]:
+    """A teleop at 0.4 m/s and 0.8 rad/s whose keys stay pressed, for the tests that only look at what a key says."""
+    with town.terminal("teleop", "--speed", str(V), "--turn", str(W), "--key-timeout", "0") as terminal:
+        terminal.wait_for_text("listening")
+        yield terminal
+
+
+def start_teleop(wire: Wire, *flags: str) -> Terminal:
+    terminal = wire.terminal("teleop", *flags)
+    terminal.wait_for_text("listening")
+    return terminal
+
+
+def after(commands: Record, terminal: Terminal, key: str) -> tuple[float, ...]:
+    """The first command that is not a stop after the key was pressed on a robot that stands."""
+    seen = len(commands.messages())
+    terminal.type(key)
+    found = wait_for(lambda: [m for m in commands.messages()[seen:] if any(planar(m))], what=f"a command of {key!r}")
+    return planar(found[0])
+
+
+def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> None:
+    with start_teleop(town) as terminal:
+        start = robot.newest()
+        terminal.type("i")
+        robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
+        assert {received.sample.priority for received in robot.commands.all()} == {"INTERACTIVE_HIGH"}
+        end = robot.stands()
+        assert place(end)[0] > place(start)[0] + 0.1
+        assert place(end)[1] == pytest.approx(place(start)[1], abs=1e-3)
+
+
+@pytest.mark.parametrize(("key", "meaning"), MEANINGS)
+def test_every_key_says_what_it_does_in_teleop_twist_keyboard(
+    shared_teleop: Terminal, robot: Robot, key: str, meaning: tuple[float, ...]
+) -> None:
+    assert after(robot.commands, shared_teleop, key) == pytest.approx(meaning)
+    shared_teleop.type("k")
+    robot.stands()
+
+
+@pytest.mark.parametrize("key", ["k", "K", " ", "y", "5", "\t", "\r", f"{ESCAPE}[15~", "\x04", "ä"])
+def test_k_and_every_unknown_key_stop_the_robot(shared_teleop: Terminal, robot: Robot, key: str) -> None:
+    after(robot.commands, shared_teleop, "i")
+    robot.odom.next(lambda odom: moves(odom, V, 0, 0))
+    shared_teleop.type(key)
+    robot.told_to_stop()
+    robot.stands()
+
+
+def test_speed_keys_change_the_speeds_up_to_the_limits(town: Wire, robot: Robot) -> None:
+    limits = ("--speed-limit", "0.45", "--turn-limit", "0.9")
+    with start_teleop(town, "--speed", str(V), "--turn", str(W), *limits) as terminal:
+        for keys, speed, turn in [
+            ("w", 0.44, 0.8), ("x", 0.396, 0.8), ("e", 0.396, 0.88), ("c", 0.396, 0.792),
+            ("q", 0.4356, 0.8712), ("z", 0.39204, 0.78408), ("qqqq", 0.45, 0.9), ("z", 0.405, 0.81),
+        ]:  # fmt: skip
+            terminal.type(keys)
+            terminal.wait_for_text(f"speed {speed:.3f} m/s   turn {turn:.3f} rad/s")
+            assert after(robot.commands, terminal, "u") == pytest.approx((speed, 0, 0, turn))
+            terminal.type("k")
+            robot.stands()
+
+
+def test_a_speed_over_its_limit_is_brought_down_from_the_start(town: Wire, robot: Robot) -> None:
+    with start_teleop(town, "--speed", "3", "--speed-limit", "0.3") as terminal:
+        assert after(robot.commands, terminal, "i") == pytest.approx((0.3, 0, 0, 0))
+
+
+def test_without_another_key_the_robot_stops_after_the_key_timeout(town: Wire, robot: Robot) -> None:
+    start = robot.newest()
+    with start_teleop(town, "--key-timeout", "0.2") as terminal:
+        after(robot.commands, terminal, "i")
+        robot.told_to_stop()
+        # The sim alone would stop it only 0.5 s after the last command.
+        assert distance(start, robot.stands()) < 0.5 * 0.4
+
+
+def test_a_key_timeout_of_zero_drives_on(shared_teleop: Terminal, robot: Robot) -> None:
+    after(robot.commands, shared_teleop, "i")
+    start = robot.newest()
+    assert distance(start, robot.pass_time(1.5)) > V * 1.4
+    assert moves(robot.newest(), V, 0, 0)
+    shared_teleop.type("k")
+
+
+def test_a_held_key_drives_on_past_the_timeout(town: Wire, robot: Robot) -> None:
+    with start_teleop(town, "--key-timeout", "0.3") as terminal:
+        after(robot.commands, terminal, "i")
+        start = time_of(robot.newest())
+
+        def held_for_a_second(odom: object = None) -> bool:
+            terminal.type("i")
+            return time_of(robot.newest()) > start + 1.0
+
+        wait_for(held_for_a_second)
+        assert not any(rests(odom) for odom in robot.odom.messages() if time_of(odom) > start)
+
+
+def test_a_stop_is_repeated_until_the_robot_rests_and_then_the_teleop_is_silent(town: Wire, robot: Robot) -> None:
+    with start_teleop(town) as terminal:
+        after(robot.commands, terminal, "i")
+        terminal.type("k")
+        terminal.wait_for_text("silent")
+        robot.stands()
+        seen = len(robot.commands.messages())
+        robot.pass_time(0.5)
+        assert len(robot.commands.messages()) == seen
+
+
+def test_an_idle_teleop_says_nothing(town: Wire, robot: Robot) -> None:
+    seen = len(robot.commands.messages())
+    with start_teleop(town) as terminal:
+        terminal.type("qz")
+        terminal.wait_for_text("speed 0.495")
+    robot.newest()
+    assert len(robot.commands.messages()) == seen
+
+
+def test_a_repeat_rate_of_zero_says_a_command_once(town: Wire, robot: Robot) -> None:
+    with start_teleop(town, "--repeat-rate", "0", "--key-timeout", "0") as terminal:
+        seen = len(robot.commands.messages())
+        after(robot.commands, terminal, "i")
+        robot.pass_time(0.4)
+        assert [planar(command) for command in robot.commands.messages()[seen:]] == [(0.5, 0, 0, 0)]
+        terminal.type("k")
+        robot.told_to_stop()
+
+
+def test_stamped_commands_carry_time_and_frame_and_drive_too(town: Wire, robot: Robot) -> None:
+    with start_teleop(town, "--stamped", "--frame-id", "base_link") as terminal:
+        after(robot.commands, terminal, "J")
+        robot.odom.next(lambda odom: moves(odom, 0, 0.5, 0))
+        command = robot.commands.messages()[-1]
+        assert isinstance(command, TwistStamped)
+        assert command.header.frame_id == "base_link"
+        assert command.header.stamp.sec > 0
+
+
+@pytest.mark.parametrize("pasted", ["i", "iiii", "forward: i\nand I\n", f"{UP}{UP}", "k" * 5000 + "i"])
+def test_pasted_text_never_drives(town: Wire, robot: Robot, pasted: str) -> None:
+    with start_teleop(town) as terminal:
+        seen = len(robot.commands.messages())
+        terminal.type(f"{ESCAPE}[200~{pasted}{ESCAPE}[201~w")  # the w after it shows when it was read
+        terminal.wait_for_text("speed 0.550")
+        robot.newest()
+        assert len(robot.commands.messages()) == seen

@@ -1,0 +1,141 @@
+"""Robots with names have keys of their own."""
+
+from pathlib import Path
+
+import pytest
+
+from holozen import data
+from holozen.messages import JointState, TFMessage
+from holozen.testing import Wire, wait_for
+
+from .conftest import start_sim
+from .robots import Robot, distance, moves, place, record
+
+BOT = data.find("urdf", "hb_bot.urdf.xacro")
+
+
+@pytest.fixture(scope="module")
+def robots(town: Wire) -> tuple[Robot, Robot]:
+    """Fred and Ann in one world."""
+    start_sim(town, "--robot", f"{BOT}=Fred", "--robot", f"{BOT}=Ann")
+    return Robot(town.bus(), "Fred"), Robot(town.bus(), "Ann")
+
+
+@pytest.fixture
+def fred(robots: tuple[Robot, Robot]) -> Robot:
+    robots[0].stands()
+    robots[0].resume()
+    return robots[0]
+
+
+@pytest.fixture
+def ann(robots: tuple[Robot, Robot]) -> Robot:
+    robots[1].stands()
+    robots[1].resume()
+    return robots[1]
+
+
+def test_a_command_to_fred_moves_only_fred(fred: Robot, ann: Robot) -> None:
+    stood = ann.newest()
+    fred.drive(0.4)
+    fred.stop()
+    assert distance(ann.newest(), stood) < 1e-6
+
+
+def test_both_drive_at_once_each_its_own_way(fred: Robot, ann: Robot) -> None:
+    def both() -> bool:
+        fred.put(0, 0.3)
+        ann.put(0, 0, 0.5)
+        return moves(fred.newest(), 0, 0.3, 0) and moves(ann.newest(), 0, 0, 0.5)
+
+    wait_for(both)
+
+
+def test_they_start_side_by_side_and_apart(fred: Robot, ann: Robot) -> None:
+    assert place(fred.odom.messages()[0])[:2] == pytest.approx((0, 0), abs=1e-3)
+    x, y, yaw = place(ann.odom.messages()[0])
+    assert (x, yaw) == pytest.approx((0, 0), abs=1e-3)
+    assert y > 1.5
+
+
+def test_their_frames_carry_their_names(fred: Robot, ann: Robot) -> None:
+    odom = ann.newest()
+    assert (odom.header.frame_id, odom.child_frame_id) == ("Ann/odom", "Ann/footprint_link")
+    frames = [t for message in [record(fred.bus, "Fred/tf", TFMessage).next()] for t in message.transforms]
+    assert all(t.header.frame_id.startswith("Fred/") and t.child_frame_id.startswith("Fred/") for t in frames)
+    assert record(fred.bus, "Fred/joint_states", JointState).next().name
+
+
+def test_nobody_is_at_the_root(town: Wire, fred: Robot) -> None:
+    assert town.run("topic", "info", "cmd_vel").returncode == 1
+    info = town.run("topic", "info", "Fred/cmd_vel").stdout
+    assert "Type: geometry_msgs/msg/Twist\n" in info
+    assert "  sim (" in info
+
+
+def test_who_overruled_fred_has_nothing_to_say_to_ann(town: Wire, fred: Robot, ann: Robot) -> None:
+    person = Robot(town.bus("person"), "Fred", "INTERACTIVE_HIGH")
+    person.drive(0.3)
+    assert fred.status().obeyed.startswith("person@")
+    assert ann.status().obeyed == ""
+    ann.drive(0.2)
+
+
+def test_a_teleop_with_a_name_drives_that_robot(town: Wire, fred: Robot, ann: Robot) -> None:
+    with town.terminal("teleop", "Ann") as terminal:
+        terminal.wait_for_text("listening")
+        assert "holozen teleop  Ann" in terminal.screen()
+        seen = len(fred.commands.messages())
+        terminal.type("i")
+        ann.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
+        terminal.type("k")
+        ann.stands()
+        ann.told_to_stop()
+        assert len(fred.commands.messages()) == seen
+
+
+def test_a_wildcard_is_no_robots_name(town: Wire) -> None:
+    """Zenoh would take it, and it would drive them all."""
+    for verb in ("teleop", "controller"):
+        done = town.run(verb, "*")
+        assert done.returncode == 2
+        assert "robot name '*': use a letter, then" in done.stderr
+
+
+BROKEN_XML = "<robot name='r'><link name='a'>"
+NO_DRIVE = "<robot name='r'><link name='a'/></robot>"
+WRONG = {
+    "no such robot file": (["--robot", "nowhere.urdf"], 1, "nowhere.urdf"),
+    "a robot that is broken XML": (["--robot", "{tmp}/broken.urdf"], 1, "broken.urdf"),
+    "a robot with nothing to drive it": (["--robot", "{tmp}/still.urdf"], 1, "no planar_move plugin"),
+    "a folder for a robot": (["--robot", "{tmp}"], 1, "{tmp}"),
+    "a picture for a robot": (["--robot", "{picture}"], 1, "logo.png"),
+    "an illegal name": (["--robot", "{bot}=a/b"], 2, "robot name 'a/b'"),
+    "a wildcard for a name": (["--robot", "{bot}=*"], 2, "robot name '*'"),
+    "two robots of one name": (["--robot", "{bot}=A", "--robot", "{bot}=A"], 1, "2 robots are called 'A'"),
+    "two robots at the root": (["--robot", "{bot}", "--robot", "{bot}"], 1, "2 robots are called ''"),
+    "no such world": (["--world", "nowhere.world"], 1, "nowhere.world"),
+    "a world that is broken XML": (["--world", "{tmp}/broken.urdf"], 1, "broken XML"),
+    "a robot for a world": (["--world", "{tmp}/still.urdf"], 1, "no <sdf><world>"),
+    "a negative factor": (["--rtf", "-1"], 2, "'-1': use a number from 0 to 1000"),
+    "a factor of nan": (["--rtf", "nan"], 2, "'nan'"),
+    "a factor that is no number": (["--rtf", "fast"], 2, "'fast'"),
+    "a limit of zero": (["--max-linear", "0"], 2, "'0'"),
+    "a package without a folder": (["--package", "holo"], 2, "write NAME=DIR"),
+    "an unknown flag": (["--rft", "1"], 2, "--rft"),
+    "an endpoint that is none": (["--connect", "nonsense"], 1, "nonsense"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_a_sim_that_cannot_start_says_why_in_one_line(town: Wire, tmp_path: Path, name: str) -> None:
+    words, code, reason = WRONG[name]
+    (tmp_path / "broken.urdf").write_text(BROKEN_XML)
+    (tmp_path / "still.urdf").write_text(NO_DRIVE)
+    names = {"tmp": tmp_path, "bot": BOT, "picture": data.find("meshes", "logo.png")}
+    done = town.run("sim", *(word.format(**names) for word in words))
+    assert done.returncode == code
+    assert done.stdout == ""
+    said = [line for line in done.stderr.splitlines() if not line.startswith(("usage:", "  "))]
+    assert len(said) == 1, done.stderr
+    assert reason.format(**names) in said[0]

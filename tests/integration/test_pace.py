@@ -1,0 +1,45 @@
+"""Sim time against real time. Sims that run side by side are each other's clock."""
+
+import contextlib
+
+import pytest
+
+from holozen.testing import Wire, wait_for
+
+from .conftest import start_sim
+from .robots import Robot, time_of
+
+
+def advances(*flags: tuple[str, ...], span: float) -> list[float]:
+    """How far the time of sims with these flags goes while that of the first goes on by `span` seconds."""
+    with contextlib.ExitStack() as ends:
+        robots = []
+        for words in flags:
+            wire = ends.enter_context(Wire())
+            start_sim(wire, *words)
+            robots.append(Robot(wire.bus()))
+        begin = [time_of(robot.newest()) for robot in robots]
+        wait_for(lambda: time_of(robots[0].newest()) >= begin[0] + span, 60)
+        return [time_of(robot.newest()) - start for robot, start in zip(robots, begin, strict=True)]
+
+
+def test_half_the_real_time_factor_is_half_the_pace() -> None:
+    real, half = advances(("--rtf", "1"), ("--rtf", "0.5"), span=2.0)
+    assert half / real == pytest.approx(0.5, abs=0.12)
+
+
+def test_twice_the_real_time_factor_is_twice_the_pace() -> None:
+    real, twice = advances(("--rtf", "1"), ("--rtf", "2"), span=1.5)
+    assert twice / real == pytest.approx(2.0, abs=0.4)
+
+
+def test_a_factor_of_zero_is_as_fast_as_it_goes() -> None:
+    real, fast = advances((), ("--rtf", "0"), span=0.5)
+    assert fast > 5 * real
+
+
+def test_a_fast_sim_still_hears_and_stops_by_real_time(wire: Wire) -> None:
+    start_sim(wire, "--rtf", "0")
+    robot = Robot(wire.bus())
+    robot.drive(0.3)
+    robot.stands()

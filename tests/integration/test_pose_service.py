@@ -1,0 +1,194 @@
+"""The pose service hands out goals, and tells where robots are; every wrong question gets a reason."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from holozen import data
+from holozen.errors import ServiceError
+from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest
+from holozen.testing import Wire, wait_for
+
+from .conftest import start_sim, stranger_config
+from .robots import Robot, place, time_of
+
+HALF = math.sqrt(3) / 2
+PI = math.pi
+
+# Corners in metres for a size of 2, from the second on: each shape begins at the origin and ends there.
+CORNERS: dict[str, list[tuple[float, float]]] = {
+    "square": [(2, 0), (2, 2), (0, 2), (0, 0)],
+    "triangle": [(2, 0), (1, 2 * HALF), (0, 0)],
+    "rectangle": [(2, 0), (2, 1), (0, 1), (0, 0)],
+    "hexagon": [(2, 0), (3, 2 * HALF), (2, 4 * HALF), (0, 4 * HALF), (-1, 2 * HALF), (0, 0)],
+    "infinity": [(2 * math.sin(t), 2 * math.sin(t) * math.cos(t)) for t in (i * PI / 12 for i in range(1, 25))],
+}
+
+
+def start(wire: Wire, *flags: str) -> None:
+    wire.start("pose-service", *flags).wait_for_line("goals from")
+
+
+@pytest.fixture(scope="module")
+def service(town: Wire) -> Any:
+    """A pose service with a square of 1 m: ask it for a goal by number."""
+    start(town)
+    bus = town.bus("asker")
+    return lambda number: bus.call("next_goal", NextGoalRequest(number), NextGoalReply)
+
+
+def ask(session: zenoh.Session, selector: str, payload: bytes | None = None) -> tuple[Any, Any]:
+    """The one reply to a plain `get`: its value, or its error."""
+    (reply,) = session.get(selector, payload=payload, timeout=10)
+    answer = reply.ok or reply.err
+    assert answer and str(answer.encoding) == "application/json"
+    value = json.loads(bytes(answer.payload))
+    return (value, None) if reply.ok else (None, value)
+
+
+@pytest.mark.parametrize("shape", CORNERS)
+def test_every_goal_of_every_shape_is_a_corner_and_looks_at_the_next(wire: Wire, shape: str) -> None:
+    start(wire, "--shape", shape, "--size", "2")
+    bus, corners = wire.bus(), CORNERS[shape]
+    goals = [bus.call("next_goal", NextGoalRequest(i), NextGoalReply) for i in range(len(corners))]
+    for goal, corner, ahead in zip(goals, corners, corners[1:] + corners[:1], strict=True):
+        assert (goal.x_goal, goal.y_goal) == pytest.approx(corner, abs=1e-9)
+        look = math.atan2(ahead[1] - corner[1], ahead[0] - corner[0])
+        assert math.remainder(goal.theta_goal - look, math.tau) == pytest.approx(0, abs=1e-6)
+    assert [goal.end_of_list for goal in goals] == [0] * (len(corners) - 1) + [1]
+    with pytest.raises(ServiceError, match=f"goal {len(corners)}: the list holds goals 0 to {len(corners) - 1}"):
+        bus.call("next_goal", NextGoalRequest(len(corners)), NextGoalReply)
+
+
+@pytest.mark.parametrize("number", [4, 5, -1, -4, 2**63 - 1, -(2**63)])
+def test_past_either_end_of_the_list_there_is_a_reason(service: Any, number: int) -> None:
+    with pytest.raises(ServiceError, match=f"^goal {number}: the list holds goals 0 to 3$"):
+        service(number)
+    assert service(0).x_goal == 1
+
+
+def test_a_stranger_asks_by_the_selector(town: Wire, service: Any, stranger: zenoh.Session) -> None:
+    ok, _ = ask(stranger, "next_goal?request_goal=1")
+    assert ok == {"x_goal": 1, "y_goal": 1, "theta_goal": pytest.approx(PI), "end_of_list": 0}
+
+
+@pytest.mark.parametrize(
+    ("selector", "payload", "reason"),
+    [
+        ("next_goal?request_goal=9", None, "goal 9: the list holds goals 0 to 3"),
+        ("next_goal?request_goal=one", None, "not a NextGoalRequest: Expected `int`, got `str` - at `$.request_goal`"),
+        ("next_goal?goal=1", None, "not a NextGoalRequest: Object contains unknown field `goal`"),
+        ("next_goal", b'{"request_goal":1.5}', "not a NextGoalRequest: Expected `int`, got `float`"),
+        ("next_goal", b'{"request":1}', "not a NextGoalRequest: Object contains unknown field `request`"),
+        ("next_goal", b"{", "not a NextGoalRequest: "),
+        ("next_goal", b"[" * 50_000, "not a NextGoalRequest: "),
+        ("next_goal", b'{"request_goal":99999999999999999999999}', "goal 99999999999999999999999: the list"),
+        ("next_goal", b" " * 16_000_001, "request of 16000001 bytes; at most 16000000 are read"),
+        ("get_pose", b'{"name":"nobody"}', "no nobody/odom has been heard; robots heard: none"),
+        ("get_pose", b'{"name":"a/b"}', "robot name 'a/b': use a letter, then"),
+        ("get_pose", b'{"name":"**"}', "robot name '**': use a letter, then"),
+    ],
+)
+def test_a_wrong_request_gets_an_error_reply_and_the_service_goes_on(
+    town: Wire, service: Any, stranger: zenoh.Session, selector: str, payload: bytes | None, reason: str
+) -> None:
+    ok, error = ask(stranger, selector, payload)
+    assert ok is None
+    assert error["error"].startswith(reason)
+    assert service(2).y_goal == 1
+
+
+def test_goals_from_a_file_are_handed_out_as_they_stand(wire: Wire, tmp_path: Path) -> None:
+    (tmp_path / "goals.txt").write_text("# x y theta\n1.5 -2 0.5\n\n3, 4   # looks along x\n-1e-3,0,-3.1\n")
+    start(wire, "--goals", str(tmp_path / "goals.txt"))
+    bus = wire.bus()
+    goals = [bus.call("next_goal", NextGoalRequest(i), NextGoalReply) for i in range(3)]
+    assert [(g.x_goal, g.y_goal, g.theta_goal, g.end_of_list) for g in goals] == [
+        (1.5, -2, 0.5, 0), (3, 4, 0, 0), (-1e-3, 0, -3.1, 1),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (b"", "no goal in it"),
+        (b"# nothing\n", "no goal in it"),
+        (b"1 2 3\n1 two 3\n", "goals.txt:2: '1 two 3'; write x y theta"),
+        (b"1\n", "goals.txt:1: '1'; write x y theta"),
+        (b"1 2 3 4\n", "goals.txt:1: "),
+        (b"nan 0 0\n", "goals.txt:1: "),
+        (b"0 inf\n", "goals.txt:1: "),
+        (b"\xff\xfe1", "goals.txt: "),
+    ],
+)
+def test_a_file_of_goals_that_is_wrong_is_named_with_its_line(
+    town: Wire, tmp_path: Path, content: bytes, reason: str
+) -> None:
+    (tmp_path / "goals.txt").write_bytes(content)
+    done = town.run("pose-service", "--goals", str(tmp_path / "goals.txt"))
+    assert done.returncode == 1
+    assert done.stderr.count("\n") == 1
+    assert reason in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "reason"),
+    [
+        (["--goals", "nowhere.txt"], 1, "nowhere.txt"),
+        (["--goals", "/"], 1, "goals /: "),
+        (["--shape", "star"], 2, "star"),
+        (["--size", "0"], 2, "'0': use a number from 0.01 to 1000 m"),
+        (["--size", "nan"], 2, "'nan'"),
+    ],
+)
+def test_a_wrong_flag_is_told_in_one_line(town: Wire, words: list[str], code: int, reason: str) -> None:
+    done = town.run("pose-service", *words)
+    assert done.returncode == code
+    assert reason in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+
+
+def test_get_pose_tells_the_last_odom_until_it_is_stale(wire: Wire) -> None:
+    """From no robot at all, through a sim that runs, to one that was killed and started again."""
+    start(wire, "--shape", "square")
+    bus = wire.bus()
+
+    def pose(name: str = "") -> GetPoseReply:
+        return bus.call("get_pose", GetPoseRequest(name), GetPoseReply)
+
+    def fails(reason: str) -> bool:
+        try:
+            pose()
+        except ServiceError as error:
+            return reason in str(error)
+        return False
+
+    assert fails("no odom has been heard; robots heard: none")
+    sim = start_sim(wire)
+    robot = Robot(bus)
+    robot.drive(0, 0.3)
+    before = robot.stop()
+    wait_for(lambda: not fails(""))
+    reply = pose()
+    assert place(reply.odom) == pytest.approx(place(before), abs=1e-3)
+    assert time_of(reply.odom) >= time_of(before) - 0.1
+    assert 0 <= reply.age < 0.2
+    with pytest.raises(ServiceError, match=r"^no Fred/odom has been heard; robots heard: '' \(at the root\)$"):
+        pose("Fred")
+    sim.kill()
+    wait_for(lambda: fails("odom is stale: the last one came "))
+    start_sim(wire)
+    wait_for(lambda: not fails(""))
+
+
+def test_get_pose_knows_robots_by_name(wire: Wire) -> None:
+    start(wire)
+    start_sim(wire, "--robot", f"{data.find('urdf', 'hb_bot.urdf.xacro')}=Fred")
+    with zenoh.open(stranger_config(wire)) as session:
+        pose = wait_for(lambda: ask(session, "get_pose?name=Fred")[0])
+        assert pose["odom"]["header"]["frame_id"] == "Fred/odom"
+        assert ask(session, "get_pose?name=Ann")[1] == {"error": "no Ann/odom has been heard; robots heard: Fred"}

@@ -1,0 +1,186 @@
+"""Commands that nobody should send: none moves the robot, each is counted, and told without a flood."""
+
+import json
+import math
+import struct
+import time
+from collections.abc import Callable, Iterator
+
+import msgspec
+import pytest
+import zenoh
+
+from holozen.codec import WIRES
+from holozen.messages import Header, Time, Twist, TwistStamped, Vector3
+from holozen.testing import Wire, wait_for
+
+from .conftest import start_sim
+from .robots import Robot, distance, moves, place, rests, time_of
+
+JSON, MSGPACK = WIRES["json"], WIRES["msgpack"]
+TOLD = "cmd_vel: from "
+
+
+def packed(x: float) -> bytes:
+    """A Twist in msgpack, which has a NaN and an infinity."""
+    return msgspec.msgpack.encode(Twist(Vector3(x=x)))
+
+
+def stamped(seconds: float) -> bytes:
+    return msgspec.json.encode(TwistStamped(Header(Time.of(seconds)), Twist.planar(1.0)))
+
+
+BAD = {
+    "NaN in msgpack": ("not finite", packed(math.nan), MSGPACK),
+    "infinity in msgpack": ("not finite", packed(math.inf), MSGPACK),
+    "minus infinity in msgpack": ("not finite", packed(-math.inf), MSGPACK),
+    "NaN in the unused angular.x": ("not finite", msgspec.msgpack.encode(Twist(angular=Vector3(x=math.nan))), MSGPACK),
+    "NaN in a stamped one": (
+        "not finite", msgspec.msgpack.encode(TwistStamped(twist=Twist(Vector3(y=math.nan)))), MSGPACK),
+    "NaN in JSON": ("malformed", b'{"linear":{"x":NaN}}', JSON),
+    "a number too large for JSON": ("malformed", b'{"linear":{"x":1e999}}', JSON),
+    "a null": ("malformed", b'{"linear":{"x":null}}', JSON),
+    "a typo": ("malformed", b'{"linaer":{"x":1}}', JSON),
+    "an unknown field deep inside": ("malformed", b'{"linear":{"x":1,"w":1}}', JSON),
+    "a list": ("malformed", b"[]", JSON),
+    "a number": ("malformed", b"1.0", JSON),
+    "a text for a number": ("malformed", b'{"linear":{"x":"1"}}', JSON),
+    "half of it": ("malformed", b'{"linear":{"x":1', JSON),
+    "nothing": ("malformed", b"", JSON),
+    "no UTF-8": ("malformed", b'{"linear":{"\xff":1}}', JSON),
+    "bytes": ("malformed", bytes(range(256)), "zenoh/bytes"),
+    "deep nesting": ("malformed", b"[" * 60_000, JSON),
+    "msgpack called JSON": ("malformed", packed(1.0), JSON),
+    "JSON called msgpack": ("malformed", b'{"linear":{"x":1}}', MSGPACK),
+    "an encoding nobody knows": ("malformed", b'{"linear":{"x":1}}', "image/png"),
+    "CDR": ("malformed", b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0), "application/cdr"),
+    "10 MB": ("oversized", b'{"linear":{"x":1}}' + b" " * 10_000_000, JSON),
+    "just over the limit": ("oversized", b'{"linear":{"x":1}}'.ljust(65_537), JSON),
+    "a stamp of yesterday": ("stale", stamped(time.time() - 86_400), JSON),
+    "a stamp of tomorrow": ("stale", stamped(time.time() + 86_400), JSON),
+    "a stamp before the epoch": ("stale", stamped(-5.0), JSON),
+}  # fmt: skip
+
+
+@pytest.fixture
+def standing(robot: Robot) -> Iterator[Robot]:
+    """A robot that must not move in this test."""
+    before = robot.newest()
+    yield robot
+    after = robot.pass_time(0.1)  # so the sim steps on
+    assert distance(before, after) < 1e-6
+    assert all(map(math.isfinite, place(after)))
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_it_is_refused_and_counted_and_the_robot_stands(standing: Robot, stranger: zenoh.Session, name: str) -> None:
+    kind, payload, encoding = BAD[name]
+    before = standing.status().refused.get(kind, 0)
+    stranger.put("cmd_vel", payload, encoding=encoding, congestion_control=zenoh.CongestionControl.BLOCK)
+    status = standing.status_when(lambda status: status.refused.get(kind, 0) > before)
+    assert status.refused[kind] == before + 1
+    assert status.obeyed == ""
+    assert status.last_refusal.startswith("anonymous (DATA): ")
+
+
+def test_a_delete_is_no_command(standing: Robot, stranger: zenoh.Session) -> None:
+    before = standing.status().refused.get("malformed", 0)
+    stranger.delete("cmd_vel")
+    standing.status_when(lambda status: status.refused.get("malformed", 0) == before + 1)
+
+
+def test_a_driven_robot_drives_on_through_a_flood_of_bad_commands(robot: Robot, stranger: zenoh.Session) -> None:
+    begin = len(robot.odom.messages())
+    robot.drive(0.3)
+    for kind, payload, encoding in list(BAD.values()) * 5:
+        if kind != "oversized":
+            stranger.put("cmd_vel", payload, encoding=encoding)
+        robot.put(0.3)
+    odoms = robot.drive(0.3, until=lambda odom: moves(odom, 0.3, 0, 0))
+    seen = robot.odom.messages()[begin:]
+    first = next(i for i, odom in enumerate(seen) if not rests(odom))
+    assert not any(rests(odom) for odom in seen[first:])
+    assert moves(odoms[-1], 0.3, 0, 0)
+
+
+def test_a_flood_is_told_once_a_second_and_counted_in_full(wire: Wire) -> None:
+    sim = start_sim(wire)
+    robot = Robot(wire.bus())
+    begin = time.monotonic()
+    for count in range(1, 501):
+        robot.bus.session.put("cmd_vel", b"[]", congestion_control=zenoh.CongestionControl.BLOCK)
+        if count % 50 == 0:  # the sim keeps the newest 64
+            wait_for(lambda count=count: robot.status().refused.get("malformed") == count)  # type: ignore[misc]
+    robot.pass_time(1.1)
+    robot.bus.session.put("cmd_vel", b"[]")
+    assert " more)" in sim.wait_for_line(" more)")
+    assert sim.err.count(TOLD) <= 2 + (time.monotonic() - begin)
+    assert robot.status().refused == {"malformed": 501}
+
+
+def test_a_person_reads_who_sent_what_and_what_is_wrong_with_it(wire: Wire) -> None:
+    sim = start_sim(wire)
+    robot = Robot(wire.bus("typist"))
+    robot.bus.session.put("cmd_vel", b'{"linaer":{}}', attachment=b"typist@1")
+    line = sim.wait_for_line(TOLD)
+    assert line == ("cmd_vel: from typist@1: not a Twist: Object contains unknown field `linaer`")
+
+
+def test_a_source_cannot_write_on_the_terminal_through_its_name(wire: Wire) -> None:
+    sim = start_sim(wire)
+    Robot(wire.bus()).bus.session.put("cmd_vel", b'{"\\u001b[31m\\n":1}', attachment=b"\x1b[2Jme\nsim: all is well")
+    sim.wait_for_line(TOLD)
+    assert "\x1b" not in sim.err
+    assert "\nsim: all is well" not in sim.err
+
+
+@pytest.mark.parametrize(
+    ("asked", "driven"),
+    [
+        ((100.0, 0, 0), (5, 0, 0)),
+        ((0, -100.0, 0), (0, -5, 0)),
+        ((30.0, 40.0, 0), (3, 4, 0)),
+        ((0, 0, 99.0), (0, 0, 10)),
+    ],
+)
+def test_over_the_limit_is_clamped_in_the_same_direction_and_told(
+    robot: Robot, asked: tuple[float, float, float], driven: tuple[float, float, float]
+) -> None:
+    before = robot.status().refused.get("clamped", 0)
+    robot.drive(*asked, until=lambda odom: moves(odom, *driven, tolerance=0.01))
+    status = robot.status_when(lambda status: status.refused.get("clamped", 0) > before)
+    assert "over the limits of 5 m/s and 10 rad/s, clamped" in status.last_refusal
+    robot.stop()
+
+
+@pytest.mark.parametrize("huge", [1.7e308, -1.7e308])
+def test_numbers_at_the_end_of_the_scale_leave_a_robot_with_a_place(robot: Robot, huge: float) -> None:
+    robot.put(huge, huge, huge)
+    robot.pass_time(0.1)
+    stood = robot.stop()
+    assert all(map(math.isfinite, place(stood)))
+    robot.drive(0.3)
+
+
+def test_clamping_is_told_on_stderr_with_the_limits_of_the_flags(wire: Wire) -> None:
+    sim = start_sim(wire, "--max-linear", "0.2", "--max-angular", "0.4")
+    robot = Robot(wire.bus())
+    robot.drive(1, 0, 1, until=lambda odom: moves(odom, 0.2, 0, 0.4))
+    sim.wait_for_line("over the limits of 0.2 m/s and 0.4 rad/s, clamped: (1.0, 0.0, 1.0)")
+
+
+def test_a_fresh_stamp_of_either_clock_and_no_stamp_are_obeyed(robot: Robot, stranger: zenoh.Session) -> None:
+    """Sim time and wall time, as senders have the one or the other; a zero stamp says nothing."""
+    for stamp in (time.time, lambda: time_of(robot.newest()), lambda: 0.0):
+
+        def driven(stamp: Callable[[], float] = stamp) -> bool:
+            stranger.put("cmd_vel", stamped(stamp()))
+            return moves(robot.newest(), 1, 0, 0)
+
+        wait_for(driven)
+        robot.stands()
+
+
+def test_an_extra_schema_in_the_encoding_does_no_harm(robot: Robot, stranger: zenoh.Session) -> None:
+    stranger.put("cmd_vel", json.dumps({"linear": {"x": 0.3}}), encoding="application/json;geometry_msgs/msg/Twist")
+    robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))

@@ -1,0 +1,192 @@
+"""`holozen service`, `node` and `router`, and the command line as a whole."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+import pytest
+
+from holozen.testing import Process, Wire, wait_for
+from holozen.testing.wire import command
+
+from .robots import Robot, place
+from .test_topic import assert_one_line
+
+ROOT = Path(__file__).parents[2]
+VERBS = ["up", "sim", "teleop", "controller", "pose-service", "router", "xacro", "topic", "service", "node"]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def pose_service(town: Wire, sim: Process) -> None:
+    town.start("pose-service").wait_for_line("goals")
+
+
+def test_service_list_names_every_service(town: Wire) -> None:
+    assert town.run("service", "list").stdout.split() == ["get_pose", "next_goal", "resume"]
+    assert town.run("service", "list", "-t").stdout.splitlines() == [
+        "get_pose [holozen/srv/GetPose]",
+        "next_goal [holozen/srv/NextGoal]",
+        "resume [std_srvs/srv/Trigger]",
+    ]
+
+
+def test_service_list_of_nobody_says_so(wire: Wire) -> None:
+    done = wire.run("service", "list")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == "no services: nobody is there; `holozen up` starts some\n"
+
+
+def test_service_call_prints_the_reply(town: Wire) -> None:
+    done = town.run("service", "call", "next_goal", '{"request_goal": 3}')
+    assert done.returncode == 0
+    lines = [line.split(": ") for line in done.stdout.splitlines()]
+    assert {name: float(value) for name, value in lines} == {
+        "x_goal": 0,
+        "y_goal": 0,
+        "theta_goal": 0,
+        "end_of_list": 1,
+    }
+    as_json = town.run("service", "call", "/next_goal", "request_goal: 3", "--json").stdout
+    assert json.loads(as_json) == {"x_goal": 0.0, "y_goal": 0.0, "theta_goal": 0.0, "end_of_list": 1}
+
+
+def test_service_call_without_a_request_sends_zeros(town: Wire, robot: Robot) -> None:
+    assert town.run("service", "call", "next_goal").stdout.startswith("x_goal: 1.0\n")
+    before = place(robot.newest())
+    wait_for(lambda: town.run("service", "call", "get_pose").returncode == 0)
+    reply = json.loads(town.run("service", "call", "get_pose", "--json").stdout)
+    position = reply["odom"]["pose"]["pose"]["position"]
+    assert (position["x"], position["y"]) == pytest.approx(before[:2], abs=1e-6)
+
+
+@pytest.mark.parametrize("wire_name", ["json", "msgpack"])
+def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
+    done = town.run("service", "call", "next_goal", '{"request_goal": 1}', "--wire", wire_name)
+    assert done.stdout.startswith("x_goal: 1.0\ny_goal: 1.0\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "reason"),
+    [
+        (["call", "next_goal", '{"request_goal": 7}'], 1, "holozen service: goal 7: the list holds goals 0 to 3"),
+        (
+            ["call", "next_goal", '{"goal": 7}'],
+            1,
+            "refused: not a NextGoalRequest: Object contains unknown field `goal`",
+        ),
+        (["call", "next_goal", "[1]"], 1, "refused: not a NextGoalRequest: "),
+        (["call", "next_goal", "{a: b: c}"], 1, "refused: neither JSON nor YAML: "),
+        (["call", "get_pose", '{"name": "Fred"}'], 1, "no Fred/odom has been heard"),
+        (["call", "get_pose", '{"name": "*"}'], 1, "robot name '*': use a letter"),
+        (["call", "Fred/resume", "--timeout", "0.3"], 1, "no reply from 'Fred/resume' within 0.3 s"),
+        (["call", "make_tea"], 1, "'make_tea' has no known type; known: next_goal, get_pose, resume"),
+        (["call", "next_goal", "--timeout", "0"], 2, "'0': use a number"),
+        (["call"], 2, "key"),
+        (["ring"], 2, "'ring'"),
+        ([], 2, "VERB"),
+    ],
+)
+def test_a_call_that_fails_says_why_in_one_line(town: Wire, words: list[str], code: int, reason: str) -> None:
+    assert_one_line(town.run("service", *words), code, reason)
+
+
+def test_node_list_names_who_runs(town: Wire) -> None:
+    assert town.run("node", "list").stdout.split() == ["pose_service", "sim"]
+    with town.terminal("teleop") as terminal:
+        terminal.wait_for_text("listening")
+        assert town.run("node", "list").stdout.split() == ["pose_service", "sim", "teleop"]
+    wait_for(lambda: town.run("node", "list").stdout.split() == ["pose_service", "sim"])
+
+
+def test_node_list_of_nobody_says_so(wire: Wire) -> None:
+    done = wire.run("node", "list")
+    assert (done.returncode, done.stdout) == (0, "")
+    assert done.stderr == "no nodes: nobody is there; `holozen up` starts some\n"
+
+
+def test_clients_meet_through_a_router(wire: Wire) -> None:
+    with Process(command("router", "--listen", wire.endpoint)) as router:
+        router.wait_for_line(f"router: listens at {wire.endpoint}")
+        client = ["--mode", "client", "--connect", wire.endpoint]
+        with Process(command("sim", *client)) as sim, Process(command("pose-service", *client)) as service:
+            sim.wait_for_line("listens on")
+            service.wait_for_line("goals")
+            words = command("topic", "echo", "odom", "--once", "--timeout", "10", *client)
+            assert subprocess.run(words, capture_output=True, timeout=30).returncode == 0
+            nodes = subprocess.run(command("node", "list", *client), capture_output=True, text=True).stdout
+            assert nodes.split() == ["pose_service", "router", "sim"]
+            assert service.terminate() == 0
+            assert sim.terminate() == 0
+        assert router.terminate() == 0
+        assert "Traceback" not in sim.err + service.err + router.err
+
+
+def test_clients_wait_for_their_router_and_find_it_again(wire: Wire) -> None:
+    client = ["--mode", "client", "--connect", wire.endpoint]
+    with Process(command("sim", *client)) as sim:
+        sim.wait_for_line(f"waiting for a Zenoh router at {wire.endpoint}")
+        for _ in range(2):
+            with Process(command("router", "--listen", wire.endpoint)) as router:
+                router.wait_for_line("listens at")
+                sim.wait_for_line("listens on cmd_vel")
+                words = command("topic", "echo", "odom", "--once", "--timeout", "15", *client)
+                assert subprocess.run(words, capture_output=True, timeout=30).returncode == 0
+                router.kill()
+        assert sim.terminate() == 0
+
+
+def test_a_client_that_waits_for_its_router_ends_on_a_signal(wire: Wire) -> None:
+    with Process(command("sim", "--mode", "client", "--connect", wire.endpoint)) as sim:
+        sim.wait_for_line("waiting for a Zenoh router")
+        sim.signal(signal.SIGTERM)
+        sim.wait(within=5)
+        assert "Traceback" not in sim.err
+
+
+def test_a_router_whose_port_is_taken_says_so(town: Wire) -> None:
+    done = subprocess.run(command("router", "--listen", town.endpoint), capture_output=True, text=True, timeout=30)
+    assert_one_line(done, 1, "holozen router: cannot open Zenoh: ", str(town.port))
+
+
+def test_an_unknown_verb_names_those_that_exist(town: Wire) -> None:
+    assert_one_line(town.run("drive"), 2, "holozen: no verb 'drive'; there are up, sim, ")
+
+
+def test_help_names_every_verb_and_every_verb_has_help() -> None:
+    shown = subprocess.run(command("--help"), capture_output=True, text=True)
+    assert shown.returncode == 0
+    for verb in VERBS:
+        assert f"\n  {verb} " in shown.stdout
+        help_of_it = subprocess.run(command(verb, "--help"), capture_output=True, text=True)
+        assert (help_of_it.returncode, help_of_it.stderr) == (0, "")
+        assert help_of_it.stdout.startswith(f"usage: holozen {verb}")
+
+
+def test_without_a_verb_it_shows_the_help_and_fails() -> None:
+    done = subprocess.run([sys.executable, "-m", "holozen"], capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "usage: holozen VERB" in done.stdout + done.stderr
+
+
+def test_the_version_is_that_of_the_package() -> None:
+    assert subprocess.run(command("--version"), capture_output=True, text=True).stdout == f"{version('holozen')}\n"
+
+
+@pytest.mark.parametrize("unbuffered", ["1", ""])
+@pytest.mark.parametrize(
+    "verb", ["--help", "--version", "xacro urdf/hb_bot.urdf.xacro", "topic --help", "service list"]
+)
+def test_output_into_a_reader_that_is_gone_ends_quietly(town: Wire, verb: str, unbuffered: str) -> None:
+    read, write = os.pipe()
+    os.close(read)
+    flags = town.flags if verb == "service list" else []
+    env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
+    with os.fdopen(write, "wb") as gone:
+        done = subprocess.run(
+            command(*verb.split(), *flags), stdout=gone, stderr=subprocess.PIPE, text=True, cwd=ROOT, env=env
+        )
+    assert (done.returncode, done.stderr) == (0, "")

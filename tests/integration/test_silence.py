@@ -1,0 +1,123 @@
+"""A robot that hears nothing stands: the sim needs nobody's last word for it."""
+
+import signal
+
+import pytest
+
+from holozen.messages import Odometry
+from holozen.testing import Process, Terminal, Wire, wait_for
+
+from .robots import Robot, distance, moves, place, planar, rests, speeds, time_of
+
+SILENCE = 0.5  # s; the promise
+STEP = 1 / 240  # s
+ODOM = 0.02  # s between two odoms
+CATCH_UP = 0.1  # s; the sim may be behind the clock by this much, and then makes up for it
+LONGEST = SILENCE + CATCH_UP + ODOM + 2 * STEP
+
+
+def test_one_command_moves_the_robot_for_half_a_second(robot: Robot) -> None:
+    robot.put(0.4)
+    robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+    robot.stands()
+    moving = [time_of(odom) for odom in robot.odom.messages() if speeds(odom)[0] > 0.3]
+    run = moving[-1] - next(t for t in moving if all(moved(robot, t, moving[-1])))
+    assert SILENCE - 3 * ODOM < run < LONGEST
+
+
+def moved(robot: Robot, begin: float, end: float) -> list[bool]:
+    """Whether the robot moved at each odom of a span of time."""
+    return [not rests(odom) for odom in robot.odom.messages() if begin <= time_of(odom) <= end]
+
+
+def test_a_moment_of_silence_shorter_than_that_does_not_stop_it(robot: Robot) -> None:
+    robot.drive(0.3)
+    begin = time_of(robot.newest())
+    for _ in range(4):
+        robot.put(0.3)
+        robot.pass_time(0.25)
+    assert all(moved(robot, begin, time_of(robot.newest()) - 0.02))
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP], ids=lambda n: n.name)
+def test_a_teleop_that_dies_while_driving_leaves_a_robot_that_stands(town: Wire, robot: Robot, number: int) -> None:
+    with drives_fast(town, robot) as terminal:
+        terminal.process.signal(number)
+        wait_for(lambda: state(terminal.process) in "TZ")
+        last = robot.newest()  # no command has left the teleop since before this one
+        stood = robot.stands()
+        assert 0 < distance(last, stood) <= 2.0 * LONGEST
+        assert any(planar(robot.commands.messages()[-1])), "nobody told it to stop"
+
+
+def test_a_teleop_that_wakes_up_after_its_key_timeout_does_not_drive_on(town: Wire, robot: Robot) -> None:
+    with drives_fast(town, robot) as terminal:
+        terminal.process.signal(signal.SIGSTOP)
+        stood = robot.stands()
+        terminal.process.signal(signal.SIGCONT)
+        terminal.wait_for_text("silent")
+        assert distance(stood, robot.pass_time(0.2)) < 1e-3
+
+
+def drives_fast(town: Wire, robot: Robot) -> Terminal:
+    terminal = town.terminal("teleop", "--speed", "2", "--key-timeout", "0.4")
+    terminal.wait_for_text("listening")
+    terminal.type("i")
+    robot.odom.next(lambda odom: moves(odom, 2, 0, 0))
+    return terminal
+
+
+def state(process: Process) -> str:
+    """The kernel's letter for what a process does: T is stopped, Z has ended."""
+    if process.returncode is not None:
+        return "Z"
+    with open(f"/proc/{process.pid}/stat") as file:
+        return file.read().rpartition(")")[2].split()[0]
+
+
+def test_after_a_silence_the_same_source_drives_again(robot: Robot) -> None:
+    robot.drive(0.3)
+    robot.stands()
+    robot.drive(0.3)
+
+
+def test_a_robot_in_silence_stays_where_it_is(robot: Robot) -> None:
+    robot.drive(0.3, 0.2, 0.5)
+    stood = robot.stands()
+    later: Odometry = robot.pass_time(1.0)
+    assert place(later) == pytest.approx(place(stood), abs=1e-6)
+
+
+def test_a_sim_that_hung_drops_the_commands_that_waited(sim: Process, robot: Robot) -> None:
+    """They are of unknown age: whoever sent them may have let go since."""
+    before = robot.status().refused.get("late", 0)
+    sim.signal(signal.SIGSTOP)
+    wait_for(lambda: state(sim) == "T")
+    stood = robot.odom.messages()[-1]
+    put_for(robot, SILENCE + 0.2)
+    sim.signal(signal.SIGCONT)
+    status = robot.status_when(lambda status: status.refused.get("late", 0) > before)
+    assert "waited while the sim stood still" in status.last_refusal
+    assert distance(stood, robot.pass_time(0.3)) < 1e-3
+    robot.drive(0.3)
+
+
+def test_a_sim_that_hung_longer_than_a_lease_comes_back(sim: Process, robot: Robot) -> None:
+    """Zenoh gives its links up after a second; they are made anew."""
+    sim.signal(signal.SIGSTOP)
+    wait_for(lambda: state(sim) == "T")
+    stood = robot.odom.messages()[-1]
+    put_for(robot, 2.5)
+    sim.signal(signal.SIGCONT)
+    assert distance(stood, robot.pass_time(0.3)) < 1e-3
+    robot.drive(0.3)
+
+
+def put_for(robot: Robot, seconds: float) -> None:
+    """Command the robot at 20 Hz for a while."""
+    import threading
+
+    pause = threading.Event()
+    for _ in range(round(seconds / 0.05)):
+        robot.put(1.0)
+        pause.wait(0.05)

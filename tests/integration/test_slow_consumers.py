@@ -1,0 +1,50 @@
+"""A slow consumer cannot delay control."""
+
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from holozen.testing import Process, Wire
+
+from .conftest import deaf, start_sim
+from .robots import Robot, time_of
+
+AT_ONCE = 2.0  # s; a publisher that waits for a slow reader waits 5
+ENOUGH = 100  # s of sim time, with 200 samples each: more than Zenoh's queue of 256 and loopback's buffers hold
+
+
+@pytest.fixture
+def fast_robot(wire: Wire) -> Robot:
+    """A robot whose sim goes as fast as it can, and so tells as much as it can."""
+    start_sim(wire, "--rtf", "0")
+    return Robot(wire.bus())
+
+
+@pytest.fixture(params=["reads nothing", "is stopped"])
+def slow(request: pytest.FixtureRequest, wire: Wire, fast_robot: Robot) -> Iterator[Process]:
+    """A subscriber of odom, tf and joint_states that has been told more than it can hold."""
+    with deaf(wire, "**") as process:
+        if request.param == "is stopped":
+            process.signal(signal.SIGSTOP)
+        end = time_of(fast_robot.newest()) + ENOUGH
+        while time_of(fast_robot.odom.next(within=AT_ONCE)) < end:
+            pass
+        yield process
+
+
+def test_commands_and_odom_go_through(fast_robot: Robot, slow: Process) -> None:
+    for speed in (0.5, -0.5, 0.3):
+        fast_robot.drive(speed)
+    assert slow.returncode is None
+
+
+def test_a_slow_reader_gets_the_newest(wire: Wire, fast_robot: Robot) -> None:
+    """Its queue is a ring: what it missed is gone, and what it reads is now."""
+    slow = fast_robot.bus.subscribe("odom", type(fast_robot.newest()), depth=1)
+    begin = time_of(fast_robot.newest())
+    fast_robot.odom.next(lambda odom: time_of(odom) > begin + 20)
+    before = time_of(fast_robot.odom.messages()[-1])
+    received = slow.try_recv()
+    assert received is not None and received.message is not None
+    assert time_of(received.message) >= before - 1

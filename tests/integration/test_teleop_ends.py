@@ -1,0 +1,155 @@
+"""However a teleop ends, the last thing it says is a stop, and the terminal is as it was."""
+
+import signal
+import sys
+from pathlib import Path
+
+import pytest
+
+from holozen.testing import Terminal, Wire, wait_for
+
+from .conftest import deaf, start_sim
+from .robots import Robot, moves, planar
+
+ROOT = Path(__file__).parents[2]
+DRIVES_ON = ("--key-timeout", "0")
+
+# A teleop with one part broken while it drives. BREAK is the statement that breaks it.
+BROKEN = """
+import sys
+sys.path.insert(0, {root!r})
+from services.teleop import __main__ as teleop, cockpit
+def breaks(*_):
+    raise RuntimeError("broken on purpose")
+press = cockpit.Cockpit.press
+def press_and_break(self, key):
+    press(self, key)
+    {statement}
+cockpit.Cockpit.press = press_and_break
+sys.exit(teleop.main(sys.argv[1:]))
+"""
+
+
+def driving(robot: Robot, terminal: Terminal) -> Terminal:
+    """The teleop in this terminal, while it drives."""
+    terminal.wait_for_text("listening")
+    terminal.type("i")
+    robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
+    return terminal
+
+
+def assert_tidy(terminal: Terminal) -> None:
+    """The terminal has its modes, its first screen and its cursor again."""
+    assert terminal.modes() == terminal.modes_before
+    last = {code: terminal.raw.rfind(f"\x1b[?{code}") for code in ("1049h", "1049l", "25l", "25h", "2004h", "2004l")}
+    assert last["1049h"] < last["1049l"], "the full screen was left"
+    assert last["25l"] < last["25h"], "the cursor is shown"
+    assert last["2004h"] < last["2004l"], "paste is plain again"
+
+
+def test_without_a_terminal_it_says_so_in_one_line(town: Wire) -> None:
+    done = town.run("teleop")
+    assert done.returncode == 2
+    assert done.stdout == ""
+    assert done.stderr.count("\n") == 1
+    assert "needs a terminal" in done.stderr
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda n: n.name)
+def test_a_signal_stops_the_robot_and_leaves_the_terminal_tidy(town: Wire, robot: Robot, number: int) -> None:
+    with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
+        terminal.process.signal(number)
+        assert terminal.process.wait() == 0
+        robot.stands()
+        robot.told_to_stop()
+        assert_tidy(terminal)
+        assert "Traceback" not in terminal.raw
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda n: n.name)
+def test_a_signal_to_an_idle_teleop_says_nothing(town: Wire, robot: Robot, number: int) -> None:
+    with town.terminal("teleop") as terminal:
+        terminal.wait_for_text("listening")
+        seen = len(robot.commands.messages())
+        terminal.process.signal(number)
+        assert terminal.process.wait() == 0
+        robot.newest()
+        assert len(robot.commands.messages()) == seen
+        assert_tidy(terminal)
+
+
+def test_ctrl_c_stops_the_robot_and_quits(town: Wire, robot: Robot) -> None:
+    with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
+        terminal.type("\x03")
+        assert terminal.process.wait() == 0
+        robot.stands()
+        robot.told_to_stop()
+        assert_tidy(terminal)
+
+
+def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> None:
+    with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
+        terminal.hang_up()
+        terminal.process.wait()
+        robot.stands()
+        robot.told_to_stop()
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "cockpit.Cockpit.state = breaks",  # the next picture fails
+        "cockpit.Cockpit.tick = breaks",
+        "breaks()",
+    ],
+    ids=["picture", "tick", "key"],
+)
+def test_an_exception_stops_the_robot_and_is_told_in_one_line(
+    town: Wire, robot: Robot, tmp_path: Path, statement: str
+) -> None:
+    script = tmp_path / "broken_teleop.py"
+    script.write_text(BROKEN.format(root=str(ROOT), statement=statement))
+    with Terminal([sys.executable, str(script), *DRIVES_ON, *town.flags]) as terminal:
+        terminal.wait_for_text("listening")
+        seen = len(robot.commands.messages())
+        terminal.type("i")
+        assert terminal.process.wait() == 1
+        robot.stands()
+        assert any(any(planar(command)) for command in robot.commands.messages()[seen:]), "it drove"
+        robot.told_to_stop()
+        assert_tidy(terminal)
+        assert "teleop: RuntimeError: broken on purpose; the robot was told to stop" in terminal.raw
+        assert "Traceback" not in terminal.raw
+
+
+def test_the_stop_arrives_though_a_subscriber_of_cmd_vel_reads_nothing(town: Wire, robot: Robot) -> None:
+    with deaf(town, "cmd_vel"), driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
+        terminal.process.signal(signal.SIGTERM)
+        assert terminal.process.wait() == 0
+        robot.stands()
+        robot.told_to_stop()
+
+
+def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
+    sim = start_sim(wire)
+    robot = Robot(wire.bus())
+    terminal = driving(robot, wire.terminal("teleop", *DRIVES_ON))
+    sim.kill()
+    terminal.wait_for_text("ODOM IS STALE")
+    terminal.process.signal(signal.SIGTERM)
+    assert terminal.process.wait() == 0
+    robot.told_to_stop()
+    stops = [command for command in robot.commands.messages() if not any(planar(command))]
+    assert len(stops) > 5, "without odom a stop is repeated for a second"
+    assert_tidy(terminal)
+
+
+def test_a_teleop_alone_says_that_nobody_listens(wire: Wire) -> None:
+    terminal = wire.terminal("teleop", *DRIVES_ON)
+    screen = terminal.wait_for_text("NO ODOM")
+    assert "NOBODY IS LISTENING on cmd_vel" in screen
+    terminal.type("i")
+    terminal.wait_for_text("command   x +0.500")
+    start_sim(wire)
+    terminal.wait_for_text("listening sim")
+    wait_for(lambda: "NO ODOM" not in terminal.screen())

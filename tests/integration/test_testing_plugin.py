@@ -1,0 +1,131 @@
+"""The fixtures that come with holozen, as the tests of somebody else's robot use them."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+USERS_TESTS = """
+from holozen.messages import Odometry, Twist
+
+def test_the_robot_drives_and_stands_in_silence(wire, wait_for):
+    wire.start("sim")
+    bus = wire.bus("my_test")
+    odom = bus.latest("odom", Odometry)
+    commands = bus.publisher("cmd_vel", Twist)
+    wait_for(lambda: odom.count)
+    commands.put(Twist.planar(x=0.3))
+    wait_for(lambda: odom.read()[0].twist.twist.linear.x > 0.2)
+    wait_for(lambda: abs(odom.read()[0].twist.twist.linear.x) < 0.01)
+
+def test_a_key_drives(wire, terminal, wait_for):
+    wire.start("sim").wait_for_line("listens on")
+    teleop = terminal("teleop", "--speed", "0.2")
+    teleop.wait_for_text("listening sim")
+    teleop.type("i")
+    assert "x +0.200" in teleop.wait_for_text("measured  x +0.200")
+    assert teleop.process.terminate() == 0
+    assert teleop.modes() == teleop.modes_before
+"""
+
+
+def run_pytest(folder: Path, tests: str, *flags: str) -> subprocess.CompletedProcess[str]:
+    (folder / "test_mine.py").write_text(tests)
+    words = [
+        sys.executable,
+        "-W",
+        "error",
+        "-m",
+        "pytest",
+        "-p",
+        "no:cacheprovider",
+        "-W",
+        "error",
+        *flags,
+        str(folder),
+    ]
+    return subprocess.run(words, capture_output=True, text=True, cwd=folder, timeout=60)
+
+
+def running_at(text: str) -> list[str]:
+    """The processes that run holozen and name this text."""
+    shown = subprocess.run(["ps", "-eo", "pid,args"], capture_output=True, text=True, check=True).stdout
+    return [line for line in shown.splitlines() if "-m holozen" in line and text in line]
+
+
+def test_a_user_tests_a_robot_without_an_import_of_ours(tmp_path: Path) -> None:
+    done = run_pytest(tmp_path, USERS_TESTS)
+    assert done.returncode == 0, done.stdout
+    assert "2 passed" in done.stdout
+
+
+def test_a_test_that_fails_shows_what_its_processes_wrote_and_leaves_none(tmp_path: Path) -> None:
+    done = run_pytest(
+        tmp_path,
+        """
+def test_it(wire):
+    wire.start("sim").wait_for_line("listens on")
+    wire.terminal("teleop").wait_for_text("listening")
+    print(f"ENDPOINT {wire.endpoint}.")
+    assert False
+""",
+    )
+    assert done.returncode == 1
+    assert "sim: hb_bot listens on cmd_vel" in done.stdout
+    endpoint = re.search(r"ENDPOINT (tcp/127\.0\.0\.1:\d+)\.", done.stdout)
+    assert endpoint
+    assert running_at(endpoint[1]) == []
+
+
+@pytest.mark.parametrize(
+    ("test", "reason"),
+    [
+        ("wait_for(lambda: [], within=0.1, what='rain')", "waited 0.1 s in vain for rain; the last look gave []"),
+        ("wire.start('sim').wait_for_line('tea', within=0.5)", "'tea' from <"),
+        ("wire.start('sim', '--rtf', 'x').wait_for_line('tea')", "exit code 2> ended without 'tea'; it wrote:"),
+        ("wire.start('sim').wait(within=0.1)", "still runs after 0.1 s; it wrote:"),
+        ("terminal('topic', 'list').wait_for_text('tea')", "ended without 'tea' on its screen:"),
+    ],
+)
+def test_a_condition_that_never_comes_true_says_what_was_waited_for(tmp_path: Path, test: str, reason: str) -> None:
+    done = run_pytest(tmp_path, f"def test_it(wire, terminal, wait_for):\n    {test}\n")
+    assert done.returncode == 1
+    assert reason in done.stdout
+
+
+def test_two_wires_hear_nothing_of_each_other(tmp_path: Path) -> None:
+    done = run_pytest(
+        tmp_path,
+        """
+from holozen.testing import Wire
+
+def test_it(wire):
+    wire.start("sim").wait_for_line("listens on")
+    assert "odom" in wire.run("topic", "list").stdout
+    with Wire() as other:
+        assert other.run("topic", "list").stdout == ""
+""",
+    )
+    assert done.returncode == 0, done.stdout
+
+
+def test_pytest_loads_nothing_heavy_for_those_who_do_not_use_it(tmp_path: Path) -> None:
+    heavy = ["zenoh", "msgspec", "numpy", "pybullet", "prompt_toolkit", "pyte"]
+    done = run_pytest(tmp_path, f"import sys\ndef test_it():\n    assert not set({heavy}) & set(sys.modules)\n")
+    assert done.returncode == 0, done.stdout
+
+
+def test_without_pyte_the_screen_says_what_to_install(tmp_path: Path) -> None:
+    done = run_pytest(
+        tmp_path,
+        """
+import sys
+
+def test_it(terminal, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyte", None)
+    terminal("topic", "list").screen()
+""",
+    )
+    assert "RuntimeError: Terminal.screen needs pyte; run: pip install pyte" in done.stdout

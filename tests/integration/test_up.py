@@ -1,0 +1,200 @@
+"""`holozen up`: everything in one command, and nothing left of it afterwards."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen import data
+from holozen.testing import Process, Terminal, Wire, wait_for
+
+from .conftest import start_sim
+from .robots import Robot, moves, rests
+
+PARTS = {"sim", "pose-service", "controller"}
+AT_MOST = 6.0  # s; it promises 2, and a busy machine gets more
+
+
+def words_of(pid: int) -> list[str]:
+    """A running process's words; none if it is gone."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    except OSError:
+        return []
+
+
+def parts_at(wire: Wire) -> dict[str, int]:
+    """The verbs that run on this wire, with their process ids; `up` itself too."""
+    found = {}
+    for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))):
+        words = words_of(pid)
+        if wire.endpoint in words and "holozen" in words and "-c" not in words:
+            found[words[words.index("holozen") + 1]] = pid
+    return found
+
+
+def all_run(wire: Wire, parts: set[str]) -> dict[str, int]:
+    return wait_for(lambda: found if parts <= set(found := parts_at(wire)) else {}, 20)
+
+
+def driven(robot: Robot) -> None:
+    robot.odom.next(lambda odom: not rests(odom), within=20)
+
+
+def test_without_a_terminal_the_controller_drives_the_square(wire: Wire) -> None:
+    up = wire.start("up", "--rtf", "8", "--size", "0.5", "--laps", "1")
+    up.wait_for_line("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
+    up.wait_for_line("lap 1 goal 3: (0.00, 0.00, 0 deg)", within=40)
+    assert set(parts_at(wire)) >= {"up", "sim", "pose-service"}
+    assert "Traceback" not in up.err
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda n: n.name)
+def test_a_signal_ends_all_of_it_with_a_stop_of_the_robot(wire: Wire, number: int) -> None:
+    up = wire.start("up")
+    robot = Robot(wire.bus())
+    driven(robot)
+    assert set(all_run(wire, PARTS)) == {"up", *PARTS}
+    up.signal(number)
+    assert up.wait(AT_MOST) == 0
+    assert parts_at(wire) == {}
+    robot.told_to_stop()
+    assert "Traceback" not in up.err
+    assert "was killed" not in up.err
+
+
+def test_two_signals_in_a_row_leave_nothing_either(wire: Wire) -> None:
+    up = wire.start("up")
+    all_run(wire, PARTS)
+    up.signal(signal.SIGINT)
+    up.signal(signal.SIGINT)
+    up.wait()
+    wait_for(lambda: parts_at(wire) == {})
+    assert "Traceback" not in up.err
+
+
+def test_a_signal_right_at_the_start_leaves_nothing(wire: Wire) -> None:
+    up = wire.start("up")
+    up.wait_for_line("no terminal here")
+    up.signal(signal.SIGINT)
+    up.wait()
+    wait_for(lambda: parts_at(wire) == {})
+    assert "Traceback" not in up.err
+
+
+def test_a_part_that_hangs_is_killed_and_told(wire: Wire) -> None:
+    up = wire.start("up")
+    os.kill(all_run(wire, PARTS)["sim"], signal.SIGSTOP)
+    up.signal(signal.SIGINT)
+    assert up.wait(AT_MOST) == 0
+    assert parts_at(wire) == {}
+    assert "up: sim did not end within 0.5 s and was killed" in up.err
+
+
+def test_killed_it_leaves_nothing(wire: Wire) -> None:
+    up = wire.start("up")
+    all_run(wire, PARTS)
+    up.kill()
+    wait_for(lambda: parts_at(wire) == {})
+
+
+def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> None:
+    terminal = wire.terminal("up")
+    robot = Robot(wire.bus())
+    terminal.wait_for_text("driver    controller@")
+    all_run(wire, {"teleop", *PARTS})
+    terminal.type(",")
+    robot.odom.next(lambda odom: moves(odom, -0.5, 0, 0))
+    terminal.wait_for_text("driver    you")
+    terminal.type("\x03")
+    assert terminal.process.wait(AT_MOST) == 0
+    assert parts_at(wire) == {}
+    robot.told_to_stop()
+    assert terminal.modes() == terminal.modes_before
+    assert "controller: yields to teleop@" in terminal.screen(), "what the others had to say comes at the end"
+    assert "Traceback" not in terminal.raw
+
+
+def test_a_terminal_that_is_closed_ends_all(wire: Wire) -> None:
+    terminal = wire.terminal("up")
+    terminal.wait_for_text("driver    controller@")
+    terminal.hang_up()
+    terminal.process.wait()
+    wait_for(lambda: parts_at(wire) == {})
+
+
+def test_killed_in_a_terminal_it_leaves_no_process(wire: Wire) -> None:
+    terminal = wire.terminal("up")
+    terminal.wait_for_text("driver    controller@")
+    terminal.process.kill()
+    wait_for(lambda: parts_at(wire) == {})
+
+
+def test_a_killed_teleop_ends_all_and_leaves_the_terminal_tidy(wire: Wire) -> None:
+    terminal = wire.terminal("up")
+    terminal.wait_for_text("driver    controller@")
+    os.kill(parts_at(wire)["teleop"], signal.SIGKILL)
+    terminal.process.wait()
+    assert parts_at(wire) == {}
+    assert terminal.modes() == terminal.modes_before
+    assert terminal.raw.rfind("\x1b[?1049h") < terminal.raw.rfind("\x1b[?1049l")
+
+
+def broken_robot(folder: Path) -> str:
+    path = folder / "broken.urdf"
+    path.write_text("<robot name='r'><link name='a'>")
+    return str(path)
+
+
+@pytest.mark.parametrize("start", [Wire.start, Wire.terminal], ids=["without a terminal", "in a terminal"])
+def test_a_robot_that_is_broken_ends_all_and_says_why(
+    wire: Wire, tmp_path: Path, start: Callable[..., Process | Terminal]
+) -> None:
+    started = start(wire, "up", "--robot", broken_robot(tmp_path))
+    process = started.process if isinstance(started, Terminal) else started
+    assert process.wait() == 1
+    shown = started.raw if isinstance(started, Terminal) else started.err
+    assert "broken.urdf" in shown
+    assert "up: sim failed with exit code 1; ending the others" in shown
+    assert "Traceback" not in shown
+    assert parts_at(wire) == {}
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "reason"),
+    [
+        (["--rtf", "fast"], (1, 2), "'fast'"),
+        (["--shape", "star"], (1, 2), "star"),
+        (["--goals", "nowhere.txt"], (1, 2), "nowhere.txt"),
+        (["--laps", "many"], (1, 2), "'many'"),
+        (["--world", "nowhere.world"], (1, 2), "nowhere.world"),
+        (["--robot", "a=b/c"], (2,), "robot name 'b/c'"),
+        (["--speed", "1"], (2,), "--speed"),
+    ],
+)
+def test_a_wrong_flag_ends_it_with_the_reason(wire: Wire, words: list[str], code: tuple[int, ...], reason: str) -> None:
+    up = wire.start("up", *words)
+    assert up.wait() in code
+    assert reason in up.err
+    assert "Traceback" not in up.err
+    assert parts_at(wire) == {}
+
+
+def test_a_robot_with_a_name_is_driven_by_that_name(wire: Wire) -> None:
+    wire.start("up", "--robot", f"{data.find('urdf', 'hb_bot.urdf.xacro')}=Fred")
+    driven(Robot(wire.bus(), "Fred"))
+
+
+def test_a_killed_sim_is_told_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:
+    up = wire.start("up")
+    robot = Robot(wire.bus())
+    driven(robot)
+    os.kill(parts_at(wire)["sim"], signal.SIGKILL)
+    up.wait_for_line("up: sim was ended by signal 9; `holozen sim` starts it again")
+    up.wait_for_line("controller: waiting for odom")
+    assert set(parts_at(wire)) == {"up", "pose-service", "controller"}
+    start_sim(wire)
+    driven(robot)
+    up.wait_for_line("controller: goes on")

@@ -1,0 +1,177 @@
+"""A person beats a script beats the autopilot, and nobody who was overruled takes the robot back by himself."""
+
+from collections.abc import Callable
+
+import pytest
+
+from holozen.errors import ServiceError
+from holozen.messages import CommandStatus, Twist
+from holozen.testing import Process, Wire, wait_for
+from holozen.wire import PRIORITY_OF
+
+from .robots import Robot, moves, rests
+
+PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
+
+Hand = Callable[[float], None]
+
+
+def hand(wire: Wire, node: str, priority: str) -> Hand:
+    """A source that commands forward speeds."""
+    publisher = wire.bus(node).publisher("cmd_vel", Twist, priority)
+    return lambda x: publisher.put(Twist.planar(x))
+
+
+@pytest.fixture(scope="module")
+def person(town: Wire, sim: Process) -> Hand:
+    return hand(town, "person", PERSON)
+
+
+@pytest.fixture(scope="module")
+def script(town: Wire, sim: Process) -> Hand:
+    return hand(town, "script", SCRIPT)
+
+
+@pytest.fixture(scope="module")
+def other_script(town: Wire, sim: Process) -> Hand:
+    return hand(town, "other", SCRIPT)
+
+
+@pytest.fixture(scope="module")
+def autopilot(town: Wire, sim: Process) -> Hand:
+    return hand(town, "autopilot", AUTOPILOT)
+
+
+def drive(robot: Robot, hand: Hand, x: float, *others: tuple[Hand, float]) -> None:
+    """Command until the robot goes at `x`, while the others want something else all the time."""
+
+    def going() -> bool:
+        for other, speed in others:
+            other(speed)
+        hand(x)
+        return moves(robot.newest(), x, 0, 0)
+
+    wait_for(going, what=lambda: f"the robot to go at {x}: {robot.status()}")
+
+
+def refused(robot: Robot, hand: Hand, reason: str) -> CommandStatus:
+    """Command once, and wait until the sim says that it was refused for this reason."""
+    before = robot.status().refused.get(reason, 0)
+    hand(0.9)
+    return robot.status_when(lambda status: status.refused.get(reason, 0) > before)
+
+
+def test_teleop_controller_and_plain_put_have_these_priorities() -> None:
+    assert PRIORITY_OF == {"teleop": PERSON, "controller": AUTOPILOT}
+
+
+def test_a_person_overrules_a_script_and_a_script_the_autopilot(
+    robot: Robot, person: Hand, script: Hand, autopilot: Hand
+) -> None:
+    drive(robot, autopilot, 0.1)
+    assert robot.status().obeyed.startswith("autopilot@")
+    drive(robot, script, 0.2, (autopilot, 0.1))
+    assert robot.status().obeyed.startswith("script@")
+    drive(robot, person, 0.3, (autopilot, 0.1), (script, 0.2))
+    status = robot.status()
+    assert status.obeyed.startswith("person@")
+    assert status.priority == PERSON
+    assert status.held
+
+
+def test_a_lower_one_that_begins_while_a_higher_one_drives_does_not_move_the_robot(
+    robot: Robot, person: Hand, script: Hand, autopilot: Hand
+) -> None:
+    drive(robot, person, 0.3)
+    begin = len(robot.odom.messages())
+    drive(robot, person, 0.4, (script, -0.9), (autopilot, -0.9))
+    drive(robot, person, 0.3, (script, -0.9), (autopilot, -0.9))
+    assert all(odom.twist.twist.linear.x > 0 for odom in robot.odom.messages()[begin:])
+
+
+@pytest.mark.parametrize("overruled", ["script", "autopilot"])
+def test_when_the_person_falls_silent_the_robot_stands_until_resume(
+    robot: Robot, person: Hand, script: Hand, autopilot: Hand, overruled: str
+) -> None:
+    lower = {"script": script, "autopilot": autopilot}[overruled]
+    drive(robot, lower, 0.1)
+    drive(robot, person, 0.3, (lower, 0.1))
+
+    def stands() -> bool:
+        lower(0.1)
+        return rests(robot.newest())
+
+    wait_for(stands)
+    status = refused(robot, lower, "held")
+    assert status.obeyed == ""
+    assert rests(robot.newest())
+    assert robot.resume() == "every source may drive"
+    drive(robot, lower, 0.1)
+
+
+def test_an_autopilot_that_never_drove_is_held_too_after_a_person_did(
+    robot: Robot, person: Hand, autopilot: Hand
+) -> None:
+    drive(robot, person, 0.3)
+    robot.stands()
+    refused(robot, autopilot, "held")
+    assert rests(robot.newest())
+
+
+def test_a_script_that_a_person_starts_after_driving_may_drive(robot: Robot, person: Hand, script: Hand) -> None:
+    drive(robot, person, 0.3)
+    robot.stands()
+    drive(robot, script, 0.2)
+
+
+def test_among_equals_the_one_that_drives_goes_on(robot: Robot, script: Hand, other_script: Hand) -> None:
+    drive(robot, script, 0.2)
+    begin = len(robot.odom.messages())
+    for _ in range(10):
+        other_script(0.9)
+        script(0.2)
+        robot.newest()
+    assert all(moves(odom, 0.2, 0, 0) for odom in robot.odom.messages()[begin:])
+    assert robot.status().refused["overruled"] >= 10
+
+
+def test_an_equal_takes_over_once_the_other_is_silent(robot: Robot, script: Hand, other_script: Hand) -> None:
+    drive(robot, script, 0.2)
+    robot.stands()
+    drive(robot, other_script, 0.3)
+
+
+def test_resume_is_refused_while_a_person_drives(robot: Robot, person: Hand) -> None:
+    drive(robot, person, 0.3)
+    with pytest.raises(ServiceError, match=r"person@.* drives; stop first"):
+        robot.resume()
+    drive(robot, person, 0.3)
+
+
+def test_resume_is_granted_as_soon_as_the_person_has_stopped(robot: Robot, person: Hand, autopilot: Hand) -> None:
+    drive(robot, person, 0.3)
+    drive(robot, person, 0.0)
+    assert robot.resume()
+    drive(robot, autopilot, 0.1)
+
+
+def test_a_stop_of_a_person_stops_a_driving_autopilot(robot: Robot, person: Hand, autopilot: Hand) -> None:
+    drive(robot, autopilot, 0.2)
+    person(0.0)
+    robot.stands()
+    refused(robot, autopilot, "overruled")
+
+
+def test_controller_resume_tells_what_the_sim_says(town: Wire, robot: Robot, person: Hand) -> None:
+    drive(robot, person, 0.3)
+    robot.stands()
+    done = town.run("controller", "--resume")
+    assert (done.returncode, done.stderr) == (0, "every source may drive\n")
+    assert not robot.status().held
+
+
+def test_controller_resume_without_a_sim_says_so(wire: Wire) -> None:
+    done = wire.run("controller", "--resume")
+    assert done.returncode == 1
+    assert done.stderr.startswith("controller: no reply from 'resume' within 5 s")
+    assert done.stderr.count("\n") == 1

@@ -1,0 +1,70 @@
+"""The `zenoh` command of PyPI's zenoh-cli, which knows nothing of us, reads and drives the robot."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from holozen.testing import Process, Wire, wait_for
+
+from .robots import Robot, moves, time_of
+
+ZENOH = str(Path(sys.executable).with_name("zenoh"))
+
+
+def zenoh(wire: Wire, *words: str) -> Process:
+    """The command as the README has it, without its shout into the network while it looks for a router."""
+    quiet = ("--cfg", "scouting/multicast/enabled:false")
+    return Process(
+        [ZENOH, "--mode", "client", "--connect", wire.endpoint, *quiet, *words], env={"PYTHONUNBUFFERED": "1"}
+    )
+
+
+@pytest.fixture(autouse=True)
+def installed() -> None:
+    if not os.path.exists(ZENOH):
+        pytest.skip("needs zenoh-cli; run: scripts/venv requirements-dev.lock")
+
+
+def test_it_subscribes_to_odom_and_shows_readable_text(town: Wire, robot: Robot) -> None:
+    with zenoh(town, "subscribe", "-k", "odom", "--decoder", "json") as process:
+        line = process.wait_for_line('"child_frame_id"')
+    assert "footprint_link" in line
+    assert "Traceback" not in process.err
+
+
+def test_it_puts_commands(town: Wire, robot: Robot) -> None:
+    with zenoh(town, "put", "-k", "cmd_vel", "-v", '{"linear":{"x":0.3}}') as process:
+        robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
+        assert process.wait() == 0
+    robot.stands()
+
+
+def test_its_commands_that_are_wrong_are_refused(town: Wire, robot: Robot) -> None:
+    before = robot.status().refused.get("malformed", 0)
+    with zenoh(town, "put", "-k", "cmd_vel", "-v", '{"linaer":{"x":0.3}}') as process:
+        status = robot.status_when(lambda status: status.refused.get("malformed", 0) > before)
+        process.wait()
+    assert "unknown field `linaer`" in status.last_refusal
+
+
+def test_it_gets_the_last_odom(town: Wire, robot: Robot) -> None:
+    before = time_of(robot.newest())
+    with zenoh(town, "get", "-s", "odom", "--decoder", "json") as process:
+        assert process.wait() == 0
+    shown = process.out[process.out.index("{") : process.out.rindex("}") + 1]
+    stamp = json.loads(shown)["header"]["stamp"]
+    assert stamp["sec"] + stamp["nanosec"] * 1e-9 >= before
+
+
+def test_it_asks_for_a_goal(town: Wire, robot: Robot) -> None:
+    town.start("pose-service").wait_for_line("goals")
+
+    def asked() -> str:
+        with zenoh(town, "get", "-s", "next_goal?request_goal=1", "--decoder", "json") as process:
+            process.wait()
+        return process.out
+
+    assert '"y_goal": 1' in wait_for(asked)
