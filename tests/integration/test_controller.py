@@ -118,7 +118,7 @@ def test_the_teleops_r_hands_over(wire: Wire, scene: Scene) -> None:
     terminal.wait_for_text("driver    you")
     terminal.type("k")
     scene.controller.wait_for_line("yields to teleop@")
-    terminal.wait_for_text("driver    nobody; r hands over to the controller")
+    terminal.wait_for_text("driver    nobody; r lets the controller drive again")
     scene.robot.stands()
     terminal.type("r")
     scene.controller_drives()

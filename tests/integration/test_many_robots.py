@@ -84,7 +84,7 @@ def test_who_overruled_fred_has_nothing_to_say_to_ann(town: Wire, fred: Robot, a
 def test_a_teleop_with_a_name_drives_that_robot(town: Wire, fred: Robot, ann: Robot) -> None:
     with town.terminal("teleop", "Ann") as terminal:
         terminal.wait_for_text("listening")
-        assert "holozen teleop  Ann" in terminal.screen()
+        assert "holozen teleop Ann" in terminal.screen()
         seen = len(fred.commands.messages())
         terminal.type("i")
         ann.odom.next(lambda odom: moves(odom, 0.5, 0, 0))

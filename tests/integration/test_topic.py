@@ -7,6 +7,7 @@ import subprocess
 import pytest
 import zenoh
 
+from holozen.cli.pub import STOPS
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
@@ -188,8 +189,10 @@ def test_pub_reads_a_value_from_standard_input(town: Wire, robot: Robot) -> None
     robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
 
 
-@pytest.mark.parametrize(("words", "count"), [(["--once"], 1), (["-1"], 1), (["--times", "5", "--rate", "100"], 5 + 1)])
-def test_pub_says_it_as_often_as_told_and_a_stop_after_more_than_one(
+@pytest.mark.parametrize(
+    ("words", "count"), [(["--once"], 1), (["-1"], 1), (["--times", "5", "--rate", "100"], 5 + STOPS)]
+)
+def test_pub_says_it_as_often_as_told_and_stops_after_more_than_one(
     town: Wire, robot: Robot, words: list[str], count: int
 ) -> None:
     before = robot.status().accepted
