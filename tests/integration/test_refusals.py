@@ -89,6 +89,14 @@ def test_a_delete_is_no_command(standing: Robot, stranger: zenoh.Session) -> Non
     standing.status_when(lambda status: status.refused.get("malformed", 0) == before + 1)
 
 
+@pytest.mark.parametrize("key", ["*", "**", "cmd_ve$*"])
+def test_a_command_for_every_robot_is_one_for_none(standing: Robot, stranger: zenoh.Session, key: str) -> None:
+    before = standing.status().refused.get("wildcard", 0)
+    stranger.put(key, b'{"linear":{"x":1}}')
+    status = standing.status_when(lambda status: status.refused.get("wildcard", 0) > before)
+    assert "name one robot" in status.last_refusal
+
+
 def test_a_driven_robot_drives_on_through_a_flood_of_bad_commands(robot: Robot, stranger: zenoh.Session) -> None:
     begin = len(robot.odom.messages())
     robot.drive(0.3)

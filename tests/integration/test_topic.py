@@ -240,6 +240,7 @@ def test_pub_without_a_subscriber_says_so(wire: Wire) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "reason"),
     [
+        (["pub", "*/cmd_vel", "{}"], 1, "'*/cmd_vel': write to one key; a wildcard would move every robot"),
         (["pub", "speed", "{}"], 1, "'speed' has no known type; known keys: cmd_vel, odom, "),
         (["pub", "cmd_vel", "{}", "--rate", "0"], 2, "'0': use a number from 0.01 to 10000 Hz"),
         (["pub", "cmd_vel", "{}", "--times", "0"], 2, "'0': use a whole number from 1 up"),

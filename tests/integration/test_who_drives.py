@@ -135,6 +135,16 @@ def test_among_equals_the_one_that_drives_goes_on(robot: Robot, script: Hand, ot
     assert robot.status().refused["overruled"] >= 10
 
 
+def test_an_equal_may_stop_the_robot_and_then_the_other_is_held(robot: Robot, script: Hand, other_script: Hand) -> None:
+    drive(robot, script, 0.2)
+    other_script(0.0)
+    robot.stands()
+    refused(robot, script, "overruled")
+    robot.pass_time(0.6)
+    refused(robot, script, "held")
+    assert rests(robot.newest())
+
+
 def test_an_equal_takes_over_once_the_other_is_silent(robot: Robot, script: Hand, other_script: Hand) -> None:
     drive(robot, script, 0.2)
     robot.stands()

@@ -2,15 +2,18 @@
 
 import os
 import threading
+import time
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
+from holozen import bus as module
 from holozen.bus import Bus, BusError, NoReply, Publisher, ServiceError
 from holozen.connection import Connection
 from holozen.door import is_free
@@ -163,19 +166,19 @@ def test_a_wrong_key_leaves_nothing_in_the_graph(pair: tuple[Bus, Bus]) -> None:
     assert [endpoint.key for endpoint in graph.endpoints()] == ["odom"]
 
 
-def test_a_service_that_is_not_there_yet_is_waited_for(wire: Wire) -> None:
+def test_a_service_that_is_not_there_yet_is_waited_for(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
     server, caller = wire.bus("server"), wire.bus("caller")
-    asking = threading.Event()
-    with ThreadPoolExecutor() as pool:
+    pauses: list[float] = []
 
-        def call() -> TriggerReply:
-            asking.set()
-            return caller.call("resume", TriggerRequest(), TriggerReply, 10)
+    def sleep(seconds: float) -> None:
+        if not pauses:  # it was asked for once, in vain
+            server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply()).start()
+        pauses.append(seconds)
+        time.sleep(seconds)
 
-        reply = pool.submit(call)
-        assert asking.wait(10)
-        server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply()).start()
-        assert reply.result() == TriggerReply()
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=time.monotonic, sleep=sleep))
+    assert caller.call("resume", TriggerRequest(), TriggerReply, 10) == TriggerReply()
+    assert pauses
 
 
 def test_a_service_that_is_not_there_is_named_with_the_time_it_had(wire: Wire) -> None:
@@ -232,6 +235,8 @@ def test_when_the_holder_of_the_door_goes_another_opens_it_and_late_joiners_get_
     wait_for(lambda: not is_free(wire.endpoint))
     late = wire.bus("late")
     wait_for(late.connected)
+    heir.close()
+    wait_for(lambda: is_free(wire.endpoint))  # whoever has left holds no door
 
 
 def test_what_does_not_run_long_leaves_the_door_shut(wire: Wire) -> None:

@@ -49,9 +49,10 @@ def test_the_door_is_opened_when_its_holder_goes_and_closed_at_the_end(
     listener: socket.socket, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(door, "LOOK", 0.001)
-    closing, opened = Looks(), []
+    closing, tries, opened = Looks(), [], []
 
     def open_door(endpoint: str) -> Callable[[], None] | None:
+        tries.append(endpoint)
         with contextlib.suppress(OSError):
             opened.append(socket.create_server(("127.0.0.1", int(endpoint.rpartition(":")[2]))))
             return opened[-1].close
@@ -59,7 +60,7 @@ def test_the_door_is_opened_when_its_holder_goes_and_closed_at_the_end(
 
     keeper = door.keep(endpoint_of(listener), closing, open_door)
     wait_for(lambda: closing.count > 3)
-    assert not opened
+    assert not tries  # a session that cannot listen would take long to close
     listener.close()
     wait_for(lambda: opened)
     closing.set()

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from holozen.graph import ALL, Endpoint, Graph, includes, on_key, parse, token
 
 chunks = st.text("ab%*$2A4.-_é", min_size=1, max_size=6).filter(lambda chunk: "*" not in chunk and "$" not in chunk)
-wild = chunks | st.sampled_from(["*", "**", "a$*b"])
+wild = chunks | st.sampled_from(["*", "**", "a$*b", "%2A", "%24", "%25"])
 names = st.text("abcXYZ09_-", min_size=1, max_size=8)
 
 

@@ -95,7 +95,8 @@ def test_a_reader_that_has_seen_enough_is_no_failure(links: int, tmp_path: Path)
     os.close(reading)
     words = [sys.executable, "-m", "holozen", "xacro", str(path)]
     with open(writing, "wb") as pipe:
-        done = subprocess.run(words, stdout=pipe, stderr=subprocess.PIPE, timeout=60)
+        env = {**os.environ, "PYTHONUNBUFFERED": ""}
+        done = subprocess.run(words, stdout=pipe, stderr=subprocess.PIPE, timeout=60, env=env)
     assert (done.returncode, done.stderr) == (0, b"")
 
 

@@ -81,6 +81,7 @@ def test_bytes_that_are_no_text_are_shown_as_a_hex_dump() -> None:
     assert decode(b"\x89PNG", "image/png") == "4 bytes of image/png: 89 50 4e 47"
     assert decode(b"\xff" * 33, "zenoh/bytes") == f"33 bytes of zenoh/bytes: {'ff ' * 31}ff ..."
     assert decode(b"\xff" * 32, "zenoh/bytes").endswith(" ff")
+    assert decode(b"\xa1\xff", MSGPACK) == "2 bytes of application/msgpack: a1 ff"
     assert decode(b"\xc1", MSGPACK) == "1 bytes of application/msgpack: c1"
     assert decode(b"\x91" * 100_000, MSGPACK).startswith("100000 bytes of application/msgpack: 91 91")
 

@@ -184,6 +184,20 @@ def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) 
     assert "goes on" in case.said
 
 
+def test_a_controller_that_drives_lets_go_without_a_word_when_another_takes_over(case: Case) -> None:
+    """A stop of its own would hold up the person who drives now."""
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.robot.heard)
+    case.robot.slips.set()
+    wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.said)
+    assert case.said[-1].startswith("yields to teleop@9; ")
+    case.stop.set()
+    assert len(lap.result(30)) < 2
+    case.follower.halt()
+    assert Twist() not in case.robot.heard
+
+
 def test_a_goal_beyond_any_floor_is_not_driven_to(case: Case) -> None:
     def next_goal(_request: NextGoalRequest) -> NextGoalReply:
         return NextGoalReply(2e6)
