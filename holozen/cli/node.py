@@ -4,7 +4,7 @@ import argparse
 
 from holozen import connection
 from holozen.bus import Bus
-from holozen.tell import say
+from holozen.tell import printable, say
 
 
 def parser() -> argparse.ArgumentParser:
@@ -19,7 +19,8 @@ def main(argv: list[str]) -> int:
     with Bus("node_list", connection.from_arguments(args), patience=3.0) as bus:
         endpoints = bus.graph().settled(bus.connected)
     names = sorted(endpoint.node for endpoint in endpoints if endpoint.kind == "node")
-    print("\n".join(names) if names else "", end="\n" if names else "")
+    for name in names:
+        print(printable(name))
     if not names:
         say("no nodes: nobody is there; `holozen up` starts some")
     return 0

@@ -8,7 +8,7 @@ from holozen.bus import Bus
 from holozen.cli.pub import read_message
 from holozen.cli.show import decode, lines
 from holozen.flags import key, number
-from holozen.tell import say
+from holozen.tell import printable, say
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,7 +40,7 @@ def list_services(args: argparse.Namespace) -> int:
         endpoints = bus.graph().settled(bus.connected)
     found = sorted({(e.key, e.type) for e in endpoints if e.kind == "srv"})
     for name, kind in found:
-        print(f"{name} [{kind}]" if args.show_types else name)
+        print(printable(f"{name} [{kind}]" if args.show_types else name))
     if not found:
         say("no services: nobody is there; `holozen up` starts some")
     return 0

@@ -7,7 +7,7 @@ from holozen import connection
 from holozen.bus import Bus
 from holozen.flags import count, key, number
 from holozen.graph import on_key
-from holozen.tell import say
+from holozen.tell import printable, say
 
 PATIENCE = 3.0  # s; a client waits this long for its router
 
@@ -83,7 +83,7 @@ def list_topics(args: argparse.Namespace) -> int:
     ends = [e for e in endpoints if e.kind in ("pub", "sub") and "*" not in e.key]
     topics = sorted({(e.key, e.type) for e in ends if not e.type.startswith("any/")})
     for name, kind in topics:
-        print(f"{name} [{kind}]" if args.show_types else name)
+        print(printable(f"{name} [{kind}]" if args.show_types else name))
     if not topics:
         say("no topics: nobody is there; `holozen up` starts a robot")
     return 0
@@ -99,11 +99,11 @@ def info(args: argparse.Namespace) -> int:
         say(f"holozen topic: unknown key {args.key!r}; known: {known}")
         return 1
     types = sorted({e.type for e in pubs + subs if not e.type.startswith("any/")})
-    print(f"Type: {', '.join(types) or 'unknown'}")
+    print(printable(f"Type: {', '.join(types) or 'unknown'}"))
     for title, found in (("Publisher", pubs), ("Subscription", subs)):
         print(f"{title} count: {len(found)}")
         for endpoint in found:
-            print(f"  {endpoint.node} ({endpoint.session[:6]})")
+            print(printable(f"  {endpoint.node} ({endpoint.session[:6]})"))
     return 0
 
 

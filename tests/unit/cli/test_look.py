@@ -58,6 +58,16 @@ def test_topics_are_listed_once_with_their_types(sim: Bus, run: Run) -> None:
     assert run("topic", "list", "-t")[1] == "Fred/odom [nav_msgs/msg/Odometry]\ncmd_vel [geometry_msgs/msg/Twist]\n"
 
 
+def test_names_from_the_wire_cannot_move_the_cursor(wire: Wire, run: Run) -> None:
+    stranger = wire.bus("evil\x1b[2J\nnode", lasting=True)
+    stranger.publisher("evil\x1b[2J\nkey", Twist)
+    stranger.serve("evil\x1b[2J\nservice", NextGoalRequest, NextGoalReply, goal)
+    assert run("topic", "list")[1] == "evil?[2J?key\n"
+    assert run("service", "list")[1] == "evil?[2J?service\n"
+    assert run("node", "list")[1] == "evil?[2J?node\n"
+    assert f"  evil?[2J?node ({stranger.id[:6]})\n" in run("topic", "info", "evil\x1b[2J\nkey")[1]
+
+
 def test_info_shows_type_writers_and_readers_also_those_of_an_expression(sim: Bus, run: Run, wire: Wire) -> None:
     reader = wire.bus("pose_service")
     reader.subscribe("**/odom", Odometry)
