@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 
 from holozen import messages as m
+from holozen import simulation_interfaces as s
 
 COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stands
 MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded at all
@@ -54,12 +55,21 @@ TOPICS = (
     Topic("joint_states", (m.JointState,), ("sim",), (), 50.0, 0.2, ""),
     Topic("tf", (m.TFMessage,), ("sim",), (), 50.0, 0.2, ""),
     Topic("clock", (m.Clock,), ("sim",), (), 50.0, 0.2, ""),
+    Topic("joint_command", (m.JointState,), (), ("sim",), 20.0, COMMAND_SILENCE,
+          "0.5 s without a fresh one: joints hold still"),
 )  # fmt: skip
 
 SERVICES = (
     Service("next_goal", m.NextGoalRequest, m.NextGoalReply, "pose_service", "the goal with a number, in odom"),
     Service("get_pose", m.GetPoseRequest, m.GetPoseReply, "pose_service", "a robot's last odom and its age"),
     Service("resume", m.TriggerRequest, m.TriggerReply, "sim", "lets the sources drive that a higher one overruled"),
+    Service("spawn_entity", s.SpawnEntityRequest, s.SpawnEntityReply, "sim", "puts a robot or object into the world"),
+    Service("delete_entity", s.DeleteEntityRequest, s.DeleteEntityReply, "sim", "takes it out again"),
+    Service("get_entities", s.GetEntitiesRequest, s.GetEntitiesReply, "sim", "the names of all there are"),
+    Service(
+        "get_entity_state", s.GetEntityStateRequest, s.GetEntityStateReply, "sim", "where one is, and its velocity"
+    ),
+    Service("set_entity_state", s.SetEntityStateRequest, s.SetEntityStateReply, "sim", "puts one elsewhere"),
 )
 
 
@@ -74,7 +84,7 @@ def table() -> str:
 def _topic_row(row: Topic) -> str:
     types = row.type.ROS + "".join(f" ({other.__name__} accepted)" for other in row.types[1:])
     # A plain tool may write a command as well as read anything.
-    writers = [*row.writers, "anyone"] if row.key == "cmd_vel" else row.writers
+    writers = [*row.writers, "anyone"] if row.key in ("cmd_vel", "joint_command") else row.writers
     ends = f"{', '.join(writers)} -> {', '.join(row.readers) or 'anyone'}"
     return f"| `{row.key}` | {types} | {ends} | {row.rate:g} Hz | {row.rule} |"
 

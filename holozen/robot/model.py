@@ -5,19 +5,22 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
+from holozen.robot.drives import Drive
 from holozen.robot.errors import RobotError
-from holozen.robot.parts import Inertial, Joint, Limits, Link, Pose, Shape
-from holozen.robot.plugins import PlanarMove, read_plugins
+from holozen.robot.parts import Inertial, Joint, Limits, Link, Pose, Sensor, Shape, Transmission
+from holozen.robot.plugins import read_plugins
+from holozen.robot.source import Source
 from holozen.robot.tag import Tag, read_xml
 from holozen.robot.tree import root_of
-from holozen.robot.urdf import Source, read_joint, read_link
+from holozen.robot.urdf import read_joint, read_link
 from holozen.robot.xacro import expand, is_xacro, read_text
 
 __all__ = [
-    "Inertial", "Joint", "Limits", "Link", "PlanarMove", "Pose", "RobotError", "RobotModel", "Shape",
+    "Drive", "Inertial", "Joint", "Limits", "Link", "Pose", "RobotError", "RobotModel", "Shape",
     "load", "parse",
 ]  # fmt: skip
 
+HERE = Pose()
 Part = TypeVar("Part", Link, Joint)
 
 
@@ -25,16 +28,20 @@ Part = TypeVar("Part", Link, Joint)
 class RobotModel:
     """A tree of links from `root`, in the order of the file.
 
-    `planar_move` is None for a robot without that plugin. Each of `warnings` is a line that names file, line,
-    element and what was done instead.
+    `drive` is None for a robot without a plugin that drives it. Each of `warnings` is a line that names file, line,
+    element and what was done instead. A `static` one never moves. `pose` is where the file itself puts it (SDF).
     """
 
     name: str
     root: str
     links: Mapping[str, Link]
     joints: Mapping[str, Joint]
-    planar_move: PlanarMove | None
-    warnings: tuple[str, ...]
+    drive: Drive | None
+    warnings: tuple[str, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    transmissions: tuple[Transmission, ...] = ()
+    static: bool = False
+    pose: Pose = HERE
 
 
 def load(path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}) -> RobotModel:

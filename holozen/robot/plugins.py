@@ -2,10 +2,11 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from holozen.robot.drives import Drive
+from holozen.robot.source import Source
 from holozen.robot.tag import Tag, number
-from holozen.robot.urdf import Source
 from holozen.wire import COMMAND_SILENCE
 
 PLANAR_MOVE = re.compile(r"(.*/)?(lib)?gazebo_ros_planar_move(\.so)?")
@@ -13,30 +14,9 @@ PLANAR_MOVE = re.compile(r"(.*/)?(lib)?gazebo_ros_planar_move(\.so)?")
 _KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
 
 
-@dataclass(frozen=True, slots=True)
-class PlanarMove:
-    """Gazebo's planar_move: a Twist moves the whole robot over the plane.
-
-    All defaults but the timeout are Gazebo's.
-    Topics have their namespace before them and no slash at the front. `odometry_rate` in Hz of sim time.
-    `robot_base_frame` names a link, the child frame of odometry. `command_timeout` in seconds; -1 switches it
-    off. `covariance` is the variance of x and y in m^2 and of yaw in rad^2.
-    """
-
-    command_topic: str = "cmd_vel"
-    odometry_topic: str = "odom"
-    odometry_frame: str = "odom"
-    odometry_rate: float = 20.0
-    robot_base_frame: str = ""
-    command_timeout: float = COMMAND_SILENCE
-    publish_odom: bool = True
-    publish_odom_tf: bool = True
-    covariance: tuple[float, float, float] = (1e-5, 1e-5, 1e-3)
-
-
-def read_plugins(robot: Tag, links: Mapping[str, object], root: str, source: Source) -> PlanarMove | None:
+def read_plugins(robot: Tag, links: Mapping[str, object], root: str, source: Source) -> Drive | None:
     """The planar_move plugin of a `<robot>`, if it has one; other plugins make warnings. Raises RobotError."""
-    drive: PlanarMove | None = None
+    drive: Drive | None = None
     for plugin in _plugins(robot):
         filename = plugin.attributes.get("filename", "").strip()
         if not PLANAR_MOVE.fullmatch(filename):
@@ -53,9 +33,7 @@ def _plugins(robot: Tag) -> Iterator[Tag]:
         yield from gazebo.below("plugin")
 
 
-def _with_known_frame(
-    drive: PlanarMove, plugin: Tag, links: Mapping[str, object], root: str, source: Source
-) -> PlanarMove:
+def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, object], root: str, source: Source) -> Drive:
     if drive.robot_base_frame in links:
         return drive
     if drive.robot_base_frame:
@@ -63,12 +41,12 @@ def _with_known_frame(
     return replace(drive, robot_base_frame=root)
 
 
-def _planar_move(plugin: Tag) -> PlanarMove:
+def _planar_move(plugin: Tag) -> Drive:
     """The tags of gazebo_ros_planar_move.cpp, in its ROS 1 (noetic) and its ROS 2 version."""
-    plain, settings = PlanarMove(), _Settings(plugin)
+    plain, settings = Drive(), _Settings(plugin)
     variances = zip(("covariance_x", "covariance_y", "covariance_yaw"), plain.covariance, strict=True)
     x, y, yaw = (settings.number(default, name) for name, default in variances)
-    return PlanarMove(
+    return Drive(
         command_topic=settings.topic("cmd_vel", "command_topic"),
         odometry_topic=settings.topic("odom", "odometry_topic"),
         odometry_frame=settings.word("odometry_frame").strip("/") or plain.odometry_frame,

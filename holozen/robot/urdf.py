@@ -1,34 +1,14 @@
 """URDF elements -> links and joints."""
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
 
-from holozen.robot.errors import RobotError
-from holozen.robot.parts import JOINT_KINDS, Inertial, Joint, Limits, Link, Pose, Shape
+from holozen.robot.parts import JOINT_KINDS, Inertial, Joint, Limits, Link
+from holozen.robot.shapes import needed, read_pose, read_shape
+from holozen.robot.source import Source
 from holozen.robot.tag import Tag, Vector
-from holozen.robot.uris import resolve_uri
 
-SMALLEST = 1e-6  # of a size in metres, and of a mesh's scale
-
-SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
-"""Attributes that give a shape's size, and how many numbers each holds."""
-
+SMALLEST_AXIS = 1e-6
 NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@dataclass(slots=True)
-class Source:
-    """The file a robot comes from, the packages given with it, and what there is to warn of in it."""
-
-    origin: Path
-    packages: Mapping[str, Path]
-    warnings: list[str] = field(default_factory=list)
-
-    def warn(self, tag: Tag, problem: str) -> None:
-        """Notes a mistake that a robot can be driven with."""
-        self.warnings.append(str(tag.wrong(problem)))
 
 
 def read_link(tag: Tag, source: Source) -> Link:
@@ -37,8 +17,8 @@ def read_link(tag: Tag, source: Source) -> Link:
     return Link(
         name=tag.word("name"),
         inertial=None if inertial is None else _inertial(inertial, source),
-        visuals=tuple(_shape(visual, source) for visual in tag.all("visual")),
-        collisions=tuple(_shape(collision, source) for collision in tag.all("collision")),
+        visuals=tuple(read_shape(visual, source) for visual in tag.all("visual")),
+        collisions=tuple(read_shape(collision, source) for collision in tag.all("collision")),
     )
 
 
@@ -48,30 +28,17 @@ def read_joint(tag: Tag, source: Source) -> Joint:
     if kind not in JOINT_KINDS:
         raise tag.wrong(f"has the unknown type {kind!r}; known are {', '.join(JOINT_KINDS)}")
     ends = {name: tag.first(name) for name in ("parent", "child")}
-    parent, child = (_needed(tag, name).word("link") for name in ends)
-    return Joint(tag.word("name"), kind, parent, child, _pose(tag), _axis(tag, kind), _limits(tag, kind, source))
-
-
-def _needed(tag: Tag, name: str) -> Tag:
-    found = tag.first(name)
-    if found is None:
-        raise tag.wrong(f"has no <{name}>")
-    return found
-
-
-def _pose(tag: Tag) -> Pose:
-    origin = tag.first("origin")
-    zero = (0.0, 0.0, 0.0)
-    return Pose() if origin is None else Pose(origin.vector("xyz", zero), origin.vector("rpy", zero))
+    parent, child = (needed(tag, name).word("link") for name in ends)
+    return Joint(tag.word("name"), kind, parent, child, read_pose(tag), _axis(tag, kind), _limits(tag, kind, source))
 
 
 def _inertial(tag: Tag, source: Source) -> Inertial:
-    mass = _needed(tag, "mass").number("value")
+    mass = needed(tag, "mass").number("value")
     if mass < 0:
-        raise _needed(tag, "mass").wrong(f"value: {mass} kg is below zero")
+        raise needed(tag, "mass").wrong(f"value: {mass} kg is below zero")
     if mass == 0:
         source.warn(tag, "has no mass; the link is taken as massless, with no inertia")
-    return Inertial(_pose(tag), mass, _inertia(tag, source) if mass else NO_INERTIA)
+    return Inertial(read_pose(tag), mass, _inertia(tag, source) if mass else NO_INERTIA)
 
 
 def _inertia(tag: Tag, source: Source) -> tuple[float, float, float, float, float, float]:
@@ -93,49 +60,13 @@ def _positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz
     return xx > 0 and minor > 0 and determinant > 0
 
 
-def _shape(tag: Tag, source: Source) -> Shape:
-    geometry = _needed(tag, "geometry")
-    known = [child for child in geometry.children if child.name in SIZES or child.name == "mesh"]
-    if not known:
-        found = ", ".join(f"<{child.name}>" for child in geometry.children) or "nothing"
-        raise geometry.wrong(f"holds {found}; it has to hold <box>, <cylinder>, <sphere> or <mesh>")
-    shape = known[0]
-    if shape.name == "mesh":
-        return Shape("mesh", _scale(shape), _pose(tag), _mesh(shape, tag.name, source))
-    return Shape(shape.name, _size(shape), _pose(tag))
-
-
-def _size(tag: Tag) -> tuple[float, ...]:
-    attributes, count = SIZES[tag.name]
-    size = tuple(value for attribute in attributes.split() for value in tag.numbers(attribute, count))
-    if min(size) < SMALLEST:
-        raise tag.wrong(f"has the size {size} m; each number has to be {SMALLEST:g} or more")
-    return size
-
-
-def _scale(tag: Tag) -> Vector:
-    scale = tag.vector("scale", (1.0, 1.0, 1.0))
-    if min(abs(factor) for factor in scale) < SMALLEST:
-        raise tag.wrong(f"has the scale {scale}; a zero leaves nothing of the mesh (below zero mirrors it)")
-    return scale
-
-
-def _mesh(tag: Tag, use: str, source: Source) -> Path | None:
-    uri = tag.word("filename")
-    try:
-        return resolve_uri(uri, source.origin, source.packages)
-    except RobotError as error:
-        source.warn(tag, f"({use}) is left out: {error}")
-        return None
-
-
 def _axis(tag: Tag, kind: str) -> Vector:
     axis = tag.first("axis")
     if axis is None or kind in ("fixed", "floating"):
         return (1.0, 0.0, 0.0)
     x, y, z = axis.vector("xyz", (1.0, 0.0, 0.0))
     length = math.hypot(x, y, z)
-    if length < SMALLEST:
+    if length < SMALLEST_AXIS:
         raise axis.wrong("has no direction; a wheel that turns about its own y has xyz='0 1 0'")
     return x / length, y / length, z / length
 

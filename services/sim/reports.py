@@ -18,7 +18,7 @@ from holozen.messages import (
     TwistWithCovariance,
     Vector3,
 )
-from holozen.robot.model import PlanarMove, RobotModel
+from holozen.robot.model import Drive, RobotModel
 from holozen.robot.rigid import Frame
 
 UNKNOWN = 1e12  # m^2, rad^2; Gazebo's variance for what planar_move does not steer
@@ -41,7 +41,7 @@ class Schedule:
         return began
 
 
-def covariance(drive: PlanarMove) -> list[float]:
+def covariance(drive: Drive) -> list[float]:
     """The 6 x 6 diagonal that Gazebo's planar_move tells."""
     x, y, yaw = drive.covariance
     diagonal = (x, y, UNKNOWN, UNKNOWN, UNKNOWN, yaw)

@@ -7,7 +7,7 @@ from pathlib import Path
 from holozen import data
 from holozen.bus import Bus
 from holozen.graph import Graph, on_key
-from holozen.robot.model import PlanarMove, RobotError, RobotModel, load
+from holozen.robot.model import Drive, RobotError, RobotModel, load
 from holozen.robot.rigid import Body, PlacedShape, lump
 from holozen.tell import say
 from holozen.wire import key_for
@@ -42,12 +42,12 @@ def spawn_all(bus: Bus, world: World, args: argparse.Namespace) -> list[Vehicle]
     return vehicles
 
 
-def _read(path: Path, packages: dict[str, Path]) -> tuple[RobotModel, PlanarMove, Body]:
+def _read(path: Path, packages: dict[str, Path]) -> tuple[RobotModel, Drive, Body]:
     """A robot's file, checked. Raises RobotError."""
     model = load(path, packages=packages)
     for warning in model.warnings:
         say(f"sim: {warning}")
-    drive = model.planar_move
+    drive = model.drive
     if drive is None:
         raise RobotError(f"{path}: no planar_move plugin, so nothing drives it; other drives are not simulated yet")
     body = lump(model)

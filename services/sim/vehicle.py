@@ -15,7 +15,7 @@ from holozen.messages import (
     TwistStamped,
 )
 from holozen.readers import Subscription
-from holozen.robot.model import PlanarMove, RobotModel
+from holozen.robot.model import Drive, RobotModel
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
 from .intake import Intake
@@ -30,9 +30,7 @@ STATUS_RATE = 10.0  # Hz of real time: it is for people
 class Vehicle:
     """A robot with a planar_move drive. `robot` is its name, empty for the one at the root of the keys."""
 
-    def __init__(
-        self, bus: Bus, robot: str, model: RobotModel, drive: PlanarMove, body: PlanarBody, intake: Intake
-    ) -> None:
+    def __init__(self, bus: Bus, robot: str, model: RobotModel, drive: Drive, body: PlanarBody, intake: Intake) -> None:
         self.body, self._intake, self._drive = body, intake, drive
         self._prefix = key_for("", robot)
         self._variances = covariance(drive)

@@ -124,7 +124,7 @@ def test_services_are_listed_and_called(sim: Bus, run: Run) -> None:
         (("next_goal", "request_goal: 4"), "holozen service: goal 4: the list holds goals 0 to 3\n"),
         (("next_goal", "{gaol: 4}"), "holozen service call next_goal: refused: not a NextGoalRequest: Object contains"),
         (("get_pose", "--timeout", "0.05"), "holozen service: no reply from 'get_pose' within 0.05 s"),
-        (("nonsense",), "holozen service call: 'nonsense' has no known type; known: next_goal, get_pose, resume\n"),
+        (("nonsense",), "holozen service call: 'nonsense' has no known type; known: next_goal, get_pose, resume, "),
     ],
 )
 def test_a_call_that_fails_is_one_line(sim: Bus, run: Run, words: tuple[str, ...], told: str) -> None:

@@ -353,4 +353,4 @@ def test_hb_bot_is_read_as_the_lesson_describes_it() -> None:
     ]
     assert {joint.axis for joint in wheels} == {(0, 1, 0)}
     assert {joint.limits for joint in wheels} == {Limits(effort=5, velocity=5)}
-    assert model.planar_move is not None and model.planar_move.command_topic == "cmd_vel"
+    assert model.drive is not None and model.drive.command_topic == "cmd_vel"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from holozen.robot.drives import Drive
 from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel, parse
-from holozen.robot.plugins import PlanarMove
 
 ORIGIN = Path("somewhere/robot.urdf")
 
@@ -20,19 +20,19 @@ def plugin(tags: str, filename: str = "libgazebo_ros_planar_move.so") -> str:
     return f'<plugin name="drive" filename="{filename}">{tags}</plugin>'
 
 
-def drive(tags: str) -> PlanarMove:
+def drive(tags: str) -> Drive:
     model = robot(plugin(tags))
-    assert model.planar_move is not None and model.warnings == ()
-    return model.planar_move
+    assert model.drive is not None and model.warnings == ()
+    return model.drive
 
 
 def test_a_robot_without_plugin_has_no_drive() -> None:
     model = robot("<material>Gazebo/Black</material>")
-    assert model.planar_move is None and model.warnings == ()
+    assert model.drive is None and model.warnings == ()
 
 
 def test_without_tags_gazebos_defaults_hold_with_the_watchdog_on() -> None:
-    assert drive("") == PlanarMove("cmd_vel", "odom", "odom", 20.0, "base", 0.5, True, True, (1e-5, 1e-5, 1e-3))
+    assert drive("") == Drive("cmd_vel", "odom", "odom", 20.0, "base", 0.5, True, True, (1e-5, 1e-5, 1e-3))
 
 
 def test_ros_1_tags_are_read() -> None:
@@ -41,7 +41,7 @@ def test_ros_1_tags_are_read() -> None:
         "<odometryFrame>/map</odometryFrame><odometryRate>50.0</odometryRate><robotBaseFrame>base</robotBaseFrame>"
         "<cmdTimeout>0.25</cmdTimeout><broadcastTransform>false</broadcastTransform>"
     )
-    assert drive(tags) == PlanarMove("drive", "where", "map", 50.0, "base", 0.25, True, False)
+    assert drive(tags) == Drive("drive", "where", "map", 50.0, "base", 0.25, True, False)
 
 
 def test_ros_2_tags_are_read() -> None:
@@ -52,7 +52,7 @@ def test_ros_2_tags_are_read() -> None:
         "<odometry_frame>map</odometry_frame><robot_base_frame>base</robot_base_frame>"
         "<covariance_x>0.1</covariance_x><covariance_y>0.2</covariance_y><covariance_yaw>0.3</covariance_yaw>"
     )
-    expected = PlanarMove("demo/drive", "where", "map", 10.0, "base", 0.5, True, False, (0.1, 0.2, 0.3))
+    expected = Drive("demo/drive", "where", "map", 10.0, "base", 0.5, True, False, (0.1, 0.2, 0.3))
     assert drive(tags) == expected
 
 
@@ -61,7 +61,7 @@ def test_both_spellings_may_be_mixed_and_spaced() -> None:
         "<ros><remapping> cmd_vel := /drive </remapping></ros><command_topic>cmd_vel</command_topic>"
         "<odometryFrame> map\n</odometryFrame><odometry_rate>30</odometry_rate><publishRate>10</publishRate>"
     )
-    assert drive(tags) == PlanarMove("drive", "odom", "map", 30.0, "base")
+    assert drive(tags) == Drive("drive", "odom", "map", 30.0, "base")
 
 
 def test_a_namespace_stands_before_relative_topics_only() -> None:
@@ -79,16 +79,16 @@ def test_a_topic_is_remapped_by_its_default_name_and_by_its_own() -> None:
 @pytest.mark.parametrize(
     ("tags", "expected"),
     [
-        ("<command_timeout>2</command_timeout>", PlanarMove(robot_base_frame="base", command_timeout=2)),
-        ("<publishOdometry>FALSE</publishOdometry>", PlanarMove(robot_base_frame="base", publish_odom=False)),
-        ("<publish_odometry_tf>0</publish_odometry_tf>", PlanarMove(robot_base_frame="base", publish_odom_tf=False)),
-        ("<publish_odom>1</publish_odom>", PlanarMove(robot_base_frame="base")),
-        ("<odometryFrame>/</odometryFrame>", PlanarMove(robot_base_frame="base")),
-        ("<robotBaseFrame>/base</robotBaseFrame>", PlanarMove(robot_base_frame="base")),
-        ("<covariance_y>0</covariance_y>", PlanarMove(robot_base_frame="base", covariance=(1e-5, 0, 1e-3))),
+        ("<command_timeout>2</command_timeout>", Drive(robot_base_frame="base", command_timeout=2)),
+        ("<publishOdometry>FALSE</publishOdometry>", Drive(robot_base_frame="base", publish_odom=False)),
+        ("<publish_odometry_tf>0</publish_odometry_tf>", Drive(robot_base_frame="base", publish_odom_tf=False)),
+        ("<publish_odom>1</publish_odom>", Drive(robot_base_frame="base")),
+        ("<odometryFrame>/</odometryFrame>", Drive(robot_base_frame="base")),
+        ("<robotBaseFrame>/base</robotBaseFrame>", Drive(robot_base_frame="base")),
+        ("<covariance_y>0</covariance_y>", Drive(robot_base_frame="base", covariance=(1e-5, 0, 1e-3))),
     ],
 )
-def test_spellings_that_people_use_are_understood(tags: str, expected: PlanarMove) -> None:
+def test_spellings_that_people_use_are_understood(tags: str, expected: Drive) -> None:
     assert drive(tags) == expected
 
 
@@ -104,7 +104,7 @@ def test_a_negative_timeout_switches_the_watchdog_off() -> None:
 
 def test_a_base_frame_that_is_no_link_is_told_and_the_root_is_taken() -> None:
     model = robot(plugin("<robotBaseFrame>chasis</robotBaseFrame>"))
-    assert model.planar_move is not None and model.planar_move.robot_base_frame == "base"
+    assert model.drive is not None and model.drive.robot_base_frame == "base"
     told = "<plugin name='drive'> names the base frame 'chasis', which is no link; 'base' is used"
     assert model.warnings == (f"{ORIGIN}, line 3: {told}",)
 
@@ -113,7 +113,7 @@ def test_every_other_plugin_is_named_also_inside_a_sensor() -> None:
     control = plugin("", "libgazebo_ros_control.so")
     sensor = f'<sensor name="s">{plugin("", "libgazebo_ros_camera.so").replace("drive", "eye")}</sensor>'
     model = robot(control, sensor, plugin(""), "<plugin/>")
-    assert model.planar_move is not None
+    assert model.drive is not None
     assert [warning.partition(": ")[2] for warning in model.warnings] == [
         "<plugin name='drive'> (libgazebo_ros_control.so) is not known here and does nothing",
         "<plugin name='eye'> (libgazebo_ros_camera.so) is not known here and does nothing",
@@ -123,14 +123,14 @@ def test_every_other_plugin_is_named_also_inside_a_sensor() -> None:
 
 @pytest.mark.parametrize("filename", ["gazebo_ros_planar_move", "/opt/ros/lib/libgazebo_ros_planar_move.so"])
 def test_the_plugin_is_known_by_its_file_name(filename: str) -> None:
-    assert robot(plugin("", filename)).planar_move is not None
+    assert robot(plugin("", filename)).drive is not None
 
 
 def test_a_second_planar_move_is_told_and_the_first_drives() -> None:
     first, second = (plugin(f"<odometryRate>{rate}</odometryRate>") for rate in (1, 2))
     for gazebo in ((first, second), (first + second,), (f"<a>{first}</a>{second}",), (f"<a>{first}{second}</a>",)):
         model = robot(*gazebo)
-        assert model.planar_move is not None and model.planar_move.odometry_rate == 1
+        assert model.drive is not None and model.drive.odometry_rate == 1
         (warning,) = model.warnings
         assert warning.endswith("<plugin name='drive'> is a second planar_move; only the first one drives")
 

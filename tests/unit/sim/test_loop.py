@@ -25,7 +25,7 @@ from holozen.messages import (
     TriggerRequest,
     Twist,
 )  # fmt: skip
-from holozen.robot.model import PlanarMove, load
+from holozen.robot.model import Drive, load
 from holozen.robot.rigid import lump
 from holozen.testing import Wire, wait_for
 from holozen.wire import MAX_COMMAND_BYTES, PRIORITY_OF
@@ -39,15 +39,15 @@ from services.sim.worldfile import WorldSpec
 
 MODEL = load(Path(__file__).parents[3] / "urdf" / "hb_bot.urdf.xacro")
 BODY = lump(MODEL)
-assert MODEL.planar_move is not None
-DRIVE = MODEL.planar_move
+assert MODEL.drive is not None
+DRIVE = MODEL.drive
 FORWARD = (0.5, 0.0, 0.0)
 
 
 class Sim:
     """One hb_bot called Fred, at the origin of a world with ground."""
 
-    def __init__(self, wire: Wire, world: World, rtf: float = 0.0, drive: PlanarMove = DRIVE) -> None:
+    def __init__(self, wire: Wire, world: World, rtf: float = 0.0, drive: Drive = DRIVE) -> None:
         self.world, self.bus = world, wire.bus("sim")
         self.arbiter = Arbiter(drive.command_timeout)
         intake = Intake("Fred/cmd_vel", self.arbiter, 5.0, 10.0)
@@ -135,7 +135,7 @@ def test_transforms_and_clock_are_told(sim: Sim) -> None:
 
 
 def test_odom_and_its_transform_can_be_switched_off(wire: Wire, world: World) -> None:
-    sim = Sim(wire, world, drive=PlanarMove(publish_odom=False, publish_odom_tf=False))
+    sim = Sim(wire, world, drive=Drive(publish_odom=False, publish_odom_tf=False))
     odom = sim.bus.subscribe("Fred/odom", Odometry, depth=1000)
     tf = sim.bus.subscribe("Fred/tf", TFMessage, depth=1000)
     sim.run(240)

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.messages import Header, Quaternion, Time, Twist
-from holozen.robot.model import PlanarMove, RobotModel, load
+from holozen.robot.model import Drive, RobotModel, load
 from holozen.robot.parts import Joint, Limits, Link, Pose
 from holozen.robot.rotation import Array, matrix_of, quaternion_of
 from services.sim.reports import JointFrames, Schedule, covariance, odometry, transform
@@ -48,8 +48,8 @@ def test_it_is_due_at_the_first_look_and_once_after_a_gap() -> None:
 
 def test_the_covariance_is_the_one_of_gazebos_planar_move() -> None:
     expected = np.diag([1e-5, 1e-5, 1e12, 1e12, 1e12, 1e-3])
-    assert np.array_equal(np.reshape(covariance(PlanarMove()), (6, 6)), expected)
-    assert covariance(PlanarMove(covariance=(1, 2, 3)))[::7] == [1, 2, 1e12, 1e12, 1e12, 3]
+    assert np.array_equal(np.reshape(covariance(Drive()), (6, 6)), expected)
+    assert covariance(Drive(covariance=(1, 2, 3)))[::7] == [1, 2, 1e12, 1e12, 1e12, 3]
 
 
 def test_odometry_is_the_world_pose_and_the_body_velocity_with_both_covariances() -> None:
