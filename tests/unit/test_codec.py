@@ -26,13 +26,23 @@ plain = st.recursive(
 def values(kind: Any) -> st.SearchStrategy[Any]:
     """Every value that a field of this type may have."""
     if isinstance(kind, type) and issubclass(kind, m.Message):
-        hints = typing.get_type_hints(kind)
+        hints = typing.get_type_hints(kind, include_extras=True)
         return st.builds(kind, **{name: values(hints[name]) for name in kind.__struct_fields__})
+    if typing.get_origin(kind) is typing.Annotated:
+        return bounded(*typing.get_args(kind))
     if typing.get_origin(kind) is list:
         return st.lists(values(typing.get_args(kind)[0]), max_size=3)
     if typing.get_origin(kind) is dict:
         return st.dictionaries(st.text(), st.integers(0, 2**63), max_size=3)
     return {float: finite, int: st.integers(0, 999_999_999), str: st.text(), bool: st.booleans()}[kind]
+
+
+def bounded(kind: Any, meta: msgspec.Meta) -> st.SearchStrategy[Any]:
+    """Whole numbers within the field's bounds; of anything else the plain type."""
+    if kind is not int:
+        return values(kind)
+    least = int(meta.ge or 0)
+    return st.integers(least, int(meta.le) if meta.le is not None else int(meta.lt or 1) - 1)
 
 
 def covered(message: Any) -> Any:
