@@ -120,6 +120,11 @@ class Bus:
         self._readers.add(tap)
         return tap
 
+    def drop(self, reader: "Subscription[Any] | Tap | Server") -> None:
+        """Close a reader or a server before the bus; nothing of its key stays."""
+        reader.close()
+        self._readers.discard(reader.tap if isinstance(reader, Subscription) else reader)
+
     def serve(self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R]) -> "Server":
         """Answer requests on `key`. The caller asks for the work: `answer_pending()` in a loop, or `start()`."""
         from holozen.server import Server

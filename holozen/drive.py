@@ -44,3 +44,19 @@ def wheel_rate(velocity: Planar, wheel: Wheel) -> float:
     x, y, turn = velocity
     vx, vy = x - turn * wheel.y, y + turn * wheel.x
     return (vx * wheel.ay - vy * wheel.ax) / wheel.radius
+
+
+def mecanum_rates(velocity: Planar, arm: float, radius: float) -> tuple[float, float, float, float]:
+    """The rates (rad/s) of mecanum wheels, front left, front right, back left, back right, rollers at 45 degrees.
+
+    `arm` is half the sum of wheelbase and track, in m. Source: Taheri, Qiao and Ghaeminezhad, "Kinematic model of a
+    four mecanum wheeled mobile robot", International Journal of Computer Applications 113, 2015, equation 20.
+    """
+    x, y, turn = velocity
+    around = arm * turn
+    return (
+        (x - y - around) / radius,
+        (x + y + around) / radius,
+        (x + y - around) / radius,
+        (x - y + around) / radius,
+    )

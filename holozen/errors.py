@@ -6,7 +6,13 @@ class BusError(Exception):
 
 
 class ServiceError(BusError):
-    """A service answered with an error, or nobody answered. Handlers raise it to refuse a request."""
+    """A service answered with an error, or nobody answered. Handlers raise it to refuse a request, with `fields` of the
+    reply that go with the reason.
+    """
+
+    def __init__(self, text: str, **fields: object) -> None:
+        super().__init__(text)
+        self.fields = fields
 
 
 class NoReply(ServiceError):

@@ -91,21 +91,21 @@ class Subscription(Generic[M]):
     def __init__(self, samples: Tap, kinds: tuple[type[M], ...]) -> None:
         from holozen import codec
 
-        self._samples, self._kinds = samples, kinds
+        self.tap, self._kinds = samples, kinds
         self._decode, self._error = codec.decode, codec.CodecError
 
     def try_recv(self) -> Received[M] | None:
         """The next waiting message, or None."""
-        sample = self._samples.try_recv()
+        sample = self.tap.try_recv()
         return None if sample is None else self._received(sample)
 
     def recv(self) -> Received[M]:
         """The next message; waits for it. Raises BusError once the bus is closed."""
-        return self._received(self._samples.recv())
+        return self._received(self.tap.recv())
 
     def close(self) -> None:
         """Stop listening."""
-        self._samples.close()
+        self.tap.close()
 
     def _received(self, sample: Sample) -> Received[M]:
         if len(sample.payload) != sample.size:

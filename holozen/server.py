@@ -2,7 +2,7 @@
 
 import json
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from holozen.errors import ServiceError
@@ -67,7 +67,9 @@ class Server:
             try:
                 reply = self._codec.encode(self._answer(self._read(query)), self._wire)
                 query.reply(self._key, reply, encoding=self._codec.WIRES[self._wire])
-            except (ServiceError, self._codec.CodecError) as error:
+            except ServiceError as error:
+                _refuse(query, str(error), error.fields)
+            except self._codec.CodecError as error:
                 _refuse(query, str(error))
             except Exception as error:
                 say(f"{self._key}: {type(error).__name__}: {error}")
@@ -83,5 +85,5 @@ class Server:
         return self._codec.decode(bytes(query.payload), str(query.encoding), (self._request,))
 
 
-def _refuse(query: Any, text: str) -> None:
-    query.reply_err(json.dumps({"error": text}), encoding="application/json")
+def _refuse(query: Any, text: str, fields: Mapping[str, object] = {}) -> None:
+    query.reply_err(json.dumps({"error": text, **fields}), encoding="application/json")

@@ -1,14 +1,14 @@
 """A robot as one rigid body, all joints at zero: mass, inertia, and where each part is."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel
-from holozen.robot.parts import Inertial, Pose, Shape
-from holozen.robot.rotation import Array, Quaternion, matrix_of, principal, quaternion_of, triple
+from holozen.robot.parts import Inertial, Link, Pose, Shape
+from holozen.robot.rotation import Array, Quaternion, matrix_of, principal, quaternion_of, rpy_of, triple
 from holozen.robot.tag import Vector
 from holozen.robot.tree import descend
 
@@ -31,6 +31,17 @@ class Frame:
     def __matmul__(self, inner: "Frame") -> "Frame":
         """`inner`, which is told in this frame, in the frame that this one is told in."""
         return Frame(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
+
+    @property
+    def inverse(self) -> "Frame":
+        """The outer frame as this one sees it."""
+        back = self.rotation.T
+        return Frame(-(back @ self.position), back)
+
+    @property
+    def pose(self) -> Pose:
+        """The frame as a URDF pose."""
+        return Pose(self.xyz, rpy_of(self.rotation))
 
     @property
     def xyz(self) -> Vector:
@@ -100,15 +111,21 @@ def lump(model: RobotModel) -> Body:
 
     A link without mass only lends its shapes. Raises RobotError for a robot without mass.
     """
-    frames = link_frames(model)
-    links = [(frames[link.name], link.inertial) for link in model.links.values() if link.inertial]
-    mass, centre, inertia = _sum([(frame @ Frame.of(inertial.pose), inertial) for frame, inertial in links])
-    if mass < SMALLEST_MASS:
-        problem = f"robot {model.name!r} has a mass of {mass} kg"
+    body = lump_links(model, link_frames(model))
+    if body.mass < SMALLEST_MASS and not model.static:
+        problem = f"robot {model.name!r} has a mass of {body.mass} kg"
         raise RobotError(f"{problem}; give a link an <inertial> with a <mass> of {SMALLEST_MASS} kg or more")
+    return body
+
+
+def lump_links(model: RobotModel, frames: Mapping[str, Frame]) -> Body:
+    """The links named by `frames` as one body, in the frame that `frames` are told in."""
+    links = [model.links[name] for name in frames]
+    parts = [(frames[link.name] @ Frame.of(link.inertial.pose), link.inertial) for link in links if link.inertial]
+    mass, centre, inertia = _sum(parts)
     moments, axes = principal(inertia)
     moments = np.maximum(moments, mass * SMALLEST_GYRATION**2)
-    return Body(mass, triple(centre), triple(moments), quaternion_of(axes), tuple(_collisions(model, frames)))
+    return Body(mass, triple(centre), triple(moments), quaternion_of(axes), tuple(_collisions(links, frames)))
 
 
 def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
@@ -129,8 +146,8 @@ def _tensor(part: Inertial) -> Array:
     return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
-def _collisions(model: RobotModel, frames: dict[str, Frame]) -> Iterable[PlacedShape]:
-    for link in model.links.values():
+def _collisions(links: list[Link], frames: Mapping[str, Frame]) -> Iterable[PlacedShape]:
+    for link in links:
         for shape in link.collisions:
             frame = frames[link.name] @ Frame.of(shape.pose)
             yield PlacedShape(link.name, shape, frame.xyz, frame.quaternion)

@@ -1,5 +1,6 @@
 """Rotations as 3x3 matrices, roll pitch yaw, and quaternions x, y, z, w. Angles in radians."""
 
+import math
 from collections.abc import Sequence
 from itertools import permutations
 from typing import Any
@@ -9,6 +10,8 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Quaternion = tuple[float, float, float, float]
+
+UPRIGHT = 1e-8  # cosine of a pitch that counts as straight up or down
 
 
 def matrix_of(rpy: Sequence[float]) -> Array:
@@ -22,6 +25,18 @@ def matrix_of(rpy: Sequence[float]) -> Array:
             [-sp, cp * sr, cp * cr],
         ]
     )
+
+
+def rpy_of(matrix: Array) -> tuple[float, float, float]:
+    """Roll, pitch and yaw of a rotation matrix, the inverse of `matrix_of`; roll is 0 where x points straight up or
+    down, since roll and yaw turn the same way there.
+    """
+    (a, b, _), (d, e, _), (g, h, i) = matrix.tolist()
+    level = math.hypot(a, d)
+    pitch = math.atan2(0.0 - g, level)  # 0.0 - 0.0 has no sign
+    if level < UPRIGHT:
+        return 0.0, pitch, math.atan2(0.0 - b, e)
+    return math.atan2(h, i), pitch, math.atan2(d, a)
 
 
 def quaternion_of(matrix: Array) -> Quaternion:
@@ -41,6 +56,18 @@ def quaternion_of(matrix: Array) -> Quaternion:
     row = row / (np.linalg.norm(row) * (-1 if row[3] < 0 else 1))
     x, y, z, w = row.tolist()
     return x, y, z, w
+
+
+def matrix_of_quaternion(q: Quaternion) -> Array:
+    """The rotation matrix of a unit quaternion."""
+    x, y, z, w = q
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:

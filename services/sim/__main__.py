@@ -19,6 +19,7 @@ def parser() -> argparse.ArgumentParser:
     add("--world", type=Path, default=data.find("worlds", "gazebo.world"), help="an SDF file (default: gazebo.world)")
     add("--robot", type=flags.robot_file, action="append", metavar="FILE[=NAME]",
         help="a xacro or URDF file, and the robot's name (default: hb_bot at the root of the keys)")  # fmt: skip
+    add("--drive", choices=["planar_move"], help="for robots that have no drive of their own")
     add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR", help="for $(find NAME)")
     add("--rtf", type=flags.number(0, 1000), help="real-time factor; 0: as fast as it goes (default: the world's)")
     add("--max-linear", type=flags.number(0.01, 50, "m/s"), default=intake.MAX_LINEAR, metavar="M/S",
@@ -36,15 +37,19 @@ def main(argv: list[str] | None = None) -> int:
         spec = worldfile.load(args.world)
         with Bus("sim", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             # The engine takes the longest to load, and a wrong flag should not wait for it.
+            from .entities import Entities
+            from .entity_services import EntityServices
             from .loop import Loop
             from .spawn import spawn_all
             from .world import World
 
             world = World(spec)
-            vehicles = spawn_all(bus, world, args)
+            entities = Entities(bus, world, (args.max_linear, args.max_angular))
+            spawn_all(entities, args)
             for warning in spec.warnings:
                 say(f"sim: {warning}")
-            Loop(bus, world, vehicles, spec.rtf if args.rtf is None else args.rtf).run(stop)
+            services = EntityServices(bus, entities, dict(args.package))
+            Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services).run(stop)
     except (BusError, RobotError, worldfile.WorldError) as error:
         say(f"sim: {error}")
         return 1

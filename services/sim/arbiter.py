@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass
 
-from holozen.limits import STOP, Planar
+from holozen.limits import STOP
 from holozen.readers import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
+
+from .motion import Motion, is_stop
 
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # nobody stands above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here on down a source never takes a robot that others have driven
@@ -19,7 +21,7 @@ class Driver:
 
     source: str
     rank: int
-    velocity: Planar
+    motion: Motion
     heard: float
 
 
@@ -39,12 +41,12 @@ class Arbiter:
         self._held: set[str] = set()
         self._highest = AUTOPILOT + 1  # the best rank that drove since the last resume
 
-    def offer(self, source: str, rank: int, velocity: Planar, now: float, heard: float | None = None) -> str:
+    def offer(self, source: str, rank: int, motion: Motion, now: float, heard: float | None = None) -> str:
         """Take a command at time `now` that came at `heard` at the earliest. Returns why it is not obeyed, or ""."""
         rank = max(rank, PERSON)
         driver = self.driver(now)
         other = driver if driver and driver.source != source else None
-        stops = velocity == STOP and driver is not None and rank <= driver.rank
+        stops = is_stop(motion) and driver is not None and rank <= driver.rank
         if other and rank >= other.rank and not stops and now - other.heard <= COMMAND_SILENCE:
             if rank > other.rank:
                 self._hold(source)
@@ -53,7 +55,7 @@ class Arbiter:
             return HELD
         if other and (stops or rank < other.rank):
             self._hold(other.source)
-        self._driver = Driver(source, rank, velocity, now if heard is None else heard)
+        self._driver = Driver(source, rank, motion, now if heard is None else heard)
         self._highest = min(self._highest, rank)
         return ""
 
@@ -64,10 +66,10 @@ class Arbiter:
             return None
         return driver
 
-    def velocity(self, now: float) -> Planar:
+    def motion(self, now: float) -> Motion:
         """What the robot is to do at `now`."""
         driver = self.driver(now)
-        return driver.velocity if driver else STOP
+        return driver.motion if driver else STOP
 
     @property
     def held(self) -> bool:
@@ -77,7 +79,7 @@ class Arbiter:
     def resume(self, now: float) -> str:
         """Let every source drive again. Returns why not, if somebody above an autopilot moves the robot at `now`."""
         driver = self.driver(now)
-        if driver and driver.rank < AUTOPILOT and driver.velocity != STOP:
+        if driver and driver.rank < AUTOPILOT and not is_stop(driver.motion):
             return f"{driver.source} drives; stop first"
         self._driver = driver if driver and driver.rank >= AUTOPILOT else None
         self._held.clear()

@@ -1,35 +1,31 @@
-"""What arrives on one robot's cmd_vel: checked, limited, counted, and told at most once a second."""
+"""What arrives on one robot's cmd_vel: checked, limited, and handed to the arbiter."""
 
-import math
-from collections import Counter
 from collections.abc import Callable
 
 from holozen.limits import STOP, Planar, clamp_speed
-from holozen.messages import CommandStatus, Twist, TwistStamped, not_finite
+from holozen.messages import CommandStatus, Twist, TwistStamped
 from holozen.readers import PRIORITIES, Received
 from holozen.tell import say
 from holozen.wire import COMMAND_SILENCE, MAX_STAMP_AGE
 
 from .arbiter import Arbiter
+from .ledger import Ledger, source_of
 
-TELL_EVERY = 1.0  # s
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
 
 
 class Intake:
-    """Judges commands and hands the good ones to the arbiter. `key` names the robot's cmd_vel in what is told."""
+    """Judges commands and hands the good ones to the arbiter. `keys` are the robot's: its cmd_vel first, which is named
+    in what is told.
+    """
 
     def __init__(
-        self, key: str, arbiter: Arbiter, linear: float, angular: float, say: Callable[[str], None] = say
-    ) -> None:
-        self.arbiter = arbiter
-        self._key, self._linear, self._angular, self._say = key, linear, angular, say
-        self._accepted = 0
-        self._refused: Counter[str] = Counter()
-        self._last = ""
-        self._told = -math.inf
-        self._untold = 0
+        self, key: str, arbiter: Arbiter, linear: float, angular: float, say: Callable[[str], None] = say,
+        others: tuple[str, ...] = (),
+    ) -> None:  # fmt: skip
+        self.arbiter, self.ledger = arbiter, Ledger(say)
+        self.keys, self._linear, self._angular = (key, *others), linear, angular
 
     def take(
         self,
@@ -43,16 +39,10 @@ class Intake:
         `clocks` are the times in seconds that a stamp may be measured by.
         """
         heard = now if heard is None else heard
-        sample, message = received.sample, received.message
-        source = sample.source or f"anonymous ({sample.priority})"
-        if sample.key != self._key:
-            return self._refuse("wildcard", f"a command for {sample.key!r}; name one robot", source, now)
+        message, source = self.ledger.open(received, self.keys, now), source_of(received)
         if message is None:
-            kind = "oversized" if received.error.startswith("oversized") else "malformed"
-            return self._refuse(kind, received.error, source, now)
+            return None
         twist = message.twist if isinstance(message, TwistStamped) else message
-        if bad := not_finite(twist):
-            return self._refuse("not finite", f"{bad} is not a finite number", source, now)
         if isinstance(message, TwistStamped):
             age = _age(message, clocks)
             if abs(age) > MAX_STAMP_AGE:
@@ -61,7 +51,7 @@ class Intake:
         velocity = (twist.linear.x, twist.linear.y, twist.angular.z)
         if now - heard > COMMAND_SILENCE and velocity != STOP:
             return self._refuse("late", f"it waited up to {now - heard:.1f} s for the sim", source, now)
-        self._obey(velocity, source, PRIORITIES.index(sample.priority), now, heard)
+        return self._obey(velocity, source, PRIORITIES.index(received.sample.priority), now, heard)
 
     def status(self, now: float) -> CommandStatus:
         """Who drives, and the counts so far."""
@@ -71,29 +61,23 @@ class Intake:
             priority=PRIORITIES[driver.rank] if driver else "",
             held=self.arbiter.held,
             resumed=self.arbiter.resumed,
-            accepted=self._accepted,
-            refused=dict(self._refused),
-            last_refusal=self._last,
+            accepted=self.ledger.accepted,
+            refused=dict(self.ledger.refused),
+            last_refusal=self.ledger.last,
         )
 
     def _obey(self, velocity: Planar, source: str, rank: int, now: float, heard: float) -> None:
         limited = clamp_speed(velocity, self._linear, self._angular)
         if reason := self.arbiter.offer(source, rank, limited, now, heard):
             return self._refuse(reason.partition(":")[0], reason, source, now)
-        self._accepted += 1
+        self.ledger.accepted += 1
         if limited != velocity:
             text = f"over the limits of {self._linear:g} m/s and {self._angular:g} rad/s, clamped: {velocity}"
             self._refuse("clamped", text, source, now)
+        return None
 
     def _refuse(self, kind: str, reason: str, source: str, now: float) -> None:
-        self._refused[kind] += 1
-        self._last = f"{source}: {reason}"[:300]
-        self._untold += 1
-        if now - self._told < TELL_EVERY:
-            return
-        more = f" (and {self._untold - 1} more)" if self._untold > 1 else ""
-        self._say(f"{self._key}: from {self._last}{more}")
-        self._told, self._untold = now, 0
+        self.ledger.refuse(self.keys[0], kind, reason, source, now)
 
 
 def _age(message: TwistStamped, clocks: tuple[float, ...]) -> float:

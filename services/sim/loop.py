@@ -6,9 +6,10 @@ import time
 from holozen.bus import Bus, Publisher
 from holozen.messages import Clock, Time
 
+from .entities import Entities
+from .entity_services import EntityServices
 from .pace import Pace
 from .reports import Schedule
-from .vehicle import Vehicle
 from .world import World
 
 CLOCK_RATE = 50.0  # Hz of sim time
@@ -18,10 +19,13 @@ DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring
 
 
 class Loop:
-    """Runs one world with its vehicles at `rtf` times real time (0: as fast as it goes)."""
+    """Runs one world with its entities at `rtf` times real time (0: as fast as it goes)."""
 
-    def __init__(self, bus: Bus, world: World, vehicles: list[Vehicle], rtf: float) -> None:
-        self._world, self._vehicles, self._rtf = world, vehicles, rtf
+    def __init__(
+        self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None
+    ) -> None:
+        self._world, self._vehicles, self._rtf = world, entities.vehicles, rtf
+        self._services = services
         self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
         self._clock_due = Schedule(CLOCK_RATE)
         self._heard = self._before_stall = time.monotonic()
@@ -48,6 +52,8 @@ class Loop:
         clocks = (time.time(), self._world.time)
         for vehicle in self._vehicles:
             vehicle.hear(now, clocks, since)
+        if self._services:
+            self._services.answer()
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

@@ -1,97 +1,92 @@
 """A robot in the world: what it hears on its keys, what it does at a step, and what it tells."""
 
 from holozen.bus import Bus, Publisher
-from holozen.errors import ServiceError
-from holozen.messages import (
-    CommandStatus,
-    Header,
-    JointState,
-    Odometry,
-    TFMessage,
-    Time,
-    TriggerReply,
-    TriggerRequest,
-    Twist,
-    TwistStamped,
-)
-from holozen.readers import Subscription
+from holozen.messages import TFMessage, Time
+from holozen.robot.drives import Balancing
 from holozen.robot.model import Drive, RobotModel
-from holozen.wire import MAX_COMMAND_BYTES, key_for
+from holozen.wire import COMMAND_SILENCE, key_for
 
+from .arbiter import Arbiter
+from .drive_keys import DriveKeys
+from .drives import Mover
 from .intake import Intake
-from .reports import JointFrames, Schedule, covariance, odometry, transform
-from .wheels import Wheels
-from .world import PlanarBody
-
-JOINT_RATE = 50.0  # Hz of sim time
-STATUS_RATE = 10.0  # Hz of real time: it is for people
+from .joint_intake import JointIntake
+from .joint_keys import JOINT_RATE, JointKeys
+from .jointed import JointedBody
+from .joints import Motors
+from .ledger import Ledger
+from .motion import JointMotion
+from .reports import Schedule
 
 
 class Vehicle:
-    """A robot with a planar_move drive. `robot` is its name, empty for the one at the root of the keys."""
+    """A robot with a drive, with joints, or with both. `prefix` is its name on the wire, empty at the root."""
 
-    def __init__(self, bus: Bus, robot: str, model: RobotModel, drive: Drive, body: PlanarBody, intake: Intake) -> None:
-        self.body, self._intake, self._drive = body, intake, drive
-        self._prefix = key_for("", robot)
-        self._variances = covariance(drive)
-        self._wheels, self._frames = Wheels(model), JointFrames(model, self._prefix)
-        self._rolled = 0.0  # sim time up to which the wheels have turned
-        self._now = 0.0
-        command = key_for(drive.command_topic, robot)
-        place = command.rpartition("/")[0]  # a namespace in the robot's file is as good as a name
-        self._commands: Subscription[Twist | TwistStamped] = bus.subscribe(
-            command, Twist, TwistStamped, limit=MAX_COMMAND_BYTES
-        )
-        self._resume = bus.serve(key_for("resume", place), TriggerRequest, TriggerReply, self._on_resume)
-        self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, robot), Odometry)
-        self._joints: Publisher[JointState] = bus.publisher(key_for("joint_states", place), JointState)
+    def __init__(self, bus: Bus, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float]) -> None:
+        self.mover = mover
+        drive = model.drive
+        command = key_for(drive.command_topic if drive else "cmd_vel", prefix)
+        place = command.rpartition("/")[0]
+        self.arbiter = wheels = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE)
+        self._other_arbiter = others = Arbiter(COMMAND_SILENCE)
+        intake = Intake(command, wheels, *limits, others=_aliases(drive, prefix or model.name))
+        self._wheels, self._others = _motors(mover)
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", place), TFMessage)
-        self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
-        self._odom_due, self._joints_due = Schedule(drive.odometry_rate), Schedule(JOINT_RATE)
-        self._status_due = Schedule(STATUS_RATE)
+        self._drive = DriveKeys(bus, prefix, drive, intake, self._tf, others) if drive else None
+        pairs = ((self._wheels, wheels), (self._others, others))
+        groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
+        ledger = intake.ledger if drive else Ledger()
+        hands = JointIntake(key_for("joint_command", place), ledger, groups, mover.names)
+        self._joints = JointKeys(bus, place, model, mover.names, prefix, hands, self._tf)
+        self._odom_due = Schedule(drive.odometry_rate if drive else 0.0)
+        self._joints_due = Schedule(JOINT_RATE)
 
     def hear(self, now: float, clocks: tuple[float, ...], since: float) -> None:
         """Take what waits at `now`; it came after `since`. `clocks` are those of stamps. All in seconds."""
-        self._now = now
-        while (received := self._commands.try_recv()) is not None:
-            self._intake.take(received, now, clocks, since)
-        self._resume.answer_pending()
-        if self._status_due.due(now):
-            self._status.put(self._intake.status(now))
+        if self._drive:
+            self._drive.hear(now, clocks, since)
+        self._joints.hear(now, since)
 
     def move(self, now: float, dt: float) -> None:
-        """Set the commanded velocity for the next step of `dt` seconds."""
-        self.body.drive(self._intake.arbiter.velocity(now), dt)
+        """Do what is commanded for the next step of `dt` seconds."""
+        wanted = self._drive.wanted(now, dt) if self._drive else None
+        if self._wheels:
+            self._wheels.do(wanted if isinstance(wanted, JointMotion) else None)
+        if wanted and not isinstance(wanted, JointMotion):
+            self.mover.move(wanted, dt)
+        if self._others:
+            motion = self._other_arbiter.motion(now)
+            self._others.do(motion if isinstance(motion, JointMotion) else None)
+        if isinstance(self.mover.body, JointedBody):
+            self.mover.body.mimic()
 
     def tell(self, time: float, dt: float) -> None:
         """Publish what is due at the sim time `time`, after a step of `dt` seconds."""
         odom_due, joints_due = self._odom_due.due(time), self._joints_due.due(time)
         if not (odom_due or joints_due):
             return
-        velocity, stamp = self.body.velocity(dt), Time.of(time)
-        self._wheels.roll(velocity, time - self._rolled)
-        self._rolled = time
-        if odom_due:
-            self._tell_odom(stamp, velocity)
+        stamp, moved = Time.of(time), self.mover.moved(time, dt)
+        if odom_due and self._drive:
+            self._drive.tell(stamp, moved)
         if joints_due:
-            self._tell_joints(stamp)
+            self._joints.tell(stamp, self.mover.states())
 
-    def _tell_odom(self, stamp: Time, velocity: tuple[float, float, float]) -> None:
-        position, rotation = self.body.pose()
-        header = Header(stamp, f"{self._prefix}{self._drive.odometry_frame}")
-        base = f"{self._prefix}{self._drive.robot_base_frame}"
-        if self._drive.publish_odom:
-            self._odom.put(odometry(header, base, position, rotation, velocity, self._variances))
-        if self._drive.publish_odom_tf:
-            self._tf.put(TFMessage([transform(header, base, position, rotation)]))
+    def close(self) -> None:
+        """Leave the wire."""
+        if self._drive:
+            self._drive.close()
+        self._joints.close()
+        self._tf.close()
 
-    def _tell_joints(self, stamp: Time) -> None:
-        wheels = self._wheels
-        angles = dict(zip(wheels.names, wheels.angles, strict=True))
-        self._joints.put(JointState(Header(stamp), wheels.names, wheels.angles, wheels.rates))
-        self._tf.put(TFMessage(self._frames.transforms(stamp, angles)))
 
-    def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
-        if reason := self._intake.arbiter.resume(self._now):
-            raise ServiceError(reason)
-        return TriggerReply(True, "every source may drive")
+def _aliases(drive: Drive | None, name: str) -> tuple[str, ...]:
+    """More keys for commands: wheely_boi's plugin listens on `cmd` below its model's name, twice."""
+    return (f"{name}/{name}/cmd",) if drive and isinstance(drive.mechanism, Balancing) else ()
+
+
+def _motors(mover: Mover) -> tuple[Motors | None, Motors | None]:
+    """Those of the wheels and those of the other joints, where commands may move them."""
+    if not isinstance(mover.body, JointedBody):
+        return None, None
+    free = frozenset(mover.names) - mover.wheels - mover.kept
+    return (Motors(mover.body, mover.wheels) if mover.wheels else None), (Motors(mover.body, free) if free else None)

@@ -14,9 +14,12 @@ OTHERS = [path for folder in ("examples", "meshes", "scripts") for path in REPO.
 # Library -> the only places of it in holozen/ and services/.
 PLACES = {
     "zenoh": ["holozen/bus.py"],
-    "pybullet": ["services/sim/world.py"],
+    "pybullet": ["services/sim/engine.py"],
     "prompt_toolkit": ["services/teleop/"],
-    "numpy": ["holozen/robot/rigid.py", "holozen/robot/rotation.py"],
+    "numpy": [
+        f"holozen/robot/{name}.py" for name in ("collada", "hulls", "obj", "rigid", "rotation", "stl")
+    ],
+    "collada": [],
     "xacro": ["holozen/robot/xacro.py"],
     "pytest": ["holozen/testing/"],
     "hypothesis": [],

@@ -37,55 +37,55 @@ def test_nobody_stands_above_a_person(arbiter: Arbiter) -> None:
     assert arbiter.offer("hurry", PRIORITIES.index("REAL_TIME"), LEFT, 1.1) == "overruled: teleop drives"
     assert arbiter.offer("hurry", PRIORITIES.index("REAL_TIME"), LEFT, 2.0) == ""
     assert arbiter.offer("teleop", PERSON, STOP, 2.1) == ""
-    assert arbiter.velocity(2.1) == STOP
+    assert arbiter.motion(2.1) == STOP
 
 
 def test_without_a_command_the_robot_stands(arbiter: Arbiter) -> None:
-    assert arbiter.velocity(0) == STOP
+    assert arbiter.motion(0) == STOP
     assert arbiter.driver(0) is None
     assert not arbiter.held
 
 
 def test_a_command_is_obeyed_at_once(arbiter: Arbiter) -> None:
     assert arbiter.offer("teleop", PERSON, FORWARD, 1.0) == ""
-    assert arbiter.velocity(1.0) == FORWARD
+    assert arbiter.motion(1.0) == FORWARD
 
 
 def test_a_stop_is_obeyed_at_once(arbiter: Arbiter) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
     assert arbiter.offer("teleop", PERSON, STOP, 1.01) == ""
-    assert arbiter.velocity(1.01) == STOP
+    assert arbiter.motion(1.01) == STOP
 
 
 def test_after_half_a_second_of_silence_the_robot_stands(arbiter: Arbiter) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
-    assert arbiter.velocity(1.5) == FORWARD
-    assert arbiter.velocity(1.5 + 1e-6) == STOP
+    assert arbiter.motion(1.5) == FORWARD
+    assert arbiter.motion(1.5 + 1e-6) == STOP
     assert arbiter.driver(1.5 + 1e-6) is None
 
 
 def test_a_fresh_command_keeps_the_robot_going(arbiter: Arbiter) -> None:
     for now in (1.0, 1.4, 1.8):
         arbiter.offer("teleop", PERSON, FORWARD, now)
-    assert arbiter.velocity(2.2) == FORWARD
+    assert arbiter.motion(2.2) == FORWARD
 
 
 @pytest.mark.parametrize(("low", "high"), [(CONTROLLER, SCRIPT), (CONTROLLER, PERSON), (SCRIPT, PERSON)])
 def test_a_higher_source_takes_the_robot_while_the_lower_one_drives(arbiter: Arbiter, low: int, high: int) -> None:
     arbiter.offer("low", low, FORWARD, 1.0)
     assert arbiter.offer("high", high, LEFT, 1.1) == ""
-    assert arbiter.velocity(1.1) == LEFT
+    assert arbiter.motion(1.1) == LEFT
     assert arbiter.offer("low", low, FORWARD, 1.2) == "overruled: high drives"
-    assert arbiter.velocity(1.2) == LEFT
+    assert arbiter.motion(1.2) == LEFT
 
 
 @pytest.mark.parametrize("rank", [PERSON, SCRIPT, CONTROLLER])
 def test_among_equals_the_one_that_drives_goes_on_while_it_is_fresh(arbiter: Arbiter, rank: int) -> None:
     arbiter.offer("first", rank, FORWARD, 1.0)
     assert arbiter.offer("second", rank, LEFT, 1.1) == "overruled: first drives"
-    assert arbiter.velocity(1.1) == FORWARD
+    assert arbiter.motion(1.1) == FORWARD
     assert arbiter.offer("second", rank, LEFT, 1.6) == ""
-    assert arbiter.velocity(1.6) == LEFT
+    assert arbiter.motion(1.6) == LEFT
 
 
 @pytest.mark.parametrize(("rank", "stopper"), [(PERSON, PERSON), (SCRIPT, SCRIPT), (CONTROLLER, CONTROLLER),
@@ -95,10 +95,10 @@ def test_an_equal_or_higher_source_may_stop_the_robot_and_it_stays_stopped(
 ) -> None:
     arbiter.offer("first", rank, FORWARD, 1.0)
     assert arbiter.offer("second", stopper, STOP, 1.1) == ""
-    assert arbiter.velocity(1.1) == STOP
+    assert arbiter.motion(1.1) == STOP
     for now in (1.2, 9.0):
         assert arbiter.offer("first", rank, FORWARD, now)
-        assert arbiter.velocity(now) == STOP
+        assert arbiter.motion(now) == STOP
     assert arbiter.resume(9.1) == ""
     assert arbiter.offer("first", rank, FORWARD, 9.2) == ""
 
@@ -107,7 +107,7 @@ def test_an_equal_or_higher_source_may_stop_the_robot_and_it_stays_stopped(
 def test_a_lower_source_may_not_even_stop_the_robot(arbiter: Arbiter, low: int) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
     assert arbiter.offer("low", low, STOP, 1.1) == "overruled: teleop drives"
-    assert arbiter.velocity(1.1) == FORWARD
+    assert arbiter.motion(1.1) == FORWARD
 
 
 def test_a_held_source_may_stop_the_robot_but_not_drive_it(arbiter: Arbiter) -> None:
@@ -116,20 +116,20 @@ def test_a_held_source_may_stop_the_robot_but_not_drive_it(arbiter: Arbiter) -> 
     arbiter.offer("another script", SCRIPT, FORWARD, 2.0)
     for now in (2.1, 2.2):  # a stop is repeated
         assert arbiter.offer("script", SCRIPT, STOP, now) == ""
-        assert arbiter.velocity(now) == STOP
+        assert arbiter.motion(now) == STOP
     assert arbiter.offer("script", SCRIPT, FORWARD, 2.3) == HELD
 
 
 def test_a_command_is_as_old_as_it_may_have_waited(arbiter: Arbiter) -> None:
     assert arbiter.offer("teleop", PERSON, FORWARD, now=1.0, heard=0.7) == ""
-    assert arbiter.velocity(1.2) == FORWARD
-    assert arbiter.velocity(1.2 + 1e-6) == STOP
+    assert arbiter.motion(1.2) == FORWARD
+    assert arbiter.motion(1.2 + 1e-6) == STOP
 
 
 def test_a_stop_of_any_age_stops_the_robot(arbiter: Arbiter) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
     assert arbiter.offer("teleop", PERSON, STOP, now=1.1, heard=-math.inf) == ""
-    assert arbiter.velocity(1.1) == STOP
+    assert arbiter.motion(1.1) == STOP
 
 
 @pytest.mark.parametrize("low", [SCRIPT, CONTROLLER])
@@ -138,7 +138,7 @@ def test_an_overruled_source_does_not_get_the_robot_back_by_waiting(arbiter: Arb
     arbiter.offer("teleop", PERSON, LEFT, 1.1)
     for now in (2.0, 60.0, 3600.0):
         assert arbiter.offer("low", low, FORWARD, now) == HELD
-        assert arbiter.velocity(now) == STOP
+        assert arbiter.motion(now) == STOP
     assert arbiter.held
 
 
@@ -158,7 +158,7 @@ def test_no_autopilot_takes_a_robot_that_others_drove_not_even_a_new_one(arbiter
     arbiter.offer("teleop", above, LEFT, 1.0)
     assert arbiter.held
     assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == HELD
-    assert arbiter.velocity(9.0) == STOP
+    assert arbiter.motion(9.0) == STOP
 
 
 def test_the_autopilot_itself_may_fall_silent_and_go_on(arbiter: Arbiter) -> None:
@@ -197,14 +197,14 @@ def test_resume_leaves_an_autopilot_that_drives_at_the_wheel(arbiter: Arbiter) -
     arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
     assert arbiter.resume(1.1) == ""
     assert drives(arbiter, 1.1) == "controller"
-    assert arbiter.velocity(1.1) == FORWARD
+    assert arbiter.motion(1.1) == FORWARD
 
 
 def test_a_timeout_of_zero_obeys_for_one_moment(arbiter: Arbiter) -> None:
     arbiter = Arbiter(timeout=0)
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
-    assert arbiter.velocity(1.0) == FORWARD
-    assert arbiter.velocity(1.0 + 1e-9) == STOP
+    assert arbiter.motion(1.0) == FORWARD
+    assert arbiter.motion(1.0 + 1e-9) == STOP
 
 
 class TestWithoutATimeout:
@@ -216,24 +216,24 @@ class TestWithoutATimeout:
 
     def test_a_silent_source_is_obeyed_for_ever(self, arbiter: Arbiter) -> None:
         arbiter.offer("teleop", PERSON, FORWARD, 1.0)
-        assert arbiter.velocity(1e6) == FORWARD
+        assert arbiter.motion(1e6) == FORWARD
 
     def test_a_second_teleop_can_stop_what_a_dead_one_left_driving(self, arbiter: Arbiter) -> None:
         arbiter.offer("dead teleop", PERSON, FORWARD, 1.0)
         assert arbiter.offer("teleop", PERSON, STOP, 1.1) == ""
-        assert arbiter.velocity(9.0) == STOP
+        assert arbiter.motion(9.0) == STOP
 
     def test_a_second_teleop_can_drive_what_a_dead_one_left_driving(self, arbiter: Arbiter) -> None:
         arbiter.offer("dead teleop", PERSON, FORWARD, 1.0)
         assert arbiter.offer("teleop", PERSON, LEFT, 1.4) == "overruled: dead teleop drives"
         assert arbiter.offer("teleop", PERSON, LEFT, 2.0) == ""
-        assert arbiter.velocity(2.0) == LEFT
+        assert arbiter.motion(2.0) == LEFT
 
     def test_a_person_is_not_locked_out_by_who_took_the_robot_while_they_were_silent(self, arbiter: Arbiter) -> None:
         arbiter.offer("teleop", PERSON, STOP, 1.0)
         assert arbiter.offer("script", SCRIPT, FORWARD, 9.0) == ""
         assert arbiter.offer("teleop", PERSON, STOP, 9.1) == ""
-        assert arbiter.velocity(9.1) == STOP
+        assert arbiter.motion(9.1) == STOP
 
     def test_an_autopilot_waits_for_resume_all_the_same(self, arbiter: Arbiter) -> None:
         arbiter.offer("teleop", PERSON, STOP, 1.0)
@@ -279,7 +279,7 @@ class Robot(RuleBasedStateMachine):
         after = self.arbiter.driver(self.now)
         if not refused:
             assert after is not None
-            assert (after.source, after.velocity, after.heard) == (source, velocity, self.now)
+            assert (after.source, after.motion, after.heard) == (source, velocity, self.now)
             assert source not in self.lost or velocity == STOP
             self.heard[source], self.said[source] = self.now, velocity
         else:
@@ -303,7 +303,7 @@ class Robot(RuleBasedStateMachine):
     def resume(self) -> None:
         driver = self.arbiter.driver(self.now)
         refused = self.arbiter.resume(self.now)
-        assert bool(refused) == bool(driver and driver.rank < AUTOPILOT and driver.velocity != STOP)
+        assert bool(refused) == bool(driver and driver.rank < AUTOPILOT and driver.motion != STOP)
         if not refused:
             self.lost.clear()
             assert not self.arbiter.held
@@ -312,11 +312,11 @@ class Robot(RuleBasedStateMachine):
     def the_robot_does_what_its_one_driver_said_last(self) -> None:
         driver = self.arbiter.driver(self.now)
         if driver is None:
-            assert self.arbiter.velocity(self.now) == STOP
+            assert self.arbiter.motion(self.now) == STOP
         else:
             assert driver.rank == SOURCES[driver.source]
-            assert self.arbiter.velocity(self.now) == self.said[driver.source]
-            assert driver.source not in self.lost or driver.velocity == STOP
+            assert self.arbiter.motion(self.now) == self.said[driver.source]
+            assert driver.source not in self.lost or driver.motion == STOP
 
     @invariant()
     def nobody_drives_after_the_timeout(self) -> None:

@@ -12,7 +12,9 @@ from holozen.messages import Header, Time, Twist, TwistStamped, Vector3
 from holozen.readers import PRIORITIES, Received, Sample
 from holozen.wire import MAX_STAMP_AGE
 from services.sim.arbiter import Arbiter
-from services.sim.intake import TELL_EVERY, Intake
+from services.sim.intake import Intake
+from services.sim.ledger import TELL_EVERY
+from services.sim.motion import Motion
 
 CLOCKS = (1000.0, 5.0)  # the day's and the sim's
 
@@ -32,8 +34,8 @@ class Judge:
         sent = SimpleNamespace(key_expr=key, payload=b"", encoding="", priority=rank, attachment=source.encode())
         self.intake.take(Received(Sample(sent), message, error), now, CLOCKS, now - waited)
 
-    def velocity(self, now: float = 10.0) -> tuple[float, float, float]:
-        return self.intake.arbiter.velocity(now)
+    def motion(self, now: float = 10.0) -> Motion:
+        return self.intake.arbiter.motion(now)
 
 
 @pytest.fixture
@@ -47,7 +49,7 @@ def stamped(seconds: float, x: float = 1.0) -> TwistStamped:
 
 def test_a_good_command_drives_and_is_counted(judge: Judge) -> None:
     judge.take(Twist.planar(1, -0.5, 2), priority="INTERACTIVE_HIGH", source="teleop@9")
-    assert judge.velocity() == (1, -0.5, 2)
+    assert judge.motion() == (1, -0.5, 2)
     status = judge.intake.status(10.0)
     assert (status.obeyed, status.priority, status.accepted) == ("teleop@9", "INTERACTIVE_HIGH", 1)
     assert (status.refused, status.last_refusal, judge.told) == ({}, "", [])
@@ -64,12 +66,12 @@ def test_the_status_of_a_silent_robot_names_nobody(judge: Judge) -> None:
 
 def test_what_a_planar_base_cannot_do_is_left_out(judge: Judge) -> None:
     judge.take(Twist(Vector3(1, 0, 5), Vector3(5, 5, 1)))
-    assert judge.velocity() == (1, 0, 1)
+    assert judge.motion() == (1, 0, 1)
 
 
 def test_a_faster_command_is_clamped_in_its_direction_and_told(judge: Judge) -> None:
     judge.take(Twist.planar(30, 40, -50))
-    assert judge.velocity() == pytest.approx((1.2, 1.6, -3))
+    assert judge.motion() == pytest.approx((1.2, 1.6, -3))
     status = judge.intake.status(10.0)
     assert (status.accepted, status.refused) == (1, {"clamped": 1})
     assert judge.told == [
@@ -87,9 +89,10 @@ def test_a_number_that_is_not_finite_never_drives(
     twist = Twist()
     setattr(getattr(twist, part), axis, bad)
     judge.take(twist if kind is Twist else TwistStamped(twist=twist))
-    assert judge.velocity() == STOP
+    assert judge.motion() == STOP
     assert judge.intake.status(10.0).refused == {"not finite": 1}
-    assert judge.told == [f"Fred/cmd_vel: from me@1: {part}.{axis} is not a finite number"]
+    path = f"{part}.{axis}" if kind is Twist else f"twist.{part}.{axis}"
+    assert judge.told == [f"Fred/cmd_vel: from me@1: {path} is not a finite number"]
 
 
 @pytest.mark.parametrize(
@@ -113,45 +116,45 @@ def test_a_stamp_may_be_off_by_half_a_second_by_the_clock_it_is_nearest_to(
 ) -> None:
     judge.take(stamped(stamp))
     if age:
-        assert judge.velocity() == STOP
+        assert judge.motion() == STOP
         assert judge.told == [f"Fred/cmd_vel: from me@1: stamp is {age} s old; at most {MAX_STAMP_AGE} s"]
         assert judge.intake.status(10.0).refused == {"stale": 1}
     else:
-        assert judge.velocity() == (1, 0, 0)
+        assert judge.motion() == (1, 0, 0)
         assert judge.told == []
 
 
 def test_a_stamp_makes_a_command_older_but_never_younger(judge: Judge) -> None:
     judge.take(stamped(999.7))
-    assert judge.velocity(10.1) == (1, 0, 0)
-    assert judge.velocity(10.3) == STOP  # half a second after its stamp
+    assert judge.motion(10.1) == (1, 0, 0)
+    assert judge.motion(10.3) == STOP  # half a second after its stamp
     judge.take(stamped(1000.3), now=20.0)
-    assert judge.velocity(20.4) == (1, 0, 0)
-    assert judge.velocity(20.6) == STOP
+    assert judge.motion(20.4) == (1, 0, 0)
+    assert judge.motion(20.6) == STOP
 
 
 def test_a_command_that_may_have_waited_too_long_is_refused_but_a_stop_is_not(judge: Judge) -> None:
     judge.take(Twist.planar(1), waited=0.4)
-    assert judge.velocity() == (1, 0, 0)
+    assert judge.motion() == (1, 0, 0)
     judge.take(Twist.planar(2), waited=0.6)
-    assert judge.velocity() == (1, 0, 0)
+    assert judge.motion() == (1, 0, 0)
     assert judge.told == ["Fred/cmd_vel: from me@1: it waited up to 0.6 s for the sim"]
     judge.take(Twist(), waited=math.inf)
-    assert judge.velocity() == STOP
+    assert judge.motion() == STOP
     assert judge.intake.status(10.0).refused == {"late": 1}
 
 
 @pytest.mark.parametrize("key", ["*/cmd_vel", "**", "Ann/cmd_vel"])
 def test_a_command_for_every_robot_is_for_none(judge: Judge, key: str) -> None:
     judge.take(Twist.planar(1), key=key)
-    assert judge.velocity() == STOP
+    assert judge.motion() == STOP
     assert judge.intake.status(10.0).refused == {"wildcard": 1}
     assert judge.told == [f"Fred/cmd_vel: from me@1: a command for {key!r}; name one robot"]
 
 
 def test_no_stamp_is_a_fresh_one(judge: Judge) -> None:
     judge.take(stamped(0.0))
-    assert judge.velocity() == (1, 0, 0)
+    assert judge.motion() == (1, 0, 0)
 
 
 def test_an_overruled_and_a_held_source_are_counted_apart(judge: Judge) -> None:
@@ -159,7 +162,7 @@ def test_an_overruled_and_a_held_source_are_counted_apart(judge: Judge) -> None:
     judge.take(Twist.planar(2), now=1.1)
     judge.take(Twist.planar(2), now=9.0)
     assert judge.intake.status(9.0).refused == {"overruled": 1, "held": 1}
-    assert judge.velocity(9.0) == STOP
+    assert judge.motion(9.0) == STOP
 
 
 def test_a_source_without_a_name_is_called_by_its_priority(judge: Judge) -> None:
@@ -196,7 +199,9 @@ def test_whatever_comes_the_engine_gets_finite_velocities_within_the_limits(give
     judge = Judge()
     for message in given:
         judge.take(message)
-    x, y, turn = judge.velocity()
+    motion = judge.motion()
+    assert isinstance(motion, tuple)
+    x, y, turn = motion
     assert math.hypot(x, y) <= 2 * (1 + 1e-9)
     assert abs(turn) <= 3
     status = judge.intake.status(10.0)

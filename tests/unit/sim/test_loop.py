@@ -5,6 +5,7 @@ import time
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -26,19 +27,16 @@ from holozen.messages import (
     Twist,
 )  # fmt: skip
 from holozen.robot.model import Drive, load
-from holozen.robot.rigid import lump
 from holozen.testing import Wire, wait_for
 from holozen.wire import MAX_COMMAND_BYTES, PRIORITY_OF
 from services.sim import loop as loop_module
-from services.sim.arbiter import Arbiter
-from services.sim.intake import Intake
+from services.sim.engine import UPRIGHT
+from services.sim.entities import Entities
 from services.sim.loop import DISTRUST, Loop
-from services.sim.vehicle import Vehicle
 from services.sim.world import World
 from services.sim.worldfile import WorldSpec
 
 MODEL = load(Path(__file__).parents[3] / "urdf" / "hb_bot.urdf.xacro")
-BODY = lump(MODEL)
 assert MODEL.drive is not None
 DRIVE = MODEL.drive
 FORWARD = (0.5, 0.0, 0.0)
@@ -49,10 +47,11 @@ class Sim:
 
     def __init__(self, wire: Wire, world: World, rtf: float = 0.0, drive: Drive = DRIVE) -> None:
         self.world, self.bus = world, wire.bus("sim")
-        self.arbiter = Arbiter(drive.command_timeout)
-        intake = Intake("Fred/cmd_vel", self.arbiter, 5.0, 10.0)
-        self.vehicle = Vehicle(self.bus, "Fred", MODEL, drive, world.add(BODY, (0, 0, 0)), intake)
-        self.loop = Loop(self.bus, world, [self.vehicle], rtf)
+        self.entities = Entities(self.bus, world, (5.0, 10.0))
+        self.entities.add("Fred", replace(MODEL, drive=drive), ((0, 0, 0), UPRIGHT))
+        (self.vehicle,) = self.entities.vehicles
+        self.arbiter = self.vehicle.arbiter
+        self.loop = Loop(self.bus, world, self.entities, rtf)
 
     def run(self, steps: int) -> None:
         self.loop.run(threading.Event(), steps)
@@ -159,7 +158,7 @@ def test_a_command_from_another_process_drives_and_its_silence_stops(wire: Wire,
         commands.put(Twist.planar(0.5))
         wait_for(lambda: speed() == pytest.approx(0.5, abs=1e-3))
         wait_for(lambda: speed() == pytest.approx(0, abs=1e-3))
-    assert 0.24 < sim.vehicle.body.pose()[0][0] < 0.5  # half a second of it, and the way of late steps
+    assert 0.24 < sim.vehicle.mover.body.pose()[0][0] < 0.5  # half a second of it, and the way of late steps
 
 
 def test_what_is_wrong_never_reaches_the_engine_and_is_counted(wire: Wire, world: World) -> None:
@@ -184,7 +183,7 @@ def test_what_is_wrong_never_reaches_the_engine_and_is_counted(wire: Wire, world
             before = refused(kind)
             me.session.put("Fred/cmd_vel", payload, congestion_control=zenoh.CongestionControl.BLOCK)
             wait_for(partial(lambda kind, before: refused(kind) > before, kind, before))
-    assert sim.vehicle.body.pose()[0][:2] == pytest.approx((0, 0), abs=1e-4)
+    assert sim.vehicle.mover.body.pose()[0][:2] == pytest.approx((0, 0), abs=1e-4)
 
 
 def test_the_priority_is_read_off_the_sample(wire: Wire, world: World) -> None:
@@ -222,13 +221,17 @@ def clock(monkeypatch: pytest.MonkeyPatch) -> list[float]:
 def test_commands_that_waited_through_a_stall_are_refused(clock: list[float], sim: Sim) -> None:
     """The sim stood still and goes on: what waits may be of any age since it last heard."""
     commands: Publisher[Twist] = sim.bus.publisher("Fred/cmd_vel", Twist)
+    status = sim.bus.subscribe("Fred/cmd_vel_status", CommandStatus)
     for pause, refused in ((0.05, False), (0.45, False), (0.6, True), (DISTRUST / 2, True), (DISTRUST, False)):
         clock[0] += pause
         commands.put(Twist.planar(pause))
         sim.run(1)
         driver = sim.arbiter.driver(clock[0])
-        assert (driver is None or driver.velocity[0] != pause) == refused, pause
-    assert sim.vehicle._intake.status(clock[0]).refused == {"late": 2}
+        assert (driver is None or driver.motion != (pause, 0, 0)) == refused, pause
+    clock[0] += 1
+    sim.run(1)
+    told = [received.message for received in iter(status.try_recv, None) if received.message]
+    assert told[-1].refused == {"late": 2}
 
 
 def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: Sim) -> None:
@@ -238,4 +241,4 @@ def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: S
     clock[0] += 60
     commands.put(Twist())
     sim.run(1)
-    assert sim.arbiter.velocity(clock[0]) == STOP
+    assert sim.arbiter.motion(clock[0]) == STOP

@@ -10,6 +10,7 @@ import pytest
 from holozen.bus import Bus
 from holozen.robot.model import RobotError
 from holozen.testing import Wire, wait_for
+from services.sim.entities import Entities, Entity
 from services.sim.spawn import GAP, spawn_all
 from services.sim.world import World
 from services.sim.worldfile import WorldSpec
@@ -33,14 +34,20 @@ def bus(wire: Wire) -> Bus:
     return wire.bus("sim")
 
 
-def wanted(*robots: tuple[Path, str]) -> argparse.Namespace:
-    return argparse.Namespace(robot=list(robots), package=[], max_linear=5.0, max_angular=10.0)
+def wanted(*robots: tuple[Path, str], drive: str = "") -> argparse.Namespace:
+    return argparse.Namespace(robot=list(robots), package=[], drive=drive)
 
 
 def file(folder: Path, body: str) -> Path:
     path = folder / "robot.urdf"
     path.write_text(f'<robot name="r">{body}</robot>')
     return path
+
+
+def spawn(bus: Bus, world: World, args: argparse.Namespace) -> list[Entity]:
+    entities = Entities(bus, world, (5.0, 10.0))
+    spawn_all(entities, args)
+    return list(entities)
 
 
 def keys(bus: Bus) -> set[str]:
@@ -52,15 +59,16 @@ def keys(bus: Bus) -> set[str]:
 def test_without_a_file_hb_bot_stands_at_the_root_of_the_keys(
     bus: Bus, world: World, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (vehicle,) = spawn_all(bus, world, wanted())
-    assert vehicle.body.pose()[0] == pytest.approx((0, 0, 0), abs=1e-6)
-    assert keys(bus) == {"cmd_vel", "odom", "tf", "joint_states", "cmd_vel_status", "resume"}
+    (entity,) = spawn(bus, world, wanted())
+    assert entity.name == "hb_bot"
+    assert entity.body.pose()[0] == pytest.approx((0, 0, -0.04), abs=1e-6)
+    assert keys(bus) == {"cmd_vel", "odom", "tf", "joint_states", "joint_command", "cmd_vel_status", "resume"}
     assert capsys.readouterr().err == "sim: hb_bot listens on cmd_vel\n"
 
 
 def test_named_robots_have_keys_of_their_own_and_stand_side_by_side(bus: Bus, world: World) -> None:
-    vehicles = spawn_all(bus, world, wanted((HB_BOT, "Fred"), (HB_BOT, "Ann"), (HB_BOT, "")))
-    places = [vehicle.body.pose()[0] for vehicle in vehicles]
+    entities = spawn(bus, world, wanted((HB_BOT, "Fred"), (HB_BOT, "Ann"), (HB_BOT, "")))
+    places = [entity.body.pose()[0] for entity in entities]
     assert {round(x, 6) for x, _, _ in places} == {0.0}
     (_, first, _), (_, second, _), (_, third, _) = places
     assert first == pytest.approx(0, abs=1e-6)
@@ -73,7 +81,7 @@ def test_the_plugins_tags_name_the_topics(
     bus: Bus, world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     tags = "<commandTopic>go</commandTopic><odometryTopic>where</odometryTopic>"
-    spawn_all(bus, world, wanted((file(tmp_path, LINK.format(BALL) + DRIVE.format(tags)), "Fred")))
+    spawn(bus, world, wanted((file(tmp_path, LINK.format(BALL) + DRIVE.format(tags)), "Fred")))
     assert {"Fred/go", "Fred/where", "Fred/go_status"} <= keys(bus)
     told = capsys.readouterr().err
     assert f"sim: {tmp_path}/robot.urdf: topic 'go': the teleop and the controller use 'cmd_vel'\n" in told
@@ -82,25 +90,27 @@ def test_the_plugins_tags_name_the_topics(
 
 def test_a_namespace_in_the_file_is_as_good_as_a_name(bus: Bus, world: World, tmp_path: Path) -> None:
     tags = "<commandTopic>Ann/cmd_vel</commandTopic><odometryTopic>Ann/odom</odometryTopic>"
-    spawn_all(bus, world, wanted((file(tmp_path, LINK.format(BALL) + DRIVE.format(tags)), "")))
-    assert keys(bus) == {f"Ann/{key}" for key in ("cmd_vel", "odom", "tf", "joint_states", "cmd_vel_status", "resume")}
+    spawn(bus, world, wanted((file(tmp_path, LINK.format(BALL) + DRIVE.format(tags)), "")))
+    assert keys(bus) == {
+        f"Ann/{key}" for key in ("cmd_vel", "odom", "tf", "joint_states", "joint_command", "cmd_vel_status", "resume")
+    }
 
 
 def test_a_second_sim_of_the_same_robot_is_refused(wire: Wire, bus: Bus, world: World) -> None:
     first = wire.bus("first_sim")
-    spawn_all(first, world, wanted((HB_BOT, "Fred")))
+    spawn(first, world, wanted((HB_BOT, "Fred")))
     wait_for(bus.connected)
     wait_for(bus.graph().endpoints)
-    told = rf"^Fred/odom is published by first_sim \({first.id[:6]}\) already; end that one, or use --robot FILE=NAME$"
+    told = rf": Fred/odom is published by first_sim \({first.id[:6]}\) already; end that one, or use another name"
 
     def refused() -> bool:
         with closing(World(WorldSpec())) as second, pytest.raises(RobotError, match=told):
-            spawn_all(bus, second, wanted((HB_BOT, "Fred")))
+            spawn(bus, second, wanted((HB_BOT, "Fred")))
         return True
 
     assert refused()
     with closing(World(WorldSpec())) as second:
-        assert len(spawn_all(bus, second, wanted((HB_BOT, "Ann")))) == 1
+        assert len(spawn(bus, second, wanted((HB_BOT, "Ann")))) == 1
 
 
 @pytest.mark.parametrize(
@@ -112,31 +122,42 @@ def test_a_second_sim_of_the_same_robot_is_refused(wire: Wire, bus: Bus, world: 
 )
 def test_two_robots_of_one_name_are_refused(bus: Bus, world: World, robots: list[str], told: str) -> None:
     with pytest.raises(RobotError) as error:
-        spawn_all(bus, world, wanted(*((HB_BOT, name) for name in robots)))
+        spawn(bus, world, wanted(*((HB_BOT, name) for name in robots)))
     assert str(error.value) == told
 
 
 @pytest.mark.parametrize(
     ("body", "told"),
     [
-        (LINK.format(BALL), "no planar_move plugin, so nothing drives it; other drives are not simulated yet"),
-        (LINK.format("") + DRIVE, "no collision shape to stand on; give a link a <box>, <cylinder> or <sphere>"),
-        (LINK.format(MESH) + DRIVE, "no collision shape to stand on; give a link a <box>, <cylinder> or <sphere>"),
+        (LINK.format(BALL), "no plugin drives it; add one, or have it moved as a whole: --drive planar_move"),
+        (
+            LINK.format("") + DRIVE,
+            "no collision shape to stand on; give a link a <box>, <cylinder>, <sphere> or <mesh>",
+        ),
     ],
-    ids=["no drive", "no collision", "only a mesh"],
+    ids=["no drive", "no collision"],
 )
 def test_a_robot_that_cannot_be_simulated_is_refused_with_its_file(
     bus: Bus, world: World, tmp_path: Path, body: str, told: str
 ) -> None:
     path = file(tmp_path, body)
     with pytest.raises(RobotError) as error:
-        spawn_all(bus, world, wanted((path, "")))
+        spawn(bus, world, wanted((path, "")))
     assert str(error.value) == f"{path}: {told}"
 
 
-def test_collision_meshes_beside_a_shape_are_named_and_left_out(
+def test_a_collision_mesh_that_is_missing_is_told_and_a_box_carries_the_robot(
     bus: Bus, world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    path = file(tmp_path, LINK.format(BALL + MESH) + DRIVE)
-    spawn_all(bus, world, wanted((path, "")))
-    assert f"sim: {path}: collision meshes are left out: a\n" in capsys.readouterr().err
+    path = file(tmp_path, LINK.format(MESH) + DRIVE)
+    (entity,) = spawn(bus, world, wanted((path, "")))
+    assert "nothing.stl" in capsys.readouterr().err
+    for _ in range(240):
+        world.step()
+    assert entity.body.pose()[0][2] > 0.01
+
+
+def test_a_robot_without_a_drive_is_moved_as_a_whole_when_asked(bus: Bus, world: World, tmp_path: Path) -> None:
+    (entity,) = spawn(bus, world, wanted((file(tmp_path, LINK.format(BALL)), "Fred"), drive="planar_move"))
+    assert entity.model.drive is not None
+    assert "Fred/cmd_vel" in keys(bus)

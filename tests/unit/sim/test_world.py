@@ -14,7 +14,8 @@ from holozen.messages import Quaternion
 from holozen.robot.model import load
 from holozen.robot.parts import Pose, Shape
 from holozen.robot.rigid import Body, PlacedShape, lump
-from services.sim.world import PlanarBody, World
+from services.sim.planar import PlanarBody
+from services.sim.world import World
 from services.sim.worldfile import WorldSpec
 
 REPO = Path(__file__).parents[3]

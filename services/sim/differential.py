@@ -1,0 +1,80 @@
+"""Wheels on two sides, turned by motors: the ground does the rest."""
+
+import math
+
+from holozen.limits import Planar
+from holozen.robot.drives import Differential
+from holozen.robot.model import RobotModel
+from holozen.robot.rigid import joint_axes
+
+from .engine import Rotation, Vector
+from .jointed import JointedBody
+from .wheels import forward_sign, radius_of
+
+
+class WheelMover:
+    """A differential or skid-steered base. Forward is where x points, whichever way a wheel's axis does."""
+
+    def __init__(self, body: JointedBody, model: RobotModel, mechanism: Differential) -> None:
+        self.body, self._mechanism = body, mechanism
+        self.names = body.names
+        self.wheels, self.kept = frozenset((*mechanism.left, *mechanism.right)), frozenset[str]()
+        self._signs = {name: forward_sign(model, name) for name in self.wheels}
+        self._separation = mechanism.separation or separation_of(model, mechanism)
+        self._radius = mechanism.radius or radius_of(model, model.joints[mechanism.left[0]].child)
+        self._odometer = Odometer()
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Turn the wheels. Sideways it cannot go."""
+        x, _, turn = velocity
+        half = turn * self._separation / 2
+        for names, speed in ((self._mechanism.left, x - half), (self._mechanism.right, x + half)):
+            for name in names:
+                self.body.turn(name, self._signs[name] * speed / self._radius, self._mechanism.torque)
+
+    def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
+        """The true pose, or what the wheels' encoders make of it, as the file wants."""
+        if not self._mechanism.encoder:
+            return *self.body.pose(), self.body.planar()
+        positions, rates = self.body.states()
+        angles, speeds = dict(zip(self.names, positions, strict=True)), dict(zip(self.names, rates, strict=True))
+        position, rotation = self._odometer.see(*self._sides(angles), self._separation)
+        left, right = self._sides(speeds)
+        return position, rotation, ((left + right) / 2, 0.0, (right - left) / self._separation)
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Positions and rates of the joints."""
+        return self.body.states()
+
+    def _sides(self, values: dict[str, float]) -> tuple[float, float]:
+        """What the left and the right wheels rolled (m) or roll (m/s), on average."""
+        sides = (self._mechanism.left, self._mechanism.right)
+        left, right = (sum(self._signs[name] * values[name] for name in names) / len(names) for names in sides)
+        return left * self._radius, right * self._radius
+
+
+class Odometer:
+    """A pose in the plane from what two sides have rolled, on exact arcs. It starts at zero."""
+
+    def __init__(self) -> None:
+        self._x = self._y = self._yaw = 0.0
+        self._seen = (0.0, 0.0)
+
+    def see(self, left: float, right: float, separation: float) -> tuple[Vector, Rotation]:
+        """The pose when the sides have rolled so far, in metres."""
+        dl, dr = left - self._seen[0], right - self._seen[1]
+        self._seen = (left, right)
+        turn, way = (dr - dl) / separation, (dl + dr) / 2
+        # The chord of an arc of length `way`: it lies half the turn aside, and is shorter.
+        chord = way * (math.sin(turn / 2) / (turn / 2) if turn else 1.0)
+        self._x += chord * math.cos(self._yaw + turn / 2)
+        self._y += chord * math.sin(self._yaw + turn / 2)
+        self._yaw += turn
+        return (self._x, self._y, 0.0), (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
+
+
+def separation_of(model: RobotModel, mechanism: Differential) -> float:
+    """The distance in metres between the two sides' wheels, by their links."""
+    axes = joint_axes(model)
+    left, right = (sum(axes[n].xyz[1] for n in names) / len(names) for names in (mechanism.left, mechanism.right))
+    return abs(left - right)

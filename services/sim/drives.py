@@ -1,0 +1,125 @@
+"""The mechanisms of drives: from the commanded velocity to the engine, and back to what odometry tells."""
+
+from typing import Protocol
+
+from holozen.limits import Planar, clamp_speed, ramp
+from holozen.robot.drives import Balancing, Differential, Drive, Mecanum
+from holozen.robot.model import RobotModel
+from holozen.robot.rigid import lump
+
+from .balance import BalanceMover
+from .body import Body
+from .differential import WheelMover
+from .engine import UPRIGHT, Rotation, Vector
+from .jointed import JointedBody
+from .planar import PlanarBody
+from .wheels import MecanumWheels, Wheels
+from .world import World
+
+Moved = tuple[Vector, Rotation, Planar]
+"""Position (m), rotation and body-frame velocity (m/s, rad/s) as odometry tells them."""
+
+
+class Mover(Protocol):
+    """A robot's body with what drives it. `names` are its joints, `wheels` those that it turns itself and joint
+    commands may turn too, `kept` those that none may.
+    """
+
+    @property
+    def body(self) -> Body:
+        """Where it is."""
+        ...
+
+    names: list[str]
+    wheels: frozenset[str]
+    kept: frozenset[str]
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Do what moves the body at `velocity` for the next step of `dt` seconds."""
+        ...
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """For odometry, at sim time `time`, after a step of `dt` seconds."""
+        ...
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Positions and rates of the joints."""
+        ...
+
+
+class PlanarMover:
+    """The whole body moves over the plane; its wheels turn for the eye."""
+
+    def __init__(self, body: PlanarBody, wheels: Wheels | MecanumWheels) -> None:
+        self.body = body
+        self._wheels = wheels
+        self.names = wheels.names
+        self.wheels, self.kept = frozenset[str](), frozenset(wheels.names)
+        self._rolled = 0.0  # sim time up to which the wheels have turned
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Set the body's velocity."""
+        self.body.drive(velocity, dt)
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """The true pose."""
+        velocity = self.body.velocity(dt)
+        self._wheels.roll(velocity, time - self._rolled)
+        self._rolled = time
+        return *self.body.pose(), velocity
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Angles and rates of the wheels, as rolling without slip would turn them."""
+        return self._wheels.angles, self._wheels.rates
+
+
+class FreeMover:
+    """A robot or an object that nothing drives; joint commands may move its joints."""
+
+    def __init__(self, body: JointedBody) -> None:
+        self.body, self.names = body, body.names
+        self.wheels = self.kept = frozenset[str]()
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Nothing: it has no drive."""
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """The true pose."""
+        return *self.body.pose(), self.body.planar()
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Positions and rates of the joints."""
+        return self.body.states()
+
+
+class Limited:
+    """The limits that a robot's file sets to its drive. A stop is at once, whatever they say."""
+
+    def __init__(self, drive: Drive) -> None:
+        self._drive = drive
+        self._now: Planar = (0.0, 0.0, 0.0)
+
+    def __call__(self, wanted: Planar, dt: float) -> Planar:
+        """The velocity of the next step of `dt` seconds."""
+        drive = self._drive
+        wanted = clamp_speed(wanted, drive.max_linear, drive.max_angular)
+        slower = all(abs(w) <= abs(n) and w * n >= 0 for w, n in zip(wanted, self._now, strict=True))
+        limits = (drive.max_linear_acceleration, drive.max_angular_acceleration)
+        self._now = wanted if slower else ramp(self._now, wanted, *limits, dt)
+        return self._now
+
+
+def mover_for(world: World, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT) -> Mover:
+    """The robot in the world, its root frame at `at`. Raises RobotError if the engine cannot have it."""
+    drive = model.drive
+    mechanism = drive.mechanism if drive else None
+    if drive is None or mechanism is None:
+        return FreeMover(world.add_jointed(model, at, rotation))
+    if isinstance(mechanism, Differential):
+        wheels = (*mechanism.left, *mechanism.right)
+        sideways = frozenset(wheels if len(wheels) > 2 else ())
+        return WheelMover(world.add_jointed(model, at, rotation, sideways), model, mechanism)
+    if isinstance(mechanism, Balancing):
+        return BalanceMover(world.add_jointed(model, at, rotation), model, mechanism, world.spec.step)
+    rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
+    return PlanarMover(world.add(lump(model), at, rotation), rolling)

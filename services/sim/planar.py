@@ -1,0 +1,54 @@
+"""A rigid base that is moved over the plane, as Gazebo's planar_move does."""
+
+from holozen.drive import to_body, to_world
+from holozen.limits import Planar
+from holozen.robot import rigid
+
+from .body import Body, Links
+from .engine import NOTHING, UPRIGHT, Rotation, Shapes, Vector, bullet, yaw_of
+
+
+class PlanarBody(Body):
+    """The drive sets its speed over ground and its turn; the engine keeps gravity, tilt and contacts. Its contacts have
+    no friction: wheels that roll do not brake.
+    """
+
+    def __init__(self, world: int, shapes: Shapes, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT) -> None:
+        links, (first, *others) = Links(), shapes.of(body.collisions) or [NOTHING]
+        links.carry(-1, others)
+        # An engine's base is placed by its inertial frame, which is where its centre of mass is.
+        number: int = bullet.createMultiBody(
+            body.mass,
+            first,
+            basePosition=at,
+            baseOrientation=rotation,
+            baseInertialFramePosition=body.centre,
+            baseInertialFrameOrientation=body.axes,
+            physicsClientId=world,
+            **links.arguments,
+        )
+        super().__init__(world, number, body.centre, body.axes)
+        for link in range(-1, len(links)):
+            bullet.changeDynamics(
+                number, link, lateralFriction=0, linearDamping=0, angularDamping=0, physicsClientId=world
+            )
+        bullet.changeDynamics(number, -1, localInertiaDiagonal=body.inertia, physicsClientId=world)
+
+    def drive(self, velocity: Planar, dt: float) -> None:
+        """Set the body-frame velocity for the next step of `dt` seconds; what gravity and contacts do is left alone."""
+        _, rotation, centre = self._root()
+        (_, _, falling), (roll, pitch, _) = bullet.getBaseVelocity(self._body, self._world)
+        vx, vy = to_world(velocity, yaw_of(rotation), dt)
+        turn = velocity[2]
+        # The centre goes round the root; as with the heading, the middle of the step keeps it on its circle.
+        cx, cy = to_world((centre[0], centre[1], turn), 0.0, dt)
+        linear = (vx - turn * cy, vy + turn * cx, falling)
+        bullet.resetBaseVelocity(self._body, linear, (roll, pitch, turn), self._world)
+
+    def velocity(self, dt: float) -> Planar:
+        """The root frame's planar velocity during the last step of `dt` seconds, as seen from the body's heading."""
+        _, rotation, centre = self._root()
+        (vx, vy, _), (_, _, turn) = bullet.getBaseVelocity(self._body, self._world)
+        cx, cy = to_world((centre[0], centre[1], -turn), 0.0, dt)
+        x, y = to_body(vx + turn * cy, vy - turn * cx, yaw_of(rotation) - turn * dt / 2)
+        return x, y, turn
