@@ -24,7 +24,9 @@ from holozen.publisher import Publisher
 from holozen.robot.model import load
 from holozen.robot.rigid import lump
 from holozen.robot.xacro import expand
-from services.sim import intake, world, worldfile
+from services.sim import intake, worldfile
+from services.sim.engine import bullet
+from services.sim.entities import Entities
 from services.sim.loop import Loop
 from services.sim.spawn import spawn_all
 from services.sim.vehicle import Vehicle
@@ -37,7 +39,7 @@ COMMAND = Twist.planar(0.3, 0.1, 0.4)
 RATE = 20.0  # Hz of real time, of the commands
 REST = -0.04  # m; the height of the root frame when the robot stands on its wheels
 
-engine: Any = vars(world)["engine"]  # imported there, where pybullet is kept from writing to the terminal
+engine: Any = bullet  # imported there, where pybullet is kept from writing to the terminal
 
 Stepper = Callable[[int], None]
 """Makes so many steps."""
@@ -63,8 +65,10 @@ def drive(endpoint: str) -> None:
 def our_loop(bus: Bus) -> Stepper:
     """Our world with hb_bot on its keys, as `holozen sim --rtf 0` runs it."""
     world = World(WORLD)
-    flags = Namespace(robot=None, package=[], max_linear=intake.MAX_LINEAR, max_angular=intake.MAX_ANGULAR)
-    loop = Loop(bus, world, spawn_all(bus, world, flags), rtf=0)
+    flags = Namespace(robot=None, package=[], drive="", max_linear=intake.MAX_LINEAR, max_angular=intake.MAX_ANGULAR)
+    entities = Entities(bus, world, (flags.max_linear, flags.max_angular))
+    spawn_all(entities, flags)
+    loop = Loop(bus, world, entities, rtf=0)
     return lambda steps: loop.run(threading.Event(), steps)
 
 

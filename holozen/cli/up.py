@@ -29,8 +29,9 @@ def parser() -> argparse.ArgumentParser:
         description="Start the sim, the controller, the pose service, and the teleop if there is a terminal.",
     )
     parser.add_argument("--robot", type=flags.robot_file, metavar="FILE[=NAME]", help="as for `holozen sim --robot`")
-    for flag in ("--world", "--rtf"):
+    for flag in ("--world", "--rtf", "--drive"):
         parser.add_argument(flag, help=f"as for `holozen sim {flag}`")
+    parser.add_argument("--package", action="append", default=[], metavar="NAME=DIR", help="as for `holozen sim`")
     for flag in ("--shape", "--size", "--goals"):
         parser.add_argument(flag, help=f"as for `holozen pose-service {flag}`")
     parser.add_argument("--laps", default="0", help="as for `holozen controller --laps` (default: 0, for ever)")
@@ -49,7 +50,8 @@ def main(argv: list[str]) -> int:
         team = Team(connection.from_arguments(args).arguments(), log if has_terminal else None)
         try:
             robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
-            team.start("sim", [*robot, *_flags(args, "world", "rtf")])
+            packages = [word for package in args.package for word in ("--package", package)]
+            team.start("sim", [*robot, *packages, *_flags(args, "world", "rtf", "drive")])
             team.start("pose-service", _flags(args, "shape", "size", "goals"))
             name = [args.robot[1]] if args.robot and args.robot[1] else []
             team.start("controller", [*name, "--laps", args.laps])

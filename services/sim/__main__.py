@@ -19,6 +19,7 @@ def parser() -> argparse.ArgumentParser:
     add("--world", type=Path, default=data.find("worlds", "gazebo.world"), help="an SDF file (default: gazebo.world)")
     add("--robot", type=flags.robot_file, action="append", metavar="FILE[=NAME]",
         help="a xacro or URDF file, and the robot's name (default: hb_bot at the root of the keys)")  # fmt: skip
+    add("--empty", action="store_true", help="no robot at the start; `holozen spawn` puts some in")
     add("--drive", choices=["planar_move"], help="for robots that have no drive of their own")
     add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR", help="for $(find NAME)")
     add("--rtf", type=flags.number(0, 1000), help="real-time factor; 0: as fast as it goes (default: the world's)")
@@ -40,12 +41,14 @@ def main(argv: list[str] | None = None) -> int:
             from .entities import Entities
             from .entity_services import EntityServices
             from .loop import Loop
-            from .spawn import spawn_all
+            from .spawn import furnish, spawn_all
             from .world import World
 
             world = World(spec)
             entities = Entities(bus, world, (args.max_linear, args.max_angular))
-            spawn_all(entities, args)
+            furnish(entities, spec.models)
+            if args.robot or not args.empty:
+                spawn_all(entities, args)
             for warning in spec.warnings:
                 say(f"sim: {warning}")
             services = EntityServices(bus, entities, dict(args.package))

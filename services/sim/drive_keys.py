@@ -57,6 +57,9 @@ class DriveKeys:
         for commands in self._commands:
             while (received := commands.try_recv()) is not None:
                 self._intake.take(received, now, clocks, since)
+
+    def answer(self, now: float) -> None:
+        """Answer calls, and tell the status."""
         self._resume.answer_pending()
         if self._status_due.due(now):
             self._status.put(self._intake.status(now))

@@ -1,5 +1,6 @@
 """The mechanisms of drives: from the commanded velocity to the engine, and back to what odometry tells."""
 
+import math
 from typing import Protocol
 
 from holozen.limits import Planar, clamp_speed, ramp
@@ -97,11 +98,15 @@ class Limited:
 
     def __init__(self, drive: Drive) -> None:
         self._drive = drive
+        limits = (drive.max_linear, drive.max_angular, drive.max_linear_acceleration, drive.max_angular_acceleration)
+        self._unlimited = all(math.isinf(limit) for limit in limits)
         self._now: Planar = (0.0, 0.0, 0.0)
 
     def __call__(self, wanted: Planar, dt: float) -> Planar:
         """The velocity of the next step of `dt` seconds."""
         drive = self._drive
+        if self._unlimited:
+            return wanted
         wanted = clamp_speed(wanted, drive.max_linear, drive.max_angular)
         slower = all(abs(w) <= abs(n) and w * n >= 0 for w, n in zip(wanted, self._now, strict=True))
         limits = (drive.max_linear_acceleration, drive.max_angular_acceleration)

@@ -25,7 +25,7 @@ class Loop:
         self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None
     ) -> None:
         self._world, self._vehicles, self._rtf = world, entities.vehicles, rtf
-        self._services = services
+        self._services, self._served = services, 0.0
         self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
         self._clock_due = Schedule(CLOCK_RATE)
         self._heard = self._before_stall = time.monotonic()
@@ -52,8 +52,9 @@ class Loop:
         clocks = (time.time(), self._world.time)
         for vehicle in self._vehicles:
             vehicle.hear(now, clocks, since)
-        if self._services:
+        if self._services and now - self._served >= LOOK:
             self._services.answer()
+            self._served = now
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

@@ -7,6 +7,7 @@ from pathlib import Path
 from holozen import data
 from holozen.robot.model import RobotError, RobotModel, load, planar_drive
 from holozen.robot.rigid import PlacedShape, lump
+from holozen.robot.rotation import matrix_of, quaternion_of
 from holozen.robot.standing import lowest
 from holozen.tell import say
 from holozen.wire import key_for
@@ -15,6 +16,16 @@ from .engine import UPRIGHT
 from .entities import Entities, EntityError
 
 GAP = 0.5  # m between two robots at the start
+
+
+def furnish(entities: Entities, models: tuple[RobotModel, ...]) -> None:
+    """The models of the world file, where it puts them. Raises RobotError."""
+    for model in models:
+        rotation = quaternion_of(matrix_of(model.pose.rpy))
+        try:
+            entities.add(entities.free_name(_legal(model.name)), model, (model.pose.xyz, rotation))
+        except EntityError as error:
+            raise RobotError(f"model {model.name!r} of the world: {error}") from None
 
 
 def spawn_all(entities: Entities, args: argparse.Namespace) -> None:

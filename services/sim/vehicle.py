@@ -18,6 +18,8 @@ from .ledger import Ledger
 from .motion import JointMotion
 from .reports import Schedule
 
+LOOK = 0.004  # s; joint commands and calls need not be heard at every step of a sim that runs fast
+
 
 class Vehicle:
     """A robot with a drive, with joints, or with both. `prefix` is its name on the wire, empty at the root."""
@@ -38,6 +40,8 @@ class Vehicle:
         ledger = intake.ledger if drive else Ledger()
         hands = JointIntake(key_for("joint_command", place), ledger, groups, mover.names)
         self._joints = JointKeys(bus, place, model, mover.names, prefix, hands, self._tf)
+        self._looked = 0.0  # when joint commands and calls were heard last
+        self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
         self._odom_due = Schedule(drive.odometry_rate if drive else 0.0)
         self._joints_due = Schedule(JOINT_RATE)
 
@@ -45,20 +49,25 @@ class Vehicle:
         """Take what waits at `now`; it came after `since`. `clocks` are those of stamps. All in seconds."""
         if self._drive:
             self._drive.hear(now, clocks, since)
-        self._joints.hear(now, since)
+        if now - self._looked >= LOOK:
+            self._joints.hear(now, min(since, self._looked or since))
+            if self._drive:
+                self._drive.answer(now)
+            self._looked = now
 
     def move(self, now: float, dt: float) -> None:
         """Do what is commanded for the next step of `dt` seconds."""
-        wanted = self._drive.wanted(now, dt) if self._drive else None
-        if self._wheels:
-            self._wheels.do(wanted if isinstance(wanted, JointMotion) else None)
-        if wanted and not isinstance(wanted, JointMotion):
-            self.mover.move(wanted, dt)
+        if self._drive:
+            wanted = self._drive.wanted(now, dt)
+            if self._wheels:
+                self._wheels.do(wanted if isinstance(wanted, JointMotion) else None)
+            if not isinstance(wanted, JointMotion):
+                self.mover.move(wanted, dt)
         if self._others:
             motion = self._other_arbiter.motion(now)
             self._others.do(motion if isinstance(motion, JointMotion) else None)
-        if isinstance(self.mover.body, JointedBody):
-            self.mover.body.mimic()
+        if self._jointed:
+            self._jointed.mimic()
 
     def tell(self, time: float, dt: float) -> None:
         """Publish what is due at the sim time `time`, after a step of `dt` seconds."""

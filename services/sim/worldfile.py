@@ -1,7 +1,17 @@
-"""World files: what the simulator starts with. The reading is the library's, so that `holozen check` reads them too."""
+"""World files: what the simulator starts with. The library reads them, so that `holozen check` can too."""
+
+from collections.abc import Mapping
+from pathlib import Path
 
 from holozen.robot.errors import RobotError as WorldError
 from holozen.robot.world import GRAVITY, STEP, WorldSpec
-from holozen.robot.world import load_world as load
 
 __all__ = ["GRAVITY", "STEP", "WorldError", "WorldSpec", "load"]
+
+
+def load(path: Path, packages: Mapping[str, Path] = {}) -> WorldSpec:
+    """The world in an SDF file; `packages` as for robots. Raises WorldError naming file and line."""
+    # With numpy in it; `--help` should not wait for that.
+    from holozen.robot.sdf_world import load_world
+
+    return load_world(path, packages)

@@ -1,0 +1,245 @@
+"""Robots and objects come into the world and leave it by requests; what is wrong is told, and nothing stays behind."""
+
+import json
+import math
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen import simulation_interfaces as si
+from holozen.bus import ServiceError
+from holozen.messages import Header, Message, Point, Pose, Quaternion, Twist, Vector3
+from holozen.robot.xacro import expand
+from holozen.testing import Wire, wait_for
+from services.sim.entities import Entities, Entity
+from services.sim.entity_services import EntityServices
+from services.sim.loop import Loop
+from services.sim.world import World
+from services.sim.worldfile import WorldSpec
+
+REPO = Path(__file__).parents[3]
+HB_BOT = expand(REPO / "urdf" / "hb_bot.urdf.xacro")
+BALL = (
+    '<robot name="ball"><link name="a"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/>'
+    '</inertial><collision><geometry><sphere radius="0.2"/></geometry></collision></link></robot>'
+)
+BOX = (
+    '<sdf version="1.6"><model name="crate"><link name="a"><inertial><mass>2</mass><inertia><ixx>0.1</ixx>'
+    "<iyy>0.1</iyy><izz>0.1</izz></inertia></inertial><collision name='c'><geometry><box><size>1 1 1</size></box>"
+    "</geometry></collision></link></model></sdf>"
+)
+
+
+class Town:
+    """A world with its services, answered while a request waits."""
+
+    def __init__(self, wire: Wire, world: World) -> None:
+        self.bus, self.client = wire.bus("sim"), wire.bus("client")
+        self.entities = Entities(self.bus, world, (5.0, 10.0))
+        self.services = EntityServices(self.bus, self.entities, {})
+        self.loop = Loop(self.bus, world, self.entities, 0.0, self.services)
+        wait_for(self.client.connected)
+
+    def spawn(self, name: str = "Fred", text: str = HB_BOT, z: float = 0.0, **fields: object) -> Entity:
+        """Put one in without the wire."""
+        request = si.SpawnEntityRequest(name=name, resource_string=text, initial_pose=at(0, 0, z), **fields)  # type: ignore[arg-type]
+        return self.entities.named(self.services._spawn(request).entity_name)
+
+    def refusal(self, ask: Callable[[], object]) -> tuple[int, str]:
+        """The code and the reason of a request that fails."""
+        with pytest.raises(ServiceError) as error:
+            ask()
+        result = error.value.fields["result"]
+        assert isinstance(result, dict) and result["error_message"] == str(error.value)
+        return result["result"], str(error.value)
+
+    def tokens(self) -> set[str]:
+        """The keys that the sim stands on."""
+        return {endpoint.key for endpoint in self.client.graph().settled(self.client.connected) if endpoint.key}
+
+
+def at(x: float, y: float, z: float, frame: str = "", q: Quaternion | None = None) -> si.PoseStamped:
+    return si.PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), q or Quaternion()))
+
+
+@pytest.fixture
+def world() -> Iterator[World]:
+    with closing(World(WorldSpec(ground=True))) as world:
+        yield world
+
+
+@pytest.fixture
+def town(wire: Wire, world: World) -> Town:
+    return Town(wire, world)
+
+
+def test_a_robot_is_put_where_the_request_says_and_has_keys_by_its_name(town: Town) -> None:
+    turned = Quaternion(0, 0, math.sqrt(0.5), math.sqrt(0.5))
+    request = si.SpawnEntityRequest("Fred", resource_string=HB_BOT, initial_pose=at(1, 2, 0.5, "world", turned))
+    assert town.services._spawn(request).entity_name == "Fred"
+    position, rotation = town.entities.named("Fred").body.pose()
+    assert position == pytest.approx((1, 2, 0.5), abs=1e-6)
+    assert rotation == pytest.approx((0, 0, math.sqrt(0.5), math.sqrt(0.5)), abs=1e-6)
+    assert {"Fred/cmd_vel", "Fred/odom", "Fred/joint_states", "Fred/tf", "Fred/resume"} <= town.tokens()
+
+
+def test_a_namespace_in_the_request_is_where_the_keys_are(town: Town) -> None:
+    town.spawn("Fred", entity_namespace="lab")
+    assert {"lab/cmd_vel", "lab/odom"} <= town.tokens()
+    assert town.refusal(lambda: town.spawn("Ann", entity_namespace="lab"))[0] == si.NAME_NOT_UNIQUE
+    assert town.refusal(lambda: town.spawn("Ann", entity_namespace="a/*"))[0] == si.NAMESPACE_INVALID
+
+
+def test_a_robot_without_a_drive_is_an_object_without_keys(town: Town) -> None:
+    before = town.tokens()
+    entity = town.spawn("ball", BALL, z=1.0)
+    town.loop.run(steps(), 480)
+    assert entity.body.pose()[0][2] == pytest.approx(0.2, abs=2e-3)
+    assert town.tokens() == before
+
+
+def test_an_object_from_sdf_lies_in_the_world(town: Town) -> None:
+    entity = town.spawn("crate", BOX, z=1.0)
+    town.loop.run(steps(), 480)
+    assert entity.body.pose()[0][2] == pytest.approx(0.5, abs=2e-3)
+
+
+def test_a_name_is_made_where_none_is_given_or_renaming_is_allowed(town: Town) -> None:
+    names = [town.spawn("", BALL, z=1).name, town.spawn("", BALL, z=2).name]
+    assert names == ["ball", "ball_1"]
+    assert town.spawn("ball", BALL, z=3, allow_renaming=True).name == "ball_2"
+
+
+NOT_THERE = "there is no entity 'Ann'; there are Fred"
+EXPRESSION = "<robot xmlns:xacro=''>${9**9**9}</robot>"
+FILE: dict[str, object] = {"resource_string": "", "uri": "file:///etc/passwd"}
+TURNED_BY_NOTHING = at(0, 0, 0, "", Quaternion(0, 0, 0, 0))
+REFUSED: dict[str, tuple[dict[str, object], int, str]] = {
+    "the same name": ({"name": "Fred"}, si.NAME_NOT_UNIQUE, "there is an entity 'Fred' already; there are Fred"),
+    "a wildcard for a name": ({"name": "*"}, si.NAME_INVALID, "robot name '*': use a letter"),
+    "a path for a name": ({"name": "a/b"}, si.NAME_INVALID, "robot name 'a/b': use a letter"),
+    "no text": ({"resource_string": ""}, si.NO_RESOURCE, "resource_string is empty"),
+    "a file": (FILE, si.UNSUPPORTED_ASSETS, "resource_string is empty"),
+    "xacro": ({"resource_string": EXPRESSION}, si.UNSUPPORTED_FORMAT, "is xacro; expand it first"),
+    "broken XML": ({"resource_string": "<robot>"}, si.RESOURCE_PARSE_ERROR, "line 1: broken XML"),
+    "no robot": ({"resource_string": "<a/>"}, si.RESOURCE_PARSE_ERROR, "<a>"),
+    "another frame": ({"initial_pose": at(0, 0, 0, "Fred/base")}, si.INVALID_POSE, "in the frame 'world'"),
+    "a far place": ({"initial_pose": at(1e300, 0, 0)}, si.INVALID_POSE, "use finite numbers up to 10000 m"),
+    "no rotation": ({"initial_pose": TURNED_BY_NOTHING}, si.INVALID_POSE, "no unit quaternion"),
+}
+
+
+@pytest.mark.parametrize("fault", REFUSED)
+def test_a_request_that_is_wrong_is_refused_with_a_code_and_changes_nothing(town: Town, fault: str) -> None:
+    town.spawn("Fred")
+    fields, code, told = REFUSED[fault]
+    request = si.SpawnEntityRequest(**({"name": "Ann", "resource_string": HB_BOT} | fields))  # type: ignore[arg-type]
+    found, reason = town.refusal(lambda: town.services._spawn(request))
+    assert (found, told in reason, reason.isprintable()) == (code, True, True), reason
+    assert [entity.name for entity in town.entities] == ["Fred"]
+    assert len(town.entities.vehicles) == 1
+
+
+def test_an_error_reply_carries_the_result_of_the_ros_service(wire: Wire, town: Town) -> None:
+    queries = town.client.session.get("delete_entity", payload=b'{"entity": "Ann"}', timeout=5)
+    town.spawn("Fred")
+
+    def reply() -> Any:
+        town.services.answer()
+        return queries.try_recv()
+
+    told = json.loads(bytes(wait_for(reply).err.payload))
+    assert told == {"error": NOT_THERE, "result": {"result": si.NOT_FOUND, "error_message": NOT_THERE}}
+
+
+def test_what_is_deleted_leaves_no_key_and_no_token_and_its_name_is_free(town: Town) -> None:
+    before = town.tokens()
+    for _ in range(3):
+        town.spawn("Fred")
+        town.loop.run(steps(), 24)
+        town.services._delete(si.DeleteEntityRequest("Fred"))
+        town.loop.run(steps(), 24)
+        wait_for(lambda: town.tokens() == before)
+    assert list(town.entities) == [] and town.entities.vehicles == []
+    assert town.refusal(lambda: town.services._delete(si.DeleteEntityRequest("Fred")))[0] == si.NOT_FOUND
+
+
+def test_a_deleted_robot_is_out_of_the_way_of_others(town: Town) -> None:
+    town.spawn("low", BALL, z=0.2)
+    high = town.spawn("high", BALL, z=0.7)
+    town.services._delete(si.DeleteEntityRequest("low"))
+    town.loop.run(steps(), 480)
+    assert high.body.pose()[0] == pytest.approx((0, 0, 0.2), abs=2e-3)
+
+
+def test_entities_are_listed_and_filtered_by_a_simple_pattern(town: Town) -> None:
+    for name in ("ball_a", "ball_b", "crate"):
+        town.spawn(name, BALL, z=len(name))
+
+    def listed(pattern: str) -> list[str]:
+        return town.services._list(si.GetEntitiesRequest(si.EntityFilters(pattern))).entities
+
+    assert listed("") == ["ball_a", "ball_b", "crate"]
+    assert listed("^ball_.$|crate") == ["ball_a", "ball_b", "crate"]
+    assert listed("_a") == ["ball_a"]
+    for bad in ("(a+)+$", "*", "a" * 101):
+        assert town.refusal(partial(listed, bad))[1]
+
+
+def test_the_state_is_the_pose_and_the_velocity_in_the_world(town: Town) -> None:
+    town.spawn("ball", BALL, z=5)
+    town.loop.run(steps(), 24)
+    state = town.services._state(si.GetEntityStateRequest("ball")).state
+    assert state.header.frame_id == "world" and state.header.stamp.seconds() == pytest.approx(0.1)
+    assert state.twist.linear.z == pytest.approx(-0.98, abs=1e-3)
+    assert state.pose.position.z < 5
+
+
+def test_an_entity_can_be_put_elsewhere_with_a_velocity(town: Town) -> None:
+    ball = town.spawn("ball", BALL, z=1)
+    twist = Twist(Vector3(1, 2, 3), Vector3(0, 0, 0.5))
+    town.services._put(si.SetEntityStateRequest("ball", si.EntityState(pose=at(3, 4, 5).pose, twist=twist)))
+    assert ball.body.pose()[0] == pytest.approx((3, 4, 5))
+    linear, angular = ball.body.twist()
+    assert linear == pytest.approx((1, 2, 3))
+    assert angular == pytest.approx((0, 0, 0.5))
+
+
+@pytest.mark.parametrize(
+    "state",
+    [
+        si.EntityState(pose=at(math.nan, 0, 0).pose),
+        si.EntityState(pose=at(0, 0, 1e9).pose),
+        si.EntityState(pose=at(0, 0, 1).pose, twist=Twist(Vector3(math.inf, 0, 0))),
+        si.EntityState(pose=at(0, 0, 1).pose, twist=Twist(Vector3(0, 0, 1000))),
+        si.EntityState(header=Header(frame_id="moon"), pose=at(0, 0, 1).pose),
+    ],
+    ids=["nan", "far", "infinite", "too fast", "frame"],
+)
+def test_a_state_that_no_engine_survives_is_refused(town: Town, state: si.EntityState) -> None:
+    ball = town.spawn("ball", BALL, z=1)
+    town.refusal(lambda: town.services._put(si.SetEntityStateRequest("ball", state)))
+    assert ball.body.pose()[0] == pytest.approx((0, 0, 1))
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda services: services._delete(si.DeleteEntityRequest("Ann")),
+        lambda services: services._state(si.GetEntityStateRequest("Ann")),
+        lambda services: services._put(si.SetEntityStateRequest("Ann")),
+    ],
+    ids=["delete", "get state", "set state"],
+)
+def test_an_unknown_entity_is_told_with_those_that_there_are(town: Town, ask: Callable[[object], Message]) -> None:
+    town.spawn("Fred")
+    assert town.refusal(lambda: ask(town.services)) == (si.NOT_FOUND, NOT_THERE)
+
+
+def steps() -> threading.Event:
+    return threading.Event()
