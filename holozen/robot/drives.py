@@ -16,8 +16,9 @@ class Differential:
     """Wheels on two sides: linear.x and angular.z count, linear.y is ignored. With four or more it is a skid-steer.
 
     `left` and `right` name joints. `separation` between the sides and `radius` of the wheels are in metres; 0: as the
-    robot's own links have them. `torque` in N m is the most that a wheel's motor gives. `encoder` is true where
-    odometry adds up the wheels' turns, false where it tells the true pose.
+    robot's own links have them. `torque` in N m is the most that a wheel's motor gives, `acceleration` in m/s^2 the
+    most by which a wheel's rim speeds up or slows down. `encoder` is true where odometry adds up the wheels' turns,
+    false where it tells the true pose.
     """
 
     left: tuple[str, ...]
@@ -26,11 +27,14 @@ class Differential:
     radius: float = 0.0
     torque: float = math.inf
     encoder: bool = True
+    acceleration: float = math.inf
 
 
 @dataclass(frozen=True, slots=True)
 class Mecanum:
-    """Four wheels with rollers at 45 degrees. Joints by their place; metres; 0: as the robot's own links have them."""
+    """Four wheels with rollers at 45 degrees. Joints by their place; metres; 0: as the robot's own links have them.
+    `encoder` as for Differential.
+    """
 
     front_left: str
     front_right: str
@@ -39,6 +43,7 @@ class Mecanum:
     separation: float = 0.0
     wheelbase: float = 0.0
     radius: float = 0.0
+    encoder: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +55,19 @@ class Balancing:
 
 
 Mechanism = Planar | Differential | Mecanum | Balancing
+
+
+def joints_of(mechanism: Mechanism) -> tuple[str, ...]:
+    """The joints that a mechanism turns."""
+    match mechanism:
+        case Planar():
+            return ()
+        case Differential():
+            return *mechanism.left, *mechanism.right
+        case Mecanum():
+            return mechanism.front_left, mechanism.front_right, mechanism.back_left, mechanism.back_right
+        case Balancing():
+            return mechanism.left, mechanism.right
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,121 +1,115 @@
-"""Gazebo plugin tags -> how a robot is driven. Spelled as in ROS 1 (commandTopic), ROS 2, or mixed."""
+"""Gazebo plugins -> how a robot is driven. Each is known by its file name, or for gz-sim by its class."""
 
-import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
+from holozen.robot import drives_gz, drives_ros
 from holozen.robot.drives import Drive
+from holozen.robot.parts import Joint
+from holozen.robot.plugin_names import file_of, kind_of
+from holozen.robot.sensors import SENSING
+from holozen.robot.settings import Settings
 from holozen.robot.source import Source
-from holozen.robot.tag import Tag, number
-from holozen.wire import COMMAND_SILENCE
+from holozen.robot.tag import Tag
 
-PLANAR_MOVE = re.compile(r"(.*/)?(lib)?gazebo_ros_planar_move(\.so)?")
+Reader = Callable[[Settings, Mapping[str, Joint], Source], Drive]
 
-_KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
+DRIVES: dict[str, Reader] = {
+    "gazebo_ros_planar_move": drives_ros.planar_move,
+    "gazebo_ros_diff_drive": drives_ros.diff_drive,
+    "gazebo_ros_skid_steer_drive": drives_ros.skid_steer,
+    "gazebo_ros_diff_drive_multi_wheel": drives_ros.multi_wheel,
+    "diffdrive_plugin_multi_wheel": drives_ros.multi_wheel,
+    "hector_gazebo_ros_diff_drive_multi_wheel": drives_ros.multi_wheel,
+    "wb_plugin": drives_ros.balancing,
+    "gz:velocity-control": drives_gz.velocity_control,
+    "gz:diff-drive": drives_gz.diff_drive,
+    "gz:mecanum-drive": drives_gz.mecanum_drive,
+}
+PUBLISHER = "gz:odometry-publisher"
+
+JOINTS = "joint_states is published anyway, and joints obey joint_command"
+STATES = "joint_states is published anyway"
+POSES = "odom and tf are published anyway"
+SERVER = "the sim does this itself"
+INSTEAD = {
+    "gazebo_ros_control": JOINTS,
+    "gazebo_ros2_control": JOINTS,
+    "gz_ros2_control": JOINTS,
+    "ign_ros2_control": JOINTS,
+    "gz:joint-position-controller": JOINTS,
+    "gz:joint-trajectory-controller": JOINTS,
+    "gz:joint-controller": JOINTS,
+    "gazebo_ros_joint_pose_trajectory": JOINTS,
+    "gazebo_ros_joint_state_publisher": STATES,
+    "gz:joint-state-publisher": STATES,
+    "gazebo_ros_p3d": POSES,
+    "gz:pose-publisher": POSES,
+    "gz:physics": SERVER,
+    "gz:user-commands": SERVER,
+    "gz:scene-broadcaster": SERVER,
+    "gz:sensors": "sensors are not simulated yet",
+    "gz:imu": "sensors are not simulated yet",
+    "gz:contact": "sensors are not simulated yet",
+    "roboticsgroup_gazebo_mimic_joint_plugin": "a URDF <mimic> does the same",
+}
+"""Plugin that drives nothing -> what happens without it."""
 
 
-def read_plugins(robot: Tag, links: Mapping[str, object], root: str, source: Source) -> Drive | None:
-    """The planar_move plugin of a `<robot>`, if it has one; other plugins make warnings. Raises RobotError."""
-    drive: Drive | None = None
+def read_plugins(
+    robot: Tag, links: Mapping[str, object], joints: Mapping[str, Joint], root: str, source: Source
+) -> Drive | None:
+    """What drives a `<robot>` or `<model>`: the first plugin that drives; the others make warnings.
+
+    `links` and `joints` are those there are, by name. Plugins inside a `<sensor>` are the sensor's own. Raises
+    RobotError for a plugin that drives and cannot as it is written.
+    """
+    drive, publishers = None, []
     for plugin in _plugins(robot):
-        filename = plugin.attributes.get("filename", "").strip()
-        if not PLANAR_MOVE.fullmatch(filename):
-            source.warn(plugin, f"({filename or 'no filename'}) is not known here and does nothing")
+        kind = kind_of(plugin)
+        if kind == PUBLISHER:
+            publishers.append(plugin)
+        elif kind not in DRIVES:
+            _tell(plugin, kind, source)
         elif drive is not None:
-            source.warn(plugin, "is a second planar_move; only the first one drives")
+            source.warn(plugin, "is a second drive; only the first one drives")
         else:
-            drive = _with_known_frame(_planar_move(plugin), plugin, links, root, source)
-    return drive
+            drive = DRIVES[kind](Settings(plugin), joints, source)
+            driver = plugin
+    if drive is None:
+        for plugin in publishers:
+            source.warn(plugin, "tells the odometry of a drive, and there is none")
+        return None
+    for plugin in publishers:
+        drive, driver = drives_gz.with_publisher(drive, Settings(plugin), source), plugin
+    return _with_known_frame(drive, driver, links, root, source)
 
 
 def _plugins(robot: Tag) -> Iterator[Tag]:
-    for gazebo in robot.all("gazebo"):
-        yield from gazebo.below("plugin")
+    """Those outside of sensors, at any depth below a `<gazebo>`, or directly below a `<model>`."""
+    waiting = [tag for tag in reversed(robot.children) if tag.name in ("gazebo", "plugin")]
+    while waiting:
+        tag = waiting.pop()
+        if tag.name == "plugin":
+            yield tag
+        elif tag.name != "sensor":
+            waiting += reversed(tag.children)
+
+
+def _tell(plugin: Tag, kind: str, source: Source) -> None:
+    if kind in INSTEAD:
+        source.warn(plugin, f"({file_of(plugin)}) is not run here; {INSTEAD[kind]}")
+    elif kind in SENSING:
+        source.warn(plugin, f"({SENSING[kind]}) is not simulated yet")
+    else:
+        near = source.nearest(kind, (*DRIVES, *INSTEAD, *SENSING, PUBLISHER)) if kind else ""
+        source.warn(plugin, f"({file_of(plugin) or 'no filename'}) is not known here and does nothing{near}")
 
 
 def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, object], root: str, source: Source) -> Drive:
-    if drive.robot_base_frame in links:
+    frame = drive.robot_base_frame
+    if frame in links:
         return drive
-    if drive.robot_base_frame:
-        source.warn(plugin, f"names the base frame {drive.robot_base_frame!r}, which is no link; {root!r} is used")
+    if frame:
+        source.warn(plugin, f"names the base frame {frame[:80]!r}, which is no link; {root!r} is used")
     return replace(drive, robot_base_frame=root)
-
-
-def _planar_move(plugin: Tag) -> Drive:
-    """The tags of gazebo_ros_planar_move.cpp, in its ROS 1 (noetic) and its ROS 2 version."""
-    plain, settings = Drive(), _Settings(plugin)
-    variances = zip(("covariance_x", "covariance_y", "covariance_yaw"), plain.covariance, strict=True)
-    x, y, yaw = (settings.number(default, name) for name, default in variances)
-    return Drive(
-        command_topic=settings.topic("cmd_vel", "command_topic"),
-        odometry_topic=settings.topic("odom", "odometry_topic"),
-        odometry_frame=settings.word("odometry_frame").strip("/") or plain.odometry_frame,
-        odometry_rate=settings.number(plain.odometry_rate, "odometry_rate", "publish_rate", zero=False),
-        robot_base_frame=settings.word("robot_base_frame").strip("/"),
-        command_timeout=settings.timeout("cmd_timeout", "command_timeout"),
-        publish_odom=settings.flag("publish_odom", "publish_odometry"),
-        publish_odom_tf=settings.flag("publish_odom_tf", "publish_odometry_tf", "broadcast_transform"),
-        covariance=(x, y, yaw),
-    )
-
-
-class _Settings:
-    """The tags inside a plugin by their ROS 2 spelling; of two with one name the first counts."""
-
-    def __init__(self, plugin: Tag) -> None:
-        self.plugin = plugin
-        self.tags = {_snake_case(tag.name): tag for tag in reversed(plugin.children)}
-
-    def tag(self, *names: str) -> Tag:
-        """The first of `names` that is there and not empty, else an empty tag."""
-        found = (self.tags[name] for name in names if name in self.tags)
-        return next((tag for tag in found if tag.text.strip()), Tag(names[0], {}, self.plugin.place, self.plugin))
-
-    def word(self, *names: str) -> str:
-        return self.tag(*names).text.strip()
-
-    def number(self, default: float, *names: str, zero: bool = True) -> float:
-        """A number above zero, or zero where that is allowed."""
-        word = self.word(*names)
-        value = number(word) if word else default
-        if value is None or value < 0 or (value == 0 and not zero):
-            raise self.tag(*names).wrong(f"is {word!r}; it has to be a number {'not below' if zero else 'above'} 0")
-        return value
-
-    def timeout(self, *names: str) -> float:
-        """Seconds, or -1 for a watchdog that is off."""
-        value = number(self.word(*names) or "")
-        return -1.0 if value is not None and value < 0 else self.number(COMMAND_SILENCE, *names, zero=False)
-
-    def flag(self, *names: str) -> bool:
-        """True unless the file says otherwise."""
-        word = self.word(*names).lower() or "true"
-        if word not in ("true", "1", "false", "0"):
-            raise self.tag(*names).wrong(f"is {word!r}; it has to be true or false")
-        return word in ("true", "1")
-
-    def topic(self, default: str, name: str) -> str:
-        """The key of a topic: its name, as remapped, after the namespace unless it starts with a slash."""
-        remapped = self._remappings()
-        topic = self.word(name) or default
-        topic = remapped.get(topic.strip("/"), remapped.get(default, topic))
-        key = topic if topic.startswith("/") else f"{self._namespace()}/{topic}"
-        key = re.sub("/+", "/", key).strip("/")
-        if not _KEY.fullmatch(key):
-            problem = f"makes the topic {key[:80]!r}; a topic has letters, digits, '_', '-' and single '/'"
-            raise self.tag(name).wrong(problem)
-        return key
-
-    def _namespace(self) -> str:
-        ros = self.tags.get("ros")
-        namespace = ros.first("namespace") if ros else None
-        return namespace.text.strip() if namespace else self.word("robot_namespace")
-
-    def _remappings(self) -> dict[str, str]:
-        ros = self.tags.get("ros")
-        pairs = [tag.text.partition(":=") for tag in (ros.all("remapping") if ros else ())]
-        return {old.strip().strip("/"): new.strip() for old, _, new in pairs if new.strip()}
-
-
-def _snake_case(name: str) -> str:
-    return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", name).lower()

@@ -11,6 +11,10 @@ Vector = tuple[float, float, float]
 
 LARGEST = 1e6  # m, kg, kg m^2; larger numbers are mistakes, and 1e308 is what makes an engine count in NaN
 
+MOST_TEXT = 4_000_000  # characters, or bytes of a file; these three keep a hostile file from stalling its reader
+MOST_ELEMENTS = 50_000
+DEEPEST = 200
+
 
 @dataclass(eq=False, slots=True)
 class Tag:
@@ -29,7 +33,10 @@ class Tag:
 
     def first(self, name: str) -> "Tag | None":
         """The first child called `name`: as in URDF, a second one is not read."""
-        return next(iter(self.all(name)), None)
+        for child in self.children:
+            if child.name == name:
+                return child
+        return None
 
     def below(self, name: str) -> "Iterator[Tag]":
         """The elements called `name` at any depth, in the order of the file."""
@@ -43,6 +50,10 @@ class Tag:
     def wrong(self, problem: str) -> RobotError:
         """The error that says where this element stands and what is wrong with it."""
         return RobotError(f"{self.place}: {self} {problem}")
+
+    def value(self) -> str:
+        """What a Gazebo element says: its `value="..."`, else its text."""
+        return (self.attributes.get("value") or self.text).strip()
 
     def word(self, attribute: str) -> str:
         """An attribute that must be there and not empty."""
@@ -99,12 +110,14 @@ def number(word: str) -> float | None:
     return value if math.isfinite(value) and "_" not in word else None
 
 
-def read_xml(text: str, place: str) -> Tag:
-    """The root element of an XML text; `place` names the text in messages.
+def read_xml(text: str, place: str, most: int = MOST_TEXT) -> Tag:
+    """The root element of an XML text of at most `most` characters; `place` names the text in messages.
 
     Raises RobotError with the line for broken XML and for entity declarations: a robot needs none, and they
-    are what makes a short file expand without end or reach for other files.
+    are what makes a short file expand without end or reach for other files. Too much text is refused before it is
+    read, too many elements or too deep ones as soon as they are met.
     """
+    check_size(len(text), place, most)
     if not text.strip():
         raise RobotError(f"{place}: the file is empty; it has to hold a <robot>")
     reader = _Reader(place)
@@ -115,6 +128,13 @@ def read_xml(text: str, place: str) -> Tag:
     return reader.root.children[0]
 
 
+def check_size(size: int, place: str, most: int = MOST_TEXT) -> None:
+    """Raises RobotError for an XML text of more than `most` characters, or a file of more bytes."""
+    if size > most:
+        told = f"{size / 1e6:.1f} MB of XML; a robot or world has at most {most / 1e6:g} MB"
+        raise RobotError(f"{place}: the file holds {told}: put its meshes into files of their own")
+
+
 def _cut(text: str) -> str:
     return repr(text if len(text) <= 80 else text[:77] + "...")
 
@@ -123,6 +143,8 @@ class _Reader:
     def __init__(self, place: str) -> None:
         self.place = place
         self.root = self.open = Tag("", {}, place)
+        self.count = 0
+        self.texts: list[list[str]] = [[]]  # of the open elements; joined once, since comments cut a text into pieces
         self.parser = expat.ParserCreate("utf-8")
         self.parser.buffer_text = True
         self.parser.StartElementHandler = self.start
@@ -132,15 +154,22 @@ class _Reader:
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         tag = Tag(name, attributes, f"{self.place}, line {self.parser.CurrentLineNumber}", self.open)
+        self.count += 1
+        if self.count > MOST_ELEMENTS:
+            raise tag.wrong(f"is element number {self.count}; a file holds at most {MOST_ELEMENTS}")
+        if len(self.texts) > DEEPEST:
+            raise tag.wrong(f"lies inside {DEEPEST} others; elements lie at most {DEEPEST} deep")
         self.open.children.append(tag)
         self.open = tag
+        self.texts.append([])
 
     def end(self, name: str) -> None:
         assert self.open.parent is not None, "expat closes what it opened"
+        self.open.text = "".join(self.texts.pop())
         self.open = self.open.parent
 
     def characters(self, text: str) -> None:
-        self.open.text += text
+        self.texts[-1].append(text)
 
     def entity(self, name: str, *rest: object) -> None:
         line = self.parser.CurrentLineNumber

@@ -1,8 +1,10 @@
 """URDF elements -> links and joints."""
 
 import math
+from dataclasses import replace
 
-from holozen.robot.parts import JOINT_KINDS, Inertial, Joint, Limits, Link
+from holozen.robot.materials import Materials, urdf_color
+from holozen.robot.parts import JOINT_KINDS, Inertial, Joint, Limits, Link, Mimic, Shape
 from holozen.robot.shapes import needed, read_pose, read_shape
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag, Vector
@@ -11,13 +13,13 @@ SMALLEST_AXIS = 1e-6
 NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def read_link(tag: Tag, source: Source) -> Link:
-    """A `<link>`. Raises RobotError."""
+def read_link(tag: Tag, source: Source, materials: Materials = {}) -> Link:
+    """A `<link>`; `materials` are those of its robot. Raises RobotError."""
     inertial = tag.first("inertial")
     return Link(
         name=tag.word("name"),
         inertial=None if inertial is None else _inertial(inertial, source),
-        visuals=tuple(read_shape(visual, source) for visual in tag.all("visual")),
+        visuals=tuple(_visual(visual, source, materials) for visual in tag.all("visual")),
         collisions=tuple(read_shape(collision, source) for collision in tag.all("collision")),
     )
 
@@ -29,15 +31,36 @@ def read_joint(tag: Tag, source: Source) -> Joint:
         raise tag.wrong(f"has the unknown type {kind!r}; known are {', '.join(JOINT_KINDS)}")
     ends = {name: tag.first(name) for name in ("parent", "child")}
     parent, child = (needed(tag, name).word("link") for name in ends)
-    return Joint(tag.word("name"), kind, parent, child, read_pose(tag), _axis(tag, kind), _limits(tag, kind, source))
+    friction, damping = (_dynamics(tag, name) for name in ("friction", "damping"))
+    axis, limits = _axis(tag, kind), _limits(tag, kind, source)
+    return Joint(tag.word("name"), kind, parent, child, read_pose(tag), axis, limits, friction, damping, _mimic(tag))
+
+
+def _visual(tag: Tag, source: Source, materials: Materials) -> Shape:
+    shape = read_shape(tag, source)
+    color = urdf_color(tag, materials, source)
+    return replace(shape, color=color) if color else shape
+
+
+def _dynamics(tag: Tag, name: str) -> float:
+    dynamics = tag.first("dynamics")
+    value = 0.0 if dynamics is None else dynamics.number(name, 0.0)
+    if dynamics is not None and value < 0:
+        raise dynamics.wrong(f"{name}: {value} is below zero; it would drive the joint on")
+    return value
+
+
+def _mimic(tag: Tag) -> Mimic | None:
+    mimic = tag.first("mimic")
+    if mimic is None:
+        return None
+    return Mimic(mimic.word("joint"), mimic.number("multiplier", 1.0), mimic.number("offset", 0.0))
 
 
 def _inertial(tag: Tag, source: Source) -> Inertial:
     mass = needed(tag, "mass").number("value")
     if mass < 0:
         raise needed(tag, "mass").wrong(f"value: {mass} kg is below zero")
-    if mass == 0:
-        source.warn(tag, "has no mass; the link is taken as massless, with no inertia")
     return Inertial(read_pose(tag), mass, _inertia(tag, source) if mass else NO_INERTIA)
 
 
@@ -46,14 +69,14 @@ def _inertia(tag: Tag, source: Source) -> tuple[float, float, float, float, floa
     xx, xy, xz, yy, yz, zz = (given.number(name, 0.0) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     if min(xx, yy, zz) < 0:
         raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never below zero")
-    if not _positive_definite(xx, xy, xz, yy, yz, zz):
+    if not positive_definite(xx, xy, xz, yy, yz, zz):
         # Refusing it would stop many a student's robot. A point mass still counts in the robot's inertia.
         source.warn(given, "is zero or not positive definite, which no body has; the link is taken as a point mass")
         return NO_INERTIA
     return xx, xy, xz, yy, yz, zz
 
 
-def _positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> bool:
+def positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> bool:
     """Sylvester's criterion: the leading minors are above zero."""
     minor = xx * yy - xy * xy
     determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)

@@ -1,7 +1,7 @@
 """A URDF becomes a checked RobotModel, or one line that names file, line and element."""
 
 import math
-import sys
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from holozen.robot.errors import RobotError
-from holozen.robot.model import Inertial, Limits, Link, Pose, RobotModel, Shape, load, parse
+from holozen.robot.model import Drive, Inertial, Limits, Link, Pose, RobotModel, Shape, load, parse, planar_drive
 
 REPO = Path(__file__).parents[3]
 ORIGIN = Path("somewhere/robot.urdf")
@@ -46,7 +46,7 @@ def test_links_joints_and_root_are_read() -> None:
         '<joint name="j" type="revolute"><origin xyz="0 0.68 0.18" rpy="0 0 1.5"/><parent link="base"/>'
         '<child link="wheel"/><axis xyz="2 3 6"/><limit effort="5" velocity="6" lower="-1" upper="2"/>'
         "</joint>"
-        '<link name="wheel"/>'
+        '<link name="wheel"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
     )
     assert (model.name, model.root, list(model.links), model.warnings) == ("r", "base", ["base", "wheel"], ())
     expected = Inertial(Pose((0, 0, 0.28), (0.1, 0, 0)), 0.28, (1, 0.1, 0.2, 2, 0.3, 3))
@@ -78,7 +78,7 @@ def test_a_fixed_joint_may_have_an_axis_without_direction() -> None:
 
 
 def test_each_kind_of_shape_keeps_its_size_in_metres(tmp_path: Path) -> None:
-    (tmp_path / "base.dae").touch()
+    shutil.copy(REPO / "meshes" / "base.dae", tmp_path)
     shapes = {
         '<box size="1 2  3"/>': Shape("box", (1, 2, 3), Pose()),
         '<cylinder length="0.13" radius="0.14"/>': Shape("cylinder", (0.14, 0.13), Pose()),
@@ -148,6 +148,12 @@ def test_joints_of_a_transmission_are_no_joints_of_the_robot() -> None:
             TWO_LINKS + JOINT.format('<limit lower="2" upper="1"/>').replace("continuous", "revolute"),
             "above upper=1",
         ),
+        (
+            TWO_LINKS + JOINT.format('<dynamics friction="-1"/>'),
+            "<dynamics> of <joint name='j'> friction: -1.0 is below",
+        ),
+        (TWO_LINKS + JOINT.format('<dynamics damping="abc"/>'), "damping: 'abc' is no finite number"),
+        (TWO_LINKS + JOINT.format("<mimic/>"), "<mimic> of <joint name='j'> has no joint"),
         (TWO_LINKS + JOINT.format('<limit effort="abc"/>'), "effort: 'abc' is no finite number"),
         (inertial(mass="-1"), "<mass> of <link name='a'> value: -1.0 kg is below zero"),
         (inertial(mass="nan"), "'nan' is no finite number"),
@@ -209,7 +215,8 @@ def test_a_link_with_two_parents_is_refused() -> None:
         ("<robot name='r'>\n<link", ", line 2: broken XML: unclosed token; <robot name='r'> of "),
         ("<robot name='r' name='s'/>", ", line 1: broken XML: duplicate attribute"),
         ("just text", ", line 1: broken XML: syntax error"),
-        ("<sdf version='1.6'/>", ", line 1: <sdf> is no <robot>"),
+        ("<sdf version='1.6'/>", ", line 1: <sdf> "),
+        ("<urdf/>", ", line 1: <urdf> is no robot; a URDF file starts with <robot name=...>"),
         ("<robot><link name='a'/></robot>", ", line 1: <robot> has no name"),
         (
             "<!DOCTYPE r [\n<!ENTITY a SYSTEM 'file:///etc/passwd'>]><robot/>",
@@ -270,11 +277,10 @@ def test_a_missing_mesh_is_a_warning_that_names_file_line_and_element() -> None:
         '<collision><geometry><mesh filename="gone.stl"/></geometry></collision></link>'
     )
     visual, hit = model.warnings
-    assert visual.startswith(f"{ORIGIN}, line 3: <mesh> of <link name='a'> (visual) is left out: ")
-    assert hit.startswith(
-        f"{ORIGIN}, line 4: <mesh> of <link name='a'> (collision) is left out: no such file 'gone.stl'"
-    )
-    assert model.links["a"].visuals[0].path is None
+    box = "is replaced by a box of 0.1 x 0.1 x 0.1 m"
+    assert visual.startswith(f"{ORIGIN}, line 3: <mesh> of <link name='a'> (visual) {box}: ")
+    assert hit.startswith(f"{ORIGIN}, line 4: <mesh> of <link name='a'> (collision) {box}: no such file 'gone.stl'")
+    assert model.links["a"].visuals == model.links["a"].collisions == (Shape("box", (0.1, 0.1, 0.1), Pose()),)
 
 
 @pytest.mark.parametrize("kind", ["revolute", "prismatic"])
@@ -304,13 +310,60 @@ def test_an_inertia_is_kept_exactly_when_all_its_principal_moments_are_above_zer
     assert part is not None and any(part.inertia) == (least > 0)
 
 
-def test_four_hundred_links_in_a_row_and_deep_nesting_are_read() -> None:
+def test_four_hundred_links_in_a_row_are_read() -> None:
     links = "".join(f'<link name="l{i}"/>' for i in range(400))
     joint = '<joint name="j{0}" type="fixed"><parent link="l{0}"/><child link="l{1}"/></joint>'
     model = robot(links + "".join(joint.format(i, i + 1) for i in range(399)))
     assert model.root == "l0" and len(model.joints) == 399
-    deep = sys.getrecursionlimit() * 10
-    assert robot('<link name="a"/><gazebo>' + "<x>" * deep + "</x>" * deep + "</gazebo>").root == "a"
+
+
+def test_a_thousand_links_are_read_and_one_more_is_refused() -> None:
+    links = [f'<link name="l{i}"/>' for i in range(1001)]
+    joint = '<joint name="j{0}" type="fixed"><parent link="l0"/><child link="l{0}"/></joint>'
+    joints = [joint.format(i) for i in range(1, 1000)]
+    assert len(robot("".join([*links[:1000], *joints])).links) == 1000
+    assert "has 1001 links; a robot has at most 1000 links and 1000 joints" in refusal("".join(links))
+    many = "".join(joint.format(i) for i in range(1001))
+    assert "has 1001 joints; a robot has at most 1000" in refusal(links[0] + many)
+
+
+def test_dynamics_of_a_joint_are_read() -> None:
+    joint = robot(TWO_LINKS + JOINT.format('<dynamics friction="0.1" damping="0.2"/>')).joints["j"]
+    assert (joint.friction, joint.damping) == (0.1, 0.2)
+    joint = robot(TWO_LINKS + JOINT.format('<dynamics damping="0.2"/>')).joints["j"]
+    assert (joint.friction, joint.damping) == (0.0, 0.2)
+
+
+def test_a_robot_without_drive_gets_planar_move_on_its_root_and_one_with_a_drive_keeps_it() -> None:
+    model = planar_drive(robot('<link name="a"/>'))
+    assert model.drive == Drive(robot_base_frame="a")
+    assert planar_drive(model) is model
+
+
+def test_an_sdf_text_is_read_as_one() -> None:
+    text = "<sdf version='1.6'><model name='m'><link name='a'><inertial><mass>2</mass></inertial></link></model></sdf>"
+    model = parse(text, ORIGIN)
+    assert (model.name, model.root) == ("m", "a")
+
+
+def test_a_file_that_is_too_large_is_refused_by_its_size(tmp_path: Path) -> None:
+    path = tmp_path / "robot.urdf"
+    with path.open("wb") as file:
+        file.truncate(100_000_000)
+    with pytest.raises(RobotError, match=r"holds 100\.0 MB of XML; a robot or world has at most 4 MB"):
+        load(path)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "\ufeff<robot name='r'>{}</robot>",
+        "<?a b?><robot name='r'><!-- ü -->{}<?c?></robot>",
+        "<robot xmlns='x' xmlns:y='z' name='r'>\r\n{}\r\n<y:b/></robot>",
+    ],
+)
+def test_what_xml_allows_around_the_elements_does_not_matter(text: str) -> None:
+    assert parse(text.format("<link name='a'/>"), ORIGIN).root == "a"
 
 
 def test_a_xacro_file_is_loaded_and_its_lines_are_those_of_the_expanded_text(tmp_path: Path) -> None:
@@ -327,7 +380,7 @@ def test_a_xacro_file_is_loaded_and_its_lines_are_those_of_the_expanded_text(tmp
 
 def test_packages_are_given_to_xacro_and_to_meshes(tmp_path: Path) -> None:
     (tmp_path / "else").mkdir()
-    (tmp_path / "else" / "base.dae").touch()
+    shutil.copy(REPO / "meshes" / "base.dae", tmp_path / "else")
     path = tmp_path / "robot.urdf"
     mesh = collision('<mesh filename="package://p/base.dae"/>')
     path.write_text(f'<robot name="r">{mesh}</robot>')

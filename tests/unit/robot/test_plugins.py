@@ -109,16 +109,37 @@ def test_a_base_frame_that_is_no_link_is_told_and_the_root_is_taken() -> None:
     assert model.warnings == (f"{ORIGIN}, line 3: {told}",)
 
 
-def test_every_other_plugin_is_named_also_inside_a_sensor() -> None:
-    control = plugin("", "libgazebo_ros_control.so")
-    sensor = f'<sensor name="s">{plugin("", "libgazebo_ros_camera.so").replace("drive", "eye")}</sensor>'
-    model = robot(control, sensor, plugin(""), "<plugin/>")
+@pytest.mark.parametrize(
+    ("filename", "told"),
+    [
+        (
+            "libgazebo_ros_control.so",
+            "is not run here; joint_states is published anyway, and joints obey joint_command",
+        ),
+        ("libgazebo_ros_joint_state_publisher.so", "is not run here; joint_states is published anyway"),
+        ("libgazebo_ros_p3d.so", "is not run here; odom and tf are published anyway"),
+        ("gz-sim-sensors-system", "is not run here; sensors are not simulated yet"),
+        ("libgz_ros2_control-system.so", "is not known here and does nothing; the nearest is 'gz_ros2_control'"),
+        ("libgazebo_ros_planarmove.so", "is not known here and does nothing; the nearest is 'gazebo_ros_planar_move'"),
+        ("libsomething_else.so", "is not known here and does nothing"),
+    ],
+)
+def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it(filename: str, told: str) -> None:
+    model = robot(plugin("<x/>", filename), plugin(""))
     assert model.drive is not None
-    assert [warning.partition(": ")[2] for warning in model.warnings] == [
-        "<plugin name='drive'> (libgazebo_ros_control.so) is not known here and does nothing",
-        "<plugin name='eye'> (libgazebo_ros_camera.so) is not known here and does nothing",
-        "<plugin> of <robot name='r'> (no filename) is not known here and does nothing",
-    ]
+    assert model.warnings == (f"{ORIGIN}, line 3: <plugin name='drive'> ({filename}) {told}",)
+
+
+def test_a_plugin_without_file_name_is_told() -> None:
+    (warning,) = robot("<plugin/>").warnings
+    assert warning.endswith("<plugin> of <robot name='r'> (no filename) is not known here and does nothing")
+
+
+def test_a_plugin_directly_in_an_sdf_model_drives_it() -> None:
+    link = "<link name='base'><inertial><mass>1</mass></inertial></link>"
+    text = f"<sdf version='1.6'><model name='m'>{link}{plugin('<commandTopic>go</commandTopic>')}</model></sdf>"
+    model = parse(text, ORIGIN)
+    assert model.drive == Drive("go", robot_base_frame="base")
 
 
 @pytest.mark.parametrize("filename", ["gazebo_ros_planar_move", "/opt/ros/lib/libgazebo_ros_planar_move.so"])
@@ -132,7 +153,7 @@ def test_a_second_planar_move_is_told_and_the_first_drives() -> None:
         model = robot(*gazebo)
         assert model.drive is not None and model.drive.odometry_rate == 1
         (warning,) = model.warnings
-        assert warning.endswith("<plugin name='drive'> is a second planar_move; only the first one drives")
+        assert warning.endswith("<plugin name='drive'> is a second drive; only the first one drives")
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,110 @@
+"""A visual has the colour of its material; Gazebo's wins over URDF's."""
+
+from pathlib import Path
+
+import pytest
+
+from holozen.robot.model import RobotModel, parse
+from holozen.robot.parts import Color
+
+ORIGIN = Path("somewhere/robot.urdf")
+RED = '<color rgba="1 0 0 1"/>'
+SHAPE = '<geometry><box size="1 1 1"/></geometry>'
+
+
+def robot(*visuals: str, around: str = "") -> RobotModel:
+    shapes = "".join(f"<visual>{SHAPE}{visual}</visual>" for visual in visuals)
+    return parse(f'<robot name="r">\n<link name="a">{shapes}</link>\n{around}</robot>', ORIGIN)
+
+
+def colors(model: RobotModel) -> list[Color | None]:
+    return [shape.color for shape in model.links["a"].visuals]
+
+
+def told(model: RobotModel) -> list[str]:
+    return [warning.removeprefix(f"{ORIGIN}, line ") for warning in model.warnings]
+
+
+@pytest.mark.parametrize(
+    ("visual", "around"),
+    [
+        (f'<material name="x">{RED}</material>', ""),
+        (f"<material>{RED}</material>", ""),
+        (f'<material name="">{RED}</material>', ""),
+        ('<material name="x"/>', f'<material name="x">{RED}</material>'),
+        ('<material name="Gazebo/Red"/>', ""),
+        (f'<material name="x">{RED}</material>', '<material name="x"><color rgba="0 1 0 1"/></material>'),
+    ],
+)
+def test_a_material_gives_its_colour_by_itself_or_by_its_name(visual: str, around: str) -> None:
+    model = robot(visual, around=around)
+    assert (colors(model), model.warnings) == ([(1, 0, 0, 1)], ())
+
+
+def test_a_material_told_in_one_visual_is_known_to_the_others_before_and_after() -> None:
+    model = robot('<material name="x"/>', f'<material name="x">{RED}</material>', '<material name="x"/>', "")
+    assert (colors(model), model.warnings) == ([(1, 0, 0, 1)] * 3 + [None], ())
+
+
+def test_a_material_that_nothing_tells_is_a_warning_with_the_nearest_one() -> None:
+    model = robot('<material name="blak"/>', around=f'<material name="black">{RED}</material>')
+    assert colors(model) == [None]
+    assert told(model) == [
+        "2: <material name='blak'> has no colour, neither here nor under <robot>; the nearest is 'black'"
+    ]
+
+
+def test_a_colour_that_is_none_is_told_once() -> None:
+    model = robot('<material name="x"><color rgba="255 0 0 1"/></material>')
+    assert colors(model) == [None]
+    (warning,) = told(model)
+    assert warning.startswith("2: <color> of <material name='x'> has the colour '255 0 0 1', which is left out")
+
+
+def test_a_material_twice_is_told_and_the_first_counts() -> None:
+    twice = f'<material name="x">{RED}</material>\n<material name="x"><color rgba="0 1 0 1"/></material>'
+    model = robot('<material name="x"/>', around=twice)
+    assert colors(model) == [(1, 0, 0, 1)]
+    assert told(model) == ["4: <material name='x'> is there twice; the first one counts"]
+
+
+def test_a_picture_without_colour_is_told() -> None:
+    model = robot('<material name="x"><texture filename="a.png"/></material>')
+    (warning,) = told(model)
+    assert (
+        warning == "2: <material name='x'> is a picture; pictures are not shown, and it has no <color> to show instead"
+    )
+    assert robot(f'<material name="x"><texture filename="a.png"/>{RED}</material>').warnings == ()
+
+
+@pytest.mark.parametrize(
+    "inside",
+    [
+        "<material>Gazebo/Green</material>",
+        "<material> Gazebo/Green\n</material>",
+        '<material value="Gazebo/Green"/>',
+        "<visual><material><diffuse>0 1 0 1</diffuse><ambient>1 1 1 1</ambient></material></visual>",
+        "<visual><material><ambient>0 1 0</ambient></material></visual>",
+        "<visual><material><script><name>Gazebo/Green</name></script></material></visual>",
+        "<material><script>Gazebo/Green</script></material>",
+    ],
+)
+def test_the_colour_of_gazebo_wins_over_that_of_urdf(inside: str) -> None:
+    urdf = f'<material name="x">{RED}</material>'
+    model = robot(urdf, urdf, around=f'<gazebo reference="a">{inside}</gazebo>')
+    assert (colors(model), model.warnings) == ([(0, 1, 0, 1)] * 2, ())
+
+
+def test_a_colour_that_gazebo_does_not_know_is_told_and_urdfs_stays() -> None:
+    gazebo = '<gazebo reference="a"><material>Gazebo/Gren</material></gazebo>'
+    model = robot(f'<material name="x">{RED}</material>', around=gazebo)
+    assert colors(model) == [(1, 0, 0, 1)]
+    assert told(model) == [
+        "3: <material> of <robot name='r'> names the colour 'Gazebo/Gren', which Gazebo does not know; "
+        "the nearest is 'Gazebo/Green'"
+    ]
+
+
+def test_an_empty_material_of_gazebo_says_nothing() -> None:
+    model = robot(f'<material name="x">{RED}</material>', around='<gazebo reference="a"><material/></gazebo>')
+    assert (colors(model), model.warnings) == ([(1, 0, 0, 1)], ())
