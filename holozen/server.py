@@ -11,7 +11,7 @@ from holozen.tell import say
 if TYPE_CHECKING:
     from holozen.messages import Message
 
-MAX_REQUEST_BYTES = 16_000_000  # a robot's URDF fits many times; more is refused unread
+MAX_REQUEST_BYTES = 5_000_000  # a robot's URDF has at most 4 MB; more is refused unread, to stall nobody
 
 
 def reason(payload: bytes) -> str:

@@ -52,6 +52,8 @@ def main(argv: list[str] | None = None) -> int:
             for warning in spec.warnings:
                 say(f"sim: {warning}")
             services = EntityServices(bus, entities, dict(args.package))
+            if not entities.vehicles:
+                say("sim: no robot yet; `holozen spawn FILE` puts one in")
             Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services).run(stop)
     except (BusError, RobotError, worldfile.WorldError) as error:
         say(f"sim: {error}")

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from holozen.limits import Planar, clamp, ramp
+from holozen.limits import Planar, clamp
 from holozen.robot.assembly import Part, assemble
 from holozen.robot.drives import Balancing
 from holozen.robot.errors import RobotError
@@ -15,14 +15,18 @@ from holozen.robot.rotation import matrix_of_quaternion
 from .engine import Rotation, Vector, turned, yaw_of
 from .jointed import JointedBody
 from .pendulum import GRAVITY, Pendulum, gains
+from .plan import Plan
 from .wheels import forward_sign, radius_of
 
 FALLEN = 1.0  # rad of lean from which no wheel brings it back: the motors are off
-ACCELERATION = 1.0  # m/s^2 and, times TURN, rad/s^2 of what it is asked for; to slow down it has to lean too
-TURN = 8.0
-FARTHEST = 0.2  # m that it remembers to be behind, or ahead
+LEAN = 0.45  # rad to which it leans at most to speed up, or to slow down
+TURN = 8.0  # rad/s^2 by which its turn speeds up
+STRAY = 0.3  # m/s from its plan that it tries to mend at once; a harder push makes a new plan
+FARTHEST = 0.1  # m that it remembers to be behind, or ahead
 GRIP = 0.7  # of the friction of its wheels is used; a wheel that slips steers nobody
+ASTRAY = 0.3  # rad that it remembers to have turned too little, or too far
 YAW_GAIN = 12.0  # 1/s: how fast a wrong turn rate is mended
+YAW_TIME = 0.3  # s: and a wrong heading
 
 
 class BalanceMover:
@@ -36,24 +40,46 @@ class BalanceMover:
         self._pendulum = pendulum_of(model, self._sides)
         self._gains = gains(self._pendulum, dt)
         self._most, self._yaw_gain = _strengths(model, self._sides, self._pendulum)
-        self._wanted: Planar = (0.0, 0.0, 0.0)
-        self._ahead = 0.0  # m
+        self._hardest = LEAN / self._pendulum.lean_per_acceleration
+        self._rest()
         for name in self._sides:
             body.release(name, friction=0.0)  # the plugin takes it away, whatever the file says
 
     def move(self, velocity: Planar, dt: float) -> None:
         """Push the wheels for the next step. Sideways it cannot go."""
         x, _, turn = velocity
-        lean, rate, speed, turning = self._state()
+        state = lean, _, speed, turning = self._state()
         if abs(lean) > FALLEN:
-            self._wanted, self._ahead = (0.0, 0.0, 0.0), 0.0
+            self._rest()
             return self._push(0.0, 0.0)
-        self._wanted = ramp(self._wanted, (x, 0.0, turn), ACCELERATION, ACCELERATION * TURN, dt)
-        fast = speed - self._wanted[0]
+        self._plan.keep_near(speed, STRAY)
+        self._plan.step(x, dt)
+        self._turn += clamp(turn - self._turn, TURN * dt)
+        slow = self._turn - turning
+        self._behind = clamp(self._behind + slow * dt, ASTRAY)
+        drive = clamp(self._effort(state[:3], dt) / 2, self._most)
+        # Balance comes first: the turn gets what strength is left.
+        steer = clamp(self._yaw_gain * (slow + self._behind / YAW_TIME), self._most - abs(drive))
+        return self._push(drive - steer, drive + steer)
+
+    def _rest(self) -> None:
+        self._plan = Plan(self._hardest)
+        self._ahead = 0.0  # m that it is too far
+        self._turn = 0.0  # rad/s that it is to turn at now
+        self._behind = 0.0  # rad that it has turned too little
+
+    def _effort(self, state: tuple[float, float, float], dt: float) -> float:
+        """The torque of both wheels: what the plan needs, and what mends the errors."""
+        plan, pendulum, leaning = self._plan, self._pendulum, self._pendulum.lean_per_acceleration
+        lean, rate, speed = state
+        bend = leaning * plan.snap  # the lean's second derivative
+        fast = speed - (plan.speed - pendulum.lag * leaning * plan.jerk)
         self._ahead = clamp(self._ahead + fast * dt, FARTHEST)
-        effort = -sum(gain * x for gain, x in zip(self._gains, (lean, rate, fast, self._ahead), strict=True))
-        steer = self._yaw_gain * (self._wanted[2] - turning)
-        return self._push(effort / 2 - steer, effort / 2 + steer)
+        errors = (lean - leaning * plan.acceleration, rate - leaning * plan.jerk, fast, self._ahead)
+        mending = sum(gain * error for gain, error in zip(self._gains, errors, strict=True))
+        along, mixed = pendulum.inertia[0]
+        needed = pendulum.radius * float(along * (plan.acceleration - pendulum.lag * bend) + mixed * bend)
+        return needed - mending
 
     def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
         """The true pose."""
@@ -65,7 +91,7 @@ class BalanceMover:
 
     def _push(self, left: float, right: float) -> None:
         for name, sign, effort in zip(self._sides, self._signs, (left, right), strict=True):
-            self.body.push(name, sign * clamp(effort, self._most))
+            self.body.push(name, sign * effort)
 
     def _state(self) -> tuple[float, float, float, float]:
         """Lean (rad, forward), its rate, the axle's speed forward (m/s) and the turn rate (rad/s)."""

@@ -56,9 +56,10 @@ class Body:
 
 
 class Links:
-    """What `createMultiBody` is told of the links below the base. Links without a joint only carry shapes."""
+    """What `createMultiBody` is told of the links below the base. Links without a joint only carry shapes. All show `visual`."""
 
-    def __init__(self) -> None:
+    def __init__(self, visual: int) -> None:
+        self._visual = visual
         self.arguments: dict[str, list[object]] = {name: [] for name in _NAMES}
 
     def __len__(self) -> int:
@@ -75,7 +76,7 @@ class Links:
         inertial: tuple[Vector, Rotation] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
     ) -> int:
         """One link on link `parent` (-1: the base) with its frame `at` in the parent's. Returns its index."""
-        values = (mass, shape, -1, *at, *inertial, parent + 1, joint, axis)
+        values = (mass, shape, self._visual, *at, *inertial, parent + 1, joint, axis)
         for name, value in zip(_NAMES, values, strict=True):
             self.arguments[name].append(value)
         return len(self) - 1

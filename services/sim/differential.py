@@ -2,7 +2,7 @@
 
 import math
 
-from holozen.limits import Planar
+from holozen.limits import Planar, clamp
 from holozen.robot.drives import Differential
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import joint_axes
@@ -28,9 +28,14 @@ class WheelMover:
         """Turn the wheels. Sideways it cannot go."""
         x, _, turn = velocity
         half = turn * self._separation / 2
-        for names, speed in ((self._mechanism.left, x - half), (self._mechanism.right, x + half)):
+        most = self._mechanism.acceleration * dt
+        now = dict(zip(self.names, self.body.states()[1], strict=True)) if math.isfinite(most) else {}
+        for names, wanted in ((self._mechanism.left, x - half), (self._mechanism.right, x + half)):
             for name in names:
-                self.body.turn(name, self._signs[name] * speed / self._radius, self._mechanism.torque)
+                sign = self._signs[name]
+                rim = sign * now[name] * self._radius if now else wanted
+                speed = rim + clamp(wanted - rim, most)
+                self.body.turn(name, sign * speed / self._radius, self._mechanism.torque)
 
     def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
         """The true pose, or what the wheels' encoders make of it, as the file wants."""

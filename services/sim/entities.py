@@ -19,6 +19,7 @@ from .vehicle import Vehicle
 from .world import World
 
 MOST = 1000  # entities; each takes time of every step
+MOST_SHAPES = 500  # of one entity: each that touches the ground takes the engine 50 us of every step
 FARTHEST = 1e4  # m from the origin; far beyond, the engine's numbers are too coarse to stand on
 Place = tuple[Vector, Rotation]
 
@@ -108,6 +109,9 @@ class Entities:
             )
         if len(self._all) >= MOST:
             raise EntityError(si.OPERATION_FAILED, f"there are {MOST} entities, as many as there may be; delete some")
+        if (shapes := sum(len(link.collisions) for link in model.links.values())) > MOST_SHAPES:
+            problem = f"{model.name!r} has {shapes} collision shapes; at most {MOST_SHAPES} are simulated: leave some out"
+            raise EntityError(si.RESOURCE_PARSE_ERROR, problem)
         if model.drive:
             self._check_alone(key_for(model.drive.odometry_topic, prefix))
 

@@ -7,7 +7,7 @@ import numpy as np
 from holozen.robot.rotation import Array
 
 GRAVITY = 9.8  # m/s^2
-LEAN, LEAN_RATE, SPEED, DISTANCE, EFFORT = 0.05, 0.5, 0.2, 0.1, 0.1
+LEAN, LEAN_RATE, SPEED, DISTANCE, EFFORT = 0.2, 1.0, 0.1, 0.1, 0.1
 """What one thinks large, in rad, rad/s, m/s, m and N m (Bryson's rule): the squares' inverses weigh them."""
 
 Gains = tuple[float, float, float, float]
@@ -27,6 +27,28 @@ class Pendulum:
     axle: float
     body_inertia: float
     wheel_inertia: float
+
+    @property
+    def inertia(self) -> Array:
+        """The mass matrix (2, 2) of (way, lean), upright."""
+        along, mixed = self.body_mass + self.wheel_mass + self.wheel_inertia / self.radius**2, self._moment
+        return np.array([[along, mixed], [mixed, self.body_inertia + mixed * self.height]])
+
+    @property
+    def lean_per_acceleration(self) -> float:
+        """The lean in rad that a steady 1 m/s^2 needs."""
+        (along, mixed), _ = self.inertia
+        return float(self.radius * along + mixed) / (self._moment * GRAVITY)
+
+    @property
+    def lag(self) -> float:
+        """How far in m the axle is behind the point that accelerates as the body leans, for 1 rad of lean."""
+        (along, mixed), (_, about) = self.inertia
+        return float((self.radius * mixed + about) / (self.radius * along + mixed))
+
+    @property
+    def _moment(self) -> float:
+        return self.body_mass * self.height
 
 
 def gains(pendulum: Pendulum, dt: float) -> Gains:
@@ -51,14 +73,8 @@ def gains(pendulum: Pendulum, dt: float) -> Gains:
 
 def _motion(p: Pendulum, dt: float) -> tuple[Array, Array]:
     """The discrete motion of (lean, lean rate, speed, distance) with a torque that drives the wheels forward."""
-    inertia = np.array(
-        [
-            [p.body_mass + p.wheel_mass + p.wheel_inertia / p.radius**2, p.body_mass * p.height],
-            [p.body_mass * p.height, p.body_inertia + p.body_mass * p.height**2],
-        ]
-    )
-    falling = np.linalg.solve(inertia, [0.0, p.body_mass * GRAVITY * p.height])
-    pushed = np.linalg.solve(inertia, [1 / p.radius, -1.0])
+    falling = np.linalg.solve(p.inertia, [0.0, p.body_mass * GRAVITY * p.height])
+    pushed = np.linalg.solve(p.inertia, [1 / p.radius, -1.0])
     rates = np.zeros((4, 4))
     rates[0, 1] = rates[3, 2] = 1.0
     rates[1, 0], rates[2, 0] = falling[1], falling[0]

@@ -14,12 +14,13 @@ class PlanarBody(Body):
     """
 
     def __init__(self, world: int, shapes: Shapes, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT) -> None:
-        links, (first, *others) = Links(), shapes.of(body.collisions) or [NOTHING]
+        links, (first, *others) = Links(shapes.unseen), shapes.of(body.collisions) or [NOTHING]
         links.carry(-1, others)
         # An engine's base is placed by its inertial frame, which is where its centre of mass is.
         number: int = bullet.createMultiBody(
             body.mass,
             first,
+            shapes.unseen,
             basePosition=at,
             baseOrientation=rotation,
             baseInertialFramePosition=body.centre,

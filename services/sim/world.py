@@ -8,8 +8,9 @@ from holozen.robot.assembly import assemble
 from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel
 
+from .dynamics import FRICTION
 from .engine import UPRIGHT, Rotation, Shapes, Vector, bullet
-from .jointed import FRICTION, MOST_JOINTS, JointedBody
+from .jointed import MOST_JOINTS, JointedBody
 from .planar import PlanarBody
 from .worldfile import WorldSpec
 
@@ -27,6 +28,8 @@ class World:
             fixedTimeStep=spec.step,
             enableFileCaching=0,
             deterministicOverlappingPairs=1,
+            # Its cone gives a wheel that slips grip by its heading in the world; the pyramid, as Gazebo's, far less.
+            enableConeFriction=0,
             physicsClientId=self._id,
         )
         if spec.ground:

@@ -1,21 +1,32 @@
-"""World files are read for what is simulated; what is not is named, and what is wrong is one line with the file."""
+"""World files are read for what is simulated; what is not is named, and what is wrong is one line with its place."""
 
+import math
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from holozen.robot.parts import Pose
+from holozen.robot.rigid import Frame, lump
 from services.sim.worldfile import GRAVITY, STEP, WorldError, WorldSpec, load
 
 REPO = Path(__file__).parents[3]
+QUARTER = math.pi / 2
+BOX = '<link name="l"><collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision></link>'
+STATIC = f'<model name="{{}}"><static>1</static>{{}}{BOX}</model>'
 
 
 @pytest.fixture
-def path(tmp_path: Path) -> Path:
-    return tmp_path / "my.world"
+def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for variable in ("GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH", "GAZEBO_MODEL_PATH", "ROS_PACKAGE_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+    tmp_path.chmod(0o1777)
+    (tmp_path / "home").mkdir()
+    return tmp_path / "home" / "my.world"
 
 
-def loaded(path: Path, body: str, name: str = ' name="w"') -> WorldSpec:
-    path.write_text(f'<sdf version="1.6"><world{name}>{body}</world></sdf>')
+def loaded(path: Path, body: str, name: str = ' name="w"', version: str = "1.9") -> WorldSpec:
+    path.write_text(f'<sdf version="{version}"><world{name}>\n{body}</world></sdf>')
     return load(path)
 
 
@@ -29,16 +40,17 @@ def refusal(path: Path, content: bytes | None = None) -> str:
     with pytest.raises(WorldError) as error:
         load(path)
     told = str(error.value)
-    assert told.startswith(f"world {path}: ")
-    assert told.isprintable()
-    return told
+    assert told.startswith(str(path)) and told.isprintable()
+    return told.removeprefix(str(path))
 
 
-@pytest.mark.parametrize("name", ["gazebo", "empty"])
-def test_the_worlds_of_the_tree_have_ground_and_the_engines_step(name: str) -> None:
+@pytest.mark.parametrize("name", ["gazebo", "empty", "arena"])
+def test_the_worlds_of_the_tree_have_sun_ground_and_the_engines_step(name: str) -> None:
     spec = load(REPO / "worlds" / f"{name}.world")
     assert spec.step == pytest.approx(1 / 240, rel=1e-12)
-    assert spec == WorldSpec(name, step=spec.step, gravity=(0, 0, -9.8), rtf=1, ground=True)
+    assert (spec.name, spec.gravity, spec.rtf, spec.ground, spec.warnings) == (name, (0, 0, -9.8), 1, True, ())
+    assert [(light.name, light.kind) for light in spec.lights] == [("sun", "directional")]
+    assert bool(spec.models) == (name == "arena")
 
 
 def test_a_world_that_says_nothing_has_the_defaults_and_no_ground(path: Path) -> None:
@@ -54,8 +66,19 @@ def test_step_gravity_and_factor_are_read(path: Path) -> None:
     assert (spec.name, spec.step, spec.gravity, spec.rtf) == ("w", 0.001, (0, 0, -1.62), 0.5)
 
 
+def test_of_several_physics_the_default_one_counts_or_else_the_first(path: Path) -> None:
+    one, two = (f"<physics{{}}><max_step_size>{step}</max_step_size></physics>" for step in (0.001, 0.002))
+    assert loaded(path, one.format("") + two.format("")).step == 0.001
+    assert loaded(path, one.format("") + two.format(' default="1"')).step == 0.002
+
+
 def test_gravity_may_stand_in_physics_as_it_did_in_old_files(path: Path) -> None:
     assert loaded(path, "<physics><gravity>0 0 -3</gravity></physics>").gravity == (0, 0, -3)
+
+
+UP, DOWN = "<pose>0 0 1 0 0 0</pose>", "<pose>0 0 -1 0 0 0</pose>"
+UPWARDS = "<normal>0 0 2</normal>"
+PLANE = '<link name="l"><collision name="c">{}<geometry><plane>{}</plane></geometry></collision></link>'
 
 
 @pytest.mark.parametrize(
@@ -63,49 +86,127 @@ def test_gravity_may_stand_in_physics_as_it_did_in_old_files(path: Path) -> None
     [
         "<include><uri>model://ground_plane</uri></include>",
         "<include><uri> model://asphalt_plane </uri></include>",
-        '<model name="floor"><link><collision><geometry><plane/></geometry></collision></link></model>',
+        f'<model name="floor"><static>1</static>{PLANE.format("", "")}</model>',
+        f'<model name="m"><static>1</static>{PLANE.format("<pose>5 0 0 0 0 1</pose>", UPWARDS)}</model>',
+        f'<model name="up"><static>1</static>{UP}{PLANE.format(DOWN, "")}</model>',
     ],
 )
-def test_a_plane_is_ground(path: Path, body: str) -> None:
+def test_a_level_plane_at_zero_is_ground(path: Path, body: str) -> None:
     spec = loaded(path, body)
-    assert spec.ground
-    assert spec.warnings == ()
+    assert (spec.ground, spec.models, spec.warnings) == (True, (), ())
 
 
-def test_a_sun_needs_no_warning_and_is_no_ground(path: Path) -> None:
-    spec = loaded(path, "<include><uri>model://sun</uri></include>")
-    assert (spec.ground, spec.warnings) == (False, ())
+@pytest.mark.parametrize(
+    ("body", "xyz", "up"),
+    [
+        ("<include><uri>model://ground_plane</uri><pose>0 0 -0.5 0 0 0</pose></include>", (0, 0, -0.5), (0, 0, 1)),
+        ("<include><uri>model://ground_plane</uri><pose>0 0 0 0.1 0 0</pose></include>", (0, 0, 0),
+         (0, -math.sin(0.1), math.cos(0.1))),
+        (f'<model name="wall"><static>1</static>{PLANE.format("", "<normal>1 0 0</normal>")}</model>', (0, 0, 0),
+         (1, 0, 0)),
+        (f'<model name="m"><static>1</static><pose>0 0 2 0 0 0</pose>{PLANE.format("", "")}</model>', (0, 0, 2),
+         (0, 0, 1)),
+    ],
+)  # fmt: skip
+def test_any_other_plane_is_a_static_model_where_it_stands(
+    path: Path, body: str, xyz: tuple[float, ...], up: tuple[float, ...]
+) -> None:
+    spec = loaded(path, body)
+    (model,) = spec.models
+    (placed,) = lump(model).collisions
+    frame = Frame.of(model.pose) @ Frame.of(placed.shape.pose)
+    assert not spec.ground and model.static and placed.shape.kind == "plane"
+    np.testing.assert_allclose(frame.position, xyz, atol=1e-12)
+    np.testing.assert_allclose(frame.rotation[:, 2], up, atol=1e-12)
 
 
-def test_other_models_are_named_and_left_out(path: Path) -> None:
-    spec = loaded(path, '<include><uri>model://airplane</uri></include><model name="table"/>')
-    assert not spec.ground
-    assert [warning.split(" is left out")[0] for warning in spec.warnings] == [
-        f"world {path}: model 'airplane'",
-        f"world {path}: model 'table'",
+def test_a_ground_with_more_on_it_stays_a_model(path: Path) -> None:
+    body = PLANE.format("", "").replace("</link>", BOX.removeprefix('<link name="l">').replace('"c"', '"d"'))
+    spec = loaded(path, f'<model name="m"><static>1</static>{body}</model>')
+    assert not spec.ground and len(spec.models[0].links["l"].collisions) == 2
+
+
+def test_a_sun_is_a_light_and_no_ground(path: Path) -> None:
+    spec = loaded(path, "<include><uri>model://sun</uri><pose>0 0 5 0 0 0</pose></include>")
+    assert (spec.ground, spec.models, spec.warnings) == (False, (), ())
+    assert (spec.lights[0].name, spec.lights[0].pose) == ("sun", Pose((0, 0, 15)))
+
+
+def test_lights_written_out_are_kept(path: Path) -> None:
+    light = '<light name="lamp" type="spot"><pose>1 2 3 0 0 0</pose><diffuse>1 0 0 1</diffuse>'
+    (lamp,) = loaded(path, f"{light}<direction>0 0 -2</direction></light>").lights
+    assert (lamp.name, lamp.kind, lamp.pose.xyz, lamp.direction) == ("lamp", "spot", (1, 2, 3), (0, 0, -1))
+    assert lamp.diffuse == (1, 0, 0, 1)
+
+
+def test_models_stand_where_the_file_puts_them(path: Path) -> None:
+    spec = loaded(
+        path,
+        '<frame name="corner"><pose>10 0 0 0 0 0</pose></frame>'
+        + STATIC.format("a", f'<pose relative_to="corner">1 0 0 0 0 {QUARTER}</pose>')
+        + STATIC.format("b", '<pose relative_to="a">2 0 0 0 0 0</pose>')
+        + STATIC.format("c", '<pose relative_to="world">0 0 7 0 0 0</pose>')
+        + STATIC.format("d", ""),
+    )
+    assert [model.name for model in spec.models] == ["a", "b", "c", "d"]
+    expected = [(11, 0, 0), (11, 2, 0), (0, 0, 7), (0, 0, 0)]
+    for model, xyz in zip(spec.models, expected, strict=True):
+        assert model.static and model.pose.xyz == pytest.approx(xyz)
+
+
+def test_a_model_of_the_users_is_included(path: Path) -> None:
+    (path.parent / "models" / "table").mkdir(parents=True)
+    text = f'<sdf version="1.6">{STATIC.format("table", "")}</sdf>'
+    (path.parent / "models" / "table" / "model.sdf").write_text(text)
+    spec = loaded(path, "<include><uri>model://table</uri><pose>1 2 0 0 0 0</pose></include>")
+    assert [(model.name, model.pose.xyz) for model in spec.models] == [("table", (1, 2, 0))]
+
+
+def test_models_that_are_nowhere_are_named_and_left_out(path: Path) -> None:
+    spec = loaded(path, '<include><uri>model://airplane</uri></include>\n<model name="table"/>')
+    assert not spec.ground and spec.models == ()
+    assert [warning.removeprefix(str(path)).partition("; looked")[0] for warning in spec.warnings] == [
+        ", line 2: <include> of <world name='w'> ('model://airplane') is not found and left out",
+        ", line 3: <model name='table'> has no <link> and is left out",
+    ]
+
+
+def test_what_needs_no_physics_is_passed_over_in_silence(path: Path) -> None:
+    quiet = ("gui", "scene", "state", "plugin", "audio", "wind", "magnetic_field", "atmosphere", "my:own")
+    body = "".join(f"<{name}/>" for name in (*quiet, "spherical_coordinates"))
+    assert loaded(path, body, ' name="w" xmlns:my="x"').warnings == ()
+
+
+def test_what_is_not_simulated_or_unknown_is_told(path: Path) -> None:
+    spec = loaded(path, "<actor/>\n<modle/>\n<modle/>")
+    assert [warning.removeprefix(f"{path}, ") for warning in spec.warnings] == [
+        "line 2: <actor> of <world name='w'> is not simulated and is left out",
+        "line 3: <modle> of <world name='w'> is nothing that a <world> has in SDF, and is passed over;"
+        " the nearest is 'model'",
     ]
 
 
 @pytest.mark.parametrize(
     ("tag", "text", "told"),
     [
-        ("max_step_size", "0", "max_step_size 0 s; use 0.0001 to 0.02"),
-        ("max_step_size", "-1", "max_step_size -1 s; use 0.0001 to 0.02"),
-        ("max_step_size", "1", "max_step_size 1 s; use 0.0001 to 0.02"),
-        ("max_step_size", "nan", "physics/max_step_size 'nan' is not a finite number"),
-        ("max_step_size", "", "physics/max_step_size '' is not a finite number"),
-        ("real_time_factor", "-1", "real_time_factor -1; use 0 (as fast as it goes) to 1000"),
-        ("real_time_factor", "1001", "real_time_factor 1001; use 0 (as fast as it goes) to 1000"),
-        ("real_time_factor", "fast\nest", "physics/real_time_factor 'fast\\nest' is not a finite number"),
-        ("gravity", "0 0", "gravity '0 0'; write three numbers, such as '0 0 -9.8'"),
-        ("gravity", "0 0 down", "gravity 'down' is not a finite number"),
-        ("gravity", "0 0 -inf", "gravity '-inf' is not a finite number"),
-        ("gravity", "0 0 1e300", "gravity '0 0 1e300'; use at most 100 m/s^2 along each axis"),
+        ("max_step_size", "0", "is 0 s; use 0.0001 to 0.02"),
+        ("max_step_size", "-1", "is -1 s; use 0.0001 to 0.02"),
+        ("max_step_size", "1", "is 1 s; use 0.0001 to 0.02"),
+        ("max_step_size", "nan", "has 'nan', which is no finite number"),
+        ("max_step_size", "", "has 0 numbers instead of 1: ''"),
+        ("real_time_factor", "-1", "is -1; use 0 (as fast as it goes) to 1000"),
+        ("real_time_factor", "1001", "is 1001; use 0 (as fast as it goes) to 1000"),
+        ("real_time_factor", "fast\nest", "has 'fast', which is no finite number"),
+        ("gravity", "0 0", "has 2 numbers instead of 3: '0 0'"),
+        ("gravity", "0 0 down", "has 'down', which is no finite number"),
+        ("gravity", "0 0 -inf", "has '-inf', which is no finite number"),
+        ("gravity", "0 0 1e300", "has '1e300', which is beyond 1e+06; use metres, kilograms and radians"),
+        ("gravity", "0 0 101", "is 0 0 101; use at most 100 m/s^2 along each axis"),
     ],
 )
 def test_a_number_that_no_engine_survives_is_refused(path: Path, tag: str, text: str, told: str) -> None:
-    content = f"<sdf><world><physics><{tag}>{text}</{tag}></physics></world></sdf>"
-    assert refusal(path, content.encode()) == f"world {path}: {told}"
+    content = f'<sdf><world name="w">\n<physics>\n<{tag}>{text}</{tag}></physics></world></sdf>'
+    assert refusal(path, content.encode()) == f", line 3: <{tag}> of <world name='w'> {told}"
 
 
 @pytest.mark.parametrize("value", ["0.0001", "0.02"])
@@ -120,30 +221,89 @@ def test_a_factor_of_zero_is_as_fast_as_it_goes(path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        (b"<sdf>\n<world>\n</sdf>", "broken XML: mismatched tag: line 3, column 2"),
-        (b"", "broken XML: no element found: line 1, column 0"),
-        (b"\0", "broken XML: "),
-        (b"<sdf>&evil;</sdf>", "broken XML: undefined entity"),
-        (b'<?xml version="1.0" encoding="klingon"?><sdf/>', "unknown encoding: klingon; save it as UTF-8"),
-        (b'<?xml version="1.0" encoding="gbk"?><sdf/>', "multi-byte encodings are not supported; save it as UTF-8"),
-        (b"<robot/>", "it holds no <sdf><world>, its root is <robot>"),
-        (b"<sdf/>", "it holds no <sdf><world>, its root is <sdf>"),
-        (b"<world><world/></world>", "it holds no <sdf><world>, its root is <world>"),
+        (b"<sdf>\n<world>\n</sdf>", ", line 3: broken XML: mismatched tag; <world> of "),
+        (b"<sdf>\n<world>\n", ", line 3: broken XML: no element found; <world> of "),
+        (b"", ": the file is empty"),
+        (b"\0", ", line 1: broken XML: "),
+        (b"<sdf>&evil;</sdf>", ", line 1: broken XML: undefined entity"),
+        (b"<sdf>\xff</sdf>", ": byte 5 is not UTF-8 text; save the file as UTF-8"),
+        (b'<robot name="r"/>', ", line 1: <robot name='r'> is a robot (URDF), not a world; give it to"),
+        (b"<sdf/>", ", line 1: <sdf> holds no <world>"),
+        (b'<sdf><model name="m"/></sdf>', ", line 1: <sdf> holds a model and no <world>; put it into a running world"),
+        (b"<world><world/></world>", ", line 1: <world> is no world; a world file starts with <sdf version=...><world"),
+        (b'<sdf><world><model name="m"/>\n<model name="m"/></world></sdf>', ", line 2: <model name='m'> has a name"),
+        (b'<sdf><world><model name="m"/>\n<light name="m"><pose>1</pose></light></world></sdf>',
+         ", line 2: <pose> of <light name='m'> has 1 numbers instead of 6"),
+        (b"<sdf><world>\n<light/></world></sdf>", ", line 2: <light> has no name"),
+        (b'<sdf><world>\n<model name="m"><pose relative_to="x"/><link name="l"/></model></world></sdf>',
+         ", line 2: <model name='m'> names the frame 'x'"),
     ],
     ids=lambda value: str(value)[:30],
-)
+)  # fmt: skip
 def test_a_file_that_is_no_world_is_named_with_the_reason(path: Path, content: bytes, told: str) -> None:
-    assert refusal(path, content).startswith(f"world {path}: {told}")
+    assert refusal(path, content).startswith(told)
 
 
 def test_a_file_that_is_not_there_and_a_folder_are_named(path: Path) -> None:
-    assert refusal(path) == f"world {path}: No such file or directory"
+    assert refusal(path) == ": No such file or directory"
     path.mkdir()
-    assert refusal(path) == f"world {path}: Is a directory"
+    assert refusal(path) == ": Is a directory"
 
 
-def test_an_entity_that_names_a_file_is_not_read(path: Path) -> None:
+def test_a_file_of_100_mb_is_refused_before_it_is_read(path: Path) -> None:
+    with path.open("wb") as file:
+        file.truncate(100_000_000)
+    assert refusal(path).startswith(": the file holds 100.0 MB of XML")
+
+
+def test_an_entity_is_not_read(path: Path) -> None:
     secret = path.with_name("secret")
     secret.write_text("0 0 -1")
     content = f'<!DOCTYPE a [<!ENTITY x SYSTEM "{secret}">]><sdf><world><gravity>&x;</gravity></world></sdf>'
-    assert "broken XML: undefined entity" in refusal(path, content.encode())
+    assert refusal(path, content.encode()) == ", line 1: the entity 'x' is declared; write its text out instead"
+
+
+def test_a_big_world_is_read_whole(path: Path) -> None:
+    body = "\n".join(STATIC.format(f"box{i}", f"<pose>{i} 0 0.5 0 0 0</pose>") for i in range(500))
+    spec = loaded(path, body)
+    assert [model.pose.xyz[0] for model in spec.models] == list(range(500))
+
+
+def solid(kind: str, mass: float, size: tuple[float, ...]) -> tuple[float, float, float]:
+    """The textbook's moments of inertia of a solid."""
+    if kind == "box":
+        a, b, c = (side * side for side in size)
+        return mass * (b + c) / 12, mass * (a + c) / 12, mass * (a + b) / 12
+    if kind == "sphere":
+        return (0.4 * mass * size[0] ** 2,) * 3
+    radius, height = size
+    across = mass * (3 * radius**2 + height**2) / 12
+    return across, across, mass * radius**2 / 2
+
+
+def test_what_there_is_to_push_in_the_arena_has_the_inertia_of_its_shape_and_stands_on_the_floor() -> None:
+    things = [model for model in load(REPO / "worlds" / "arena.world").models if not model.static]
+    kinds = []
+    for model in things:
+        (link,) = model.links.values()
+        (shape,) = link.collisions
+        assert link.inertial is not None and link.inertial.mass > 0
+        xx, xy, xz, yy, yz, zz = link.inertial.inertia
+        assert (xx, yy, zz) == pytest.approx(solid(shape.kind, link.inertial.mass, shape.size), abs=1e-6)
+        assert (xy, xz, yz) == (0, 0, 0)
+        below = shape.size[0] if shape.kind == "sphere" else shape.size[-1] / 2
+        stands = model.pose.xyz[2] - below
+        assert stands == pytest.approx(0.4 if model.name == "small_crate" else 0, abs=1e-12)
+        kinds.append(shape.kind)
+    assert set(kinds) == {"box", "cylinder", "sphere"}
+
+
+def test_the_arenas_ramp_goes_from_the_floor_to_its_landing() -> None:
+    ramp = next(model for model in load(REPO / "worlds" / "arena.world").models if model.name == "ramp")
+    slope, landing = lump(ramp).collisions
+    place = Frame.of(ramp.pose) @ Frame.of(slope.shape.pose)
+    _, length, thickness = slope.shape.size
+    ends = [place.position + place.rotation @ (0, side * length / 2, thickness / 2) for side in (1, -1)]
+    np.testing.assert_allclose(ends, [(3.75, 1.5, 0), (3.75, -1.5, 0.3)], atol=1e-6)
+    assert landing.xyz[2] + landing.shape.size[2] / 2 == pytest.approx(0.3)
+    assert landing.xyz[1] + landing.shape.size[1] / 2 == pytest.approx(-1.5)

@@ -1,0 +1,156 @@
+"""Robots that cannot be: each ends in one line, and the sim goes on."""
+
+import struct
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holozen.bus import Bus
+from holozen.errors import ServiceError
+from holozen.messages import Clock
+from holozen.simulation_interfaces import DeleteEntityReply, DeleteEntityRequest, SpawnEntityReply, SpawnEntityRequest
+from holozen.testing import Wire, wait_for
+
+LIMIT = 10.0  # s for `holozen spawn` with its start and a busy machine; the figures are in the closing notes
+INERTIAL = '<inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+BALL = '<collision><geometry><sphere radius="{}"/></geometry></collision>'
+MESH = '<collision><geometry><mesh filename="{}"/></geometry></collision>'
+DRIVE = '<gazebo><plugin name="p" filename="libgazebo_ros_planar_move.so"/></gazebo>'
+XACRO = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">{}</robot>'
+
+
+@pytest.fixture(scope="module")
+def bus(town: Wire) -> Iterator[Bus]:
+    """A bus beside a sim without robots, which is there and steps after each test."""
+    town.start("sim", "--empty").wait_for_line("no robot yet")
+    yield town.bus()
+
+
+@pytest.fixture(autouse=True)
+def steps(bus: Bus) -> Iterator[None]:
+    """The sim keeps its step: at least seven tenths of the time that passes, on a machine with other work."""
+    clock = bus.latest("clock", Clock)
+    wait_for(lambda: clock.count)
+    began, simulated = time.monotonic(), seconds(clock.read()[0])
+    yield
+    count = clock.count
+    wait_for(lambda: clock.count > count + 5)
+    assert seconds(clock.read()[0]) - simulated > 0.7 * (time.monotonic() - began) - 0.2
+
+
+def seconds(clock: Clock | None) -> float:
+    return clock.clock.seconds() if clock else 0.0
+
+
+def robot(body: str) -> str:
+    return f'<robot name="r">{body}</robot>'
+
+
+def link(name: str, inside: str = "") -> str:
+    return f'<link name="{name}">{inside}</link>'
+
+
+def joint(parent: str, child: str) -> str:
+    ends = f'<parent link="{parent}"/><child link="{child}"/>'
+    return f'<joint name="{parent}_{child}" type="fixed">{ends}</joint>'
+
+
+LAUGHS = "<!DOCTYPE r [<!ENTITY a 'ha'>" + "".join(
+    f"<!ENTITY {b} '{f'&{a};' * 10}'>" for a, b in zip("abcdefghi", "bcdefghij", strict=True)
+)
+FAULTS: dict[str, tuple[str, str]] = {
+    "an empty file": ("", "the file is empty"),
+    "an unclosed tag": ('<robot name="r">\n<link name="a">', "line 2: broken XML"),
+    "a cycle": (robot(link("a") + link("b") + joint("a", "b") + joint("b", "a")), "circle"),
+    "two roots": (robot(link("a") + link("b")), "2 root links"),
+    "a duplicate link": (robot(link("a") + link("a")), "is there twice"),
+    "a mass of nan": (robot(link("a", INERTIAL.format("nan"))), "'nan' is no finite number"),
+    "a mass below zero": (robot(link("a", INERTIAL.format("-1"))), "is below zero"),
+    "a mass of abc": (robot(link("a", INERTIAL.format("abc"))), "'abc' is no finite number"),
+    "a radius of zero": (robot(link("a", INERTIAL.format(1) + BALL.format(0))), "each number has to be"),
+    "billion laughs": (f"{LAUGHS}]><robot name='&j;'/>", "entity"),
+    "an external entity": ('<!DOCTYPE r [<!ENTITY a SYSTEM "/etc/passwd">]><robot name="r">&a;</robot>', "entity"),
+    "macros without end": (
+        XACRO.format('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>'), "without end",
+    ),
+    "9**9**9": (XACRO.format('<link name="${9**9**9}"/>'), "9**9**9"),
+    "a hundred million bytes": (f"<robot name='r'><!--{'x' * 100_000_000}--></robot>", "MB"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_robot_that_cannot_be_is_told_in_one_line(town: Wire, bus: Bus, tmp_path: Path, fault: str) -> None:
+    text, told = FAULTS[fault]
+    file = tmp_path / ("r.urdf.xacro" if "xmlns:xacro" in text else "r.urdf")
+    file.write_text(text)
+    ended = town.run("spawn", str(file), "--name", "Fred", within=LIMIT)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr.count("\n") == 1
+    assert str(file) in ended.stderr and told in ended.stderr
+
+
+def triangles(count: int, bad: float = 0.0) -> bytes:
+    """A binary STL."""
+    corners = np.random.default_rng(1).random((count, 12), dtype=np.float32)
+    corners[0, 3] += bad
+    records = np.zeros(count, dtype=[("numbers", "<f4", 12), ("attribute", "<u2")])
+    records["numbers"] = corners
+    return bytes(80) + struct.pack("<I", count) + records.tobytes()
+
+
+MESHES: dict[str, tuple[Callable[[], bytes], str]] = {
+    "empty": (lambda: b"", "empty"),
+    "not a number": (lambda: triangles(10, float("nan")), "finite"),
+    "five million triangles": (lambda: triangles(5_000_000), ""),
+}
+
+
+@pytest.mark.parametrize("fault", MESHES)
+def test_a_mesh_that_cannot_be_is_told_in_one_line_and_the_robot_stands_on_a_box(
+    town: Wire, bus: Bus, tmp_path: Path, fault: str
+) -> None:
+    make, told = MESHES[fault]
+    (tmp_path / "part.stl").write_bytes(make())
+    file = tmp_path / "r.urdf"
+    file.write_text(robot(link("a", INERTIAL.format(1) + MESH.format("part.stl")) + DRIVE))
+    ended = town.run("spawn", str(file), "--name", "Fred", within=3 * LIMIT)
+    assert (ended.returncode, ended.stdout) == (0, "Fred listens on Fred/cmd_vel\n")
+    lines = ended.stderr.splitlines()
+    assert len(lines) <= 1 and all("part.stl" in line and told in line for line in lines)
+    assert bool(lines) or not told
+    assert town.run("spawn", str(file), "--strict", within=3 * LIMIT).returncode == (1 if lines else 0)
+    for name in [line.split()[0] for line in town.run("list").stdout.splitlines()]:
+        assert town.run("delete", name).returncode == 0
+
+
+def test_four_hundred_links_are_a_robot_like_any_other(town: Wire, bus: Bus, tmp_path: Path) -> None:
+    names = [f"l{number}" for number in range(400)]
+    links = "".join(link(name, INERTIAL.format(0.01) + BALL.format(0.1)) for name in names)
+    joints = "".join(joint("l0", name) for name in names[1:])
+    (tmp_path / "r.urdf").write_text(robot(links + joints + DRIVE))
+    ended = town.run("spawn", str(tmp_path / "r.urdf"), "--name", "Fred", within=LIMIT)
+    assert (ended.returncode, ended.stdout, ended.stderr) == (0, "Fred listens on Fred/cmd_vel\n", "")
+    assert town.run("delete", "Fred").returncode == 0
+
+
+RAW = {fault: text for fault, (text, _) in FAULTS.items() if len(text) < 1e6} | {
+    "200 000 links": robot(link("a") * 200_000),
+    "elements without end": "<robot>" + "<a>" * 300_000,
+    "fifteen million bytes": robot("x" * 15_000_000),
+    "a file of this machine": robot(link("a", INERTIAL.format(1) + MESH.format("/etc/passwd"))),
+    "three thousand shapes": robot(link("a", INERTIAL.format(1) + BALL.format(1) * 3000)),
+}
+
+
+@pytest.mark.parametrize("fault", RAW)
+def test_what_comes_over_the_wire_is_refused_in_one_line_or_harmless(bus: Bus, fault: str) -> None:
+    request = SpawnEntityRequest("Fred", resource_string=RAW[fault])
+    try:
+        assert bus.call("spawn_entity", request, SpawnEntityReply, timeout=LIMIT).entity_name == "Fred"
+        bus.call("delete_entity", DeleteEntityRequest("Fred"), DeleteEntityReply)
+        assert fault == "a file of this machine"
+    except ServiceError as error:
+        assert str(error).isprintable() and len(str(error)) < 1000

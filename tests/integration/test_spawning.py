@@ -1,0 +1,161 @@
+"""Robots come and go while the sim runs; the teleop and the controller drive them, and they leave no trace."""
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from holozen import simulation_interfaces as si
+from holozen.bus import Bus
+from holozen.messages import Clock
+from holozen.robot.xacro import expand
+from holozen.testing import Process, Wire, wait_for
+
+from .robots import Robot, distance, place, planar
+
+REPO = Path(__file__).parents[2]
+HB_BOT = str(REPO / "urdf" / "hb_bot.urdf.xacro")
+
+
+@pytest.fixture
+def sim(wire: Wire) -> Process:
+    """A sim without any robot."""
+    sim = wire.start("sim", "--empty")
+    sim.wait_for_line("no robot yet")
+    return sim
+
+
+def keys(bus: Bus) -> set[str]:
+    """What the sim stands on."""
+    return {endpoint.key for endpoint in bus.graph().settled(bus.connected) if endpoint.node == "sim"}
+
+
+def done(wire: Wire, verb: str, *words: str) -> str:
+    """What a verb prints that ends well."""
+    ended = wire.run(verb, *words)
+    assert (ended.returncode, ended.stderr) == (0, "")
+    return ended.stdout
+
+
+def refused(wire: Wire, verb: str, *words: str) -> str:
+    """The one line of a verb that ends badly."""
+    ended = wire.run(verb, *words)
+    assert (ended.returncode, ended.stdout, ended.stderr.count("\n")) == (1, "", 1), ended
+    return ended.stderr
+
+
+def test_a_robot_is_spawned_under_a_name_driven_listed_and_deleted(wire: Wire, sim: Process) -> None:
+    assert done(wire, "spawn", HB_BOT, "--name", "Fred", "-x", "1", "-Y", "1.5") == "Fred listens on Fred/cmd_vel\n"
+    fred = Robot(wire.bus(), "Fred")
+    start = fred.stands()
+    assert place(start) == pytest.approx((1, 0, 1.5), abs=1e-3)
+    assert (start.header.frame_id, start.child_frame_id) == ("Fred/odom", "Fred/footprint_link")
+    fred.drive(0.5, until=lambda odom: distance(odom, start) > 0.3)
+    fred.stop()
+    (told,) = [json.loads(line) for line in done(wire, "list", "--json").splitlines()]
+    assert told["name"] == "Fred"
+    assert told["pose"]["position"]["y"] > 0.29
+    assert "Fred" in done(wire, "delete", "Fred")
+    assert done(wire, "list") == ""
+
+
+def test_a_robot_without_a_height_stands_on_the_ground_and_with_one_falls(wire: Wire, sim: Process) -> None:
+    done(wire, "spawn", HB_BOT, "--name", "low")
+    done(wire, "spawn", HB_BOT, "--name", "high", "-x", "5", "-z", "0.5")
+    low, high = Robot(wire.bus(), "low"), Robot(wire.bus("other"), "high")
+    assert low.odom.messages()[0].pose.pose.position.z == pytest.approx(-0.04, abs=1e-3)
+    high.odom.next(lambda odom: abs(odom.pose.pose.position.z + 0.04) < 2e-3)
+
+
+def test_the_teleop_and_the_controller_work_on_a_robot_that_came_later(wire: Wire, sim: Process) -> None:
+    done(wire, "spawn", HB_BOT, "--name", "Fred")
+    fred = Robot(wire.bus(), "Fred")
+    terminal = wire.terminal("teleop", "Fred")
+    terminal.wait_for_text("listening sim")
+    terminal.type("i")
+    fred.odom.next(lambda odom: odom.twist.twist.linear.x > 0.4)
+    fred.stands()
+    terminal.type("\x03")
+    assert terminal.process.wait() == 0
+    fred.resume()
+    wire.start("pose-service", "--shape", "square", "--size", "0.4")
+    controller = wire.start("controller", "Fred")
+    controller.wait_for_line("goal 3", within=60)
+
+
+def test_a_name_twice_an_unknown_robot_and_a_wrong_file_are_told_with_what_there_is(
+    wire: Wire, sim: Process, tmp_path: Path
+) -> None:
+    done(wire, "spawn", HB_BOT, "--name", "Fred")
+    wrong = tmp_path / "wrong.urdf"
+    wrong.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
+    assert "there is an entity 'Fred' already; there are Fred" in refused(wire, "spawn", HB_BOT, "--name", "Fred")
+    assert "there is no entity 'Ann'; there are Fred" in refused(wire, "delete", "Ann")
+    assert f"{wrong}, line 1: <robot name='r'> has 2 root links" in refused(wire, "spawn", str(wrong))
+    assert "no such" in refused(wire, "spawn", str(tmp_path / "none.urdf")).lower()
+    assert wire.run("spawn", HB_BOT, "--name", "a/*").returncode == 2
+    assert [line.split()[0] for line in done(wire, "list").splitlines()] == ["Fred"]
+
+
+def test_a_robot_that_is_replaced_stays_where_it_was_and_stands(wire: Wire, sim: Process) -> None:
+    done(wire, "spawn", HB_BOT, "--name", "Fred", "-x", "2")
+    fred = Robot(wire.bus(), "Fred")
+    fred.drive(0.5)
+    done(wire, "spawn", HB_BOT, "--name", "Fred", "--replace")
+    after = fred.stands()
+    assert place(after)[0] > 2
+    assert distance(after, fred.pass_time(0.5)) < 1e-6
+
+
+def test_a_robot_deleted_while_it_drives_leaves_no_key_alive(wire: Wire, sim: Process) -> None:
+    bus = wire.bus()
+    before = keys(bus)
+    done(wire, "spawn", HB_BOT, "--name", "Fred")
+    fred = Robot(bus, "Fred")
+    fred.drive(0.5)
+    done(wire, "delete", "Fred")
+    told = len(fred.odom.messages())
+    wait_for(lambda: keys(bus) == before)
+    clock = bus.latest("clock", Clock)
+    wait_for(lambda: clock.count > 20)
+    assert len(fred.odom.messages()) == told
+
+
+def test_two_hundred_robots_in_a_row_leave_no_key_and_little_memory_and_the_sim_keeps_its_step(
+    wire: Wire, sim: Process
+) -> None:
+    bus = wire.bus()
+    text = expand(Path(HB_BOT))
+    before, clock = keys(bus), bus.latest("clock", Clock)
+
+    def spawn_and_delete(name: str) -> None:
+        bus.call("spawn_entity", si.SpawnEntityRequest(name, resource_string=text), si.SpawnEntityReply, timeout=20)
+        bus.call("delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, timeout=20)
+
+    for number in range(5):  # what is made once
+        spawn_and_delete(f"first_{number}")
+    memory = resident(sim)
+    for number in range(200):
+        spawn_and_delete(f"robot_{number}")
+    assert resident(sim) - memory < 20e6
+    wait_for(lambda: keys(bus) == before)
+    count = clock.count
+    wait_for(lambda: clock.count > count + 50)  # it still tells the time, 50 times a second
+    assert bus.call("get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply).entities == []
+
+
+def resident(process: Process) -> int:
+    """The memory of a process, in bytes."""
+    pages = int(Path(f"/proc/{process.pid}/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+def test_planar_commands_go_nowhere_but_to_their_robot(wire: Wire, sim: Process) -> None:
+    for name, y in (("Fred", 0), ("Ann", 3)):
+        done(wire, "spawn", HB_BOT, "--name", name, "-y", str(y))
+    fred, ann = Robot(wire.bus(), "Fred"), Robot(wire.bus("other"), "Ann")
+    there = ann.stands()
+    fred.drive(0.5)
+    assert distance(there, ann.newest()) < 1e-6
+    assert all(not any(planar(command)) for command in ann.commands.messages())
