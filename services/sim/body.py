@@ -56,7 +56,9 @@ class Body:
 
 
 class Links:
-    """What `createMultiBody` is told of the links below the base. Links without a joint only carry shapes. All show `visual`."""
+    """What `createMultiBody` is told of the links below the base, all shown as `visual`. Links without a joint only carry
+    shapes.
+    """
 
     def __init__(self, visual: int) -> None:
         self._visual = visual

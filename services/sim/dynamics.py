@@ -16,6 +16,7 @@ FRICTION = 1.0  # Gazebo's default for mu and mu2
 MOST_FRICTION = 10.0  # the engine multiplies the two surfaces'; students write 100 where they mean "does not slip"
 SIDEWAYS = 0.2  # of that is a skid-steer's friction along its axles, unless its file says otherwise
 GRAVITY = 9.8  # m/s^2
+GENTLE = 4.0  # steps in which a contact pushes out what sank into it, at the fastest
 SINK = 2e-4  # m that a skid-steer's tyres give under its weight, so that all of them carry it; and
 RECOVERY = 0.1  # s in which they come back
 
@@ -33,9 +34,9 @@ def set_joint(world: int, body: int, number: int, part: Part, damping: float) ->
     bullet.changeDynamics(body, number, localInertiaDiagonal=part.body.inertia, physicsClientId=world)
 
 
-def set_surface(world: int, body: int, links: Iterable[int], part: Part, load: float = 0.0) -> None:
-    """How the part's shapes touch, which are those of `links`. `load` in N is what rests on it if it is a wheel that
-    has to slide along its axle, else 0.
+def set_surface(world: int, body: int, links: Iterable[int], part: Part, dt: float, load: float = 0.0) -> None:
+    """How the part's shapes touch, which are those of `links`, for steps of `dt` seconds. `load` in N is what rests on
+    it if it is a wheel that has to slide along its axle, else 0.
     """
     mu, across = _friction(part.surface, load > 0)
     settings: dict[str, Any] = {"lateralFriction": min(mu, MOST_FRICTION)}
@@ -45,7 +46,9 @@ def set_surface(world: int, body: int, links: Iterable[int], part: Part, load: f
         axle = turns.index(max(turns))
         settings["anisotropicFriction"] = [across / mu if index == axle else 1.0 for index in range(3)]
     if part.surface.kp and part.surface.kd:
-        settings |= {"contactStiffness": part.surface.kp, "contactDamping": part.surface.kd}
+        # With less damping the engine pushes out what sank in at once, and so throws up what fell.
+        least = part.surface.kp * dt * GENTLE
+        settings |= {"contactStiffness": part.surface.kp, "contactDamping": max(part.surface.kd, least)}
     elif load:
         settings |= {"contactStiffness": load / SINK, "contactDamping": load / SINK * RECOVERY}
     for link in links:

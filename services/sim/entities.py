@@ -103,17 +103,25 @@ class Entities:
                 robot_name(text or "root")
             except ValueError as error:
                 raise EntityError(code, str(error)) from None
-        if name in self._all or any(prefix == other.prefix for other in self if other.vehicle):
-            raise EntityError(
-                si.NAME_NOT_UNIQUE, f"there is an entity {name!r} already; there are {listed(list(self._all))}"
-            )
+        if name in self._all:
+            there = listed(list(self._all))
+            raise EntityError(si.NAME_NOT_UNIQUE, f"there is an entity {name!r} already; there are {there}")
         if len(self._all) >= MOST:
             raise EntityError(si.OPERATION_FAILED, f"there are {MOST} entities, as many as there may be; delete some")
         if (shapes := sum(len(link.collisions) for link in model.links.values())) > MOST_SHAPES:
-            problem = f"{model.name!r} has {shapes} collision shapes; at most {MOST_SHAPES} are simulated: leave some out"
+            problem = (
+                f"{model.name!r} has {shapes} collision shapes; at most {MOST_SHAPES} are simulated: leave some out"
+            )
             raise EntityError(si.RESOURCE_PARSE_ERROR, problem)
+        self._check_keys(keys_of(model, prefix))
         if model.drive:
             self._check_alone(key_for(model.drive.odometry_topic, prefix))
+
+    def _check_keys(self, keys: set[str]) -> None:
+        """Two robots on the same keys would each get the other's commands."""
+        for other in self:
+            if taken := keys & keys_of(other.model, other.prefix):
+                raise EntityError(si.NAME_NOT_UNIQUE, f"{min(taken)} is the key of {other.name!r}; use another name")
 
     def _check_alone(self, key: str) -> None:
         """Two sims on the same keys would each get the other's commands."""
@@ -121,6 +129,12 @@ class Entities:
         for other in (other for other in others if other.session != self._bus.id):
             problem = f"{key} is published by {other.node} ({other.session[:6]}) already"
             raise EntityError(si.NAME_NOT_UNIQUE, f"{problem}; end that one, or use another name: --robot FILE=NAME")
+
+
+def keys_of(model: RobotModel, prefix: str) -> set[str]:
+    """The keys of a robot's drive, which no other may have too."""
+    drive = model.drive
+    return {key_for(topic, prefix) for topic in (drive.command_topic, drive.odometry_topic)} if drive else set()
 
 
 def checked_place(position: Vector, rotation: Rotation) -> Place:

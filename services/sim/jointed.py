@@ -2,6 +2,7 @@
 
 import math
 
+from holozen.limits import clamp
 from holozen.robot.assembly import Part
 from holozen.robot.parts import Joint
 
@@ -53,7 +54,8 @@ class JointedBody(Body):
         load = load_on(parts, len(sideways))
         for index, (part, (own, *more)) in enumerate(zip(parts, carrying, strict=True)):
             slides = part.joint is not None and part.joint.name in sideways
-            set_surface(world, number, [numbers[link] for link in (own, *more)], part, load if slides else 0.0)
+            touching = [numbers[link] for link in (own, *more)]
+            set_surface(world, number, touching, part, self._dt, load if slides else 0.0)
             if part.joint or not static:
                 set_joint(world, number, numbers[own], part, damping_of(parts, index, self._dt))
             if part.joint:
@@ -83,10 +85,14 @@ class JointedBody(Body):
         )
 
     def turn(self, name: str, rate: float, effort: float = math.inf) -> None:
-        """Turn a joint at a rate, within its limits."""
+        """Turn a joint at a rate, within its limits. One with limits to its position wants this before each step."""
         number, joint = self._joints[name]
-        rate = max(-joint.limits.velocity, min(joint.limits.velocity, rate))
-        self._motor(number, bullet.VELOCITY_CONTROL, targetVelocity=rate, force=_effort(joint, effort))
+        self._motor(
+            number,
+            bullet.VELOCITY_CONTROL,
+            targetVelocity=self._kept(number, joint, rate),
+            force=_effort(joint, effort),
+        )
 
     def go(self, name: str, position: float, closing: float = CLOSING) -> None:
         """Move a joint to a position, within its limits: two thirds of the way in `closing` seconds, if it can."""
@@ -113,6 +119,15 @@ class JointedBody(Body):
         positions = dict(zip(self.names, self.states()[0], strict=True))
         for name, mimic in self._mimics.items():
             self.go(name, mimic.multiplier * positions[mimic.joint] + mimic.offset, FOLLOWING)
+
+    def _kept(self, number: int, joint: Joint, rate: float) -> float:
+        """`rate` within the limits of the joint, for the next step. A strong motor would tear it out of the engine's."""
+        limits = joint.limits
+        rate = clamp(rate, limits.velocity)
+        if not (math.isfinite(limits.lower) and math.isfinite(limits.upper)):
+            return rate
+        position = bullet.getJointState(self._body, number, self._world)[0]
+        return max((limits.lower - position) / self._dt, min((limits.upper - position) / self._dt, rate))
 
     def _motor(self, number: int, mode: int, **values: float) -> None:
         bullet.setJointMotorControl2(self._body, number, mode, physicsClientId=self._world, **values)

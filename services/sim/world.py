@@ -58,6 +58,9 @@ class World:
         `sideways` slide along their axles. Raises RobotError if it is too large.
         """
         parts = assemble(model)
+        if parts[0].body.mass < rigid.SMALLEST_MASS and not model.static:
+            problem = f"{model.name!r}: link {parts[0].link!r} has no mass, and an engine would nail it to the world"
+            raise RobotError(f"{problem}; give it an <inertial>")
         if len(parts) > MOST_JOINTS:
             raise RobotError(
                 f"{model.name!r} has {len(parts) - 1} moving joints; at most {MOST_JOINTS - 1} are simulated"

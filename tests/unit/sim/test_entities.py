@@ -14,8 +14,10 @@ import pytest
 from holozen import simulation_interfaces as si
 from holozen.bus import ServiceError
 from holozen.messages import Header, Message, Point, Pose, Quaternion, Twist, Vector3
+from holozen.robot.model import parse
 from holozen.robot.xacro import expand
 from holozen.testing import Wire, wait_for
+from services.sim.engine import UPRIGHT
 from services.sim.entities import Entities, Entity
 from services.sim.entity_services import EntityServices
 from services.sim.loop import Loop
@@ -93,6 +95,18 @@ def test_a_namespace_in_the_request_is_where_the_keys_are(town: Town) -> None:
     assert {"lab/cmd_vel", "lab/odom"} <= town.tokens()
     assert town.refusal(lambda: town.spawn("Ann", entity_namespace="lab"))[0] == si.NAME_NOT_UNIQUE
     assert town.refusal(lambda: town.spawn("Ann", entity_namespace="a/*"))[0] == si.NAMESPACE_INVALID
+
+
+def test_two_robots_never_share_a_key_whatever_their_files_say(town: Town) -> None:
+    tag = "<commandTopic>cmd_vel</commandTopic>"
+    town.spawn("Ann")
+    inside = HB_BOT.replace(tag, f"<robotNamespace>Ann</robotNamespace>{tag}")
+    assert inside != HB_BOT
+    town.entities.add("root", parse(inside, Path("r")), ((5, 0, 0), UPRIGHT), "lab")
+    told = "lab/Ann/cmd_vel is the key of 'root'; use another name"
+    other = parse(inside.replace(">Ann<", ">lab/Ann<"), Path("r"))
+    found = town.refusal(lambda: town.entities.add("third", other, ((9, 0, 0), UPRIGHT), ""))
+    assert found == (si.NAME_NOT_UNIQUE, told)
 
 
 def test_a_robot_without_a_drive_is_an_object_without_keys(town: Town) -> None:
