@@ -9,6 +9,7 @@ from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel
 from holozen.robot.parts import Inertial, Link, Pose, Shape
 from holozen.robot.rotation import Array, Quaternion, matrix_of, principal, quaternion_of, rpy_of, triple
+from holozen.robot.shapes import solid
 from holozen.robot.tag import Vector
 from holozen.robot.tree import descend
 
@@ -150,4 +151,4 @@ def _collisions(links: list[Link], frames: Mapping[str, Frame]) -> Iterable[Plac
     for link in links:
         for shape in link.collisions:
             frame = frames[link.name] @ Frame.of(shape.pose)
-            yield PlacedShape(link.name, shape, frame.xyz, frame.quaternion)
+            yield PlacedShape(link.name, solid(shape), frame.xyz, frame.quaternion)

@@ -35,7 +35,7 @@ def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
     stop = stop_event()
     try:
-        spec = worldfile.load(args.world)
+        spec = worldfile.load(args.world, dict(args.package))
         with Bus("sim", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             # The engine takes the longest to load, and a wrong flag should not wait for it.
             from .entities import Entities

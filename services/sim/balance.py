@@ -41,6 +41,7 @@ class BalanceMover:
         self._gains = gains(self._pendulum, dt)
         self._most, self._yaw_gain = _strengths(model, self._sides, self._pendulum)
         self._hardest = LEAN / self._pendulum.lean_per_acceleration
+        self._behind = 0.0  # rad that it has turned too little
         self._rest()
         for name in self._sides:
             body.release(name, friction=0.0)  # the plugin takes it away, whatever the file says
@@ -64,9 +65,9 @@ class BalanceMover:
 
     def _rest(self) -> None:
         self._plan = Plan(self._hardest)
-        self._ahead = 0.0  # m that it is too far
-        self._turn = 0.0  # rad/s that it is to turn at now
-        self._behind = 0.0  # rad that it has turned too little
+        self._ahead: float = 0.0  # m that it is too far
+        self._turn: float = 0.0  # rad/s that it is to turn at now
+        self._behind = 0.0
 
     def _effort(self, state: tuple[float, float, float], dt: float) -> float:
         """The torque of both wheels: what the plan needs, and what mends the errors."""

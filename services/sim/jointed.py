@@ -121,12 +121,12 @@ class JointedBody(Body):
             self.go(name, mimic.multiplier * positions[mimic.joint] + mimic.offset, FOLLOWING)
 
     def _kept(self, number: int, joint: Joint, rate: float) -> float:
-        """`rate` within the limits of the joint, for the next step. A strong motor would tear it out of the engine's."""
+        """`rate` within the joint's limits, for the next step. A strong motor would tear it out of the engine's."""
         limits = joint.limits
         rate = clamp(rate, limits.velocity)
         if not (math.isfinite(limits.lower) and math.isfinite(limits.upper)):
             return rate
-        position = bullet.getJointState(self._body, number, self._world)[0]
+        position: float = bullet.getJointState(self._body, number, self._world)[0]
         return max((limits.lower - position) / self._dt, min((limits.upper - position) / self._dt, rate))
 
     def _motor(self, number: int, mode: int, **values: float) -> None:
