@@ -1,12 +1,13 @@
 """`holozen xacro`: expand a xacro file, without ROS."""
 
 import argparse
+import os
 import sys
 from pathlib import Path
 
-from holozen import flags
+from holozen import connection, flags
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.tell import say
 
 
@@ -16,25 +17,68 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("args", nargs="*", metavar="name:=value", help="values of its xacro:arg")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR")
+    watch = parser.add_argument_group("watch", "Expand again on every save, and put the robot anew into a running sim.")
+    watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
+    watch.add_argument("--name", type=flags.robot, metavar="NAME", help="the robot's name (default: as in the file)")
+    connection.add_arguments(parser)
     return parser
 
 
 def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
+    args = parser().parse_intermixed_args(argv)
     try:
-        text = expand(args.file, dict(map(_pair, args.args)), dict(args.package))
+        _check(args)
+        given = dict(map(_pair, args.args)), dict(args.package)
+        if args.watch:
+            from holozen.cli.xacro_watch import watch
+
+            return watch(args, *given)
+        text = expand_xacro(args.file, *given)
         if args.output:
-            args.output.write_text(text)
-    except (RobotError, OSError) as error:
+            write(args.output, text)
+        else:
+            _print(text)
+    except RobotError as error:
         say(f"holozen xacro: {error}")
         return 1
-    if not args.output:
-        sys.stdout.write(text)
     return 0
 
 
+def write(out: Path, text: str) -> None:
+    """Write the text to a file. Raises RobotError."""
+    try:
+        out.write_bytes(_encoded(text))
+    except OSError as error:
+        raise RobotError(f"cannot write {out}: {error.strerror}") from None
+
+
+def _print(text: str) -> None:
+    if sys.stdout is None:
+        raise RobotError("there is no standard output; write to a file with -o OUT")
+    try:
+        sys.stdout.buffer.write(_encoded(text))
+        sys.stdout.buffer.flush()
+    except BrokenPipeError:
+        raise  # the reader has seen enough
+    except OSError as error:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left would be tried again
+        raise RobotError(f"cannot write to standard output: {error.strerror}") from None
+
+
+def _encoded(text: str) -> bytes:
+    # Bytes of the environment that were no UTF-8 come out as they were.
+    return text.encode("utf-8", "surrogateescape")
+
+
+def _check(args: argparse.Namespace) -> None:
+    if args.name is not None and not args.watch:
+        raise RobotError("--name is for --watch; `holozen spawn FILE --name NAME` spawns once")
+    if args.output and args.output.exists() and args.file.exists() and args.output.samefile(args.file):
+        raise RobotError(f"-o {args.output} is the file that is expanded; write to another one")
+
+
 def _pair(text: str) -> tuple[str, str]:
-    name, assign, value = text.partition(":=")
+    name, assign, value = (part.strip() for part in text.partition(":="))
     if not assign or not name:
         raise RobotError(f"{text!r}: write name:=value")
     return name, value

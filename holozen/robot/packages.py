@@ -8,9 +8,10 @@ from collections.abc import Iterator, Mapping
 from itertools import takewhile
 from pathlib import Path
 
-from holozen.robot.errors import RobotError, listed
+from holozen.robot.errors import RobotError, listed, near
 
 PACKAGE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+_LARGEST = 1_000_000  # bytes of a package.xml
 
 
 def find_package(name: str, start: Path, given: Mapping[str, Path] = {}) -> Path:
@@ -106,8 +107,12 @@ def _children(folder: Path) -> list[Path]:
 
 def _name_in_package_xml(folder: Path) -> str | None:
     # A package.xml that cannot be read or parsed names nothing: it may belong to anybody.
+    path = folder / "package.xml"
     try:
-        name = ElementTree.parse(folder / "package.xml").getroot().findtext("name", "")
+        state = os.stat(path)
+        if not stat.S_ISREG(state.st_mode) or state.st_size > _LARGEST:
+            return None
+        name = ElementTree.parse(path).getroot().findtext("name", "")
     except (OSError, ElementTree.ParseError, ValueError):
         return None
     return name.strip() or None
@@ -119,4 +124,5 @@ def _unknown(name: str, start: Path, given: Mapping[str, Path]) -> str:
     return (
         f"{start}: there is no package {name!r}; packages found: {listed(list(known))};"
         f" looked in {', '.join(map(str, searched)) or 'no folder'}; say where it is: --package {name}=DIR"
+        f"{near(name, list(known))}"
     )

@@ -16,11 +16,9 @@ PLACES = {
     "zenoh": ["holozen/bus.py"],
     "pybullet": ["services/sim/engine.py"],
     "prompt_toolkit": ["services/teleop/"],
-    "numpy": [
-        f"holozen/robot/{name}.py" for name in ("collada", "hulls", "obj", "rigid", "rotation", "stl")
-    ],
+    "numpy": ["holozen/robot/", "services/sim/"],
     "collada": [],
-    "xacro": ["holozen/robot/xacro.py"],
+    "xacro": ["holozen/robot/xacro_child.py"],
     "pytest": ["holozen/testing/"],
     "hypothesis": [],
     "trimesh": [],

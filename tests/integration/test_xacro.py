@@ -1,14 +1,21 @@
-"""`holozen xacro` prints what the library expands."""
+"""`holozen xacro` prints what the library expands, and with --watch does so on every save."""
 
+import os
+import shutil
+import signal
 import subprocess
 import xml.etree.ElementTree as ET
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from holozen import data
 from holozen.robot.xacro import expand
+from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
+
+from .conftest import start_sim
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 ASKS = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -63,3 +70,113 @@ def test_what_is_wrong_is_told_in_one_line(
     said = [line for line in done.stderr.splitlines() if not line.startswith(("usage:", "   "))]
     assert len(said) == 1, done.stderr
     assert reason in said[0]
+
+
+def test_a_reader_that_has_seen_enough_is_no_failure() -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    done = subprocess.run(command("xacro", str(BOT)), stdout=writer, stderr=subprocess.PIPE, timeout=30)
+    os.close(writer)
+    assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.parametrize(
+    ("redirection", "told"),
+    [
+        (">/dev/full", "cannot write to standard output: No space left on device"),
+        (">&-", "there is no standard output; write to a file with -o OUT"),
+    ],
+)
+def test_an_output_that_takes_nothing_is_one_line(redirection: str, told: str) -> None:
+    words = ["sh", "-c", f'"$@" {redirection}', "sh", *command("xacro", str(BOT))]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=30)
+    assert (done.returncode, done.stderr) == (1, f"holozen xacro: {told}\n")
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Path:
+    """hb_bot in a folder of its own, with its materials and meshes."""
+    shutil.copytree(BOT.parent, tmp_path / "urdf")
+    shutil.copytree(data.find("meshes"), tmp_path / "meshes")
+    return tmp_path / "urdf" / BOT.name
+
+
+@pytest.fixture
+def watcher(robot: Path) -> Iterator[Process]:
+    """Writes robot.urdf next to the robot on every save."""
+    words = command("xacro", str(robot), "--watch", "-o", str(robot.with_name("robot.urdf")))
+    with Process(words) as process:
+        said(process, 1)
+        yield process
+
+
+def said(process: Process, count: int) -> str:
+    """The newest of `count` lines that it has written."""
+    wait_for(lambda: process.err.count("\n") >= count, what=lambda: f"line {count} of {process.err!r}")
+    lines = process.err.splitlines()
+    assert len(lines) == count, process.err
+    return lines[-1].removeprefix("holozen xacro: ")
+
+
+def test_every_save_is_one_line_and_a_new_text(robot: Path, watcher: Process) -> None:
+    text, out = robot.read_text(), robot.with_name("robot.urdf")
+    good = f"{robot} expanded, {out} written"
+    assert (said(watcher, 1), out.read_text()) == (good, expand(robot))
+    robot.write_text(text.replace("</robot>", '<link name="saved"/></robot>'))
+    assert (said(watcher, 2), '"saved"' in out.read_text()) == (good, True)
+    materials = robot.with_name("materials.xacro")
+    materials.write_text(materials.read_text().replace("</robot>", '<link name="included"/></robot>'))
+    assert (said(watcher, 3), '"included"' in out.read_text()) == (good, True)
+    (robot.parent / "new").write_text(text)
+    (robot.parent / "new").rename(robot)  # as many an editor saves
+    assert (said(watcher, 4), '"saved"' in out.read_text()) == (good, False)
+
+
+@pytest.mark.parametrize(
+    ("broken", "told"),
+    [
+        ("<robot", "line 1: broken XML: unclosed token"),
+        ('<robot name="${9**9**9}"/>', "the expression '9**9**9' takes longer than"),
+        ('<robot xmlns:xacro="x"><xacro:include filename="gone.xacro"/></robot>', "line 1: No such file or directory"),
+        (None, "No such file or directory"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_mended_by_the_next_save(
+    robot: Path, watcher: Process, broken: str | None, told: str
+) -> None:
+    text = robot.read_text()
+    if broken is None:
+        robot.unlink()
+    else:
+        robot.write_text(broken)
+    assert told in said(watcher, 2)
+    robot.write_text(text)
+    assert said(watcher, 3).startswith(f"{robot} expanded, ")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_watching_ends_in_peace(watcher: Process, number: signal.Signals) -> None:
+    watcher.signal(number)
+    assert watcher.wait() == 0
+    assert watcher.err.count("\n") == 1
+
+
+def test_a_robot_is_respawned_in_a_running_sim_on_every_save(robot: Path) -> None:
+    with Wire() as wire:
+        sim = start_sim(wire)
+        watcher = wire.start("xacro", str(robot), "--watch", "--name", "Fred")
+        told = f"{robot} expanded, Fred listens on Fred/cmd_vel"
+        assert said(watcher, 1) == told
+        robot.write_text(robot.read_text().replace("0.28", "0.27"))
+        assert said(watcher, 2) == told
+        wait_for(
+            lambda: sim.err.count("Fred was put into the world") + sim.out.count("Fred was put into the world") == 2
+        )
+        assert watcher.terminate() == 0
+
+
+def test_without_a_sim_the_watcher_says_so_and_goes_on(robot: Path) -> None:
+    with Wire() as wire:
+        watcher = wire.start("xacro", str(robot), "--watch")
+        assert said(watcher, 1).startswith(f"{robot} expanded, but no sim answered within ")
+        assert watcher.terminate() == 0

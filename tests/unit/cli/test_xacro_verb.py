@@ -35,11 +35,15 @@ def test_arguments_and_an_output_file_are_taken(file: Path, capsys: pytest.Captu
     ("words", "told"),
     [
         (["no/such.xacro"], "holozen xacro: no/such.xacro: "),
+        (["."], "holozen xacro: .: Is a directory\n"),
+        (["FILE", "-o", "."], "holozen xacro: cannot write .: Is a directory\n"),
+        (["FILE", "-o", "FILE"], "holozen xacro: -o "),
+        (["FILE", "--name", "Fred"], "holozen xacro: --name is for --watch; "),
         (["FILE", "name=Fred"], "holozen xacro: 'name=Fred': write name:=value\n"),
         (["FILE", ":=Fred"], "holozen xacro: ':=Fred': write name:=value\n"),
         (
             ["FILE", "-o", "no/such/folder/x"],
-            "holozen xacro: [Errno 2] No such file or directory: 'no/such/folder/x'\n",
+            "holozen xacro: cannot write no/such/folder/x: No such file or directory\n",
         ),
     ],
 )
@@ -49,3 +53,38 @@ def test_what_fails_is_one_line(file: Path, words: list[str], told: str, capsys:
     assert out == ""
     assert err.startswith(told)
     assert err.count("\n") == 1
+
+
+def test_values_may_stand_on_both_sides_of_the_flags(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = file.with_name("robot.urdf")
+    assert main(["xacro", str(file), "other:=1", "-o", str(out), " name := Fred "]) == 0
+    assert parse(out.read_text(), out).root == "Fred_link"
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        (b"", "robot.xacro, line 1: broken XML: no element found"),
+        (b"\x7fELF\xff\x00", "robot.xacro: byte 4 is not UTF-8 text; save the file as UTF-8"),
+        (b"\x00\x00", "robot.xacro, line 1: broken XML: not well-formed (invalid token)"),
+    ],
+)
+def test_a_file_of_something_else_is_one_line(
+    file: Path, content: bytes, told: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file.write_bytes(content)
+    assert main(["xacro", str(file)]) == 1
+    assert capsys.readouterr() == ("", f"holozen xacro: {file.parent}/{told}\n")
+
+
+def test_a_plain_urdf_goes_through_the_library_too(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    urdf = file.with_name("robot.urdf")
+    urdf.write_text('<robot name="r"><link name="${1+1}"/></robot>')
+    assert main(["xacro", str(urdf)]) == 0
+    assert '<link name="2"/>' in capsys.readouterr().out
+
+
+def test_text_that_is_not_ascii_comes_out_as_utf_8(file: Path, capsysbinary: pytest.CaptureFixture[bytes]) -> None:
+    file.write_text('<robot name="é"/>', encoding="utf-8")
+    assert main(["xacro", str(file)]) == 0
+    assert 'name="é"'.encode() in capsysbinary.readouterr().out

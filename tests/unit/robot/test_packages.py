@@ -1,5 +1,6 @@
 """A package is found by what is given, by the environment, by package.xml, and last by its place."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -107,6 +108,16 @@ def test_a_broken_package_xml_names_nothing(home: Path, broken: str) -> None:
     assert find_named("holo", start) is None
 
 
+def test_a_package_xml_that_is_no_file_of_a_sensible_size_names_nothing(home: Path) -> None:
+    start = robot_file(home / "holo")
+    xml = home / "holo" / "package.xml"
+    os.mkfifo(xml)
+    assert find_named("holo", start) is None
+    xml.unlink()
+    xml.write_text(f"<package><name>holo</name>{' ' * 1_000_000}</package>")
+    assert find_named("holo", start) is None
+
+
 def test_a_missing_package_is_named_with_those_found_and_the_places_searched(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -120,7 +131,8 @@ def test_a_missing_package_is_named_with_those_found_and_the_places_searched(
     searched = ("opt/ament", "opt/ros", "src/holo", "src", "")
     assert str(error.value) == (
         f"{start}: there is no package 'hollo'; packages found: from_ros, given, holo, wheels; looked in"
-        f" {', '.join(str(home / folder) for folder in searched)}; say where it is: --package hollo=DIR"
+        f" {', '.join(str(home / folder) for folder in searched)}; say where it is: --package hollo=DIR;"
+        " did you mean 'holo'?"
     )
 
 

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 import xacro as library
-from xacro import substitution_args
 
 from holozen.robot.errors import RobotError
 from holozen.robot.xacro import expand
@@ -81,14 +80,6 @@ def test_arguments_are_given_and_default(folder: Path) -> None:
     assert given == {"n": "b"}
 
 
-def test_the_library_is_left_as_it_was(folder: Path) -> None:
-    find = substitution_args._eval_find
-    expand(write(folder, '<link name="$(find holo)"/>'))
-    failure(write(folder, '<link name="${1/0}"/>'))
-    assert substitution_args._eval_find is find
-    assert "ament_index_python" not in sys.modules
-
-
 def test_one_failure_does_not_spoil_the_next_expansion(folder: Path) -> None:
     failure(write(folder, '<xacro:macro name="m"><a b="${nope}"/></xacro:macro><xacro:m/>', "bad.xacro"))
     told = failure(write(folder, '<link name="${nope}"/>'))
@@ -98,7 +89,7 @@ def test_one_failure_does_not_spoil_the_next_expansion(folder: Path) -> None:
 def test_an_unknown_package_is_told_with_the_way_out(home: Path, folder: Path) -> None:
     path = write(home, '<link name="$(find holo)"/>')
     told = failure(path)
-    assert told.startswith(f"{path}: there is no package 'holo'; packages found: none;")
+    assert told.startswith(f"{path}, line 2: there is no package 'holo'; packages found: none;")
     assert told.endswith("--package holo=DIR")
 
 
@@ -110,17 +101,19 @@ def test_broken_xml_is_told_with_its_line(folder: Path) -> None:
 def test_broken_xml_in_an_include_is_told_with_that_file_and_its_line(folder: Path) -> None:
     inner = write(folder, "<link", "inner.xacro")
     path = write(folder, '<xacro:include filename="inner.xacro"/>')
-    assert failure(path) == f"{inner}, line 3: broken XML: not well-formed (invalid token) (included from {path})"
+    assert failure(path) == f"{inner}, line 3: broken XML: not well-formed (invalid token) (included at {path}, line 2)"
 
 
 def test_a_bad_expression_is_told_with_the_chain_of_macros_and_includes(folder: Path) -> None:
-    macros = '<xacro:macro name="wheel" params="r"><xacro:rim r="${r}"/></xacro:macro>'
-    rim = '<xacro:macro name="rim" params="r"><link name="${r * widht}"/></xacro:macro>'
-    inner = write(folder, macros + rim + '<xacro:wheel r="2"/>', "wheels.xacro")
+    width = '<xacro:property name="width" value="1"/>'
+    wheel = '<xacro:macro name="wheel" params="r">\n<xacro:rim r="${r}"/></xacro:macro>'
+    rim = '<xacro:macro name="rim" params="r">\n<link name="${r * widht}"/></xacro:macro>'
+    inner = write(folder, f'{width}{wheel}{rim}\n\n<xacro:wheel r="2"/>', "wheels.xacro")
     path = write(folder, '<xacro:include filename="wheels.xacro"/>')
     assert failure(path) == (
-        f"{inner}: name 'widht' is not defined when evaluating expression 'r * widht'"
-        f" (in macro 'rim' of {inner}, in macro 'wheel' of {inner}, included from {path})"
+        f"{inner}, line 4: name 'widht' is not defined when evaluating expression 'r * widht'; did you mean 'width'?"
+        f" (in macro 'rim' called at {inner}, line 3, in macro 'wheel' called at {inner}, line 6,"
+        f" included at {path}, line 2)"
     )
 
 
@@ -158,12 +151,53 @@ def test_a_missing_include_under_a_given_package_guesses_nothing(folder: Path) -
 )
 def test_every_other_failure_is_one_line_with_the_file(folder: Path, body: str, told: str) -> None:
     line = failure(write(folder, body))
-    assert line.startswith(f"{folder}/robot.urdf.xacro: ") and told in line
+    assert line.startswith(f"{folder}/robot.urdf.xacro, line 2: ") and told in line
     assert len(line) < 1500
 
 
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        (
+            '<xacro:macro name="wheel"><a/></xacro:macro><xacro:wheell/>',
+            "unknown macro name: xacro:wheell; did you mean 'wheel'?",
+        ),
+        ('<xacro:property name="width" value="1"/><l n="${widht}"/>', "'widht'; did you mean 'width'?"),
+        ('<xacro:arg name="side" default="1"/><l n="$(arg sied)"/>', "default in <xacro:arg>; did you mean 'side'?"),
+        (
+            '<xacro:macro name="m" params="radius *b"><a/></xacro:macro><xacro:m raduis="1"/>',
+            "Invalid parameter \"raduis\"; did you mean 'radius'?",
+        ),
+        (
+            '<xacro:macro name="m" params="radius *b"><a/></xacro:macro><xacro:m/>',
+            "Not enough blocks; xacro:m takes radius, b",
+        ),
+        ('<xacro:property name="b"><a/></xacro:property><xacro:insert_block name="c"/>', 'Undefined block "c"'),
+    ],
+)
+def test_a_misspelt_name_is_told_with_one_that_looks_alike(folder: Path, body: str, told: str) -> None:
+    assert failure(write(folder, body)).endswith(told)
+
+
+def test_the_line_is_that_of_the_element_also_in_a_block_and_under_a_condition(folder: Path) -> None:
+    bad = '<link\n name="${nope}"/>'
+    for body in (f'<xacro:if value="1">\n{bad}</xacro:if>', f"<a/>\n{bad}", f"<a>\n{bad}</a>"):
+        assert failure(write(folder, body)).startswith(f"{folder}/robot.urdf.xacro, line 3: ")
+    block = f'<xacro:macro name="m" params="*b"><xacro:insert_block name="b"/></xacro:macro><xacro:m>\n{bad}</xacro:m>'
+    assert failure(write(folder, block)).startswith(f"{folder}/robot.urdf.xacro, line 3: ")
+
+
+@pytest.mark.parametrize("call", ["<xacro:m/>", '<xacro:include filename="inner.xacro"/>'])
+def test_after_a_call_or_an_include_the_place_is_the_callers_again(folder: Path, call: str) -> None:
+    write(folder, "\n\n<a/>", "inner.xacro")
+    told = failure(write(folder, f'<xacro:macro name="m">\n<a/></xacro:macro>\n{call}${{nope}}'))
+    assert told.startswith(f"{folder}/robot.urdf.xacro, line 4: ")
+    assert "inner" not in told and "macro 'm'" not in told
+
+
 def test_an_unknown_macro_is_told_without_anything_around_it(folder: Path) -> None:
-    assert failure(write(folder, "<xacro:wheel/>")) == f"{folder}/robot.urdf.xacro: unknown macro name: xacro:wheel"
+    told = f"{folder}/robot.urdf.xacro, line 2: unknown macro name: xacro:wheel"
+    assert failure(write(folder, "<xacro:wheel/>")) == told
 
 
 def test_a_long_chain_is_cut(folder: Path) -> None:

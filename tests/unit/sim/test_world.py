@@ -163,6 +163,21 @@ def test_a_robot_that_is_no_longer_driven_is_stopped_by_the_next_command(world: 
     assert pose(base) == pytest.approx(before, abs=1e-6)
 
 
+@pytest.mark.parametrize("name", ["hb_bot", "off-centre"])
+def test_a_robot_that_is_told_to_stand_holds_its_place_on_a_slope(name: str) -> None:
+    steep = 0.25  # rad
+    gravity = (9.8 * math.sin(steep), 0, -9.8 * math.cos(steep))  # as seen from the slope
+    with closing(World(WorldSpec(gravity=gravity, ground=True))) as world:
+        base = world.add(BODIES[name], (0, 0, 0))
+        run(world, (base, STOP), seconds=2)
+        run(world, (base, (-0.5, 0, 0)), seconds=1)
+        run(world, (base, STOP), seconds=1)
+        start = pose(base)
+        run(world, (base, STOP), seconds=10)
+        assert pose(base) == pytest.approx(start, abs=1e-4)
+        assert base.velocity(DT) == pytest.approx(STOP, abs=1e-4)
+
+
 def test_a_robot_pushes_what_is_not_driven(world: World) -> None:
     pusher, pushed = world.add(HB_BOT, (0, 0, 0)), world.add(HB_BOT, (1.7, 0, 0))
     run(world, (pusher, (0.5, 0, 0)), seconds=2)

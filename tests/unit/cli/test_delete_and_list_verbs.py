@@ -1,0 +1,70 @@
+"""`holozen list` shows what is in the world, `holozen delete` takes it out."""
+
+import json
+import math
+from collections.abc import Callable
+
+import pytest
+
+from holozen import simulation_interfaces as si
+from holozen.errors import ServiceError
+from holozen.messages import Quaternion
+
+from .conftest import FakeSim
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+def test_names_are_listed_with_their_places(sim: FakeSim, run: Run) -> None:
+    sim.put("hb_bot", 1, -2.5, -0.04, Quaternion(0, 0, math.sin(0.5), math.cos(0.5)))
+    sim.put("Fred", -1e-9, 0, 0, Quaternion(0, 0, -1e-9, 1))
+    lines = ("Fred    x 0.000  y 0.000  z 0.000 m  yaw 0.0 deg", "hb_bot  x 1.000  y -2.500  z -0.040 m  yaw 57.3 deg")
+    assert run("list") == (0, "".join(f"{line}\n" for line in lines), "")
+
+
+def test_as_json_they_are_names_and_poses(sim: FakeSim, run: Run) -> None:
+    assert run("list", "--json") == (0, "[]\n", "")
+    sim.put("Fred", 1)
+    (entity,) = json.loads(run("list", "--json")[1])
+    assert entity["name"] == "Fred"
+    assert entity["pose"] == {"position": {"x": 1, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
+
+
+def test_an_empty_world_says_how_to_fill_it(sim: FakeSim, run: Run) -> None:
+    told = "the world is empty; holozen spawn FILE --name NAME puts a robot there\n"
+    assert run("list") == (0, "", told)
+
+
+def test_one_that_goes_while_it_is_listed_is_left_out(sim: FakeSim, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    sim.put("Fred")
+    sim.put("gone")
+
+    def refuse(request: si.GetEntityStateRequest) -> str:
+        if request.entity == "gone":
+            raise ServiceError("there is no entity 'gone'")
+        return request.entity
+
+    monkeypatch.setattr(sim, "known", refuse)
+    assert run("list")[1].startswith("Fred ") and run("list")[1].count("\n") == 1
+
+
+def test_several_are_deleted(sim: FakeSim, run: Run) -> None:
+    for name in ("Fred", "Bob", "box"):
+        sim.put(name)
+    assert run("delete", "Fred", "box") == (0, "Fred is deleted\nbox is deleted\n", "")
+    assert list(sim.entities) == ["Bob"]
+
+
+def test_an_unknown_one_is_told_in_the_sim_s_words_and_the_others_go(sim: FakeSim, run: Run) -> None:
+    sim.put("Fred")
+    sim.put("Bob")
+    told = "holozen delete: there is no entity 'nobody'; there are Fred, Bob\n"
+    assert run("delete", "nobody", "Bob") == (1, "Bob is deleted\n", told)
+
+
+@pytest.mark.parametrize("name", ["*", "a/b", "", "9"])
+def test_an_illegal_name_is_wrong_usage_and_asks_nothing(sim: FakeSim, run: Run, name: str) -> None:
+    sim.put("Fred")
+    code, _, told = run("delete", "Fred", name)
+    assert code == 2 and f"robot name {name!r}: use a letter" in told
+    assert sim.log == []

@@ -1,0 +1,230 @@
+"""`holozen spawn`: the file is read here, and the sim gets a text, a name and a pose."""
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import trimesh
+
+from holozen.bus import Bus
+from holozen.cli.spawn import Place, spawn_file
+from holozen.errors import ServiceError
+from holozen.messages import Point, Pose, Quaternion
+from holozen.robot.errors import RobotError
+from holozen.robot.model import parse
+from holozen.robot.tag import read_xml
+from holozen.testing import Wire
+
+from .conftest import FakeSim
+
+Run = Callable[..., tuple[int, str, str]]
+REPO = Path(__file__).parents[3]
+HB_BOT = REPO / "urdf" / "hb_bot.urdf.xacro"
+BALL = '<collision><geometry><sphere radius="%s"/></geometry></collision>'
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+
+
+def ball(folder: Path, radius: str = "0.5", name: str = "ball", more: str = "") -> Path:
+    """A robot that is a ball, without a drive."""
+    path = folder / "ball.urdf"
+    path.write_text(f'<robot name="{name}"><link name="b&amp;c">{INERTIAL}{BALL % radius}</link>{more}</robot>')
+    return path
+
+
+def pose(sim: FakeSim, name: str) -> Pose:
+    return sim.entities[name].initial_pose.pose
+
+
+def place(sim: FakeSim, name: str) -> tuple[float, float, float, float]:
+    at = pose(sim, name)
+    return at.position.x, at.position.y, at.position.z, at.orientation.yaw()
+
+
+def test_a_robot_is_sent_under_its_name_and_put_on_the_ground(sim: FakeSim, run: Run) -> None:
+    assert run("spawn", HB_BOT, "--name", "Fred") == (0, "Fred listens on Fred/cmd_vel\n", "")
+    assert place(sim, "Fred") == pytest.approx((0, 0, -0.04, 0))
+    text = sim.entities["Fred"].resource_string
+    assert parse(text, Path("/elsewhere")).drive is not None and "${" not in text
+
+
+def test_without_a_name_it_has_that_of_its_file(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    assert run("spawn", ball(tmp_path)) == (0, "ball stands at 0.000 0.000 0.500\n", "")
+    assert list(sim.entities) == ["ball"]
+
+
+def test_it_goes_where_it_is_told(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    code, out, _ = run("spawn", ball(tmp_path), "-x", "1", "-y", "-2", "-z", "-0.5", "-Y", "1.5")
+    assert (code, out) == (0, "ball stands at 1.000 -2.000 -0.500\n")
+    assert place(sim, "ball") == pytest.approx((1, -2, -0.5, 1.5))
+    assert run("spawn", ball(tmp_path), "-x", "-1e-3", "-y", "-.5", "-z=-0", "--name", "b")[0] == 0
+    assert place(sim, "b") == pytest.approx((-0.001, -0.5, 0, 0))
+
+
+def test_an_object_of_an_sdf_file_goes_where_its_file_says(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "crate.sdf"
+    box = '<collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision>'
+    link = f'<link name="a"><inertial><mass>1</mass></inertial>{box}</link>'
+    path.write_text(f'<sdf version="1.6"><model name="crate"><pose>1 2 3 0 0 0.5</pose>{link}</model></sdf>')
+    assert run("spawn", path)[:2] == (0, "crate stands at 1.000 2.000 3.000\n")
+    assert place(sim, "crate") == pytest.approx((1, 2, 3, 0.5))
+    run("spawn", path, "-y", "0", "-z", "0.5", "--drive", "planar_move", "--name", "b")
+    assert place(sim, "b") == pytest.approx((1, 0, 0.5, 0.5))
+    assert parse(sim.entities["b"].resource_string, Path("/elsewhere")).drive is not None
+
+
+def test_a_turned_robot_stands_on_what_is_then_its_lowest_point(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "box.urdf"
+    box = '<collision><geometry><box size="1 2 3"/></geometry></collision>'
+    path.write_text(f'<robot name="box"><link name="a">{INERTIAL}{box}</link></robot>')
+    for flags, height in (((), 1.5), (("-R", math.pi / 2), 1.0), (("-P", math.pi / 2), 0.5), (("-Y", 1), 1.5)):
+        assert run("spawn", path, "--replace", *flags, "-x", 0)[0] == 0
+        assert pose(sim, "box").position.z == pytest.approx(height)
+
+
+@pytest.mark.parametrize(
+    "words", [("-urdf", "-file", HB_BOT, "-model", "Fred"), ("-file", HB_BOT, "-entity", "Fred", "-x", "0")]
+)
+def test_the_words_of_spawn_model_and_spawn_entity_are_understood(
+    sim: FakeSim, run: Run, words: tuple[str, ...]
+) -> None:
+    assert run("spawn", *words)[0] == 0
+    assert list(sim.entities) == ["Fred"]
+
+
+def test_values_of_xacro_args_may_stand_anywhere(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "ball.xacro"
+    link = f'<link name="a">{INERTIAL}{BALL % "$(arg r)"}</link>'
+    path.write_text(
+        f'<robot name="b" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:arg name="r" default="1"/>{link}</robot>'
+    )
+    for words in ((path, "r:=2", "--name", "a"), ("r:=2", path, "--name", "b"), (path, "--name", "c", "r:=2")):
+        assert run("spawn", *words)[0] == 0
+    assert {pose(sim, name).position.z for name in "abc"} == {2}
+
+
+def test_a_robot_without_a_drive_gets_one_when_asked(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    assert run("spawn", ball(tmp_path), "--drive", "planar_move") == (0, "ball listens on ball/cmd_vel\n", "")
+    drive = parse(sim.entities["ball"].resource_string, Path("/elsewhere")).drive
+    assert drive is not None and drive.robot_base_frame == "b&c"
+
+
+def test_a_robot_with_a_drive_keeps_it(sim: FakeSim, run: Run) -> None:
+    code, out, told = run("spawn", HB_BOT, "--name", "Fred", "--drive", "planar_move")
+    assert (code, out) == (0, "Fred listens on Fred/cmd_vel\n")
+    assert told == f"holozen spawn: {HB_BOT}: has a drive of its own, which is used; --drive planar_move is not\n"
+    assert sim.entities["Fred"].resource_string.count("planar_move") == parse_count(HB_BOT)
+
+
+def parse_count(path: Path) -> int:
+    return path.read_text().count("planar_move")
+
+
+def test_collision_meshes_travel_in_the_text(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
+    mesh = '<collision><geometry><mesh filename="package://p/box.stl"/></geometry></collision>'
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="r"><link name="a">{INERTIAL}{mesh}</link></robot>')
+    assert run("spawn", path, "--package", f"p={tmp_path}") == (0, "r stands at 0.000 0.000 1.500\n", "")
+    tag = next(read_xml(sim.entities["r"].resource_string, "sent").below("mesh"))
+    assert tag.attributes["filename"].startswith("data:model/stl;base64,")
+
+
+LOST = '<link name="l"><collision><geometry><mesh filename="gone.stl"/></geometry></collision></link>'
+LOST += '<joint name="j" type="fixed"><parent link="b&amp;c"/><child link="l"/></joint>'
+
+
+def test_warnings_are_told_here_once_with_their_line_and_are_errors_in_strict(
+    sim: FakeSim, run: Run, tmp_path: Path
+) -> None:
+    path = ball(tmp_path, more=LOST)
+    code, _, told = run("spawn", path)
+    assert code == 0
+    assert told.startswith(f"holozen spawn: {path}, line 1: <mesh> of <link name='l'> (collision) is replaced by a box")
+    assert told.count("\n") == told.count("gone.stl': ") + 1 == 1
+    code, _, told = run("spawn", path, "--name", "b", "--strict")
+    assert code == 1 and told.startswith(
+        f"holozen spawn: {path}, line 1: <mesh> of <link name='l'> (collision): no such"
+    )
+    assert list(sim.entities) == ["ball"]
+
+
+def test_a_wrong_file_is_told_and_nothing_is_asked(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    (tmp_path / "broken.urdf").write_text("<robot>\n<link")
+    sim.put("Fred")
+    for name, told in (("gone.urdf", "No such file"), ("broken.urdf", "line 2: broken XML"), (".", "Is a directory")):
+        code, out, said = run("spawn", tmp_path / name, "--name", "Fred", "--replace")
+        assert (code, out, said.count("\n")) == (1, "", 1)
+        assert said.startswith(f"holozen spawn: {tmp_path}") and told in said
+    assert sim.log == []
+
+
+def test_an_illegal_name_is_refused(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    code, _, told = run("spawn", HB_BOT, "--name", "a/b")
+    assert code == 2 and "robot name 'a/b': use a letter" in told
+    code, _, told = run("spawn", ball(tmp_path, name="my robot"))
+    assert code == 1
+    assert told.startswith(f"holozen spawn: {tmp_path}/ball.urdf: robot name 'my robot': use a letter")
+    assert told.endswith("; give one with --name\n")
+
+
+@pytest.mark.parametrize(
+    "words", [(), ("a.urdf", "b.urdf"), ("a:=1",), ("a.urdf", "-x", "far"), ("a.urdf", "-z", "nan")]
+)
+def test_words_that_say_nothing_are_wrong_usage(run: Run, words: tuple[str, ...]) -> None:
+    code, out, told = run("spawn", *words)
+    assert (code, out) == (2, "") and "usage: holozen spawn" in told and "Traceback" not in told
+
+
+def test_what_the_sim_refuses_is_told_in_its_own_words(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    sim.put("ball")
+    assert run("spawn", ball(tmp_path)) == (1, "", "holozen spawn: there is an entity 'ball' already\n")
+
+
+def test_without_a_sim_it_says_how_to_start_one(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("holozen.entities.NOTICE", 0.2)
+    told = "no sim answered within 0.2 s; start one in another terminal: holozen sim"
+    assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {told}\n")
+    assert run("list") == (1, "", f"holozen list: {told}\n")
+    assert run("delete", "Fred", "Bob") == (1, "", f"holozen delete: {told}\n")
+
+
+def test_replaced_it_keeps_its_place(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    sim.put("ball", 1, 2, 7, Quaternion(0, 0, math.sin(0.5), math.cos(0.5)))
+    assert run("spawn", ball(tmp_path), "--replace")[0] == 0
+    assert place(sim, "ball") == pytest.approx((1, 2, 7, 1))
+    assert sim.log == ["delete", "spawn"]
+
+
+def test_replaced_by_a_larger_one_it_is_lifted_out_of_the_ground(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    sim.put("ball", 1, 2, 0.5)
+    run("spawn", ball(tmp_path, "0.8"), "--replace")
+    assert place(sim, "ball") == pytest.approx((1, 2, 0.8, 0))
+
+
+def test_replaced_with_a_place_it_goes_there(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    sim.put("ball", 1, 2, 7)
+    run("spawn", ball(tmp_path), "--replace", "-x", "3")
+    assert place(sim, "ball") == pytest.approx((3, 0, 0.5, 0))
+
+
+def test_replace_without_an_old_one_is_a_plain_spawn(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    assert run("spawn", ball(tmp_path), "--replace")[0] == 0
+    assert sim.log == ["spawn"]
+
+
+def test_a_refusal_after_the_old_one_is_gone_says_so(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    sim.put("ball")
+    sim.refusal = "too heavy"
+    assert run("spawn", ball(tmp_path), "--replace")[2] == "holozen spawn: too heavy; the ball before it is deleted\n"
+
+
+def test_from_python_a_file_is_spawned_and_replaced(sim: FakeSim, wire: Wire, tmp_path: Path) -> None:
+    bus: Bus = wire.bus("watch")
+    assert spawn_file(bus, ball(tmp_path), "Fred", Place(x=1)) == "Fred stands at 1.000 0.000 0.500"
+    with pytest.raises(ServiceError, match="there is an entity 'Fred' already"):
+        spawn_file(bus, ball(tmp_path), "Fred")
+    assert spawn_file(bus, ball(tmp_path, "0.6"), "Fred", replace=True) == "Fred stands at 1.000 0.000 0.600"
+    with pytest.raises(RobotError):
+        spawn_file(bus, ball(tmp_path, "0"), "Fred", replace=True)
+    assert pose(sim, "Fred").position == Point(1, 0, 0.6)
