@@ -17,6 +17,7 @@ PACKAGES = {
     "docker": "docker.io",
     "docker-compose": "docker-compose",
     "ip": "iproute2",
+    "setpriv": "util-linux",
     "ss": "iproute2",
     "unshare": "util-linux",
 }

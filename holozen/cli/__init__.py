@@ -12,7 +12,11 @@ VERBS = {
     "controller": "drive a robot to the goals of next_goal",
     "pose-service": "answer next_goal and get_pose",
     "router": "run a Zenoh router",
+    "spawn": "put a robot or object into the sim",
+    "delete": "take it out again",
+    "list": "the robots and objects in the sim, and where they are",
     "xacro": "expand a xacro file",
+    "check": "say what is wrong with a robot file",
     "topic": "list, info, echo, hz, pub",
     "service": "list, call",
     "node": "list",
@@ -27,7 +31,7 @@ def main(argv: list[str] | None = None) -> int:
         try:
             return _main(sys.argv[1:] if argv is None else argv)
         finally:
-            sys.stdout.flush()  # a reader that is gone shows here, and not at the interpreter's end
+            _ = sys.stdout and sys.stdout.flush()  # a reader that is gone shows here, and not at the interpreter's end
     except BrokenPipeError:
         # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

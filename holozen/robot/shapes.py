@@ -1,13 +1,17 @@
 """URDF's visual and collision elements -> shapes."""
 
-from pathlib import Path
+import os
+from dataclasses import replace
 
 from holozen.robot.errors import RobotError
-from holozen.robot.parts import Pose, Shape
+from holozen.robot.parts import Color, Pose, Shape
+from holozen.robot.placeholder import placeholder
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag, Vector
-from holozen.robot.uris import resolve_uri
+from holozen.robot.uris import is_data, resolve_uri
 
+MOST_MESHES = 200  # of a text that came over the wire: each takes up to 1 ms of the sim's loop
+MOST_BYTES = 5_000_000  # of a file that such a text names: 0.3 s
 SMALLEST = 1e-6  # of a size in metres, and of a mesh's scale
 
 SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
@@ -23,8 +27,60 @@ def read_shape(tag: Tag, source: Source) -> Shape:
         raise geometry.wrong(f"holds {found}; it has to hold <box>, <cylinder>, <sphere> or <mesh>")
     shape = known[0]
     if shape.name == "mesh":
-        return Shape("mesh", _scale(shape), read_pose(tag), _mesh(shape, tag.name, source))
+        return mesh_shape(shape, shape.word("filename"), _scale(shape), read_pose(tag), tag.name, source)
     return Shape(shape.name, _size(shape), read_pose(tag))
+
+
+def mesh_shape(
+    tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Source, color: Color | None = None
+) -> Shape:
+    """The mesh that `uri` names, for a visual or collision (`use`) of a link around `tag`, in URDF or SDF.
+
+    A collision mesh is read, a visual one only found. A mesh that is missing or bad makes a warning and a box in its
+    place, or with `source.strict` a RobotError. Of a text that came over the wire visual meshes are not even
+    looked for.
+    """
+    if use == "visual" and source.confined:
+        return Shape("mesh", scale, pose, color=color)
+    try:
+        shape = _found(tag, uri, scale, pose, use, source)
+    except RobotError as error:
+        if source.strict:
+            raise tag.wrong(f"({use}): {error}") from None
+        shape = placeholder(tag, pose)
+        size = " x ".join(f"{edge:.3g}" for edge in shape.size)
+        source.warn(tag, f"({use}) is replaced by a box of {size} m: {error}")
+    return replace(shape, color=color)
+
+
+def solid(shape: Shape) -> Shape:
+    """What the sim takes: the convex hull of a mesh that was found; any other shape as it is. Raises RobotError."""
+    if shape.kind != "mesh" or shape.path is None:
+        return shape
+    from holozen.robot.meshes import hull
+
+    x, y, z = shape.size
+    return replace(shape, kind="hull", size=(), points=hull(shape.path, (x, y, z)))
+
+
+def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Source) -> Shape:
+    source.meshes += 1
+    if source.confined and source.meshes > MOST_MESHES:
+        raise RobotError(f"is number {source.meshes}; of a text that was sent {MOST_MESHES} collision meshes are read")
+    if is_data(uri):
+        from holozen.robot.meshes import data_hull
+
+        return Shape("hull", (), pose, points=data_hull(uri, scale))
+    path = resolve_uri(
+        uri, source.origin, source.packages, source.confined, lambda taken: source.warn(tag, f"({use}): {taken}")
+    )
+    if use == "collision":
+        from holozen.robot.meshes import hull
+
+        if source.confined and os.path.getsize(path) > MOST_BYTES:
+            raise RobotError(f"{path}: is too large to be read here; send the mesh itself (holozen spawn does)")
+        hull(path, scale)  # here a bad one can be told with its line; `solid` does not read it again
+    return Shape("mesh", scale, pose, path)
 
 
 def needed(tag: Tag, name: str) -> Tag:
@@ -55,12 +111,3 @@ def _scale(tag: Tag) -> Vector:
     if min(abs(factor) for factor in scale) < SMALLEST:
         raise tag.wrong(f"has the scale {scale}; a zero leaves nothing of the mesh (below zero mirrors it)")
     return scale
-
-
-def _mesh(tag: Tag, use: str, source: Source) -> Path | None:
-    uri = tag.word("filename")
-    try:
-        return resolve_uri(uri, source.origin, source.packages)
-    except RobotError as error:
-        source.warn(tag, f"({use}) is left out: {error}")
-        return None

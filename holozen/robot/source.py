@@ -25,6 +25,7 @@ class Source:
     guesses: int = 0
     strict: bool = False
     confined: bool = False
+    meshes: int = 0
 
     def warn(self, tag: Tag, problem: str) -> None:
         """Notes a mistake that a robot can be driven with."""

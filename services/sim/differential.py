@@ -11,6 +11,8 @@ from .engine import Rotation, Vector
 from .jointed import JointedBody
 from .wheels import forward_sign, radius_of
 
+SLACK = 0.1  # m/s by which a rim may lag behind what it was told
+
 
 class WheelMover:
     """A differential or skid-steered base. Forward is where x points, whichever way a wheel's axis does."""
@@ -23,19 +25,25 @@ class WheelMover:
         self._separation = mechanism.separation or separation_of(model, mechanism)
         self._radius = mechanism.radius or radius_of(model, model.joints[mechanism.left[0]].child)
         self._odometer = Odometer()
+        self._rims = (0.0, 0.0)  # m/s that the left and the right wheels were told
 
     def move(self, velocity: Planar, dt: float) -> None:
         """Turn the wheels. Sideways it cannot go."""
         x, _, turn = velocity
         half = turn * self._separation / 2
-        most = self._mechanism.acceleration * dt
-        now = dict(zip(self.names, self.body.states()[1], strict=True)) if math.isfinite(most) else {}
-        for names, wanted in ((self._mechanism.left, x - half), (self._mechanism.right, x + half)):
+        self._rims = self._ramped((x - half, x + half), self._mechanism.acceleration * dt)
+        for names, speed in zip((self._mechanism.left, self._mechanism.right), self._rims, strict=True):
             for name in names:
-                sign = self._signs[name]
-                rim = sign * now[name] * self._radius if now else wanted
-                speed = rim + clamp(wanted - rim, most)
-                self.body.turn(name, sign * speed / self._radius, self._mechanism.torque)
+                self.body.turn(name, self._signs[name] * speed / self._radius, self._mechanism.torque)
+
+    def _ramped(self, wanted: tuple[float, float], most: float) -> tuple[float, float]:
+        """The speeds of both sides' rims for the next step, in which they change by no more than `most`, in m/s."""
+        if math.isinf(most):
+            return wanted
+        now = self._sides(dict(zip(self.names, self.body.states()[1], strict=True)))
+        # What holds the wheels back holds the ramp back, too; but small differences would turn the robot.
+        left, right = (n + clamp(rim - n, SLACK) for n, rim in zip(now, self._rims, strict=True))
+        return left + clamp(wanted[0] - left, most), right + clamp(wanted[1] - right, most)
 
     def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
         """The true pose, or what the wheels' encoders make of it, as the file wants."""

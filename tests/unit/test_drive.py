@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.drive import Wheel, to_body, to_world, wheel_rate
+from holozen.drive import Wheel, mecanum_rates, to_body, to_world, wheel_rate
 
 speeds = st.floats(-5, 5)
 angles = st.floats(-10, 10)
@@ -61,3 +61,23 @@ def test_the_wheel_turns_by_the_way_it_rolls(
     way = (centre(dt) - centre(-dt)) / (2 * dt)
     rolling = np.cross([wheel.ax, wheel.ay, 0], [0, 0, 1])
     assert wheel_rate((x, y, turn), wheel) == pytest.approx(way @ rolling / radius, abs=1e-5 / radius)
+
+
+CORNERS = [(1, 1), (1, -1), (-1, 1), (-1, -1)]
+"""Front and left (1) or back and right (-1) of the wheels, in the order of `mecanum_rates`."""
+
+
+@given(speeds, speeds, speeds, st.floats(0.05, 1), st.floats(0.05, 1), st.floats(0.02, 0.5))
+def test_a_mecanum_wheel_rolls_what_its_rollers_cannot(
+    x: float, y: float, turn: float, length: float, width: float, radius: float
+) -> None:
+    """Along its axle a roller on the ground does not slip: there rim and ground are equally fast."""
+    rates = mecanum_rates((x, y, turn), length + width, radius)
+    for rate, (front, left) in zip(rates, CORNERS, strict=True):
+        ground = np.array([x - turn * left * width, y + turn * front * length])
+        axle = np.array([1, -front * left]) / math.sqrt(2)  # of the roller that touches the ground
+        assert rate * radius * axle[0] == pytest.approx(ground @ axle, abs=1e-9)
+
+
+def test_a_mecanum_base_goes_left_on_crossed_wheels() -> None:
+    assert mecanum_rates((0, 0.3, 0), 0.5, 0.1) == pytest.approx((-3, 3, 3, -3))

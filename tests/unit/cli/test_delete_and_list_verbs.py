@@ -23,9 +23,10 @@ def test_names_are_listed_with_their_places(sim: FakeSim, run: Run) -> None:
 
 
 def test_as_json_they_are_names_and_poses(sim: FakeSim, run: Run) -> None:
-    assert run("list", "--json") == (0, "[]\n", "")
+    assert run("list", "--json") == (0, "", "")
     sim.put("Fred", 1)
-    (entity,) = json.loads(run("list", "--json")[1])
+    sim.put("Ann")
+    _, entity = [json.loads(line) for line in run("list", "--json")[1].splitlines()]
     assert entity["name"] == "Fred"
     assert entity["pose"] == {"position": {"x": 1, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
 

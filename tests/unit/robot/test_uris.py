@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from holozen.data import find
 from holozen.robot.errors import RobotError
-from holozen.robot.uris import resolve_uri
+from holozen.robot.uris import MODEL_PATHS, resolve_uri
 
 
 @pytest.fixture
@@ -116,3 +117,93 @@ def test_nothing_is_fetched_from_elsewhere(start: Path, uri: str) -> None:
 def test_a_package_uri_has_to_name_its_package(start: Path) -> None:
     with pytest.raises(RobotError, match="'' is no package name"):
         resolve_uri("package:///meshes/base.dae", start)
+
+
+@pytest.mark.parametrize("variable", MODEL_PATHS)
+def test_a_model_is_found_in_the_folders_that_gazebo_is_told(
+    start: Path, home: Path, variable: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesh = home / "models" / "cafe" / "meshes" / "cafe.dae"
+    mesh.parent.mkdir(parents=True)
+    mesh.touch()
+    monkeypatch.setenv(variable, f":relative:{home}/nowhere:{home}/models")
+    assert resolve_uri("model://cafe/meshes/cafe.dae", start) == mesh
+
+
+def test_what_was_taken_for_another_file_is_told(start: Path, home: Path) -> None:
+    told: list[str] = []
+    found = resolve_uri("/home/asha/wheel.stl", start, tell=told.append)
+    assert told == [f"there is no file '/home/asha/wheel.stl'; {found} is taken, which has its name"]
+    resolve_uri(str(found), start, tell=told.append)
+    assert len(told) == 1
+
+
+def confined(uri: str, start: Path, given: Path) -> Path | None:
+    """What a text that came over the wire finds when the package `holo` is given."""
+    try:
+        return resolve_uri(uri, start, {"holo": given}, confined=True)
+    except RobotError as error:
+        assert "send the mesh itself (holozen spawn does)" in str(error) or "no package" in str(error)
+        return None
+
+
+def test_a_confined_text_finds_files_of_known_packages(start: Path, home: Path) -> None:
+    mesh = home / "holo" / "meshes" / "base.dae"
+    for uri in ("package://holo/meshes/base.dae", "model://holo/meshes/base.dae", str(mesh), f"file://{mesh}"):
+        assert confined(uri, start, home / "holo") == mesh
+
+
+@pytest.mark.parametrize("variable", ["ROS_PACKAGE_PATH", "GZ_SIM_RESOURCE_PATH"])
+def test_a_confined_text_finds_files_of_the_environment_s_packages(
+    start: Path, home: Path, variable: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(variable, str(home))
+    assert resolve_uri("package://wheels/meshes/wheel.stl", start, confined=True).name == "wheel.stl"
+
+
+def test_a_confined_text_finds_the_meshes_that_holozen_has(start: Path) -> None:
+    mesh = find("meshes", "wheel.stl")
+    assert resolve_uri(f"file://{mesh}", start, confined=True) == mesh
+
+
+@pytest.mark.parametrize(
+    "uri",
+    [
+        "/etc/passwd",
+        "file:///etc/passwd",
+        "package://holo/../wheels/meshes/wheel.stl",
+        "package://holo/..%2Fwheels/meshes/wheel.stl",
+        "package://holo/meshes/out.stl",
+        "package://holo/%00",
+        "package://holo//etc/passwd",
+        "package://../wheels/meshes/wheel.stl",
+        "package://wheels/meshes/wheel.stl",
+        "package://holozen/nothing.stl",
+        "model://../x",
+        "../meshes/base.dae",
+        "meshes/base.dae",
+        "file://meshes/base.dae",
+        "C:/holo/meshes/base.dae",
+        "/home/asha/base.dae",
+        "/",
+        "",
+    ],
+)
+def test_a_confined_text_finds_nothing_else(start: Path, home: Path, uri: str) -> None:
+    (home / "holo" / "meshes" / "out.stl").symlink_to(home / "wheels" / "meshes" / "wheel.stl")
+    assert confined(uri, start, home / "holo") is None
+
+
+def test_a_relative_path_means_nothing_to_a_confined_text(start: Path, home: Path) -> None:
+    with pytest.raises(RobotError, match="is a path that means nothing here; send the mesh itself"):
+        resolve_uri(f"{home}/holo/meshes/base.dae"[1:], start, {"holo": home / "holo"}, confined=True)
+
+
+def test_a_package_beside_another_with_a_longer_name_is_outside_of_it(start: Path, home: Path) -> None:
+    (home / "holo2").mkdir()
+    (home / "holo2" / "a.stl").touch()
+    assert confined(f"{home}/holo2/a.stl", start, home / "holo") is None
+
+
+def test_the_whole_disk_is_no_known_folder(start: Path) -> None:
+    assert confined("/etc/passwd", start, Path("/")) is None

@@ -1,0 +1,1 @@
+"""What a teaching assistant would see in a robot file."""

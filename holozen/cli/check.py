@@ -1,0 +1,56 @@
+"""`holozen check`: what is wrong with a robot file."""
+
+import argparse
+import json
+import re
+from pathlib import Path
+
+from holozen import flags
+from holozen.tell import printable
+
+AFTER = """A good file prints nothing. The exit code is 1 when there is an error, 0 when there is nothing or only
+warnings, 2 for wrong usage. The lines of the --require file are `link NAME` or `joint NAME [TYPE]`; # starts
+a comment."""
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="holozen check", description="Say what is wrong with a xacro, URDF or SDF robot.", epilog=AFTER
+    )
+    parser.add_argument("file", type=Path)
+    parser.add_argument("args", type=_pair, nargs="*", metavar="name:=value", help="values of its xacro:arg")
+    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR")
+    parser.add_argument("--fits", type=_size, default=(), metavar="LxW[xH]", help="most metres along x, y, z: 0.4x0.2")
+    parser.add_argument("--require", type=Path, metavar="FILE", help="links and joints that have to be there")
+    parser.add_argument("--json", action="store_true", help="print one JSON object a finding")
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    args = parser().parse_args(argv)
+    from holozen.check.report import check
+    from holozen.check.subject import Wanted
+
+    findings = check(args.file, dict(args.args), dict(args.package), Wanted(args.fits, args.require))
+    for finding in findings:
+        text = json.dumps(finding.fields()) if args.json else "\n".join(map(printable, str(finding).split("\n")))
+        print(text)
+    return int(any(finding.severity == "error" for finding in findings))
+
+
+def _pair(text: str) -> tuple[str, str]:
+    name, assign, value = text.partition(":=")
+    if not assign or not name:
+        raise argparse.ArgumentTypeError(f"{text!r}: write name:=value")
+    return name, value
+
+
+def _size(text: str) -> tuple[float, ...]:
+    words = re.split(r"[xX]", text)
+    try:
+        values = tuple(float(word) for word in words)
+    except ValueError:
+        values = ()
+    if len(values) not in (2, 3) or not all(0 < value < 1e3 for value in values):
+        raise argparse.ArgumentTypeError(f"{text!r}: write metres as 0.4x0.2 or 0.4x0.2x0.3 (length, width, height)")
+    return values

@@ -1,0 +1,42 @@
+"""`holozen delete`: take robots or objects out of the running sim."""
+
+import argparse
+
+from holozen import connection
+from holozen.bus import Bus
+from holozen.errors import ServiceError
+from holozen.tell import say
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(prog="holozen delete", description="Take robots or objects out of the sim.")
+    parser.add_argument("names", nargs="+", type=_name, metavar="NAME", help="as `holozen list` shows them")
+    connection.add_arguments(parser)
+    return parser
+
+
+def main(argv: list[str]) -> int:
+    args = parser().parse_args(argv)
+    from holozen import entities
+
+    failed = 0
+    with Bus("delete", connection.from_arguments(args), patience=3.0) as bus:
+        entities.names(bus)  # without a sim this says so, once
+        for name in args.names:
+            try:
+                entities.delete(bus, name)
+            except ServiceError as error:
+                say(f"holozen delete: {error}")
+                failed = 1
+            else:
+                print(f"{name} is deleted")
+    return failed
+
+
+def _name(text: str) -> str:
+    from holozen.wire import robot_name
+
+    try:
+        return robot_name(text)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None

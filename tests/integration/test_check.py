@@ -1,0 +1,80 @@
+"""`holozen check` as a person runs it."""
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from holozen import data
+from holozen.testing.wire import command
+
+BOT = data.find("urdf", "hb_bot.urdf.xacro")
+TYPO = """<robot name="r">
+<link name="a">
+<inertial><mass value="1"/><inertia ixx="1" iyy="1" ivz="0" izz="1"/></inertial></link></robot>"""
+WARNS = """<robot name="r">
+<link name="a"><inertial><mass value="1"/><inertia ixx="9" iyy="9" izz="9"/></inertial>
+<collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
+
+
+def run(*words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command("check", *words), capture_output=True, text=True, timeout=30)
+
+
+def test_a_good_file_is_silent() -> None:
+    done = run(str(BOT))
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+
+
+def test_an_error_is_told_with_its_line_and_how_to_mend_it(tmp_path: Path) -> None:
+    (tmp_path / "r.urdf").write_text(TYPO)
+    done = run(str(tmp_path / "r.urdf"))
+    assert (done.returncode, done.stderr) == (1, "")
+    where, why = done.stdout.splitlines()
+    assert where.startswith(f"{tmp_path / 'r.urdf'}:3: error: ")
+    assert "'ivz'" in where and where.endswith("[attribute]")
+    assert "write iyz=" in why or "write ixz=" in why or "write ixy=" in why
+
+
+def test_warnings_alone_are_no_failure(tmp_path: Path) -> None:
+    (tmp_path / "r.urdf").write_text(WARNS)
+    done = run(str(tmp_path / "r.urdf"))
+    assert done.returncode == 0
+    assert ": warning: " in done.stdout and "[inertia-size]" in done.stdout
+
+
+def test_json_has_one_object_a_line(tmp_path: Path) -> None:
+    (tmp_path / "r.urdf").write_text(TYPO)
+    done = run(str(tmp_path / "r.urdf"), "--json")
+    (finding,) = map(json.loads, done.stdout.splitlines())
+    assert done.returncode == 1
+    assert set(finding) == {"severity", "rule", "file", "line", "expanded", "problem", "reason", "mend"}
+    assert (finding["line"], finding["rule"], finding["severity"]) == (3, "attribute", "error")
+
+
+def test_a_task_sets_size_and_names(tmp_path: Path) -> None:
+    (tmp_path / "names.txt").write_text("link base_link\nlink body\n")
+    done = run(str(BOT), "--fits", "0.4x0.2", "--require", str(tmp_path / "names.txt"))
+    assert done.returncode == 1
+    assert "has to fit into 0.4 x 0.2 m" in done.stdout
+    assert "there is no link 'body'" in done.stdout and "'base_link'" not in done.stdout.partition("there are:")[0]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["--fits", "big"], "write metres as 0.4x0.2"),
+        (["n=1"], "write name:=value"),
+        (["--fits", "1x-1"], "write metres"),
+    ],
+)
+def test_wrong_words_are_told(words: list[str], told: str) -> None:
+    done = run(str(BOT), *words)
+    assert done.returncode == 2
+    assert told in done.stderr and "Traceback" not in done.stderr
+
+
+def test_a_file_that_is_not_there_is_one_finding(tmp_path: Path) -> None:
+    done = run(str(tmp_path / "nowhere.xacro"))
+    assert (done.returncode, len(done.stdout.splitlines()), done.stderr) == (1, 2, "")

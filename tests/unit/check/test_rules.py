@@ -1,0 +1,235 @@
+"""Each rule finds its mistake in a robot that is good but for it, and nothing else is found."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen.check.report import check
+from holozen.check.rules import RULES
+from holozen.check.subject import Wanted
+from tests.unit.check.conftest import HERE, Findings
+
+Rules = Callable[..., list[str]]
+
+ARM_LIMIT = '<limit lower="-1" upper="1" effort="5" velocity="2"/>'
+LEFT = '<parent link="base"/><child link="left_wheel"/><origin xyz="0.05 0.12 0"/><axis xyz="0 1 0"/>'
+RIGHT = '<parent link="base"/><child link="right_wheel"/><origin xyz="0.05 -0.12 0"/><axis xyz="0 1 0"/>'
+BASE = '<mass value="2"/><inertia ixx="0.009" ixy="0" ixz="0" iyy="0.017" iyz="0" izz="0.024"/>'
+SECOND_PARENT = '<joint name="x" type="fixed"><parent link="ball"/><child link="arm"/></joint>'
+FRAME = "<robotBaseFrame>footprint</robotBaseFrame>"
+PLUGIN = '<plugin name="drive" filename="libgazebo_ros_diff_drive.so">'
+
+BROKEN = [
+    # rule, what is in the good robot, what is there instead, what the finding speaks of
+    ("tag", '<collision><origin xyz="0 0 0.1"/>', '<colision/><collision><origin xyz="0 0 0.1"/>', "write <collision>"),
+    ("tag", ARM_LIMIT, ARM_LIMIT + '<dynamic damping="1"/>', "write <dynamics>"),
+    ("tag", "<mu1>1.0</mu1>", "<slefCollide>true</slefCollide>", "write <selfCollide>"),
+    ("tag", "<commandTopic>cmd_vel</commandTopic>", "<comandTopic>cmd_vel</comandTopic>", "write <commandTopic>"),
+    ("tag", '<link name="arm">', '<Link name="x"/><link name="arm">', "write <link>"),
+    ("attribute", 'iyy="0.017" iyz="0"', 'iyy="0.017" ivz="0"', "write iyz="),
+    ("attribute", '<sphere radius="0.015"/>', '<sphere radius="0.015" raduis="1"/>', "write radius="),
+    ("attribute", 'radius="0.05" length="0.03"', 'radius="0.05" length="0.03" lenght="0.03"', "write length="),
+    ("attribute", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 0.05" ryp="0 0 0"/>', "write rpy="),
+    ("place", "<inertial>" + BASE + "</inertial>", "<inertial>" + BASE + '</inertial><mass value="1"/>', "<inertial>"),
+    ("joint-type", 'name="arm_joint" type="revolute"', 'name="arm_joint" type="revolut"', 'type="revolute"'),
+    ("twice", "</robot>", '<link name="ball"/></robot>', "first at"),
+    ("no-link", '<parent link="arm"/><child link="thumb"/>', '<parent link="amr"/><child link="thumb"/>', "'arm'"),
+    ("no-link", 'reference="left_wheel"', 'reference="lef_wheel"', "'left_wheel'"),
+    ("tree", "</robot>", '<link name="lost"/></robot>', "'lost' hangs on no joint"),
+    ("tree", '<parent link="footprint"/><child link="base"/>', '<parent link="ball"/><child link="base"/>', ""),
+    ("colour", '<material name="orange"/>', '<material name="ornge"/>', "'orange'"),
+    ("colour", '<material name="orange"/>', '<material name="orange"><color rgba="1 0 0 1"/></material>', "another"),
+    ("tag", "<robotBaseFrame>", "<robot_base_fram>x</robot_base_fram><robotBaseFrame>", "write <robot_base_frame>"),
+    ("tag", "<mu1>1.0</mu1>", "<sensr/>", "write <sensor>"),
+    ("tree", "</robot>", SECOND_PARENT + "</robot>", "two joints"),
+    ("attribute", ARM_LIMIT, ARM_LIMIT.replace("/>", ' effrt="1"/>'), "write effort="),
+    ("plugin-link", FRAME, FRAME + "<frameName>footprnt</frameName>", "write footprint"),
+    ("unused-colour", "</robot>", '<material name="blue"><color rgba="0 0 1 1"/></material></robot>', "'blue'"),
+    ("limit", ARM_LIMIT, "", "continuous"),
+    ("limit-range", ARM_LIMIT, '<limit lower="1" upper="-1" effort="5" velocity="2"/>', "exchange"),
+    ("limit-range", ARM_LIMIT, '<limit effort="5" velocity="2"/>', "both 0"),
+    ("limit-effort", ARM_LIMIT, '<limit lower="-1" upper="1" effort="0" velocity="2"/>', "effort 0"),
+    ("limit-effort", ARM_LIMIT, '<limit lower="-1" upper="1" effort="5"/>', "no velocity"),
+    ("mimic", '<mimic joint="finger_joint"/>', '<mimic joint="fingr_joint"/>', "'finger_joint'"),
+    ("mimic", '<mimic joint="finger_joint"/>', '<mimic joint="thumb_joint"/>', "itself"),
+    ("degrees", ARM_LIMIT, '<limit lower="-90" upper="90" effort="5" velocity="2"/>', "1.571"),
+    ("degrees", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 0.05" rpy="0 0 90"/>', "looks like degrees"),
+    ("no-inertia", "<inertial>" + BASE + "</inertial>", "", "'base'"),
+    ("mass", '<mass value="2"/>', '<mass value="0"/>', "0 kg"),
+    ("mass", '<mass value="2"/>', '<mass value="-2"/>', "-2 kg"),
+    ("mass", '<mass value="2"/>', "", "no <mass>"),
+    ("attribute", '<mass value="2"/>', '<mass vlaue="2"/>', "write value="),
+    ("heavy", BASE, '<mass value="2000"/><inertia ixx="9" iyy="17" izz="24"/>', "2000 kg"),
+    ("inertia", 'ixx="0.009"', 'ixx="-0.009"', "not positive definite"),
+    ("inertia", 'ixx="0.009" ixy="0"', 'ixx="0.009" ixy="0.02"', "not positive definite"),
+    ("inertia", 'izz="0.024"', 'izz="0.029"', "sum of the other two"),
+    ("inertia-size", BASE, '<mass value="2"/><inertia ixx="1" iyy="1" izz="1"/>', "up to 1 kg m^2"),
+    ("inertia-size", BASE, '<mass value="2"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/>', "a solid body"),
+    ("wheel-axis", LEFT, LEFT.replace("0 1 0", "1 0 0"), "turns about (1 0 0)"),
+    ("wheel-height", LEFT, LEFT.replace("0.12 0", "0.12 0.02"), "20 mm above the other wheels"),
+    ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.3 0.02 0.05"/>', "the robot stands on"),
+    ("overlap", RIGHT, RIGHT.replace("-0.12", "0.11"), "inside each other"),
+    ("overlap", LEFT, LEFT.replace("0.12", "0.05"), "inside the collision shape of 'base'"),
+    ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_dif_drive", "libgazebo_ros_diff_drive.so"),
+    ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "does nothing"),
+    ("plugin-link", FRAME, "<robotBaseFrame>chasis</robotBaseFrame>", "names no link"),
+    ("plugin-joint", "<leftJoint>left_joint", "<leftJoint>left_jiont", "'left_joint'"),
+    ("two-drives", PLUGIN, '<plugin name="a" filename="libgazebo_ros_planar_move.so"/>' + PLUGIN, "keep one"),
+    ("no-drive", "gazebo_ros_diff_drive", "gazebo_ros_camera", "no plugin that drives"),
+]  # fmt: skip
+
+
+BLUE = '<material name="blue"><color rgba="0 0 1 1"/></material>'
+TRANSMISSION = '<transmission name="t"><type>x</type><joint name="left_joint"/><actuator name="a"/></transmission>'
+FORK = (
+    '<link name="fork"><inertial><mass value="0.1"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial></link>'
+    '<joint name="fork_joint" type="continuous"><parent link="base"/><child link="fork"/>'
+    '<axis xyz="0 0 1"/></joint>'
+    '<link name="front_wheel"><inertial><mass value="0.1"/><inertia ixx="1e-5" iyy="1e-5" izz="1e-5"/></inertial>'
+    '<collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
+    '<joint name="front_wheel_joint" type="continuous"><parent link="fork"/><child link="front_wheel"/>'
+    '<origin xyz="0.1 0 0.3"/><axis xyz="0 1 0"/></joint>'
+)
+
+FINE = [
+    # what is in the good robot, and what may as well be there
+    ("</robot>", BLUE + BLUE.replace("blue", "green") + "</robot>"),
+    ("</robot>", TRANSMISSION + "</robot>"),
+    ("</robot>", FORK + "</robot>"),
+    ("</robot>", '<ns:extension xmlns:ns="x" raduis="1"/><unheard_of/></robot>'),
+    ("<mu1>1.0</mu1>", "<mu>1.0</mu><legacyModeNS>true</legacyModeNS><verbose>true</verbose>"),
+    ('<sphere radius="0.015"/>', '<sphere radius="0.012"/>'),  # leans back on its ball
+    ('<sphere radius="0.015"/>', '<sphere radius="0.03"/>'),  # and forward
+    ('<mass value="0.01"/><inertia ixx="1e-6"', '<mass value="0.01"/><inertia ixx="1.001e-6"'),
+    (FRAME, "<robotBaseFrame>/robot/footprint</robotBaseFrame><frameName>map</frameName>"),
+    (FRAME, FRAME + "<legacyModeNS>true</legacyModeNS>"),
+    (PLUGIN, '<plugin name="x" filename="libgazebo_ros_p3d.so"/>' + PLUGIN),
+    (PLUGIN, '<plugin name="x" filename="libhector_gazebo_ros_gps.so"/>' + PLUGIN),
+    ('<link name="footprint"/>', '<link name="footprint"><inertial><mass value="0"/></inertial></link>'),
+    (LEFT, LEFT.replace("0.12", "0.11")),  # reaches into the body, and out of it
+    ('<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 0.05" rpy="0 0 5"/>'),
+    (BASE, BASE.replace('izz="0.024"', 'izz="0.0261"')),  # a figure too few
+]
+
+
+@pytest.mark.parametrize(("old", "new"), FINE)
+def test_what_is_no_mistake_is_not_told(old: str, new: str, good: str, findings: Findings) -> None:
+    assert good.count(old) > 0
+    assert findings(good.replace(old, new, 1)) == []
+
+
+def test_a_mere_description_needs_no_drive(good: str, findings: Findings) -> None:
+    description = good[: good.index("<gazebo")] + "</robot>"
+    assert findings(description) == []
+
+
+def test_the_good_robots_are_silent(good: str, good_sdf: str, findings: Findings) -> None:
+    assert findings(good) == []
+    assert findings(good_sdf, "robot.sdf") == []
+
+
+@pytest.mark.parametrize(("rule", "old", "new", "told"), BROKEN)
+def test_a_rule_finds_its_mistake_and_no_other_does(
+    rule: str, old: str, new: str, told: str, good: str, findings: Findings
+) -> None:
+    assert good.count(old) > 0
+    found = findings(good.replace(old, new, 1))
+    assert {finding.rule for finding in found} == {rule}, "\n".join(map(str, found))
+    assert any(told in str(finding) for finding in found)
+
+
+def test_a_wheel_without_collision_sinks(good: str, rules: Rules) -> None:
+    start = good.index("<collision><origin rpy=")
+    end = good.index("</collision>", start) + len("</collision>")
+    assert rules(good[:start] + good[end:]) == ["wheel-collision"]
+
+
+def test_a_robot_heavier_than_steel_though_no_link_is(good: str, findings: Findings) -> None:
+    heavy = good.replace(BASE, '<mass value="149"/><inertia ixx="0.67" iyy="1.27" izz="1.79"/>', 1)
+    assert findings(heavy) == []
+    body, finger, rest = heavy.partition('<link name="finger">')
+    (finding,) = findings(body + finger + rest.replace('<mass value="0.01"/>', '<mass value="100"/>', 1))
+    assert finding.rule == "heavy" and "block of steel" in finding.problem
+
+
+def test_a_warning_does_not_hide_why_a_part_cannot_be_loaded(good: str, rules: Rules) -> None:
+    text = good.replace('<material name="orange"/>', '<material name="ornge"/>', 1)
+    assert rules(text.replace('<origin xyz="0 0 0.02"/>', '<origin xyz="0 0 abc"/>', 1)) == ["colour", "load"]
+
+
+def test_a_file_that_is_wrong_all_over_ends_soon(good: str, findings: Findings) -> None:
+    wrong = "".join(f'<link name="lost{number}"/>' for number in range(3000))
+    found = findings(good.replace("</robot>", wrong + "</robot>"))
+    assert len(found) == 101
+    assert "more than 100" in found[0].problem
+
+
+def test_a_finding_stands_at_its_line(good: str, findings: Findings) -> None:
+    text = good.replace('iyz="0"', 'ivz="0"', 1)
+    line = text[: text.index("ivz")].count("\n") + 1
+    (finding,) = findings(text)
+    assert (finding.place.line, finding.place.expanded) == (line, False)
+    assert finding.severity == "error"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "rule"),
+    [
+        ("<child>left_wheel</child>", "<child>left_whel</child>", "no-link"),
+        ("<mass>2</mass>", "<mass>0</mass>", "mass"),
+        ("<izz>0.024</izz>", "<izz>0.24</izz>", "inertia"),
+        ("<ixx>0.009</ixx><iyy>0.017</iyy><izz>0.024</izz>", "", "inertia-size"),
+        ("<radius>0.05</radius>", "<raduis>0.05</raduis>", "tag"),
+        ("0.05 0.12 0.05 -1.5708", "0.05 0.12 0.07 -1.5708", "wheel-height"),
+        ("<left_joint>left_joint", "<left_joint>left", "plugin-joint"),
+        ("gz-sim-diff-drive-system", "gz-sim-diff-drvie-system", "plugin-name"),
+        ('<link name="right_wheel">', '<link name="left_wheel">', "twice"),
+    ],
+)
+def test_sdf_has_the_same_rules(old: str, new: str, rule: str, good_sdf: str, rules: Rules) -> None:
+    assert old in good_sdf
+    assert rule in rules(good_sdf.replace(old, new, 1), "robot.sdf")
+
+
+def test_every_rule_is_tried(request: pytest.FixtureRequest) -> None:
+    elsewhere = {
+        "macro-twice", "unused", "wheel-collision", "mesh", "mesh-path", "mesh-empty", "mesh-unit", "fits",
+        "require-file", "require",
+    }  # fmt: skip
+    assert {rule for rule, *_ in BROKEN} | elsewhere == {rule.name for rule in RULES}
+
+
+def test_the_files_of_the_lessons_are_silent() -> None:
+    files = sorted(HERE.parents[2].glob("urdf/*"))
+    assert len(files) > 1
+    assert [str(finding) for path in files if path.is_file() for finding in check(path)] == []
+
+
+def test_a_wanted_size_is_measured(good: str, findings: Findings) -> None:
+    assert findings(good, wanted=Wanted((0.31, 0.28, 0.34))) == []
+    (finding,) = findings(good, wanted=Wanted((0.4, 0.2)))
+    assert finding.rule == "fits"
+    assert "0.3 x 0.27 x 0.32 m" in finding.problem and "width (y) 0.27 m is too much" in finding.problem
+
+
+def test_names_are_wanted_by_a_file(good: str, findings: Findings, tmp_path: Path) -> None:
+    lines = [
+        "# the homework",
+        "link base",
+        "joint arm_joint revolute  # arm",
+        "joint left_joint prismatic",
+        "link bsae",
+    ]
+    (tmp_path / "names.txt").write_text("\n".join([*lines, "wheel x", "joint a b", "link"]))
+    found = findings(good, wanted=Wanted(require=tmp_path / "names.txt"))
+    told = [(finding.rule, finding.place.line, finding.problem) for finding in found]
+    assert [line for rule, line, _ in told if rule == "require-file"] == [6, 7, 8]
+    assert [problem for rule, _, problem in told if rule == "require"] == [
+        "there is no link 'bsae' (did you mean 'base'?)",
+        "joint 'left_joint' is continuous, not prismatic",
+    ]
+
+
+def test_a_file_of_names_that_is_not_there_is_told(good: str, rules: Rules, tmp_path: Path) -> None:
+    assert rules(good, wanted=Wanted(require=tmp_path / "nowhere.txt")) == ["require-file"]

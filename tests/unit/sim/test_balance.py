@@ -1,0 +1,191 @@
+"""wheely_boi in the real engine: it stands, drives, stops and bears kicks, and so do those that students make of it."""
+
+import math
+import re
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen.limits import STOP, Planar
+from holozen.robot.errors import RobotError
+from holozen.robot.model import RobotModel, load, parse
+from holozen.robot.standing import lowest
+from holozen.robot.xacro import expand
+from services.sim.balance import BalanceMover
+from services.sim.drives import mover_for
+from services.sim.engine import UPRIGHT, turned, yaw_of
+from services.sim.world import World
+
+FILE = Path(__file__).parents[3] / "urdf" / "wheely_boi.xacro"
+DT = 1 / 240
+UPSIDE = (0.0, 0.0, 1.0)
+
+
+def wheely(**values: float) -> RobotModel:
+    """The lesson's robot with other values of its properties, or of the mass of its body or of each wheel."""
+    text = FILE.read_text()
+    for name, value in values.items():
+        text = re.sub(rf'(name="{name}" value=)"[^"]*"', rf'\g<1>"{value}"', text)
+    for name, old in (("body_mass", "0.18"), ("wheel_mass", "0.3")):
+        text = text.replace(f'mass="{old}"', f'mass="{values.get(name, old)}"')
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, FILE.name)
+        path.write_text(text)
+        return load(path, packages={"holo": FILE.parents[1]})
+
+
+class Rider:
+    """A robot that balances, and how far it ever leaned."""
+
+    def __init__(self, world: World, model: RobotModel) -> None:
+        mover = mover_for(world, model, (0, 0, -lowest(model)), UPRIGHT)
+        assert isinstance(mover, BalanceMover)
+        self.world, self.mover, self.most = world, mover, 0.0
+
+    def drive(self, seconds: float, velocity: Planar = STOP, dt: float = DT) -> Planar:
+        """The velocity at the end."""
+        for _ in range(round(seconds / dt)):
+            self.mover.move(velocity, dt)
+            self.world.step()
+            self.most = max(self.most, self.lean)
+        return self.mover.body.planar()
+
+    @property
+    def lean(self) -> float:
+        return math.acos(min(1.0, turned(self.mover.body.pose()[1], UPSIDE)[2]))
+
+    @property
+    def place(self) -> Planar:
+        (x, y, _), rotation = self.mover.body.pose()
+        return x, y, yaw_of(rotation)
+
+    def kick(self, speed: float, turn: float = 0.0) -> None:
+        position, rotation = self.mover.body.pose()
+        yaw = yaw_of(rotation)
+        self.mover.body.put(position, rotation, (speed * math.cos(yaw), speed * math.sin(yaw), 0), (0, 0, turn))
+
+
+@pytest.fixture
+def rider(ground: World) -> Rider:
+    return Rider(ground, wheely())
+
+
+def test_it_stands_for_a_minute(rider: Rider) -> None:
+    rider.drive(60)
+    assert rider.most < 0.01
+    assert rider.place == pytest.approx((0, 0, 0), abs=2e-3)
+
+
+@pytest.mark.parametrize("speed", [0.1, 0.5, 1.0, -0.5])
+def test_it_comes_to_a_speed_soon_and_keeps_it(rider: Rider, speed: float) -> None:
+    rider.drive(1.5, (speed, 0, 0))
+    assert rider.mover.body.planar()[0] == pytest.approx(speed, rel=0.1)
+    rider.drive(1.5, (speed, 0, 0))
+    start = rider.place
+    rider.drive(4, (speed, 0, 0))
+    assert rider.place[0] - start[0] == pytest.approx(4 * speed, rel=0.01)
+    assert rider.most < 0.55
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0])
+def test_it_stops_and_stays(rider: Rider, speed: float) -> None:
+    rider.drive(3, (speed, 0, 0))
+    start = rider.place
+    rider.drive(2)
+    stopped = rider.place
+    assert stopped[0] - start[0] < 0.15 + 0.6 * speed**2
+    rider.drive(2)
+    assert rider.place == pytest.approx(stopped, abs=0.01)
+    assert rider.most < 0.55
+
+
+@pytest.mark.parametrize(("speed", "turn"), [(0.0, 1.0), (0.0, -3.0), (0.5, 1.0), (0.5, -2.0)])
+def test_it_turns_where_it_stands_and_while_it_drives(rider: Rider, speed: float, turn: float) -> None:
+    rider.drive(3, (speed, 0, turn))
+    _, _, rate = rider.drive(0.5, (speed, 0, turn))
+    assert rate == pytest.approx(turn, rel=0.03)
+    assert rider.most < 0.55
+
+
+def test_what_it_missed_while_it_sped_up_does_not_turn_it_for_ever(rider: Rider) -> None:
+    rider.drive(3, (0.5, 0, 1))
+    rider.drive(2)
+    start = rider.place
+    rider.drive(5)
+    assert rider.place == pytest.approx(start, abs=0.02)
+
+
+@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (1.5, 0.0, 3.0)])
+def test_commands_that_flip_all_the_time_do_not_throw_it(rider: Rider, velocity: Planar) -> None:
+    for number in range(30):
+        sign = 1 if number % 2 else -1
+        rider.drive(0.3, (sign * velocity[0], 0, sign * velocity[2]))
+    assert rider.most < 0.6
+    rider.drive(4)
+    assert rider.lean < 0.05
+
+
+@pytest.mark.parametrize("speed", [0.3, -0.8, 1.2])
+@pytest.mark.parametrize("driven", [0.0, 0.5])
+def test_a_kick_does_not_throw_it(rider: Rider, speed: float, driven: float) -> None:
+    rider.drive(2, (driven, 0, 0))
+    rider.kick(speed)
+    rider.drive(4, (driven, 0, 0))
+    assert rider.most < 0.9
+    assert rider.mover.body.planar()[0] == pytest.approx(driven, abs=0.03)
+
+
+def test_once_it_lies_its_motors_are_off_until_it_is_put_upright(rider: Rider) -> None:
+    rider.mover.body.put((0, 0, 0.1), (0, math.sin(0.7), 0, math.cos(0.7)), (0, 0, 0), (0, 0, 0))
+    rider.drive(3, (1, 0, 1))
+    assert rider.lean > 1
+    assert max(map(abs, rider.mover.body.planar())) < 0.01
+    rider.mover.body.put((0, 0, 0.074), UPRIGHT, (0, 0, 0), (0, 0, 0))
+    rider.drive(3)
+    assert rider.lean < 0.02
+    assert rider.drive(3, (0.5, 0, 0))[0] == pytest.approx(0.5, rel=0.02)
+
+
+VARIATIONS: list[dict[str, float]] = [
+    {"body_mass": 0.09},
+    {"body_mass": 0.36},
+    {"wheel_mass": 0.15},
+    {"wheel_mass": 0.6},
+    {"body_height": 0.2},
+    {"body_height": 0.3, "body_mass": 0.36},
+    {"body_height": 0.06},
+    {"wheel_radius": 0.02},
+    {"wheel_radius": 0.06},
+    {"body_height": 0.2, "wheel_radius": 0.06},
+    {"body_width": 0.15},
+]
+
+
+@pytest.mark.parametrize("values", VARIATIONS, ids=str)
+def test_what_a_student_makes_of_it_rides_as_well(ground: World, values: dict[str, float]) -> None:
+    rider = Rider(ground, wheely(**values))
+    rider.drive(2)
+    assert rider.most < 0.02
+    assert rider.drive(3, (0.5, 0, 0))[0] == pytest.approx(0.5, abs=0.02)
+    assert rider.drive(3, (0.5, 0, 1.5))[2] == pytest.approx(1.5, abs=0.1)
+    rider.drive(3)
+    rider.kick(0.5)
+    rider.drive(5)
+    assert rider.most < 0.9
+    assert max(map(abs, rider.mover.body.planar())) < 0.03
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda text: text.replace("-0.04", "0.04"),  # the body hangs below the axle
+        lambda text: text.replace('<cylinder length="0.01" radius="0.034"', '<box size="0.07 0.07 0.01"'),
+    ],
+    ids=["hangs", "square wheels"],
+)
+def test_what_cannot_balance_is_refused(ground: World, spoil: Callable[[str], str]) -> None:
+    model = parse(spoil(expand(FILE)), FILE)
+    with pytest.raises(RobotError, match="cannot balance on jointL and jointR"):
+        mover_for(ground, model, (0, 0, 1), UPRIGHT)

@@ -1,0 +1,182 @@
+"""Wheels on two sides in the real engine: forward is forward whichever way an axis points, and encoders add up."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holozen.limits import STOP, Planar
+from holozen.robot.drives import Differential
+from holozen.robot.model import RobotModel, load
+from holozen.robot.standing import lowest
+from services.sim.differential import Odometer, WheelMover, separation_of
+from services.sim.drives import mover_for
+from services.sim.engine import yaw_of
+from services.sim.world import World
+
+URDF = Path(__file__).parents[3] / "urdf"
+TWO = load(URDF / "differential.urdf.xacro")
+FOUR = load(URDF / "rover.urdf.xacro")
+DT = 1 / 240
+
+
+def with_wheels(model: RobotModel, **changes: Any) -> RobotModel:
+    assert model.drive is not None
+    return replace(model, drive=replace(model.drive, mechanism=replace(mechanism(model), **changes)))
+
+
+def mechanism(model: RobotModel) -> Differential:
+    assert model.drive is not None
+    assert isinstance(model.drive.mechanism, Differential)
+    return model.drive.mechanism
+
+
+def turned_over(model: RobotModel, name: str) -> RobotModel:
+    """With a joint's axis pointing the other way."""
+    joint = model.joints[name]
+    x, y, z = joint.axis
+    return replace(model, joints={**model.joints, name: replace(joint, axis=(-x, -y, -z))})
+
+
+class Driven:
+    """A robot on the ground, and how far it has turned."""
+
+    def __init__(self, world: World, model: RobotModel) -> None:
+        mover = mover_for(world, model, (0, 0, -lowest(model)))
+        assert isinstance(mover, WheelMover)
+        self.world, self.mover, self.turned = world, mover, 0.0
+        self.drive(0.3)
+
+    def drive(self, seconds: float, velocity: Planar = STOP) -> Planar:
+        """Where it is then."""
+        for _ in range(round(seconds / DT)):
+            before = self.place[2]
+            self.mover.move(velocity, DT)
+            self.world.step()
+            self.turned += math.remainder(self.place[2] - before, math.tau)
+        return self.place
+
+    @property
+    def place(self) -> Planar:
+        (x, y, _), rotation = self.mover.body.pose()
+        return x, y, yaw_of(rotation)
+
+
+@pytest.mark.parametrize("model", [TWO, FOUR], ids=["two wheels", "four wheels"])
+@pytest.mark.parametrize("speed", [0.5, -0.5, 1.0])
+def test_straight_on_it_goes_as_far_as_told(ground: World, model: RobotModel, speed: float) -> None:
+    robot = Driven(ground, model)
+    start = robot.drive(1, (speed, 0, 0))
+    end = robot.drive(2, (speed, 0, 0))
+    assert end[0] - start[0] == pytest.approx(2 * speed, rel=1e-3)
+    assert end[1:] == pytest.approx(start[1:], abs=2e-3)
+
+
+@pytest.mark.parametrize("name", ["left_wheel_joint", "right_wheel_joint"])
+def test_forward_is_forward_whichever_way_an_axis_points(ground: World, name: str) -> None:
+    robot = Driven(ground, turned_over(TWO, name))
+    assert robot.drive(2, (0.5, 0, 0))[0] == pytest.approx(0.95, abs=0.1)
+    assert robot.turned == pytest.approx(0, abs=1e-2)
+
+
+@pytest.mark.parametrize("turn", [0.5, -1.0, 3.0])
+def test_two_wheels_turn_as_fast_as_told(ground: World, turn: float) -> None:
+    robot = Driven(ground, TWO)
+    robot.drive(1, (0, 0, turn))
+    begin = robot.turned
+    robot.drive(2, (0, 0, turn))
+    assert robot.turned - begin == pytest.approx(2 * turn, rel=0.01)
+
+
+@pytest.mark.parametrize("velocity", [(0, 0, 0.2), (0, 0, 0.5), (0, 0, -1), (0, 0, 2), (0, 0, 4), (0.4, 0, 1)], ids=str)
+def test_four_wheels_turn_at_nearly_the_rate_that_is_told(ground: World, velocity: Planar) -> None:
+    robot = Driven(ground, FOUR)
+    start = robot.drive(1, velocity)
+    begin = robot.turned
+    end = robot.drive(6, velocity)
+    assert 0.85 < (robot.turned - begin) / (6 * velocity[2]) < 1.01
+    if velocity[0] == 0:
+        assert math.dist(start[:2], end[:2]) < 0.03
+
+
+def test_four_wheels_turn_alike_wherever_they_look(ground: World) -> None:
+    robot = Driven(ground, FOUR)
+    robot.drive(1, (0, 0, 1))
+    rates = []
+    for _ in range(40):
+        begin = robot.turned
+        robot.drive(0.2, (0, 0, 1))
+        rates.append((robot.turned - begin) / 0.2)
+    assert 0.8 < min(rates) <= max(rates) < 1.05
+
+
+def test_sideways_it_does_not_go(ground: World) -> None:
+    assert Driven(ground, TWO).drive(1, (0, 1, 0)) == pytest.approx((0, 0, 0), abs=1e-3)
+
+
+@pytest.mark.parametrize("acceleration", [0.5, 2.0])
+def test_its_wheels_keep_to_their_acceleration(ground: World, acceleration: float) -> None:
+    robot = Driven(ground, with_wheels(TWO, acceleration=acceleration))
+    robot.drive(0.25, (2, 0, 0))
+    assert robot.mover.body.planar()[0] == pytest.approx(acceleration * 0.25, rel=0.05)
+    robot.drive(0.125)
+    assert robot.mover.body.planar()[0] == pytest.approx(acceleration * 0.125, rel=0.1)
+
+
+def test_its_motors_give_no_more_than_their_torque(ground: World) -> None:
+    robot = Driven(ground, with_wheels(TWO, torque=0.03, acceleration=math.inf))
+    robot.drive(0.5, (2, 0, 0))
+    # Two motors move 5.9 kg and spin two wheels of 7.2e-4 kg m^2; the ball carries 20.6 N and rubs with 0.01 of it.
+    expected = (2 * 0.03 / 0.06 - 0.206) / (5.9 + 2 * 7.2e-4 / 0.06**2) * 0.5
+    assert robot.mover.body.planar()[0] == pytest.approx(expected, rel=0.1)
+
+
+def test_what_the_file_does_not_measure_is_measured(ground: World) -> None:
+    robot = Driven(ground, with_wheels(TWO, separation=0.0, radius=0.0))
+    assert separation_of(TWO, mechanism(TWO)) == pytest.approx(0.31)
+    robot.drive(1, (0.5, 0, 0.5))
+    assert robot.mover.body.planar()[0::2] == pytest.approx((0.5, 0.5), abs=0.01)
+
+
+def test_encoders_tell_what_wheels_roll_and_the_world_what_is(ground: World) -> None:
+    robot = Driven(ground, TWO)
+    for velocity in ((0.5, 0, 0), (0.5, 0, 0.8), (0, 0, -1), (-0.3, 0, 0.2)):
+        robot.drive(1.5, velocity)
+        position, rotation, speeds = robot.mover.moved(0, DT)
+        x, y, yaw = robot.place
+        assert math.dist(position[:2], (x, y)) < 0.06
+        assert math.remainder(yaw_of(rotation) - yaw, math.tau) == pytest.approx(0, abs=0.03)
+        assert speeds == pytest.approx(robot.mover.body.planar(), abs=0.06)
+
+
+def test_against_a_wall_encoders_go_on_and_the_world_does_not(ground: World) -> None:
+    wall = load(URDF / "rover.urdf.xacro")
+    ground.add_jointed(replace(wall, static=True, drive=None), (0.5, 0, 0.05))
+    robot, other = Driven(ground, TWO), with_wheels(TWO, encoder=False)
+    robot.drive(3, (0.5, 0, 0))
+    assert robot.mover.moved(0, DT)[0][0] > 1.0
+    assert robot.place[0] < 0.4
+    robot.mover.body.remove()
+    true = Driven(ground, other)
+    true.drive(3, (0.5, 0, 0))
+    assert true.mover.moved(0, DT)[0] == true.mover.body.pose()[0]
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2), st.integers(1, 50))
+def test_an_arc_ends_at_the_same_place_in_one_look_or_in_many(left: float, right: float, looks: int) -> None:
+    once, often = Odometer(), Odometer()
+    one = once.see(left, right, 0.3)
+    for look in range(1, looks + 1):
+        many = often.see(left * look / looks, right * look / looks, 0.3)
+    assert many[0] == pytest.approx(one[0], abs=1e-9)
+    assert abs(sum(a * b for a, b in zip(many[1], one[1], strict=True))) == pytest.approx(1)
+
+
+def test_an_arc_is_a_circle_about_a_point_beside() -> None:
+    # A quarter to the left on a radius of 1 m, the wheels 0.2 m apart.
+    (x, y, _), rotation = Odometer().see(0.9 * math.pi / 2, 1.1 * math.pi / 2, 0.2)
+    assert (x, y, yaw_of(rotation)) == pytest.approx((1, 1, math.pi / 2))

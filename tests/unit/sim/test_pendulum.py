@@ -1,0 +1,89 @@
+"""The gains hold the pendulum that they were made for, and one that is somewhat different."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from services.sim.pendulum import GRAVITY, Pendulum, gains
+
+WHEELY = Pendulum(
+    body_mass=0.18,
+    wheel_mass=0.6,
+    radius=0.034,
+    height=0.04,
+    axle=-0.04,
+    body_inertia=6e-4,
+    wheel_inertia=3.5e-5,
+)
+DT = 1 / 240
+
+
+def accelerations(p: Pendulum, lean: float, rate: float, torque: float) -> tuple[float, float]:
+    """Of the lean and of the way: Lagrange's equations, not linearised, by hand."""
+    sine, cosine = np.sin(lean), np.cos(lean)
+    coupling = p.body_mass * p.height * cosine
+    matrix = np.array(
+        [
+            [p.body_mass + p.wheel_mass + p.wheel_inertia / p.radius**2, coupling],
+            [coupling, p.body_inertia + p.body_mass * p.height**2],
+        ]
+    )
+    forces = [
+        torque / p.radius + p.body_mass * p.height * rate**2 * sine,
+        p.body_mass * GRAVITY * p.height * sine - torque,
+    ]
+    way, leaning = np.linalg.solve(matrix, forces)
+    return float(leaning), float(way)
+
+
+def held(real: Pendulum, known: Pendulum, lean: float, seconds: float, dt: float = DT) -> np.ndarray:
+    """Lean, its rate, speed and way after being held with the gains for `known`."""
+    found = np.array(gains(known, dt))
+    state = np.array([lean, 0.0, 0.0, 0.0])
+    for _ in range(round(seconds / dt)):
+        torque = -float(found @ state)
+        for _ in range(4):
+            leaning, pulling = accelerations(real, state[0], state[1], torque)
+            state[1] += leaning * dt / 4
+            state[2] += pulling * dt / 4
+            state[0] += state[1] * dt / 4
+            state[3] += state[2] * dt / 4
+        assert abs(state[0]) < 1, "it fell"
+    return state
+
+
+@pytest.mark.parametrize("lean", [-0.3, 0.05, 0.3])
+def test_a_leaning_body_is_brought_upright_and_back_to_its_place(lean: float) -> None:
+    assert held(WHEELY, WHEELY, lean, 10) == pytest.approx([0, 0, 0, 0], abs=2e-3)
+
+
+@pytest.mark.parametrize("dt", [1 / 1000, 1 / 240, 1 / 100])
+def test_the_gains_are_those_for_the_step(dt: float) -> None:
+    assert held(WHEELY, WHEELY, 0.1, 10, dt) == pytest.approx([0, 0, 0, 0], abs=2e-3)
+
+
+@pytest.mark.parametrize("factor", [0.7, 1.4])
+@pytest.mark.parametrize("name", ["body_mass", "wheel_mass", "radius", "height", "body_inertia", "wheel_inertia"])
+def test_a_body_that_is_not_quite_as_told_is_held_as_well(name: str, factor: float) -> None:
+    real = replace(WHEELY, **{name: getattr(WHEELY, name) * factor})
+    assert held(real, WHEELY, 0.1, 15) == pytest.approx([0, 0, 0, 0], abs=5e-3)
+
+
+def test_without_a_push_it_falls() -> None:
+    leaning, _ = accelerations(WHEELY, 0.01, 0, 0)
+    assert leaning > 0
+
+
+def test_a_steady_lean_goes_with_a_steady_acceleration() -> None:
+    lean = 1e-4 * WHEELY.lean_per_acceleration
+    along = WHEELY.inertia[0][0]
+    leaning, way = accelerations(WHEELY, lean, 0, WHEELY.radius * along * 1e-4)
+    assert leaning == pytest.approx(0, abs=1e-9)
+    assert way == pytest.approx(1e-4, rel=1e-6)
+
+
+def test_the_point_ahead_of_the_axle_accelerates_by_the_lean_alone() -> None:
+    for torque in (-0.01, 0, 0.02):
+        leaning, way = accelerations(WHEELY, 1e-4, 0, torque)
+        assert way + WHEELY.lag * leaning == pytest.approx(1e-4 / WHEELY.lean_per_acceleration, rel=1e-5)
