@@ -10,7 +10,7 @@ from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel, parse
 from holozen.robot.tag import Tag, read_xml
 from holozen.robot.xacro import is_xacro, process, read_text
-from holozen.robot.xacro_inputs import Outcome
+from holozen.robot.xacro.inputs import Outcome
 
 EXPANDED = " (expanded)"  # after the file's name, in messages about the expanded text
 SILENT = ("gazebo", "plugin", "sensor", "material", "inertial", "mesh")
@@ -84,7 +84,7 @@ def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
 def _model(subject: Subject, root: Tag, text: str, place: str) -> RobotModel:
     if not subject.sdf:
         return parse(text, subject.path, subject.packages, place)
-    from holozen.robot.sdf import parse_sdf
+    from holozen.robot.sdf.models import parse_sdf
     from holozen.robot.source import Source
 
     return parse_sdf(root, Source(subject.path, subject.packages))

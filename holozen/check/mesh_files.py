@@ -8,7 +8,7 @@ from holozen.check.finding import Mistake
 from holozen.check.placed import Placed, around, box_of, size_of
 from holozen.check.subject import Subject
 from holozen.robot.errors import RobotError
-from holozen.robot.meshes import bounds
+from holozen.robot.mesh.files import bounds
 from holozen.robot.rigid import link_frames
 from holozen.robot.tag import Tag, Vector, number
 from holozen.robot.uris import is_data, resolve_uri

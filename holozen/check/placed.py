@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from holozen.robot.errors import RobotError
-from holozen.robot.meshes import hull
+from holozen.robot.mesh.files import hull
 from holozen.robot.model import RobotModel
 from holozen.robot.parts import Shape
 from holozen.robot.rigid import Frame, link_frames

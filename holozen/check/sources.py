@@ -11,7 +11,7 @@ from holozen.robot.errors import RobotError
 from holozen.robot.packages import find_package
 from holozen.robot.tag import Tag, read_xml
 from holozen.robot.xacro import read_text
-from holozen.robot.xacro_run import run
+from holozen.robot.xacro.run import run
 
 MARK = "holozen-line"  # the attribute that carries file and line through xacro
 MOST_FILES = 200

@@ -13,7 +13,7 @@ from holozen.errors import BusError
 from holozen.process import stop_event
 from holozen.robot.errors import RobotError
 from holozen.robot.xacro import process
-from holozen.robot.xacro_inputs import SAVED, Inputs, Outcome, now, unchanged
+from holozen.robot.xacro.inputs import SAVED, Inputs, Outcome, now, unchanged
 from holozen.tell import say
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ from dataclasses import replace
 from holozen.robot.errors import listed
 from holozen.robot.materials import gazebo_color
 from holozen.robot.parts import Joint, Link, Surface
-from holozen.robot.settings import Settings
+from holozen.robot.plugins.settings import Settings
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag
 

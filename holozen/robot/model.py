@@ -80,7 +80,7 @@ def parse(
     tag = read_xml(text, place or str(origin))
     source = Source(origin, packages, strict=strict, confined=confined)
     if tag.name == "sdf":
-        from holozen.robot.sdf import parse_sdf  # which builds a RobotModel itself
+        from holozen.robot.sdf.models import parse_sdf  # which builds a RobotModel itself
 
         return parse_sdf(tag, source)
     if tag.name != "robot":

@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from holozen.robot.errors import RobotError
-from holozen.robot.meshes import data_uri
+from holozen.robot.mesh.files import data_uri
 from holozen.robot.tag import read_xml
 from holozen.robot.uris import is_data, resolve_uri
 from holozen.robot.xacro import expand

@@ -3,8 +3,8 @@
 from collections.abc import Mapping
 
 from holozen.robot.parts import Sensor
-from holozen.robot.plugin_names import kind_of
-from holozen.robot.settings import Settings
+from holozen.robot.plugins.names import kind_of
+from holozen.robot.plugins.settings import Settings
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag, number
 

@@ -57,7 +57,7 @@ def solid(shape: Shape) -> Shape:
     """What the sim takes: the convex hull of a mesh that was found; any other shape as it is. Raises RobotError."""
     if shape.kind != "mesh" or shape.path is None:
         return shape
-    from holozen.robot.meshes import hull
+    from holozen.robot.mesh.files import hull
 
     x, y, z = shape.size
     return replace(shape, kind="hull", size=(), points=hull(shape.path, (x, y, z)))
@@ -68,14 +68,14 @@ def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Sour
     if source.confined and source.meshes > MOST_MESHES:
         raise RobotError(f"is number {source.meshes}; of a text that was sent {MOST_MESHES} collision meshes are read")
     if is_data(uri):
-        from holozen.robot.meshes import data_hull
+        from holozen.robot.mesh.files import data_hull
 
         return Shape("hull", (), pose, points=data_hull(uri, scale))
     path = resolve_uri(
         uri, source.origin, source.packages, source.confined, lambda taken: source.warn(tag, f"({use}): {taken}")
     )
     if use == "collision":
-        from holozen.robot.meshes import hull
+        from holozen.robot.mesh.files import hull
 
         if source.confined and os.path.getsize(path) > MOST_BYTES:
             raise RobotError(f"{path}: is too large to be read here; send the mesh itself (holozen spawn does)")

@@ -56,8 +56,8 @@ class Body:
 
 
 class Links:
-    """What `createMultiBody` is told of the links below the base, all shown as `visual`. Links without a joint only carry
-    shapes.
+    """What `createMultiBody` is told of the links below the base, all shown as `visual`. Those without a joint only
+    carry shapes.
     """
 
     def __init__(self, visual: int) -> None:

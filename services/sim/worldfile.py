@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from holozen.robot.errors import RobotError as WorldError
-from holozen.robot.world import GRAVITY, STEP, WorldSpec
+from holozen.robot.sdf.world import GRAVITY, STEP, WorldSpec
 
 __all__ = ["GRAVITY", "STEP", "WorldError", "WorldSpec", "load"]
 
@@ -12,6 +12,6 @@ __all__ = ["GRAVITY", "STEP", "WorldError", "WorldSpec", "load"]
 def load(path: Path, packages: Mapping[str, Path] = {}) -> WorldSpec:
     """The world in an SDF file; `packages` as for robots. Raises WorldError naming file and line."""
     # With numpy in it; `--help` should not wait for that.
-    from holozen.robot.sdf_world import load_world
+    from holozen.robot.sdf.world_file import load_world
 
     return load_world(path, packages)

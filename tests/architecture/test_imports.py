@@ -18,7 +18,7 @@ PLACES = {
     "prompt_toolkit": ["services/teleop/"],
     "numpy": ["holozen/robot/", "services/sim/"],
     "collada": [],
-    "xacro": ["holozen/robot/xacro_child.py"],
+    "xacro": ["holozen/robot/xacro/child.py"],
     "pytest": ["holozen/testing/"],
     "hypothesis": [],
     "trimesh": [],

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from holozen.robot.errors import RobotError
-from holozen.robot.meshes import hull
+from holozen.robot.mesh.files import hull
 from holozen.robot.model import load, parse
 from holozen.robot.portable import portable
 

@@ -10,7 +10,7 @@ import trimesh
 
 from holozen.robot import shapes
 from holozen.robot.errors import RobotError
-from holozen.robot.meshes import data_uri
+from holozen.robot.mesh.files import data_uri
 from holozen.robot.parts import Pose, Shape
 from holozen.robot.shapes import mesh_shape, read_shape, solid
 from holozen.robot.source import Source

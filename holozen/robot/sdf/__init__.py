@@ -1,0 +1,1 @@
+"""SDF models and worlds -> robots, bodies and what the world is like."""

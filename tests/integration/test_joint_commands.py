@@ -1,0 +1,174 @@
+"""The homework: every joint of the rover moves on joint_command, a person comes first, and silence holds still."""
+
+from collections.abc import Callable
+
+import pytest
+
+from holozen import entities
+from holozen.bus import Publisher
+from holozen.messages import JointState
+from holozen.testing import Wire, wait_for
+
+from .robots import Record, Robot, place, record, speeds
+from .test_robots import URDF
+
+JOINTS = ["jFL", "jFR", "jBL", "jBR"]
+RADIUS = 0.05
+
+
+class Rover:
+    """The rover and all that is heard of its joints."""
+
+    def __init__(self, wire: Wire) -> None:
+        bus = wire.bus("script")
+        self.robot = Robot(bus)
+        self.states: Record = record(bus, "joint_states", JointState)
+        self.commands: Publisher[JointState] = bus.publisher("joint_command", JointState, "DATA")
+        self.person = Robot(wire.bus("person"), priority="INTERACTIVE_HIGH")
+
+    def newest(self) -> tuple[dict[str, float], dict[str, float]]:
+        """Positions and rates that were told after this call."""
+        state = self.states.next()
+        return dict(zip(state.name, state.position, strict=True)), dict(zip(state.name, state.velocity, strict=True))
+
+    def rates(self) -> dict[str, float]:
+        return self.newest()[1]
+
+    def command(self, until: Callable[[], object], **values: dict[str, float]) -> None:
+        """Say it again and again until something is true: command(..., velocity={"jFL": 1.0})."""
+        (joints,) = values.values()
+        message = JointState(name=list(joints))
+        for kind, told in values.items():
+            setattr(message, kind, list(told.values()))
+
+        def look() -> bool:
+            self.commands.put(message)
+            return bool(until())
+
+        wait_for(look, 20, lambda: f"{values} to be done; {self.robot._last_status()}")
+
+    def still(self) -> dict[str, float]:
+        """Wait until all joints are; their positions."""
+        wait_for(lambda: max(map(abs, self.rates().values())) < 1e-3, what="the joints to be still")
+        return self.newest()[0]
+
+
+@pytest.fixture(scope="module")
+def made(town: Wire) -> Rover:
+    town.start("sim", "--robot", str(URDF / "rover.urdf.xacro"), "--rtf", "4").wait_for_line("listens on")
+    return Rover(town)
+
+
+@pytest.fixture
+def rover(made: Rover) -> Rover:
+    """It stands, and whoever drove before is forgotten."""
+    made.still()
+    made.robot.status_when(lambda status: not status.obeyed)
+    made.robot.resume()
+    return made
+
+
+@pytest.mark.parametrize("rate", [2.0, -2.0])
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_joint_turns_at_the_rate_that_it_is_told(rover: Rover, joint: str, rate: float) -> None:
+    rover.command(lambda: rover.rates()[joint] == pytest.approx(rate, abs=0.05), velocity={joint: rate})
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_joint_goes_where_it_is_told(rover: Rover, joint: str) -> None:
+    goal = rover.newest()[0][joint] + 1.0
+    rover.command(lambda: rover.newest()[0][joint] == pytest.approx(goal, abs=0.02), position={joint: goal})
+
+
+@pytest.mark.parametrize("joint", JOINTS)
+def test_a_joint_gives_way_to_a_torque(rover: Rover, joint: str) -> None:
+    begin = rover.newest()[0][joint]
+    rover.command(lambda: rover.newest()[0][joint] > begin + 0.5, effort={joint: 1.5})
+
+
+def test_all_wheels_alike_drive_the_robot(rover: Rover) -> None:
+    rover.command(
+        lambda: speeds(rover.robot.newest())[0] == pytest.approx(0.2, abs=0.01), velocity=dict.fromkeys(JOINTS, 4.0)
+    )
+
+
+@pytest.mark.parametrize("kind", ["velocity", "effort"])
+def test_after_a_silence_the_joints_hold_still(rover: Rover, kind: str) -> None:
+    begin = rover.newest()[0]["jFL"]
+    rover.command(lambda: abs(rover.newest()[0]["jFL"] - begin) > 1, **{kind: dict.fromkeys(JOINTS, 2.0)})
+    rover.robot.status_when(lambda status: not status.obeyed)
+    held = rover.still()
+    rover.robot.pass_time(1.0)
+    assert rover.newest()[0] == pytest.approx(held, abs=1e-3)
+
+
+def test_a_person_takes_the_wheels_from_a_script(rover: Rover) -> None:
+    back = {"velocity": dict.fromkeys(JOINTS, -4.0)}
+    rover.command(lambda: speeds(rover.robot.newest())[0] < -0.15, **back)
+
+    def person_drives() -> bool:
+        rover.person.put(0.5)
+        return speeds(rover.robot.newest())[0] == pytest.approx(0.5, abs=0.02)
+
+    rover.command(person_drives, **back)
+    assert rover.rates() == pytest.approx(dict.fromkeys(JOINTS, 0.5 / RADIUS), abs=0.5)
+    status = rover.robot.status()
+    assert status.obeyed.startswith("person")
+    assert any(reason.startswith("overruled") for reason in status.refused)
+
+
+def test_the_script_that_was_overruled_waits_for_resume(rover: Rover) -> None:
+    ahead = {"velocity": dict.fromkeys(JOINTS, 4.0)}
+    rover.command(lambda: speeds(rover.robot.newest())[0] > 0.15, **ahead)
+    rover.person.put(0.0, 0.0, 0.5)
+    rover.command(lambda: rover.robot.status().obeyed.startswith("person"), **ahead)
+    rover.person.put()
+    rover.command(lambda: not rover.robot.status().obeyed, **ahead)
+    held = rover.still()
+    for _ in range(10):
+        rover.command(lambda: True, **ahead)
+        rover.robot.newest()
+    assert rover.newest()[0] == pytest.approx(held, abs=1e-2)
+    rover.robot.resume()
+    rover.command(lambda: speeds(rover.robot.newest())[0] > 0.15, **ahead)
+
+
+def test_a_twist_drives_again_after_joint_commands(rover: Rover) -> None:
+    rover.command(lambda: rover.rates()["jFL"] > 1, effort={"jFL": 1.0})
+    rover.robot.status_when(lambda status: not status.obeyed)
+    start = place(rover.robot.newest())
+    rover.robot.drive(0.5, until=lambda odom: speeds(odom)[0] > 0.48)
+    assert place(rover.robot.newest()) != start
+
+
+@pytest.mark.parametrize(
+    ("message", "told"),
+    [
+        (JointState(name=["jXX"], velocity=[1.0]), "no joint 'jXX'"),
+        (JointState(name=["jFL"], velocity=[1.0, 2.0]), "1 names and 2 values"),
+        (JointState(name=["jFL"], velocity=[1.0], effort=[1.0]), "give one of position, velocity and effort"),
+    ],
+    ids=["unknown", "uneven", "both"],
+)
+def test_a_wrong_command_moves_nothing_and_is_told(rover: Rover, message: JointState, told: str) -> None:
+    held = rover.still()
+
+    def refused() -> bool:
+        rover.commands.put(message)
+        return told in rover.robot.status().last_refusal
+
+    wait_for(refused, what=f"a refusal with {told!r}")
+    assert rover.newest()[0] == pytest.approx(held, abs=1e-3)
+
+
+def test_the_wheels_of_what_balances_take_no_commands(rover: Rover, town: Wire) -> None:
+    bus = town.bus()
+    assert town.run("spawn", str(URDF / "wheely_boi.xacro"), "--name", "Fred", "-y", "5").returncode == 0
+    fred, commands = Robot(bus, "Fred"), bus.publisher("Fred/joint_command", JointState)
+
+    def refused() -> bool:
+        commands.put(JointState(name=["jointL"], effort=[1.0]))
+        return "follows the drive" in fred.status().last_refusal
+
+    wait_for(refused, what="a refusal")
+    entities.delete(bus, "Fred")
