@@ -44,6 +44,7 @@ class JointedBody(Body):
             baseOrientation=rotation,
             baseInertialFramePosition=root.centre,
             baseInertialFrameOrientation=root.axes,
+            flags=bullet.URDF_GLOBAL_VELOCITIES_MB,  # without it a tumbling body turns ever faster
             physicsClientId=world,
             **links.arguments,
         )
@@ -109,7 +110,11 @@ class JointedBody(Body):
     def push(self, name: str, effort: float) -> None:
         """Give a joint a torque or force for the next step, within its limits. `release` it once before."""
         number, joint = self._joints[name]
-        effort = max(-_effort(joint), min(_effort(joint), effort))
+        effort = clamp(effort, _effort(joint))
+        if math.isfinite(joint.limits.velocity):
+            rate = bullet.getJointState(self._body, number, self._world)[1]
+            if abs(rate) >= joint.limits.velocity and rate * effort > 0:
+                effort = 0.0
         self._motor(number, bullet.TORQUE_CONTROL, force=effort)
 
     def mimic(self) -> None:

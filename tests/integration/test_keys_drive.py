@@ -134,6 +134,7 @@ def test_a_stop_is_repeated_until_the_robot_rests_and_then_the_teleop_is_silent(
         terminal.type("k")
         terminal.wait_for_text("silent")
         robot.stands()
+        robot.pass_time(0.2)  # the teleop has to see it too
         seen = len(robot.commands.messages())
         robot.pass_time(0.5)
         assert len(robot.commands.messages()) == seen

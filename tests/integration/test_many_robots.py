@@ -107,7 +107,7 @@ NO_DRIVE = "<robot name='r'><link name='a'/></robot>"
 WRONG = {
     "no such robot file": (["--robot", "nowhere.urdf"], 1, "nowhere.urdf"),
     "a robot that is broken XML": (["--robot", "{tmp}/broken.urdf"], 1, "broken.urdf"),
-    "a robot with nothing to drive it": (["--robot", "{tmp}/still.urdf"], 1, "no planar_move plugin"),
+    "a robot with nothing to drive it": (["--robot", "{tmp}/still.urdf"], 1, "no plugin drives it"),
     "a folder for a robot": (["--robot", "{tmp}"], 1, "{tmp}"),
     "a picture for a robot": (["--robot", "{picture}"], 1, "logo.png"),
     "an illegal name": (["--robot", "{bot}=a/b"], 2, "robot name 'a/b'"),
@@ -116,7 +116,7 @@ WRONG = {
     "two robots at the root": (["--robot", "{bot}", "--robot", "{bot}"], 1, "2 robots are called ''"),
     "no such world": (["--world", "nowhere.world"], 1, "nowhere.world"),
     "a world that is broken XML": (["--world", "{tmp}/broken.urdf"], 1, "broken XML"),
-    "a robot for a world": (["--world", "{tmp}/still.urdf"], 1, "no <sdf><world>"),
+    "a robot for a world": (["--world", "{tmp}/still.urdf"], 1, "is a robot (URDF), not a world"),
     "a negative factor": (["--rtf", "-1"], 2, "'-1': use a number from 0 to 1000"),
     "a factor of nan": (["--rtf", "nan"], 2, "'nan'"),
     "a factor that is no number": (["--rtf", "fast"], 2, "'fast'"),

@@ -12,6 +12,7 @@ import pytest
 
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
+from holozen.wire import SERVICES
 
 from .robots import Robot, place
 from .test_topic import assert_one_line
@@ -26,12 +27,11 @@ def pose_service(town: Wire, sim: Process) -> None:
 
 
 def test_service_list_names_every_service(town: Wire) -> None:
-    assert town.run("service", "list").stdout.split() == ["get_pose", "next_goal", "resume"]
-    assert town.run("service", "list", "-t").stdout.splitlines() == [
-        "get_pose [holozen/srv/GetPose]",
-        "next_goal [holozen/srv/NextGoal]",
-        "resume [std_srvs/srv/Trigger]",
-    ]
+    services = {service.key: service.reply.ROS for service in SERVICES}
+    assert town.run("service", "list").stdout.split() == sorted(services)
+    lines = town.run("service", "list", "-t").stdout.splitlines()
+    assert lines == [f"{key} [{kind}]" for key, kind in sorted(services.items())]
+    assert "resume [std_srvs/srv/Trigger]" in lines
 
 
 def test_service_list_of_nobody_says_so(wire: Wire) -> None:

@@ -17,6 +17,7 @@ TOPICS = {
     "clock": "rosgraph_msgs/msg/Clock",
     "cmd_vel": "geometry_msgs/msg/Twist",
     "cmd_vel_status": "holozen/msg/CommandStatus",
+    "joint_command": "sensor_msgs/msg/JointState",
     "joint_states": "sensor_msgs/msg/JointState",
     "odom": "nav_msgs/msg/Odometry",
     "tf": "tf2_msgs/msg/TFMessage",

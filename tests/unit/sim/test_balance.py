@@ -89,6 +89,24 @@ def test_it_comes_to_a_speed_soon_and_keeps_it(rider: Rider, speed: float) -> No
     assert rider.most < 0.55
 
 
+def test_it_is_at_half_a_metre_a_second_within_a_second(rider: Rider) -> None:
+    assert rider.drive(0.8, (0.5, 0, 0))[0] == pytest.approx(0.5, rel=0.06)
+
+
+@pytest.mark.parametrize("speed", [0.2, 0.5, -1.0])
+def test_what_it_is_late_at_the_start_it_makes_up_at_the_end(rider: Rider, speed: float) -> None:
+    rider.drive(4, (speed, 0, 0))
+    rider.drive(4)
+    assert rider.place[0] == pytest.approx(4 * speed, abs=0.02)
+
+
+def test_a_push_from_behind_is_made_good(rider: Rider) -> None:
+    rider.drive(1)
+    rider.kick(0.2)
+    rider.drive(8)
+    assert rider.place[0] == pytest.approx(0, abs=0.02)
+
+
 @pytest.mark.parametrize("speed", [0.3, 1.0])
 def test_it_stops_and_stays(rider: Rider, speed: float) -> None:
     rider.drive(3, (speed, 0, 0))
@@ -97,11 +115,11 @@ def test_it_stops_and_stays(rider: Rider, speed: float) -> None:
     stopped = rider.place
     assert stopped[0] - start[0] < 0.15 + 0.6 * speed**2
     rider.drive(2)
-    assert rider.place == pytest.approx(stopped, abs=0.01)
+    assert rider.place == pytest.approx(stopped, abs=0.03)
     assert rider.most < 0.55
 
 
-@pytest.mark.parametrize(("speed", "turn"), [(0.0, 1.0), (0.0, -3.0), (0.5, 1.0), (0.5, -2.0)])
+@pytest.mark.parametrize(("speed", "turn"), [(0.0, 0.2), (0.0, 1.0), (0.0, -3.0), (0.5, 1.0), (0.5, -2.0)])
 def test_it_turns_where_it_stands_and_while_it_drives(rider: Rider, speed: float, turn: float) -> None:
     rider.drive(3, (speed, 0, turn))
     _, _, rate = rider.drive(0.5, (speed, 0, turn))
@@ -174,7 +192,7 @@ def test_what_a_student_makes_of_it_rides_as_well(ground: World, values: dict[st
     rider.kick(0.5)
     rider.drive(5)
     assert rider.most < 0.9
-    assert max(map(abs, rider.mover.body.planar())) < 0.03
+    assert max(map(abs, rider.mover.body.planar())) < 0.06
 
 
 @pytest.mark.parametrize(

@@ -127,6 +127,16 @@ def test_its_wheels_keep_to_their_acceleration(ground: World, acceleration: floa
     assert robot.mover.body.planar()[0] == pytest.approx(acceleration * 0.125, rel=0.1)
 
 
+def test_wheels_that_others_turned_slow_down_from_where_they_are(ground: World) -> None:
+    robot = Driven(ground, with_wheels(TWO, acceleration=1.0))
+    for _ in range(240):
+        for name in robot.mover.wheels:
+            robot.mover.body.turn(name, 1.0 / 0.06)
+        ground.step()
+    robot.drive(0.25)
+    assert robot.mover.body.planar()[0] == pytest.approx(0.75, abs=0.12)
+
+
 def test_its_motors_give_no_more_than_their_torque(ground: World) -> None:
     robot = Driven(ground, with_wheels(TWO, torque=0.03, acceleration=math.inf))
     robot.drive(0.5, (2, 0, 0))

@@ -90,6 +90,21 @@ def test_each_joint_turns_its_own_part_in_whatever_order_they_are_told(space: Wo
         assert angle == pytest.approx(rate * 0.5, rel=0.02)
 
 
+def test_a_torque_moves_the_part_of_its_joint_though_the_engine_numbers_them_otherwise(space: World) -> None:
+    # Shapes that do not fit into a part are links of their own, which the engine counts between the others.
+    many = "".join(f'<collision><origin xyz="{i} 0 0"/>{CUBE.removeprefix("<collision>")}' for i in range(20))
+    inertias = {"jb": 1e-2, "jc": 2e-2, "jd": 4e-2}
+    wheels = [link(name[1], 1, inertia, many) for name, inertia in inertias.items()]
+    joints = [joint(name, "a", name[1], xyz=f"0 {9 * number} 0") for number, name in enumerate(inertias)]
+    body = space.add_jointed(robot(link("a", HEAVY, HEAVY, many), *wheels, *joints), (0, 0, 0))
+    for _ in range(24):
+        for name in inertias:
+            body.push(name, 0.1)
+        space.step()
+    for name, inertia in inertias.items():
+        assert state(body, name)[1] == pytest.approx(0.1 / inertia * 0.1, rel=1e-2)
+
+
 def test_more_shapes_than_the_engine_takes_for_one_part_all_touch(ground: World) -> None:
     # Twenty boxes in a row, of which only the last one is long enough to reach the ground.
     boxes = [f'<collision><origin xyz="{i} 0 0"/>{CUBE.removeprefix("<collision>")}' for i in range(-10, 10)]
@@ -174,6 +189,14 @@ def test_a_joint_turns_no_faster_than_its_limit(space: World) -> None:
     assert state(body)[1] == pytest.approx(2)
 
 
+def test_a_push_turns_a_joint_no_faster_than_its_limit(space: World) -> None:
+    body = space.add_jointed(on_a_rock('<limit effort="100" velocity="2"/>'), (0, 0, 0))
+    for _ in range(240):
+        body.push("j", 0.01)
+        space.step()
+    assert state(body)[1] == pytest.approx(2, abs=0.05)
+
+
 def test_a_motor_gives_no_more_than_its_limit(space: World) -> None:
     body = space.add_jointed(on_a_rock('<limit effort="0.01" velocity="100"/>'), (0, 0, 0))
     body.turn("j", 50)
@@ -232,6 +255,18 @@ def test_a_pendulum_keeps_its_energy_and_its_period(air: World) -> None:
     assert abs(pendulum_energy(body) - begin) < 0.02 * swing
     period = (crossings[-1] - crossings[0]) / (len(crossings) - 1)
     assert period == pytest.approx(math.tau * math.sqrt((1e-3 + 0.25) / (G * 0.5)), rel=5e-3)
+
+
+@pytest.mark.parametrize("spin", [5, 20, 50])
+def test_a_body_that_tumbles_does_not_turn_ever_faster(space: World, spin: float) -> None:
+    moments = '<inertia ixx="0.01" iyy="0.02" izz="0.03" ixy="0" ixz="0" iyz="0"/>'
+    base = f'<link name="a"><inertial><mass value="1"/>{moments}</inertial></link>'
+    body = space.add_jointed(robot(base, link("b", 0.2, 3e-4), joint("j", "a", "b", xyz="0.1 0.1 0")), (0, 0, 0))
+    body.put((0, 0, 0), (0, 0, 0, 1), (0, 0, 0), (0.1 * spin, spin, 0.1 * spin))  # about the middle axis: it tumbles
+    for _ in range(10 * 240):
+        body.turn("j", 0)
+        space.step()
+        assert math.hypot(*body.twist()[1]) < 1.4 * spin
 
 
 def test_a_static_body_stays_where_it_is(air: World) -> None:
