@@ -11,6 +11,7 @@ from holozen.robot.errors import RobotError
 from holozen.robot.packages import find_package
 from holozen.robot.tag import Tag, read_xml
 from holozen.robot.xacro import read_text
+from holozen.robot.xacro.inputs import Outcome
 from holozen.robot.xacro.run import run
 
 MARK = "holozen-line"  # the attribute that carries file and line through xacro
@@ -51,17 +52,27 @@ def trace(plain: Tag, sources: list[SourceFile], args: Mapping[str, str], packag
     The files are expanded a second time, with a mark in each start tag. The result counts only if it is the same text
     but for the marks. Raises RobotError if the copies cannot be read.
     """
-    with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
-        copies = {source.path: Path(folder, f"{number}.xacro") for number, source in enumerate(sources)}
-        for number, source in enumerate(sources):
-            copies[source.path].write_bytes(_marked(source, number, copies))
-        outcome = run(copies[sources[0].path], args, {**_packages(sources, packages), **packages})
+    try:
+        with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
+            outcome = _expanded(Path(folder), sources, args, packages)
+    except OSError:  # there is no place to write in
+        return []
     if outcome.error:
         return []
     marked = list(elements(read_xml(outcome.text, "marked")))
     places = [tag.attributes.pop(MARK, "") for tag in marked]
     same = [(tag.name, tag.attributes) for tag in marked] == [(tag.name, tag.attributes) for tag in elements(plain)]
     return places if same else []
+
+
+def _expanded(
+    folder: Path, sources: list[SourceFile], args: Mapping[str, str], packages: Mapping[str, Path]
+) -> Outcome:
+    """What the marked copies in `folder` become."""
+    copies = {source.path: folder / f"{number}.xacro" for number, source in enumerate(sources)}
+    for number, source in enumerate(sources):
+        copies[source.path].write_bytes(_marked(source, number, copies))
+    return run(copies[sources[0].path], args, {**_packages(sources, packages), **packages})
 
 
 def elements(root: Tag) -> Iterator[Tag]:

@@ -37,8 +37,10 @@ class WheelMover:
                 self.body.turn(name, self._signs[name] * speed / self._radius, self._mechanism.torque)
 
     def _ramped(self, wanted: tuple[float, float], most: float) -> tuple[float, float]:
-        """The speeds of both sides' rims for the next step, in which they change by no more than `most`, in m/s."""
-        if math.isinf(most):
+        """The speeds of both sides' rims for the next step, in which they change by no more than `most`, in m/s. A stop
+        is at once: the file may not make it a slow one.
+        """
+        if math.isinf(most) or not any(wanted):
             return wanted
         now = self._sides(dict(zip(self.names, self.body.states()[1], strict=True)))
         # What holds the wheels back holds the ramp back, too; but small differences would turn the robot.

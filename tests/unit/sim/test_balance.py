@@ -93,6 +93,11 @@ def test_it_is_at_half_a_metre_a_second_within_a_second(rider: Rider) -> None:
     assert rider.drive(0.8, (0.5, 0, 0))[0] == pytest.approx(0.5, rel=0.06)
 
 
+@pytest.mark.parametrize("speed", [0.3, 0.5, 1.0])
+def test_it_hardly_overshoots(rider: Rider, speed: float) -> None:
+    assert max(rider.drive(DT, (speed, 0, 0))[0] for _ in range(480)) < 1.01 * speed
+
+
 @pytest.mark.parametrize("speed", [0.2, 0.5, -1.0])
 def test_what_it_is_late_at_the_start_it_makes_up_at_the_end(rider: Rider, speed: float) -> None:
     rider.drive(4, (speed, 0, 0))
