@@ -152,7 +152,7 @@ class Bus:
 
     def call_bytes(self, key: str, payload: bytes, encoding: str, timeout: float) -> Sample:
         """`call` without types."""
-        from holozen.server import reason
+        from holozen.server import refusal
 
         deadline = time.monotonic() + timeout
         while (left := deadline - time.monotonic()) > 0:
@@ -161,8 +161,8 @@ class Bus:
             for reply in replies:
                 if reply.ok:
                     return Sample(reply.ok)
-                if (refusal := bytes(reply.err.payload)) != TIMEOUT:
-                    raise ServiceError(reason(refusal))
+                if (answer := bytes(reply.err.payload)) != TIMEOUT:
+                    raise refusal(answer)
             time.sleep(min(0.01, max(left, 0)))
         raise NoReply(f"no reply from {key!r} within {timeout:g} s; `holozen service list` shows who serves")
 

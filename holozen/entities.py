@@ -37,6 +37,12 @@ def spawn(bus: Bus, name: str, text: str, at: Pose) -> str:
     return _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE).entity_name or name
 
 
+def is_taken(error: ServiceError) -> bool:
+    """Whether a spawn failed for its name alone."""
+    result = error.fields.get("result")
+    return isinstance(result, dict) and result.get("result") == si.NAME_NOT_UNIQUE
+
+
 def _ask(bus: Bus, key: str, request: Message, reply: type[R], timeout: float) -> R:
     answer = bus.call(key, request, reply, timeout)
     result: si.Result = answer.result

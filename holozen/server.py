@@ -14,13 +14,14 @@ if TYPE_CHECKING:
 MAX_REQUEST_BYTES = 5_000_000  # a robot's URDF has at most 4 MB; more is refused unread, to stall nobody
 
 
-def reason(payload: bytes) -> str:
-    """The text of an error reply: ours are `{"error": text}`, a stranger's are shown as they are."""
+def refusal(payload: bytes) -> ServiceError:
+    """The error of an error reply: ours are `{"error": text}` with more fields, a stranger's are shown as they are."""
     text = payload.decode(errors="replace")
     try:
-        return str(json.loads(text)["error"])
-    except (ValueError, TypeError, KeyError, RecursionError):
-        return text or "the service answered with an error and no reason"
+        fields = json.loads(text)
+        return ServiceError(str(fields.pop("error")), **fields)
+    except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+        return ServiceError(text or "the service answered with an error and no reason")
 
 
 class Server:
@@ -37,10 +38,11 @@ class Server:
         self.thread: threading.Thread | None = None  # the one of `start`
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
-    def answer_pending(self) -> None:
-        """Answer the requests that wait; returns at once when there are none."""
-        while (query := self._queries.try_recv()) is not None:
+    def answer_pending(self, most: int = 1000) -> None:
+        """Answer the requests that wait, at most so many; returns at once when there are none."""
+        while most > 0 and (query := self._queries.try_recv()) is not None:
             self._reply(query)
+            most -= 1
 
     def start(self) -> None:
         """Answer from a thread of its own, until the bus is closed."""

@@ -131,15 +131,17 @@ def put(bus: Bus, candidate: Candidate, place: Place, replace: bool) -> str:
     """Spawn what was read. Raises ServiceError."""
     from holozen import entities
 
-    old = None
-    if candidate.name in entities.names(bus) and replace:
-        old = entities.pose(bus, candidate.name)
-        entities.delete(bus, candidate.name)
+    there = candidate.name in entities.names(bus)
+    old = entities.pose(bus, candidate.name) if replace and there else None
     pose = _kept(candidate.model, old) if old and place == Place() else _chosen(candidate.model, place)
     try:
         name = entities.spawn(bus, candidate.name, candidate.text, pose)
     except ServiceError as error:
-        raise ServiceError(f"{error}; the {candidate.name} before it is deleted" if old else str(error)) from None
+        # The sim finds what is wrong with a robot before it looks at the name: the old one goes only for a good one.
+        if not old or not entities.is_taken(error):
+            raise
+        entities.delete(bus, candidate.name)
+        name = entities.spawn(bus, candidate.name, candidate.text, pose)
     return _told(name, candidate.model, pose)
 
 

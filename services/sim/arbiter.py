@@ -6,7 +6,7 @@ from holozen.limits import STOP
 from holozen.readers import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
 
-from .motion import Motion, is_stop
+from .motion import JointMotion, Motion, is_stop
 
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # nobody stands above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here on down a source never takes a robot that others have driven
@@ -62,9 +62,10 @@ class Arbiter:
     def driver(self, now: float) -> Driver | None:
         """The source that is obeyed at `now`; None when all are silent."""
         driver = self._driver
-        if driver and 0 <= self.timeout < now - driver.heard:
+        if driver is None:
             return None
-        return driver
+        timeout = COMMAND_SILENCE if isinstance(driver.motion, JointMotion) else self.timeout
+        return None if 0 <= timeout < now - driver.heard else driver
 
     def motion(self, now: float) -> Motion:
         """What the robot is to do at `now`."""
@@ -86,6 +87,10 @@ class Arbiter:
         self._highest = AUTOPILOT + 1
         self.resumed += 1
         return ""
+
+    def inherit(self, other: "Arbiter") -> None:
+        """Hold whom another one held: a robot that was replaced."""
+        self._held, self._highest = set(other._held), other._highest
 
     def _is_held(self, source: str) -> bool:
         return source in self._held or len(self._held) >= MOST_HELD

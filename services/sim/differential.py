@@ -34,7 +34,7 @@ class WheelMover:
         self._rims = self._ramped((x - half, x + half), self._mechanism.acceleration * dt)
         for names, speed in zip((self._mechanism.left, self._mechanism.right), self._rims, strict=True):
             for name in names:
-                self.body.turn(name, self._signs[name] * speed / self._radius, self._mechanism.torque)
+                self.body.roll(name, self._signs[name] * speed / self._radius, self._mechanism.torque)
 
     def _ramped(self, wanted: tuple[float, float], most: float) -> tuple[float, float]:
         """The speeds of both sides' rims for the next step, in which they change by no more than `most`, in m/s. A stop

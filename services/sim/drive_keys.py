@@ -1,7 +1,6 @@
 """The keys of a robot's drive: commands in, odometry and status out."""
 
 from holozen.bus import Bus, Publisher, Subscription
-from holozen.errors import ServiceError
 from holozen.limits import STOP, Planar
 from holozen.messages import (
     CommandStatus,
@@ -9,15 +8,12 @@ from holozen.messages import (
     Odometry,
     TFMessage,
     Time,
-    TriggerReply,
-    TriggerRequest,
     Twist,
     TwistStamped,
 )
 from holozen.robot.model import Drive
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
-from .arbiter import Arbiter
 from .drives import Limited, Moved
 from .intake import Intake
 from .motion import JointMotion
@@ -27,40 +23,29 @@ STATUS_RATE = 10.0  # Hz of real time: it is for people
 
 
 class DriveKeys:
-    """What a drive hears and tells, its keys in the place `prefix`, a robot's name or empty.
+    """What a drive hears and tells, its keys in the place `prefix`, a robot's name or empty."""
 
-    `others` are the arbiters that `resume` frees too.
-    """
-
-    def __init__(
-        self, bus: Bus, prefix: str, drive: Drive, intake: Intake, tf: Publisher[TFMessage], *others: Arbiter
-    ) -> None:
+    def __init__(self, bus: Bus, prefix: str, drive: Drive, intake: Intake, tf: Publisher[TFMessage]) -> None:
         self._bus, self._drive, self._intake, self._tf = bus, drive, intake, tf
-        self._arbiters = (intake.arbiter, *others)
         self._frames = key_for("", prefix)
         self._variances = covariance(drive)
         self._limited = Limited(drive)
-        self._now = 0.0
         command = intake.keys[0]
         self._commands: list[Subscription[Twist | TwistStamped]] = [
             bus.subscribe(key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES) for key in intake.keys
         ]
-        place = command.rpartition("/")[0]  # a namespace in the robot's file is as good as a name
-        self._resume = bus.serve(key_for("resume", place), TriggerRequest, TriggerReply, self._on_resume)
         self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, prefix), Odometry)
         self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
         self.rate, self._status_due = drive.odometry_rate, Schedule(STATUS_RATE)
 
     def hear(self, now: float, clocks: tuple[float, ...], since: float) -> None:
         """Take what waits at `now`; it came after `since`. `clocks` are those of stamps. All in seconds."""
-        self._now = now
         for commands in self._commands:
             while (received := commands.try_recv()) is not None:
                 self._intake.take(received, now, clocks, since)
 
-    def answer(self, now: float) -> None:
-        """Answer calls, and tell the status."""
-        self._resume.answer_pending()
+    def tell_status(self, now: float) -> None:
+        """Publish who drives, when it is due."""
         if self._status_due.due(now):
             self._status.put(self._intake.status(now))
 
@@ -86,12 +71,5 @@ class DriveKeys:
         """Leave the wire."""
         for commands in self._commands:
             self._bus.drop(commands)
-        self._bus.drop(self._resume)
         for publisher in (self._odom, self._status):
             publisher.close()
-
-    def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
-        for arbiter in self._arbiters:
-            if reason := arbiter.resume(self._now):
-                raise ServiceError(reason)
-        return TriggerReply(True, "every source may drive")

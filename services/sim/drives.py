@@ -4,6 +4,7 @@ import math
 from typing import Protocol
 
 from holozen.limits import Planar, clamp_speed, ramp
+from holozen.robot import drives
 from holozen.robot.drives import Balancing, Differential, Drive, Mecanum
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import lump
@@ -115,16 +116,21 @@ class Limited:
 
 
 def mover_for(world: World, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT) -> Mover:
-    """The robot in the world, its root frame at `at`. Raises RobotError if the engine cannot have it."""
-    drive = model.drive
-    mechanism = drive.mechanism if drive else None
-    if drive is None or mechanism is None:
-        return FreeMover(world.add_jointed(model, at, rotation))
-    if isinstance(mechanism, Differential):
-        wheels = (*mechanism.left, *mechanism.right)
-        sideways = frozenset(wheels if len(wheels) > 2 else ())
-        return WheelMover(world.add_jointed(model, at, rotation, sideways), model, mechanism)
-    if isinstance(mechanism, Balancing):
-        return BalanceMover(world.add_jointed(model, at, rotation), model, mechanism, world.spec.step)
-    rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
-    return PlanarMover(world.add(lump(model), at, rotation), rolling)
+    """The robot in the world, its root frame at `at`; nothing drives a static one. Raises RobotError if the engine
+    cannot have it, and leaves nothing behind then.
+    """
+    mechanism = model.drive.mechanism if model.drive and not model.static else None
+    if isinstance(mechanism, drives.Planar | Mecanum):
+        rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
+        return PlanarMover(world.add(lump(model), at, rotation), rolling)
+    wheels = (*mechanism.left, *mechanism.right) if isinstance(mechanism, Differential) else ()
+    body = world.add_jointed(model, at, rotation, frozenset(wheels if len(wheels) > 2 else ()))
+    try:
+        if isinstance(mechanism, Differential):
+            return WheelMover(body, model, mechanism)
+        if isinstance(mechanism, Balancing):
+            return BalanceMover(body, model, mechanism, world.spec.step)
+        return FreeMover(body)
+    except Exception:
+        body.remove()
+        raise

@@ -2,24 +2,27 @@
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from holozen import simulation_interfaces as si
 from holozen.bus import Bus
 from holozen.errors import ServiceError
 from holozen.graph import on_key
+from holozen.robot.assembly import MOVING
 from holozen.robot.errors import RobotError, listed
 from holozen.robot.model import RobotModel
-from holozen.wire import key_for, robot_name
+from holozen.tell import say
+from holozen.wire import SERVICES, key_for, robot_name
 
 from .body import Body
-from .drives import FreeMover, mover_for
+from .drives import Mover, mover_for
 from .engine import Rotation, Vector
-from .vehicle import Vehicle
+from .vehicle import Memory, Vehicle, keys_of
 from .world import World
 
 MOST = 1000  # entities; each takes time of every step
 MOST_SHAPES = 500  # of one entity: each that touches the ground takes the engine 50 us of every step
+LONGEST = 300  # characters of a reason
 FARTHEST = 1e4  # m from the origin; far beyond, the engine's numbers are too coarse to stand on
 Place = tuple[Vector, Rotation]
 
@@ -49,6 +52,7 @@ class Entities:
         self._bus, self._world, self._limits = bus, world, limits
         self._graph = bus.graph()
         self._all: dict[str, Entity] = {}
+        self._before: dict[str, Memory] = {}  # prefix -> whom the last robot there held
         self.vehicles: list[Vehicle] = []
 
     @property
@@ -62,25 +66,52 @@ class Entities:
     def named(self, name: str) -> Entity:
         """The entity called `name`. Raises EntityError that says which there are."""
         if name not in self._all:
-            raise EntityError(si.NOT_FOUND, f"there is no entity {name!r}; there are {listed(list(self._all))}")
+            raise EntityError(si.NOT_FOUND, f"there is no entity {name[:80]!r}; there are {listed(list(self._all))}")
         return self._all[name]
 
     def add(self, name: str, model: RobotModel, place: Place, prefix: str | None = None) -> Entity:
         """Put a robot or object into the world, its root frame at `place`. Its keys are below `prefix`, by default its
-        name. Raises EntityError.
+        name. What is wrong with the robot is found before its name is looked at. Raises EntityError.
         """
         prefix = name if prefix is None else prefix
-        self._check(name, prefix, model)
+        model = replace(model, drive=None) if model.static else model
+        mover = self._mover(model, place)
         try:
-            mover = mover_for(self._world, model, *place)
+            self._check(name, prefix, model)
+            entity = Entity(name, model, mover.body, prefix=prefix)
+            if model.drive or mover.names:
+                entity.vehicle = Vehicle(self._bus, prefix, model, mover, self._limits)
+        except Exception:
+            mover.body.remove()
+            raise
+        self._all[name] = entity
+        if entity.vehicle:
+            self._remember(prefix, entity.vehicle)
+            self.vehicles.append(entity.vehicle)
+        return entity
+
+    def fail(self, vehicle: Vehicle, error: Exception) -> None:
+        """Take a robot out that cannot go on, so that the others can."""
+        name = next(entity.name for entity in self if entity.vehicle is vehicle)
+        say(f"sim: {name} was taken out of the world: {error}")
+        self.remove(name)
+
+    def _mover(self, model: RobotModel, place: Place) -> Mover:
+        if (shapes := sum(len(link.collisions) for link in model.links.values())) > MOST_SHAPES:
+            problem = f"{model.name[:80]!r} has {shapes} collision shapes; at most {MOST_SHAPES} are simulated"
+            raise EntityError(si.RESOURCE_PARSE_ERROR, problem)
+        try:
+            return mover_for(self._world, model, *place)
         except RobotError as error:
             raise EntityError(si.RESOURCE_PARSE_ERROR, str(error)) from None
-        entity = Entity(name, model, mover.body, prefix=prefix)
-        if not isinstance(mover, FreeMover) or mover.names:
-            entity.vehicle = Vehicle(self._bus, prefix, model, mover, self._limits)
-            self.vehicles.append(entity.vehicle)
-        self._all[name] = entity
-        return entity
+
+    def _remember(self, prefix: str, vehicle: Vehicle) -> None:
+        """A robot that takes the place of another one obeys nobody whom that one did not."""
+        if old := self._before.pop(prefix, None):
+            vehicle.inherit(old)
+        self._before[prefix] = vehicle.memory
+        while len(self._before) > MOST:
+            del self._before[next(iter(self._before))]
 
     def remove(self, name: str) -> None:
         """Take an entity out of the world, and its keys off the wire. Raises EntityError."""
@@ -102,26 +133,26 @@ class Entities:
             try:
                 robot_name(text or "root")
             except ValueError as error:
-                raise EntityError(code, str(error)) from None
+                raise EntityError(code, str(error)[:LONGEST]) from None
         if name in self._all:
             there = listed(list(self._all))
             raise EntityError(si.NAME_NOT_UNIQUE, f"there is an entity {name!r} already; there are {there}")
         if len(self._all) >= MOST:
             raise EntityError(si.OPERATION_FAILED, f"there are {MOST} entities, as many as there may be; delete some")
-        if (shapes := sum(len(link.collisions) for link in model.links.values())) > MOST_SHAPES:
-            problem = (
-                f"{model.name!r} has {shapes} collision shapes; at most {MOST_SHAPES} are simulated: leave some out"
-            )
-            raise EntityError(si.RESOURCE_PARSE_ERROR, problem)
-        self._check_keys(keys_of(model, prefix))
+        if speaks(model):
+            self._check_keys(keys_of(model, prefix))
         if model.drive:
             self._check_alone(key_for(model.drive.odometry_topic, prefix))
 
-    def _check_keys(self, keys: set[str]) -> None:
-        """Two robots on the same keys would each get the other's commands."""
-        for other in self:
-            if taken := keys & keys_of(other.model, other.prefix):
-                raise EntityError(si.NAME_NOT_UNIQUE, f"{min(taken)} is the key of {other.name!r}; use another name")
+    def _check_keys(self, keys: list[str]) -> None:
+        """Two robots on the same keys would each get the other's commands; so would one on a key of the sim's."""
+        taken = {row.key for row in SERVICES if row.server == "sim" and row.key != "resume"} | {"clock"}
+        for key in keys:
+            if keys.count(key) > 1 or key in taken:
+                raise EntityError(si.NAMESPACE_INVALID, f"the robot's file puts two things on the key {key[:80]!r}")
+        for other in (other for other in self if other.vehicle):
+            if both := set(keys) & set(keys_of(other.model, other.prefix)):
+                raise EntityError(si.NAME_NOT_UNIQUE, f"{min(both)} is the key of {other.name!r}; use another name")
 
     def _check_alone(self, key: str) -> None:
         """Two sims on the same keys would each get the other's commands."""
@@ -131,10 +162,9 @@ class Entities:
             raise EntityError(si.NAME_NOT_UNIQUE, f"{problem}; end that one, or use another name: --robot FILE=NAME")
 
 
-def keys_of(model: RobotModel, prefix: str) -> set[str]:
-    """The keys of a robot's drive, which no other may have too."""
-    drive = model.drive
-    return {key_for(topic, prefix) for topic in (drive.command_topic, drive.odometry_topic)} if drive else set()
+def speaks(model: RobotModel) -> bool:
+    """Whether a robot has keys: a drive, or joints to tell of."""
+    return bool(model.drive) or any(joint.kind in MOVING for joint in model.joints.values())
 
 
 def checked_place(position: Vector, rotation: Rotation) -> Place:

@@ -15,8 +15,9 @@ from .engine import Rotation, Vector
 from .entities import Entities, EntityError, Place, checked_place
 
 FASTEST = 100.0  # m/s and rad/s that an entity may be given
+MOST_MARKS = 20_000  # "<" in a text; reading more of them would stall the steps
 WORLD = ("", "world", "odom", "map")  # frames that mean the world
-_XACRO = re.compile(r"<xacro:|xmlns:xacro|\$\{")
+_XACRO = re.compile(r"<xacro:|\$\{")  # the namespace alone may be left over from an expansion
 
 
 class EntityServices:
@@ -34,9 +35,9 @@ class EntityServices:
         ]
 
     def answer(self) -> None:
-        """Answer what waits."""
+        """Answer what waits, of each kind one request: many at once must not stall the steps."""
         for server in self._servers:
-            server.answer_pending()
+            server.answer_pending(most=1)
 
     def _spawn(self, request: si.SpawnEntityRequest) -> si.SpawnEntityReply:
         model = self._read(request)
@@ -56,6 +57,9 @@ class EntityServices:
         if not text:
             problem = "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn FILE` sends it"
             raise EntityError(si.UNSUPPORTED_ASSETS if request.uri else si.NO_RESOURCE, problem)
+        if text.count("<") > MOST_MARKS:
+            problem = f"resource_string has more than {MOST_MARKS // 2} elements; a robot has at most as many"
+            raise EntityError(si.RESOURCE_PARSE_ERROR, problem)
         if _XACRO.search(text):
             raise EntityError(si.UNSUPPORTED_FORMAT, "resource_string is xacro; expand it first: `holozen xacro FILE`")
         try:
@@ -93,6 +97,8 @@ class EntityServices:
         linear, angular = _vector(state.twist.linear), _vector(state.twist.angular)
         if not_finite(state.twist) or max(map(abs, (*linear, *angular))) > FASTEST:
             raise EntityError(si.OPERATION_FAILED, f"twist {linear}, {angular}: use at most {FASTEST:g} m/s and rad/s")
+        if entity.model.static and any((*linear, *angular)):
+            raise EntityError(si.OPERATION_FAILED, f"{request.entity!r} is static; it has no velocity")
         entity.body.put(position, rotation, linear, angular)
         return si.SetEntityStateReply()
 

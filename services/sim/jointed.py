@@ -85,6 +85,11 @@ class JointedBody(Body):
             number, bullet.VELOCITY_CONTROL, targetVelocity=0, force=joint.friction if friction is None else friction
         )
 
+    def roll(self, name: str, rate: float, effort: float) -> None:
+        """Turn a wheel at a rate. The drive's limits hold, not the joint's: exporters write 0 where they know none."""
+        number, _ = self._joints[name]
+        self._motor(number, bullet.VELOCITY_CONTROL, targetVelocity=rate, force=min(effort, STRONGEST))
+
     def turn(self, name: str, rate: float, effort: float = math.inf) -> None:
         """Turn a joint at a rate, within its limits. One with limits to its position wants this before each step."""
         number, joint = self._joints[name]
@@ -107,10 +112,10 @@ class JointedBody(Body):
             maxVelocity=min(joint.limits.velocity, FASTEST),
         )
 
-    def push(self, name: str, effort: float) -> None:
+    def push(self, name: str, effort: float, most: float = math.inf) -> None:
         """Give a joint a torque or force for the next step, within its limits. `release` it once before."""
         number, joint = self._joints[name]
-        effort = clamp(effort, _effort(joint))
+        effort = clamp(effort, _effort(joint, most))
         if math.isfinite(joint.limits.velocity):
             rate = bullet.getJointState(self._body, number, self._world)[1]
             if abs(rate) >= joint.limits.velocity and rate * effort > 0:
@@ -126,13 +131,17 @@ class JointedBody(Body):
             self.go(name, mimic.multiplier * positions[mimic.joint] + mimic.offset, FOLLOWING)
 
     def _kept(self, number: int, joint: Joint, rate: float) -> float:
-        """`rate` within the joint's limits, for the next step. A strong motor would tear it out of the engine's."""
+        """`rate` within the joint's limits, for the next step. A strong motor would tear it out of the engine's; but
+        whoever is beyond them already is only kept from going on.
+        """
         limits = joint.limits
         rate = clamp(rate, limits.velocity)
-        if not (math.isfinite(limits.lower) and math.isfinite(limits.upper)):
+        if not rate or not (math.isfinite(limits.lower) and math.isfinite(limits.upper)):
             return rate
         position: float = bullet.getJointState(self._body, number, self._world)[0]
-        return max((limits.lower - position) / self._dt, min((limits.upper - position) / self._dt, rate))
+        if rate < 0:
+            return max(rate, min(0.0, (limits.lower - position) / self._dt))
+        return min(rate, max(0.0, (limits.upper - position) / self._dt))
 
     def _motor(self, number: int, mode: int, **values: float) -> None:
         bullet.setJointMotorControl2(self._body, number, mode, physicsClientId=self._world, **values)

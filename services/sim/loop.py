@@ -24,7 +24,7 @@ class Loop:
     def __init__(
         self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None
     ) -> None:
-        self._world, self._vehicles, self._rtf = world, entities.vehicles, rtf
+        self._world, self._entities, self._vehicles, self._rtf = world, entities, entities.vehicles, rtf
         self._services, self._served = services, 0.0
         self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
         self._clock_due = Schedule(CLOCK_RATE)
@@ -58,10 +58,13 @@ class Loop:
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step
-        for vehicle in self._vehicles:
-            vehicle.move(now, dt)
-        world.step()
-        for vehicle in self._vehicles:
-            vehicle.tell(world.time, dt)
+        try:
+            for vehicle in self._vehicles:
+                vehicle.move(now, dt)
+            world.step()
+            for vehicle in self._vehicles:
+                vehicle.tell(world.time, dt)
+        except (ArithmeticError, ValueError) as error:  # a position that is no number any more, say
+            self._entities.fail(vehicle, error)
         if self._clock_due.due(world.time):
             self._clock.put(Clock(Time.of(world.time)))

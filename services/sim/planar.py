@@ -56,6 +56,11 @@ class PlanarBody(Body):
         linear = (vx - turn * cy, vy + turn * cx, falling)
         bullet.resetBaseVelocity(self._body, linear, (roll, pitch, turn), self._world)
 
+    def put(self, position: Vector, rotation: Rotation, linear: Vector, angular: Vector) -> None:
+        """Place the root frame in the world, with its velocity and rotation rate there."""
+        self._held = None
+        super().put(position, rotation, linear, angular)
+
     def _back(self, x: float, y: float, dt: float) -> tuple[float, float]:
         """The velocity towards the place that is held; whoever is pushed hard holds the next one."""
         if self._held is None or math.dist(self._held, (x, y)) > YIELDS:

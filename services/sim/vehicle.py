@@ -1,9 +1,10 @@
 """A robot in the world: what it hears on its keys, what it does at a step, and what it tells."""
 
 from holozen.bus import Bus, Publisher
-from holozen.messages import TFMessage, Time
-from holozen.robot.drives import Balancing
-from holozen.robot.model import Drive, RobotModel
+from holozen.errors import ServiceError
+from holozen.messages import TFMessage, Time, TriggerReply, TriggerRequest
+from holozen.robot.drives import Balancing, Differential
+from holozen.robot.model import RobotModel
 from holozen.wire import COMMAND_SILENCE, key_for
 
 from .arbiter import Arbiter
@@ -20,51 +21,68 @@ from .reports import Schedule
 
 LOOK = 0.004  # s; joint commands and calls need not be heard at every step of a sim that runs fast
 
+Memory = tuple[Arbiter, Arbiter]
+
 
 class Vehicle:
     """A robot with a drive, with joints, or with both. `prefix` is its name on the wire, empty at the root."""
 
     def __init__(self, bus: Bus, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float]) -> None:
-        self.mover = mover
+        self.mover, self._bus = mover, bus
         drive = model.drive
-        command = key_for(drive.command_topic if drive else "cmd_vel", prefix)
-        place = command.rpartition("/")[0]
-        self.arbiter = wheels = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE)
-        self._other_arbiter = others = Arbiter(COMMAND_SILENCE)
-        intake = Intake(command, wheels, *limits, others=_aliases(drive, prefix or model.name))
-        self._wheels, self._others = _motors(mover)
+        command = command_key(model, prefix)
+        place = command.rpartition("/")[0]  # a namespace in the robot's file is as good as a name
+        self.arbiter = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE)
+        self.joint_arbiter = Arbiter(COMMAND_SILENCE)
+        self._wheels, self._others = _motors(mover, model)
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", place), TFMessage)
-        self._drive = DriveKeys(bus, prefix, drive, intake, self._tf, others) if drive else None
-        pairs = ((self._wheels, wheels), (self._others, others))
+        self._resume = bus.serve(key_for("resume", place), TriggerRequest, TriggerReply, self._on_resume)
+        intake = Intake(command, self.arbiter, *limits, others=_aliases(model, prefix))
+        self._drive = DriveKeys(bus, prefix, drive, intake, self._tf) if drive else None
+        pairs = ((self._wheels, self.arbiter), (self._others, self.joint_arbiter))
         groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
         ledger = intake.ledger if drive else Ledger()
         hands = JointIntake(key_for("joint_command", place), ledger, groups, mover.names)
         self._joints = JointKeys(bus, place, model, mover.names, prefix, hands, self._tf)
-        self._looked = 0.0  # when joint commands and calls were heard last
+        self._looked = self._now = 0.0  # when joint commands and calls were heard last, and commands
         self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
         self._odom_due = Schedule(drive.odometry_rate if drive else 0.0)
         self._joints_due = Schedule(JOINT_RATE)
 
+    @property
+    def memory(self) -> Memory:
+        """Who is held, for the robot that takes the place of this one."""
+        return self.arbiter, self.joint_arbiter
+
+    def inherit(self, memory: Memory) -> None:
+        """Hold whom the robot before this one held: replacing it frees nobody."""
+        for arbiter, other in zip(self.memory, memory, strict=True):
+            arbiter.inherit(other)
+
     def hear(self, now: float, clocks: tuple[float, ...], since: float) -> None:
         """Take what waits at `now`; it came after `since`. `clocks` are those of stamps. All in seconds."""
+        self._now = now
         if self._drive:
             self._drive.hear(now, clocks, since)
         if now - self._looked >= LOOK:
             self._joints.hear(now, min(since, self._looked or since))
+            self._resume.answer_pending()
             if self._drive:
-                self._drive.answer(now)
+                self._drive.tell_status(now)
             self._looked = now
 
     def move(self, now: float, dt: float) -> None:
         """Do what is commanded for the next step of `dt` seconds."""
         if self._drive:
             wanted = self._drive.wanted(now, dt)
-            if self._wheels:
-                self._wheels.do(wanted if isinstance(wanted, JointMotion) else None)
             if not isinstance(wanted, JointMotion):
+                if self._wheels:
+                    self._wheels.forget()
                 self.mover.move(wanted, dt)
+            elif self._wheels:
+                self._wheels.do(wanted)
         if self._others:
-            motion = self._other_arbiter.motion(now)
+            motion = self.joint_arbiter.motion(now)
             self._others.do(motion if isinstance(motion, JointMotion) else None)
         if self._jointed:
             self._jointed.mimic()
@@ -85,17 +103,46 @@ class Vehicle:
         if self._drive:
             self._drive.close()
         self._joints.close()
+        self._bus.drop(self._resume)
         self._tf.close()
 
+    def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
+        for arbiter in (self.arbiter, self.joint_arbiter):
+            if reason := arbiter.resume(self._now):
+                raise ServiceError(reason)
+        return TriggerReply(True, "every source may drive")
 
-def _aliases(drive: Drive | None, name: str) -> tuple[str, ...]:
+
+def command_key(model: RobotModel, prefix: str) -> str:
+    """Where a robot below `prefix` hears commands; all its other keys but odometry are beside it."""
+    return key_for(model.drive.command_topic if model.drive else "cmd_vel", prefix)
+
+
+def keys_of(model: RobotModel, prefix: str) -> list[str]:
+    """All keys of a robot below `prefix`, none of which another one may have too."""
+    command = command_key(model, prefix)
+    place = command.rpartition("/")[0]
+    keys = [key_for(key, place) for key in ("tf", "resume", "joint_states", "joint_command")]
+    if model.drive:
+        odometry = key_for(model.drive.odometry_topic, prefix)
+        keys += [command, f"{command}_status", odometry, *_aliases(model, prefix)]
+    return keys
+
+
+def _aliases(model: RobotModel, prefix: str) -> tuple[str, ...]:
     """More keys for commands: wheely_boi's plugin listens on `cmd` below its model's name, twice."""
-    return (f"{name}/{name}/cmd",) if drive and isinstance(drive.mechanism, Balancing) else ()
+    name = prefix or model.name
+    return (f"{name}/{name}/cmd",) if model.drive and isinstance(model.drive.mechanism, Balancing) else ()
 
 
-def _motors(mover: Mover) -> tuple[Motors | None, Motors | None]:
+def _motors(mover: Mover, model: RobotModel) -> tuple[Motors | None, Motors | None]:
     """Those of the wheels and those of the other joints, where commands may move them."""
     if not isinstance(mover.body, JointedBody):
         return None, None
-    free = frozenset(mover.names) - mover.wheels - mover.kept
-    return (Motors(mover.body, mover.wheels) if mover.wheels else None), (Motors(mover.body, free) if free else None)
+    mechanism = model.drive.mechanism if model.drive else None
+    wheels = others = None
+    if isinstance(mechanism, Differential) and mover.wheels:
+        wheels = Motors(mover.body, mover.wheels, mechanism.torque, together=True)
+    if free := frozenset(mover.names) - mover.wheels - mover.kept:
+        others = Motors(mover.body, free)
+    return wheels, others

@@ -6,7 +6,7 @@ from holozen.drive import Wheel, mecanum_rates, wheel_rate
 from holozen.limits import Planar
 from holozen.robot.drives import Mecanum
 from holozen.robot.model import RobotModel
-from holozen.robot.rigid import joint_axes
+from holozen.robot.rigid import Axis, joint_axes
 
 FLAT = 0.1  # an axle steeper than this (sine of its angle to the ground) is no wheel's
 
@@ -17,7 +17,7 @@ class Wheels:
     def __init__(self, model: RobotModel) -> None:
         axes = joint_axes(model)
         self.names = list(axes)
-        self._wheels = [_wheel(model, name) for name in self.names]
+        self._wheels = [_wheel(model, name, axes[name]) for name in self.names]
         self.angles = [0.0] * len(self.names)
         self.rates = [0.0] * len(self.names)
 
@@ -54,8 +54,8 @@ def forward_sign(model: RobotModel, joint: str) -> float:
     return -1.0 if joint_axes(model)[joint].direction[1] < 0 else 1.0
 
 
-def _wheel(model: RobotModel, name: str) -> Wheel | None:
-    joint, axis = model.joints[name], joint_axes(model)[name]
+def _wheel(model: RobotModel, name: str, axis: Axis) -> Wheel | None:
+    joint = model.joints[name]
     radius = radius_of(model, joint.child)
     length = math.hypot(axis.direction[0], axis.direction[1])
     if joint.kind != "continuous" or not radius or abs(axis.direction[2]) > FLAT:

@@ -7,7 +7,7 @@ import pytest
 from holozen.bus import Bus, NoReply, ServiceError
 from holozen.codec import WIRES
 from holozen.messages import NextGoalReply, NextGoalRequest, TriggerReply, TriggerRequest
-from holozen.server import MAX_REQUEST_BYTES, reason
+from holozen.server import MAX_REQUEST_BYTES, refusal
 from holozen.testing import Wire, wait_for
 
 
@@ -159,4 +159,4 @@ def test_a_closed_server_answers_no_more(wire: Wire) -> None:
     ids=lambda value: str(value[:12]),
 )
 def test_the_reason_of_ours_and_of_strangers_is_shown(payload: bytes, text: str) -> None:
-    assert reason(payload) == text
+    assert str(refusal(payload)) == text

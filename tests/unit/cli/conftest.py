@@ -29,8 +29,11 @@ class FakeSim:
 
     def spawn(self, request: si.SpawnEntityRequest) -> si.SpawnEntityReply:
         self.log.append("spawn")
-        if self.refusal or request.name in self.entities:
-            raise ServiceError(self.refusal or f"there is an entity {request.name!r} already")
+        if self.refusal:
+            raise ServiceError(self.refusal, result={"result": si.RESOURCE_PARSE_ERROR, "error_message": self.refusal})
+        if request.name in self.entities:
+            taken = f"there is an entity {request.name!r} already"
+            raise ServiceError(taken, result={"result": si.NAME_NOT_UNIQUE, "error_message": taken})
         self.entities[request.name] = request
         return si.SpawnEntityReply(entity_name=request.name)
 

@@ -193,7 +193,7 @@ def test_replaced_it_keeps_its_place(sim: FakeSim, run: Run, tmp_path: Path) -> 
     sim.put("ball", 1, 2, 7, Quaternion(0, 0, math.sin(0.5), math.cos(0.5)))
     assert run("spawn", ball(tmp_path), "--replace")[0] == 0
     assert place(sim, "ball") == pytest.approx((1, 2, 7, 1))
-    assert sim.log == ["delete", "spawn"]
+    assert sim.log == ["spawn", "delete", "spawn"]
 
 
 def test_replaced_by_a_larger_one_it_is_lifted_out_of_the_ground(sim: FakeSim, run: Run, tmp_path: Path) -> None:
@@ -213,10 +213,11 @@ def test_replace_without_an_old_one_is_a_plain_spawn(sim: FakeSim, run: Run, tmp
     assert sim.log == ["spawn"]
 
 
-def test_a_refusal_after_the_old_one_is_gone_says_so(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+def test_a_robot_that_the_sim_refuses_leaves_the_old_one_where_it_is(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     sim.put("ball")
     sim.refusal = "too heavy"
-    assert run("spawn", ball(tmp_path), "--replace")[2] == "holozen spawn: too heavy; the ball before it is deleted\n"
+    assert run("spawn", ball(tmp_path), "--replace")[2] == "holozen spawn: too heavy\n"
+    assert sim.log == ["spawn"] and list(sim.entities) == ["ball"]
 
 
 def test_from_python_a_file_is_spawned_and_replaced(sim: FakeSim, wire: Wire, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from holozen.limits import STOP, Planar
 from holozen.readers import PRIORITIES
 from services.sim.arbiter import AUTOPILOT, HELD, MOST_HELD, Arbiter, Driver
+from services.sim.motion import JointMotion
 
 FORWARD: Planar = (0.3, 0.0, 0.0)
 LEFT: Planar = (0.0, 0.3, 0.0)
@@ -335,3 +336,12 @@ class Robot(RuleBasedStateMachine):
 
 TestAnySequence = Robot.TestCase
 TestAnySequence.settings = settings(deadline=None, max_examples=200, stateful_step_count=30)
+
+
+def test_joint_commands_end_with_silence_even_where_the_watchdog_is_off() -> None:
+    arbiter = Arbiter(-1)
+    arbiter.offer("script", 4, JointMotion("velocity", (("wheel", 1.0),)), 10.0)
+    assert arbiter.driver(10.4) is not None
+    assert arbiter.motion(10.6) == STOP
+    arbiter.offer("script", 4, (0.5, 0, 0), 11.0)
+    assert arbiter.motion(1000.0) == (0.5, 0, 0)

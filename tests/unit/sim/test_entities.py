@@ -17,7 +17,7 @@ from holozen.messages import Header, Message, Point, Pose, Quaternion, Twist, Ve
 from holozen.robot.model import parse
 from holozen.robot.xacro import expand
 from holozen.testing import Wire, wait_for
-from services.sim.engine import UPRIGHT
+from services.sim.engine import UPRIGHT, bullet
 from services.sim.entities import Entities, Entity
 from services.sim.entity_services import EntityServices
 from services.sim.loop import Loop
@@ -257,3 +257,80 @@ def test_an_unknown_entity_is_told_with_those_that_there_are(town: Town, ask: Ca
 
 def steps() -> threading.Event:
     return threading.Event()
+
+
+LIMITED = '<joint name="j" type="revolute"><parent link="a"/><child link="b"/><limit lower="-1" upper="1" {}/></joint>'
+ARM = (
+    '<robot name="arm"><link name="a">{inertial}<collision><geometry><box size="0.5 0.5 0.1"/></geometry></collision>'
+    '</link><link name="b">{inertial}</link>{joint}</robot>'
+).format(
+    inertial='<inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/></inertial>',
+    joint=LIMITED.format('effort="100" velocity="10"'),
+)
+
+
+def test_a_robot_that_cannot_be_leaves_nothing_in_the_world(town: Town, world: World) -> None:
+    """wheely_boi upside down: its plugin refuses it after the engine has it."""
+    text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
+    town.spawn("ball", BALL, z=1.0)
+    code, told = town.refusal(lambda: town.spawn("Fred", text, z=0.3))
+    assert (code, "cannot balance" in told) == (si.RESOURCE_PARSE_ERROR, True)
+    assert bullet.getNumBodies(world._id) == 2  # the ground and the ball
+
+
+def test_what_is_wrong_with_a_robot_is_told_before_its_name_is_taken(town: Town) -> None:
+    town.spawn("Fred")
+    text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
+    assert town.refusal(lambda: town.spawn("Fred", text))[0] == si.RESOURCE_PARSE_ERROR
+
+
+def test_a_robot_in_the_place_of_another_obeys_nobody_whom_that_one_held(town: Town) -> None:
+    town.spawn("Fred")
+    (vehicle,) = town.entities.vehicles
+    assert vehicle.arbiter.offer("script", 4, (0.5, 0, 0), 10.0) == ""
+    assert vehicle.arbiter.offer("person", 1, (0.5, 0, 0), 10.1) == ""
+    town.services._delete(si.DeleteEntityRequest("Fred"))
+    town.spawn("Fred")
+    (vehicle,) = town.entities.vehicles
+    assert vehicle.arbiter.offer("script", 4, (0.5, 0, 0), 20.0).startswith("held")
+    assert vehicle.arbiter.resume(20.1) == ""
+    assert vehicle.arbiter.offer("script", 4, (0.5, 0, 0), 20.2) == ""
+
+
+def test_a_robot_with_joints_and_no_drive_has_a_resume_of_its_own(town: Town) -> None:
+    town.spawn("arm", ARM, z=0.05)
+    assert {"arm/resume", "arm/joint_command", "arm/joint_states"} <= town.tokens()
+    other = town.refusal(lambda: town.spawn("second", ARM, entity_namespace="arm"))
+    assert other[0] == si.NAME_NOT_UNIQUE
+
+
+def test_a_static_robot_is_never_driven(town: Town) -> None:
+    moved = '<plugin name="p" filename="libgazebo_ros_planar_move.so"/>'
+    entity = town.spawn("wall", BOX.replace("<link", f"<static>true</static>{moved}<link"), z=0.5)
+    assert entity.vehicle is None
+    town.loop.run(steps(), 240)
+    assert entity.body.pose()[0] == pytest.approx((0, 0, 0.5), abs=1e-6)
+    state = si.EntityState(pose=at(1, 0, 0.5).pose, twist=Twist(Vector3(1, 0, 0)))
+    assert "is static" in town.refusal(lambda: town.services._put(si.SetEntityStateRequest("wall", state)))[1]
+
+
+@pytest.mark.parametrize("tag", ["clock", "spawn_entity", "tf", "odom"])
+def test_a_robots_file_puts_nothing_on_a_key_that_is_taken(town: Town, tag: str) -> None:
+    text = HB_BOT.replace("<commandTopic>cmd_vel<", f"<commandTopic>/{tag}<")
+    model = parse(text, Path("r"))
+    code, told = town.refusal(lambda: town.entities.add("Fred", model, ((0, 0, 0), UPRIGHT), ""))
+    assert (code, repr(tag) in told) == (si.NAMESPACE_INVALID, True)
+
+
+def test_a_robot_that_moves_to_nowhere_is_taken_out_and_the_others_go_on(
+    town: Town, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    town.spawn("Fred")
+    ann = town.spawn("Ann", entity_namespace="ann")
+    (fred, _) = town.entities.vehicles
+    lost = ((math.nan, 0.0, 0.0), UPRIGHT, (0.0, 0.0, 0.0))
+    monkeypatch.setattr(fred.mover, "moved", lambda time, dt: lost)
+    town.loop.run(steps(), 24)
+    assert [entity.name for entity in town.entities] == ["Ann"]
+    assert "sim: Fred was taken out of the world: " in capsys.readouterr().err
+    assert ann.vehicle in town.entities.vehicles
