@@ -9,6 +9,7 @@ from typing import Any
 
 from holozen import codec, connection, wire
 from holozen.bus import Bus, Publisher
+from holozen.graph import on_key
 from holozen.messages import Message, Twist, TwistStamped
 from holozen.process import stop_event
 from holozen.tell import say
@@ -24,9 +25,12 @@ def pub(args: argparse.Namespace) -> int:
     if set(args.key) & set("*$?#"):
         say(f"holozen topic pub: {args.key!r}: write to one key; a wildcard would move every robot")
         return 1
+    row = row or _row_of_listener(args)
     if row is None:
         known = ", ".join(topic.key for topic in wire.TOPICS)
-        say(f"holozen topic pub: {args.key!r} has no known type; known keys: {known}, each also as ROBOT/key")
+        say(
+            f"holozen topic pub: {args.key!r} has no known type; known keys: {known}, each also as ROBOT/key"
+        )
         return 1
     try:
         message = read_message(args.value, row.types)
@@ -46,6 +50,13 @@ def pub(args: argparse.Namespace) -> int:
             if isinstance(message, Twist | TwistStamped) and not args.once:
                 _stop_robot(publisher, message)
     return 0
+
+
+def _row_of_listener(args: argparse.Namespace) -> wire.Topic | None:
+    """The row of the type that somebody reads on the key: a robot's file may call its topics anything."""
+    with Bus("topic_pub", connection.from_arguments(args), patience=PATIENCE) as bus:
+        wanted = {endpoint.type for endpoint in on_key(bus.graph().settled(bus.connected), args.key, "sub")}
+    return next((row for row in wire.TOPICS if {kind.ROS for kind in row.types} & wanted), None)
 
 
 def read_message(text: str, kinds: tuple[type[Message], ...]) -> Message:

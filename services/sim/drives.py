@@ -124,7 +124,7 @@ def mover_for(world: World, model: RobotModel, at: Vector, rotation: Rotation = 
         rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
         return PlanarMover(world.add(lump(model), at, rotation), rolling)
     wheels = (*mechanism.left, *mechanism.right) if isinstance(mechanism, Differential) else ()
-    body = world.add_jointed(model, at, rotation, frozenset(wheels if len(wheels) > 2 else ()))
+    body = world.add_jointed(model, at, rotation, frozenset(wheels))
     try:
         if isinstance(mechanism, Differential):
             return WheelMover(body, model, mechanism)

@@ -13,6 +13,7 @@ from holozen.robot.rotation import Array, matrix_of_quaternion
 from .engine import Vector, bullet
 
 FRICTION = 1.0  # Gazebo's default for mu and mu2
+DRAG = 0.1  # of a caster without a word in its file; with more it chatters and lifts the wheels
 MOST_FRICTION = 10.0  # the engine multiplies the two surfaces'; students write 100 where they mean "does not slip"
 SIDEWAYS = 0.2  # of that is a skid-steer's friction along its axles, unless its file says otherwise
 GRAVITY = 9.8  # m/s^2
@@ -34,11 +35,14 @@ def set_joint(world: int, body: int, number: int, part: Part, damping: float) ->
     bullet.changeDynamics(body, number, localInertiaDiagonal=part.body.inertia, physicsClientId=world)
 
 
-def set_surface(world: int, body: int, links: Iterable[int], part: Part, dt: float, load: float = 0.0) -> None:
+def set_surface(
+    world: int, body: int, links: Iterable[int], part: Part, dt: float, load: float = 0.0, drags: bool = False
+) -> None:
     """How the part's shapes touch, which are those of `links`, for steps of `dt` seconds. `load` in N is what rests on
-    it if it is a wheel that has to slide along its axle, else 0.
+    it if it is a wheel that has to slide along its axle, else 0. What `drags` is a caster, or the belly, of a robot
+    that wheels drive.
     """
-    mu, across = _friction(part.surface, load > 0)
+    mu, across = _friction(part.surface, load > 0, DRAG if drags else FRICTION)
     settings: dict[str, Any] = {"lateralFriction": min(mu, MOST_FRICTION)}
     if part.joint and mu and across < mu:
         # The axle keeps its direction while the wheel turns, so the link's own axes will do.
@@ -93,8 +97,8 @@ def _moment(part: Part, axis: Array) -> float:
     return float(np.array(part.body.inertia) @ along**2)
 
 
-def _friction(surface: Surface, slides: bool) -> tuple[float, float]:
+def _friction(surface: Surface, slides: bool, default: float) -> tuple[float, float]:
     """Friction as a wheel rolls, and along its axle."""
-    along = FRICTION if surface.mu1 is None else surface.mu1
+    along = default if surface.mu1 is None else surface.mu1
     across = along if surface.mu2 is None else surface.mu2
     return (along, across * SIDEWAYS) if slides and along == across else (along, across)

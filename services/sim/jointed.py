@@ -21,7 +21,8 @@ MOST_JOINTS = 120  # pybullet stops at 127 without a word
 class JointedBody(Body):
     """The parts of `assemble`, the root's first. Joints are called by their names; rad, rad/s, N m or m, m/s, N.
 
-    The wheels on the joints named `sideways` have to slide along their axles.
+    `wheels` names the joints of those that drive it. More than two have to slide along their axles, and what else
+    touches the ground slides too, unless the file says how it touches.
     """
 
     def __init__(
@@ -31,7 +32,7 @@ class JointedBody(Body):
         parts: list[Part],
         at: Vector,
         rotation: Rotation = UPRIGHT,
-        sideways: frozenset[str] = frozenset(),
+        wheels: frozenset[str] = frozenset(),
         static: bool = False,
     ) -> None:
         root, links = parts[0].body, Links(shapes.unseen)
@@ -52,11 +53,11 @@ class JointedBody(Body):
         numbers = links.numbers(number, world)
         self._dt: float = bullet.getPhysicsEngineParameters(world)["fixedTimeStep"]
         self._joints: dict[str, tuple[int, Joint]] = {}
-        load = load_on(parts, len(sideways))
+        load = load_on(parts, len(wheels)) if len(wheels) > 2 else 0.0
         for index, (part, (own, *more)) in enumerate(zip(parts, carrying, strict=True)):
-            slides = part.joint is not None and part.joint.name in sideways
+            drives = part.joint is not None and part.joint.name in wheels
             touching = [numbers[link] for link in (own, *more)]
-            set_surface(world, number, touching, part, self._dt, load if slides else 0.0)
+            set_surface(world, number, touching, part, self._dt, load if drives else 0.0, bool(wheels) and not drives)
             if part.joint or not static:
                 set_joint(world, number, numbers[own], part, damping_of(parts, index, self._dt))
             if part.joint:

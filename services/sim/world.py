@@ -52,20 +52,21 @@ class World:
         return PlanarBody(self._id, self._shapes, body, at, rotation)
 
     def add_jointed(
-        self, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT, sideways: frozenset[str] = frozenset()
+        self, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT, wheels: frozenset[str] = frozenset()
     ) -> JointedBody:
-        """Put a robot with motors in its joints, or an object, into the world. The wheels on the joints named
-        `sideways` slide along their axles. Raises RobotError if it is too large.
+        """Put a robot with motors in its joints, or an object, into the world. `wheels` names the
+        joints of those that drive it. Raises RobotError if it is too large.
         """
         parts = assemble(model)
         if parts[0].body.mass < rigid.SMALLEST_MASS and not model.static:
-            problem = f"{model.name!r}: link {parts[0].link!r} has no mass, and an engine would nail it to the world"
-            raise RobotError(f"{problem}; give it an <inertial>")
+            solid = next((link.name for link in model.links.values() if link.collisions), parts[0].link)
+            problem = f"{model.name[:80]!r} has no mass: neither {parts[0].link!r} nor what is fixed to it has any"
+            raise RobotError(f"{problem}; give {solid!r} an <inertial>")
         if len(parts) > MOST_JOINTS:
             raise RobotError(
                 f"{model.name!r} has {len(parts) - 1} moving joints; at most {MOST_JOINTS - 1} are simulated"
             )
-        return JointedBody(self._id, self._shapes, parts, at, rotation, sideways, model.static)
+        return JointedBody(self._id, self._shapes, parts, at, rotation, wheels, model.static)
 
     def close(self) -> None:
         """Free the engine."""

@@ -159,3 +159,16 @@ def test_planar_commands_go_nowhere_but_to_their_robot(wire: Wire, sim: Process)
     fred.drive(0.5)
     assert distance(there, ann.newest()) < 1e-6
     assert all(not any(planar(command)) for command in ann.commands.messages())
+
+
+def test_a_topic_that_the_robots_file_names_is_published_to_by_its_readers_type(
+    wire: Wire, sim: Process, tmp_path: Path
+) -> None:
+    text = expand(Path(HB_BOT)).replace("<commandTopic>cmd_vel<", "<commandTopic>go<")
+    (tmp_path / "r.urdf").write_text(text)
+    assert done(wire, "spawn", str(tmp_path / "r.urdf"), "--name", "Fred") == "Fred listens on Fred/go\n"
+    fred = Robot(wire.bus(), "Fred")
+    pub = wire.start("topic", "pub", "Fred/go", '{"linear": {"x": 0.3}}')
+    fred.odom.next(lambda odom: odom.twist.twist.linear.x > 0.29)
+    pub.terminate()
+    fred.stands()
