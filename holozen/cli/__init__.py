@@ -32,6 +32,8 @@ def main(argv: list[str] | None = None) -> int:
             return _main(sys.argv[1:] if argv is None else argv)
         finally:
             _ = sys.stdout and sys.stdout.flush()  # a reader that is gone shows here, and not at the interpreter's end
+    except KeyboardInterrupt:
+        return 130
     except BrokenPipeError:
         # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -67,8 +69,6 @@ def _run(verb: str, words: list[str]) -> int:
             raise
         say(f"holozen {verb} needs {error.name}; run: pip install 'holozen[{verb}]'")
         return 1
-    except KeyboardInterrupt:
-        return 130
 
 
 def _module(verb: str) -> ModuleType:

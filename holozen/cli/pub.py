@@ -28,9 +28,7 @@ def pub(args: argparse.Namespace) -> int:
     row = row or _row_of_listener(args)
     if row is None:
         known = ", ".join(topic.key for topic in wire.TOPICS)
-        say(
-            f"holozen topic pub: {args.key!r} has no known type; known keys: {known}, each also as ROBOT/key"
-        )
+        say(f"holozen topic pub: {args.key!r} has no known type; known keys: {known}, each also as ROBOT/key")
         return 1
     try:
         message = read_message(args.value, row.types)
