@@ -22,6 +22,8 @@ _CASES = (
 
 def mend(place: Place, reason: str) -> str:
     """How to mend a file that cannot be read; broken XML by the line that it is told at and the one before."""
+    if "is a world" in reason:
+        return "check takes a robot, or a single <model>"
     if "broken XML" not in reason:
         return "mend that, then the rest is checked"
     if "mismatched" in reason or "no element found" in reason:

@@ -96,14 +96,22 @@ def two_drives(subject: Subject) -> Iterator[Mistake]:
 
 def no_drive(subject: Subject) -> Iterator[Mistake]:
     """A robot on wheels that has plugin tags, and none that drives it. A file without any is a mere description."""
-    names = [plugin_name(plugin) for plugin in subject.plugins]
-    driven = any(name in (*DRIVES, *CONTROLS) or nearest(name, DRIVES, 6) for name in names)
-    elsewhere = [tag for tag in subject.root.children if tag.name in ("transmission", "ros2_control")]
+    controls = [tag for tag in subject.plugins if plugin_name(tag) in CONTROLS] + subject.root.all("ros2_control")
     wheels = [wheel for wheel in subject.wheels if wheel.sure]
-    simulated = names or subject.root.all("gazebo")
-    if simulated and len(wheels) > 1 and not driven and not elsewhere:
-        mend = f"add <gazebo><plugin> with filename={_file(DRIVES[0])!r}, or spawn it with --drive planar_move"
-        yield Mistake(subject.root, f"the robot has {len(wheels)} wheels and no plugin that drives it", mend)
+    simulated = controls or subject.plugins or subject.root.all("gazebo")
+    if not simulated or len(wheels) < 2 or _is_driven(subject):
+        return
+    problem = f"the robot has {len(wheels)} wheels and no plugin that drives it"
+    if controls:
+        problem += f"; nothing here reads {plugin_name(controls[0]) or controls[0].name}"
+    mend = f"add <gazebo><plugin> with filename={_file(DRIVES[1])!r}, or spawn it with --drive planar_move"
+    yield Mistake(controls[0] if controls else subject.root, problem, mend)
+
+
+def _is_driven(subject: Subject) -> bool:
+    names = [plugin_name(plugin) for plugin in subject.plugins]
+    near = any(name in DRIVES or nearest(name, DRIVES, 6) for name in names)
+    return near or (subject.model is not None and subject.model.drive is not None)
 
 
 def plugin_name(plugin: Tag) -> str:

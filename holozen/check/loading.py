@@ -13,6 +13,7 @@ from holozen.robot.xacro import is_xacro, process, read_text
 from holozen.robot.xacro.inputs import Outcome
 
 EXPANDED = " (expanded)"  # after the file's name, in messages about the expanded text
+SEE_WORLD = "; see it with: holozen sim --world FILE"
 SILENT = ("gazebo", "plugin", "sensor", "material", "inertial", "mesh")
 """Where the loader's warnings are no mistakes of the file, or have rules of their own."""
 
@@ -58,7 +59,7 @@ def _robot(root: Tag) -> Tag:
             raise root.wrong("holds no <model>")
         return model
     if root.name == "sdf":
-        raise root.wrong("holds a <world>; check takes a robot, or a single <model>")
+        raise root.wrong(f"is a world{SEE_WORLD}")
     raise root.wrong("is no robot; a URDF file starts with <robot name=...>, an SDF file with <sdf version=...>")
 
 

@@ -13,6 +13,8 @@ from holozen.robot.rigid import link_frames
 from holozen.robot.tag import Tag, Vector, number
 from holozen.robot.uris import is_data, resolve_uri
 
+PACKAGE = "put the file there, or write package://PACKAGE/PATH"
+MODEL = "put the file into MODEL beside this model, or name the folder that holds model://MODEL in GAZEBO_MODEL_PATH"
 FACTOR = 20.0  # larger than all the rest, or smaller than what else its link has
 TINY = 500.0  # smaller than all the rest
 ALONE = 200.0  # larger than what is no mesh
@@ -22,13 +24,16 @@ UNITS = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 1000.0: ""
 
 
 def missing(subject: Subject) -> Iterator[Mistake]:
-    """Meshes that are not found."""
+    """Meshes that are not found. Where they were looked for is told once."""
+    searched = ""
     for tag, uri, _ in _meshes(subject):
         try:
             resolve_uri(uri, subject.path, subject.packages)
         except RobotError as error:
-            mend = "put the file there, or write package://PACKAGE/PATH"
-            yield Mistake(tag, f"mesh: {error}", mend)
+            told, places, rest = str(error).partition("; packages found: ")
+            problem = told if searched and searched == rest else str(error)
+            searched = rest if places else searched
+            yield Mistake(tag, f"mesh: {problem}", MODEL if uri.lower().startswith("model:") else PACKAGE)
 
 
 def elsewhere(subject: Subject) -> Iterator[Mistake]:
@@ -51,7 +56,8 @@ def unreadable(subject: Subject) -> Iterator[Mistake]:
             try:
                 bounds(path)
             except RobotError as error:
-                yield Mistake(tag, f"mesh {error}", "export it again")
+                again = "then check again" if "git lfs pull" in str(error) else "export it again"
+                yield Mistake(tag, f"mesh {error}", again)
 
 
 def units(subject: Subject) -> Iterator[Mistake]:

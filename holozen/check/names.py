@@ -26,14 +26,18 @@ def duplicates(subject: Subject) -> Iterator[Mistake]:
 
 
 def unknown_links(subject: Subject) -> Iterator[Mistake]:
-    """Joints and <gazebo> tags that name a link that is not there."""
+    """Joints that name a link that is not there."""
     for joint in subject.root.all("joint"):
         for end in ("parent", "child"):
             tag = joint.first(end)
             name = _end(tag, subject.sdf) if tag else ""
             if tag and name and not _is_link(name, subject):
                 yield _unknown(tag, f"{joint} names the {end} link {name!r}, which is not there", name, subject.links)
-    for gazebo in subject.root.all("gazebo"):
+
+
+def unknown_references(subject: Subject) -> Iterator[Mistake]:
+    """<gazebo> tags that name a link that is not there; a file without links is one for others to include."""
+    for gazebo in subject.root.all("gazebo") if subject.links else ():
         name = gazebo.attributes.get("reference", "").strip()
         if name and name not in subject.links and name not in subject.joints:
             known = [*subject.links, *subject.joints]

@@ -1,5 +1,6 @@
 """A robot file -> everything that is wrong with it."""
 
+import re
 from collections.abc import Iterable, Mapping
 from itertools import islice
 from pathlib import Path
@@ -13,7 +14,10 @@ from holozen.robot.errors import RobotError
 from holozen.robot.tag import Tag
 
 MOST = 100  # findings of one rule
+LONGEST = 2000  # characters of a problem, and of how to mend it
 WHOLE = ("tree", "no-inertia", "place", "tag")  # the loader speaks of the robot as a whole where these name a link
+
+_LONG = re.compile(r"\S{301,}")  # paths may be long
 
 
 def check(
@@ -77,4 +81,10 @@ def _unsaid(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mistake
 
 def _finding(rule: Rule, mistake: Mistake, subject: Subject) -> Finding:
     place: Place = subject.place(mistake.at)
-    return Finding(rule.name, rule.severity, place, mistake.problem, rule.why, mistake.mend)
+    return Finding(rule.name, rule.severity, place, _short(mistake.problem), rule.why, _short(mistake.mend))
+
+
+def _short(text: str) -> str:
+    """The text with its long words cut, and itself: both may hold what a file says, of any length."""
+    text = _LONG.sub(lambda word: f"{word[0][:77]}...", text)
+    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."

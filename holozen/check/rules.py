@@ -2,7 +2,18 @@
 
 from collections.abc import Iterator
 
-from holozen.check import driving, inertias, joints, mesh_files, names, spelling, standing, wanted
+from holozen.check import (
+    driving,
+    inertias,
+    joints,
+    measures,
+    mesh_files,
+    names,
+    overlapping,
+    spelling,
+    standing,
+    wanted,
+)
 from holozen.check.finding import Mistake, Rule
 from holozen.check.loading import said
 from holozen.check.subject import Subject
@@ -46,9 +57,17 @@ RULES = (
     Rule("tag", "error", "a misspelt element", "it is passed over in silence", spelling.misspelt_tags),
     Rule("attribute", "error", "a misspelt attribute", "it is passed over in silence", spelling.misspelt_attributes),
     Rule("place", "error", "an element where nothing reads it", "it is passed over in silence", spelling.misplaced),
+    Rule("ignored", "warning", "an element that URDF does not have", "URDF readers pass over it", spelling.ignored),
     Rule("joint-type", "error", "a joint type that does not exist", "the robot cannot be loaded", spelling.joint_kinds),
     Rule("twice", "error", "two links or two joints with one name", "nobody knows which is meant", names.duplicates),
-    Rule("no-link", "error", "a joint or a gazebo tag that names no link", "it hangs in the air", names.unknown_links),
+    Rule("no-link", "error", "a joint that names no link", "it hangs in the air", names.unknown_links),
+    Rule(
+        "gazebo-link",
+        "warning",
+        "a gazebo tag that names no link",
+        "its settings are lost, as in Gazebo",
+        names.unknown_references,
+    ),
     Rule("tree", "error", "links that are not one tree", "the robot falls apart", names.unconnected),
     Rule(
         "colour", "warning", "a material without a colour, or with two", "the colour is left to chance", names.colours
@@ -98,9 +117,30 @@ RULES = (
     Rule(
         "overlap",
         "warning",
-        "a wheel inside another or inside the body",
-        "contacts push them apart, or it looks wrong",
-        standing.overlaps,
+        "a wheel inside another, or more than half of it inside the body",
+        "no real robot has them so",
+        overlapping.overlaps,
+    ),
+    Rule(
+        "wheel-load",
+        "warning",
+        "a part of the body that is as low as the wheels",
+        "it drags over the ground, and the wheels slip",
+        standing.dragging,
+    ),
+    Rule(
+        "wheel-side",
+        "error",
+        "a left wheel on the right side, or the other way round",
+        "it turns the wrong way: the plugin's tags say which side is which",
+        measures.sides,
+    ),
+    Rule(
+        "wheel-measure",
+        "warning",
+        "a plugin's wheel separation or diameter, 20 % off from the robot's",
+        "it turns or drives at another speed than it is told",
+        measures.measures,
     ),
     Rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it", driving.misspelt_plugins),
     Rule("plugin", "warning", "an unknown plugin", "it does nothing here", driving.unknown_plugins),

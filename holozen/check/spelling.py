@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from holozen.check.finding import Mistake
 from holozen.check.subject import Subject
-from holozen.check.vocabulary import GAZEBO, MISPLACED, PLUGIN, SDF, URDF
+from holozen.check.vocabulary import GAZEBO, IGNORED, MISPLACED, PLUGIN, SDF, URDF
 from holozen.check.words import nearest
 from holozen.robot.parts import JOINT_KINDS
 from holozen.robot.tag import Tag
@@ -50,6 +50,14 @@ def misplaced(subject: Subject) -> Iterator[Mistake]:
             if tag.name in MISPLACED and tag.name not in URDF[parent.name].children:
                 owners = " or ".join(f"<{name}>" for name in MISPLACED[tag.name])
                 yield Mistake(tag, f"<{tag.name}> stands in {parent}, which has none", f"move it into {owners}")
+
+
+def ignored(subject: Subject) -> Iterator[Mistake]:
+    """Elements of SDF, or of older URDF, in a URDF."""
+    for parent in _urdf_elements(subject):
+        for tag in parent.children if parent.name not in FREE else ():
+            if tag.name in IGNORED:
+                yield Mistake(tag, f"<{tag.name}> in {parent} is not read", IGNORED[tag.name])
 
 
 def joint_kinds(subject: Subject) -> Iterator[Mistake]:

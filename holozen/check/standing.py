@@ -1,22 +1,25 @@
-"""Wheels: on the ground, on their axles, and clear of the rest."""
+"""Wheels: on the ground, on their axles, and carrying the robot."""
 
 import math
 from collections.abc import Iterator
-from itertools import combinations
 from statistics import median_low
 
 from holozen.check.finding import Mistake
-from holozen.check.placed import Placed, along, dot, minus
+from holozen.check.inertias import groups
+from holozen.check.placed import Placed, dot
 from holozen.check.resting import Ground, stand
 from holozen.check.subject import Subject
-from holozen.check.wheels import Wheel, is_called_wheel
+from holozen.check.wheels import ALIGNED, LEAST, Wheel, is_called_caster, is_called_wheel
+from holozen.robot.drives import Planar
 from holozen.robot.errors import RobotError
+from holozen.robot.parts import Link
 from holozen.robot.rigid import lump
+from holozen.robot.tag import Vector
 
-ALIGNED = math.cos(math.radians(5))
 LEAN = math.sin(math.radians(3))
-SLACK = 0.1  # of a wheel's radius
-LEAST = 0.002  # m
+TOUCHING = 0.0005  # m
+SAME = math.cos(math.radians(0.5))
+ROUGH = 0.2  # friction of a part that drags
 
 
 def wheel_collisions(subject: Subject) -> Iterator[Mistake]:
@@ -49,7 +52,7 @@ def wheel_heights(subject: Subject) -> Iterator[Mistake]:
         return
     bottoms = [wheel.bottom for wheel in wheels]
     middle = median_low(bottoms)
-    odd = [wheel for wheel in wheels if abs(wheel.bottom - middle) > _slack(wheel)]
+    odd = [wheel for wheel in wheels if abs(wheel.bottom - middle) > wheel.slack]
     for wheel in odd:
         way = "above" if wheel.bottom > middle else "below"
         problem = f"wheel {wheel.joint.child!r} is {_length(abs(wheel.bottom - middle))} {way} the other wheels"
@@ -58,21 +61,56 @@ def wheel_heights(subject: Subject) -> Iterator[Mistake]:
         yield from _off_ground(subject, wheels, ground)
 
 
-def overlaps(subject: Subject) -> Iterator[Mistake]:
-    """Wheels inside each other, or as a whole inside the body."""
-    solid = [wheel for wheel in subject.wheels if wheel.shape.use == "collision" and not subject.guessed]
-    for one, other in combinations(solid, 2):
-        if _meet(one, other):
-            problem = f"wheels {one.joint.child!r} and {other.joint.child!r} are inside each other"
-            yield Mistake(subject.joints[other.joint.name], problem, "move one, or make them smaller")
-    rest = [shape for shape in subject.placed if shape.use == "collision" and shape.shape.kind != "mesh"]
-    links = {wheel.joint.child for wheel in subject.wheels}
-    for wheel in solid:
-        for shape in rest:
-            if shape.link not in links and _swallows(shape, wheel):
-                problem = f"wheel {wheel.joint.child!r} is inside the collision shape of {shape.link!r}"
-                yield Mistake(subject.joints[wheel.joint.name], problem, "move the wheel out, or make the body smaller")
-                break
+def dragging(subject: Subject) -> Iterator[Mistake]:
+    """Parts of the body that touch the ground beside wheels that would carry it, or in place of wheels."""
+    wheels = [wheel for wheel in subject.wheels if wheel.rolls and wheel.sure]
+    ground = _ground(subject, wheels)
+    centre = _centre(subject)
+    if not (ground and centre) or _slides(subject) or next(wheel_heights(subject), None):
+        return
+    rough = [shape for shape in _body(subject) if ground.above(shape) < TOUCHING]
+    if rough and (_carries(rough, wheels, centre) or not _needs(rough, subject, centre, ground)):
+        lowest = min(rough, key=lambda shape: shape.farthest((0.0, 0.0, -1.0))[2])
+        problem = f"the collision shape of {lowest.link!r} is as low as the wheels and stands on the ground beside them"
+        mend = "lower the wheels or make them larger, or give a part that has to slide friction (mu1, mu2) 0"
+        yield Mistake(subject.links[lowest.link], problem, mend)
+
+
+def _slides(subject: Subject) -> bool:
+    """Whether the wheels are only seen, and the drive moves the whole robot."""
+    assert subject.model is not None
+    return subject.model.drive is not None and isinstance(subject.model.drive.mechanism, Planar)
+
+
+def _body(subject: Subject) -> list[Placed]:
+    """The collision shapes that neither turn, nor are round, smooth or called a caster."""
+    assert subject.model is not None
+    body = next(group for group in groups(subject) if subject.model.root in group)
+    joints = {joint.child: joint.name for joint in subject.model.joints.values()}
+    smooth = [name for name in body if _friction(subject.model.links[name]) < ROUGH]
+    smooth += [name for name in body if is_called_caster(name, joints.get(name, ""))]
+    solid = [shape for shape in subject.placed if shape.use == "collision" and shape.link in body]
+    return [shape for shape in solid if shape.shape.kind != "sphere" and shape.link not in smooth]
+
+
+def _friction(link: Link) -> float:
+    mu1, mu2 = link.surface.mu1, link.surface.mu2
+    return min(1.0 if mu1 is None else mu1, 1.0 if mu2 is None else mu2)
+
+
+def _carries(rough: list[Placed], wheels: list[Wheel], centre: Vector) -> bool:
+    """Whether the robot stands on these parts alone, and its wheels reach no deeper."""
+    ground = stand(rough, centre)
+    return not ground.tips and all(ground.above(wheel.shape) > -TOUCHING for wheel in wheels)
+
+
+def _needs(rough: list[Placed], subject: Subject, centre: Vector, ground: Ground) -> bool:
+    """Whether the robot tips or leans without these parts."""
+    others = [shape for shape in subject.placed if shape.use == "collision" and shape not in rough]
+    if not others:
+        return True
+    without = stand(others, centre)
+    return without.tips or dot(without.up, ground.up) < SAME
 
 
 def _solid(link: str, subject: Subject) -> bool:
@@ -91,13 +129,20 @@ def _ground(subject: Subject, wheels: list[Wheel]) -> Ground | None:
         or any(wheel.shape.use != "collision" for wheel in wheels)
     ):
         return None
-    try:
-        centre = lump(subject.model).centre
-    except RobotError:
+    centre = _centre(subject)
+    if centre is None:
         return None
     ground = stand(solid, centre)
     lowest = min(shape.farthest((0.0, 0.0, -1.0))[2] for shape in solid)
     return Ground(0.0, 0.0, lowest, True) if ground.tips or not _stands(ground, wheels) else ground
+
+
+def _centre(subject: Subject) -> Vector | None:
+    """The centre of mass in the root frame; None for a robot without mass."""
+    try:
+        return lump(subject.model).centre if subject.model else None
+    except RobotError:
+        return None
 
 
 def _stands(ground: Ground, wheels: list[Wheel]) -> bool:
@@ -106,7 +151,7 @@ def _stands(ground: Ground, wheels: list[Wheel]) -> bool:
 
 
 def _touches(wheel: Wheel, ground: Ground) -> bool:
-    return ground.above(wheel.shape) <= _slack(wheel)
+    return ground.above(wheel.shape) <= wheel.slack
 
 
 def _is_level(wheel: Wheel, ground: Ground) -> bool:
@@ -122,38 +167,6 @@ def _off_ground(subject: Subject, wheels: list[Wheel], ground: Ground) -> Iterat
         if not _touches(wheel, ground):
             problem = f"wheel {wheel.joint.child!r} hangs {_length(ground.above(wheel.shape))} above the ground{under}"
             yield Mistake(subject.joints[wheel.joint.name], problem, "lower the wheel, or lift what stands below it")
-
-
-def _meet(one: Wheel, other: Wheel) -> bool:
-    away = minus(other.shape.centre, one.shape.centre)
-    slack = _slack(one) + _slack(other)
-    if abs(dot(one.axis, other.axis)) < ALIGNED:
-        return math.hypot(*away) < slack
-    side = abs(dot(away, one.axis))
-    across = math.hypot(*along(away, one.axis, -dot(away, one.axis)))
-    return side < _width(one) + _width(other) - LEAST and across < _radius(one) + _radius(other) - slack
-
-
-def _swallows(shape: Placed, wheel: Wheel) -> bool:
-    ends = [along(wheel.shape.centre, wheel.axis, side * _width(wheel)) for side in (-1, 1)]
-    return all(shape.holds(end) for end in ends)
-
-
-def _width(wheel: Wheel) -> float:
-    """Half its width, from the centre along the axle."""
-    return dot(minus(wheel.shape.farthest(wheel.axis), wheel.shape.centre), wheel.axis)
-
-
-def _radius(wheel: Wheel) -> float:
-    return max(dot(minus(wheel.shape.farthest(axis), wheel.shape.centre), axis) for axis in _across(wheel))
-
-
-def _across(wheel: Wheel) -> list[tuple[float, float, float]]:
-    return [axis for axis in wheel.shape.axes if abs(dot(axis, wheel.axis)) < 0.5] or list(wheel.shape.axes)
-
-
-def _slack(wheel: Wheel) -> float:
-    return max(LEAST, SLACK * _radius(wheel))
 
 
 def _length(metres: float) -> str:

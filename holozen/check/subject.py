@@ -15,6 +15,8 @@ from holozen.robot.tag import Tag
 
 _WHERE = re.compile(r"(?P<file>.*?)(?:, line (?P<line>\d+))?: (?P<told>.*)", re.DOTALL)
 
+PLUGIN_OWNERS = ("model", "world", "sensor")  # in SDF
+
 
 @dataclass(frozen=True, slots=True)
 class Told:
@@ -76,8 +78,10 @@ class Subject:
 
     @cached_property
     def plugins(self) -> list[Tag]:
-        """Every <plugin>."""
-        return list(self.root.below("plugin"))
+        """Every <plugin> that a simulator reads: in URDF inside a <gazebo>, in SDF of a model, world or sensor."""
+        holders = [self.root] if self.sdf else self.root.all("gazebo")
+        found = [plugin for holder in holders for plugin in holder.below("plugin")]
+        return [tag for tag in found if not self.sdf or (tag.parent and tag.parent.name in PLUGIN_OWNERS)]
 
     @cached_property
     def plugin_joints(self) -> list[tuple[Tag, str]]:

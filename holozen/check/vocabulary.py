@@ -75,6 +75,15 @@ MISPLACED = {
 }
 """Elements that a reader passes over in silence anywhere else."""
 
+IGNORED = {
+    "surface": 'write <gazebo reference="LINK"> with <mu1> and <mu2> in it, next to the links',
+    "pose": 'write <origin xyz="..." rpy="..."/> in the joint, inertial, visual or collision',
+    "joint_properties": 'write <dynamics damping="..." friction="..."/>',
+    "plugin": "write it into a <gazebo>",
+    "self_collide": 'write <gazebo reference="LINK"><selfCollide>true</selfCollide></gazebo>',
+}
+"""Elements of SDF and of older URDF that people write into a URDF, and what to write instead."""
+
 GAZEBO = _set(
     """material mu mu1 mu2 kp kd fdir1 selfCollide self_collide maxVel minDepth maxContacts max_contacts laserRetro
     turnGravityOff gravity dampingFactor implicitSpringDamper provideFeedback springStiffness springReference stopCfm

@@ -1,19 +1,24 @@
 """Which parts of a robot are wheels."""
 
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from holozen.check.placed import UP, Placed, dot
+from holozen.check.placed import UP, Placed, dot, minus
 from holozen.robot.model import RobotModel
 from holozen.robot.parts import Joint
 from holozen.robot.rigid import joint_axes
 from holozen.robot.tag import Tag, Vector
 
+ALIGNED = math.cos(math.radians(5))
+SLACK = 0.1  # of a wheel's radius
+LEAST = 0.002  # m
 MOVING = ("continuous", "revolute", "prismatic", "floating", "planar")
 
 _NAMED = re.compile(r"wheel|tyre|tire(?!d)|(^|_)w[FBRL][LR]?$", re.IGNORECASE)
 _NOT_ROLLING = re.compile(r"steer|caster|castor|swivel|roller|rotor|prop", re.IGNORECASE)
+_CASTER = re.compile(r"caster|castor|ball|swivel|roller", re.IGNORECASE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +40,25 @@ class Wheel:
         """The height of its lowest point in the root frame, metres."""
         return self.shape.farthest((0.0, 0.0, -1.0))[2]
 
+    @property
+    def half_width(self) -> float:
+        """From the centre along the axle, metres."""
+        return self._reach(self.axis)
+
+    @property
+    def radius(self) -> float:
+        """From the axle, metres."""
+        across = [axis for axis in self.shape.axes if abs(dot(axis, self.axis)) < 0.5]
+        return max(map(self._reach, across or self.shape.axes))
+
+    @property
+    def slack(self) -> float:
+        """How far off it may be without being wrong, metres."""
+        return max(LEAST, SLACK * self.radius)
+
+    def _reach(self, way: Vector) -> float:
+        return dot(minus(self.shape.farthest(way), self.shape.centre), way)
+
 
 def find_wheels(model: RobotModel, placed: Iterable[Placed], named: Iterable[tuple[Tag, str]]) -> list[Wheel]:
     """Wheels are on continuous joints that hang on the body, have nothing movable on them, and are named by a plugin,
@@ -55,6 +79,11 @@ def find_wheels(model: RobotModel, placed: Iterable[Placed], named: Iterable[tup
 def is_called_wheel(*names: str) -> bool:
     """Whether one of the names says that the part is a wheel that rolls on the ground."""
     return any(_NAMED.search(name) for name in names) and not any(_NOT_ROLLING.search(name) for name in names)
+
+
+def is_called_caster(*names: str) -> bool:
+    """Whether one of the names says that the part rolls or slides under the robot."""
+    return any(_CASTER.search(name) for name in names)
 
 
 def _by_link(placed: Iterable[Placed]) -> dict[str, Placed]:

@@ -1,5 +1,6 @@
 """Colours: those that Gazebo knows by name, and those written as numbers."""
 
+from holozen.robot.errors import cut
 from holozen.robot.parts import Color
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag, number
@@ -54,7 +55,7 @@ def read_color(tag: Tag, words: str, source: Source) -> Color | None:
     known = [value for value in values if value is not None and 0 <= value <= 1]
     if len(values) not in (3, 4) or len(known) != len(values):
         told = "red, green, blue and alpha, each from 0 to 1"
-        source.warn(tag, f"has the colour {words[:80]!r}, which is left out; write {told}")
+        source.warn(tag, f"has the colour {cut(words)}, which is left out; write {told}")
         return None
     red, green, blue, alpha = (*known, 1.0)[:4]
     return red, green, blue, alpha

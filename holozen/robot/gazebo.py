@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from holozen.robot.errors import listed
+from holozen.robot.errors import cut, listed
 from holozen.robot.materials import gazebo_color
 from holozen.robot.parts import Joint, Link, Surface
 from holozen.robot.plugins.settings import Settings
@@ -31,7 +31,7 @@ def read_gazebo(
             dressed[name] = _dressed(dressed[name], tag, source)
         elif name not in joints:
             near = source.nearest(name, (*links, *joints))
-            told = f"reference={name[:80]!r} names no link and no joint{near}; it is left out"
+            told = f"reference={cut(name)} names no link and no joint{near}; it is left out"
             source.warn(tag, f"{told}; the links there are: {listed(list(links))}")
     return dressed, static
 

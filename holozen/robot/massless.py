@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from holozen.robot.drives import Drive, Planar, joints_of
-from holozen.robot.errors import listed
+from holozen.robot.errors import cut, listed
 from holozen.robot.parts import Joint, Link
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag
@@ -60,7 +60,7 @@ def tell_massless(
         if name in branches:
             below = [other for other in branches[name] if other != name]
             also = f" and the links below it: {listed(below)}" if below else ""
-            told = f"has no mass, so it is left out, as in Gazebo, with the joint {above[name]!r}{also}"
+            told = f"has no mass, so it is left out, as in Gazebo, with the joint {cut(above[name])}{also}"
             source.warn(tag, f"{told}; give it an <inertial>")
         elif name not in lost and inertial is not None and inertial.mass == 0:
             source.warn(tag.first("inertial") or tag, "has no mass; the link is taken as massless, with no inertia")
@@ -83,7 +83,7 @@ def check_drive(
     for name in joints_of(drive.mechanism) if drive else ():
         child = joints[name].child
         if child in lost:
-            told = f"has no mass, so the joint {name!r} is left out, as in Gazebo, and the drive needs it"
+            told = f"has no mass, so the joint {cut(name)} is left out, as in Gazebo, and the drive needs it"
             raise tags[lost[child]].wrong(f"{told}; give it an <inertial>")
     masses = _lumped(links, {joint.child: joint for joint in joints.values()}, list(descend(root, joints)))
     if masses[root] <= LIGHTEST and any(mass > LIGHTEST for mass in masses.values()):

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from holozen.robot.colors import GAZEBO, nearest_gazebo, read_color
+from holozen.robot.errors import cut
 from holozen.robot.parts import Color
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag
@@ -65,7 +66,7 @@ def material_color(material: Tag, source: Source) -> Color | None:
     told = script.first("name") or script
     name = told.value()
     if name and name not in GAZEBO:
-        source.warn(told, f"names the colour {name[:80]!r}, which Gazebo does not know{nearest_gazebo(name, source)}")
+        source.warn(told, f"names the colour {cut(name)}, which Gazebo does not know{nearest_gazebo(name, source)}")
     return GAZEBO.get(name)
 
 

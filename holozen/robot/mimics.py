@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from holozen.robot.errors import RobotError, listed
+from holozen.robot.errors import RobotError, cut, listed
 from holozen.robot.parts import Joint
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag
@@ -14,7 +14,7 @@ def check_mimics(robot: Tag, joints: Mapping[str, Joint], source: Source) -> Non
     for name, other in followed.items():
         if other not in joints:
             near = source.nearest(other, joints)
-            told = f"follows the joint {other[:80]!r}, which is not there{near}"
+            told = f"follows the joint {cut(other)}, which is not there{near}"
             raise _wrong(robot, name, f"{told}; the joints there are: {listed(list(joints))}")
     done: set[str] = set()
     for start in followed:

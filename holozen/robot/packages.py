@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 from itertools import takewhile
 from pathlib import Path
 
-from holozen.robot.errors import RobotError, listed, near
+from holozen.robot.errors import RobotError, cut, listed, near
 
 PACKAGE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 _LARGEST = 1_000_000  # bytes of a package.xml
@@ -33,7 +33,7 @@ def find_package(name: str, start: Path, given: Mapping[str, Path] = {}) -> Path
 def find_named(name: str, start: Path, given: Mapping[str, Path] = {}) -> Path | None:
     """As `find_package`, but only where something says that the folder is this package; else None."""
     if not PACKAGE_NAME.fullmatch(name):
-        raise RobotError(f"{start}: {name[:80]!r} is no package name; a name has letters, digits, '_' and '-' only")
+        raise RobotError(f"{start}: {cut(name)} is no package name; a name has letters, digits, '_' and '-' only")
     if name in given:
         return _given_folder(name, given[name])
     shared = (prefix / "share" / name for prefix in _environment("AMENT_PREFIX_PATH"))
@@ -64,7 +64,7 @@ def folders_above(start: Path) -> list[Path]:
 
 def _given_folder(name: str, folder: Path) -> Path:
     if not os.path.isdir(folder):
-        raise RobotError(f"--package {name}={folder}: there is no such folder; give the folder of package {name!r}")
+        raise RobotError(f"--package {name}={folder}: there is no such folder; give the folder of package {cut(name)}")
     return folder
 
 
@@ -122,7 +122,7 @@ def _unknown(name: str, start: Path, given: Mapping[str, Path]) -> str:
     searched = [*_environment("AMENT_PREFIX_PATH"), *_environment("ROS_PACKAGE_PATH"), *folders_above(start)]
     known = _packages_of(_environment("ROS_PACKAGE_PATH")) | local_packages(start) | dict(given)
     return (
-        f"{start}: there is no package {name!r}; packages found: {listed(list(known))};"
-        f" looked in {', '.join(map(str, searched)) or 'no folder'}; say where it is: --package {name}=DIR"
+        f"{start}: there is no package {cut(name)}; packages found: {listed(list(known))};"
+        f" looked in {', '.join(map(str, searched)) or 'no folder'}; say where it is: --package {name[:80]}=DIR"
         f"{near(name, list(known))}"
     )

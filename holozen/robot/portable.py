@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from xml.parsers import expat
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 from holozen.robot.mesh.files import data_uri
 from holozen.robot.tag import read_xml
 from holozen.robot.uris import is_data, resolve_uri
@@ -32,7 +32,7 @@ def portable(
         try:
             hull = data_uri(resolve_uri(uri, path, packages))
         except RobotError as error:
-            warnings.append(f"{path}: the collision mesh {uri[:200]!r} is not sent: {error}")
+            warnings.append(f"{path}: the collision mesh {cut(uri)} is not sent: {error}")
         else:
             data = data[:start] + hull.encode() + data[end:]
     return data.decode(), tuple(reversed(warnings))

@@ -5,11 +5,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 from holozen.robot.model import RobotModel
 from holozen.robot.parts import Inertial, Link, Pose, Shape
-from holozen.robot.rotation import Array, Quaternion, matrix_of, principal, quaternion_of, rpy_of, triple
+from holozen.robot.rotation import Array, Quaternion, matrix_of, principal, quaternion_of, rpy_of, symmetric, triple
 from holozen.robot.shapes import solid
+from holozen.robot.solids import is_absurd, moments
 from holozen.robot.tag import Vector
 from holozen.robot.tree import descend
 
@@ -114,19 +115,27 @@ def lump(model: RobotModel) -> Body:
     """
     body = lump_links(model, link_frames(model))
     if body.mass < SMALLEST_MASS and not model.static:
-        problem = f"robot {model.name!r} has a mass of {body.mass} kg"
+        problem = f"robot {cut(model.name)} has a mass of {body.mass} kg"
         raise RobotError(f"{problem}; give a link an <inertial> with a <mass> of {SMALLEST_MASS} kg or more")
     return body
 
 
 def lump_links(model: RobotModel, frames: Mapping[str, Frame]) -> Body:
-    """The links named by `frames` as one body, in the frame that `frames` are told in."""
+    """The links named by `frames` as one body, in the frame that `frames` are told in. Its moments of inertia are those
+    of its shapes where its own are far below them: an engine makes what turns so easily spin.
+    """
     links = [model.links[name] for name in frames]
     parts = [(frames[link.name] @ Frame.of(link.inertial.pose), link.inertial) for link in links if link.inertial]
     mass, centre, inertia = _sum(parts)
-    moments, axes = principal(inertia)
-    moments = np.maximum(moments, mass * SMALLEST_GYRATION**2)
-    return Body(mass, triple(centre), triple(moments), quaternion_of(axes), tuple(_collisions(links, frames)))
+    principals, axes = principal(_not_absurd(inertia, mass, links, frames))
+    principals = np.maximum(principals, mass * SMALLEST_GYRATION**2)
+    return Body(mass, triple(centre), triple(principals), quaternion_of(axes), tuple(_collisions(links, frames)))
+
+
+def _not_absurd(inertia: Array, mass: float, links: list[Link], frames: Mapping[str, Frame]) -> Array:
+    placed = [(shape, frames[link.name] @ Frame.of(shape.pose)) for link in links for shape in link.collisions]
+    least = moments((shape, frame.position, frame.rotation) for shape, frame in placed)
+    return inertia if least is None or not is_absurd(inertia, mass, least) else mass * least
 
 
 def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
@@ -137,14 +146,9 @@ def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
     inertia = np.zeros((3, 3))
     for frame, part in parts:
         away = frame.position - centre
-        inertia += frame.rotation @ _tensor(part) @ frame.rotation.T
+        inertia += frame.rotation @ symmetric(part.inertia) @ frame.rotation.T
         inertia += part.mass * (away @ away * np.eye(3) - np.outer(away, away))
     return mass, centre, inertia
-
-
-def _tensor(part: Inertial) -> Array:
-    xx, xy, xz, yy, yz, zz = part.inertia
-    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
 
 def _collisions(links: list[Link], frames: Mapping[str, Frame]) -> Iterable[PlacedShape]:

@@ -85,6 +85,12 @@ def principal(inertia: Array) -> tuple[Array, Array]:
     return moments, axes
 
 
+def symmetric(values: Sequence[float]) -> Array:
+    """The tensor (3, 3) of xx, xy, xz, yy, yz, zz."""
+    xx, xy, xz, yy, yz, zz = values
+    return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+
 def triple(values: Any) -> tuple[float, float, float]:
     """Three plain floats, as engines want them."""
     x, y, z = (float(value) for value in values)

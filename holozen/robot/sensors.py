@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from holozen.robot.errors import cut
 from holozen.robot.parts import Sensor
 from holozen.robot.plugins.names import kind_of
 from holozen.robot.plugins.settings import Settings
@@ -50,7 +51,7 @@ def read_sensor(tag: Tag, link: str, source: Source) -> Sensor:
     kind = tag.attributes.get("type", "").strip() or "unknown"
     plugin = tag.first("plugin") or Tag("plugin", {}, tag.place, tag)
     rate = _rate(tag, source) or _rate(plugin, source)
-    source.warn(tag, f"({kind}) is not simulated yet")
+    source.warn(tag, f"({kind[:80]}) is not simulated yet")
     return Sensor(tag.attributes.get("name", kind), kind, link, rate, _topic(tag) or _topic(plugin))
 
 
@@ -67,7 +68,7 @@ def _rate(owner: Tag, source: Source) -> float:
     word = told.value()
     value = number(word) if word else 0.0
     if value is None or value < 0:
-        source.warn(told, f"is {word[:80]!r}; it is taken as every step")
+        source.warn(told, f"is {cut(word)}; it is taken as every step")
     return max(0.0, value or 0.0)
 
 

@@ -23,7 +23,7 @@ def read_shape(tag: Tag, source: Source) -> Shape:
     geometry = needed(tag, "geometry")
     known = [child for child in geometry.children if child.name in SIZES or child.name == "mesh"]
     if not known:
-        found = ", ".join(f"<{child.name}>" for child in geometry.children) or "nothing"
+        found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
         raise geometry.wrong(f"holds {found}; it has to hold <box>, <cylinder>, <sphere> or <mesh>")
     shape = known[0]
     if shape.name == "mesh":

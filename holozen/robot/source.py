@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 
+from holozen.robot.errors import cut
 from holozen.robot.tag import Tag
 
 MOST_WARNINGS = 200
@@ -34,11 +35,14 @@ class Source:
         elif len(self.warnings) == MOST_WARNINGS:
             self.warnings.append(f"{tag.place}: there are more than {MOST_WARNINGS} warnings; the rest is not told")
 
-    def nearest(self, name: str, known: Iterable[str]) -> str:
-        """The one of `known` that `name` is most like, as the phrase "; the nearest is ...", or nothing."""
+    def nearest(self, name: str, known: Iterable[str], common: str = "", alike: float = 0.6) -> str:
+        """The one of `known` that `name` is most like, as the phrase "; the nearest is ...", or nothing.
+
+        `alike` is how much the two have in common, from 0 to 1; the beginning `common` does not count.
+        """
         self.guesses += 1
         if self.guesses > MOST_GUESSES:
             return ""
-        same = {other.casefold()[:60]: other for other in known}
-        found = get_close_matches(name.casefold()[:60], same, 1)
-        return f"; the nearest is {same[found[0]]!r}" if found else ""
+        same = {other.removeprefix(common).casefold()[:60]: other for other in known}
+        found = get_close_matches(name.removeprefix(common).casefold()[:60], same, 1, alike)
+        return f"; the nearest is {cut(same[found[0]])}" if found else ""

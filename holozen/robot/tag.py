@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from xml.parsers import expat
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 
 Vector = tuple[float, float, float]
 
@@ -71,7 +71,7 @@ class Tag:
         text = self.word(attribute)
         values = tuple(self._number(attribute, word, most) for word in text.split())
         if len(values) != count:
-            raise self.wrong(f"{attribute}={_cut(text)} has {len(values)} numbers instead of {count}")
+            raise self.wrong(f"{attribute}={cut(text)} has {len(values)} numbers instead of {count}")
         return values
 
     def number(self, attribute: str, default: float | None = None, most: float = LARGEST) -> float:
@@ -86,9 +86,9 @@ class Tag:
     def _number(self, attribute: str, word: str, most: float) -> float:
         value = number(word)
         if value is None:
-            raise self.wrong(f"{attribute}: {_cut(word)} is no finite number; write 0.25, and spaces between several")
+            raise self.wrong(f"{attribute}: {cut(word)} is no finite number; write 0.25, and spaces between several")
         if abs(value) > most:
-            raise self.wrong(f"{attribute}: {_cut(word)} is beyond {most:g}; use metres and kilograms")
+            raise self.wrong(f"{attribute}: {cut(word)} is beyond {most:g}; use metres and kilograms")
         return value
 
     def __str__(self) -> str:
@@ -96,9 +96,9 @@ class Tag:
         while owner is not None and "name" not in owner.attributes:
             owner = owner.parent
         if owner is None:
-            return f"<{self.name}>"
-        named = f"<{owner.name} name={_cut(owner.attributes['name'])}>"
-        return named if owner is self else f"<{self.name}> of {named}"
+            return f"<{self.name[:80]}>"
+        named = f"<{owner.name[:80]} name={cut(owner.attributes['name'])}>"
+        return named if owner is self else f"<{self.name[:80]}> of {named}"
 
 
 def number(word: str) -> float | None:
@@ -135,10 +135,6 @@ def check_size(size: int, place: str, most: int = MOST_TEXT) -> None:
         raise RobotError(f"{place}: the file holds {told}: put its meshes into files of their own")
 
 
-def _cut(text: str) -> str:
-    return repr(text if len(text) <= 80 else text[:77] + "...")
-
-
 class _Reader:
     def __init__(self, place: str) -> None:
         self.place = place
@@ -173,7 +169,7 @@ class _Reader:
 
     def entity(self, name: str, *rest: object) -> None:
         line = self.parser.CurrentLineNumber
-        raise RobotError(f"{self.place}, line {line}: the entity {name!r} is declared; write its text out instead")
+        raise RobotError(f"{self.place}, line {line}: the entity {cut(name)} is declared; write its text out instead")
 
     def broken(self, error: expat.ExpatError) -> RobotError:
         unclosed = f"; {self.open} of {self.open.place} is still open" if self.open.name else ""

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from holozen.robot.errors import cut
 from holozen.robot.parts import Joint, Transmission
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag, number
@@ -15,7 +16,7 @@ def read_transmissions(robot: Tag, joints: Mapping[str, Joint], source: Source) 
         unknown = [name for name in names if name not in joints]
         if unknown:
             near = source.nearest(unknown[0], joints)
-            source.warn(tag, f"names the joint {unknown[0][:80]!r}, which is not there{near}; it is left out")
+            source.warn(tag, f"names the joint {cut(unknown[0])}, which is not there{near}; it is left out")
         elif not names:
             source.warn(tag, "names no joint; it is left out")
         else:
@@ -47,5 +48,5 @@ def _reduction(tag: Tag, source: Source) -> float:
         return 1.0
     value = number(told.value())
     if not value:
-        source.warn(told, f"is {told.value()[:80]!r}; 1 is used")
+        source.warn(told, f"is {cut(told.value())}; 1 is used")
     return value or 1.0

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 
-from holozen.robot.errors import listed
+from holozen.robot.errors import cut, listed
 from holozen.robot.parts import Joint
 from holozen.robot.tag import Tag
 
@@ -39,7 +39,7 @@ def _check_ends(tags: Mapping[str, Tag], links: Mapping[str, object], joints: Ma
         for end, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in links:
                 known = listed(list(links))
-                raise tags[joint.name].wrong(f"names the {end} link {name!r}; the links there are: {known}")
+                raise tags[joint.name].wrong(f"names the {end} link {cut(name)}; the links there are: {known}")
 
 
 def _parents(tags: Mapping[str, Tag], joints: Mapping[str, Joint]) -> dict[str, str]:
@@ -48,5 +48,5 @@ def _parents(tags: Mapping[str, Tag], joints: Mapping[str, Joint]) -> dict[str, 
     for joint in joints.values():
         other = parents.setdefault(joint.child, joint.name)
         if other != joint.name:
-            raise tags[joint.name].wrong(f"has the child link {joint.child!r}, which joint {other!r} has already")
+            raise tags[joint.name].wrong(f"has the child link {cut(joint.child)}, which joint {cut(other)} has already")
     return parents

@@ -3,32 +3,34 @@
 import math
 from dataclasses import replace
 
+from holozen.robot.errors import cut
 from holozen.robot.materials import Materials, urdf_color
+from holozen.robot.moments import NO_INERTIA, with_moments
 from holozen.robot.parts import JOINT_KINDS, Inertial, Joint, Limits, Link, Mimic, Shape
 from holozen.robot.shapes import needed, read_pose, read_shape
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag, Vector
 
 SMALLEST_AXIS = 1e-6
-NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def read_link(tag: Tag, source: Source, materials: Materials = {}) -> Link:
     """A `<link>`; `materials` are those of its robot. Raises RobotError."""
     inertial = tag.first("inertial")
-    return Link(
+    link = Link(
         name=tag.word("name"),
-        inertial=None if inertial is None else _inertial(inertial, source),
+        inertial=None if inertial is None else _inertial(inertial),
         visuals=tuple(_visual(visual, source, materials) for visual in tag.all("visual")),
         collisions=tuple(read_shape(collision, source) for collision in tag.all("collision")),
     )
+    return with_moments(link, inertial, source)
 
 
 def read_joint(tag: Tag, source: Source) -> Joint:
     """A `<joint>`. Raises RobotError."""
     kind = tag.word("type")
     if kind not in JOINT_KINDS:
-        raise tag.wrong(f"has the unknown type {kind!r}; known are {', '.join(JOINT_KINDS)}")
+        raise tag.wrong(f"has the unknown type {cut(kind)}; known are {', '.join(JOINT_KINDS)}")
     ends = {name: tag.first(name) for name in ("parent", "child")}
     parent, child = (needed(tag, name).word("link") for name in ends)
     friction, damping = (_dynamics(tag, name) for name in ("friction", "damping"))
@@ -57,23 +59,20 @@ def _mimic(tag: Tag) -> Mimic | None:
     return Mimic(mimic.word("joint"), mimic.number("multiplier", 1.0), mimic.number("offset", 0.0))
 
 
-def _inertial(tag: Tag, source: Source) -> Inertial:
+def _inertial(tag: Tag) -> Inertial:
     mass = needed(tag, "mass").number("value")
     if mass < 0:
         raise needed(tag, "mass").wrong(f"value: {mass} kg is below zero")
-    return Inertial(read_pose(tag), mass, _inertia(tag, source) if mass else NO_INERTIA)
+    return Inertial(read_pose(tag), mass, _inertia(tag) if mass else NO_INERTIA)
 
 
-def _inertia(tag: Tag, source: Source) -> tuple[float, float, float, float, float, float]:
+def _inertia(tag: Tag) -> tuple[float, float, float, float, float, float]:
     given = tag.first("inertia") or Tag("inertia", {}, tag.place, tag)
     xx, xy, xz, yy, yz, zz = (given.number(name, 0.0) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     if min(xx, yy, zz) < 0:
         raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never below zero")
-    if not positive_definite(xx, xy, xz, yy, yz, zz):
-        # Refusing it would stop many a student's robot. A point mass still counts in the robot's inertia.
-        source.warn(given, "is zero or not positive definite, which no body has; the link is taken as a point mass")
-        return NO_INERTIA
-    return xx, xy, xz, yy, yz, zz
+    # Refusing what is not positive definite would stop many a student's robot.
+    return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
 
 
 def positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> bool:
@@ -101,7 +100,7 @@ def _limits(tag: Tag, kind: str, source: Source) -> Limits:
         if bounded:
             source.warn(tag, f"is {kind} and has no <limit>; it is taken as unlimited")
         return Limits()
-    effort, velocity = (limit.number(name, math.inf, most=math.inf) for name in ("effort", "velocity"))
+    effort, velocity = (_most(limit, name, source) for name in ("effort", "velocity"))
     if not bounded:
         return Limits(effort, velocity)
     # URDF: a position bound that is left out is 0.
@@ -109,3 +108,11 @@ def _limits(tag: Tag, kind: str, source: Source) -> Limits:
     if lower > upper:
         raise limit.wrong(f"has lower={lower} above upper={upper}")
     return Limits(effort, velocity, lower, upper)
+
+
+def _most(limit: Tag, name: str, source: Source) -> float:
+    value = limit.number(name, math.inf, most=math.inf)
+    if value < 0:
+        source.warn(limit, f"{name}: {value:g} is below zero; it is taken as unlimited")
+        return math.inf
+    return value

@@ -8,8 +8,8 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from holozen import data
-from holozen.robot.errors import RobotError
-from holozen.robot.packages import find_named, find_package, local_packages, nearest_robot_folder
+from holozen.robot.errors import RobotError, cut
+from holozen.robot.packages import find_named, find_package, folders_above, local_packages, nearest_robot_folder
 
 MOST_FOLDERS = 5000  # searched for a lost mesh in one package; keeps it short where a home folder passes for one
 MODEL_PATHS = ("GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH")
@@ -30,10 +30,11 @@ def resolve_uri(
     """The existing file that `uri` names, as an absolute path.
 
     `uri` is `package://NAME/...`, `model://NAME/...`, `file:///...`, an absolute path, or a path relative to
-    the folder of the robot file `start` or to its package; percent-encoded or not. Models are looked for in the
-    folders of GAZEBO_MODEL_PATH and GZ_SIM_RESOURCE_PATH too. An absolute path that does not exist here comes
-    from another machine: its file name is searched in the given packages, in the robot's own and in the ones next to
-    it, and the match that shares most of the path's end is taken; `tell` is called with a line about it.
+    the folder of the robot file `start` or to its package; percent-encoded or not. Models and packages are looked for
+    in the folders of GAZEBO_MODEL_PATH and GZ_SIM_RESOURCE_PATH, and by their folder's name beside the folders above
+    `start`, too. An absolute path that does not exist here comes from another machine: its file name is searched in the
+    given packages, in the robot's own and in the ones next to it, and the match that shares most of the path's end is
+    taken; `tell` is called with a line about it.
 
     With `confined` only files that really lie in a known folder are found, symbolic links followed: given packages,
     those that ROS's and Gazebo's environment variables name, and holozen's own. Nothing outside is even looked at.
@@ -48,15 +49,23 @@ def resolve_uri(
     if found is None and not scheme and _ABSOLUTE.match(rest):
         found = _by_file_name(unquote(rest), start, given)
         if found is not None:
-            tell(f"there is no file {uri[:200]!r}; {found} is taken, which has its name")
+            tell(f"there is no file {cut(uri, 200)}; {found} is taken, which has its name")
     if found is None:
-        raise RobotError(f"no such file {uri[:200]!r}; looked for {' and '.join(str(place) for place in places)}")
+        looked = " and ".join(cut(str(place), 300)[1:-1] for place in places)
+        raise RobotError(f"no such file {cut(uri, 200)}; looked for {looked}")
     return Path(os.path.abspath(found))
 
 
 def _confined(uri: str, scheme: str, rest: str, given: Mapping[str, Path]) -> Path:
     if not scheme and not rest.startswith("/"):
-        raise RobotError(f"{uri[:200]!r} is a path that means nothing here; send the mesh itself (holozen spawn does)")
+        told = "is a path that means nothing here; send the mesh itself (holozen spawn does)"
+        raise RobotError(f"{cut(uri, 200)} {told}")
+    name = unquote(rest.partition("/")[0])
+    if scheme and not _named_folders(name, NOWHERE, given):
+        raise RobotError(
+            f"{cut(uri, 200)}: the sim does not know the package {cut(name)}; start it with"
+            f" --package {name[:80]}=DIR, or use `holozen spawn FILE`, which sends meshes along"
+        )
     roots = [os.path.realpath(folder) for folder in _known_folders(given)]
     for place in _places(scheme, rest, NOWHERE, given):
         real = "" if "\0" in str(place) else os.path.realpath(place)
@@ -64,7 +73,7 @@ def _confined(uri: str, scheme: str, rest: str, given: Mapping[str, Path]) -> Pa
         if any(real.startswith(root + os.sep) for root in roots) and os.path.isfile(real):
             return Path(real)
     raise RobotError(
-        f"{uri[:200]!r} is no file in a known package; send the mesh itself (holozen spawn does),"
+        f"{cut(uri, 200)} is no file in a known package; send the mesh itself (holozen spawn does),"
         " or start the sim with --package NAME=DIR"
     )
 
@@ -87,7 +96,7 @@ def _split(uri: str) -> tuple[str, str]:
     assert match is not None, "the pattern takes any text"
     scheme, rest = (match[1] or "").lower(), match[2]
     if scheme not in ("", "file", "package", "model"):
-        raise RobotError(f"{uri[:200]!r} is not fetched; write package://NAME/FILE, file:///FILE or a relative path")
+        raise RobotError(f"{cut(uri, 200)} is not fetched; write package://NAME/FILE, file:///FILE or a relative path")
     return scheme.replace("file", ""), rest.removeprefix("localhost") if scheme == "file" else rest
 
 
@@ -103,9 +112,19 @@ def _places(scheme: str, rest: str, start: Path, given: Mapping[str, Path]) -> I
 
 def _folders(name: str, start: Path, given: Mapping[str, Path]) -> list[Path]:
     """Those of the package or model; the last resort of `find_package` if nothing is called so."""
+    return _named_folders(name, start, given) or [find_package(name, start, given)]
+
+
+def _named_folders(name: str, start: Path, given: Mapping[str, Path]) -> list[Path]:
     named = find_named(name, start, given)
     models = [folder / name for folder in _environment(*MODEL_PATHS) if os.path.isdir(folder / name)]
-    return [*([named] if named else []), *models] or [find_package(name, start, given)]
+    models += [folder / name for folder in folders_above(start) if _is_model(folder / name)]
+    return [*([named] if named else []), *models]
+
+
+def _is_model(folder: Path) -> bool:
+    """Whether something in a folder says that it is a model's or a package's."""
+    return any(os.path.exists(folder / name) for name in ("model.config", "package.xml", "meshes"))
 
 
 def _own_folders(start: Path) -> list[Path]:

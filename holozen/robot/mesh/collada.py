@@ -12,7 +12,7 @@ from typing import BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 from holozen.robot.rotation import Array
 from holozen.robot.tag import Tag, read_xml
 
@@ -54,7 +54,7 @@ def _up(root: Tag) -> str:
     tag = next(root.below("up_axis"), Tag("up_axis", {}, root.place, root))
     up = tag.text.strip() or "Y_UP"
     if up not in UP:
-        raise tag.wrong(f"is {up[:40]!r}; there are {', '.join(UP)}")
+        raise tag.wrong(f"is {cut(up)}; there are {', '.join(UP)}")
     return up
 
 
@@ -80,7 +80,7 @@ class _Scene:
         name = tag.word(attribute).strip().removeprefix("#")
         found = self.elements.get((kind, name))
         if found is None:
-            raise tag.wrong(f"{attribute}={name[:80]!r} names no <{kind}> of this file")
+            raise tag.wrong(f"{attribute}={cut(name)} names no <{kind}> of this file")
         return found
 
     def placed(self, root: Tag) -> Iterator[tuple[Tag, Array]]:

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 from holozen.robot.mesh import collada, hulls, obj, stl
 from holozen.robot.rotation import Array, triple
 from holozen.robot.tag import Vector
@@ -19,6 +19,7 @@ from holozen.robot.tag import Vector
 T = TypeVar("T")
 UNSCALED = (1.0, 1.0, 1.0)
 MOST_DATA = 1_000_000  # characters of a data: URI; the hull of any mesh takes 6000
+POINTER = b"version https://git-lfs.github.com/spec/v1"  # what stands in place of a file that was not fetched
 
 Reader = Callable[[BinaryIO, int, str], Iterator[Array]]
 READERS: dict[str, tuple[Reader, int]] = {
@@ -57,11 +58,11 @@ def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
         raise RobotError(f"a data: URI of {len(uri)} characters; at most {MOST_DATA} are read")
     head = _DATA.match(uri.lstrip())
     if head is None:
-        raise RobotError(f"{uri[:60]!r} is not read; write data:model/stl;base64,...")
+        raise RobotError(f"{cut(uri)} is not read; write data:model/stl;base64,...")
     try:
         data = base64.b64decode("".join(uri.lstrip()[head.end() :].split()), validate=True)
     except (binascii.Error, ValueError):
-        raise RobotError(f"{uri[:60]!r} is no base64") from None
+        raise RobotError(f"{cut(uri)} is no base64") from None
     return _solid(_farthest(stl.read(io.BytesIO(data), len(data), "data: URI"), "data: URI"), scale, "data: URI")
 
 
@@ -112,6 +113,9 @@ def _read(path: str, size: int) -> Array:
         raise RobotError(f"{path}: has {size / 1e6:.0f} MB, at most {most / 1e6:.0f} MB are read; simplify the mesh")
     try:
         with open(path, "rb") as file:
+            if file.read(len(POINTER)) == POINTER:
+                raise RobotError(f"{path}: is a Git LFS pointer and no mesh; run: git lfs pull")
+            file.seek(0)
             return _farthest(reader(file, size, path), path)
     except OSError as error:
         raise RobotError(f"{path}: {error.strerror}") from None

@@ -26,7 +26,7 @@ def read(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
         except OverflowError:
             raise RobotError(f"{place}, line {number}: a face names a vertex that is not there") from None
         except ValueError as error:
-            raise RobotError(f"{place}, line {number}: {error}") from None
+            raise RobotError(f"{place}, line {number}: {str(error)[:200]}") from None
     if used:
         yield _chosen(np.array(vertices).reshape(-1, 3), np.array(used), place)
 

@@ -65,4 +65,4 @@ def _corners(text: bytes, place: str) -> Array:
     try:
         return np.fromiter(map(float, words), np.float64, len(words)).reshape(-1, 3)
     except ValueError as error:
-        raise RobotError(f"{place}: a vertex holds no number: {error}") from None
+        raise RobotError(f"{place}: a vertex holds no number: {str(error)[:200]}") from None

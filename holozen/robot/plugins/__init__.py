@@ -4,8 +4,10 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 
 from holozen.robot.drives import Drive
-from holozen.robot.parts import Joint
+from holozen.robot.errors import cut
+from holozen.robot.parts import Joint, Link
 from holozen.robot.plugins import gz, ros
+from holozen.robot.plugins.measures import Robot, measured
 from holozen.robot.plugins.names import file_of, kind_of
 from holozen.robot.plugins.settings import Settings
 from holozen.robot.sensors import SENSING
@@ -57,7 +59,7 @@ INSTEAD = {
 
 
 def read_plugins(
-    robot: Tag, links: Mapping[str, object], joints: Mapping[str, Joint], root: str, source: Source
+    robot: Tag, links: Mapping[str, Link], joints: Mapping[str, Joint], root: str, source: Source
 ) -> Drive | None:
     """What drives a `<robot>` or `<model>`: the first plugin that drives; the others make warnings.
 
@@ -74,8 +76,8 @@ def read_plugins(
         elif drive is not None:
             source.warn(plugin, "is a second drive; only the first one drives")
         else:
-            drive = DRIVES[kind](Settings(plugin), joints, source)
-            driver = plugin
+            told = DRIVES[kind](Settings(plugin), joints, source)
+            drive, driver = measured(told, plugin, Robot(links, joints, root)), plugin
     if drive is None:
         for plugin in publishers:
             source.warn(plugin, "tells the odometry of a drive, and there is none")
@@ -98,18 +100,24 @@ def _plugins(robot: Tag) -> Iterator[Tag]:
 
 def _tell(plugin: Tag, kind: str, source: Source) -> None:
     if kind in INSTEAD:
-        source.warn(plugin, f"({file_of(plugin)}) is not run here; {INSTEAD[kind]}")
+        source.warn(plugin, f"({_file(plugin)}) is not run here; {INSTEAD[kind]}")
     elif kind in SENSING:
         source.warn(plugin, f"({SENSING[kind]}) is not simulated yet")
     else:
-        near = source.nearest(kind, (*DRIVES, *INSTEAD, *SENSING, PUBLISHER)) if kind else ""
-        source.warn(plugin, f"({file_of(plugin) or 'no filename'}) is not known here and does nothing{near}")
+        known = (*DRIVES, *INSTEAD, *SENSING, PUBLISHER)
+        near = source.nearest(kind, known, "gazebo_ros_", alike=0.8) if kind else ""
+        source.warn(plugin, f"({_file(plugin) or 'no filename'}) is not known here and does nothing{near}")
 
 
-def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, object], root: str, source: Source) -> Drive:
+def _file(plugin: Tag) -> str:
+    name = file_of(plugin)
+    return name if len(name) <= 80 else f"{name[:77]}..."
+
+
+def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, Link], root: str, source: Source) -> Drive:
     frame = drive.robot_base_frame
     if frame in links:
         return drive
     if frame:
-        source.warn(plugin, f"names the base frame {frame[:80]!r}, which is no link; {root!r} is used")
+        source.warn(plugin, f"names the base frame {cut(frame)}, which is no link; {cut(root)} is used")
     return replace(drive, robot_base_frame=root)

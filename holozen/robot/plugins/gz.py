@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from holozen.robot.drives import Differential, Drive, Mecanum, Mechanism, Planar
+from holozen.robot.errors import cut
 from holozen.robot.parts import Joint
 from holozen.robot.plugins.settings import Settings
 from holozen.robot.plugins.wheel_joints import wheel_joints
@@ -46,7 +47,7 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
         name = f"{corner}_joint"
         named = wheel_joints(settings, joints, source, "", name)
         if len(named) > 1:
-            source.warn(settings.each(name)[-1], f"is a second wheel at one corner; only {named[0]!r} drives")
+            source.warn(settings.each(name)[-1], f"is a second wheel at one corner; only {cut(named[0])} drives")
         corners.append(named[0])
     front_left, front_right, back_left, back_right = corners
     wheels = Mecanum(
@@ -119,7 +120,7 @@ def _limit(settings: Settings, what: str, source: Source) -> float:
     for tag, sign in zip(tags, (1, -1), strict=True):
         value = number(tag.value()) if tag.value() else sign * math.inf
         if value is None or value * sign <= 0:
-            raise tag.wrong(f"is {tag.value()[:80]!r}; it has to be a number {'above' if sign > 0 else 'below'} 0")
+            raise tag.wrong(f"is {cut(tag.value())}; it has to be a number {'above' if sign > 0 else 'below'} 0")
     sizes = sorted(abs(value) for value in values if value is not None)
     if sizes and sizes[0] != sizes[-1]:
         source.warn(tags[1], f"differs from {tags[0].name}; {sizes[0]:g} holds both ways")

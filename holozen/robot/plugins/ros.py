@@ -10,8 +10,9 @@ import math
 from collections.abc import Mapping
 
 from holozen.robot.drives import Balancing, Differential, Drive, Planar
+from holozen.robot.errors import cut
 from holozen.robot.parts import Joint
-from holozen.robot.plugins.settings import Settings
+from holozen.robot.plugins.settings import SMALLEST, Settings
 from holozen.robot.plugins.wheel_joints import turning, wheel_joint, wheel_joints
 from holozen.robot.source import Source
 
@@ -97,7 +98,7 @@ def _differential(settings: Settings, left: tuple[str, ...], right: tuple[str, .
         left,
         right,
         separation=settings.maybe_measure("wheel_separation"),
-        radius=settings.maybe_measure("wheel_diameter") / 2,
+        radius=settings.maybe_measure("wheel_diameter", least=2 * SMALLEST) / 2,
         torque=settings.number(TORQUE, "wheel_torque", "max_wheel_torque", "torque"),
         encoder=encoder,
         acceleration=acceleration or math.inf,
@@ -111,7 +112,7 @@ def _rate(settings: Settings) -> float:
 def _encoder(settings: Settings) -> bool:
     word = settings.word("odometry_source").lower() or "world"
     if word not in SOURCES:
-        told = f"is {word[:80]!r}; it has to be encoder (0) or world (1)"
+        told = f"is {cut(word)}; it has to be encoder (0) or world (1)"
         raise settings.tag("odometry_source").wrong(told)
     return SOURCES[word]
 
@@ -119,7 +120,7 @@ def _encoder(settings: Settings) -> bool:
 def _check_pairs(settings: Settings, pairs: int, source: Source) -> None:
     told = settings.tag("num_wheel_pairs")
     if told.value() and settings.number(1, "num_wheel_pairs") != pairs:
-        raise told.wrong(f"is {told.value()[:80]!r}, but there are {pairs} left and {pairs} right joints")
+        raise told.wrong(f"is {cut(told.value())}, but there are {pairs} left and {pairs} right joints")
     for name in ("wheel_separation", "wheel_diameter"):
         values = settings.each(name)
         if len({tag.value() for tag in values}) > 1:

@@ -3,8 +3,11 @@
 import re
 from collections.abc import Iterator
 
+from holozen.robot.errors import cut
 from holozen.robot.tag import LARGEST, Tag, number
 from holozen.wire import COMMAND_SILENCE
+
+SMALLEST = 1e-3  # m; of a wheel's radius, and between wheels
 
 _KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
 _HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
@@ -36,19 +39,22 @@ class Settings:
         word = self.word(*names)
         value = number(word) if word else default
         if value is None or value < 0 or (value == 0 and not zero):
-            told = f"is {word[:80]!r}; it has to be a number {'not below' if zero else 'above'} 0"
+            told = f"is {cut(word)}; it has to be a number {'not below' if zero else 'above'} 0"
             raise self.tag(*names).wrong(told)
         if value > most and word:
-            raise self.tag(*names).wrong(f"is {word[:80]!r}; it has to be at most {most:g}")
+            raise self.tag(*names).wrong(f"is {cut(word)}; it has to be at most {most:g}")
         return value
 
     def maybe(self, *names: str, most: float = LARGEST) -> float | None:
         """A number not below zero, or None if none of `names` is there. Raises RobotError."""
         return self.number(0.0, *names, most=most) if self.word(*names) else None
 
-    def maybe_measure(self, *names: str) -> float:
-        """Metres above zero, or 0 if none of `names` is there. Raises RobotError."""
-        return self.number(0.0, *names, zero=False) if self.word(*names) else 0.0
+    def maybe_measure(self, *names: str, least: float = SMALLEST) -> float:
+        """Metres, at least `least`, or 0 if none of `names` is there. Raises RobotError."""
+        value = self.number(0.0, *names, zero=False) if self.word(*names) else 0.0
+        if 0 < value < least:
+            raise self.tag(*names).wrong(f"is {cut(self.word(*names))}; it has to be at least {least:g} m")
+        return value
 
     def timeout(self, *names: str) -> float:
         """Seconds, or -1 for a watchdog that is off. Raises RobotError."""
@@ -59,7 +65,7 @@ class Settings:
         """True, false, 1 or 0; `default` if the file says neither. Raises RobotError."""
         word = self.word(*names).lower() or str(default).lower()
         if word not in ("true", "1", "false", "0"):
-            raise self.tag(*names).wrong(f"is {word[:80]!r}; it has to be true or false")
+            raise self.tag(*names).wrong(f"is {cut(word)}; it has to be true or false")
         return word in ("true", "1")
 
     def frame(self, *names: str) -> str:
@@ -77,7 +83,7 @@ class Settings:
         key = topic if topic.startswith("/") else f"{self._namespace()}/{topic}"
         key = re.sub("/+", "/", key).strip("/")
         if not _KEY.fullmatch(key):
-            problem = f"makes the topic {key[:80]!r}; a topic has letters, digits, '_', '-' and single '/'"
+            problem = f"makes the topic {cut(key)}; a topic has letters, digits, '_', '-' and single '/'"
             raise self.tag(*names).wrong(problem)
         return key
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 
-from holozen.robot.errors import listed
+from holozen.robot.errors import cut, listed
 from holozen.robot.parts import Joint
 from holozen.robot.plugins.settings import Settings
 from holozen.robot.source import Source
@@ -36,10 +36,10 @@ def turning(tag: Tag, name: str, joints: Mapping[str, Joint], source: Source) ->
     """`name`. Raises RobotError with what there is for one that is no joint, or a joint that does not turn."""
     if name not in joints:
         near = source.nearest(name, joints)
-        told = f"names the joint {name[:80]!r}, which is not there{near}"
+        told = f"names the joint {cut(name)}, which is not there{near}"
         raise tag.wrong(f"{told}; the joints there are: {listed(list(joints))}")
     if joints[name].kind not in TURNING:
-        raise tag.wrong(f"names the joint {name[:80]!r}, which is {joints[name].kind}; a wheel's joint is continuous")
+        raise tag.wrong(f"names the joint {cut(name)}, which is {joints[name].kind}; a wheel's joint is continuous")
     return name
 
 

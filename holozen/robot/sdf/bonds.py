@@ -3,14 +3,14 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from holozen.robot.errors import listed
+from holozen.robot.errors import cut, listed
 from holozen.robot.mimics import check_mimics
 from holozen.robot.model import MOST_PARTS
 from holozen.robot.parts import Joint, Limits, Pose
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import triple
 from holozen.robot.sdf.frames import INSIDE, WORLD, Frames, whole
-from holozen.robot.sdf.joints import AS_FIXED, GEARBOX, axis_of, has_spring, kind_of, read_joint
+from holozen.robot.sdf.joints import AS_FIXED, GEARBOX, axis_of, has_spring, kind_of, read_joint, rolls
 from holozen.robot.sdf.members import Member, joint_end
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag, Vector
@@ -111,7 +111,9 @@ class Bonds:
             source.warn(tag, "is a gearbox, which is not simulated, and is left out")
             return
         if tag.word("type").strip() in AS_FIXED:
-            source.warn(tag, f"is of the type {tag.word('type').strip()}, which is not simulated; it is taken as fixed")
+            slides = f", and its link {cut(joint_end(tag, 'child'))} slides without friction" if rolls(tag) else ""
+            told = f"is of the type {tag.word('type').strip()}, which is not simulated; it is taken as fixed{slides}"
+            source.warn(tag, told)
         if kind != "fixed" and has_spring(tag):
             source.warn(tag, "has a spring, which is not simulated")
         parent, child = (self.frames.link(tag, member.name, joint_end(tag, end)) for end in ("parent", "child"))
@@ -133,12 +135,12 @@ class Bonds:
     def _check_ends(self, tag: Tag, parent: str, child: str) -> None:
         for name in (parent, child):
             if name not in self.links and (name != WORLD or name == child):
-                raise tag.wrong(f"holds {self.local(name) or 'the world'!r}, which is no link of this model")
+                raise tag.wrong(f"holds {cut(self.local(name) or 'the world')}, which is no link of this model")
         if parent == child:
-            raise tag.wrong(f"holds the link {self.local(child)!r} on itself")
+            raise tag.wrong(f"holds the link {cut(self.local(child))} on itself")
         if child in self.holders or child in self.grounded:
             holder = repr(self.holders[child].name) if child in self.holders else "to the world"
-            told = f"has the child link {self.local(child)!r}, which the joint {holder} has already"
+            told = f"has the child link {cut(self.local(child))}, which the joint {holder} has already"
             raise tag.wrong(f"{told}; take one away, or swap the parent and the child of one")
 
     def _check_circles(self, tag: Tag) -> None:

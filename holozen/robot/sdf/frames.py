@@ -5,7 +5,7 @@ A name is whole, from the outside inwards: `table::drawer::knob`. The empty name
 
 from dataclasses import dataclass
 
-from holozen.robot.errors import RobotError, listed
+from holozen.robot.errors import RobotError, cut, listed
 from holozen.robot.parts import Pose
 from holozen.robot.rigid import Frame
 from holozen.robot.tag import Tag
@@ -93,7 +93,7 @@ class Frames:
         found = self._known(tag, scope, name)
         while not (node := self._nodes.get(found)) or not node.is_link:
             if found in seen:
-                raise tag.wrong(f"names {name!r}, which is attached in a circle")
+                raise tag.wrong(f"names {cut(name)}, which is attached in a circle")
             seen.add(found)
             found = self._next(tag, found, node)
         return found
@@ -102,7 +102,7 @@ class Frames:
         if node is not None and node.attached:
             return self._known(node.tag, node.scope, node.attached)
         if not self._roots.get(name):
-            raise tag.wrong(f"names {name.rpartition(INSIDE)[2]!r}, which has no link")
+            raise tag.wrong(f"names {cut(name.rpartition(INSIDE)[2])}, which has no link")
         return self._known(tag, name, self._roots[name])
 
     def _base(self, node: _Node) -> str:
@@ -117,7 +117,7 @@ class Frames:
     def _unknown(self, tag: Tag, scope: str, name: str) -> RobotError:
         start = f"{scope}{INSIDE}" if scope else ""
         inside = [key[len(start) :].strip() for key in self._nodes if key.startswith(start)]
-        return tag.wrong(f"names the frame {name[:80]!r}; the frames there are: {listed(inside)}")
+        return tag.wrong(f"names the frame {cut(name)}; the frames there are: {listed(inside)}")
 
     def _add(self, name: str, node: _Node) -> None:
         if name in self._nodes:

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 from holozen.robot.packages import find_named, folders_above, local_packages
 from holozen.robot.sdf.values import word
 from holozen.robot.source import Source
@@ -138,15 +138,15 @@ def version_of(root: Tag) -> tuple[int, ...]:
 def _found(outer: Piece, uri: str) -> Path | None:
     places = list(dict.fromkeys(_places(outer.source, uri)))
     if not places:
-        outer.source.warn(outer.tag, f"({uri[:200]!r}) is not fetched and left out; write model://NAME")
+        outer.source.warn(outer.tag, f"({cut(uri)}) is not fetched and left out; write model://NAME")
         return None
     files = (file for place in places if (file := _model_file(place)))
     found = next((file for file in files if not outer.source.confined or _is_known(file, outer.source)), None)
     if found is None:
-        shown = ", ".join(str(place.parent) for place in places[:6])
+        shown = ", ".join(cut(str(place.parent), 200)[1:-1] for place in places[:6])
         more = f" and {len(places) - 6} more" if len(places) > 6 else ""
         mend = "add its folder to GZ_SIM_RESOURCE_PATH or give --package NAME=DIR"
-        outer.source.warn(outer.tag, f"({uri[:200]!r}) is not found and left out; looked in {shown}{more}; {mend}")
+        outer.source.warn(outer.tag, f"({cut(uri)}) is not found and left out; looked in {shown}{more}; {mend}")
     return found
 
 

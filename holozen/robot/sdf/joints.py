@@ -2,6 +2,7 @@
 
 import math
 
+from holozen.robot.errors import cut
 from holozen.robot.parts import Joint, Limits, Mimic
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import triple
@@ -10,6 +11,7 @@ from holozen.robot.tag import Tag, Vector
 
 KINDS = ("continuous", "revolute", "prismatic", "fixed")
 AS_FIXED = ("ball", "universal", "screw", "revolute2")
+ROLLING = ("ball", "universal")  # of those; a caster on one rolls every way
 GEARBOX = "gearbox"  # couples two other joints; it holds nothing together
 
 NOISE = 1e-12  # of a rotated unit vector
@@ -44,8 +46,13 @@ def kind_of(tag: Tag) -> str:
     kind = tag.word("type").strip()
     if kind not in (*KINDS, *AS_FIXED, GEARBOX):
         known = ", ".join((*KINDS, *AS_FIXED, GEARBOX))
-        raise tag.wrong(f"has the unknown type {kind[:80]!r}; known are {known}")
+        raise tag.wrong(f"has the unknown type {cut(kind)}; known are {known}")
     return "fixed" if kind in AS_FIXED else kind
+
+
+def rolls(tag: Tag) -> bool:
+    """Whether a joint leaves its link free to roll every way, and yet is taken as fixed."""
+    return tag.attributes.get("type", "").strip() in ROLLING
 
 
 def axis_of(tag: Tag, version: tuple[int, ...]) -> tuple[Vector, str]:

@@ -3,13 +3,14 @@
 import math
 from dataclasses import dataclass
 
+from holozen.robot.moments import NO_INERTIA, with_moments
 from holozen.robot.parts import Inertial, Link, Pose, Surface
 from holozen.robot.sdf.shapes import read_shape
 from holozen.robot.sdf.values import compose, empty, flag, numbers, read_pose, value
 from holozen.robot.shapes import needed
 from holozen.robot.source import Source
 from holozen.robot.tag import Tag
-from holozen.robot.urdf import NO_INERTIA, positive_definite
+from holozen.robot.urdf import positive_definite
 
 GAZEBOS_INERTIAL = Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
 
@@ -28,7 +29,7 @@ def read_link(tag: Tag, name: str, frame: Pose, held: Held, source: Source) -> L
         source.warn(tag, "is kinematic, which is not simulated; gravity and contacts move it like any other")
     visuals = [read_shape(visual, frame, source) for visual in tag.all("visual")]
     collisions = [read_shape(collision, frame, source) for collision in tag.all("collision")]
-    return Link(
+    link = Link(
         name=name,
         inertial=_inertial(tag, frame, held.static, source),
         visuals=tuple(shape for shape in visuals if shape is not None),
@@ -36,6 +37,7 @@ def read_link(tag: Tag, name: str, frame: Pose, held: Held, source: Source) -> L
         surface=_surface(tag, flag(tag, "self_collide", held.self_collide), source),
         gravity=flag(tag, "gravity", True),
     )
+    return with_moments(link, tag.first("inertial"), source, silent=held.static)
 
 
 def _inertial(tag: Tag, frame: Pose, static: bool, source: Source) -> Inertial | None:
@@ -52,20 +54,16 @@ def _inertial(tag: Tag, frame: Pose, static: bool, source: Source) -> Inertial |
     if mass == 0 and not static:
         source.warn(inertial, "has no mass; the link is taken as massless, with no inertia")
     pose = compose(frame, read_pose(inertial).pose)
-    return Inertial(pose, mass, _inertia(inertial, static, source) if mass else NO_INERTIA)
+    return Inertial(pose, mass, _inertia(inertial) if mass else NO_INERTIA)
 
 
-def _inertia(tag: Tag, static: bool, source: Source) -> tuple[float, float, float, float, float, float]:
+def _inertia(tag: Tag) -> tuple[float, float, float, float, float, float]:
     given = tag.first("inertia") or empty(tag)
     xx, yy, zz = (value(given, name, 1.0) for name in ("ixx", "iyy", "izz"))
     xy, xz, yz = (value(given, name, 0.0) for name in ("ixy", "ixz", "iyz"))
     if min(xx, yy, zz) < 0:
         raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never below zero")
-    if positive_definite(xx, xy, xz, yy, yz, zz):
-        return xx, xy, xz, yy, yz, zz
-    if not static:
-        source.warn(given, "is zero or not positive definite, which no body has; the link is taken as a point mass")
-    return NO_INERTIA
+    return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
 
 
 def _surface(tag: Tag, self_collide: bool, source: Source) -> Surface:

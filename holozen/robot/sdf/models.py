@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from holozen.robot.errors import RobotError, listed
+from holozen.robot.errors import RobotError, cut, listed
 from holozen.robot.model import RobotModel
 from holozen.robot.sdf.frames import WORLD, Frames
 from holozen.robot.sdf.include import Includes, Piece, version_of
@@ -56,4 +56,4 @@ def models_in(outer: Piece, frames: Frames, includes: Includes) -> Iterator[Robo
 
 
 def _taken(tag: Tag, name: str) -> RobotError:
-    return tag.wrong(f"makes a body called {name!r}, which there is already; give each its own name")
+    return tag.wrong(f"makes a body called {cut(name)}, which there is already; give each its own name")

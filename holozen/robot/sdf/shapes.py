@@ -37,7 +37,7 @@ def read_shape(tag: Tag, frame: Pose, source: Source) -> Shape | None:
     geometry = needed(tag, "geometry")
     known = [child for child in geometry.children if child.name in (*SIZES, *LEFT_OUT, "plane", "mesh", "empty")]
     if not known:
-        found = ", ".join(f"<{child.name}>" for child in geometry.children) or "nothing"
+        found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
         raise geometry.wrong(f"holds {found}; it has to hold {_listed()}, <plane> or <mesh>")
     color = _color(tag, source) if tag.name == "visual" else None
     return _shape(known[0], tag.name, pose, color, source)

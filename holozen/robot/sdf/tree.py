@@ -9,6 +9,7 @@ from holozen.robot.plugins import read_plugins
 from holozen.robot.rigid import Frame
 from holozen.robot.sdf.bonds import Bonds
 from holozen.robot.sdf.frames import INSIDE, WORLD, Frames
+from holozen.robot.sdf.joints import rolls
 from holozen.robot.sdf.links import Held, read_link
 from holozen.robot.sdf.members import Member
 from holozen.robot.sdf.values import flag
@@ -70,7 +71,11 @@ def _placed(bonds: Bonds, first: str) -> dict[str, Frame]:
 def _link(name: str, bonds: Bonds, placed: Mapping[str, Frame], held: Held) -> Link:
     member, tag = bonds.links[name]
     frame = (placed[name].inverse @ bonds.frames.of(name)).pose
-    return read_link(tag, bonds.local(name), frame, held, member.piece.source)
+    link = read_link(tag, bonds.local(name), frame, held, member.piece.source)
+    if name not in bonds.holders or not rolls(bonds.holders[name].tag):
+        return link
+    # What would roll has to slide: a caster that drags keeps the robot from turning.
+    return replace(link, surface=replace(link.surface, mu1=0.0, mu2=0.0))
 
 
 def _standing(bonds: Bonds, first: str, root: str, placed: Mapping[str, Frame]) -> Joint:

@@ -3,6 +3,7 @@
 import math
 from dataclasses import dataclass
 
+from holozen.robot.errors import cut
 from holozen.robot.parts import Pose
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import matrix_of_quaternion, rpy_of
@@ -36,7 +37,7 @@ def numbers(tag: Tag, count: int, most: float = LARGEST) -> tuple[float, ...]:
     words = tag.text.split()
     values = tuple(_number(tag, word, most) for word in words)
     if len(values) != count:
-        raise tag.wrong(f"has {len(values)} numbers instead of {count}: {_cut(tag.text.strip())}")
+        raise tag.wrong(f"has {len(values)} numbers instead of {count}: {cut(tag.text.strip())}")
     return values
 
 
@@ -71,7 +72,7 @@ def flag(tag: Tag, name: str, default: bool) -> bool:
         return default
     text = child.text.strip().lower()
     if text not in ("true", "1", "false", "0"):
-        raise child.wrong(f"is {_cut(text)}; it has to be true or false")
+        raise child.wrong(f"is {cut(text)}; it has to be true or false")
     return text in ("true", "1")
 
 
@@ -116,11 +117,7 @@ def _with_quaternion(tag: Tag) -> Pose:
 def _number(tag: Tag, word: str, most: float) -> float:
     value = number(word)
     if value is None:
-        raise tag.wrong(f"has {_cut(word)}, which is no finite number")
+        raise tag.wrong(f"has {cut(word)}, which is no finite number")
     if abs(value) > most:
-        raise tag.wrong(f"has {_cut(word)}, which is beyond {most:g}; use metres, kilograms and radians")
+        raise tag.wrong(f"has {cut(word)}, which is beyond {most:g}; use metres, kilograms and radians")
     return value
-
-
-def _cut(text: str) -> str:
-    return repr(text if len(text) <= 80 else text[:77] + "...")

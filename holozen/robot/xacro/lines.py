@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 from xml.dom import expatbuilder, minidom
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 
 
 class Place(NamedTuple):
@@ -37,7 +37,7 @@ def keep_places(file: Callable[[], str]) -> None:
 
     def entity(self: Any, name: str, *_rest: object) -> None:
         place = Place(file(), self.getParser().CurrentLineNumber)
-        raise RobotError(f"{place}: the entity {name!r} is declared; write its text out instead")
+        raise RobotError(f"{place}: the entity {cut(name)} is declared; write its text out instead")
 
     def copied(node: Any, deep: bool, owner: Any) -> Any:
         clone = copy(node, deep, owner)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import IO
 
-from holozen.robot.errors import RobotError
+from holozen.robot.errors import RobotError, cut
 from holozen.robot.xacro.inputs import Outcome
 
 PATIENCE = 60.0  # s; the child's own limits count processor time and end it long before, unless it waits
@@ -91,4 +91,4 @@ def _noted(path: Path, note: IO[bytes]) -> tuple[str, str]:
     except ValueError:
         return str(path), "the file"
     where = f"{file}, line {line}" if file else str(path)
-    return where, f"the expression {expression!r}" if expression else "this element"
+    return where, f"the expression {cut(expression, 200)}" if expression else "this element"

@@ -48,6 +48,28 @@ def test_a_mesh_with_nothing_in_it(content: bytes, good: str, rules: Rules, tmp_
     assert rules(with_mesh(good, "body.stl")) == ["mesh-empty"]
 
 
+@pytest.mark.parametrize("name", ["body.stl", "body.dae", "body.obj"])
+def test_a_mesh_that_git_lfs_has_not_fetched(name: str, good: str, findings: Findings, tmp_path: Path) -> None:
+    (tmp_path / name).write_text("version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n")
+    (finding,) = findings(with_mesh(good, name))
+    assert finding.rule == "mesh-empty"
+    assert finding.problem == f"mesh {tmp_path / name}: is a Git LFS pointer and no mesh; run: git lfs pull"
+    assert finding.mend == "then check again"
+
+
+@pytest.mark.parametrize(
+    ("uri", "mend"), [("package://lost/a.stl", "write package://PACKAGE"), ("model://lost/a.stl", "GAZEBO_MODEL_PATH")]
+)
+def test_where_a_package_was_looked_for_is_told_once(uri: str, mend: str, good: str, findings: Findings) -> None:
+    other = '<sphere radius="0.015"/>'
+    assert other in good
+    found = findings(with_mesh(good, uri).replace(other, f'<mesh filename="{uri}"/>'))
+    first, second = (finding for finding in found if finding.rule == "mesh")
+    assert "packages found" in first.problem and "looked in" in first.problem
+    assert second.problem.endswith("there is no package 'lost'")
+    assert mend in first.mend and mend in second.mend
+
+
 @pytest.mark.parametrize(
     ("size", "scale", "mend"),
     [

@@ -18,6 +18,8 @@ RIGHT = '<parent link="base"/><child link="right_wheel"/><origin xyz="0.05 -0.12
 BASE = '<mass value="2"/><inertia ixx="0.009" ixy="0" ixz="0" iyy="0.017" iyz="0" izz="0.024"/>'
 SECOND_PARENT = '<joint name="x" type="fixed"><parent link="ball"/><child link="arm"/></joint>'
 FRAME = "<robotBaseFrame>footprint</robotBaseFrame>"
+BODY = '<collision><origin xyz="0 0 0.02"/><geometry><box size="0.3 0.2 0.1"/>'
+SWAPPED = "<leftJoint>right_joint</leftJoint><rightJoint>left_joint<"
 PLUGIN = '<plugin name="drive" filename="libgazebo_ros_diff_drive.so">'
 
 BROKEN = [
@@ -35,7 +37,15 @@ BROKEN = [
     ("joint-type", 'name="arm_joint" type="revolute"', 'name="arm_joint" type="revolut"', 'type="revolute"'),
     ("twice", "</robot>", '<link name="ball"/></robot>', "first at"),
     ("no-link", '<parent link="arm"/><child link="thumb"/>', '<parent link="amr"/><child link="thumb"/>', "'arm'"),
-    ("no-link", 'reference="left_wheel"', 'reference="lef_wheel"', "'left_wheel'"),
+    ("gazebo-link", 'reference="left_wheel"', 'reference="lef_wheel"', "'left_wheel'"),
+    ("ignored", '<sphere radius="0.015"/></geometry>', '<sphere radius="0.015"/></geometry><surface/>', "<mu1>"),
+    ("ignored", '<link name="arm">', '<link name="arm"><pose>0 0 1 0 0 0</pose>', "<origin"),
+    ("ignored", ARM_LIMIT, ARM_LIMIT + '<joint_properties damping="1"/>', "<dynamics"),
+    ("ignored", "</robot>", '<plugin name="x" filename="libx.so"/></robot>', "into a <gazebo>"),
+    ("wheel-load", BODY, BODY.replace("0.02", "0"), "'base' is as low as the wheels"),
+    ("wheel-side", "<leftJoint>left_joint</leftJoint><rightJoint>right_joint<", SWAPPED, "'left_joint' (a right joint"),
+    ("wheel-measure", "<wheelSeparation>0.24", "<wheelSeparation>0.3", "is 0.3 m, and the wheels are 0.24 m apart"),
+    ("wheel-measure", "<wheelDiameter>0.1<", "<wheelDiameter>0.05<", "is 0.05 m, and that of 'left_wheel' is 0.1 m"),
     ("tree", "</robot>", '<link name="lost"/></robot>', "'lost' hangs on no joint"),
     ("tree", '<parent link="footprint"/><child link="base"/>', '<parent link="ball"/><child link="base"/>', ""),
     ("colour", '<material name="orange"/>', '<material name="ornge"/>', "'orange'"),
@@ -69,8 +79,6 @@ BROKEN = [
     ("wheel-axis", LEFT, LEFT.replace("0 1 0", "1 0 0"), "turns about (1 0 0)"),
     ("wheel-height", LEFT, LEFT.replace("0.12 0", "0.12 0.02"), "20 mm above the other wheels"),
     ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.3 0.02 0.05"/>', "the robot stands on"),
-    ("overlap", RIGHT, RIGHT.replace("-0.12", "0.11"), "inside each other"),
-    ("overlap", LEFT, LEFT.replace("0.12", "0.05"), "inside the collision shape of 'base'"),
     ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_dif_drive", "libgazebo_ros_diff_drive.so"),
     ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "does nothing"),
     ("plugin-link", FRAME, "<robotBaseFrame>chasis</robotBaseFrame>", "names no link"),
@@ -92,6 +100,12 @@ FORK = (
     '<origin xyz="0.1 0 0.3"/><axis xyz="0 1 0"/></joint>'
 )
 
+LEGACY = "<legacyMode>true</legacyMode>"
+ROS2_CONTROL = (
+    '<ros2_control name="x" type="system"><hardware><plugin>gazebo_ros2_control/GazeboSystem</plugin></hardware>'
+    "</ros2_control>"
+)
+
 FINE = [
     # what is in the good robot, and what may as well be there
     ("</robot>", BLUE + BLUE.replace("blue", "green") + "</robot>"),
@@ -110,6 +124,10 @@ FINE = [
     (LEFT, LEFT.replace("0.12", "0.11")),  # reaches into the body, and out of it
     ('<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 0.05" rpy="0 0 5"/>'),
     (BASE, BASE.replace('izz="0.024"', 'izz="0.0261"')),  # a figure too few
+    ("<wheelSeparation>0.24", "<wheelSeparation>0.28"),
+    ("<wheelDiameter>0.1<", "<wheelDiameter>0.09<"),
+    ("<leftJoint>left_joint</leftJoint><rightJoint>right_joint<", SWAPPED.replace("<leftJ", LEGACY + "<leftJ", 1)),
+    ("</robot>", ROS2_CONTROL + "</robot>"),
 ]
 
 
@@ -122,6 +140,31 @@ def test_what_is_no_mistake_is_not_told(old: str, new: str, good: str, findings:
 def test_a_mere_description_needs_no_drive(good: str, findings: Findings) -> None:
     description = good[: good.index("<gazebo")] + "</robot>"
     assert findings(description) == []
+
+
+@pytest.mark.parametrize("instead", ["", '<plugin name="c" filename="libgazebo_ros2_control.so"/>'])
+def test_ros2_control_alone_drives_nothing_here(instead: str, good: str, findings: Findings) -> None:
+    start, end = good.index("<plugin"), good.index("</plugin>") + len("</plugin>")
+    text = good[:start] + instead + good[end:]
+    (finding,) = findings(text.replace("</robot>", ROS2_CONTROL + "</robot>"))
+    assert (finding.rule, finding.severity) == ("no-drive", "warning")
+    assert "2 wheels and no plugin that drives it; nothing here reads" in finding.problem and "ros2" in finding.problem
+    assert "libgazebo_ros_diff_drive.so" in finding.mend and "--drive planar_move" in finding.mend
+
+
+def test_an_arm_needs_no_drive(findings: Findings) -> None:
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    assert findings(f'<robot name="r"><link name="a">{inertial}</link>{ROS2_CONTROL}</robot>') == []
+
+
+def test_the_settings_of_a_file_for_others_to_include_are_not_lost(rules: Rules) -> None:
+    assert "gazebo-link" not in rules('<robot name="r"><gazebo reference="base"><mu1>1</mu1></gazebo></robot>')
+
+
+def test_a_world_is_told_how_to_be_seen(findings: Findings) -> None:
+    (finding,) = findings('<sdf version="1.9"><world name="w"/></sdf>', "w.sdf")
+    assert "is a world; see it with: holozen sim --world FILE" in finding.problem
+    assert finding.mend == "check takes a robot, or a single <model>"
 
 
 def test_the_good_robots_are_silent(good: str, good_sdf: str, findings: Findings) -> None:
@@ -192,10 +235,28 @@ def test_sdf_has_the_same_rules(old: str, new: str, rule: str, good_sdf: str, ru
     assert rule in rules(good_sdf.replace(old, new, 1), "robot.sdf")
 
 
+def test_in_sdf_a_plugin_counts_in_a_model_a_world_or_a_sensor(good_sdf: str, rules: Rules) -> None:
+    plugin, link = '<plugin name="x" filename="libmy_magic.so"/>', '<link name="right_wheel">'
+    assert link in good_sdf
+    assert rules(good_sdf.replace(link, plugin + link), "robot.sdf") == ["plugin"]
+    sensor = f'<sensor name="s" type="imu">{plugin}</sensor>'
+    assert rules(good_sdf.replace(link, link + sensor), "robot.sdf") == ["plugin"]
+    assert rules(good_sdf.replace(link, link + plugin), "robot.sdf") == []
+
+
+def test_a_skid_steer_may_be_told_a_wider_base(good: str, rules: Rules) -> None:
+    wide = good.replace("<wheelSeparation>0.24", "<wheelSeparation>0.4")
+    assert rules(wide) == ["wheel-measure"]
+    start, end = wide.index('<link name="left_wheel">'), wide.index('<link name="ball">')
+    rear = wide[start:end].replace("_wheel", "_rear").replace("_joint", "_rear_joint").replace("0.05 ", "-0.1 ", 4)
+    tags = "<leftJoint>left_rear_joint</leftJoint><rightJoint>right_rear_joint</rightJoint><wheelSeparation>"
+    assert rules(wide[:end] + rear + wide[end:].replace("<wheelSeparation>", tags)) == []
+
+
 def test_every_rule_is_tried(request: pytest.FixtureRequest) -> None:
     elsewhere = {
         "macro-twice", "unused", "wheel-collision", "mesh", "mesh-path", "mesh-empty", "mesh-unit", "fits",
-        "require-file", "require",
+        "require-file", "require", "overlap",
     }  # fmt: skip
     assert {rule for rule, *_ in BROKEN} | elsewhere == {rule.name for rule in RULES}
 

@@ -89,6 +89,7 @@ def test_a_base_frame_that_is_gone_is_told() -> None:
 
 def drive(filename: str) -> str:
     tags = "<leftJoint>ab</leftJoint><rightJoint>ac</rightJoint>"
+    tags += "<wheelSeparation>0.4</wheelSeparation><wheelDiameter>0.2</wheelDiameter>"
     return f'<gazebo><plugin name="p" filename="{filename}">{tags}</plugin></gazebo>'
 
 

@@ -11,9 +11,9 @@ MASS = '<mass value="12"/>'
 INERTIA = '<inertia ixx="0.13" iyy="0.10" izz="0.05"/>'  # of 12 kg in a box of 0.1 x 0.2 x 0.3 m
 
 
-def mesh(inertial: str) -> Tag:
-    """The mesh of a link with these elements in its inertial."""
-    link = f"<link><inertial>{inertial}</inertial><visual><geometry><mesh/></geometry></visual></link>"
+def mesh(inertial: str, beside: str = "") -> Tag:
+    """The mesh of a link with these elements in its inertial and beside it."""
+    link = f"<link><inertial>{inertial}</inertial>{beside}<visual><geometry><mesh/></geometry></visual></link>"
     return next(read_xml(link, "a.urdf").below("mesh"))
 
 
@@ -53,6 +53,43 @@ def test_where_the_inertia_is_that_of_no_small_body_it_is_a_cube_where_the_mesh_
 
 def test_an_inertial_frame_that_is_none_does_not_hide_the_mesh_s_own_fault() -> None:
     assert placeholder(mesh(f'<origin xyz="0 0 x"/>{MASS}{INERTIA}'), THERE).pose == THERE
+
+
+@pytest.mark.parametrize(
+    ("shape", "size"),
+    [
+        ('<box size="0.4 0.5 0.6"/>', (0.4, 0.5, 0.6)),
+        ('<cylinder radius="0.2" length="0.1"/>', (0.4, 0.4, 0.1)),
+        ('<sphere radius="0.7"/>', (1.4, 1.4, 1.4)),
+        ("<box><size>0.4 0.5 0.6</size></box>", (0.4, 0.5, 0.6)),
+        ("<cylinder><radius>0.2</radius><length>0.1</length></cylinder>", (0.4, 0.4, 0.1)),
+    ],
+)
+def test_what_is_seen_has_the_size_of_what_is_touched(shape: str, size: tuple[float, ...]) -> None:
+    small = '<collision><geometry><box size="0.01 0.01 0.01"/></geometry></collision>'
+    origin = '<origin xyz="0 0 0.5"/>'
+    link = mesh(MASS + INERTIA, f"{small}<collision>{origin}<geometry>{shape}</geometry></collision>")
+    assert placeholder(link, THERE) == Shape("box", size, THERE if "><" in shape else Pose((0, 0, 0.5)))
+
+
+@pytest.mark.parametrize(
+    "shape",
+    ['<mesh filename="x"/>', '<box size="1 2"/>', '<sphere radius="0"/>', '<cylinder radius="x" length="1"/>', ""],
+)
+def test_a_collision_shape_without_a_size_tells_nothing(shape: str) -> None:
+    link = mesh(MASS + INERTIA, f"<collision><geometry>{shape}</geometry></collision>")
+    assert placeholder(link, THERE).size == pytest.approx((0.1, 0.2, 0.3))
+
+
+def test_what_is_touched_has_not_the_size_of_another_collision() -> None:
+    box = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    link = f"<link>{box}<collision><geometry><mesh/></geometry></collision></link>"
+    assert placeholder(next(read_xml(link, "a.urdf").below("mesh")), THERE).size == (0.1, 0.1, 0.1)
+
+
+def test_an_inertia_makes_no_box_that_hides_the_robot() -> None:
+    great = '<mass value="1"/><inertia ixx="0.3" iyy="0.3" izz="0.3"/>'  # of a cube with edges of 1.3 m
+    assert placeholder(mesh(great), THERE).size == pytest.approx((0.3, 0.3, 0.3))
 
 
 def test_outside_of_any_link_it_is_a_cube() -> None:

@@ -22,6 +22,14 @@ def test_the_nearest_name_is_told_whatever_its_case() -> None:
     assert source.nearest("xyz", ["wheel", "chassis"]) == ""
 
 
+def test_what_names_have_in_common_makes_them_no_nearer() -> None:
+    source, known = Source(Path("r.urdf"), {}), ["gazebo_ros_imu", "gazebo_ros_planar_move"]
+    assert source.nearest("gazebo_ros_foo", known) == "; the nearest is 'gazebo_ros_imu'"
+    assert source.nearest("gazebo_ros_foo", known, "gazebo_ros_", alike=0.8) == ""
+    found = source.nearest("gazebo_ros_planarmove", known, "gazebo_ros_", alike=0.8)
+    assert found == "; the nearest is 'gazebo_ros_planar_move'"
+
+
 def test_guessing_ends_in_a_file_of_nothing_but_mistakes() -> None:
     source = Source(Path("r.urdf"), {})
     told = [source.nearest("whel", ["wheel"]) for _ in range(MOST_GUESSES + 1)]

@@ -130,6 +130,22 @@ def test_a_model_is_found_in_the_folders_that_gazebo_is_told(
     assert resolve_uri("model://cafe/meshes/cafe.dae", start) == mesh
 
 
+@pytest.mark.parametrize("mark", ["model.config", "package.xml", "meshes/"])
+@pytest.mark.parametrize("beside", ["", "holo/"])
+def test_a_model_is_found_beside_the_folders_that_the_robot_lies_in(
+    start: Path, home: Path, beside: str, mark: str
+) -> None:
+    mesh = home / f"{beside}cafe" / "dae" / "cafe.dae"
+    mesh.parent.mkdir(parents=True)
+    mesh.touch()
+    with pytest.raises(RobotError, match="no such file"):
+        resolve_uri("model://cafe/dae/cafe.dae", start)
+    sign = home / f"{beside}cafe" / mark
+    sign.mkdir() if mark.endswith("/") else sign.write_text("<package><name>other</name></package>")
+    for scheme in ("model", "package"):
+        assert resolve_uri(f"{scheme}://cafe/dae/cafe.dae", start) == mesh
+
+
 def test_what_was_taken_for_another_file_is_told(start: Path, home: Path) -> None:
     told: list[str] = []
     found = resolve_uri("/home/asha/wheel.stl", start, tell=told.append)
@@ -143,7 +159,8 @@ def confined(uri: str, start: Path, given: Path) -> Path | None:
     try:
         return resolve_uri(uri, start, {"holo": given}, confined=True)
     except RobotError as error:
-        assert "send the mesh itself (holozen spawn does)" in str(error) or "no package" in str(error)
+        told = ("send the mesh itself (holozen spawn does)", "the sim does not know the package", "is no package name")
+        assert any(words in str(error) for words in told)
         return None
 
 
@@ -207,3 +224,12 @@ def test_a_package_beside_another_with_a_longer_name_is_outside_of_it(start: Pat
 
 def test_the_whole_disk_is_no_known_folder(start: Path) -> None:
     assert confined("/etc/passwd", start, Path("/")) is None
+
+
+def test_a_package_that_the_sim_does_not_know_is_told_with_what_to_do(home: Path) -> None:
+    with pytest.raises(RobotError) as error:
+        resolve_uri("package://holo/meshes/base.dae", home / "robot.urdf", confined=True)
+    assert str(error.value) == (
+        "'package://holo/meshes/base.dae': the sim does not know the package 'holo'; start it with --package holo=DIR,"
+        " or use `holozen spawn FILE`, which sends meshes along"
+    )

@@ -10,7 +10,9 @@ from holozen.robot.model import RobotModel, parse
 
 ORIGIN = Path("somewhere/robot.urdf")
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+PLACES = {"fl": "0.2 0.2 0", "fr": "0.2 -0.2 0", "rl": "-0.2 0.2 0", "rr": "-0.2 -0.2 0"}
 WHEELS = ("fl", "fr", "rl", "rr")
+ROUND = '<collision><geometry><cylinder radius="0.1" length="0.05"/></geometry></collision>'
 PAIRS = "".join(
     f"<{side}_joint>{name}</{side}_joint>" for side, name in zip(("left", "right") * 2, WHEELS, strict=True)
 )
@@ -25,9 +27,10 @@ def plugin(system: str, tags: str = "") -> str:
 
 
 def robot(*plugins: str) -> RobotModel:
-    links = "".join(f'<link name="{name}">{INERTIAL}</link>' for name in ("base", *(f"l_{name}" for name in WHEELS)))
-    joint = '<joint name="{0}" type="continuous"><parent link="base"/><child link="l_{0}"/></joint>'
-    joints = "".join(joint.format(name) for name in WHEELS)
+    names = ("base", *(f"l_{name}" for name in WHEELS))
+    links = "".join(f'<link name="{name}">{INERTIAL}{ROUND}</link>' for name in names)
+    joint = '<joint name="{0}" type="continuous"><parent link="base"/><child link="l_{0}"/><origin xyz="{1}"/></joint>'
+    joints = "".join(joint.format(*wheel) for wheel in PLACES.items())
     return parse(f'<robot name="bot">\n{links}{joints}\n<gazebo>{"".join(plugins)}</gazebo></robot>', ORIGIN)
 
 

@@ -122,6 +122,8 @@ def test_a_base_frame_that_is_no_link_is_told_and_the_root_is_taken() -> None:
         ("libgz_ros2_control-system.so", "is not known here and does nothing; the nearest is 'gz_ros2_control'"),
         ("libgazebo_ros_planarmove.so", "is not known here and does nothing; the nearest is 'gazebo_ros_planar_move'"),
         ("libsomething_else.so", "is not known here and does nothing"),
+        ("libgazebo_ros_magic_wand.so", "is not known here and does nothing"),
+        ("libmecanum.so", "is not known here and does nothing"),
     ],
 )
 def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it(filename: str, told: str) -> None:

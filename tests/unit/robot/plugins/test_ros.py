@@ -25,11 +25,15 @@ CORNERS = (
 def robot(tags: str, filename: str = DIFF, wheels: tuple[str, ...] = WHEELS) -> RobotModel:
     """A robot with a joint for each of `wheels`, a fixed one called stiff, and one plugin on line 3."""
     inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+    inertial += '<collision><geometry><cylinder radius="0.1" length="0.05"/></geometry></collision>'
     links = "".join(
         f'<link name="{name}">{inertial}</link>' for name in ("base", "s", *(f"l_{name}" for name in wheels))
     )
     ends = '<parent link="base"/><child link="{}"/></joint>'
-    joints = "".join(f'<joint name="{name}" type="continuous">{ends.format(f"l_{name}")}' for name in wheels)
+    joints = "".join(
+        f'<joint name="{name}" type="continuous"><origin xyz="0 {index} 0"/>{ends.format(f"l_{name}")}'
+        for index, name in enumerate(wheels)
+    )
     joints += f'<joint name="stiff" type="fixed">{ends.format("s")}'
     plugin = f'<plugin name="p" filename="{filename}">{tags}</plugin>'
     return parse(f'<robot name="r">\n{links}{joints}\n<gazebo>{plugin}</gazebo></robot>', ORIGIN)
@@ -175,10 +179,12 @@ def test_hectors_plugin_understands_the_tags_of_the_others_and_has_their_default
 
 def test_a_wheel_may_hang_on_a_revolute_joint() -> None:
     inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
-    joint = '<joint name="{0}" type="revolute"><parent link="a"/><child link="{0}"/><limit upper="9"/></joint>'
+    inertial += '<collision><geometry><cylinder radius="0.1" length="0.05"/></geometry></collision>'
+    ends = '<parent link="a"/><child link="{0}"/><origin xyz="0 {1} 0"/>'
+    joint = f'<joint name="{{0}}" type="revolute">{ends}<limit upper="9"/></joint>'
     links = "".join(f'<link name="{name}">{inertial}</link>' for name in ("a", "fl", "fr"))
     plugin = f'<gazebo><plugin filename="{DIFF}">{PAIR}</plugin></gazebo>'
-    model = parse(f'<robot name="r">{links}{joint.format("fl")}{joint.format("fr")}{plugin}</robot>', ORIGIN)
+    model = parse(f'<robot name="r">{links}{joint.format("fl", 1)}{joint.format("fr", -1)}{plugin}</robot>', ORIGIN)
     assert model.drive is not None and joints_of(model.drive.mechanism) == ("fl", "fr")
 
 

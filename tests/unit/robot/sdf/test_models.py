@@ -166,9 +166,19 @@ def test_a_joint_of_a_model_inside_follows_one_beside_it() -> None:
 def test_a_joint_that_is_not_simulated_is_told_and_fixed(kind: str) -> None:
     robot = model(A + B + JOINT.format(kind, ""))
     assert robot.joints["j"].kind == "fixed"
+    slides = ", and its link 'b' slides without friction" if kind in ("ball", "universal") else ""
     assert robot.warnings == (
-        f"a.sdf, line 3: <joint name='j'> is of the type {kind}, which is not simulated; it is taken as fixed",
+        f"a.sdf, line 3: <joint name='j'> is of the type {kind}, which is not simulated; it is taken as fixed{slides}",
     )
+
+
+@pytest.mark.parametrize(("kind", "friction"), [("ball", 0.0), ("universal", 0.0), ("fixed", 0.9), ("screw", 0.9)])
+def test_the_link_of_a_ball_joint_slides_as_a_caster_rolls(kind: str, friction: float) -> None:
+    mu = "<surface><friction><ode><mu>0.9</mu><mu2>0.9</mu2></ode></friction></surface>"
+    ball = f"<collision><geometry><sphere><radius>1</radius></sphere></geometry>{mu}</collision></link>"
+    robot = model(A + B.replace("</link>", ball) + JOINT.format(kind, ""))
+    assert (robot.links["b"].surface.mu1, robot.links["b"].surface.mu2) == (friction, friction)
+    assert robot.links["a"].surface == Surface()
 
 
 @pytest.mark.parametrize(
