@@ -9,7 +9,7 @@ from holozen.bus import Bus
 from holozen.testing import Process, Wire
 
 from .conftest import start_sim
-from .robots import Robot, place
+from .robots import Robot, distance, moves, place
 
 REPO = Path(__file__).parents[2]
 ARENA = str(REPO / "worlds" / "arena.world")
@@ -70,4 +70,7 @@ def test_a_robot_climbs_the_ramp(wire: Wire, disc: str) -> None:
     robot = Robot(bus)
     x = where(bus, "ramp")[0]
     robot.drive(0.5, 0, until=lambda odom: odom.pose.pose.position.z > 0.15 or place(odom)[0] > x + 1)
-    assert robot.stop().pose.pose.position.z > 0.1
+    robot.put()
+    stood = robot.odom.next(lambda odom: moves(odom, 0, 0, 0))
+    assert stood.pose.pose.position.z > 0.1
+    assert distance(stood, robot.pass_time(2)) < 0.01  # it does not creep down again
