@@ -37,8 +37,8 @@ class Stated:
 
     `way` and `yaw` are how far it is from the closed form after 2 m, and `turn` the part of a commanded turn that it
     makes, at least and at most. `spot` is how far it strays while it turns on the spot. `settling` is the time that it
-    takes to come to a speed, and `stopping` the way that it takes to stop from 0.5 m/s. `odom` is how far odometry is from the
-    truth after all that, in metres and in radians, and `speed` how far its velocity is from the commanded one.
+    takes to come to a speed, `stopping` the way that it takes to stop from 0.5 m/s. `odom` is how far odometry is from
+    the truth after all that, in metres and in radians, and `speed` how far its velocity is from the commanded one.
     """
 
     way: float = 1e-3
