@@ -1,5 +1,6 @@
 """The full-screen application: layout, bindings, style."""
 
+import asyncio
 import math
 import time
 from collections.abc import Callable
@@ -61,18 +62,24 @@ def bindings(press: Callable[[str], None], leave: Callable[[], None]) -> KeyBind
     """Every key goes to `press`; Ctrl-C calls `leave` and ends the application."""
     keys = KeyBindings()
     escaped = -math.inf
+    together = False  # what was read in one go with an Escape is still being worked off
 
     @keys.add(Keys.Any)
     def _(event: KeyPressEvent) -> None:
         # The letters of an escape sequence that is not known here are nobody's keys: Escape alone counts, as a stop.
-        if time.monotonic() - escaped > BURST:
+        if not together and time.monotonic() - escaped > BURST:
             press(event.key_sequence[0].key)
 
     @keys.add(Keys.Escape)
     def _(event: KeyPressEvent) -> None:
-        nonlocal escaped
-        escaped = time.monotonic()
+        nonlocal escaped, together
+        escaped, together = time.monotonic(), True
+        asyncio.get_running_loop().call_soon(apart)
         press(event.key_sequence[0].key)
+
+    def apart() -> None:
+        nonlocal together
+        together = False
 
     for name in (key for key in MOVES if len(key) > 1):
 
