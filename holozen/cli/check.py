@@ -17,7 +17,7 @@ def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="holozen check", description="Say what is wrong with a xacro, URDF or SDF robot.", epilog=AFTER
     )
-    parser.add_argument("file", type=Path)
+    parser.add_argument("file", type=Path, help="a xacro, URDF or SDF file")
     parser.add_argument("args", type=_pair, nargs="*", metavar="name:=value", help="values of its xacro:arg")
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR")
     parser.add_argument("--fits", type=_size, default=(), metavar="LxW[xH]", help="most metres along x, y, z: 0.4x0.2")

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     from holozen.messages import Pose
 
 
+TILTED = 5.0  # degrees; less is a robot on a slope, or one that balances
+
+
 def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="holozen list", description="Show the robots and objects in the sim.")
     parser.add_argument("--json", action="store_true", help="name and pose as one JSON object a line")
@@ -43,7 +46,15 @@ def main(argv: list[str]) -> int:
 def _where(pose: "Pose") -> str:
     at, yaw = pose.position, math.degrees(pose.orientation.yaw())
     x, y, z, turn = (round(value, 3) + 0.0 for value in (at.x, at.y, at.z, yaw))  # + 0.0: a -0 is 0 for people
-    return f"x {x:.3f}  y {y:.3f}  z {z:.3f} m  yaw {turn:.1f} deg"
+    return f"x {x:.3f}  y {y:.3f}  z {z:.3f} m  yaw {turn:.1f} deg{_lean(pose)}"
+
+
+def _lean(pose: "Pose") -> str:
+    """By how much it is tilted, where one would see it."""
+    q = pose.orientation
+    up = 1 - 2 * (q.x * q.x + q.y * q.y)  # the z part of its z axis
+    lean = math.degrees(math.acos(max(-1.0, min(1.0, up))))
+    return f"  tilted by {lean:.0f} deg" if lean > TILTED else ""
 
 
 def _entities(bus: Bus) -> "Iterator[tuple[str, Pose]]":

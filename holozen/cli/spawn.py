@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from holozen.robot.model import RobotModel
 
 FAR = 1e6  # m
+ROUND = 6.2832  # rad; whoever writes more means degrees
 PLUGIN = '<gazebo><plugin name="planar_move" filename="libgazebo_ros_planar_move.so"/></gazebo>'
 ENDS = {"</robot>": PLUGIN, "</model>": PLUGIN.removeprefix("<gazebo>").removesuffix("</gazebo>")}
 """The end of a URDF's and of an SDF's robot, and what goes before it for a drive."""
@@ -53,11 +54,14 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("words", nargs="*", metavar="FILE [name:=value]", help="the file, and values of its xacro:arg")
     parser.add_argument("-file", "--file", metavar="FILE", help="the file, as spawn_model wants it")
     parser.add_argument("--name", "-model", "-entity", type=flags.robot, default="", help="default: as in the file")
-    for flag, unit in (("x", "m"), ("y", "m"), ("z", "m"), ("R", "rad"), ("P", "rad"), ("Y", "rad")):
-        parser.add_argument(f"-{flag}", type=flags.number(-FAR, FAR, unit), metavar=unit, help=PLACES[flag])
-    parser.add_argument("--replace", action="store_true", help="in place of one with that name")
-    parser.add_argument("--drive", choices=("planar_move",), help="for a robot whose file has none")
-    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR")
+    for flag in "xyz":
+        parser.add_argument(f"-{flag}", type=flags.number(-FAR, FAR, "m"), metavar="m", help=PLACES[flag])
+    for flag in "RPY":
+        parser.add_argument(f"-{flag}", type=flags.number(-ROUND, ROUND, "rad"), metavar="rad", help=PLACES[flag])
+    parser.add_argument("--replace", action="store_true", help="put it in the place of the one with that name")
+    parser.add_argument("--drive", choices=("planar_move",), help="how to move a robot whose file has no drive")
+    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
+        help="the folder of package NAME, for $(find NAME) and package://NAME")  # fmt: skip
     parser.add_argument("--strict", action="store_true", help="a missing or bad mesh is an error")
     parser.add_argument("-urdf", "-sdf", action="store_true", help=argparse.SUPPRESS)  # the file says which it is
     connection.add_arguments(parser)
@@ -66,7 +70,7 @@ def parser() -> argparse.ArgumentParser:
 
 PLACES = {
     "x": "position", "y": "position", "z": "height (default: it stands on the ground)",
-    "R": "roll", "P": "pitch", "Y": "yaw",
+    "R": "roll, not in degrees", "P": "pitch, not in degrees", "Y": "yaw, not in degrees",
 }  # fmt: skip
 
 
@@ -119,6 +123,8 @@ def read(
         name = robot_name(name or model.name)
     except ValueError as error:
         raise RobotError(f"{path}: {error}; give one with --name") from None
+    if not any(link.collisions for link in model.links.values()):
+        say(f"holozen spawn: {path}: has no collision shape and falls through the ground; see: holozen check {path}")
     text, _ = portable(path, args, packages)  # its warnings are among the model's
     if drive and model.drive is None:
         return _driven(Candidate(name, text, model))
@@ -138,6 +144,8 @@ def put(bus: Bus, candidate: Candidate, place: Place, replace: bool) -> str:
         name = entities.spawn(bus, candidate.name, candidate.text, pose)
     except ServiceError as error:
         # The sim finds what is wrong with a robot before it looks at the name: the old one goes only for a good one.
+        if entities.is_taken(error) and not replace:
+            raise ServiceError(f"{error}; --replace takes its place, --name gives another") from None
         if not old or not entities.is_taken(error):
             raise
         entities.delete(bus, candidate.name)
@@ -212,4 +220,6 @@ def _told(name: str, model: "RobotModel", pose: "Pose") -> str:
     if model.drive is not None:
         return f"{name} listens on {key_for(model.drive.command_topic, name)}"
     at = pose.position
-    return f"{name} stands at {at.x:.3f} {at.y:.3f} {at.z:.3f}"
+    wheels = any(joint.kind == "continuous" for joint in model.joints.values())
+    hint = "; nothing drives it: spawn it with --drive planar_move to move it as a whole" if wheels else ""
+    return f"{name} stands at {at.x:.3f} {at.y:.3f} {at.z:.3f}{hint}"

@@ -13,13 +13,15 @@ from holozen.tell import say
 
 def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="holozen xacro", description="Expand a xacro file to URDF.")
-    parser.add_argument("file", type=Path)
+    parser.add_argument("file", type=Path, help="the xacro file")
     parser.add_argument("args", nargs="*", metavar="name:=value", help="values of its xacro:arg")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
-    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR")
+    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
+        help="the folder of package NAME, for $(find NAME)")  # fmt: skip
     watch = parser.add_argument_group("watch", "Expand again on every save, and put the robot anew into a running sim.")
     watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
     watch.add_argument("--name", type=flags.robot, metavar="NAME", help="the robot's name (default: as in the file)")
+    watch.add_argument("--drive", choices=("planar_move",), default="", help="how to move one whose file has no drive")
     connection.add_arguments(parser)
     return parser
 
@@ -71,8 +73,8 @@ def _encoded(text: str) -> bytes:
 
 
 def _check(args: argparse.Namespace) -> None:
-    if args.name is not None and not args.watch:
-        raise RobotError("--name is for --watch; `holozen spawn FILE --name NAME` spawns once")
+    if not args.watch and (args.name is not None or args.drive):
+        raise RobotError("--name and --drive are for --watch; `holozen spawn FILE` spawns once")
     if args.output and args.output.exists() and args.file.exists() and args.output.samefile(args.file):
         raise RobotError(f"-o {args.output} is the file that is expanded; write to another one")
 

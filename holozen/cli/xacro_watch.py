@@ -65,7 +65,8 @@ def _used(
         if bus:
             from holozen.cli.spawn import spawn_file
 
-            told += f", {spawn_file(bus, args.file, args.name or '', replace=True, args=values, packages=packages)}"
+            name, drive = args.name or "", args.drive
+            told += f", {spawn_file(bus, args.file, name, None, True, values, packages, drive)}"
     except (RobotError, BusError) as error:
         told += f", but {error}"
     return told

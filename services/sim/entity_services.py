@@ -6,6 +6,7 @@ from pathlib import Path
 
 from holozen import simulation_interfaces as si
 from holozen.bus import Bus
+from holozen.graph import on_key
 from holozen.messages import Header, Point, Pose, Quaternion, Time, Twist, Vector3, not_finite
 from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel, parse
@@ -15,6 +16,7 @@ from .engine import Rotation, Vector
 from .entities import Entities, EntityError, Place, checked_place
 
 FASTEST = 100.0  # m/s and rad/s that an entity may be given
+ALONE = 50  # looks, about a second, after which one knows who else is there
 MOST_MARKS = 20_000  # "<" in a text; reading more of them would stall the steps
 WORLD = ("", "world", "odom", "map")  # frames that mean the world
 _XACRO = re.compile(r"<xacro:|\$\{")  # the namespace alone may be left over from an expansion
@@ -25,6 +27,7 @@ class EntityServices:
 
     def __init__(self, bus: Bus, entities: Entities, packages: Mapping[str, Path]) -> None:
         self._entities, self._packages = entities, packages
+        self._bus, self._graph, self._looks = bus, bus.graph(), 0
         serve = bus.serve
         self._servers = [
             serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self._spawn),
@@ -38,6 +41,14 @@ class EntityServices:
         """Answer what waits, of each kind one request: many at once must not stall the steps."""
         for server in self._servers:
             server.answer_pending(most=1)
+        self._looks += 1
+        if self._looks == ALONE:
+            self._tell_of_others()
+
+    def _tell_of_others(self) -> None:
+        others = on_key(self._graph.endpoints(), "spawn_entity", "srv")
+        if any(other.session != self._bus.id for other in others):
+            say("sim: another sim answers spawn_entity here too; what is spawned goes to either: end one of them")
 
     def _spawn(self, request: si.SpawnEntityRequest) -> si.SpawnEntityReply:
         model = self._read(request)

@@ -58,28 +58,39 @@ def application(
     return app
 
 
+class Sequence:
+    """An escape sequence that is not known here. Its letters are nobody's keys: Escape alone counts, as a stop."""
+
+    def __init__(self) -> None:
+        self._began = -math.inf
+        self._reading = False  # what was read in one go with the Escape is still being worked off
+
+    def begin(self) -> None:
+        """An Escape came."""
+        self._began, self._reading = time.monotonic(), True
+        asyncio.get_running_loop().call_soon(self._read)
+
+    def goes_on(self) -> bool:
+        """Whether what comes now belongs to it."""
+        return self._reading or time.monotonic() - self._began <= BURST
+
+    def _read(self) -> None:
+        self._reading = False
+
+
 def bindings(press: Callable[[str], None], leave: Callable[[], None]) -> KeyBindings:
     """Every key goes to `press`; Ctrl-C calls `leave` and ends the application."""
-    keys = KeyBindings()
-    escaped = -math.inf
-    together = False  # what was read in one go with an Escape is still being worked off
+    keys, sequence = KeyBindings(), Sequence()
 
     @keys.add(Keys.Any)
     def _(event: KeyPressEvent) -> None:
-        # The letters of an escape sequence that is not known here are nobody's keys: Escape alone counts, as a stop.
-        if not together and time.monotonic() - escaped > BURST:
+        if not sequence.goes_on():
             press(event.key_sequence[0].key)
 
     @keys.add(Keys.Escape)
     def _(event: KeyPressEvent) -> None:
-        nonlocal escaped, together
-        escaped, together = time.monotonic(), True
-        asyncio.get_running_loop().call_soon(apart)
+        sequence.begin()
         press(event.key_sequence[0].key)
-
-    def apart() -> None:
-        nonlocal together
-        together = False
 
     for name in (key for key in MOVES if len(key) > 1):
 

@@ -69,3 +69,10 @@ def test_an_illegal_name_is_wrong_usage_and_asks_nothing(sim: FakeSim, run: Run,
     code, _, told = run("delete", "Fred", name)
     assert code == 2 and f"robot name {name!r}: use a letter" in told
     assert sim.log == []
+
+
+def test_what_lies_on_its_side_is_told_so(sim: FakeSim, run: Run) -> None:
+    sim.put("Fred", q=Quaternion(math.sqrt(0.5), 0, 0, math.sqrt(0.5)))
+    sim.put("Ann", q=Quaternion(0.01, 0, 0, 1))
+    ann, fred = run("list")[1].splitlines()
+    assert fred.endswith("  tilted by 90 deg") and "tilted" not in ann

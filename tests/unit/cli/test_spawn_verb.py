@@ -24,6 +24,8 @@ HB_BOT = REPO / "urdf" / "hb_bot.urdf.xacro"
 BALL = '<collision><geometry><sphere radius="%s"/></geometry></collision>'
 INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
 
+MASSIVE = '<link name="w"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial></link>'
+
 
 def ball(folder: Path, radius: str = "0.5", name: str = "ball", more: str = "") -> Path:
     """A robot that is a ball, without a drive."""
@@ -178,7 +180,21 @@ def test_words_that_say_nothing_are_wrong_usage(run: Run, words: tuple[str, ...]
 
 def test_what_the_sim_refuses_is_told_in_its_own_words(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     sim.put("ball")
-    assert run("spawn", ball(tmp_path)) == (1, "", "holozen spawn: there is an entity 'ball' already\n")
+    told = "there is an entity 'ball' already; --replace takes its place, --name gives another"
+    assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {told}\n")
+
+
+def test_a_robot_with_wheels_and_no_drive_is_told_how_to_move_it(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    joint = '<joint name="j" type="continuous"><parent link="b&amp;c"/><child link="w"/></joint>'
+    path = ball(tmp_path, more=MASSIVE + joint)
+    assert "nothing drives it: spawn it with --drive planar_move" in run("spawn", path)[1]
+    assert "listens on" in run("spawn", path, "--drive", "planar_move", "--replace")[1]
+
+
+@pytest.mark.parametrize("flag", ["-R", "-P", "-Y"])
+def test_angles_in_degrees_are_refused(run: Run, tmp_path: Path, flag: str) -> None:
+    code, _, said = run("spawn", ball(tmp_path), flag, "90")
+    assert (code, "use a number from -6.2832 to 6.2832 rad" in said) == (2, True)
 
 
 def test_without_a_sim_it_says_how_to_start_one(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

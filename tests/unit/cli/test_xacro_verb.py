@@ -38,7 +38,7 @@ def test_arguments_and_an_output_file_are_taken(file: Path, capsys: pytest.Captu
         (["."], "holozen xacro: .: Is a directory\n"),
         (["FILE", "-o", "."], "holozen xacro: cannot write .: Is a directory\n"),
         (["FILE", "-o", "FILE"], "holozen xacro: -o "),
-        (["FILE", "--name", "Fred"], "holozen xacro: --name is for --watch; "),
+        (["FILE", "--name", "Fred"], "holozen xacro: --name and --drive are for --watch; "),
         (["FILE", "name=Fred"], "holozen xacro: 'name=Fred': write name:=value\n"),
         (["FILE", ":=Fred"], "holozen xacro: ':=Fred': write name:=value\n"),
         (
