@@ -24,6 +24,9 @@ TURN = 8.0  # rad/s^2 by which its turn speeds up
 STRAY = 0.3  # m/s from its plan that it tries to mend at once; a harder push makes a new plan
 FARTHEST = 0.1  # m that it remembers to be behind, or ahead
 GRIP = 0.7  # of the friction of its wheels is used; a wheel that slips steers nobody
+STILL = 0.01  # m/s; a plan slower than this is to stand
+NEAR = 0.01  # m
+FORGETS = 0.3  # s
 ASTRAY = 0.3  # rad that it remembers to have turned too little, or too far
 YAW_GAIN = 12.0  # 1/s: how fast a wrong turn rate is mended
 YAW_TIME = 0.3  # s: and a wrong heading
@@ -58,6 +61,12 @@ class BalanceMover:
         self._turn += clamp(turn - self._turn, TURN * dt)
         slow = self._turn - turning
         self._behind = clamp(self._behind + slow * dt, ASTRAY)
+        if not (x or turn or self._turn) and abs(self._plan.speed) < STILL:
+            # Told to stand, it forgets its heading, and its place when it is near: its wheels stick and slip, and it
+            # would hunt for ever.
+            self._behind = 0.0
+            if abs(self._ahead) < NEAR:
+                self._ahead *= 1 - dt / FORGETS
         drive = clamp(self._effort(state[:3], dt) / 2, self._most)
         # Balance comes first: the turn gets what strength is left.
         steer = clamp(self._yaw_gain * (slow + self._behind / YAW_TIME), self._most - abs(drive))

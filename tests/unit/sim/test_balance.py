@@ -211,3 +211,15 @@ def test_what_a_student_makes_of_it_rides_as_well(ground: World, values: dict[st
 def test_what_cannot_balance_is_refused(ground: World, spoil: Callable[[str], str]) -> None:
     with pytest.raises(RobotError, match=r"cannot balance on jointL|balances on the wheel"):
         mover_for(ground, parse(spoil(expand(FILE)), FILE), (0, 0, 1), UPRIGHT)
+
+
+@pytest.mark.parametrize("before", [(0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, 1.0)])
+def test_told_to_stand_it_does_not_hunt(ground: World, before: tuple[float, float, float]) -> None:
+    model = load(FILE)
+    mover = mover_for(ground, model, (0, 0, -lowest(model)))
+    rates = []
+    for number in range(15 * 240):
+        mover.move(before if number < 5 * 240 else (0.0, 0.0, 0.0), ground.spec.step)
+        ground.step()
+        rates.append(abs(mover.body.planar()[2]))
+    assert max(rates[8 * 240 :]) < 0.03
