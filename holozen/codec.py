@@ -2,16 +2,21 @@
 
 from collections.abc import Callable
 from functools import lru_cache, partial
+from types import ModuleType
 from typing import Any, TypeVar
 
 import msgspec
 
+from holozen.cdr import CodecError
 from holozen.messages import Message, not_finite
 from holozen.tell import printable
 
-M = TypeVar("M", bound=Message)
+__all__ = ["WIRES", "CodecError", "convert", "decode", "encode", "encoding"]
 
-WIRES = {"json": "application/json", "msgpack": "application/msgpack"}
+M = TypeVar("M", bound=Message)
+Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
+
+WIRES = {"json": "application/json", "msgpack": "application/msgpack", "cdr": "application/cdr"}
 """What `--wire` may name, and the Encoding it writes."""
 
 # Encodings that say nothing of the content; our default is JSON, which is what people put by hand.
@@ -23,37 +28,42 @@ _encode_json = msgspec.json.Encoder().encode
 _encode_msgpack = msgspec.msgpack.Encoder().encode
 
 
-class CodecError(ValueError):
-    """Bytes that are no such message, or a message that has no bytes. The text is one line."""
-
-
 def encode(message: Message, wire: str = "json") -> bytes:
     """The bytes of `message`. A NaN or an infinity raises CodecError: JSON would turn it into a null."""
     try:
-        payload = _encode_json(message) if wire == "json" else _encode_msgpack(message)
+        payload, fine = _WRITERS[wire](message)
     except UnicodeEncodeError as error:
         raise CodecError(f"{type(message).__name__}: a text that is not Unicode: {error.reason}") from None
-    # No message has a null of its own, so only a payload with one needs the slow look.
-    if (wire != "json" or b"null" in payload) and (bad := not_finite(message)):
+    if not fine and (bad := not_finite(message)):
         raise CodecError(f"{type(message).__name__}.{bad} is not a finite number")
     return payload
 
 
+def encoding(wire: str, kind: type[Message]) -> str:
+    """The Encoding of a message. CDR says nothing of itself, so the type goes along, as Zenoh's schema."""
+    return f"{WIRES[wire]};{_structs().ros_name(kind)}" if wire == "cdr" else WIRES[wire]
+
+
 def decode(payload: bytes, encoding: str, types: tuple[type[M], ...]) -> M:
     """The message in `payload`, of the first of `types` that fits. Raises CodecError with the reason."""
-    return _first(types, _decoders(types, encoding), payload)
+    makers: Makers[M] = _decoders(types, encoding, _is_cdr(payload))
+    return _first(makers, payload)
 
 
 def convert(value: Any, types: tuple[type[M], ...]) -> M:
     """`decode` for plain dicts, lists and numbers (what JSON or YAML gave)."""
-    return _first(types, tuple(partial(msgspec.convert, type=kind, strict=False) for kind in types), value)
+    makers = tuple((kind, partial(msgspec.convert, type=kind, strict=False)) for kind in types)
+    made: M = _first(makers, value)
+    return made
 
 
-def _first(types: tuple[type[M], ...], makers: tuple[Callable[[Any], M], ...], value: Any) -> M:
+def _first(makers: Makers[M], value: Any) -> M:
     reasons = []
-    for kind, make in zip(types, makers, strict=True):
+    for kind, make in makers:
         try:
             return make(value)
+        except CodecError as error:
+            reasons.append(_short(str(error)))
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
             reasons.append(_told(kind, error))
     # What has a header was meant as the stamped type.
@@ -62,21 +72,69 @@ def _first(types: tuple[type[M], ...], makers: tuple[Callable[[Any], M], ...], v
 
 def _told(kind: type[Message], error: Exception) -> str:
     """One line; a field's name in it came over the wire and may be anything."""
-    text = printable(str(error))
-    return f"not a {kind.__name__}: {text if len(text) <= LONGEST else text[:LONGEST] + ' ...'}"
+    return _short(f"not a {kind.__name__}: {error}")
+
+
+def _short(text: str) -> str:
+    text = printable(text)
+    return text if len(text) <= LONGEST else text[:LONGEST] + " ..."
+
+
+def _write_json(message: Message) -> tuple[bytes, bool]:
+    payload = _encode_json(message)
+    return payload, b"null" not in payload  # no message has a null of its own, so only one with it needs a look
+
+
+_WRITERS: dict[str, Callable[[Message], tuple[bytes, bool]]] = {
+    "json": _write_json,
+    "msgpack": lambda message: (_encode_msgpack(message), False),
+    "cdr": lambda message: _structs().write(message),
+}
 
 
 @lru_cache(maxsize=64)
-def _decoders(types: tuple[type[M], ...], encoding: str) -> tuple[Callable[[bytes], M], ...]:
-    module = msgspec.json if _format(encoding) == "json" else msgspec.msgpack
-    return tuple(module.Decoder(kind).decode for kind in types)
+def _decoders(types: tuple[type[M], ...], encoding: str, is_cdr: bool) -> Makers[M]:
+    form = _format(encoding, is_cdr)
+    if form == "cdr":
+        kinds = _named(types, encoding.partition(";")[2])
+        return tuple((kind, _structs().codec(kind).read) for kind in kinds)
+    module = msgspec.json if form == "json" else msgspec.msgpack
+    return tuple((kind, module.Decoder(kind).decode) for kind in types)
 
 
-def _format(encoding: str) -> str:
-    """`json` or `msgpack`. An Encoding may carry a schema after a semicolon."""
+def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
+    """Those of `types` that an Encoding's schema names; all of them if it names no type."""
+    from holozen.interfaces import InterfaceError
+    from holozen.interfaces.registry import full_name
+
+    try:
+        said = full_name(schema)
+    except InterfaceError:
+        return types
+    found = tuple(kind for kind in types if _structs().ros_name(kind) == said)
+    if not found:
+        raise CodecError(_short(f"not a {types[0].__name__}: its encoding says {said}"))
+    return found
+
+
+def _format(encoding: str, is_cdr: bool) -> str:
+    """The wire of an Encoding, which may carry a schema after a semicolon."""
     name = encoding.partition(";")[0]
     if name in _JSON:
-        return "json"
-    if name == WIRES["msgpack"]:
-        return "msgpack"
-    raise CodecError(f"encoding {name[:80]!r} is not understood; known: {', '.join(WIRES.values())}")
+        # Bridges to ROS 2 write CDR and do not say so; no text begins with a NUL.
+        return "cdr" if is_cdr else "json"
+    found = next((wire for wire, written in WIRES.items() if written == name), None)
+    if found is None:
+        raise CodecError(f"encoding {name[:80]!r} is not understood; known: {', '.join(WIRES.values())}")
+    return found
+
+
+def _is_cdr(payload: bytes) -> bool:
+    return payload[:1] == b"\0"
+
+
+def _structs() -> ModuleType:
+    """CDR of our messages, loaded when it is first needed."""
+    from holozen.cdr import structs
+
+    return structs

@@ -15,10 +15,6 @@ Covariance = Annotated[list[float], Meta(min_length=36, max_length=36)]
 """A 6 x 6 matrix, row by row, over x, y, z and the rotations about x, y, z."""
 
 
-def _zeros() -> list[float]:
-    return [0.0] * 36
-
-
 class Message(Struct, forbid_unknown_fields=True):
     """What every message is: a Struct that knows its ROS name and refuses fields it does not have."""
 
@@ -35,8 +31,7 @@ class Time(Message):
     @classmethod
     def of(cls, seconds: float) -> "Time":
         """The Time nearest to `seconds`."""
-        total = round(seconds * 1e9)
-        return cls(total // 1_000_000_000, total % 1_000_000_000)
+        return cls(*divmod(round(seconds * 1e9), 1_000_000_000))
 
     def seconds(self) -> float:
         """This time as one number, in seconds."""
@@ -92,9 +87,9 @@ class Twist(Message):
         return cls(Vector3(x, y, 0.0), Vector3(0.0, 0.0, turn))
 
     def is_slow(self, limit: float = 0.0) -> bool:
-        """Whether no component is above `limit` in m/s or rad/s; by default, whether this is a stop."""
-        vectors = (self.linear, self.angular)
-        return all(max(abs(v.x), abs(v.y), abs(v.z)) <= limit for v in vectors)
+        """Whether no component is above `limit` in m/s or rad/s; by default, whether this is a stop. NaN is none."""
+        sizes = (abs(size) for v in (self.linear, self.angular) for size in (v.x, v.y, v.z))
+        return all(size <= limit for size in sizes)
 
 
 class TwistStamped(Message):
@@ -112,13 +107,13 @@ class Pose(Message):
 class PoseWithCovariance(Message):
     ROS: ClassVar[str] = "geometry_msgs/msg/PoseWithCovariance"
     pose: Pose = field(default_factory=Pose)
-    covariance: Covariance = field(default_factory=_zeros)
+    covariance: Covariance = field(default_factory=lambda: [0.0] * 36)
 
 
 class TwistWithCovariance(Message):
     ROS: ClassVar[str] = "geometry_msgs/msg/TwistWithCovariance"
     twist: Twist = field(default_factory=Twist)
-    covariance: Covariance = field(default_factory=_zeros)
+    covariance: Covariance = field(default_factory=lambda: [0.0] * 36)
 
 
 class Odometry(Message):
@@ -165,12 +160,24 @@ class Clock(Message):
     clock: Time = field(default_factory=Time)
 
 
+class CommandSource(Message):
+    """One who commands a robot: its Zenoh priority, commands a second (Hz), and whether it is obeyed or held."""
+
+    ROS: ClassVar[str] = "holozen/msg/CommandSource"
+    source: str = ""
+    priority: str = ""
+    rate: float = 0.0
+    obeyed: bool = False
+    held: bool = False
+
+
 class CommandStatus(Message):
     """Who drives a robot, and what became of the commands it got.
 
     `obeyed` is the driving source (empty: nobody), `priority` its Zenoh priority. `held` is true after a
     higher source took over: lower ones wait for a call of `resume`. `resumed` counts those calls, `accepted` and
-    `refused` (by reason) the commands, since the sim's start.
+    `refused` (by reason; pairs in ROS) the commands, since the sim's start. `stopped` names who set the software stop
+    (empty: nobody did); `sources` are those that spoke lately.
     """
 
     ROS: ClassVar[str] = "holozen/msg/CommandStatus"
@@ -181,6 +188,8 @@ class CommandStatus(Message):
     accepted: int = 0
     refused: dict[str, int] = field(default_factory=dict)
     last_refusal: str = ""
+    stopped: str = ""
+    sources: list[CommandSource] = field(default_factory=list)
 
 
 class NextGoalRequest(Message):

@@ -1,6 +1,8 @@
 """Bytes and messages: both wires carry every message, and what is none is refused in one line."""
 
 import math
+import subprocess
+import sys
 import typing
 from typing import Any
 
@@ -88,7 +90,7 @@ def test_encodings_that_say_nothing_are_taken_for_json(encoding: str) -> None:
     assert decode(encode(m.Twist.planar(1)), encoding, (m.Twist,)) == m.Twist.planar(1)
 
 
-@pytest.mark.parametrize("encoding", ["image/png", "application/cdr", "application/jsonx", "x" * 5000, "a\nb"])
+@pytest.mark.parametrize("encoding", ["image/png", "application/x-cdr", "application/jsonx", "x" * 5000, "a\nb"])
 def test_another_encoding_is_refused_with_those_known(encoding: str) -> None:
     told = refusal(b"{}", encoding)
     assert repr(encoding[:80]) in told
@@ -201,3 +203,9 @@ def test_plain_values_become_messages() -> None:
     assert convert({"request_goal": "2"}, (m.NextGoalRequest,)) == m.NextGoalRequest(2)  # from a selector's parameters
     with pytest.raises(CodecError, match=r"not a Twist: .*`linaer`"):
         convert({"linaer": {}}, (m.Twist,))
+
+
+def test_cdr_is_loaded_only_where_it_is_used() -> None:
+    code = "import sys, holozen.codec as c; c.encode(c.Message()); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert {name for name in done.stdout.split() if name.startswith(("holozen.cdr", "holozen.int"))} == {"holozen.cdr"}

@@ -151,8 +151,9 @@ def test_a_twist_is_a_stop_only_if_all_six_numbers_are_zero(part: str, axis: str
     setattr(getattr(twist, part), axis, -1e-300)
     assert not twist.is_slow()
     assert twist.is_slow(0.01)
-    setattr(getattr(twist, part), axis, 0.02)
-    assert not twist.is_slow(0.01)
+    for fast in (0.02, -0.02, math.nan):
+        setattr(getattr(twist, part), axis, fast)
+        assert not twist.is_slow(0.01)
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

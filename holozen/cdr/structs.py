@@ -1,0 +1,107 @@
+"""Our own messages as CDR: msgspec Structs, with the exact types of their definitions."""
+
+import struct
+import typing
+from functools import cache, partial
+from typing import Any
+
+import msgspec
+
+from holozen.cdr import CodecError
+from holozen.cdr.codec import Codec
+from holozen.cdr.source import Shape
+from holozen.interfaces import Field, Interface, Registry
+from holozen.interfaces.definition import INTEGERS
+from holozen.interfaces.values import completed
+from holozen.messages import Message
+
+_REGISTRY = Registry()
+_HALVES = {"Request": "_Request", "Reply": "_Response"}
+_WRONG = (ArithmeticError, AttributeError, TypeError, ValueError, struct.error)  # what a wrong value raises
+
+
+def ros_name(kind: type[Message]) -> str:
+    """The full name of a message in ROS; of a service's, with the half it is: `std_srvs/srv/Trigger_Request`."""
+    halves = (half for end, half in _HALVES.items() if kind.__name__.endswith(end))
+    return kind.ROS + (next(halves, "") if "/srv/" in kind.ROS else "")
+
+
+def interface(kind: type[Message]) -> Interface:
+    """The definition of a message."""
+    return _REGISTRY.find(ros_name(kind))
+
+
+@cache
+def codec(kind: type[Message]) -> Codec:
+    """Reads and writes a message."""
+    return Codec(interface(kind), Structs(kind), kind.__name__)
+
+
+def write(message: Message) -> tuple[bytes, bool]:
+    """The bytes of a message, and whether all its numbers may be finite. Raises CodecError."""
+    try:
+        return codec(type(message)).write(message)
+    except UnicodeEncodeError:
+        raise  # is told alike for all wires
+    except _WRONG as error:
+        raise CodecError(f"{type(message).__name__}: {_reason(message) or error}") from None
+
+
+def _reason(message: Message) -> str:
+    try:
+        completed(interface(type(message)), msgspec.to_builtins(message))
+    except _WRONG as error:
+        return str(error)
+    return ""
+
+
+class Structs(Shape):
+    """Values are Structs. A `dict` stands for a sequence of pairs, which is what ROS has for it."""
+
+    def __init__(self, kind: type[Message]) -> None:
+        super().__init__()
+        self._classes: dict[str, type[Message]] = {}
+        self._add(kind)
+
+    def made(self, interface: Interface, values: list[str]) -> str:
+        """A Struct; of a type that has none, the tuple of its fields."""
+        kind = self._classes.get(interface.name)
+        if kind is None:
+            return f"({', '.join(values)})"
+        hints = typing.get_type_hints(kind, include_extras=True)
+        fields = zip(interface.fields, values, strict=True)
+        return f"{kind.__name__}({', '.join(self._value(hints[field.name], field, value) for field, value in fields)})"
+
+    def part(self, interface: Interface, field: Field, owner: str) -> str:
+        """An attribute, or an item of such a tuple."""
+        kind = self._classes.get(interface.name)
+        if kind is None:
+            return f"{owner}[{interface.fields.index(field)}]"
+        hint = typing.get_type_hints(kind)[field.name]
+        return f"list({owner}.{field.name}.items())" if typing.get_origin(hint) is dict else f"{owner}.{field.name}"
+
+    def _add(self, kind: type[Message]) -> None:
+        self._classes[ros_name(kind)] = self.names[kind.__name__] = kind
+        for hint in typing.get_type_hints(kind).values():
+            for inner in (hint, *typing.get_args(hint)):
+                if isinstance(inner, type) and issubclass(inner, Message) and ros_name(inner) not in self._classes:
+                    self._add(inner)
+
+    def _value(self, hint: Any, field: Field, value: str) -> str:
+        if typing.get_origin(hint) is dict:
+            return f"dict({value})"
+        metas = [meta for meta in getattr(hint, "__metadata__", ()) if isinstance(meta, msgspec.Meta)]
+        for meta in metas if field.type in INTEGERS and not field.array else []:
+            low, high = INTEGERS[field.type]
+            least = low if meta.ge is None else int(meta.ge)
+            most = int(meta.le) if meta.le is not None else int(meta.lt) - 1 if meta.lt is not None else high
+            if least > low or most < high:
+                self.names[f"limited_{field.name}"] = partial(_limited, field.name, least, most)
+                return f"limited_{field.name}({value})"
+        return value
+
+
+def _limited(name: str, least: int, most: int, value: int) -> int:
+    if least <= value <= most:
+        return value
+    raise ValueError(f"{name} of {value}; use a number from {least} to {most}")

@@ -1,0 +1,151 @@
+"""The messages of ROS 2's rcl_interfaces that read and set the parameters of a node, field for field."""
+
+import math
+from typing import Annotated, ClassVar
+
+from msgspec import Meta, field
+
+from holozen.messages import Message
+
+Value = bool | int | float | str
+Byte = Annotated[int, Meta(ge=0, le=255)]
+Count = Annotated[int, Meta(ge=0)]
+
+NOT_SET, BOOL, INTEGER, DOUBLE, STRING = range(5)
+WORDS = (
+    "not set", "boolean", "integer", "double", "string", "byte array", "boolean array", "integer array", "double array",
+    "string array",
+)  # fmt: skip
+"""What people call the types of ParameterType, in their order."""
+
+_FIELDS = (
+    "", "bool_value", "integer_value", "double_value", "string_value", "byte_array_value", "bool_array_value",
+    "integer_array_value", "double_array_value", "string_array_value",
+)  # fmt: skip
+
+
+class ParameterValue(Message):
+    """A value, in the field that its `type` says."""
+
+    ROS: ClassVar[str] = "rcl_interfaces/msg/ParameterValue"
+    type: Byte = NOT_SET
+    bool_value: bool = False
+    integer_value: int = 0
+    double_value: float = 0.0
+    string_value: str = ""
+    byte_array_value: list[Byte] = field(default_factory=list)
+    bool_array_value: list[bool] = field(default_factory=list)
+    integer_array_value: list[int] = field(default_factory=list)
+    double_array_value: list[float] = field(default_factory=list)
+    string_array_value: list[str] = field(default_factory=list)
+
+    @classmethod
+    def of(cls, value: Value) -> "ParameterValue":
+        """The message that holds `value`."""
+        if isinstance(value, bool):
+            return cls(BOOL, bool_value=value)
+        if isinstance(value, int):
+            return cls(INTEGER, integer_value=value)
+        if isinstance(value, float):
+            return cls(DOUBLE, double_value=value)
+        return cls(STRING, string_value=value)
+
+    def plain(self) -> object:
+        """The value; None if there is none."""
+        return getattr(self, _FIELDS[self.type]) if NOT_SET < self.type < len(_FIELDS) else None
+
+
+class Parameter(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/msg/Parameter"
+    name: str = ""
+    value: ParameterValue = field(default_factory=ParameterValue)
+
+
+class FloatingPointRange(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/msg/FloatingPointRange"
+    from_value: float = 0.0
+    to_value: float = 0.0
+    step: float = 0.0
+
+
+class IntegerRange(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/msg/IntegerRange"
+    from_value: int = 0
+    to_value: int = 0
+    step: Count = 0
+
+
+class ParameterDescriptor(Message):
+    """What a parameter is and which values it takes. The ranges hold one entry, or none."""
+
+    ROS: ClassVar[str] = "rcl_interfaces/msg/ParameterDescriptor"
+    name: str = ""
+    type: Byte = NOT_SET
+    description: str = ""
+    additional_constraints: str = ""
+    read_only: bool = False
+    dynamic_typing: bool = False
+    floating_point_range: Annotated[list[FloatingPointRange], Meta(max_length=1)] = field(default_factory=list)
+    integer_range: Annotated[list[IntegerRange], Meta(max_length=1)] = field(default_factory=list)
+
+
+class ListParametersResult(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/msg/ListParametersResult"
+    names: list[str] = field(default_factory=list)
+    prefixes: list[str] = field(default_factory=list)
+
+
+class SetParametersResult(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/msg/SetParametersResult"
+    successful: bool = False
+    reason: str = ""
+
+
+class ListParametersRequest(Message):
+    """Names below `prefixes` (empty: all), with at most `depth` parts after the prefix (0: any)."""
+
+    ROS: ClassVar[str] = "rcl_interfaces/srv/ListParameters"
+    prefixes: list[str] = field(default_factory=list)
+    depth: Count = 0
+
+
+class ListParametersReply(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/srv/ListParameters"
+    result: ListParametersResult = field(default_factory=ListParametersResult)
+
+
+class GetParametersRequest(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/srv/GetParameters"
+    names: list[str] = field(default_factory=list)
+
+
+class GetParametersReply(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/srv/GetParameters"
+    values: list[ParameterValue] = field(default_factory=list)
+
+
+class SetParametersRequest(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/srv/SetParameters"
+    parameters: list[Parameter] = field(default_factory=list)
+
+
+class SetParametersReply(Message):
+    """One result for each parameter of the request."""
+
+    ROS: ClassVar[str] = "rcl_interfaces/srv/SetParameters"
+    results: list[SetParametersResult] = field(default_factory=list)
+
+
+class DescribeParametersRequest(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/srv/DescribeParameters"
+    names: list[str] = field(default_factory=list)
+
+
+class DescribeParametersReply(Message):
+    ROS: ClassVar[str] = "rcl_interfaces/srv/DescribeParameters"
+    descriptors: list[ParameterDescriptor] = field(default_factory=list)
+
+
+def number_range(low: float, high: float) -> list[FloatingPointRange]:
+    """The range of a number; none if it has no ends."""
+    return [FloatingPointRange(low, high)] if math.isfinite(low) and math.isfinite(high) else []
