@@ -7,6 +7,7 @@ import re
 from dataclasses import dataclass
 
 from holozen import messages as m
+from holozen import rcl_interfaces as r
 from holozen import simulation_interfaces as s
 
 COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stands
@@ -62,6 +63,8 @@ TOPICS = (
 SERVICES = (
     Service("next_goal", m.NextGoalRequest, m.NextGoalReply, "pose_service", "the goal with a number, in odom"),
     Service("get_pose", m.GetPoseRequest, m.GetPoseReply, "pose_service", "a robot's last odom and its age"),
+    Service("stop", m.TriggerRequest, m.TriggerReply, "sim", "the robot stands, whatever it is told, until `release`"),
+    Service("release", m.TriggerRequest, m.TriggerReply, "sim", "ends a `stop`; by itself it moves nothing"),
     Service("resume", m.TriggerRequest, m.TriggerReply, "sim", "lets the sources drive that a higher one overruled"),
     Service("spawn_entity", s.SpawnEntityRequest, s.SpawnEntityReply, "sim", "puts a robot or object into the world"),
     Service("delete_entity", s.DeleteEntityRequest, s.DeleteEntityReply, "sim", "takes it out again"),
@@ -71,6 +74,14 @@ SERVICES = (
     ),
     Service("set_entity_state", s.SetEntityStateRequest, s.SetEntityStateReply, "sim", "puts one elsewhere"),
 )
+
+OF_NODES = (
+    Service("list_parameters", r.ListParametersRequest, r.ListParametersReply, "", "names of a node's parameters"),
+    Service("get_parameters", r.GetParametersRequest, r.GetParametersReply, "", "their values"),
+    Service("set_parameters", r.SetParametersRequest, r.SetParametersReply, "", "sets all of them, or none"),
+    Service("describe_parameters", r.DescribeParametersRequest, r.DescribeParametersReply, "", "what they take"),
+)
+"""What every node with parameters serves, each below its name: `sim/get_parameters`."""
 
 
 def table() -> str:
@@ -113,4 +124,4 @@ def topic(key: str) -> Topic | None:
 def service(key: str) -> Service | None:
     """The table's row for a service key, with or without a robot's name before it."""
     last = key.rpartition("/")[2]
-    return next((row for row in SERVICES if row.key == last), None)
+    return next((row for row in (*SERVICES, *OF_NODES) if row.key == last), None)

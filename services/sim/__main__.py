@@ -5,16 +5,21 @@ import sys
 from pathlib import Path
 
 from holozen import connection, data, flags
-from holozen.bus import Bus, BusError
+from holozen.bus import Bus
+from holozen.errors import BusError
 from holozen.process import stop_event
 from holozen.robot.model import RobotError
 from holozen.tell import say
 
-from . import intake, worldfile
+from . import intake, pace, worldfile
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="holozen sim", description="Simulate robots in a world.")
+    parser = argparse.ArgumentParser(
+        prog="holozen sim",
+        description="Simulate robots in a world.",
+        epilog="example: holozen sim --robot my_bot.urdf.xacro=Fred",
+    )
     add = parser.add_argument
     add("--world", type=Path, default=data.find("worlds", "gazebo.world"), help="an SDF file (default: gazebo.world)")
     add("--robot", type=flags.robot_file, action="append", metavar="FILE[=NAME]",
@@ -22,10 +27,12 @@ def parser() -> argparse.ArgumentParser:
     add("--empty", action="store_true", help="no robot at the start; `holozen spawn` puts some in")
     add("--drive", choices=["planar_move"], help="for robots that have no drive of their own")
     add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR", help="for $(find NAME)")
-    add("--rtf", type=flags.number(0, 1000), help="real-time factor; 0: as fast as it goes (default: the world's)")
-    add("--max-linear", type=flags.number(0.01, 50, "m/s"), default=intake.MAX_LINEAR, metavar="M/S",
+    add(
+        "--rtf", type=flags.number(*pace.FACTORS), help="real-time factor; 0: as fast as it goes (default: the world's)"
+    )
+    add("--max-linear", type=flags.number(*intake.LINEAR, "m/s"), default=intake.MAX_LINEAR, metavar="M/S",
         help="faster commands are clamped (default: %(default)s)")  # fmt: skip
-    add("--max-angular", type=flags.number(0.01, 100, "rad/s"), default=intake.MAX_ANGULAR, metavar="RAD/S",
+    add("--max-angular", type=flags.number(*intake.ANGULAR, "rad/s"), default=intake.MAX_ANGULAR, metavar="RAD/S",
         help="(default: %(default)s)")  # fmt: skip
     connection.add_arguments(parser)
     return parser
@@ -38,9 +45,12 @@ def main(argv: list[str] | None = None) -> int:
         spec = worldfile.load(args.world, dict(args.package))
         with Bus("sim", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             # The engine takes the longest to load, and a wrong flag should not wait for it.
+            from holozen.parameters import Parameters
+
             from .entities import Entities
             from .entity_services import EntityServices
             from .loop import Loop
+            from .parameters import declared
             from .spawn import furnish, spawn_all
             from .world import World
 
@@ -54,7 +64,9 @@ def main(argv: list[str] | None = None) -> int:
             services = EntityServices(bus, entities, dict(args.package))
             if not entities.vehicles:
                 say("sim: no robot yet; `holozen spawn FILE` puts one in")
-            Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services).run(stop)
+            loop = Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services)
+            loop.answers.append(Parameters(bus, "sim", lambda: declared(entities, loop.pace)).answer)
+            loop.run(stop)
     except (BusError, RobotError, worldfile.WorldError) as error:
         say(f"sim: {error}")
         return 1

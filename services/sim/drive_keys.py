@@ -1,6 +1,6 @@
 """The keys of a robot's drive: commands in, odometry and status out."""
 
-from holozen.bus import Bus, Publisher, Subscription
+from holozen.bus import Bus
 from holozen.limits import STOP, Planar
 from holozen.messages import (
     CommandStatus,
@@ -11,6 +11,8 @@ from holozen.messages import (
     Twist,
     TwistStamped,
 )
+from holozen.publisher import Publisher
+from holozen.readers import Subscription
 from holozen.robot.model import Drive
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
@@ -36,7 +38,7 @@ class DriveKeys:
         ]
         self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, prefix), Odometry)
         self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
-        self.rate, self._status_due = drive.odometry_rate, Schedule(STATUS_RATE)
+        self._status_due = Schedule(STATUS_RATE)
 
     def hear(self, now: float, clocks: tuple[float, ...], since: float) -> None:
         """Take what waits at `now`; it came after `since`. `clocks` are those of stamps. All in seconds."""
@@ -44,9 +46,9 @@ class DriveKeys:
             while (received := commands.try_recv()) is not None:
                 self._intake.take(received, now, clocks, since)
 
-    def tell_status(self, now: float) -> None:
-        """Publish who drives, when it is due."""
-        if self._status_due.due(now):
+    def tell_status(self, now: float, at_once: bool = False) -> None:
+        """Publish who drives, when it is due or `at_once`."""
+        if self._status_due.due(now) or at_once:
             self._status.put(self._intake.status(now))
 
     def wanted(self, now: float, dt: float) -> Planar | JointMotion:

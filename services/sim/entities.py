@@ -15,6 +15,7 @@ from holozen.tell import say
 from holozen.wire import SERVICES, key_for, robot_name
 
 from .body import Body
+from .calls import Calls
 from .drives import Mover, mover_for
 from .engine import Rotation, Vector
 from .vehicle import Memory, Vehicle, keys_of
@@ -49,10 +50,10 @@ class Entities:
     """The entities of one world. `limits` are the fastest commands in m/s and rad/s."""
 
     def __init__(self, bus: Bus, world: World, limits: tuple[float, float]) -> None:
-        self._bus, self._world, self._limits = bus, world, limits
+        self._bus, self._world, self.limits = bus, world, limits
         self._graph = bus.graph()
         self._all: dict[str, Entity] = {}
-        self._before: dict[str, Memory] = {}  # prefix -> whom the last robot there held
+        self._before: dict[str, Memory] = {}  # prefix -> whom the last robot there held, and who stopped it
         self.vehicles: list[Vehicle] = []
 
     @property
@@ -80,7 +81,7 @@ class Entities:
             self._check(name, prefix, model)
             entity = Entity(name, model, mover.body, prefix=prefix)
             if model.drive or mover.names:
-                entity.vehicle = Vehicle(self._bus, prefix, model, mover, self._limits)
+                entity.vehicle = Vehicle(self._bus, prefix, model, mover, self.limits)
         except Exception:
             mover.body.remove()
             raise
@@ -89,6 +90,18 @@ class Entities:
             self._remember(prefix, entity.vehicle)
             self.vehicles.append(entity.vehicle)
         return entity
+
+    def limit(self, linear: float, angular: float) -> None:
+        """Clamp the next commands of all robots to these limits, in m/s and rad/s."""
+        self.limits = (linear, angular)
+        for vehicle in self.vehicles:
+            vehicle.limit(linear, angular)
+
+    def hear_who_left(self) -> None:
+        """Stop every robot that is driven by a node whose process is gone."""
+        for source in self._graph.left():
+            for vehicle in self.vehicles:
+                vehicle.forget(source)
 
     def fail(self, vehicle: Vehicle, error: Exception) -> None:
         """Take a robot out that cannot go on, so that the others can."""
@@ -106,12 +119,15 @@ class Entities:
             raise EntityError(si.RESOURCE_PARSE_ERROR, str(error)) from None
 
     def _remember(self, prefix: str, vehicle: Vehicle) -> None:
-        """A robot that takes the place of another one obeys nobody whom that one did not."""
+        """A robot in the place of another one obeys nobody whom that one did not, and is stopped if that was."""
         if old := self._before.pop(prefix, None):
             vehicle.inherit(old)
         self._before[prefix] = vehicle.memory
+        if setter := vehicle.arbiter.latch.setter:
+            say(f"sim: {prefix or 'the robot'} is stopped by {setter}, as the one before it was; `holozen release`")
         while len(self._before) > MOST:
-            del self._before[next(iter(self._before))]
+            free = (prefix for prefix, (arbiter, _) in self._before.items() if not arbiter.latch.setter)
+            del self._before[next(free, next(iter(self._before)))]  # a stop is forgotten last
 
     def remove(self, name: str) -> None:
         """Take an entity out of the world, and its keys off the wire. Raises EntityError."""
@@ -146,7 +162,7 @@ class Entities:
 
     def _check_keys(self, keys: list[str]) -> None:
         """Two robots on the same keys would each get the other's commands; so would one on a key of the sim's."""
-        taken = {row.key for row in SERVICES if row.server == "sim" and row.key != "resume"} | {"clock"}
+        taken = {row.key for row in SERVICES if row.server == "sim"} - {*Calls.VERBS} | {"clock"}
         for key in keys:
             if keys.count(key) > 1 or key in taken:
                 raise EntityError(si.NAMESPACE_INVALID, f"the robot's file puts two things on the key {key[:80]!r}")

@@ -2,17 +2,20 @@
 
 from collections.abc import Callable
 
-from holozen.limits import STOP, Planar, clamp_speed
-from holozen.messages import CommandStatus, Twist, TwistStamped
+from holozen.limits import Planar, clamp_speed
+from holozen.messages import CommandSource, CommandStatus, Twist, TwistStamped
 from holozen.readers import PRIORITIES, Received
 from holozen.tell import say
-from holozen.wire import COMMAND_SILENCE, MAX_STAMP_AGE
+from holozen.wire import MAX_STAMP_AGE
 
 from .arbiter import Arbiter
 from .ledger import Ledger, source_of
+from .motion import is_stop
+from .speakers import Speakers
 
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
+LINEAR, ANGULAR = (0.01, 50.0), (0.01, 100.0)  # what they may be set to
 
 
 class Intake:
@@ -24,8 +27,8 @@ class Intake:
         self, key: str, arbiter: Arbiter, linear: float, angular: float, say: Callable[[str], None] = say,
         others: tuple[str, ...] = (),
     ) -> None:  # fmt: skip
-        self.arbiter, self.ledger = arbiter, Ledger(say)
-        self.keys, self._linear, self._angular = (key, *others), linear, angular
+        self.arbiter, self.ledger, self._speakers = arbiter, Ledger(say), Speakers()
+        self.keys, self.linear, self.angular = (key, *others), linear, angular
 
     def take(
         self,
@@ -39,40 +42,47 @@ class Intake:
         `clocks` are the times in seconds that a stamp may be measured by.
         """
         heard = now if heard is None else heard
-        message, source = self.ledger.open(received, self.keys, now), source_of(received)
+        rank, source = PRIORITIES.index(received.sample.priority), source_of(received)
+        self._speakers.hear(source, rank, now)
+        message = self.ledger.open(received, self.keys, now)
         if message is None:
             return None
         twist = message.twist if isinstance(message, TwistStamped) else message
-        if isinstance(message, TwistStamped):
+        velocity = (twist.linear.x, twist.linear.y, twist.angular.z)
+        if isinstance(message, TwistStamped) and not is_stop(velocity):  # a stop is obeyed whatever its sender's clock
             age = _age(message, clocks)
             if abs(age) > MAX_STAMP_AGE:
+                self.arbiter.latch.refusal(source, False, now)  # it has not let go
                 return self._refuse("stale", f"stamp is {age:.1f} s old; at most {MAX_STAMP_AGE} s", source, now)
             heard = min(heard, now - age)
-        velocity = (twist.linear.x, twist.linear.y, twist.angular.z)
-        if now - heard > COMMAND_SILENCE and velocity != STOP:
-            return self._refuse("late", f"it waited up to {now - heard:.1f} s for the sim", source, now)
-        return self._obey(velocity, source, PRIORITIES.index(received.sample.priority), now, heard)
+        return self._obey(velocity, source, rank, now, heard)
 
     def status(self, now: float) -> CommandStatus:
-        """Who drives, and the counts so far."""
-        driver = self.arbiter.driver(now)
+        """Who drives, who speaks, and the counts so far."""
+        driver, held = self.arbiter.driver(now), self.arbiter.holds
+        obeyed = driver.source if driver else ""
         return CommandStatus(
-            obeyed=driver.source if driver else "",
+            obeyed=obeyed,
             priority=PRIORITIES[driver.rank] if driver else "",
             held=self.arbiter.held,
             resumed=self.arbiter.resumed,
             accepted=self.ledger.accepted,
             refused=dict(self.ledger.refused),
             last_refusal=self.ledger.last,
+            stopped=self.arbiter.latch.setter,
+            sources=[
+                CommandSource(source, PRIORITIES[rank], rate, source == obeyed, held(source, rank, now))
+                for source, rank, rate in self._speakers.lately(now)
+            ],
         )
 
     def _obey(self, velocity: Planar, source: str, rank: int, now: float, heard: float) -> None:
-        limited = clamp_speed(velocity, self._linear, self._angular)
+        limited = clamp_speed(velocity, self.linear, self.angular)
         if reason := self.arbiter.offer(source, rank, limited, now, heard):
             return self._refuse(reason.partition(":")[0], reason, source, now)
         self.ledger.accepted += 1
         if limited != velocity:
-            text = f"over the limits of {self._linear:g} m/s and {self._angular:g} rad/s, clamped: {velocity}"
+            text = f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: {velocity}"
             self._refuse("clamped", text, source, now)
         return None
 

@@ -3,11 +3,10 @@
 from holozen.messages import JointState
 from holozen.readers import PRIORITIES, Received
 from holozen.robot.errors import listed
-from holozen.wire import COMMAND_SILENCE
 
 from .arbiter import Arbiter
 from .ledger import Ledger, source_of
-from .motion import JointMotion, is_stop, motion_of
+from .motion import JointMotion, motion_of
 
 
 class JointIntake:
@@ -28,9 +27,6 @@ class JointIntake:
             motion = self._checked(motion_of(message))
         except ValueError as error:
             return self._ledger.refuse(self.key, "malformed", str(error), source, now)
-        if now - heard > COMMAND_SILENCE and not is_stop(motion):
-            late = f"it waited up to {now - heard:.1f} s for the sim"
-            return self._ledger.refuse(self.key, "late", late, source, now)
         rank = PRIORITIES.index(received.sample.priority)
         for names, arbiter in self._groups:
             if part := motion.only(names):

@@ -1,7 +1,8 @@
 """The keys of a robot's joints: joint_command in, joint_states and tf out."""
 
-from holozen.bus import Bus, Publisher
+from holozen.bus import Bus
 from holozen.messages import Header, JointState, TFMessage, Time
+from holozen.publisher import Publisher
 from holozen.robot.model import RobotModel
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 

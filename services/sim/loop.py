@@ -3,8 +3,9 @@
 import threading
 import time
 
-from holozen.bus import Bus, Publisher
+from holozen.bus import Bus
 from holozen.messages import Clock, Time
+from holozen.publisher import Publisher
 
 from .entities import Entities
 from .entity_services import EntityServices
@@ -14,6 +15,7 @@ from .world import World
 
 CLOCK_RATE = 50.0  # Hz of sim time
 LOOK = 0.02  # s; how often requests and commands are heard while no step is due
+GRAPH = 0.004  # s; how often one looks who left
 STALL = 0.1  # s without hearing; commands may have waited as long
 DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring old commands
 
@@ -24,8 +26,10 @@ class Loop:
     def __init__(
         self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None
     ) -> None:
-        self._world, self._entities, self._vehicles, self._rtf = world, entities, entities.vehicles, rtf
-        self._services, self._served = services, 0.0
+        self._world, self._entities, self._vehicles = world, entities, entities.vehicles
+        self.pace = Pace(world.spec.step, rtf, time.monotonic())
+        self.answers = [services.answer] if services else []  # called between steps, to answer requests
+        self._served = self._looked = 0.0
         self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
         self._clock_due = Schedule(CLOCK_RATE)
         self._heard = self._before_stall = time.monotonic()
@@ -33,7 +37,8 @@ class Loop:
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:
         """Step until `stop` is set, or `steps` were made."""
-        pace = Pace(self._world.spec.step, self._rtf, time.monotonic())
+        pace = self.pace
+        pace.keep(pace.rtf, time.monotonic())
         last = None if steps is None else self._world.steps + steps
         while not stop.is_set() and self._world.steps != last:
             now = time.monotonic()
@@ -52,8 +57,12 @@ class Loop:
         clocks = (time.time(), self._world.time)
         for vehicle in self._vehicles:
             vehicle.hear(now, clocks, since)
-        if self._services and now - self._served >= LOOK:
-            self._services.answer()
+        if now - self._looked >= GRAPH:
+            self._entities.hear_who_left()  # after all that they said
+            self._looked = now
+        if now - self._served >= LOOK:
+            for answer in self.answers:
+                answer()
             self._served = now
 
     def _step(self, now: float) -> None:

@@ -2,14 +2,20 @@
 
 STALL = 0.1  # s; a sim that is later than this starts anew from now instead of racing to catch up
 
+FACTORS = (0.0, 1000.0)  # real-time factors that may be set
+
 
 class Pace:
     """Steps of `dt` simulated seconds at `rtf` times real time; an `rtf` of 0 never waits."""
 
     def __init__(self, dt: float, rtf: float, now: float) -> None:
-        self._period = dt / rtf if rtf else 0.0
-        self._due = now
+        self._dt = dt
+        self.keep(rtf, now)
         self.lost = 0.0  # s of real time given up after stalls
+
+    def keep(self, rtf: float, now: float) -> None:
+        """Go on at `rtf` from `now`."""
+        self.rtf, self._period, self._due = rtf, self._dt / rtf if rtf else 0.0, now
 
     def left(self, now: float) -> float:
         """Seconds until the next step; zero or less when it is due."""

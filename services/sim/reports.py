@@ -30,12 +30,15 @@ class Schedule:
     """Says when something with a rate in Hz is due, on a clock in seconds that only goes forward."""
 
     def __init__(self, rate: float) -> None:
-        self._rate = rate
-        self._count = -1
+        self.keep(rate)
+
+    def keep(self, rate: float) -> None:
+        """Take another rate; the first is due at once."""
+        self.rate, self._count = rate, -1
 
     def due(self, time: float) -> bool:
         """Whether a period has begun since the last time this was true."""
-        count = int(time * self._rate + 1e-6)
+        count = int(time * self.rate + 1e-6)
         began = count > self._count
         self._count = count
         return began

@@ -1,13 +1,14 @@
 """A robot in the world: what it hears on its keys, what it does at a step, and what it tells."""
 
-from holozen.bus import Bus, Publisher
-from holozen.errors import ServiceError
-from holozen.messages import TFMessage, Time, TriggerReply, TriggerRequest
+from holozen.bus import Bus
+from holozen.messages import TFMessage, Time
+from holozen.publisher import Publisher
 from holozen.robot.drives import Balancing, Differential
 from holozen.robot.model import RobotModel
 from holozen.wire import COMMAND_SILENCE, key_for
 
 from .arbiter import Arbiter
+from .calls import Calls
 from .drive_keys import DriveKeys
 from .drives import Mover
 from .intake import Intake
@@ -36,26 +37,27 @@ class Vehicle:
         self.joint_arbiter = Arbiter(COMMAND_SILENCE)
         self._wheels, self._others = _motors(mover, model)
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", place), TFMessage)
-        self._resume = bus.serve(key_for("resume", place), TriggerRequest, TriggerReply, self._on_resume)
-        intake = Intake(command, self.arbiter, *limits, others=_aliases(model, prefix))
+        self.prefix = prefix
+        self._intake = intake = Intake(command, self.arbiter, *limits, others=_aliases(model, prefix))
         self._drive = DriveKeys(bus, prefix, drive, intake, self._tf) if drive else None
         pairs = ((self._wheels, self.arbiter), (self._others, self.joint_arbiter))
         groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
         ledger = intake.ledger if drive else Ledger()
         hands = JointIntake(key_for("joint_command", place), ledger, groups, mover.names)
         self._joints = JointKeys(bus, place, model, mover.names, prefix, hands, self._tf)
+        self._calls = Calls(bus, command, self.memory, self._tell_status)
         self._looked = self._now = 0.0  # when joint commands and calls were heard last, and commands
         self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
-        self._odom_due = Schedule(drive.odometry_rate if drive else 0.0)
+        self.odom_due = Schedule(drive.odometry_rate if drive else 0.0)
         self._joints_due = Schedule(JOINT_RATE)
 
     @property
     def memory(self) -> Memory:
-        """Who is held, for the robot that takes the place of this one."""
+        """Who is held, and who stopped it, for the robot that takes the place of this one."""
         return self.arbiter, self.joint_arbiter
 
     def inherit(self, memory: Memory) -> None:
-        """Hold whom the robot before this one held: replacing it frees nobody."""
+        """Hold whom the robot before this one held, and stand if it was stopped: replacing it frees nobody."""
         for arbiter, other in zip(self.memory, memory, strict=True):
             arbiter.inherit(other)
 
@@ -66,10 +68,29 @@ class Vehicle:
             self._drive.hear(now, clocks, since)
         if now - self._looked >= LOOK:
             self._joints.hear(now, min(since, self._looked or since))
-            self._resume.answer_pending()
+            self._calls.answer(now)
             if self._drive:
                 self._drive.tell_status(now)
             self._looked = now
+
+    @property
+    def drives(self) -> bool:
+        """Whether cmd_vel moves it."""
+        return self._drive is not None
+
+    def limit(self, linear: float, angular: float) -> None:
+        """Clamp the next commands to these limits, in m/s and rad/s."""
+        self._intake.linear, self._intake.angular = linear, angular
+
+    def watch(self, timeout: float) -> None:
+        """Stand after `timeout` seconds without a command, from now on."""
+        self.arbiter.wait_for(timeout, self._now)
+
+    def forget(self, source: str) -> None:
+        """Stand, if `source` drives: its process is gone. What it said before is heard first."""
+        self._joints.hear(self._now, self._looked)
+        for arbiter in self.memory:
+            arbiter.forget(source)
 
     def move(self, now: float, dt: float) -> None:
         """Do what is commanded for the next step of `dt` seconds."""
@@ -89,7 +110,7 @@ class Vehicle:
 
     def tell(self, time: float, dt: float) -> None:
         """Publish what is due at the sim time `time`, after a step of `dt` seconds."""
-        odom_due, joints_due = self._odom_due.due(time), self._joints_due.due(time)
+        odom_due, joints_due = self.odom_due.due(time), self._joints_due.due(time)
         if not (odom_due or joints_due):
             return
         stamp, moved = Time.of(time), self.mover.moved(time, dt)
@@ -103,14 +124,12 @@ class Vehicle:
         if self._drive:
             self._drive.close()
         self._joints.close()
-        self._bus.drop(self._resume)
+        self._calls.close()
         self._tf.close()
 
-    def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
-        for arbiter in (self.arbiter, self.joint_arbiter):
-            if reason := arbiter.resume(self._now):
-                raise ServiceError(reason)
-        return TriggerReply(True, "every source may drive")
+    def _tell_status(self) -> None:
+        if self._drive:
+            self._drive.tell_status(self._now, at_once=True)
 
 
 def command_key(model: RobotModel, prefix: str) -> str:
@@ -122,7 +141,7 @@ def keys_of(model: RobotModel, prefix: str) -> list[str]:
     """All keys of a robot below `prefix`, none of which another one may have too."""
     command = command_key(model, prefix)
     place = command.rpartition("/")[0]
-    keys = [key_for(key, place) for key in ("tf", "resume", "joint_states", "joint_command")]
+    keys = [key_for(key, place) for key in ("tf", "joint_states", "joint_command", *Calls.VERBS)]
     if model.drive:
         odometry = key_for(model.drive.odometry_topic, prefix)
         keys += [command, f"{command}_status", odometry, *_aliases(model, prefix)]

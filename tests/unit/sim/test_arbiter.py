@@ -10,7 +10,7 @@ from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, 
 from holozen.limits import STOP, Planar
 from holozen.readers import PRIORITIES
 from services.sim.arbiter import AUTOPILOT, HELD, MOST_HELD, Arbiter, Driver
-from services.sim.motion import JointMotion
+from services.sim.motion import JointMotion, Motion
 
 FORWARD: Planar = (0.3, 0.0, 0.0)
 LEFT: Planar = (0.0, 0.3, 0.0)
@@ -50,6 +50,20 @@ def test_without_a_command_the_robot_stands(arbiter: Arbiter) -> None:
 def test_a_command_is_obeyed_at_once(arbiter: Arbiter) -> None:
     assert arbiter.offer("teleop", PERSON, FORWARD, 1.0) == ""
     assert arbiter.motion(1.0) == FORWARD
+
+
+def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbiter) -> None:
+    arbiter.offer("script", SCRIPT, FORWARD, 1.0)
+    arbiter.wait_for(2.0, now=1.6)
+    assert (arbiter.motion(1.6), arbiter.driver(1.6)) == (STOP, None)
+    arbiter.offer("script", SCRIPT, FORWARD, 2.0)
+    assert (arbiter.motion(3.9), arbiter.motion(4.1)) == (FORWARD, STOP)
+
+
+def test_a_shorter_watchdog_stops_a_robot_that_was_not_told_to_go_on(arbiter: Arbiter) -> None:
+    arbiter.offer("script", SCRIPT, FORWARD, 1.0)
+    arbiter.wait_for(0.1, now=1.05)
+    assert (arbiter.motion(1.09), arbiter.motion(1.11)) == (FORWARD, STOP)
 
 
 def test_a_stop_is_obeyed_at_once(arbiter: Arbiter) -> None:
@@ -252,12 +266,120 @@ def test_a_flood_of_names_takes_bounded_memory_and_lets_nobody_through(arbiter: 
         assert arbiter.offer(f"script {number}", SCRIPT, FORWARD, 9.0) == HELD
 
 
+class TestSoftwareStop:
+    """`stop` and `release`; the rules of letting go are those of the latch."""
+
+    def test_the_robot_stands_at_once_and_whatever_is_commanded(self, arbiter: Arbiter) -> None:
+        arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+        arbiter.stop("ann@1", 1.1)
+        assert arbiter.motion(1.1) == STOP
+        for rank in (0, PERSON, SCRIPT, CONTROLLER, BACKGROUND):
+            assert arbiter.offer(f"source {rank}", rank, LEFT, 1.2).startswith("stopped: by ann@1; ")
+            assert arbiter.motion(1.2) == STOP
+        assert arbiter.driver(1.2) is None
+
+    @pytest.mark.parametrize("timeout", [0.5, 5.0, -1])
+    def test_releasing_it_moves_nothing(self, timeout: float) -> None:
+        arbiter = Arbiter(timeout)
+        arbiter.offer("script", SCRIPT, FORWARD, 1.0)
+        arbiter.stop("ann@1", 1.1)
+        arbiter.latch.release()
+        assert arbiter.motion(1.2) == STOP
+        assert arbiter.offer("script", SCRIPT, FORWARD, 1.3).startswith("let go first: ")
+        assert arbiter.offer("script", SCRIPT, STOP, 1.4) == ""
+        assert arbiter.offer("script", SCRIPT, FORWARD, 1.5) == ""
+
+    def test_an_autopilot_waits_for_resume_besides(self, arbiter: Arbiter) -> None:
+        arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
+        arbiter.stop("ann@1", 1.1)
+        assert arbiter.held
+        arbiter.latch.release()
+        assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == HELD
+        assert arbiter.resume(9.1) == ""
+        assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.2) == ""
+
+    def test_resume_does_not_make_up_for_letting_go(self, arbiter: Arbiter) -> None:
+        arbiter.stop("ann@1", 1.0)
+        arbiter.offer("controller", CONTROLLER, FORWARD, 2.0)
+        arbiter.latch.release()
+        assert arbiter.resume(2.1) == ""
+        assert arbiter.offer("controller", CONTROLLER, FORWARD, 2.2).startswith("let go first: ")
+        assert arbiter.offer("controller", CONTROLLER, FORWARD, 2.8) == ""
+
+    def test_resume_is_refused_while_it_holds(self, arbiter: Arbiter) -> None:
+        arbiter.stop("ann@1", 1.0)
+        assert arbiter.resume(2.0) == "stopped: by ann@1; `holozen release` lets it drive again"
+        assert (arbiter.resumed, arbiter.held) == (0, True)
+
+    def test_a_joint_that_was_moved_stands_too(self, arbiter: Arbiter) -> None:
+        arbiter.offer("script", SCRIPT, JointMotion("position", (("arm", 1.0),)), 1.0)
+        arbiter.stop("ann@1", 1.1)
+        assert arbiter.motion(1.1) == STOP
+        assert arbiter.offer("script", SCRIPT, JointMotion("position", (("arm", 1.0),)), 1.2).startswith("stopped: ")
+
+    def test_the_robot_in_the_place_of_a_stopped_one_is_stopped(self, arbiter: Arbiter) -> None:
+        arbiter.stop("ann@1", 1.0)
+        heir = Arbiter(0.5)
+        heir.inherit(arbiter)
+        assert heir.offer("teleop", PERSON, FORWARD, 9.0).startswith("stopped: by ann@1; ")
+
+
+class TestLostOperator:
+    """The process behind a source is gone."""
+
+    def test_the_robot_that_it_drove_stands_at_once(self, arbiter: Arbiter) -> None:
+        arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+        arbiter.forget("teleop")
+        assert arbiter.motion(1.0) == STOP
+
+    @pytest.mark.parametrize("motion", [FORWARD, JointMotion("velocity", (("arm", 1.0),))])
+    def test_so_it_does_where_the_watchdog_is_off(self, motion: Motion) -> None:
+        arbiter = Arbiter(-1)
+        arbiter.offer("teleop", PERSON, motion, 1.0)
+        arbiter.forget("teleop")
+        assert arbiter.motion(1.0) == arbiter.motion(1e6) == STOP
+
+    def test_the_loss_of_a_stranger_changes_nothing(self, arbiter: Arbiter) -> None:
+        arbiter.forget("stranger")
+        arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+        arbiter.forget("stranger")
+        assert arbiter.motion(1.1) == FORWARD
+
+    def test_nobody_else_gets_the_robot_any_sooner_for_it(self, arbiter: Arbiter) -> None:
+        """A name can be forged: what a loss does may only stop the robot."""
+        arbiter.offer("first", SCRIPT, FORWARD, 1.0)
+        arbiter.forget("first")
+        assert arbiter.offer("second", SCRIPT, LEFT, 1.1) == "overruled: first drives"
+        assert arbiter.motion(1.1) == STOP
+        assert arbiter.offer("second", SCRIPT, LEFT, 1.6) == ""
+
+    def test_a_source_that_comes_back_is_obeyed_as_usual(self, arbiter: Arbiter) -> None:
+        arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+        arbiter.forget("teleop")
+        assert arbiter.offer("teleop", PERSON, LEFT, 1.1) == ""
+        assert arbiter.motion(1.1) == LEFT
+
+    def test_the_loss_of_a_person_frees_no_autopilot_and_holds_up_no_resume(self, arbiter: Arbiter) -> None:
+        arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+        arbiter.forget("teleop")
+        assert arbiter.offer("controller", CONTROLLER, LEFT, 9.0) == HELD
+        assert arbiter.resume(9.0) == ""
+
+
+@pytest.mark.parametrize(("rank", "holds"), [(SCRIPT, False), (CONTROLLER, True)])
+def test_one_knows_who_has_to_wait(arbiter: Arbiter, rank: int, holds: bool) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.holds("me", rank, 9.0) == holds
+    arbiter.stop("ann@1", 10.0)
+    assert arbiter.holds("me", rank, 10.1)
+
+
 SOURCES = {"teleop": PERSON, "second teleop": PERSON, "script": SCRIPT, "another script": SCRIPT,
            "controller": CONTROLLER, "second controller": CONTROLLER, "recorder": BACKGROUND}  # fmt: skip
 
 
 class Robot(RuleBasedStateMachine):
-    """Any commands from any sources, pauses and resumes, beside what each source was told."""
+    """Any commands from any sources, pauses, stops, losses and resumes, beside what each source was told."""
 
     timeout = 0.5
 
@@ -276,8 +398,13 @@ class Robot(RuleBasedStateMachine):
     @rule(source=st.sampled_from(sorted(SOURCES)), velocity=st.sampled_from([STOP, FORWARD, LEFT]))
     def speak(self, source: str, velocity: Planar) -> None:
         before = self.arbiter.driver(self.now)
+        waits = self.arbiter.latch.waits(source, self.now) and velocity != STOP
         refused = self.arbiter.offer(source, SOURCES[source], velocity, self.now)
         after = self.arbiter.driver(self.now)
+        if self.arbiter.latch.setter or waits:
+            assert refused.startswith("stopped: " if self.arbiter.latch.setter else "let go first: ")
+            assert after == before
+            return
         if not refused:
             assert after is not None
             assert (after.source, after.motion, after.heard) == (source, velocity, self.now)
@@ -304,10 +431,36 @@ class Robot(RuleBasedStateMachine):
     def resume(self) -> None:
         driver = self.arbiter.driver(self.now)
         refused = self.arbiter.resume(self.now)
-        assert bool(refused) == bool(driver and driver.rank < AUTOPILOT and driver.motion != STOP)
+        driven = driver and driver.rank < AUTOPILOT and driver.motion != STOP
+        assert bool(refused) == bool(driven or self.arbiter.latch.setter)
         if not refused:
             self.lost.clear()
             assert not self.arbiter.held
+
+    @rule()
+    def stop(self) -> None:
+        self.arbiter.stop("ann", self.now)
+        assert self.arbiter.motion(self.now) == STOP
+        assert self.arbiter.held
+
+    @rule()
+    def release(self) -> None:
+        before = self.arbiter.motion(self.now)
+        self.arbiter.latch.release()
+        assert self.arbiter.motion(self.now) == before
+
+    @rule(source=st.sampled_from(sorted(SOURCES)))
+    def lose(self, source: str) -> None:
+        before = self.arbiter.driver(self.now)
+        self.arbiter.forget(source)
+        after = self.arbiter.driver(self.now)
+        if before and before.source == source:
+            self.said[source] = STOP
+        assert (before and before.source) == (after and after.source)
+
+    @invariant()
+    def a_stopped_robot_stands(self) -> None:
+        assert not self.arbiter.latch.setter or self.arbiter.driver(self.now) is None
 
     @invariant()
     def the_robot_does_what_its_one_driver_said_last(self) -> None:

@@ -13,11 +13,12 @@ import pytest
 import zenoh
 
 from holozen import simulation_interfaces as si
-from holozen.bus import ServiceError
-from holozen.messages import Header, Message, Point, Pose, Quaternion, Twist, Vector3
+from holozen.errors import ServiceError
+from holozen.messages import Header, JointState, Message, Point, Pose, Quaternion, TriggerRequest, Twist, Vector3
 from holozen.robot.model import parse
 from holozen.robot.xacro import expand
 from holozen.testing import Wire, wait_for
+from services.sim import entities as entities_module
 from services.sim.engine import UPRIGHT, bullet
 from services.sim.entities import Entities, Entity
 from services.sim.entity_services import EntityServices
@@ -307,9 +308,43 @@ def test_a_robot_in_the_place_of_another_obeys_nobody_whom_that_one_held(town: T
     assert vehicle.arbiter.offer("script", 4, (0.5, 0, 0), 20.2) == ""
 
 
+def test_a_stop_outlives_its_robot_and_a_thousand_others(
+    town: Town, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(entities_module, "MOST", 2)
+    for name in ("Fred", "Ann", "Bob", "Eve"):
+        town.spawn(name)
+        (vehicle,) = town.entities.vehicles
+        if name == "Fred":
+            vehicle.arbiter.stop("ann@1", 10.0)
+        town.services._delete(si.DeleteEntityRequest(name))
+    assert len(town.entities._before) == 2
+    town.spawn("Fred")
+    (vehicle,) = town.entities.vehicles
+    assert vehicle.arbiter.offer("person", 1, (0.5, 0, 0), 20.0).startswith("stopped: by ann@1; ")
+    assert "sim: Fred is stopped by ann@1, as the one before it was" in capsys.readouterr().err
+
+
+def test_an_arm_can_be_stopped_too(town: Town) -> None:
+    """It has joints and no drive."""
+    town.spawn("arm", ARM, z=0.05)
+    (vehicle,) = town.entities.vehicles
+    commands = town.client.publisher("arm/joint_command", JointState)
+    wait_for(lambda: commands.matched)
+    vehicle._calls._on_stop(TriggerRequest())
+
+    def refused() -> int:
+        commands.put(JointState(name=["j"], velocity=[1.0]))
+        town.loop.run(steps(), 24)
+        return vehicle._joints._intake._ledger.refused["stopped"]
+
+    wait_for(refused)
+    assert vehicle.joint_arbiter.driver(vehicle._now) is None
+
+
 def test_a_robot_with_joints_and_no_drive_has_a_resume_of_its_own(town: Town) -> None:
     town.spawn("arm", ARM, z=0.05)
-    assert {"arm/resume", "arm/joint_command", "arm/joint_states"} <= town.tokens()
+    assert {"arm/resume", "arm/stop", "arm/release", "arm/joint_command", "arm/joint_states"} <= town.tokens()
     other = town.refusal(lambda: town.spawn("second", ARM, entity_namespace="arm"))
     assert other[0] == si.NAME_NOT_UNIQUE
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.limits import STOP
-from holozen.messages import Header, Time, Twist, TwistStamped, Vector3
+from holozen.messages import CommandSource, Header, Time, Twist, TwistStamped, Vector3
 from holozen.readers import PRIORITIES, Received, Sample
 from holozen.wire import MAX_STAMP_AGE
 from services.sim.arbiter import Arbiter
@@ -138,7 +138,7 @@ def test_a_command_that_may_have_waited_too_long_is_refused_but_a_stop_is_not(ju
     assert judge.motion() == (1, 0, 0)
     judge.take(Twist.planar(2), waited=0.6)
     assert judge.motion() == (1, 0, 0)
-    assert judge.told == ["Fred/cmd_vel: from me@1: it waited up to 0.6 s for the sim"]
+    assert judge.told == ["Fred/cmd_vel: from me@1: late: it waited up to 0.6 s for the sim"]
     judge.take(Twist(), waited=math.inf)
     assert judge.motion() == STOP
     assert judge.intake.status(10.0).refused == {"late": 1}
@@ -168,6 +168,53 @@ def test_an_overruled_and_a_held_source_are_counted_apart(judge: Judge) -> None:
 def test_a_source_without_a_name_is_called_by_its_priority(judge: Judge) -> None:
     judge.take(Twist.planar(1), source="")
     assert judge.intake.status(10.0).obeyed == "anonymous (DATA)"
+
+
+def test_the_status_names_who_speaks_how_often_and_who_is_obeyed(judge: Judge) -> None:
+    for count in range(21):
+        judge.take(Twist.planar(0.1), now=1.0 + count * 0.05, priority="INTERACTIVE_HIGH", source="teleop@9")
+        if count % 2 == 0:
+            judge.take(Twist.planar(0.2), now=1.0 + count * 0.05, priority="DATA_LOW", source="controller@8")
+        judge.intake.status(1.0 + count * 0.05)
+    teleop, controller = judge.intake.status(2.0).sources
+    assert (teleop.rate, controller.rate) == pytest.approx((20, 10), abs=1)
+    assert teleop == CommandSource("teleop@9", "INTERACTIVE_HIGH", teleop.rate, obeyed=True, held=False)
+    assert controller == CommandSource("controller@8", "DATA_LOW", controller.rate, obeyed=False, held=True)
+    assert judge.intake.status(9.0).sources == []
+
+
+def test_while_it_is_stopped_every_command_is_refused_and_counted(judge: Judge) -> None:
+    judge.intake.arbiter.stop("ann@1", 10.0)
+    judge.take(Twist.planar(1), priority="INTERACTIVE_HIGH")
+    judge.take(Twist())
+    judge.take(stamped(1000.0))
+    status = judge.intake.status(10.0)
+    assert (status.stopped, status.obeyed, status.held) == ("ann@1", "", True)
+    assert status.refused == {"stopped": 3}
+    assert judge.told == ["Fred/cmd_vel: from me@1: stopped: by ann@1; `holozen release` lets it drive again"]
+    assert judge.motion() == STOP
+
+
+@pytest.mark.parametrize("seconds", [900.0, 1100.0])
+def test_a_stop_is_obeyed_whatever_its_stamp(judge: Judge, seconds: float) -> None:
+    judge.take(Twist.planar(1), priority="INTERACTIVE_HIGH")
+    judge.take(stamped(seconds, 0.0), priority="INTERACTIVE_HIGH", source="ann@1")
+    assert judge.motion() == STOP
+    judge.take(Twist.planar(1), now=10.1, priority="INTERACTIVE_HIGH")
+    assert judge.motion(10.1) == STOP, "who was stopped waits"
+
+
+@pytest.mark.parametrize("kind", ["late", "stale"])
+def test_who_commands_through_a_bad_link_has_not_let_go(judge: Judge, kind: str) -> None:
+    """What comes too late to be obeyed still shows that its sender has not let go."""
+    judge.intake.arbiter.stop("ann@1", 10.0)
+    judge.intake.arbiter.latch.release()
+    for now in (10.4, 10.8):
+        judge.take(Twist.planar(1) if kind == "late" else stamped(990.0), now, waited=0.6)
+    judge.take(Twist.planar(1), now=11.2)
+    assert judge.motion(11.2) == STOP
+    judge.take(Twist.planar(1), now=11.8)
+    assert judge.motion(11.8) == (1, 0, 0)
 
 
 def test_refusals_are_told_once_a_second_with_the_number_of_the_others(judge: Judge) -> None:

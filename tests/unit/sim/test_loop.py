@@ -1,5 +1,6 @@
 """The loop with a real engine and a real bus: commands in, odometry out, at the pace that was asked for."""
 
+import json
 import threading
 import time
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from types import SimpleNamespace
 import pytest
 import zenoh
 
-from holozen.bus import Publisher, ServiceError, Subscription
+from holozen.errors import ServiceError
 from holozen.limits import STOP
 from holozen.messages import (
     Clock,
@@ -26,6 +27,8 @@ from holozen.messages import (
     TriggerRequest,
     Twist,
 )  # fmt: skip
+from holozen.publisher import Publisher
+from holozen.readers import Subscription
 from holozen.robot.model import Drive, load
 from holozen.testing import Wire, wait_for
 from holozen.wire import MAX_COMMAND_BYTES, PRIORITY_OF
@@ -208,6 +211,52 @@ def test_resume_is_a_service_between_the_steps(wire: Wire, world: World) -> None
         with pytest.raises(ServiceError, match=r"^teleop@1 drives; stop first$"):
             me.call("Fred/resume", TriggerRequest(), TriggerReply)
     assert sim.arbiter.resumed == 1
+
+
+def test_stop_and_release_are_services_and_told_at_once(wire: Wire, world: World) -> None:
+    sim, me = Sim(wire, world, rtf=1.0), wire.bus("me")
+    status = me.subscribe("Fred/cmd_vel_status", CommandStatus)
+    with sim.running():
+        for verb, setter in (("stop", me.source), ("stop", me.source), ("release", ""), ("release", "")):
+            assert me.call(f"Fred/{verb}", TriggerRequest(), TriggerReply).success
+            assert sim.arbiter.latch.setter == sim.vehicle.joint_arbiter.latch.setter == setter
+            told = [received.message for received in iter(status.try_recv, None) if received.message]
+            if told:  # a change is told before it is confirmed, the rest when it is due
+                assert told[-1].stopped == setter
+            (answer,) = [reply.ok for reply in me.session.get("Fred/cmd_vel_status")]
+            assert json.loads(bytes(answer.payload))["stopped"] == setter
+
+
+def test_of_a_stop_and_a_release_that_wait_together_the_stop_wins(wire: Wire, sim: Sim) -> None:
+    me = wire.bus("me")
+    sim.bus.session.declare_queryable("here", lambda query: query.reply("here", b""))
+    wait_for(lambda: list(me.session.get("here")))
+    asked = [me.ask_all(f"Fred/{verb}", 60.0) for verb in ("stop", "release", "stop", "release")]
+    assert list(me.session.get("here")), "what was asked before this waits at the sim now"
+    sim.run(1)
+    assert all(len(list(answers)) == 1 for answers in asked)
+    assert sim.arbiter.latch.setter == me.source
+
+
+def test_a_node_that_leaves_stops_the_robot_that_it_drove_and_no_other(clock: list[float], sim: Sim) -> None:
+    """Time stands still here, so it is no watchdog that stops it."""
+    for name, source in (("Fred", "teleop@abcdef"), ("Ann", "other@abcdef")):
+        if name == "Ann":
+            sim.entities.add("Ann", replace(MODEL, drive=DRIVE), ((3, 0, 0), UPRIGHT))
+        sim.entities.vehicles[-1].arbiter.offer(source, 1, FORWARD, clock[0])
+    fred, ann = sim.entities.vehicles
+    token = sim.bus.session.liveliness().declare_token("@holozen/abcdef0123/teleop/node")
+    sim.run(10)
+    assert fred.arbiter.motion(clock[0]) == FORWARD
+    token.undeclare()
+
+    def stands() -> bool:
+        sim.loop._looked = 0.0
+        sim.run(1)
+        return fred.arbiter.motion(clock[0]) == STOP
+
+    wait_for(stands)
+    assert ann.arbiter.motion(clock[0]) == FORWARD
 
 
 @pytest.fixture

@@ -38,6 +38,16 @@ def test_a_rate_above_the_steps_is_due_at_each_step() -> None:
     assert all(schedule.due(step / 240) for step in range(2400))
 
 
+@pytest.mark.parametrize("rate", [1.0, 1000.0])
+def test_another_rate_holds_at_once(rate: float) -> None:
+    schedule = Schedule(50)
+    assert schedule.due(100.0)
+    schedule.keep(rate)
+    assert schedule.due(100.001)
+    assert not schedule.due(100.0011)
+    assert schedule.due(100.002 + 1 / rate)
+
+
 def test_it_is_due_at_the_first_look_and_once_after_a_gap() -> None:
     schedule = Schedule(10)
     assert schedule.due(1e5)

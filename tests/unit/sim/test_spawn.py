@@ -22,6 +22,8 @@ LINK = '<link name="a">{}<inertial><mass value="1"/>' + INERTIA + "</inertial></
 BALL = '<collision><geometry><sphere radius="1"/></geometry></collision>'
 MESH = '<collision><geometry><mesh filename="nothing.stl"/></geometry></collision>'
 
+KEYS = {"cmd_vel", "odom", "tf", "joint_states", "joint_command", "cmd_vel_status", "resume", "stop", "release"}
+
 
 @pytest.fixture
 def world() -> Iterator[World]:
@@ -62,7 +64,7 @@ def test_without_a_file_hb_bot_stands_at_the_root_of_the_keys(
     (entity,) = spawn(bus, world, wanted())
     assert entity.name == "hb_bot"
     assert entity.body.pose()[0] == pytest.approx((0, 0, -0.04), abs=1e-6)
-    assert keys(bus) == {"cmd_vel", "odom", "tf", "joint_states", "joint_command", "cmd_vel_status", "resume"}
+    assert keys(bus) == KEYS
     assert capsys.readouterr().err == "sim: hb_bot listens on cmd_vel\n"
 
 
@@ -91,9 +93,7 @@ def test_the_plugins_tags_name_the_topics(
 def test_a_namespace_in_the_file_is_as_good_as_a_name(bus: Bus, world: World, tmp_path: Path) -> None:
     tags = "<commandTopic>Ann/cmd_vel</commandTopic><odometryTopic>Ann/odom</odometryTopic>"
     spawn(bus, world, wanted((file(tmp_path, LINK.format(BALL) + DRIVE.format(tags)), "")))
-    assert keys(bus) == {
-        f"Ann/{key}" for key in ("cmd_vel", "odom", "tf", "joint_states", "joint_command", "cmd_vel_status", "resume")
-    }
+    assert keys(bus) == {f"Ann/{key}" for key in KEYS}
 
 
 def test_a_second_sim_of_the_same_robot_is_refused(wire: Wire, bus: Bus, world: World) -> None:
