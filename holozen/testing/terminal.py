@@ -6,12 +6,13 @@ import select
 import sys
 import termios
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
 from holozen.testing.process import Process, wait_for
 
-ROWS, COLUMNS = 32, 100
+SIZE = 100, 32  # columns and rows
 # Makes the terminal on standard input the controlling one, so that it hangs up and interrupts as real ones do.
 _ENTER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
 
@@ -19,21 +20,25 @@ _ENTER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); 
 class Terminal:
     """A process and the terminal it runs in. Its output is read all the time, as a terminal does.
 
-    `screen` needs the package pyte; nothing else does.
+    `size` is in columns and rows. `screen` needs the package pyte; nothing else does.
     """
 
-    def __init__(self, words: Sequence[str], *, env: Mapping[str, str] | None = None) -> None:
+    def __init__(
+        self, words: Sequence[str], *, env: Mapping[str, str] | None = None, size: tuple[int, int] = SIZE
+    ) -> None:
         self._master, slave = pty.openpty()
-        termios.tcsetwinsize(slave, (ROWS, COLUMNS))
+        self._size = size
+        termios.tcsetwinsize(slave, size[::-1])
         self.modes_before = self.modes()
         self._bytes = b""
         self._shown = 0  # how many of them the emulator has seen
         self._emulator: Any = None
-        self._closing = threading.Event()
+        self._closing, self._frozen = threading.Event(), threading.Event()
         try:
             self.process = Process(
                 [sys.executable, "-S", "-c", _ENTER, *words],
-                env={"TERM": "xterm-256color", **(env or {})},
+                # It is not in the tmux or screen that the tests may run in.
+                env={"TERM": "xterm-256color", "TMUX": "", "STY": "", **(env or {})},
                 stdin=slave,
                 stdout=slave,
                 stderr=slave,
@@ -53,6 +58,45 @@ class Terminal:
         """Press keys: `terminal.type("i")`; a control or arrow key by the bytes it sends, such as `"\\x1b[A"`."""
         os.write(self._master, keys.encode() if isinstance(keys, str) else keys)
 
+    def hold(self, key: str | bytes, seconds: float, delay: float = 0.5, interval: float = 0.04) -> list[float]:
+        """Hold a key as long, in a terminal that repeats it after `delay` and then every `interval` seconds.
+
+        Returns when each was sent, on the clock of time.monotonic.
+        """
+        sent = [time.monotonic()]
+        self.type(key)
+        due = sent[0] + delay
+        while due <= sent[0] + seconds:
+            time.sleep(max(0.0, due - time.monotonic()))
+            sent.append(time.monotonic())
+            self.type(key)
+            due += interval
+        return sent
+
+    def resize(self, columns: int, rows: int) -> None:
+        """Give the window another size, and tell the process."""
+        if self._emulator is not None:
+            self.screen()  # what was written until now was written for the old size
+            self._emulator.listener.resize(rows, columns)
+        self._size = columns, rows
+        termios.tcsetwinsize(self._master, (rows, columns))
+
+    def freeze(self) -> None:
+        """Hang: read nothing more of what the process writes, until `thaw`."""
+        self._frozen.set()
+
+    def thaw(self) -> None:
+        """Read on."""
+        self._frozen.clear()
+
+    def received(self, data: bytes) -> None:
+        """Called with what the process has written. Does nothing; a terminal that answers questions does it here."""
+
+    @property
+    def closed(self) -> bool:
+        """Whether it was hung up."""
+        return self._closing.is_set()
+
     @property
     def raw(self) -> str:
         """All that was written to the terminal, with its control sequences."""
@@ -65,7 +109,7 @@ class Terminal:
         except ModuleNotFoundError:
             raise RuntimeError("Terminal.screen needs pyte; run: pip install pyte") from None
         if self._emulator is None:
-            self._emulator = pyte.ByteStream(pyte.Screen(COLUMNS, ROWS))
+            self._emulator = pyte.ByteStream(pyte.Screen(*self._size))
         new = self._bytes[self._shown :]
         self._shown += len(new)
         self._emulator.feed(new)
@@ -101,9 +145,15 @@ class Terminal:
 
     def _read(self) -> None:
         while not self._closing.is_set():
+            if self._frozen.is_set():
+                self._closing.wait(0.005)
+                continue
             if not select.select([self._master], [], [], 0.02)[0]:
                 continue
             try:
-                self._bytes += os.read(self._master, 65536)
+                data = os.read(self._master, 65536)
             except OSError:  # the last process has left the terminal
                 self._closing.wait()
+            else:
+                self._bytes += data
+                self.received(data)

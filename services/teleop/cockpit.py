@@ -1,126 +1,161 @@
-"""Joins pilot and bus: publishes what the keys say, reads what the screen shows."""
+"""Joins pilot and robots: publishes what the keys say, hands over, goes from robot to robot."""
 
 import time
+from collections.abc import Sequence
 
-from holozen.bus import Bus, Publisher, ServiceError
-from holozen.graph import on_key
-from holozen.messages import (
-    CommandStatus,
-    Header,
-    Odometry,
-    Time,
-    TriggerReply,
-    TriggerRequest,
-    Twist,
-    TwistStamped,
-)
-from holozen.wire import PRIORITY_OF, key_for, topic
+from holozen.bus import Bus
+from holozen.errors import ServiceError
+from holozen.graph import Graph, on_key
+from holozen.messages import TriggerReply, TriggerRequest, Twist
 
-from .keymap import RESUME
+from .fixed_keys import FIXED
+from .helm import Helm
+from .keys import Event, Focus, Key, Unknown
 from .pilot import Pilot
-from .view import State
 
-RESTS = 0.01  # m/s and rad/s; slower than this is standing
-STALL = 0.25  # s without a tick; longer pauses make old keys of new ones
+FASTER = {"faster": 1.1, "slower": 0.9}  # a gamepad's buttons
 RESUME_TIMEOUT = 0.2  # s; the keys wait while the sim is asked
+UNSEEN = "the window lost the focus: stopped"
+BLIND = "odom comes no more: stopped; press a key again to drive"
+ANEW = "the robot began anew: stopped; press a key again to drive"
+ON_THE_WAY = "on the way to the next robot: press the key again"
 
 
 class Cockpit:
-    """One robot's teleop without its screen. `stamped`: publish TwistStamped with this frame_id, else None."""
+    """The teleop without its terminal. `stamped`: publish TwistStamped with this frame_id, else None. `command`: where
+    the first robot listens, if not at its own cmd_vel.
+    """
 
-    def __init__(self, bus: Bus, robot: str, pilot: Pilot, stamped: str | None) -> None:
-        row = topic("odom")
-        assert row is not None
-        self.pilot, self._bus, self._robot, self._stamped, self._silence = pilot, bus, robot, stamped, row.silence
-        self._key = key_for("cmd_vel", robot)
-        kind: type[Twist] | type[TwistStamped] = Twist if stamped is None else TwistStamped
-        self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self._key, kind, PRIORITY_OF["teleop"])
-        self._odom = bus.latest(key_for("odom", robot), Odometry)
-        self._status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
-        self._graph = bus.graph()
-        self._due = 0.0
-        self._sent: Twist | None = None
-        self._note = ""
-        self._ticked = time.monotonic()  # when the keys were last known to be live
-        self._handing = False  # over to others, as soon as the robot rests
+    def __init__(self, bus: Bus, robots: Sequence[str], pilot: Pilot, stamped: str | None, command: str = "") -> None:
+        self.pilot, self.bus, self._stamped = pilot, bus, stamped
+        self._robots = list(robots)
+        self._first, self._command = self._robots[0] if robots else command.rpartition("/")[0], command
+        self.helm = self._helm(self._first)
+        pilot.switch(self.helm.robot)
+        self.graph: Graph = bus.graph()
+        self.sent: Twist | None = None
+        self.warning = ""
+        self.help = False
+        self._sees = False  # odom, when the robot was looked at last
+        self.due = 0.0  # when a command is to be repeated
+        self._wanted = ""  # what is done as soon as the robot rests: "resume" or "next_robot"
 
-    def press(self, key: str) -> None:
-        """Take a key, and publish at once what it changes."""
-        self._note = ""
-        now = time.monotonic()
-        if now - self._ticked > STALL:  # it was typed while nothing was shown and nothing was sent
-            return self.let_go()
-        self._handing = key == RESUME
-        if self._handing:
-            return self.let_go()
-        self.pilot.press(key, now)
-        self._publish()
+    def take(self, event: Event, now: float) -> str:
+        """Take a key event, and publish at once what it changes. Returns "quit" or "suspend" where it asks for that."""
+        if isinstance(event, Focus):
+            return self.let_go(UNSEEN) if not event.gained and self.pilot.grip.keys else ""
+        if not isinstance(event, Key | Unknown):
+            return ""
+        key = event if isinstance(event, Key) else Key("unknown")
+        if key.kind == "press" or key.kind == "typed":
+            if self._goes_on() and FIXED.get(key.name) not in ("quit", "suspend"):
+                return self.let_go(ON_THE_WAY)
+            self.warning, self._wanted = "", ""
+        return self.act(self.pilot.take(key, now), now)
 
-    def tick(self) -> None:
-        """Publish what is due: a stop when the key timed out, else what is repeated."""
-        now = self._ticked = time.monotonic()
-        if self._handing and not self.pilot.engaged:
-            self._hand_over()
+    def act(self, action: str, now: float) -> str:
+        """Do what a key or a button asks for besides motion. Returns what is left to do, "quit" or "suspend"."""
+        if action in ("resume", "next_robot"):
+            self.let_go()
+            self._wanted = action
+        elif action == "help":
+            self.help = not self.help
+        elif action in FASTER:
+            self.pilot.scale(FASTER[action])
+        self.publish(now)
+        return action if action in ("quit", "suspend") else ""
+
+    def steer(self, stick: tuple[float, float, float], now: float) -> None:
+        """Take the joystick's place (forward, left, counter-clockwise; -1 to 1), and publish what it changes."""
+        if stick != self.pilot.stick:
+            self.pilot.steer(stick, now)
+            self.publish(now)
+
+    def tick(self, now: float) -> None:
+        """Publish what is due: a stop when a key is no longer held, else what is repeated."""
+        if self._wanted and not self.pilot.engaged:
+            self._do_wanted()
+        lost = self.helm.lost()
+        if lost and self._sees and self._drives:
+            self.let_go(BLIND)
+        self._sees = not lost
+        if self.helm.began_anew() and self._drives:
+            self.let_go(ANEW)
         repeats = self.pilot.settings.repeat_rate > 0 or self.pilot.stopping_since() is not None
-        if self.pilot.expire(now) or (repeats and now >= self._due):
-            self._publish()
+        if self.pilot.expire(now) or (repeats and now >= self.due):
+            self.publish(now)
 
-    def let_go(self) -> None:
-        """Publish a stop at once, if this teleop moves the robot."""
-        if self.pilot.engaged:
-            self.pilot.stop(time.monotonic())
-            self._publish()
+    def let_go(self, why: str = "") -> str:
+        """Let go of all keys, and publish a stop at once if this teleop moves the robot. `why` is shown."""
+        if self._drives:
+            now = time.monotonic()
+            self.pilot.stop(now)
+            self.publish(now)
+        else:  # keys may be held that together move nothing, and a stop that has begun goes on
+            self.pilot.let_go()
+        self.warning = why or self.warning
+        return ""
 
     def halt(self) -> None:
         """Stop the robot if this teleop moves it: zeros until odom shows rest, at most a second."""
         self.let_go()
         while self.pilot.engaged:
             time.sleep(0.01)
-            self._publish()
+            self.publish(time.monotonic())
 
-    def state(self) -> State:
-        """What there is to show."""
-        odom, age = self._odom.read()
-        status = self._status.read()[0] or CommandStatus()
-        twist = odom.twist.twist if odom else Twist()
-        settings, sent = self.pilot.settings, self._sent
-        return State(
-            robot=self._robot,
-            speed=settings.speed,
-            turn=settings.turn,
-            command=(sent.linear.x, sent.linear.y, sent.angular.z) if sent else None,
-            measured=(twist.linear.x, twist.linear.y, twist.angular.z),
-            odom_age=age,
-            stale=age > self._odom.patience(self._silence),
-            listeners=[endpoint.node for endpoint in on_key(self._graph.endpoints(), self._key, "sub")],
-            obeyed=status.obeyed,
-            held=status.held,
-            source=self._bus.source,
-            note=self._note,
-        )
-
-    def _publish(self) -> None:
-        now = time.monotonic()
-        self._sent = self.pilot.command(now, self._rests())
-        self._due = now + 1 / (self.pilot.settings.repeat_rate or 20.0)
-        if self._sent is not None and self._stamped is None:
-            self._commands.put(self._sent)
-        elif self._sent is not None:
-            self._commands.put(TwistStamped(Header(Time.of(time.time()), self._stamped or ""), self._sent))
-
-    def _rests(self) -> bool:
-        """Whether odom, newer than the stop, shows a robot that stands."""
+    def publish(self, now: float) -> None:
+        """Publish what the pilot says at `now`, if anything."""
         since = self.pilot.stopping_since()
-        odom, age = self._odom.read()
-        if since is None or odom is None or time.monotonic() - age <= since:
-            return False
-        return odom.twist.twist.is_slow(RESTS)
+        self.sent = self.pilot.command(now, since is not None and self.helm.rests(since))
+        self.due = now + 1 / (self.pilot.settings.repeat_rate or 20.0)
+        if self.sent is not None:
+            self.helm.put(self.sent)
+
+    def ring(self) -> list[str]:
+        """The robots that Tab goes round: those that were named, or else all that listen."""
+        if len(self._robots) > 1:
+            return self._robots
+        keys = {end.key for end in self.graph.endpoints() if end.kind == "sub"}
+        places = {
+            key.removesuffix("cmd_vel").rstrip("/") for key in keys if key == "cmd_vel" or key.endswith("/cmd_vel")
+        }
+        places = {place for place in places if "/" not in place and "*" not in place}
+        return sorted({*places, self.helm.robot, *([self._first] if self._command else [])})
+
+    def listeners(self) -> list[str]:
+        """Who reads the commands."""
+        return [end.node for end in on_key(self.graph.endpoints(), self.helm.key, "sub")]
+
+    @property
+    def _drives(self) -> bool:
+        return self.pilot.engaged and self.pilot.stopping_since() is None
+
+    def _goes_on(self) -> bool:
+        """Whether this robot has to rest before the next one. A key is meant for that, and would move this one."""
+        if self._wanted == "next_robot" and not self.pilot.engaged:
+            self._do_wanted()
+        return self._wanted == "next_robot"
+
+    def _do_wanted(self) -> None:
+        wanted, self._wanted = self._wanted, ""
+        if wanted == "resume":
+            return self._hand_over()
+        ring = self.ring()
+        robot = ring[(ring.index(self.helm.robot) + 1) % len(ring)]
+        if robot == self.helm.robot:
+            self.warning = "there is no other robot"
+        else:
+            self.helm.close()
+            self.helm, self.sent = self._helm(robot), None
+            self.pilot.switch(robot)
+
+    def _helm(self, robot: str) -> Helm:
+        return Helm(self.bus, robot, self._command if robot == self._first else "", self._stamped)
 
     def _hand_over(self) -> None:
         """Tell the sim that overruled sources may drive again."""
-        self._handing = False
         try:
-            key = key_for("resume", self._robot)
-            self._note = self._bus.call(key, TriggerRequest(), TriggerReply, RESUME_TIMEOUT).message
+            key = self.helm.beside("resume")
+            self.warning = self.bus.call(key, TriggerRequest(), TriggerReply, RESUME_TIMEOUT).message
         except ServiceError as error:
-            self._note = f"not handed over: {error}"
+            self.warning = f"not handed over: {error}"

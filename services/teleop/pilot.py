@@ -1,67 +1,117 @@
 """Keys to commands. Knows no clock, no screen, no socket: times are given, in seconds."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from holozen.messages import Twist, Vector3
 
-from .keymap import MOVES, SPEEDS, Direction
+from .grip import HOLD, Grip
+from .keynames import Key
+from .layouts import Direction, Layout
 
-STILL: Direction = (0, 0, 0, 0)
+Motion = tuple[float, float, float, float]
+"""Forward, left, up, counter-clockwise: each from -1 to 1, times the speed (the last: times the turn)."""
+
+STILL: Motion = (0.0, 0.0, 0.0, 0.0)
 STOP_FOR = 1.0  # s; a stop is repeated until the robot rests, but not longer than this
+DEAD_MAN = "space"
+PIECES = ("unknown", "escape")  # these may be parts of a key that repeats, on a slow line
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The parameters of teleop_twist_keyboard: m/s, rad/s, Hz, s. A `key_timeout` of 0 drives on until another key."""
+    """The parameters of teleop_twist_keyboard: m/s, rad/s, Hz, s. A `key_timeout` of None follows the terminal."""
 
     speed: float = 0.5
     turn: float = 1.0
     speed_limit: float = 1000.0
     turn_limit: float = 1000.0
     repeat_rate: float = 20.0
-    key_timeout: float = 0.5
+    key_timeout: float | None = None
+    mode: str = HOLD
+    deadman: bool = False
 
 
 class Pilot:
-    """Says what to publish: a command while a key drives, a stop until the robot rests, then nothing."""
+    """Says what to publish: a command while keys drive, a stop until the robot rests, then nothing."""
 
-    def __init__(self, settings: Settings) -> None:
+    def __init__(self, settings: Settings, layout: Layout) -> None:
         self.settings = replace(
             settings,
             speed=min(settings.speed, settings.speed_limit),
             turn=min(settings.turn, settings.turn_limit),
         )
-        self.direction = STILL
-        self._pressed = 0.0
+        self.layout = layout
+        self.grip = Grip(settings.mode, settings.key_timeout)
+        self.stick: tuple[float, float, float] = (0.0, 0.0, 0.0)  # a joystick: forward, left, counter-clockwise
+        self.note = ""
         self._stopping: float | None = None  # since when
+        self._speeds: dict[str, tuple[float, float]] = {}  # of robots that are not driven now
+        self._robot = ""
+
+    @property
+    def motion(self) -> Motion:
+        """What the held keys mean together, or else the joystick."""
+        keys = self.grip.keys
+        if self.settings.deadman and DEAD_MAN not in keys and keys:
+            return STILL
+        moves = [self.layout.moves[key] for key in keys if key in self.layout.moves]
+        forward, left, turn = self.stick
+        return combined(moves) if moves else (forward, left, 0.0, turn)
 
     @property
     def engaged(self) -> bool:
         """Whether a key drives or a stop is still being made sure of."""
-        return self.direction != STILL or self._stopping is not None
+        return self.motion != STILL or self._stopping is not None
 
-    def press(self, key: str, now: float) -> None:
-        """A key went down (or repeated). A key that is in no table stops the robot."""
-        self._pressed = now
-        if key in SPEEDS:
-            self._scale(*SPEEDS[key])
-        elif key in MOVES:
-            self.direction, self._stopping = MOVES[key], None
-        else:
-            self.stop(now)
+    def take(self, key: Key, now: float) -> str:
+        """A key event; the action that it asks for besides, such as "resume", or "". Unknown keys stop the robot."""
+        name = self.layout.key_for(key.name, key.base)
+        if key.kind == "release":
+            return self._moved(lambda: self.grip.release(key.code), now)
+        action = ""
+        if name in self.layout.speeds:
+            self.scale(*self.layout.speeds[name])
+        elif key.kind != "repeat":
+            action = self._press(name, key, now)
+        if key.kind == "typed" and name not in self.layout.moves and name not in PIECES:
+            self.grip.interrupt(name, now)
+        return action
+
+    def let_go(self) -> None:
+        """Let go of all keys and of the joystick."""
+        self.grip.let_go()
+        self.stick = (0.0, 0.0, 0.0)
 
     def stop(self, now: float) -> None:
-        """Let go of all keys."""
-        self.direction = STILL
+        """Let go, and begin a stop."""
+        self.let_go()
         self._stopping = now
 
     def expire(self, now: float) -> bool:
-        """Stop if no key came for `key_timeout`. Whether that just happened."""
-        timeout = self.settings.key_timeout
-        expired = self.direction != STILL and timeout > 0 and now - self._pressed >= timeout
-        if expired:
-            self.stop(now)
-        return expired
+        """Let go of a key that no longer repeats. Whether that just changed the motion."""
+        before = self.motion
+        if expired := self.grip.expire(now):
+            self._settle(before != STILL, now)
+        return expired and self.motion != before
+
+    def steer(self, stick: tuple[float, float, float], now: float) -> None:
+        """The joystick moved."""
+        moved = self.motion != STILL
+        self.stick = stick
+        self._settle(moved, now)
+
+    def scale(self, speed: float, turn: float | None = None) -> None:
+        """Multiply the speed and the turn (by default by the same), up to their limits."""
+        turn = speed if turn is None else turn
+        now = self.settings
+        wanted = now.speed * speed, now.turn * turn
+        self.settings = replace(now, speed=min(now.speed_limit, wanted[0]), turn=min(now.turn_limit, wanted[1]))
+        over = [
+            name for name, value in zip(("speed", "turn"), wanted, strict=True) if value > getattr(now, f"{name}_limit")
+        ]
+        self.note = f"limit of {' and '.join(over)} reached" if over else ""
 
     def command(self, now: float, rests: bool) -> Twist | None:
         """What to publish at `now`, or None for silence. `rests`: odom, newer than the stop, shows no motion."""
@@ -74,13 +124,51 @@ class Pilot:
         """When the stop that is being made sure of began; None if there is none."""
         return self._stopping
 
-    def _scale(self, speed: float, turn: float) -> None:
-        now = self.settings
-        self.settings = replace(
-            now, speed=min(now.speed_limit, now.speed * speed), turn=min(now.turn_limit, now.turn * turn)
-        )
+    def switch(self, robot: str) -> None:
+        """Drive another robot, with the speeds that it had before."""
+        self._speeds[self._robot] = self.settings.speed, self.settings.turn
+        speed, turn = self._speeds.get(robot, self._speeds[self._robot])
+        self.settings, self._robot = replace(self.settings, speed=speed, turn=turn), robot
+
+    def _press(self, name: str, key: Key, now: float) -> str:
+        if action := self.layout.actions.get(name):
+            if action == "stop" and not (self.settings.deadman and name == DEAD_MAN):
+                self.stop(now)
+                return ""
+            if action != "stop":
+                return action
+        elif name not in self.layout.moves:
+            self.stop(now)
+            return ""
+        return self._moved(lambda: self._hold(name, key, now), now)
+
+    def _hold(self, name: str, key: Key, now: float) -> None:
+        if key.kind == "press":
+            self.grip.press(name, key.code)
+        else:
+            self.grip.type(name, now)
+
+    def _moved(self, change: Callable[[], object], now: float) -> str:
+        moved = self.motion != STILL
+        change()
+        self._settle(moved, now)
+        return ""
+
+    def _settle(self, moved: bool, now: float) -> None:
+        """After a change: a robot that moved and is let go has to be stopped; one that moves has not."""
+        if self.motion != STILL:
+            self._stopping = None
+        elif moved:
+            self._stopping = now
 
     def _twist(self) -> Twist:
-        x, y, z, turn = self.direction
+        x, y, z, turn = self.motion
         speed = self.settings.speed
         return Twist(Vector3(x * speed, y * speed, z * speed), Vector3(0.0, 0.0, turn * self.settings.turn))
+
+
+def combined(moves: list[Direction]) -> Motion:
+    """Several keys as one motion, in the plane no faster than one of them. One key alone means what its table says."""
+    x, y, z, turn = (max(-1.0, min(1.0, float(sum(axis)))) for axis in zip(*moves, strict=True))
+    scale = max(1.0, math.hypot(x, y)) if len(moves) > 1 else 1.0
+    return x / scale, y / scale, z, turn

@@ -1,113 +1,35 @@
-"""The full-screen application: layout, bindings, style."""
+"""What is seen: the picture, or a line a second."""
 
-import asyncio
-import math
-import time
-from collections.abc import Callable
+from .dials import Dials
+from .painter import Painter
+from .plain import line
+from .terminal import Terminal
+from .view import render
 
-from prompt_toolkit.application import Application
-from prompt_toolkit.formatted_text import StyleAndTextTuples
-from prompt_toolkit.input.ansi_escape_sequences import ANSI_SEQUENCES
-from prompt_toolkit.key_binding import KeyBindings, KeyPressEvent
-from prompt_toolkit.keys import Keys
-from prompt_toolkit.layout import Layout, Window
-from prompt_toolkit.layout.controls import FormattedTextControl
-from prompt_toolkit.styles import Style
-
-from .keymap import MOVES, QUIT
-
-STYLE = Style.from_dict(
-    {
-        "title": "bold reverse",
-        "driving": "bold",
-        "good": "ansigreen",
-        "warning": "bold ansired",
-    }
-)
-
-# A terminal that was told to by the program before us says when it gets and loses the focus; ESC, [ and I otherwise.
-ANSI_SEQUENCES["\x1b[I"] = ANSI_SEQUENCES["\x1b[O"] = Keys.Ignore
-
-ESCAPE_WAIT = 0.05  # s until an Escape is one, and not the start of an arrow key
-BURST = 0.05  # s in which what follows an Escape belongs to it
-
-# Bytes that a terminal sends on its own; they are nobody's key press.
-NOT_KEYS = (
-    Keys.CPRResponse,
-    Keys.Vt100MouseEvent,
-    Keys.WindowsMouseEvent,
-    Keys.ScrollUp,
-    Keys.ScrollDown,
-    Keys.Ignore,
-)
+REDRAW, LINE_EVERY = 0.05, 1.0  # s
 
 
-def application(
-    draw: Callable[[], StyleAndTextTuples], press: Callable[[str], None], leave: Callable[[], None]
-) -> Application[None]:
-    """The application; `draw` gives its text, `press` is called with each key. Pasted text presses nothing."""
-    window = Window(FormattedTextControl(draw, show_cursor=False), wrap_lines=False)
-    app: Application[None] = Application(
-        layout=Layout(window),
-        key_bindings=bindings(press, leave),
-        style=STYLE,
-        full_screen=True,
-        enable_page_navigation_bindings=False,
-    )
-    app.ttimeoutlen = ESCAPE_WAIT
-    return app
+class Screen:
+    """Shows the dials. `plain`: a line a second, for screen readers and logs. `ascii`: for terminals without more."""
 
+    def __init__(self, terminal: Terminal, dials: Dials, plain: bool, ascii: bool, colour: bool) -> None:
+        self._terminal, self._dials, self._plain, self._ascii = terminal, dials, plain, ascii
+        self._painter = Painter(terminal.write, colour)
+        self.due = 0.0  # when something is to be shown
 
-class Sequence:
-    """An escape sequence that is not known here. Its letters are nobody's keys: Escape alone counts, as a stop."""
+    def show(self, now: float, why: str) -> None:
+        """Show what is new, when it is due and the terminal takes it."""
+        if now < self.due or not self._terminal.ready():
+            return
+        self.due = now + (LINE_EVERY if self._plain else REDRAW)
+        state = self._dials.state(why, now, self._ascii)
+        if self._plain:
+            self._terminal.write(f"{line(state)}\r\n")
+        else:
+            columns, rows = self._terminal.size()
+            self._painter.paint(render(state, columns, rows), columns, rows)
 
-    def __init__(self) -> None:
-        self._began = -math.inf
-        self._reading = False  # what was read in one go with the Escape is still being worked off
-
-    def begin(self) -> None:
-        """An Escape came."""
-        self._began, self._reading = time.monotonic(), True
-        asyncio.get_running_loop().call_soon(self._read)
-
-    def goes_on(self) -> bool:
-        """Whether what comes now belongs to it."""
-        return self._reading or time.monotonic() - self._began <= BURST
-
-    def _read(self) -> None:
-        self._reading = False
-
-
-def bindings(press: Callable[[str], None], leave: Callable[[], None]) -> KeyBindings:
-    """Every key goes to `press`; Ctrl-C calls `leave` and ends the application."""
-    keys, sequence = KeyBindings(), Sequence()
-
-    @keys.add(Keys.Any)
-    def _(event: KeyPressEvent) -> None:
-        if not sequence.goes_on():
-            press(event.key_sequence[0].key)
-
-    @keys.add(Keys.Escape)
-    def _(event: KeyPressEvent) -> None:
-        sequence.begin()
-        press(event.key_sequence[0].key)
-
-    for name in (key for key in MOVES if len(key) > 1):
-
-        @keys.add(name, eager=True)
-        def _(event: KeyPressEvent, name: str = name) -> None:
-            press(name)
-
-    for ignored in (*NOT_KEYS, Keys.BracketedPaste):
-
-        @keys.add(ignored, eager=True)
-        def _(event: KeyPressEvent) -> None:
-            pass
-
-    @keys.add(QUIT, eager=True)
-    @keys.add(Keys.SIGINT, eager=True)
-    def _(event: KeyPressEvent) -> None:
-        leave()
-        event.app.exit()
-
-    return keys
+    def forget(self) -> None:
+        """Show everything anew."""
+        self.due = 0.0
+        self._painter.forget()

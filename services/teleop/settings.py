@@ -1,0 +1,102 @@
+"""The teleop's settings file: the flags that a person would write every time."""
+
+import argparse
+import os
+from collections.abc import Mapping
+
+from holozen.tell import printable
+
+from . import toml_file
+from .layouts import LAYOUTS
+from .ros_words import ros_arguments
+from .toml_file import closest, cut
+
+NAMES = (
+    "speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "key_timeout", "stamped", "frame_id",
+    "mode", "keys", "plain", "deadman", "joystick",
+)  # fmt: skip
+"""The flags that may stand in the file. Which robot and which network it is stays on the command line."""
+
+MODES = ("hold", "latch")  # the flag also takes Zenoh's modes, which are of the network
+
+Setting = str | int | float | bool
+
+
+class SettingsError(ValueError):
+    """A settings file that cannot be used; the text is one line that says why."""
+
+
+def path(environ: Mapping[str, str] = os.environ) -> str | None:
+    """Where the settings file would be; None without a home folder."""
+    folder = environ.get("XDG_CONFIG_HOME", "")
+    if not os.path.isabs(folder):  # to be passed over, says the XDG Base Directory Specification
+        home = environ.get("HOME", "")
+        folder = os.path.join(home, ".config") if os.path.isabs(home) else ""
+    return os.path.join(folder, "holozen", "teleop.toml") if folder else None
+
+
+def read(path: str | None) -> dict[str, Setting]:
+    """The settings in the file, names and kinds checked, values not; none if there is no file. SettingsError."""
+    if path is None or not os.path.lexists(path):
+        return {}
+    try:
+        found = toml_file.read(path)
+    except toml_file.TomlError as error:
+        raise SettingsError(str(error)) from None
+    for name, value in found.items():
+        if name not in NAMES:
+            raise _wrong(path, f"{cut(name)} is unknown; {closest(name.replace('-', '_'), [*NAMES])}")
+        if not isinstance(value, Setting):
+            raise _wrong(path, f"{name} is {cut(value)}; write one number, true, false or a text in quotes")
+    return found
+
+
+def apply(parser: argparse.ArgumentParser, path: str | None) -> None:
+    """Make the file's settings the defaults of the flags, after the flags' own checks; SettingsError."""
+    actions = {action.dest: action for action in parser._actions if action.option_strings}
+    values: dict[str, object] = {}
+    for name, value in read(path).items():
+        assert path is not None
+        if name not in actions:
+            raise _wrong(path, f"{name} is not for this program")
+        try:
+            values[name] = _checked(actions[name], _from_here(name, value, path))
+        except (argparse.ArgumentTypeError, ValueError) as error:
+            raise _wrong(path, f"{name} is {error}") from None
+    parser.set_defaults(**values)
+
+
+def parse(parser: argparse.ArgumentParser, words: list[str], path: str | None) -> argparse.Namespace:
+    """Flags and ROS spellings, and the file's settings where neither is given; SettingsError, RosWordError."""
+    words = ros_arguments(words)
+    parser.parse_args(words)  # --help works and wrong flags are told, whatever the file says
+    apply(parser, path)
+    return parser.parse_args(words)
+
+
+def _from_here(name: str, value: Setting, path: str) -> Setting:
+    """A layout's file is meant from the folder of the settings file."""
+    if name != "keys" or not isinstance(value, str) or value in LAYOUTS:
+        return value
+    return os.path.join(os.path.dirname(path), os.path.expanduser(value))
+
+
+def _checked(action: argparse.Action, value: Setting) -> object:
+    """The value as the flag would give it; ArgumentTypeError, ValueError."""
+    if action.nargs == 0:  # a flag that takes no value
+        if not isinstance(value, bool):
+            raise ValueError(f"{cut(value)}: write true or false")
+        return value
+    if isinstance(value, bool):
+        if action.nargs != "?":
+            raise ValueError(f"{str(value).lower()}: it needs a value")
+        return action.const if value else action.default
+    made = action.type(str(value)) if callable(action.type) else str(value)
+    choices = MODES if action.dest == "mode" else action.choices
+    if choices is not None and made not in choices:
+        raise ValueError(f"{cut(value)}: {closest(str(value), [str(choice) for choice in choices])}")
+    return made
+
+
+def _wrong(path: str, text: str) -> SettingsError:
+    return SettingsError(printable(f"{path}: {text}"))

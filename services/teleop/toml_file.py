@@ -1,0 +1,81 @@
+"""Small TOML files that people write, read with care: one line says what is wrong, and where."""
+
+import os
+import re
+import stat
+from typing import Any
+
+from holozen.tell import printable
+
+LARGEST = 64 * 1024  # bytes
+LONGEST = 1000  # characters in a line; a long dotted key keeps tomllib busy for many seconds
+_PLACE = re.compile(r"(.*) \(at (?:line (\d+), column \d+|end of document)\)", re.DOTALL)
+
+
+class TomlError(ValueError):
+    """A file that cannot be used; the text is one line."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__(printable(text))
+
+
+def read(path: str) -> dict[str, Any]:
+    """What is in the file, unchecked; TomlError. It never waits, as one would for a FIFO."""
+    import tomllib  # here and below: most starts need neither
+
+    try:
+        text = _bytes(path).decode()
+    except UnicodeDecodeError as error:
+        raise TomlError(f"{path}: is no text in UTF-8 (byte {error.start})") from None
+    for number, line in enumerate(text.split("\n"), 1):
+        if len(line) > LONGEST:
+            raise TomlError(f"{path}:{number}: is longer than {LONGEST} characters")
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise TomlError(f"{path}: is nested too deeply") from None
+    except ValueError as error:
+        raise TomlError(_not_toml(path, text, str(error))) from None
+
+
+def cut(value: object) -> str:
+    """How a value is shown in a line: as it is written in Python, but short."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def closest(name: str, known: list[str]) -> str:
+    """The words that name what there is, the one that was probably meant first."""
+    from difflib import get_close_matches
+
+    match = get_close_matches(name[:60].lower(), known, 1)
+    return f"did you mean {match[0]!r}?" if match else f"use {', '.join(known)}"
+
+
+def _bytes(path: str) -> bytes:
+    try:
+        number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
+        with open(number, "rb") as file:
+            if not stat.S_ISREG(os.fstat(number).st_mode):
+                raise TomlError(f"{path}: is no regular file")
+            found = file.read(LARGEST + 1)
+    except IsADirectoryError:
+        raise TomlError(f"{path}: is a folder") from None
+    except OSError as error:
+        raise TomlError(f"{path}: {error.strerror}") from None
+    except TomlError:
+        raise
+    except ValueError as error:  # a path with a NUL in it
+        raise TomlError(f"{path}: {error}") from None
+    if len(found) > LARGEST:
+        raise TomlError(f"{path}: is larger than {LARGEST // 1024} KB")
+    return found
+
+
+def _not_toml(path: str, text: str, said: str) -> str:
+    match = _PLACE.fullmatch(said)
+    if not match:
+        return f"{path}: is not TOML: {said}"
+    lines = text.rstrip().split("\n")
+    number = int(match[2] or len(lines))
+    return f"{path}:{number}: is not TOML: {match[1]}: {cut(lines[number - 1].strip())}"

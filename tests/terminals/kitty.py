@@ -1,0 +1,207 @@
+"""The terminal kitty on a screen that nobody sees, with keys that a test holds down."""
+
+import contextlib
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Self
+from uuid import uuid4
+
+import pyte
+
+from holozen.testing import Process, wait_for
+
+COLUMNS, ROWS = 100, 32
+QUICK = {"LIBGL_ALWAYS_SOFTWARE": "1", "KITTY_ENABLE_WAYLAND": "0"}
+
+# What runs in kitty in place of a shell: it starts what it is told to, and says how the terminal was left.
+SHELL = """
+import json, os, socket, subprocess, sys, termios, time, tty
+told = socket.socket(socket.AF_UNIX)
+told.connect(sys.argv[1])
+lines = told.makefile("rw")
+
+def ask(question):
+    before = termios.tcgetattr(0)
+    tty.setraw(0)
+    os.write(1, question.encode())
+    answer = b""
+    while not answer.endswith(b"c"):
+        answer += os.read(0, 1000)
+    termios.tcsetattr(0, termios.TCSAFLUSH, before)
+    return answer.decode()
+
+for line in lines:
+    words = json.loads(line)
+    before = termios.tcgetattr(0)
+    process = subprocess.Popen(words)
+    print(json.dumps({"pid": process.pid}), file=lines, flush=True)
+    code = process.wait()
+    left = {
+        "code": code,
+        "modes": termios.tcgetattr(0)[:4] == before[:4],
+        "flags": ask("\\x1b[?u\\x1b[c").partition("u")[0],
+        "flags of the other screen": ask("\\x1b[?1049h\\x1b[?u\\x1b[?1049l\\x1b[c").partition("u")[0],
+    }
+    print(json.dumps(left), file=lines, flush=True)
+"""
+
+
+class Display:
+    """An X server without a screen, and a hand on its keyboard."""
+
+    def __init__(self) -> None:
+        ours, its = os.pipe()
+        self._server = Process(
+            ["Xvfb", "-displayfd", "1", "-screen", "0", "1000x800x24", "-nolisten", "tcp"], stdout=its
+        )
+        os.close(its)
+        with open(ours) as told:
+            number = told.readline().strip()
+        assert number, f"Xvfb did not start: {self._server.err}"
+        self.env = {"DISPLAY": f":{number}", **QUICK}
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._server.close()
+
+    def run(self, *words: str) -> str:
+        """Run a client of the X server to its end, such as xdotool; what it printed."""
+        done = subprocess.run(words, env=os.environ | self.env, capture_output=True, text=True, timeout=20, check=True)
+        return done.stdout
+
+    def keys(self, *words: str) -> None:
+        """`keys("keydown", "shift", "keydown", "j")`: xdotool's commands; a number is the code of a key."""
+        self.run("xdotool", *words)
+
+    def focus(self, window: str) -> None:
+        """Give the keyboard to a window."""
+        self.run("xdotool", "windowfocus", "--sync", window)
+
+    @property
+    def root(self) -> str:
+        """The window behind all windows."""
+        return self.run("xdotool", "search", "--maxdepth", "0", "").split()[0]
+
+
+class Kitty:
+    """A kitty that runs one program after the other. `folder` is for its files."""
+
+    def __init__(self, display: Display, folder: Path) -> None:
+        self.display = display
+        self._dump, self._class = folder / "bytes", f"kitty-{uuid4().hex[:8]}"
+        with socket.socket(socket.AF_UNIX) as door:
+            door.bind(str(folder / "door"))
+            door.listen()
+            door.settimeout(20)
+            self._process = Process(
+                [*_kitty(self._dump, self._class), sys.executable, "-S", "-c", SHELL, str(folder / "door")],
+                env={**display.env, "HOME": str(folder), "KITTY_CONFIG_DIRECTORY": str(folder)},
+            )
+            try:
+                self._shell = door.accept()[0]
+            except TimeoutError:
+                self._process.close()
+                raise AssertionError(f"kitty did not start: {self._process.err}") from None
+        self._lines = self._shell.makefile("r")
+        self._shell.settimeout(30)
+        self.window = wait_for(lambda: self._windows()[:1], what="kitty's window")[0]
+        display.focus(self.window)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._process.close()
+        self._lines.close()
+        self._shell.close()
+
+    def run(self, words: Sequence[str]) -> "Program":
+        """Start a program in it."""
+        self._shell.sendall(f"{json.dumps(list(words))}\n".encode())
+        return Program(self, self.told()["pid"], len(self.bytes()))
+
+    def told(self) -> dict[str, Any]:
+        """What its shell says next."""
+        said: dict[str, Any] = json.loads(self._lines.readline())
+        return said
+
+    def bytes(self) -> bytes:
+        """All that was written to it."""
+        with contextlib.suppress(FileNotFoundError):
+            return self._dump.read_bytes()
+        return b""
+
+    def signal(self, number: int) -> None:
+        """Send kitty itself a signal."""
+        self._process.signal(number)
+
+    def close_window(self) -> None:
+        """As its button does."""
+        self.display.run("xdotool", "windowclose", self.window)
+        self._process.wait()
+
+    def _windows(self) -> list[str]:
+        with contextlib.suppress(subprocess.CalledProcessError):
+            return self.display.run("xdotool", "search", "--onlyvisible", "--class", self._class).split()
+        return []
+
+
+class Program:
+    """What runs in kitty now. In `with`: it is ended by SIGTERM."""
+
+    def __init__(self, kitty: Kitty, pid: int, begin: int) -> None:
+        self.kitty, self.pid, self._begin = kitty, pid, begin
+        self._left: dict[str, Any] | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        if self._left is None:
+            self.signal(15)
+            self.ended()
+
+    @property
+    def raw(self) -> str:
+        """All that it wrote, with its control sequences."""
+        return self.kitty.bytes()[self._begin :].decode(errors="replace")
+
+    def screen(self) -> str:
+        """What a person sees now, a line a row."""
+        emulator = pyte.Screen(COLUMNS, ROWS)
+        pyte.Stream(emulator).feed(self.raw)
+        return "\n".join(line.rstrip() for line in emulator.display)
+
+    def wait_for_text(self, text: str) -> str:
+        """Wait until the screen shows `text`; the screen."""
+
+        def look() -> str | None:
+            screen = self.screen()
+            return screen if text in screen else None
+
+        return wait_for(look, 20, lambda: f"{text!r} on the screen:\n{self.screen()}") or ""
+
+    def signal(self, number: int) -> None:
+        """Send it a signal."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, number)
+
+    def ended(self) -> dict[str, Any]:
+        """Wait for its end: "code", whether the "modes" are as before, and the keyboard's "flags" of both screens."""
+        if self._left is None:
+            self._left = self.kitty.told()
+        return self._left
+
+
+def _kitty(dump: Path, window_class: str) -> list[str]:
+    options = ("confirm_os_window_close=0", "update_check_interval=0", "remember_window_size=no", "font_size=8",
+               f"initial_window_width={COLUMNS}c", f"initial_window_height={ROWS}c")  # fmt: skip
+    overrides = [word for option in options for word in ("-o", option)]
+    return ["kitty", "--class", window_class, "--config", "NONE", *overrides, "--dump-bytes", str(dump)]

@@ -1,0 +1,214 @@
+"""People who drive one robot each, in a terminal each, over a line that can break."""
+
+import contextlib
+import signal
+import socket
+import threading
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Self
+
+from holozen.bus import Bus
+from holozen.connection import Connection
+from holozen.errors import BusError
+from holozen.messages import Odometry
+from holozen.testing import Wire, wait_for
+from holozen.testing.wire import command
+from holozen.wire import key_for
+from tests.integration.robots import speeds, time_of
+
+from .played import KITTY, REPEAT, Played, event
+
+FORWARD, BACKWARD = map(ord, "i,")
+SPEED = 0.5  # m/s
+RESTS = 1e-6  # m/s, rad/s
+RATE = 240  # Hz of sim time; every step tells how the robot moves
+
+BOX = f"""<robot name="box">
+  <link name="base_link">
+    <inertial><mass value="1"/><inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+    <collision><geometry><box size="0.2 0.2 0.1"/></geometry></collision>
+  </link>
+  <gazebo>
+    <plugin name="planar_move" filename="libgazebo_ros_planar_move.so">
+      <commandTopic>cmd_vel</commandTopic><odometryTopic>odom</odometryTopic><odometryFrame>odom</odometryFrame>
+      <odometryRate>{RATE}</odometryRate><robotBaseFrame>base_link</robotBaseFrame>
+    </plugin>
+  </gazebo>
+</robot>
+"""
+
+
+class Line:
+    """A cable to a port on loopback, as a TCP proxy. `cut`: it carries nothing more, and tells nobody."""
+
+    def __init__(self, port: int) -> None:
+        self._to = port
+        self._ends: list[socket.socket] = []
+        self._threads: list[threading.Thread] = []
+        self._whole, self._closing = threading.Event(), threading.Event()
+        self._whole.set()
+        self._door = socket.create_server(("127.0.0.1", 0))
+        self.port = self._door.getsockname()[1]
+        self._start(self._take)
+
+    def cut(self) -> None:
+        """Break."""
+        self._whole.clear()
+
+    def mend(self) -> None:
+        """Carry on, with what waited meanwhile."""
+        self._whole.set()
+
+    def close(self) -> None:
+        """End it, and what is connected by it."""
+        self._closing.set()
+        self._whole.set()
+        for end in (self._door, *self._ends):
+            with contextlib.suppress(OSError):
+                end.shutdown(socket.SHUT_RDWR)
+        for thread in self._threads:
+            thread.join()
+        for end in (self._door, *self._ends):
+            end.close()
+
+    def _start(self, work: Callable[..., None], *args: socket.socket) -> None:
+        self._threads.append(threading.Thread(target=work, args=args, daemon=True))
+        self._threads[-1].start()
+
+    def _take(self) -> None:
+        with contextlib.suppress(OSError):
+            while not self._closing.is_set():
+                one = self._door.accept()[0]
+                self._ends.append(one)
+                other = socket.create_connection(("127.0.0.1", self._to))
+                self._ends.append(other)
+                self._start(self._carry, one, other)
+                self._start(self._carry, other, one)
+
+    def _carry(self, source: socket.socket, to: socket.socket) -> None:
+        with contextlib.suppress(OSError):
+            while (data := source.recv(65536)) and not self._closing.is_set():
+                self._whole.wait()
+                to.sendall(data)
+            to.shutdown(socket.SHUT_RDWR)  # one end was closed, so the other is told
+
+
+class Witness:
+    """How one robot moves, as its odom tells at every step, by the sim's own clock."""
+
+    def __init__(self, bus: Bus, robot: str) -> None:
+        self.seen: list[tuple[float, float]] = []  # time of the sim in s, the fastest of its speeds
+        self._odom = bus.subscribe(key_for("odom", robot), Odometry, depth=1000)
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def now(self) -> float:
+        """The time of the newest odom."""
+        return self.seen[-1][0]
+
+    def moving(self) -> bool:
+        """Whether it drives now."""
+        return bool(self.seen) and self.seen[-1][1] > 0.9 * SPEED
+
+    def rest_after(self, time: float) -> float:
+        """When it came to rest after `time`; waits for it."""
+        begin = len(self.seen) - RATE // 4
+
+        def rest() -> float | None:
+            return next((at for at, speed in self.seen[max(0, begin) :] if at > time and speed < RESTS), None)
+
+        return wait_for(rest, what="the robot to rest") or 0.0
+
+    def moved_after(self, time: float) -> bool:
+        """Whether it moved at any time after `time`."""
+        return any(at > time and speed > RESTS for at, speed in self.seen[-10 * RATE :])
+
+    def _watch(self) -> None:
+        with contextlib.suppress(BusError):
+            while True:
+                if odom := self._odom.recv().message:
+                    self.seen.append((time_of(odom), max(map(abs, speeds(odom)))))
+
+
+class Operator:
+    """Somebody who drives one robot. `words` start the teleop where it is not the usual one, without its flags."""
+
+    def __init__(self, wire: Wire, bus: Bus, robot: str) -> None:
+        self.robot, self.witness = robot, Witness(bus, robot)
+        self._wire, self._count = wire, 0
+        self.terminal: Played | None = None
+        self.line: Line | None = None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.leave()
+
+    def sit_down(self, script: Path | None = None, shell: bool = False, line: bool = False) -> Played:
+        """Start the teleop, or this script in its place; in a shell with job control; over a line that can be cut."""
+        flags: Sequence[str] = self._wire.flags
+        if line:
+            self.line = Line(self._wire.port)
+            flags = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.line.port}",), listen=()).arguments()
+        words = command("teleop", *([self.robot] if self.robot else []), *flags)
+        if script:
+            words[1:4] = [str(script)]
+        if shell:  # it waits for Enter when the teleop was stopped, and then lets it go on
+            words = ["bash", "-m", "-c", '"$@"\n' + "read -r\nfg\n" * 100, "shell", *words]
+        self.terminal = Played(words, KITTY)
+        self.terminal.wait_for_text("listening sim")
+        wait_for(lambda: self.at.flags == 15, what="the releases to be asked for")
+        return self.terminal
+
+    @property
+    def at(self) -> Played:
+        """The terminal that they sit at."""
+        assert self.terminal is not None
+        return self.terminal
+
+    def drive(self) -> None:
+        """Hold a key until the robot moves; to and fro, so that it stays where it is."""
+        self._count += 1
+        self.key = (FORWARD, BACKWARD)[self._count % 2]
+        self.at.press(self.key)
+        wait_for(self.witness.moving, what=f"{self.robot} to move; {self.at.screen()}")
+
+    def hold_on(self) -> None:
+        """The key is still down: it repeats."""
+        self.at.type(event(self.key, kind=REPEAT))
+
+    def let_go(self) -> None:
+        """Let go of the key."""
+        self.at.release(self.key)
+
+    def job(self) -> int:
+        """The process that runs in their shell."""
+        shell = self.at.process.pid
+        return int(Path(f"/proc/{shell}/task/{shell}/children").read_text().split()[0])
+
+    def foreground(self) -> None:
+        """Let the job go on once it has stopped."""
+        job = self.job()
+        wait_for(lambda: Path(f"/proc/{job}/stat").read_text().rpartition(")")[2].split()[0] == "T", what="its stop")
+        self.at.type("\r")
+
+    def cut(self) -> None:
+        """Cut the line."""
+        assert self.line is not None
+        self.line.cut()
+
+    def mend(self) -> None:
+        """Mend the line."""
+        assert self.line is not None
+        self.line.mend()
+
+    def leave(self) -> None:
+        """End the teleop, if it lives, and close the terminal."""
+        if self.terminal:
+            with contextlib.suppress(ProcessLookupError):
+                self.terminal.process.signal(signal.SIGKILL)  # what it says at its end is not waited for
+            self.terminal.close()
+        if self.line:
+            self.line.close()
+        self.terminal = self.line = None

@@ -1,0 +1,125 @@
+"""A terminal that is played: it answers questions as a certain one does, or late, or never.
+
+The answers were taken from kitty 0.26.5, tmux 3.3a and GNU screen 4.9; those of the Linux console from its source,
+drivers/tty/vt/vt.c; those of xterm from its control sequences' documentation.
+"""
+
+import re
+import threading
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+from holozen.testing import Terminal
+
+QUESTION = re.compile(rb"\x1b\[([<>=?]?)([\d;]*)(\$?[a-zA-Z])")
+PRESS, REPEAT, RELEASE = 1, 2, 3
+SHIFT, ALT, CTRL, CAPS, NUM = 1, 2, 4, 64, 128
+FOCUS_IN, FOCUS_OUT = "\x1b[I", "\x1b[O"
+
+
+class Kind(NamedTuple):
+    """What a terminal answers. `keyboard`: it speaks the Kitty keyboard protocol; the others are "" for no answer."""
+
+    keyboard: bool = False
+    device: str = ""
+    alive: str = "\x1b[0n"
+
+
+KITTY = Kind(True, "\x1b[?62;c")
+XTERM = Kind(False, "\x1b[?64;1;2;6;9;15;16;17;18;21;22;28c")
+TMUX = Kind(False, "\x1b[?1;2c")
+SCREEN = Kind(False, "\x1b[?1;2c")
+CONSOLE = Kind(False, "\x1b[?6c")
+DUMB = Kind(False, "", "")
+WITHOUT_RELEASES = {"xterm": XTERM, "tmux": TMUX, "screen": SCREEN, "console": CONSOLE, "dumb": DUMB}
+
+
+class Played(Terminal):
+    """A terminal of some kind. `late`: seconds until it answers. `kind` may be changed while it runs."""
+
+    def __init__(
+        self, words: Sequence[str], kind: Kind, *, late: float = 0.0, env: Mapping[str, str] | None = None
+    ) -> None:
+        self.kind, self.late = kind, late
+        self.asked: list[str] = []  # the questions so far
+        self._alternate = False
+        self._flags: dict[bool, list[int]] = {False: [], True: []}  # of both screens; the last is on
+        self._rest = b""
+        super().__init__(words, env=env)
+
+    @property
+    def flags(self) -> int:
+        """The keyboard's flags that are on."""
+        return self._current[-1] if self._current else 0
+
+    @property
+    def flags_left(self) -> dict[bool, list[int]]:
+        """The flags pushed and not popped: of the main screen (False) and of the alternate one (True)."""
+        return {screen: flags for screen, flags in self._flags.items() if flags}
+
+    def press(self, code: int, modifiers: int = 0, *, shifted: int = 0, base: int = 0) -> None:
+        """A key goes down, on a terminal that was asked to tell releases."""
+        self.type(event(code, modifiers, shifted=shifted, base=base))
+
+    def repeat(self, code: int, modifiers: int = 0) -> None:
+        """It repeats."""
+        self.type(event(code, modifiers, REPEAT))
+
+    def release(self, code: int, modifiers: int = 0, *, shifted: int = 0, base: int = 0) -> None:
+        """It goes up."""
+        self.type(event(code, modifiers, RELEASE, shifted=shifted, base=base))
+
+    def received(self, data: bytes) -> None:
+        """Answer."""
+        self._rest = (self._rest + data)[-10_000:]
+        end = 0
+        for question in QUESTION.finditer(self._rest):
+            end = question.end()
+            self._hear(question[1].decode(), question[2].decode(), question[3].decode())
+        self._rest = self._rest[end:]
+
+    @property
+    def _current(self) -> list[int]:
+        return self._flags[self._alternate]
+
+    def _hear(self, mark: str, numbers: str, final: str) -> None:
+        if (mark, numbers) == ("?", "1049"):
+            self._alternate = final == "h"
+        if final == "u" and mark and self.kind.keyboard:
+            self._keyboard(mark, int(numbers.partition(";")[0] or 0))
+        elif final == "c" and not mark and self.kind.device:
+            self._answer("CSI c", self.kind.device)
+        elif final == "n" and numbers == "5" and self.kind.alive:
+            self._answer("CSI 5 n", self.kind.alive)
+
+    def _keyboard(self, mark: str, number: int) -> None:
+        if mark == "?":
+            self._answer("CSI ? u", f"\x1b[?{self.flags}u")
+        elif mark == ">":
+            self._current.append(number)
+        elif mark == "<":
+            del self._current[-max(1, number) :]
+        elif self._current:
+            self._current[-1] = number
+        else:
+            self._current.append(number)
+
+    def _answer(self, question: str, answer: str) -> None:
+        self.asked.append(question)
+        if self.late:
+            timer = threading.Timer(self.late, self._say, [answer])
+            timer.daemon = True
+            timer.start()
+        else:
+            self._say(answer)
+
+    def _say(self, answer: str) -> None:
+        if not self.closed:
+            self.type(answer)
+
+
+def event(code: int, modifiers: int = 0, kind: int = PRESS, *, shifted: int = 0, base: int = 0) -> str:
+    """A key as kitty tells it with all flags: what is not needed is left out."""
+    codes = f"{code}:{shifted or ''}:{base}" if base else f"{code}:{shifted}" if shifted else f"{code}"
+    told = f":{kind}" if kind != PRESS else ""
+    return f"\x1b[{codes};{modifiers + 1}{told}u" if modifiers or told else f"\x1b[{codes}u"

@@ -1,0 +1,61 @@
+"""docs/teleop.md has the keys and the settings as they are."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from services.teleop import layout_help
+from services.teleop.fixed_keys import FIXED
+from services.teleop.layout_file import MOTIONS
+from services.teleop.layouts import ACTIONS, LAYOUTS, load
+from services.teleop.ros_words import ros_arguments
+from services.teleop.settings import NAMES, read
+
+DOCS = Path(__file__).parents[3] / "docs" / "teleop.md"
+TABLES = {name: layout.markdown() for name, layout in LAYOUTS.items()} | {"fixed": layout_help.markdown({}, {}, FIXED)}
+
+
+def examples() -> list[str]:
+    return re.findall(r"```toml\n(.*?)```", DOCS.read_text(), re.DOTALL)
+
+
+@pytest.mark.parametrize("name", TABLES)
+def test_each_table_of_keys_is_current(name: str) -> None:
+    assert f"<!-- keys {name} -->\n{TABLES[name]}<!-- /keys -->\n" in DOCS.read_text()
+
+
+def test_every_motion_action_and_setting_is_named() -> None:
+    text = DOCS.read_text()
+    assert [word for word in (*MOTIONS, *ACTIONS) if f"`{word}`" not in text] == []
+    assert f"There are {' '.join(f'`{name}`' for name in NAMES)}. " in " ".join(text.split())
+
+
+def test_the_example_of_keys_is_a_layout(tmp_path: Path) -> None:
+    (tmp_path / "keys.toml").write_text(examples()[0])
+    layout = load(str(tmp_path / "keys.toml"))
+    assert layout.moves["y"] == (1, 0, 0, 1)
+    assert layout.actions["h"] == "resume"
+
+
+def test_the_example_of_settings_can_be_read(tmp_path: Path) -> None:
+    (tmp_path / "teleop.toml").write_text(examples()[1])
+    assert read(str(tmp_path / "teleop.toml"))["speed"] == 0.3
+
+
+def test_the_words_of_ros_mean_the_flags_beside_them() -> None:
+    rows = re.findall(r"^\| (`[_c].*?) \| (.*?) ?\| (`--.*) \|$", DOCS.read_text(), re.MULTILINE)
+    assert len(rows) == 9
+    for ros_1, ros_2, flags in (tuple(cell.replace("`", "").split() for cell in row) for row in rows):
+        meant = re.findall(r"--\S+(?: [^-\s]\S*)?", " ".join(flags))
+        assert ros_arguments(ros_1) == [flag.replace(" ", "=") for flag in meant]
+        if ros_2:
+            assert ros_arguments(["--ros-args", *ros_2]) == ros_arguments(ros_1)
+
+
+def test_the_error_that_is_shown_is_the_one_that_comes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("my_keys.toml").write_text('[moves]\nw = "forwards"\n')
+    with pytest.raises(ValueError, match="no motion") as error:
+        load("my_keys.toml")
+    assert f"```\n{error.value}\n```" in DOCS.read_text()

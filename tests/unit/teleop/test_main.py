@@ -1,0 +1,34 @@
+"""The flags together with the settings file, and what they forbid."""
+
+from pathlib import Path
+
+import pytest
+
+from services.teleop.__main__ import latches, main, parser
+from services.teleop.settings import parse
+
+
+@pytest.mark.parametrize(
+    ("text", "words", "latch"),
+    [
+        ("", [], False),
+        ("", ["--mode", "client"], False),
+        ('mode = "latch"', ["--mode", "client"], True),
+        ('mode = "latch"', ["--mode", "hold"], False),
+        ("key_timeout = 0", [], True),
+        ("key_timeout = 0", ["--mode", "hold"], False),
+        ("key_timeout = 0", ["--key-timeout", "0.5"], False),
+    ],
+)
+def test_keys_latch_only_where_nothing_nearer_says_hold(
+    tmp_path: Path, text: str, words: list[str], latch: bool
+) -> None:
+    file = tmp_path / "teleop.toml"
+    file.write_text(text)
+    assert latches(parse(parser(), words, str(file))) is latch
+
+
+@pytest.mark.parametrize("words", [["--script", "x"], ["--mode", "latch"], ["--key-timeout", "0"]])
+def test_a_dead_man_without_held_keys_is_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--deadman", *words]) == 2
+    assert capsys.readouterr().err.startswith("teleop: --deadman needs keys that are held")

@@ -1,0 +1,27 @@
+"""tmux and screen mark in their socket's mode whether anybody is attached."""
+
+from pathlib import Path
+
+import pytest
+
+from services.teleop.multiplexer import attached
+
+
+def test_elsewhere_somebody_is_always_there() -> None:
+    assert attached({})()
+    assert attached({"TMUX": "/no/such/socket,1,0"})()
+
+
+@pytest.mark.parametrize("multiplexer", ["tmux", "screen"])
+def test_a_detached_multiplexer_has_nobody(tmp_path: Path, multiplexer: str) -> None:
+    socket = tmp_path / "1234.pts-0"
+    socket.touch(0o700)
+    told = {"tmux": {"TMUX": f"{socket},42,0"}, "screen": {"STY": socket.name, "SCREENDIR": str(tmp_path)}}
+    look = attached(told[multiplexer])
+    assert look()
+    socket.chmod(0o600)
+    assert not look()
+    socket.chmod(0o700)
+    assert look()
+    socket.unlink()
+    assert not look()

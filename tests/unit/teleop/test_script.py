@@ -1,0 +1,133 @@
+"""A drive that is written down: checked whole before anything moves, then driven as if keys were held."""
+
+import signal
+import threading
+import time
+from pathlib import Path
+
+import pytest
+
+from holozen.messages import CommandSource, CommandStatus, Twist
+from holozen.readers import Subscription
+from holozen.testing import Wire, wait_for
+from services.teleop import script
+from services.teleop.cockpit import Cockpit
+from services.teleop.layouts import TTK
+from services.teleop.pilot import Pilot, Settings
+from services.teleop.script import ScriptError, Step
+
+FORWARD, STRAFE, STOP = Twist.planar(0.5), Twist.planar(0, 0.5), Twist()
+
+
+def parse(text: str) -> list[Step]:
+    return script.parse(text, "drive.txt", TTK)
+
+
+def test_each_line_is_a_step() -> None:
+    text = "# forward, then a chord\n0.5s i\n\n250ms i J  # together\n.1s\nq\nstop\n"
+    assert parse(text) == [
+        Step(0.5, ("i",)), Step(0.25, ("i", "J")), Step(0.1, ()), Step(0.0, ("q",)), Step(0.0, ()),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("line", "reason"),
+    [
+        ("0.5s y", "'y' is no key of ttk"),
+        ("i", "how long is 'i' held? write `0.5s i`"),
+        ("0s i", "how long is 'i' held?"),
+        ("1e3s i", "'1e3s' is no key"),
+        ("-1s i", "'-1s' is no key"),
+        ("nans i", "'nans' is no key"),
+        ("99999s i", "'99999s' is longer than 3600s"),
+        ("0.5s ctrl+c", "'ctrl+c' is no key"),
+        ("stop now", "'stop' is no key"),
+        ("1s \x1b[A", "is no key"),
+    ],
+)
+def test_a_wrong_line_is_told_with_its_number(line: str, reason: str) -> None:
+    with pytest.raises(ScriptError, match=r"^drive\.txt, line 2: ") as told:
+        parse(f"0.1s i\n{line}\n0.1s J")
+    assert reason in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+def test_a_script_without_an_end_is_refused() -> None:
+    with pytest.raises(ScriptError, match="longer than"):
+        parse("1s i\n" * 300_000)
+
+
+def test_what_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
+    (tmp_path / "binary").write_bytes(b"\xff\xfe1s i")
+    for path in ("none", ".", "binary"):
+        with pytest.raises(ScriptError) as told:
+            script.load(str(tmp_path / path), TTK)
+        assert str(tmp_path / path) in str(told.value)
+
+
+@pytest.fixture
+def commands(wire: Wire) -> Subscription[Twist]:
+    return wire.bus("sim").subscribe("cmd_vel", Twist, depth=1000)
+
+
+@pytest.fixture
+def cockpit(wire: Wire, commands: Subscription[Twist]) -> Cockpit:
+    cockpit = Cockpit(wire.bus("teleop"), [], Pilot(Settings(), TTK), None)
+    wait_for(cockpit.listeners)
+    return cockpit
+
+
+def heard(commands: Subscription[Twist]) -> list[Twist | None]:
+    """What was said, without repetitions."""
+    said = [received.message for received in iter(commands.try_recv, None)]
+    return [message for number, message in enumerate(said) if number == 0 or said[number - 1] != message]
+
+
+def test_a_script_is_driven_as_written_and_ends_in_a_stop(cockpit: Cockpit, commands: Subscription[Twist]) -> None:
+    assert script.run(parse("100ms i\n100ms J\nq\n50ms i\nstop"), cockpit, threading.Event()) == ""
+    cockpit.halt()
+    wait_for(lambda: not cockpit.pilot.engaged)
+    told = heard(commands)
+    assert told[0] == FORWARD
+    assert [message for message in told if message != STOP] == [FORWARD, STRAFE, Twist.planar(0.55)]
+    assert told[-1] == STOP
+
+
+def test_a_script_that_is_told_to_end_lets_go(cockpit: Cockpit, commands: Subscription[Twist]) -> None:
+    stop = threading.Event()
+    stop.set()
+    assert script.run(parse("60s i"), cockpit, stop) == "ended by a signal"
+    cockpit.halt()
+    assert heard(commands)[-1] == STOP
+
+
+def test_a_script_that_somebody_stopped_breaks_off(wire: Wire, cockpit: Cockpit, commands: Subscription[Twist]) -> None:
+    """The robot obeys nobody then, and stands."""
+    status = wire.bus("sim").publisher("cmd_vel_status", CommandStatus)
+    wait_for(lambda: status.matched)
+    status.put(CommandStatus(sources=[CommandSource(cockpit.bus.source, "INTERACTIVE_HIGH", 20.0, False, True)]))
+    wait_for(lambda: cockpit.helm.status().sources)
+    told = script.run(parse("60s i"), cockpit, threading.Event())
+    assert told.startswith("somebody stopped the robot or took it over")
+
+
+@pytest.mark.parametrize("words", [["--mode", "latch"], ["--key-timeout", "0"]])
+def test_the_keys_of_a_script_are_held_whatever_those_of_a_terminal_are(
+    wire: Wire, commands: Subscription[Twist], tmp_path: Path, words: list[str]
+) -> None:
+    (tmp_path / "drive").write_text("100ms i J")
+    assert wire.run("teleop", "--script", str(tmp_path / "drive"), *words).returncode == 0
+    assert [command for command in heard(commands) if command and command.linear.x and command.linear.y]
+
+
+def test_a_script_that_was_paused_does_not_drive_on(wire: Wire, commands: Subscription[Twist], tmp_path: Path) -> None:
+    (tmp_path / "drive").write_text("60s i")
+    process = wire.start("teleop", "--script", str(tmp_path / "drive"))
+    wait_for(lambda: FORWARD in heard(commands))
+    process.signal(signal.SIGSTOP)
+    time.sleep(1.0)  # what is shown here is that time passes
+    heard(commands)
+    process.signal(signal.SIGCONT)
+    assert process.wait() == 1
+    assert "it was paused" in process.err
+    assert FORWARD not in heard(commands)
