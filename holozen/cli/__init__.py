@@ -1,5 +1,6 @@
 """The command line. A verb's module is imported when the verb is named, so that each starts as fast as it can."""
 
+import errno
 import importlib
 import os
 import sys
@@ -7,6 +8,8 @@ from types import ModuleType
 
 VERBS = {
     "up": "start the sim, the controller, the pose service, and the teleop in this terminal",
+    "stop": "stop robots, all of them or some, until they are released",
+    "release": "let stopped robots drive again",
     "sim": "simulate robots",
     "teleop": "drive a robot from the keyboard",
     "controller": "drive a robot to the goals of next_goal",
@@ -17,11 +20,29 @@ VERBS = {
     "list": "the robots and objects in the sim, and where they are",
     "xacro": "expand a xacro file",
     "check": "say what is wrong with a robot file",
-    "topic": "list, info, echo, hz, pub",
-    "service": "list, call",
-    "node": "list",
+    "topic": "list, info, type, find, echo, hz, bw, delay, pub",
+    "service": "list, type, find, info, call",
+    "node": "list, info",
+    "param": "list, get, set, describe, dump, load",
+    "doctor": "check this machine and what runs, and say how to mend it",
+    "graph": "who writes, reads and serves what",
+    "completion": "a script that completes words in bash, zsh or fish",
+    "interface": "list, show, proto",
+    "record": "write what comes on the keys into a bag (MCAP)",
+    "replay": "publish what is in a bag again, in time",
+    "bag": "info, plot",
+    "plot": "draw numbers of live messages in the terminal",
+    "map": "draw the robots, their ways and their goals in the terminal",
 }
-EXTRAS = ("numpy", "prompt_toolkit", "pybullet", "xacro")  # what only some verbs need
+EXTRAS = (
+    "lz4",
+    "matplotlib",
+    "mcap",
+    "numpy",
+    "pybullet",
+    "xacro",
+    "zstandard",
+)  # what only some verbs need
 SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-service": "pose_service"}
 
 
@@ -36,8 +57,20 @@ def main(argv: list[str] | None = None) -> int:
         return 130
     except BrokenPipeError:
         # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_output()
         return 0
+    except OSError as error:
+        if error.errno != errno.ENOSPC or error.filename:
+            raise
+        from holozen.tell import say
+
+        _drop_output()
+        say(f"holozen: cannot write what was asked for: {error.strerror}")
+        return 1
+
+
+def _drop_output() -> None:
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _main(words: list[str]) -> int:
@@ -49,8 +82,15 @@ def _main(words: list[str]) -> int:
 
         print(version("holozen"))
         return 0
+    if words[0] == "__complete":
+        from holozen.cli.complete import main as complete
+
+        return complete(words[1:])
     if words[0] not in VERBS:
-        print(f"holozen: no verb {words[0]!r}; there are {', '.join(VERBS)}", file=sys.stderr)
+        from holozen.flags import nearest
+
+        known = f"{nearest(words[0], VERBS)}; there are {', '.join(VERBS)}"
+        print(f"holozen: no verb {words[0]!r}{known}", file=sys.stderr)
         return 2
     return _run(words[0], words[1:])
 
@@ -60,18 +100,19 @@ def _run(verb: str, words: list[str]) -> int:
     from holozen.tell import say
 
     try:
-        return int(_module(verb).main(words))
+        return int(module(verb).main(words))
     except BusError as error:
         say(f"holozen {verb}: {error}")
         return 1
     except ModuleNotFoundError as error:  # some verbs import what they need late
-        if error.name not in EXTRAS:
+        name = (error.name or "").partition(".")[0]
+        if name not in EXTRAS:
             raise
-        say(f"holozen {verb} needs {error.name}; run: pip install 'holozen[{verb}]'")
+        say(f"holozen {verb} needs {name}; run: pip install 'holozen[{verb}]'")
         return 1
 
 
-def _module(verb: str) -> ModuleType:
+def module(verb: str) -> ModuleType:
     """The verb's module. Services are `holozen.sim` when installed and `services.sim` in the bare source tree."""
     if verb not in SERVICES:
         return importlib.import_module(f"holozen.cli.{verb}")

@@ -10,7 +10,7 @@ from holozen.tell import printable
 
 AFTER = """A good file prints nothing. The exit code is 1 when there is an error, 0 when there is nothing or only
 warnings, 2 for wrong usage. The lines of the --require file are `link NAME` or `joint NAME [TYPE]`; # starts
-a comment."""
+a comment. example: holozen check my_bot.urdf.xacro"""
 
 
 def parser() -> argparse.ArgumentParser:

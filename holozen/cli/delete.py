@@ -9,7 +9,11 @@ from holozen.tell import say
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="holozen delete", description="Take robots or objects out of the sim.")
+    parser = argparse.ArgumentParser(
+        prog="holozen delete",
+        description="Take robots or objects out of the sim.",
+        epilog="example: holozen delete Fred",
+    )
     parser.add_argument("names", nargs="+", type=_name, metavar="NAME", help="as `holozen list` shows them")
     connection.add_arguments(parser)
     return parser

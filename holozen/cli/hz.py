@@ -1,53 +1,48 @@
 """`holozen topic hz`: how often messages come."""
 
-import argparse
-import statistics
-import threading
-import time
-from collections import deque
 from itertools import pairwise
 
-from holozen import connection
-from holozen.bus import Bus
-from holozen.errors import BusError
-from holozen.process import stop_event
-from holozen.tell import say
+from holozen.cli.noun import Verb
+from holozen.cli.spread import jitter, spread
+from holozen.cli.watch import arguments, lost_words, watch
 
-EVERY = 1.0  # s between two lines
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import argparse
 
+    from holozen.cli.watch import Report
 
-def hz(args: argparse.Namespace) -> int:
-    """Print the average rate, and the shortest, longest and typical deviation of the gaps, once a second."""
-    stop = stop_event()
-    arrivals: deque[float] = deque(maxlen=max(args.window, 2))
-    with Bus("topic_hz", connection.from_arguments(args), patience=3.0) as bus:
-        tap = bus.tap(args.key)
-
-        def listen() -> None:
-            while True:
-                try:
-                    tap.recv()
-                except BusError:
-                    return
-                arrivals.append(time.monotonic())
-
-        threading.Thread(target=listen, daemon=True).start()
-        seen = 0.0
-        while not stop.wait(EVERY):
-            times = list(arrivals)
-            if len(times) < 2 or times[-1] == seen:
-                say(f"no new messages on {args.key}")
-            else:
-                seen = times[-1]
-                print(rate(times), flush=True)
-    return 0
+WINDOW = 10_000  # messages, as in ROS 2
 
 
-def rate(times: list[float]) -> str:
-    """The line for arrivals at `times`, in seconds; at least two."""
+def hz(args: "argparse.Namespace") -> int:
+    """Print the average rate and how the gaps between arrivals spread, once a second."""
+    return watch(args, lambda _sample, now: now, lambda window: rate(list(window.times)), text)
+
+
+def rate(times: list[float]) -> "Report":
+    """What arrivals at `times`, in seconds, say: the rate in Hz, and the gaps in seconds. Empty for fewer than two."""
     gaps = [later - earlier for earlier, later in pairwise(times)]
-    average = len(gaps) / sum(gaps) if sum(gaps) else 0.0
+    if not gaps:
+        return {}
+    told = spread(gaps)
+    average = 1 / told["mean"] if told["mean"] else 0.0
+    return {"rate": average, **told, "jitter": jitter(gaps), "window": len(times)}
+
+
+def text(report: "Report") -> str:
+    """A report as ROS 2 shows it, and a line more."""
     return (
-        f"average rate: {average:.3f}\n"
-        f"\tmin: {min(gaps):.4f}s max: {max(gaps):.4f}s std dev: {statistics.pstdev(gaps):.5f}s window: {len(times)}"
+        f"average rate: {report['rate']:.3f}\n"
+        f"\tmin: {report['min']:.4f}s max: {report['max']:.4f}s std dev: {report['std_dev']:.5f}s"
+        f" window: {report['window']}\n"
+        f"\tp50: {report['p50']:.4f}s p95: {report['p95']:.4f}s p99: {report['p99']:.4f}s"
+        f" jitter: {report['jitter']:.5f}s{lost_words(report)}"
     )
+
+
+def _arguments(parser: "argparse.ArgumentParser") -> None:
+    arguments(parser, WINDOW)
+
+
+VERBS = {"hz": Verb("how often messages come, how evenly, how many are lost", "holozen topic hz odom", _arguments, hz)}

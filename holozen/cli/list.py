@@ -19,7 +19,11 @@ TILTED = 5.0  # degrees; less is a robot on a slope, or one that balances
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="holozen list", description="Show the robots and objects in the sim.")
+    parser = argparse.ArgumentParser(
+        prog="holozen list",
+        description="Show the robots and objects in the sim.",
+        epilog="example: holozen list --json",
+    )
     parser.add_argument("--json", action="store_true", help="name and pose as one JSON object a line")
     connection.add_arguments(parser)
     return parser

@@ -1,118 +1,220 @@
-"""`holozen topic pub`: write checked messages to a key."""
+"""`holozen topic pub`: write checked messages to a key, and see that they arrive."""
 
-import argparse
 import json
 import sys
-import threading
 import time
-from typing import Any
 
-from holozen import codec, connection, wire
-from holozen.bus import Bus, Publisher
+from holozen import wire
+from holozen.bus import Bus
+from holozen.cli import forms, values
+from holozen.cli.forms import Form, Ours
+from holozen.cli.noun import Verb, open_bus
+from holozen.cli.obeyed import Watcher
+from holozen.flags import count, key, number
 from holozen.graph import on_key
-from holozen.messages import Message, Twist, TwistStamped
+from holozen.messages import Message
 from holozen.process import stop_event
+from holozen.publisher import Publisher
 from holozen.tell import say
 
-LARGEST = 1_000_000  # bytes of a value
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import argparse
+    import threading
+    from collections.abc import Iterator
+
 STOPS, STOP_EVERY = 5, 0.02  # s
 PATIENCE = 3.0  # s until somebody has to subscribe
+LOOK = 0.1  # s between two looks at standard input's lines and at who is obeyed
 
 
-def pub(args: argparse.Namespace) -> int:
+class Refused(Exception):
+    """What is wrong, in one line, and the exit code."""
+
+    def __init__(self, text: str, code: int = 1) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+def pub(args: "argparse.Namespace") -> int:
     """Publish a value once, some times, or until interrupted; a robot that it moved is stopped at the end."""
-    row = wire.topic(args.key)
     if set(args.key) & set("*$?#"):
         say(f"holozen topic pub: {args.key!r}: write to one key; a wildcard would move every robot")
         return 1
-    row = row or _row_of_listener(args)
-    if row is None:
-        known = ", ".join(topic.key for topic in wire.TOPICS)
-        say(f"holozen topic pub: {args.key!r} has no known type; known keys: {known}, each also as ROBOT/key")
-        return 1
     try:
-        message = read_message(args.value, row.types)
-    except ValueError as error:
-        say(f"holozen topic pub {args.key}: refused: {error}")
-        return 1
-    stop = stop_event()
-    with Bus("topic_pub", connection.from_arguments(args), patience=PATIENCE) as bus:
-        publisher: Publisher[Message] = bus.publisher(args.key, type(message))
-        if not _matched(publisher, stop):
-            say(f"nobody subscribes to {args.key}")
-            if args.once:
-                return 1
-        try:
-            _publish(publisher, message, args, row.rate, stop)
-        finally:
-            if isinstance(message, Twist | TwistStamped) and not args.once:
-                _stop_robot(publisher, message)
+        form = _form(args)
+        payload = _payload(form, args) if form else None
+        stop = stop_event()
+        with open_bus(args) as bus:
+            form = form or _form_of_listener(bus, args)
+            return _run(bus, args, form, payload or _payload(form, args), stop)
+    except Refused as error:
+        say(f"holozen topic pub {error}")
+        return error.code
+
+
+def _run(bus: Bus, args: "argparse.Namespace", form: Form, payload: bytes, stop: "threading.Event") -> int:
+    publisher: Publisher[Message] = bus.publisher(args.key, form.kind)
+    matched = 0 if args.no_wait else _matched(bus, publisher, args, stop)
+    if not args.no_wait:
+        say(
+            f"{matched} subscriber{'s' * (matched != 1)} of {args.key}"
+            if matched
+            else f"nobody subscribes to {args.key}"
+        )
+        if not matched and (args.once or args.times):
+            return 1
+        if args.wait and matched < args.wait and not stop.is_set():
+            raise Refused(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
+    watcher = Watcher(bus, args.key) if form.stop() else None
+    if watcher and matched:
+        watcher.ask()
+    turns = _lines(form, args, stop) if args.stdin else _turns(payload, args, stop)
+    sent = 0
+    try:
+        for each in turns:
+            publisher.put_bytes(each)
+            sent += 1
+            if watcher:
+                watcher.look()
+    finally:
+        stopping = form.stop()
+        if stopping and not args.once:
+            _stop_robot(publisher, stopping)
+    if args.json:
+        print(json.dumps({"key": args.key, "type": form.kind.ROS, "subscribers": matched, "published": sent}))
     return 0
 
 
-def _row_of_listener(args: argparse.Namespace) -> wire.Topic | None:
-    """The row of the type that somebody reads on the key: a robot's file may call its topics anything."""
-    with Bus("topic_pub", connection.from_arguments(args), patience=PATIENCE) as bus:
-        wanted = {endpoint.type for endpoint in on_key(bus.graph().settled(bus.connected), args.key, "sub")}
-    return next((row for row in wire.TOPICS if {kind.ROS for kind in row.types} & wanted), None)
+def _form(args: "argparse.Namespace") -> Form | None:
+    """What is written: of the type given, else of the table's row; None if only who reads the key can tell."""
+    words = list(args.words)
+    given = words.pop(0) if words and forms.TYPE.fullmatch(words[0]) else ""
+    if len(words) > 1 or (args.stdin and words):
+        raise Refused(f"{args.key}: {words[-1]!r} is too much; write KEY [TYPE] VALUE", 2)
+    if not (words or given or args.stdin):
+        raise Refused(f"{args.key}: a value is missing; write {EXAMPLE}", 2)
+    args.value = words[0] if words else "{}"
+    row = wire.topic(args.key)
+    if given:
+        try:
+            form = forms.named(given, args.wire, args.force)
+        except ValueError as error:
+            raise Refused(f"{args.key}: {error}") from None
+        right = [kind.ROS for kind in row.types] if row else [form.kind.ROS]
+        if form.kind.ROS not in right and not args.force:
+            raise Refused(f"{args.key}: its type is {' or '.join(right)}, not {given}{forms.FORCE}")
+        return form
+    return Ours(row.types, args.wire, args.force) if row else None
 
 
-def read_message(text: str, kinds: tuple[type[Message], ...]) -> Message:
-    """The message that `text` (JSON or YAML, or - for standard input) describes. Raises ValueError with the reason."""
-    if text == "-":
-        text = sys.stdin.read(LARGEST + 1)
-    if len(text) > LARGEST:
-        raise ValueError(f"the value is longer than {LARGEST} bytes")
-    message = codec.convert(_plain(text), kinds)
-    codec.encode(message)  # what cannot be sent is told now
-    return message
+def _form_of_listener(bus: Bus, args: "argparse.Namespace") -> Form:
+    """A robot's file may call its topics anything: the type is that of whoever reads the key."""
+    wanted = {end.type for end in on_key(bus.graph().settled(bus.connected), args.key, "sub")}
+    if kinds := values.kinds_of(wanted):
+        return Ours(kinds, args.wire, args.force)
+    known = ", ".join(topic.key for topic in wire.TOPICS)
+    raise Refused(
+        f"{args.key!r} has no known type; known keys: {known}, each also as ROBOT/key;"
+        f" for any other give the type: holozen topic pub {args.key} geometry_msgs/msg/Twist VALUE"
+    )
 
 
-def _plain(text: str) -> Any:
+def _payload(form: Form, args: "argparse.Namespace") -> bytes:
     try:
-        return json.loads(text)
-    except RecursionError:
-        raise ValueError("the value is nested too deeply") from None
+        return b"" if args.stdin else form.payload(args.value)
     except ValueError as error:
-        return _yaml(text, error)
+        raise Refused(f"{args.key}: refused: {error}") from None
 
 
-def _yaml(text: str, why_no_json: ValueError) -> Any:
-    try:
-        import yaml
-    except ModuleNotFoundError:
-        raise ValueError(f"no JSON: {why_no_json}; to write YAML: pip install pyyaml") from None
-    try:
-        return yaml.safe_load(text)
-    except RecursionError:
-        raise ValueError("the value is nested too deeply") from None
-    except yaml.YAMLError as error:
-        raise ValueError(f"neither JSON nor YAML: {' '.join(str(error).split())}") from None
+def _matched(
+    bus: Bus, publisher: Publisher[Message], args: "argparse.Namespace", stop: "threading.Event"
+) -> int:  # fmt: skip
+    """Wait for subscribers; how many there are. Strangers show only that there are any, and count as one."""
+    wanted, deadline = args.wait or 1, None if args.wait else time.monotonic() + PATIENCE
+    if args.max_wait:
+        deadline = time.monotonic() + args.max_wait
+    graph, told = bus.graph(), False
+    while True:
+        while not publisher.matched and (deadline is None or time.monotonic() < deadline):
+            if stop.wait(0.002):
+                return 0
+        ends = on_key(graph.settled(bus.connected), args.key, "sub")
+        found = max(len(ends), int(publisher.matched))
+        if found >= wanted or (deadline and time.monotonic() > deadline) or stop.wait(0.01):
+            return found
+        if not told:
+            say(f"waiting for {wanted} subscribers of {args.key}; {found} by now")
+            told = True
 
 
-def _matched(publisher: Publisher[Message], stop: threading.Event) -> bool:
-    deadline = time.monotonic() + PATIENCE
-    while not publisher.matched:
-        if time.monotonic() > deadline or stop.wait(0.005):
-            return False
-    return True
-
-
-def _publish(
-    publisher: Publisher[Message], message: Message, args: argparse.Namespace, rate: float, stop: threading.Event
-) -> None:
-    left = 1 if args.once else args.times
-    due = time.monotonic()
+def _turns(payload: bytes, args: "argparse.Namespace", stop: "threading.Event") -> "Iterator[bytes]":
+    """The value as often as is asked for, in time."""
+    row = wire.topic(args.key)
+    period = 1 / (args.rate or (row.rate if row else 1.0))
+    left, due = 1 if args.once else args.times, time.monotonic()
     while not stop.is_set() and left != 0:
-        publisher.put(message)
+        yield payload
         left = left and left - 1
-        due += 1 / (args.rate or rate)
+        due += period
         if not args.once:  # the last one counts for a period too
             stop.wait(max(0.0, due - time.monotonic()))
 
 
-def _stop_robot(publisher: Publisher[Message], message: Message) -> None:
+def _lines(form: Form, args: "argparse.Namespace", stop: "threading.Event") -> "Iterator[bytes]":
+    """A value for each line of standard input, no faster than the rate."""
+    import queue
+    import threading
+
+    lines: queue.Queue[str] = queue.Queue(maxsize=1000)
+
+    def read() -> None:
+        while line := sys.stdin.readline(values.LARGEST + 1):
+            lines.put(line)
+        lines.put("")
+
+    threading.Thread(target=read, daemon=True).start()
+    at = 0
+    while not stop.is_set():
+        try:
+            line = lines.get(timeout=LOOK)
+        except queue.Empty:
+            continue
+        at += 1
+        if not line:
+            return
+        if not line.strip():
+            continue
+        try:
+            yield form.payload(line.strip())
+        except ValueError as error:
+            raise Refused(f"{args.key}: line {at} refused: {error}") from None
+        if args.rate:
+            stop.wait(1 / args.rate)
+
+
+def _stop_robot(publisher: Publisher[Message], payload: bytes) -> None:
     """Send stops, more than one: a congested link drops some."""
     for _ in range(STOPS):
-        publisher.put(type(message)())
+        publisher.put_bytes(payload)
         time.sleep(STOP_EVERY)
+
+
+def _arguments(parser: "argparse.ArgumentParser") -> None:
+    add = parser.add_argument
+    add("key", type=key)
+    add("words", nargs="*", metavar="[TYPE] VALUE", help="JSON or YAML; - reads it from standard input."
+        " The type, where nobody tells it, such as geometry_msgs/msg/Twist")  # fmt: skip
+    add("-r", "--rate", type=number(0.01, 10_000, "Hz"), metavar="HZ", help="(default: the topic's own rate, or 1)")
+    add("-1", "--once", action="store_true", help="publish once, as soon as somebody subscribes")
+    add("-t", "--times", type=count(1), metavar="N", help="publish N times")
+    add("-w", "--wait", "--wait-matching-subscriptions", type=count(1), metavar="N",
+        help=f"wait for N subscribers, for ever (default: for one, {PATIENCE:g} s)")  # fmt: skip
+    add("--max-wait", "--max-wait-time-secs", type=number(0.01, 1e6, "s"), metavar="S", help="wait at most S seconds")
+    add("--no-wait", action="store_true", help="do not wait for a subscriber")
+    add("--force", action="store_true", help="send numbers too that are not finite")
+    add("--stdin", action="store_true", help="one value a line on standard input")
+
+
+EXAMPLE = """holozen topic pub cmd_vel '{"linear": {"x": 0.3}}'"""
+VERBS = {"pub": Verb("write messages to a key", EXAMPLE, _arguments, pub)}

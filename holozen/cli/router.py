@@ -9,14 +9,18 @@ from holozen.tell import say
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="holozen router", description="Run a Zenoh router.")
+    parser = argparse.ArgumentParser(
+        prog="holozen router",
+        description="Run a Zenoh router.",
+        epilog="example: holozen router --listen tcp/0.0.0.0:7447",
+    )
     connection.add_arguments(parser)
     parser.set_defaults(mode="router")
     return parser
 
 
 def main(argv: list[str]) -> int:
-    where = connection.from_arguments(parser().parse_args(argv))._replace(mode="router")
+    where = connection.from_arguments(parser().parse_args(argv)).replace(mode="router")
     stop = stop_event()
     with Bus("router", where, lasting=True):
         say(f"router: listens at {', '.join(where.listen or (connection.DOOR,))}")

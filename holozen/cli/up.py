@@ -21,12 +21,15 @@ SIM_GRACE = 0.5  # s
 LOOK = 0.05  # s
 LAST_LINES = 20
 _PR_SET_PDEATHSIG = 1  # prctl(2)
+# Plain keys, no update under way, lines wrap, no reports of focus and pastes, a cursor, the main screen.
+SCREEN_LEFT = "\x1b[<u\x1b[?2026l\x1b[?7h\x1b[?1004l\x1b[?2004l\x1b[?25h\x1b[?1049l"
 
 
 def parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
         prog="holozen up",
         description="Start the sim, the controller, the pose service, and the teleop if there is a terminal.",
+        epilog="example: holozen up --robot my_bot.urdf.xacro",
     )
     parser.add_argument("--robot", type=flags.robot_file, metavar="FILE[=NAME]", help="as for `holozen sim --robot`")
     for flag in ("--world", "--rtf", "--drive"):
@@ -138,10 +141,10 @@ def _flags(args: argparse.Namespace, *names: str) -> list[str]:
 
 
 def _restore(terminal: list[Any]) -> None:
-    """Leave the terminal as it was, also after a teleop that was killed: main screen, cursor, no paste brackets."""
+    """Leave the terminal as it was, also after a teleop that was killed."""
     with contextlib.suppress(OSError, termios.error):
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, terminal)
-        print("\x1b[?1049l\x1b[?25h\x1b[?2004l", end="", flush=True)
+        print(SCREEN_LEFT, end="", flush=True)
 
 
 def _tell_last(log: IO[str]) -> None:

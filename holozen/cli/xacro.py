@@ -12,7 +12,11 @@ from holozen.tell import say
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="holozen xacro", description="Expand a xacro file to URDF.")
+    parser = argparse.ArgumentParser(
+        prog="holozen xacro",
+        description="Expand a xacro file to URDF.",
+        epilog="example: holozen xacro my_bot.urdf.xacro -o my_bot.urdf",
+    )
     parser.add_argument("file", type=Path, help="the xacro file")
     parser.add_argument("args", nargs="*", metavar="name:=value", help="values of its xacro:arg")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")

@@ -5,30 +5,32 @@ import math
 import sys
 
 from holozen import connection, flags
-from holozen.bus import Bus, BusError
+from holozen.bus import Bus
+from holozen.errors import BusError
 from holozen.messages import TriggerReply, TriggerRequest
+from holozen.parameters import Parameters
 from holozen.process import stop_event
 from holozen.tell import say
 from holozen.wire import key_for
 
 from .follow import Follower
 from .goto import Gains, Leg
+from .knobs import KNOBS, declared
 
 
 def parser() -> argparse.ArgumentParser:
     default = Gains()
-    parser = argparse.ArgumentParser(prog="holozen controller", description="Drive a robot to the goals of next_goal.")
+    parser = argparse.ArgumentParser(
+        prog="holozen controller",
+        description="Drive a robot to the goals of next_goal.",
+        epilog="example: holozen controller --laps 0",
+    )
     parser.add_argument("robot", nargs="?", default="", type=flags.robot, help="its name; none: the one at the root")
     parser.add_argument("--resume", action="store_true", help="let the controller drive again, and end")
     parser.add_argument("--laps", type=flags.count(), default=1, help="times round the list; 0: for ever (default: 1)")
-    add = parser.add_argument
-    add("--max-speed", type=flags.number(0.01, 10, "m/s"), default=default.max_speed, help="m/s (default: 0.5)")
-    add("--max-turn", type=flags.number(0.01, 20, "rad/s"), default=default.max_turn, help="rad/s (default: 1)")
-    add("--max-acceleration", type=flags.number(0.01, 100, "m/s^2"), default=default.max_acceleration, help="m/s^2")
-    add("--gain", type=flags.number(0.1, 10, "1/s"), default=default.linear, help="of the distance, 1/s")
-    add("--turn-gain", type=flags.number(0.1, 10, "1/s"), default=default.angular, help="of the angle, 1/s")
-    add("--tolerance", type=flags.number(0.001, 1, "m"), default=default.tolerance, help="m (default: 0.01)")
-    add("--angle-tolerance", type=flags.number(0.001, 1, "rad"), default=default.angle_tolerance, help="rad")
+    for knob in KNOBS:
+        parser.add_argument(knob.flag, type=flags.number(knob.low, knob.high, knob.unit),
+            default=getattr(default, knob.field), help=f"{knob.about}, {knob.unit} (default: %(default)g)")  # fmt: skip
     connection.add_arguments(parser)
     return parser
 
@@ -48,12 +50,22 @@ def follow(args: argparse.Namespace, where: connection.Connection) -> int:
     stop, laps = stop_event(), 0
     with Bus("controller", where, lasting=True, stop=stop) as bus:
         follower = Follower(bus, args.robot, _gains(args), stop, lambda text: say(f"controller: {text}"))
+        serve_parameters(bus, args.robot, follower)
         try:
             while not stop.is_set() and (laps < args.laps or not args.laps):
                 report(follower.lap(), laps := laps + 1)
         finally:
             follower.halt()
     return 0
+
+
+def serve_parameters(bus: Bus, robot: str, follower: Follower) -> None:
+    """Let others read and set its gains and limits; they hold from the next command on."""
+
+    def write(gains: Gains) -> None:
+        follower.gains = gains
+
+    Parameters(bus, key_for("controller", robot), lambda: declared(lambda: follower.gains, write)).start()
 
 
 def resume(robot: str, where: connection.Connection) -> int:
@@ -77,15 +89,7 @@ def report(legs: list[Leg], lap: int) -> None:
 
 
 def _gains(args: argparse.Namespace) -> Gains:
-    return Gains(
-        linear=args.gain,
-        angular=args.turn_gain,
-        max_speed=args.max_speed,
-        max_turn=args.max_turn,
-        max_acceleration=args.max_acceleration,
-        tolerance=args.tolerance,
-        angle_tolerance=args.angle_tolerance,
-    )
+    return Gains(**{knob.field: getattr(args, knob.name) for knob in KNOBS})
 
 
 if __name__ == "__main__":

@@ -4,9 +4,11 @@ import threading
 import time
 from collections.abc import Callable
 
-from holozen.bus import Bus, NoReply, Publisher, ServiceError
+from holozen.bus import Bus
+from holozen.errors import NoReply, ServiceError
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, Twist
+from holozen.publisher import Publisher
 from holozen.wire import PRIORITY_OF, key_for, topic
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
@@ -25,12 +27,14 @@ class Follower:
     def __init__(self, bus: Bus, robot: str, gains: Gains, stop: threading.Event, say: Callable[[str], None]) -> None:
         row = topic("odom")
         assert row is not None
-        self._bus, self._gains, self._stop, self._say, self._silence = bus, gains, stop, say, row.silence
+        self._bus, self._stop, self._say, self._silence = bus, stop, say, row.silence
+        self.gains = gains  # may be replaced while it drives
         self._odom = bus.latest(key_for("odom", robot), Odometry)
         self._status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._manners = Manners(bus.source)
         self._now: Planar = STOP
+        self._yielded = False
         self._told = ""
 
     def lap(self) -> list[Leg]:
@@ -62,7 +66,7 @@ class Follower:
         while not self._stop.is_set():
             try:
                 goal = self._bus.call("next_goal", NextGoalRequest(number), NextGoalReply, PATIENCE)
-                if max(abs(goal.x_goal), abs(goal.y_goal), abs(goal.theta_goal)) <= FARTHEST:
+                if all(abs(value) <= FARTHEST for value in (goal.x_goal, goal.y_goal, goal.theta_goal)):
                     return goal
                 self._tell(f"goal {number} is more than {FARTHEST:g} m away; waiting for another")
             except NoReply as silence:
@@ -88,11 +92,11 @@ class Follower:
                 leg, before = Leg(pose, goal, stamp), stamp - PERIOD
             leg.see(pose, stamp)
             left = error(pose, goal)
-            if arrived(left, self._now, self._gains):
+            if arrived(left, self._now, self.gains):
                 self.halt()
                 return leg
             if stamp - before >= PERIOD - 1e-6:
-                self._command(velocity(left, self._now, self._gains, min(stamp - before, 2 * PERIOD)))
+                self._command(velocity(left, self._now, self.gains, min(stamp - before, 2 * PERIOD)))
                 before = stamp
         return None
 
@@ -104,9 +108,10 @@ class Follower:
         status, _ = self._status.read()
         if status:
             self._manners.see(status)
-        if self._manners.yielded_to:
+        if reason := self._manners.reason:
             self._now = STOP  # the other one has the robot: nothing of ours moves it, not even a stop
-            self._tell(f"yields to {self._manners.yielded_to}; `holozen controller --resume` or the teleop's r resumes")
+            self._yielded = True
+            self._tell(reason)
         elif not fresh:
             self.halt()
             self._tell("waiting for odom: it is stale or was never heard")
@@ -114,6 +119,9 @@ class Follower:
             self.halt()
             self._tell(f"waiting for odom: its pose is more than {FARTHEST:g} m away")
         else:
+            if self._yielded:  # it lets go with a stop, as whoever commanded a stopped robot has to
+                self._command(STOP)
+            self._yielded = False
             self._tell("")
             return odom
         return None

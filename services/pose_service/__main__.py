@@ -5,30 +5,28 @@ import sys
 from pathlib import Path
 
 from holozen import connection
-from holozen.bus import Bus, BusError, ServiceError
+from holozen.bus import Bus
+from holozen.errors import BusError
 from holozen.flags import number
 from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest, Odometry
+from holozen.parameters import Parameters
 from holozen.process import stop_event, wait_for_end
 from holozen.tell import say
 
-from .shapes import SHAPES, Goal, GoalsError, read_goals
+from .route import SIZES, Route
+from .shapes import SHAPES, GoalsError
 from .tracker import Tracker
 
 
-def next_goal(goals: list[Goal], request: NextGoalRequest) -> NextGoalReply:
-    """The goal with the number asked for, counted from 0. Raises ServiceError past either end of the list."""
-    number = request.request_goal
-    if not 0 <= number < len(goals):
-        raise ServiceError(f"goal {number}: the list holds goals 0 to {len(goals) - 1}")
-    x, y, theta = goals[number]
-    return NextGoalReply(x, y, theta, int(number == len(goals) - 1))
-
-
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(prog="holozen pose-service", description="Answer next_goal and get_pose.")
+    parser = argparse.ArgumentParser(
+        prog="holozen pose-service",
+        description="Answer next_goal and get_pose.",
+        epilog="example: holozen pose-service --shape hexagon --size 2",
+    )
     parser.add_argument("--shape", choices=SHAPES, default="square", help="the goals' shape (default: square)")
     parser.add_argument(
-        "--size", type=number(0.01, 1000, "m"), default=1.0, help="its side (infinity: half its length) in m"
+        "--size", type=number(*SIZES, "m"), default=1.0, help="its side (infinity: half its length) in m"
     )
     parser.add_argument("--goals", type=Path, metavar="FILE", help="goals from a file instead: x y theta a line")
     connection.add_arguments(parser)
@@ -39,12 +37,13 @@ def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
     stop = stop_event()
     try:
-        goals = read_goals(args.goals) if args.goals else SHAPES[args.shape](args.size)
+        route = Route(args.shape, args.size, args.goals)
         with Bus("pose_service", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             tracker = Tracker(bus.subscribe("**/odom", Odometry, depth=256))
             bus.serve("get_pose", GetPoseRequest, GetPoseReply, tracker.get_pose).start()
-            bus.serve("next_goal", NextGoalRequest, NextGoalReply, lambda request: next_goal(goals, request)).start()
-            say(f"pose_service: {len(goals)} goals from {args.goals or args.shape}")
+            bus.serve("next_goal", NextGoalRequest, NextGoalReply, route.next_goal).start()
+            Parameters(bus, "pose_service", route.declared).start()
+            say(f"pose_service: {len(route.goals)} goals from {args.goals or args.shape}")
             wait_for_end(stop)
     except (BusError, GoalsError) as error:
         say(f"pose_service: {error}")

@@ -1,0 +1,76 @@
+"""`holozen bag`: info, plot."""
+
+import argparse
+import json
+from typing import TYPE_CHECKING
+
+from holozen.flags import Parser
+from holozen.tell import printable, say
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = Parser(prog="holozen bag", description="Look into bags: MCAP files with messages.")
+    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
+    help_line = "what is in a bag: counts, rates, gaps"
+    add = verbs.add_parser(
+        "info", help=help_line, description=help_line, epilog="example: holozen bag info square.mcap"
+    )
+    add.add_argument("files", nargs="+", type=_file, metavar="FILE")
+    add.add_argument("--json", action="store_true", help="one JSON object a file, on a line")
+    help_line = "draw the paths and velocities of a bag's robots"
+    add = verbs.add_parser(
+        "plot", help=help_line, description=help_line, epilog="example: holozen bag plot square.mcap -o square.svg"
+    )
+    add.add_argument("file", type=_file, metavar="FILE")
+    add.add_argument("-o", "--output", type=_file, metavar="PICTURE", help=".png or .svg (default: FILE with .png)")
+    add.add_argument("--topics", nargs="+", metavar="KEY", help="only these keys of odometry")
+    add.add_argument("--json", action="store_true", help="what was drawn, as one JSON object")
+    return parser
+
+
+def _file(text: str) -> "Path":
+    from pathlib import Path
+
+    return Path(text)
+
+
+def main(argv: list[str]) -> int:
+    args = parser().parse_args(argv)
+    from holozen.bag.errors import BagError
+
+    try:
+        return {"info": info, "plot": plot}[args.verb](args)
+    except BagError as error:
+        say(f"holozen bag: {error}")
+        return 1
+
+
+def info(args: argparse.Namespace) -> int:
+    """Print what is in each file."""
+    from holozen.bag.reader import Bag
+    from holozen.bag.summary import summarize
+
+    for path in args.files:
+        with Bag(path) as bag:
+            summary = summarize(bag)
+        if args.json:
+            print(json.dumps(summary.figures()), flush=True)
+        else:
+            print("\n".join(map(printable, summary.lines())), flush=True)
+    return 0
+
+
+def plot(args: argparse.Namespace) -> int:
+    """Draw a file's odometry into a picture."""
+    from holozen.bag.drawing import draw
+
+    target = args.output or args.file.with_suffix(".png")
+    drawn = draw(args.file, target, args.topics)
+    if args.json:
+        print(json.dumps({"file": str(args.file), "picture": str(target), "topics": drawn}))
+    else:
+        print(printable(f"{target}: {', '.join(f'{key} ({count} messages)' for key, count in drawn.items())}"))
+    return 0

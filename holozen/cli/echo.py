@@ -1,0 +1,181 @@
+"""`holozen topic echo`: print what comes on a key, whoever wrote it."""
+
+import sys
+
+from holozen.cli.noun import Verb, open_bus
+from holozen.flags import count, key, number
+from holozen.tap import Sample
+from holozen.tell import printable, say
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import argparse
+    from typing import Any
+
+    from holozen.bus import Bus
+
+WAITING = 1.0  # s without anything until that is said
+
+
+def echo(args: "argparse.Namespace") -> int:
+    """Print every message of a key, until interrupted."""
+    try:
+        printer = Printer(args)
+    except ValueError as error:
+        say(f"holozen topic echo: {error}")
+        return 2
+    with open_bus(args) as bus:
+        tap = bus.tap(args.key)
+        tap.ends.append(bus.announce("sub", "any/msg/Any", args.key))
+        return _echo(args, bus, tap, printer)
+
+
+def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Any", printer: "Printer") -> int:
+    import threading
+    from functools import partial
+
+    from holozen.cli.reading import Reader
+    from holozen.errors import BusError
+
+    try:
+        reader = Reader(args.type_flag or args.type or "")
+    except ValueError as error:
+        say(f"holozen topic echo: {error}")
+        return 2
+    what = "nothing that passes the filter" if args.filter else "nothing"
+    say_so = partial(say, f"waiting for {args.key}; {what} came yet")
+    late = threading.Timer(args.timeout or WAITING, tap.close if args.timeout else say_so)
+    late.daemon = True
+    late.start()
+    try:
+        while True:
+            try:
+                sample = tap.recv()
+            except BusError:
+                say(f"holozen topic: {what} came on {args.key} within {args.timeout:g} s at {bus.where}")
+                return 1
+            if not args.filter:
+                late.cancel()
+            if printer.show(sample, reader.read(sample, bus)):
+                late.cancel()
+                if args.once:
+                    return 0
+    except LookupError as error:
+        say(f"holozen topic echo {args.key}: {error.args[0]}")
+        return 1
+    finally:
+        printer.tell()
+
+
+class Printer:
+    """Prints values as the flags say, and counts what could not be shown. Raises ValueError for a wrong flag."""
+
+    def __init__(self, args: "argparse.Namespace") -> None:
+        self._args, self._many = args, "*" in args.key
+        self._count = self._undecoded = self._fieldless = 0
+        self._path = self._passes = None
+        if args.field:
+            from holozen.cli import fields
+
+            self._path, self._pick = fields.path(args.field), fields.pick
+        if args.filter:
+            from holozen.cli import filters
+
+            self._passes = filters.compiled(args.filter)
+        self._short = args.truncate_length or args.no_arr or args.no_str
+
+    def show(self, sample: Sample, value: "Any") -> bool:
+        """Print one; whether it passed the filter and had the field. Raises LookupError for a field of no message."""
+        from holozen.cli.show import Hex
+
+        self._count += 1
+        self._undecoded += isinstance(value, Hex)
+        if self._passes and not self._passes(value):
+            return False
+        if self._path:
+            try:
+                value = self._pick(value, self._path)
+            except LookupError:
+                if not self._many and not isinstance(value, Hex):
+                    raise
+                self._fieldless += 1
+                return False
+        if self._short:
+            from holozen.cli.cut import cut
+
+            value = cut(value, self._args.truncate_length, not self._args.no_arr, not self._args.no_str)
+        self._write(sample, value)
+        return True
+
+    def _write(self, sample: Sample, value: "Any") -> None:
+        if self._args.raw:
+            return self._write_raw(sample.payload)
+        if self._args.json:
+            text = self._as_json(sample, value)
+        elif self._args.csv:
+            from holozen.cli.cut import row
+
+            text = row([sample.key, value] if self._many else value)
+        else:
+            from holozen.cli.show import lines
+
+            head = [printable(f"# {sample.key}")] if self._many else []
+            text = "\n".join([*head, *lines(value, longest=0 if self._args.full_length else None), "---"])
+        print(text, flush=True)
+        return None
+
+    def _as_json(self, sample: Sample, value: "Any") -> str:
+        """One JSON object: the message, or what there is instead of one under `value` or `hex`."""
+        import json
+
+        from holozen.cli.show import Hex, strict
+
+        # An object that came as one line of JSON is printed as it came.
+        whole = not (self._many or self._path or self._short) and isinstance(value, dict)
+        text = sample.payload.decode() if whole and sample.payload.startswith(b"{") and sample.payload.isascii() else ""
+        if text and text.isprintable() and "NaN" not in text and "Infinity" not in text:
+            return text
+        if isinstance(value, Hex):
+            found = {"hex": sample.payload.hex(), "size": sample.size, "encoding": sample.encoding}
+        elif isinstance(value, dict) and not self._many:
+            found = value
+        else:
+            found = {"value": value}
+        return json.dumps(strict({"key": sample.key, **found} if self._many else found))
+
+    def _write_raw(self, payload: bytes) -> None:
+        """The bytes as they came; on a terminal only such that cannot harm it."""
+        if sys.stdout.isatty():
+            print(payload, flush=True)
+        else:
+            sys.stdout.buffer.write(payload if self._args.once else payload + b"\n")
+            sys.stdout.buffer.flush()
+
+    def tell(self) -> None:
+        """Say what could not be shown, if there was any."""
+        if self._undecoded:
+            say(f"{self._undecoded} of {self._count} samples could not be decoded; for CDR give the type: --type T")
+        if self._fieldless:
+            say(f"{self._fieldless} of {self._count} samples have no field {self._args.field}")
+
+
+def _arguments(parser: "argparse.ArgumentParser") -> None:
+    add = parser.add_argument
+    add("key", type=key, help="a key or key expression, such as odom or */odom")
+    add("type", nargs="?", metavar="TYPE", help="the same as --type")
+    told = "the type of CDR payloads, where nobody tells it, such as geometry_msgs/msg/Twist"
+    add("--type", dest="type_flag", metavar="TYPE", help=told)
+    add("--once", action="store_true", help="end after the first message")
+    add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without any")
+    add("--field", metavar="A.B", help="only this field, such as pose.pose.position or transforms[0].child_frame_id")
+    add("--filter", metavar="EXPR", help="only messages of which this is true, such as 'm.linear.x > 0.2'")
+    add("--csv", action="store_true", help="values with commas, a message a line")
+    add("--raw", action="store_true", help="the bytes as they came; on a terminal, escaped")
+    add("--no-arr", action="store_true", help="only the length of lists")
+    add("--no-str", action="store_true", help="only the length of texts")
+    told = "show at most N values of a list and characters of a text (default: 128 values of a list)"
+    add("-l", "--truncate-length", type=count(1), default=0, metavar="N", help=told)
+    add("-f", "--full-length", action="store_true", help="lists in full")
+
+
+VERBS = {"echo": Verb("print what comes on a key", "holozen topic echo odom --once", _arguments, echo)}

@@ -1,0 +1,136 @@
+"""`--filter`: a small expression over a message's fields, such as `m.linear.x > 0.2 and not m.angular.z`.
+
+It is read by Python's own parser and worked out here, node by node: comparisons, `and`, `or`, `not`, `in`, arithmetic
+without powers, `abs`, `len`, `[0]`. Nothing else has a meaning, so there is nothing that it could break. `m` is the
+message; a bare name is its field.
+"""
+
+import ast
+import operator
+from collections.abc import Callable
+from itertools import pairwise
+from typing import Any
+
+LONGEST = 1000  # characters
+MOST_NODES = 200
+
+Value = Callable[[Any], Any]
+"""What a node is worth for a message."""
+
+COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
+    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
+    ast.Eq: operator.eq, ast.NotEq: operator.ne,
+    ast.In: lambda item, inside: item in inside, ast.NotIn: lambda item, inside: item not in inside,
+}  # fmt: skip
+REASON: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
+    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
+    ast.Mod: operator.mod, ast.FloorDiv: operator.floordiv,
+}  # fmt: skip
+CALLS: dict[str, Callable[[Any], Any]] = {"abs": abs, "len": len}
+
+
+def compiled(text: str) -> Callable[[Any], bool]:
+    """Whether a message passes. Raises ValueError with one line for what is no such expression.
+
+    A message that lacks a field, or holds something else there, does not pass.
+    """
+    if len(text) > LONGEST:
+        raise ValueError(f"the filter is longer than {LONGEST} characters")
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+        why = error.msg if isinstance(error, SyntaxError) else "nested too deeply"
+        raise ValueError(f"filter {text!r}: {why}; write such as m.linear.x > 0.2") from None
+    if sum(1 for _ in ast.walk(tree)) > MOST_NODES:
+        raise ValueError(f"the filter has more than {MOST_NODES} parts")
+    worth = _value(tree, text)
+
+    def passes(message: Any) -> bool:
+        try:
+            return bool(worth(message))
+        except (LookupError, TypeError, ArithmeticError):
+            return False
+
+    return passes
+
+
+def _value(node: ast.expr, text: str) -> Value:
+    maker = _MAKERS.get(type(node))
+    made = maker(node, text) if maker else None
+    if made is None:
+        part = ast.get_source_segment(text.strip(), node) or text
+        raise ValueError(f"filter: {part!r} has no meaning here; it takes fields, numbers, texts, comparisons,"
+                         " and, or, not, in, + - * / %, abs(), len()")  # fmt: skip
+    return made
+
+
+def _constant(node: ast.Constant, _text: str) -> Value | None:
+    value = node.value
+    return (lambda _: value) if value is None or isinstance(value, bool | int | float | str) else None
+
+
+def _name(node: ast.Name, _text: str) -> Value:
+    name = node.id
+    return (lambda message: message) if name == "m" else lambda message: message[name]
+
+
+def _attribute(node: ast.Attribute, text: str) -> Value:
+    inner, name = _value(node.value, text), node.attr
+    return lambda message: inner(message)[name]
+
+
+def _subscript(node: ast.Subscript, text: str) -> Value | None:
+    if isinstance(node.slice, ast.Slice):
+        return None
+    inner, index = _value(node.value, text), _value(node.slice, text)
+    return lambda message: inner(message)[index(message)]
+
+
+def _compare(node: ast.Compare, text: str) -> Value | None:
+    sides = [_value(side, text) for side in (node.left, *node.comparators)]
+    compare = [COMPARE.get(type(op)) for op in node.ops]
+    steps = [(how, *pair) for how, pair in zip(compare, pairwise(sides), strict=True) if how]
+    if len(steps) < len(compare):
+        return None
+    return lambda message: all(how(left(message), right(message)) for how, left, right in steps)
+
+
+def _bool(node: ast.BoolOp, text: str) -> Value:
+    parts, join = [_value(part, text) for part in node.values], all if isinstance(node.op, ast.And) else any
+    return lambda message: join(part(message) for part in parts)
+
+
+def _unary(node: ast.UnaryOp, text: str) -> Value | None:
+    inner = _value(node.operand, text)
+    if isinstance(node.op, ast.Not):
+        return lambda message: not inner(message)
+    return (lambda message: -_number(inner(message))) if isinstance(node.op, ast.USub) else None
+
+
+def _binary(node: ast.BinOp, text: str) -> Value | None:
+    left, right = _value(node.left, text), _value(node.right, text)
+    reason = REASON.get(type(node.op))
+    if reason is None:
+        return None
+    # Of numbers only: a text times a thousand million would take all memory.
+    return lambda message: reason(_number(left(message)), _number(right(message)))
+
+
+def _call(node: ast.Call, text: str) -> Value | None:
+    if not isinstance(node.func, ast.Name) or node.func.id not in CALLS or len(node.args) != 1 or node.keywords:
+        return None
+    call = CALLS[node.func.id]
+    inner = _value(node.args[0], text)
+    return lambda message: call(inner(message))
+
+
+def _number(value: Any) -> float:
+    if not isinstance(value, int | float):
+        raise TypeError
+    return value
+
+
+_MAKERS: dict[type[ast.expr], Callable[[Any, str], Value | None]] = {
+    ast.Constant: _constant, ast.Name: _name, ast.Attribute: _attribute, ast.Subscript: _subscript,
+    ast.Compare: _compare, ast.BoolOp: _bool, ast.UnaryOp: _unary, ast.BinOp: _binary, ast.Call: _call,
+}  # fmt: skip
