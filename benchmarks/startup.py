@@ -25,12 +25,17 @@ HOLOZEN = str(Path(sys.executable).with_name("holozen"))
 def tell_odom(endpoint: str, rate: float) -> None:
     """A robot that stands at `endpoint` and tells its odom."""
     with Bus("robot", host(endpoint)) as bus:
-        odom = bus.publisher("odom", Odometry)
-        due = time.monotonic()
-        while True:
-            odom.put(ODOM)
-            due += 1 / rate
-            time.sleep(max(0.0, due - time.monotonic()))
+        tell_for_ever(bus, rate)
+
+
+def tell_for_ever(bus: Bus, rate: float) -> None:
+    """Publish odom at `rate` Hz."""
+    odom = bus.publisher("odom", Odometry)
+    due = time.monotonic()
+    while True:
+        odom.put(ODOM)
+        due += 1 / rate
+        time.sleep(max(0.0, due - time.monotonic()))
 
 
 def first_line(*words: str) -> list[float]:

@@ -1,38 +1,41 @@
 """The bus: one Zenoh session, typed. The only file that imports zenoh.
 
 Nothing here works in Zenoh's threads: samples wait in ring channels, so a slow reader delays nobody but itself.
-The codec is imported where a type is first named: a process that only looks at bytes starts without it.
+Only a process that names a type loads the codec.
 """
+
+from __future__ import annotations
 
 import contextlib
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from functools import partial
 
 import zenoh
 
-from holozen import graph
+from holozen import zenoh_words
 from holozen.connection import Connection
-from holozen.errors import BusError, NoReply, ServiceError
-from holozen.publisher import Publisher
-from holozen.readers import Latest, Sample, Subscription, Tap
+from holozen.errors import BusError
+from holozen.tap import Sample, Tap, source
 
+TYPE_CHECKING = False  # importing `typing` takes 3 ms, which a verb that only looks at bytes would wait for
 if TYPE_CHECKING:
+    from typing import Any, Self, TypeVar
+
+    from holozen.about import About
+    from holozen.graph import Graph
     from holozen.messages import Message
+    from holozen.publisher import Publisher
+    from holozen.readers import Latest, Subscription
     from holozen.server import Server
 
-__all__ = [
-    "Bus", "BusError", "Latest", "NoReply", "Publisher", "Sample", "ServiceError", "Subscription", "Tap",
-]  # fmt: skip
-
-M = TypeVar("M", bound="Message")
-R = TypeVar("R", bound="Message")
+    M = TypeVar("M", bound=Message)
+    R = TypeVar("R", bound=Message)
 
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
-TIMEOUT = b"Timeout"  # what Zenoh itself replies for a service that says nothing
-OPEN_STEP = 500  # ms between two looks at the signals while a client waits for its router
+ROLL_CALL = 0.5  # s
 
 
 class Bus:
@@ -54,13 +57,17 @@ class Bus:
         stop: threading.Event | None = None,
     ) -> None:
         connection = connection or Connection()
-        self.node, self.wire = node, wire or connection.wire
+        self.node, self.wire, self.where = node, wire or connection.wire, connection.where
         self.session = _open(connection, patience, stop)
         self.id = str(self.session.zid())
-        self.source = f"{node}@{self.id[:6]}"  # how others name the sender of our samples
-        self._readers: set[Tap | Server] = set()  # they live until the bus is closed
+        self.source = source(node, self.id)  # how others name the sender of our samples
+        self._readers: set[Tap | Server | About] = set()  # they live until the bus is closed
         self._closing = threading.Event()
         self._door: threading.Thread | None = None
+        if lasting:
+            from holozen.about import About
+
+            self._readers.add(About(self.session, zenoh.handlers.RingChannel(16), node))
         self._token = self.announce("node") if lasting else None
         if lasting and connection.door:
             from holozen import door
@@ -86,6 +93,8 @@ class Bus:
 
     def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
         """Show a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
+        from holozen import graph
+
         endpoint = graph.Endpoint(key, kind, type_name, self.node, self.id)
         with _one_line(f"key {key!r}"):
             _ = kind == "node" or zenoh.KeyExpr(key)  # the token's own error would name the token
@@ -94,23 +103,29 @@ class Bus:
     def publisher(self, key: str, kind: type[M], priority: str = "DATA") -> Publisher[M]:
         """A writer of `kind` on `key`."""
         from holozen import codec
+        from holozen.publisher import Publisher
 
         token = self.announce("pub", kind.ROS, key)
         publisher = self.session.declare_publisher(
-            key, encoding=codec.WIRES[self.wire], priority=getattr(zenoh.Priority, priority), express=True
+            key, encoding=codec.encoding(self.wire, kind), priority=getattr(zenoh.Priority, priority), express=True
         )
-        writer: Publisher[M] = Publisher(publisher, self.wire, self.source)
+        number = partial(zenoh.SourceInfo, publisher.id)
+        writer: Publisher[M] = Publisher(publisher, self.wire, self.source, number)
         writer.ends += [self.session.declare_queryable(key, writer.answer), token]
         return writer
 
-    def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> "Subscription[M]":
+    def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> Subscription[M]:
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused."""
+        from holozen.readers import Subscription
+
         tap = self.tap(key, depth, limit)
         tap.ends.append(self.announce("sub", kinds[0].ROS, key))
         return Subscription(tap, kinds)
 
-    def latest(self, key: str, kind: type[M]) -> "Latest[M]":
+    def latest(self, key: str, kind: type[M]) -> Latest[M]:
         """The newest message on `key`, with its age."""
+        from holozen.readers import Latest
+
         return Latest(self.subscribe(key, kind, depth=1))
 
     def tap(self, key: str, depth: int = 1024, limit: int = 0) -> Tap:
@@ -120,12 +135,12 @@ class Bus:
         self._readers.add(tap)
         return tap
 
-    def drop(self, reader: "Subscription[Any] | Tap | Server") -> None:
+    def drop(self, reader: Subscription[Any] | Tap | Server) -> None:
         """Close a reader or a server before the bus; nothing of its key stays."""
         reader.close()
-        self._readers.discard(reader.tap if isinstance(reader, Subscription) else reader)
+        self._readers.discard(getattr(reader, "tap", reader))
 
-    def serve(self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R]) -> "Server":
+    def serve(self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R]) -> Server:
         """Answer requests on `key`. The caller asks for the work: `answer_pending()` in a loop, or `start()`."""
         from holozen.server import Server
 
@@ -136,40 +151,40 @@ class Bus:
         self._readers.add(server)
         return server
 
-    def call(self, key: str, request: "Message", reply: type[R], timeout: float = 5.0) -> R:
+    def call(self, key: str, request: Message, reply: type[R], timeout: float = 5.0) -> R:
         """Ask a service and wait for its reply, and for the service itself, for at most `timeout` seconds.
 
         Raises ServiceError with the service's own reason, when nobody answered, or for a reply that is none.
         """
-        from holozen import codec
+        from holozen import caller
 
-        payload = codec.encode(request, self.wire)
-        answer = self.call_bytes(key, payload, codec.WIRES[self.wire], timeout)
-        try:
-            return codec.decode(answer.payload, answer.encoding, (reply,))
-        except codec.CodecError as error:
-            raise ServiceError(f"the reply of {key!r} is {error}") from None
+        return caller.call(self, key, request, reply, timeout)
 
-    def call_bytes(self, key: str, payload: bytes, encoding: str, timeout: float) -> Sample:
-        """`call` without types."""
-        from holozen.server import refusal
+    def ask(self, key: str, timeout: float, **request: Any) -> Iterator[Sample | bytes]:
+        """Ask once, without waiting for the service: its replies, each a sample or the bytes of an error."""
+        with _one_line(f"key {key!r}"):
+            replies = self.session.get(key, timeout=timeout, attachment=self.source, **request)
+        return (Sample(reply.ok) if reply.ok else bytes(reply.err.payload) for reply in replies)
 
-        deadline = time.monotonic() + timeout
-        while (left := deadline - time.monotonic()) > 0:
-            with _one_line(f"service {key!r}"):
-                replies = self.session.get(key, payload=payload, encoding=encoding, timeout=left)
-            for reply in replies:
-                if reply.ok:
-                    return Sample(reply.ok)
-                if (answer := bytes(reply.err.payload)) != TIMEOUT:
-                    raise refusal(answer)
-            time.sleep(min(0.01, max(left, 0)))
-        raise NoReply(f"no reply from {key!r} within {timeout:g} s; `holozen service list` shows who serves")
+    def ask_all(self, key: str, timeout: float) -> Any:
+        """Ask all who serve `key` without a payload, ahead of other traffic: the channel of their replies."""
+        return self.session.get(
+            key, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE, timeout=timeout,
+            priority=zenoh.Priority.REAL_TIME, congestion_control=zenoh.CongestionControl.BLOCK, express=True,
+            attachment=self.source,
+        )  # fmt: skip
 
-    def graph(self) -> graph.Graph:
-        """The endpoints of all nodes, kept up to date."""
-        tokens = self.session.liveliness().declare_subscriber(graph.ALL, zenoh.handlers.RingChannel(4096), history=True)
-        return graph.Graph(lambda: _token_change(tokens.try_recv()))
+    def graph(self, keys: str = "@holozen/**") -> Graph:
+        """The endpoints of all nodes, or those with tokens like `keys`, kept up to date."""
+        from holozen import graph
+
+        live = self.session.liveliness()
+        tokens = live.declare_subscriber(keys, zenoh.handlers.RingChannel(4096), history=True)
+        return graph.Graph(
+            lambda: _token_change(tokens.try_recv()),
+            lambda: list(live.get(keys, timeout=ROLL_CALL)),
+            lambda: map(str, self.session.info.peers_zid() if keys == graph.ALL else ()),
+        )
 
     def connected(self) -> bool:
         """Whether this session has a link to any other."""
@@ -193,9 +208,9 @@ def _open(connection: Connection, patience: float | None, stop: threading.Event 
             return zenoh.open(_config(connection))
         except zenoh.ZError as error:
             if connection.mode != "client" or (deadline and time.monotonic() > deadline):
-                raise BusError(f"cannot open Zenoh: {_first_words(error)}") from None
+                raise BusError(zenoh_words.opening(error, connection.mode, connection.where, patience)) from None
         if not told:
-            print(f"waiting for a Zenoh router at {', '.join(connection.connect or ())}", file=sys.stderr, flush=True)
+            print(f"waiting for a Zenoh router at {connection.where}", file=sys.stderr, flush=True)
             told = True
         if stop.wait(0.05):
             raise SystemExit(0)
@@ -204,12 +219,7 @@ def _open(connection: Connection, patience: float | None, stop: threading.Event 
 def _config(connection: Connection) -> zenoh.Config:
     with _one_line(f"Zenoh configuration {connection.config}"):
         config = zenoh.Config.from_file(connection.config) if connection.config else zenoh.Config()
-    settings = connection.settings()
-    if connection.mode == "client":
-        # Short tries, so that signals are seen in between. After the first success Zenoh reconnects for ever.
-        short = {"connect/timeout_ms": str(OPEN_STEP), "connect/exit_on_failure": "true"}
-        settings |= short | dict(connection.cfg)
-    for path, value in settings.items():
+    for path, value in connection.settings().items():
         with _one_line(f"Zenoh setting {path}:{value}"):
             config.insert_json5(path, value)
     return config
@@ -222,10 +232,11 @@ def _open_door(endpoint: str) -> Callable[[], None] | None:
         session = zenoh.open(_config(Connection(connect=(), listen=(), cfg=cfg)))
     except zenoh.ZError:
         return None
-    return lambda: _close(session)
+    token = session.liveliness().declare_token(f"@holozen/{session.zid()}/door/door")  # no stranger, and no node
+    return partial(_close, session, token)
 
 
-def _close(session: Any) -> None:
+def _close(session: Any, *_kept: Any) -> None:
     with contextlib.suppress(zenoh.ZError):
         session.close()
 
@@ -235,9 +246,4 @@ def _one_line(what: str) -> Iterator[None]:
     try:
         yield
     except zenoh.ZError as error:
-        raise BusError(f"{what}: {_first_words(error)}") from None
-
-
-def _first_words(error: Exception) -> str:
-    """Zenoh's reason in one line, without the source files it comes from."""
-    return " ".join(str(error).partition(" at /")[0].replace("\\n", " ").split()).rstrip(".")
+        raise BusError(f"{what}: {zenoh_words.reason(error)}") from None

@@ -4,27 +4,50 @@ Without flags nothing leaves this machine: peers on loopback meet at tcp/127.0.0
 """
 
 import argparse
-import json
-from typing import NamedTuple
+
+from holozen.endpoints import fault
 
 DOOR = "tcp/127.0.0.1:7447"  # where the processes of one machine meet; Zenoh's own port
 LOOPBACK = "tcp/127.0.0.1:0"  # any free port, on loopback only
 LEASE = 1000  # ms; a silent link is given up after this long (Zenoh's default is 10 s)
+OPEN_STEP = 500  # ms between two looks at the signals while a client waits for its router
 _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 
-class Connection(NamedTuple):
+class Connection:
     """Zenoh's flags as given, and how messages are written.
 
     `listen` and `connect` of None mean the loopback default, empty ones mean none.
     """
 
-    mode: str = "peer"
-    connect: tuple[str, ...] | None = None
-    listen: tuple[str, ...] | None = None
-    config: str | None = None
-    cfg: tuple[tuple[str, str], ...] = ()
-    wire: str = "json"
+    def __init__(
+        self,
+        mode: str = "peer",
+        connect: tuple[str, ...] | None = None,
+        listen: tuple[str, ...] | None = None,
+        config: str | None = None,
+        cfg: tuple[tuple[str, str], ...] = (),
+        wire: str = "json",
+    ) -> None:
+        self.mode, self.connect, self.listen = mode, connect, listen
+        self.config, self.cfg, self.wire = config, cfg, wire
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Connection) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(vars(self).values()))
+
+    def replace(self, **changes: object) -> "Connection":
+        """The same with some of its values changed."""
+        return Connection(**{**vars(self), **changes})
+
+    @property
+    def where(self) -> str:
+        """Where it looks for others, in words."""
+        if self.config and self.connect is None:
+            return f"the endpoints of {self.config}"
+        return ", ".join(self._connect_endpoints()) or ", ".join(self._listen_endpoints())
 
     @property
     def door(self) -> str | None:
@@ -45,7 +68,10 @@ class Connection(NamedTuple):
         if self.config:
             # The file decides; a mode of "peer" cannot be told from none given.
             values = {k: v for k, v in values.items() if k.endswith("/endpoints") or (k == "mode" and v != "peer")}
-        return {path: json.dumps(value) for path, value in values.items()} | dict(self.cfg)
+        if self.mode == "client":
+            # Short tries, so that signals are seen in between. After the first success Zenoh reconnects for ever.
+            values |= {"connect/timeout_ms": OPEN_STEP, "connect/exit_on_failure": True}
+        return {path: _json(value) for path, value in values.items()} | dict(self.cfg)
 
     def arguments(self) -> list[str]:
         """The flags that give another process this same connection."""
@@ -90,10 +116,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Zenoh's own flags, with the names that its other tools use."""
     group = parser.add_argument_group("zenoh", f"where to meet; by default peers on loopback at {DOOR}")
     group.add_argument("--mode", choices=("peer", "client", "router"), default="peer", help="Zenoh session mode")
-    group.add_argument("--connect", action="append", metavar="ENDPOINT", help="connect there, e.g. tcp/10.0.0.2:7447")
-    group.add_argument("--listen", action="append", metavar="ENDPOINT", help="listen there, e.g. tcp/0.0.0.0:7447")
+    for name, example in (("connect", "tcp/10.0.0.2:7447"), ("listen", "tcp/0.0.0.0:7447")):
+        told = f"{name} there, e.g. {example}"
+        group.add_argument(f"--{name}", action="append", type=endpoint, metavar="ENDPOINT", help=told)
     group.add_argument("--config", metavar="FILE", help="a Zenoh configuration file (JSON5 or YAML)")
-    group.add_argument("--wire", choices=("json", "msgpack"), default="json", help="how messages are written")
+    group.add_argument("--wire", choices=("json", "msgpack", "cdr"), default="json", help="how messages are written")
     group.add_argument("--cfg", action="append", type=_pair, default=[], metavar="PATH:VALUE", help="one setting of it")
 
 
@@ -107,6 +134,24 @@ def from_arguments(args: argparse.Namespace) -> Connection:
         cfg=tuple(args.cfg),
         wire=args.wire,
     )
+
+
+def endpoint(text: str) -> str:
+    """A parser for an endpoint."""
+    if wrong := fault(text):
+        raise argparse.ArgumentTypeError(wrong)
+    return text
+
+
+def _json(value: object) -> str:
+    """What the module `json` makes of it; that takes 2 ms to load, and these are few."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_json(name)}: {_json(inner)}" for name, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_json, value)) + "]"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return str(value).lower()
 
 
 def _pair(text: str) -> tuple[str, str]:

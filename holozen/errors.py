@@ -1,5 +1,7 @@
 """What can go wrong on the bus. Each text is one line that says why."""
 
+TIMEOUT = b"Timeout"  # what Zenoh itself replies for a service that says nothing
+
 
 class BusError(Exception):
     """The bus could not do what was asked."""

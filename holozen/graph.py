@@ -4,15 +4,22 @@ A token's key is `@holozen/<session>/<node>/<kind>/<package>/<msg or srv>/<Type>
 kind. The `@` keeps them out of reach of a plain `**`.
 """
 
+from __future__ import annotations
+
+import functools
 import time
+from collections import deque, namedtuple
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
+
+from holozen.tap import source
 
 ALL = "@holozen/**"
+STRANGERS = 5  # times as long as for others is waited for those who have told nothing
+MOST_GONE = 1000  # tokens that are remembered for who asks which nodes left; the oldest are dropped
 KINDS = ("node", "pub", "sub", "srv")
 
 
-class Endpoint(NamedTuple):
+class Endpoint(namedtuple("Endpoint", "key kind type node session")):  # of texts; `typing` would take 3 ms to load
     """One node, or one of its publishers ("pub"), subscribers ("sub") or services ("srv")."""
 
     key: str
@@ -20,6 +27,11 @@ class Endpoint(NamedTuple):
     type: str
     node: str
     session: str
+
+    @property
+    def source(self) -> str:
+        """What its samples say they come from."""
+        return source(self.node, self.session)
 
 
 def token(endpoint: Endpoint) -> str:
@@ -30,6 +42,7 @@ def token(endpoint: Endpoint) -> str:
     return start if endpoint.kind == "node" else f"{start}/{endpoint.type}/{key}"
 
 
+@functools.lru_cache(maxsize=4096)  # who shows the graph looks at the same tokens again and again
 def parse(text: str) -> Endpoint | None:
     """The endpoint a token names; None if the key is no such token."""
     parts = text.split("/", 7)
@@ -63,29 +76,66 @@ def _includes(pattern: list[str], chunks: list[str]) -> bool:
 class Graph:
     """The endpoints of all nodes as their tokens come and go.
 
-    `change` gives the next token's key and whether it is there now, or None when there is nothing new.
+    `change` gives the next token's key and whether it is there now, or None when there is nothing new. `roll_call`
+    returns when everyone who is connected by now has told theirs; `met` gives the sessions of those.
     """
 
-    def __init__(self, change: Callable[[], tuple[str, bool] | None]) -> None:
-        self._change = change
+    def __init__(
+        self,
+        change: Callable[[], tuple[str, bool] | None],
+        roll_call: Callable[[], object] = lambda: None,
+        met: Callable[[], Iterable[str]] = tuple,
+    ) -> None:
+        self._change, self._roll_call, self._met = change, roll_call, met
         self._tokens: set[str] = set()
+        self._gone: deque[str] = deque(maxlen=MOST_GONE)
 
     def endpoints(self) -> list[Endpoint]:
         """Those known by now, sorted by key."""
-        while (change := self._change()) is not None:
-            key, there = change
-            (self._tokens.add if there else self._tokens.discard)(key)
+        self._look()
         found = (parse(key) for key in self._tokens)
         return sorted(endpoint for endpoint in found if endpoint)
 
-    def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.04) -> list[Endpoint]:
-        """Those known once someone is connected and nothing changed for `quiet` seconds; at most `patience` seconds."""
+    def left(self) -> list[str]:
+        """The sources of the nodes that left since the last call. Cheap when there are none."""
+        self._look()
+        if not self._gone:
+            return []
+        gone = [parse(self._gone.popleft()) for _ in range(len(self._gone))]
+        return [endpoint.source for endpoint in gone if endpoint and endpoint.kind == "node"]
+
+    def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.015) -> list[Endpoint]:
+        """Those known once someone is connected and nothing changed for a while; at most twice `patience` seconds.
+
+        Who is met tells of others, whom it takes a moment to meet: `quiet` seconds, or twice the time that the news
+        took so far, since a slow network or machine needs longer. Who is met and has told nothing may be a stranger,
+        or one of us who is about to.
+        """
+        start = time.monotonic()
+        while not connected():
+            if time.monotonic() - start > patience:
+                return self.endpoints()
+            time.sleep(0.001)
         deadline = time.monotonic() + patience
-        while not connected() and time.monotonic() < deadline:
-            time.sleep(0.002)
+        self._roll_call()  # a link that is this young may have nobody behind it yet who answers
         known, since = self.endpoints(), time.monotonic()
-        while time.monotonic() - since < quiet and time.monotonic() < deadline:
-            time.sleep(0.002)
-            if (now := self.endpoints()) != known:
-                known, since = now, time.monotonic()
+        while (now := time.monotonic()) < deadline:
+            passed, enough = now - since, max(quiet, 2 * (since - start))
+            if known and (passed > STRANGERS * enough or (passed > enough and self._all_told())):
+                break
+            time.sleep(0.001)
+            if (newer := self.endpoints()) != known:
+                known, since = newer, time.monotonic()
         return known
+
+    def _all_told(self) -> bool:
+        return set(self._met()) <= {key.split("/", 2)[1] for key in self._tokens}
+
+    def _look(self) -> None:
+        while (change := self._change()) is not None:
+            key, there = change
+            if there:
+                self._tokens.add(key)
+            else:
+                self._tokens.discard(key)
+                self._gone.append(key)

@@ -1,5 +1,7 @@
 """The writing side of a key: messages out, and the last one for whoever asks."""
 
+from collections.abc import Callable
+from itertools import count
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 if TYPE_CHECKING:
@@ -9,15 +11,20 @@ M = TypeVar("M", bound="Message")
 
 
 class Publisher(Generic[M]):
-    """Writes messages, and answers a `get` on its key with the last one. Made by `Bus.publisher`."""
+    """Writes messages, and answers a `get` on its key with the last one. Made by `Bus.publisher`.
 
-    def __init__(self, publisher: Any, wire: str, source: str) -> None:
+    Each goes out with the sender's name, and with its number, by which a reader knows how many were lost. `number`
+    makes what Zenoh takes for that (SourceInfo).
+    """
+
+    def __init__(self, publisher: Any, wire: str, source: str, number: Callable[[int], Any]) -> None:
         from holozen import codec
 
         self.ends = [publisher]  # what stands on the wire for this publisher
         self._publisher, self._wire, self._source = publisher, wire, source.encode()
-        self._encode, self._encoding = codec.encode, codec.WIRES[wire]
+        self._encode, self._encoding = codec.encode, publisher.encoding
         self._last: bytes | None = None
+        self._numbers = map(number, count())
 
     @property
     def matched(self) -> bool:
@@ -26,8 +33,12 @@ class Publisher(Generic[M]):
 
     def put(self, message: M) -> None:
         """Send one message. Raises codec.CodecError if it holds a number that is not finite."""
-        self._last = self._encode(message, self._wire)
-        self._publisher.put(self._last, attachment=self._source)
+        self.put_bytes(self._encode(message, self._wire))
+
+    def put_bytes(self, payload: bytes) -> None:
+        """Send what is encoded already."""
+        self._last = payload
+        self._publisher.put(payload, attachment=self._source, source_info=next(self._numbers))
 
     def answer(self, query: Any) -> None:
         """Reply with the last message. Runs in Zenoh's thread, and so does nothing else."""

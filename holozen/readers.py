@@ -6,75 +6,16 @@ import time
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from holozen.errors import BusError
+from holozen.tap import PRIORITIES, Sample, Tap
 
 if TYPE_CHECKING:
     from holozen.messages import Message
 
+__all__ = ["PRIORITIES", "Arrivals", "Latest", "Received", "Sample", "Subscription", "Tap"]
+
 M = TypeVar("M", bound="Message")
 
-PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
-"""Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
-
 SLOWEST = 5.0  # s; nothing is waited for longer than this before it is called stale
-
-
-class Sample:
-    """What arrived. `payload` is empty where `size`, in bytes, is over the reader's limit (0: there is none).
-
-    Most readers want no more than the payload, so the rest is looked up in Zenoh's sample when it is asked for.
-    """
-
-    __slots__ = ("_sample", "encoding", "payload", "size")
-
-    def __init__(self, sample: Any, limit: int = 0) -> None:
-        payload = sample.payload
-        self._sample, self.encoding, self.size = sample, str(sample.encoding), len(payload)
-        self.payload = b"" if limit and self.size > limit else bytes(payload)
-
-    @property
-    def key(self) -> str:
-        """The key it came on."""
-        return str(self._sample.key_expr)
-
-    @property
-    def priority(self) -> str:
-        """The name of its Zenoh priority."""
-        return PRIORITIES[int(self._sample.priority) - 1]
-
-    @property
-    def source(self) -> str:
-        """Who says to have sent it; empty if nobody does."""
-        told = self._sample.attachment
-        return bytes(told).decode(errors="replace")[:80] if told else ""
-
-
-class Tap:
-    """Raw samples, the newest of them if there were too many to read."""
-
-    def __init__(self, subscriber: Any, limit: int = 0) -> None:
-        # Reading from the handler leaves the subscriber free to be undeclared meanwhile.
-        self.ends = [subscriber]  # what stands on the wire for this reader
-        self._samples, self._limit = subscriber.handler, limit
-        self.thread: threading.Thread | None = None  # the one that waits in `recv`
-
-    def try_recv(self) -> Sample | None:
-        """The next waiting sample, or None."""
-        sample = self._samples.try_recv()
-        return sample and Sample(sample, self._limit)
-
-    def recv(self) -> Sample:
-        """The next sample; waits for it. Raises BusError once the bus or this tap is closed."""
-        self.thread = threading.current_thread()
-        try:
-            sample = self._samples.recv()
-        except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
-            raise BusError("closed") from None
-        return Sample(sample, self._limit)
-
-    def close(self) -> None:
-        """Stop listening."""
-        for end in self.ends:
-            end.undeclare()
 
 
 class Received(NamedTuple, Generic[M]):

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
 from holozen.errors import ServiceError
+from holozen.tap import source_in
 from holozen.tell import say
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ class Server:
         # Reading from the handler leaves the queryable free to be undeclared meanwhile.
         self._queries = queryable.handler
         self.thread: threading.Thread | None = None  # the one of `start`
+        self.caller = ""  # who says to have sent the request that is being answered
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
     def answer_pending(self, most: int = 1000) -> None:
@@ -66,9 +68,11 @@ class Server:
         with query:
             if str(query.key_expr) != self._key:
                 return  # a wildcard looks around; it asks nobody to do anything
+            self.caller = source_in(query.attachment)
             try:
-                reply = self._codec.encode(self._answer(self._read(query)), self._wire)
-                query.reply(self._key, reply, encoding=self._codec.WIRES[self._wire])
+                answer = self._answer(self._read(query))
+                reply = self._codec.encode(answer, self._wire)
+                query.reply(self._key, reply, encoding=self._codec.encoding(self._wire, type(answer)))
             except ServiceError as error:
                 _refuse(query, str(error), error.fields)
             except self._codec.CodecError as error:

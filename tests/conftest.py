@@ -16,10 +16,16 @@ import pytest
 PACKAGES = {
     "docker": "docker.io",
     "docker-compose": "docker-compose",
+    "Xvfb": "xvfb",
     "ip": "iproute2",
+    "kitty": "kitty",
+    "screen": "screen",
     "setpriv": "util-linux",
+    "setxkbmap": "x11-xkb-utils",
     "ss": "iproute2",
+    "tmux": "tmux",
     "unshare": "util-linux",
+    "xdotool": "xdotool",
 }
 """Debian's package of each command that a test may need."""
 

@@ -15,7 +15,6 @@ OTHERS = [path for folder in ("examples", "meshes", "scripts") for path in REPO.
 PLACES = {
     "zenoh": ["holozen/bus.py"],
     "pybullet": ["services/sim/engine.py"],
-    "prompt_toolkit": ["services/teleop/"],
     "numpy": ["holozen/robot/", "services/sim/"],
     "collada": [],
     "xacro": ["holozen/robot/xacro/child.py"],

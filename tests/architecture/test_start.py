@@ -9,7 +9,7 @@ import pytest
 
 REPO = Path(__file__).parents[2]
 HEAVY = {
-    "numpy", "msgspec", "prompt_toolkit", "pybullet", "dataclasses", "pathlib", "yaml", "xacro", "asyncio", "inspect",
+    "numpy", "msgspec", "pybullet", "dataclasses", "pathlib", "yaml", "xacro", "asyncio", "inspect",
     "subprocess", "importlib.metadata", "xml.etree.ElementTree",
 }  # fmt: skip
 
@@ -51,6 +51,14 @@ def test_an_echo_gets_as_far_as_its_first_message_without_anything_heavy() -> No
         ("holozen.cli", set()),
         ("holozen.cli.node", set()),
         ("holozen.cli.router", set()),
+        ("holozen.cli.release", set()),
+        ("holozen.cli.param", set()),
+        ("holozen.cli.doctor", set()),
+        ("holozen.cli.bag", set()),
+        ("holozen.cli.map", set()),
+        ("holozen.cli.plot", set()),
+        ("holozen.cli.record", set()),
+        ("holozen.cli.replay", set()),
         ("holozen.testing", {"subprocess", "inspect"}),
         ("services.teleop.__main__", {"asyncio", "inspect", "subprocess"}),
         ("services.sim.__main__", {"msgspec", "pathlib", "dataclasses", "inspect", "xml.etree.ElementTree"}),

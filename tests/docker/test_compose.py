@@ -72,14 +72,14 @@ def test_the_controller_drives_its_shape(stack: Stack) -> None:
 def test_a_person_takes_over_from_a_terminal_and_hands_back(stack: Stack, watcher: Watcher) -> None:
     everybody = stack.containers()
     with Terminal(stack.words("run", "--rm", "teleop"), env=stack.env) as terminal:
-        terminal.wait_for_text("driver    controller", within=60)
+        terminal.wait_for_text("controller@", within=60)
 
         def driven() -> bool:
             terminal.type("i")  # with each status, as a held key
             return watcher.driven_by("teleop") and watcher.odom().twist.twist.linear.x > 0.4
 
         wait_for(driven, what="the teleop to drive")
-        terminal.wait_for_text("driver    you")
+        terminal.wait_for_text("you drive")
         terminal.type("\x03")
         assert terminal.process.wait(20) == 0
         assert terminal.modes() == terminal.modes_before
@@ -87,6 +87,31 @@ def test_a_person_takes_over_from_a_terminal_and_hands_back(stack: Stack, watche
     wait_for(lambda: not watcher.moves() and not watcher.status().obeyed, what="a robot that stands, nobody's")
     assert watcher.status().held
     assert stack.containers() == everybody
+    holozen(stack, "controller", "--resume")
+    wait_for(lambda: watcher.driven_by("controller"), what="the controller to go on")
+
+
+def test_a_person_attaches_and_detaches_and_the_robot_stands(stack: Stack, watcher: Watcher) -> None:
+    stack.compose("up", "-d", "teleop")
+    container = stack.container("teleop")
+    with Terminal(["docker", "attach", container], env=stack.env) as terminal:
+        terminal.wait_for_text("listening sim", within=60)
+
+        def driven() -> bool:
+            terminal.type("i")
+            return watcher.driven_by("teleop") and watcher.odom().twist.twist.linear.x > 0.4
+
+        wait_for(driven, what="the teleop to drive")
+        terminal.type("\x10\x11")  # Docker's own keys
+        terminal.process.wait(20)
+        assert "read escape sequence" in terminal.raw, "it was detached"
+    wait_for(lambda: not watcher.moves(), what="a robot that stands")
+    with Terminal(["docker", "attach", container], env=stack.env) as terminal:
+        terminal.wait_for_text("listening sim", within=20)
+        assert not watcher.moves(), "nothing moves before a new key"
+        terminal.type("\x03")
+        assert terminal.process.wait(20) == 0, terminal.raw[-400:]
+    stack.compose("rm", "-f", "teleop")
     holozen(stack, "controller", "--resume")
     wait_for(lambda: watcher.driven_by("controller"), what="the controller to go on")
 

@@ -4,9 +4,9 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from holozen.bus import Bus, Subscription
+from holozen.bus import Bus
 from holozen.messages import CommandStatus, Message, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
-from holozen.readers import Received
+from holozen.readers import Received, Subscription
 from holozen.testing import wait_for
 from holozen.wire import key_for
 

@@ -16,22 +16,25 @@ from holozen.messages import Odometry, Twist
 from holozen.testing import Process, Wire, wait_for
 
 from .conftest import start_sim, stranger_config
-from .robots import Robot, moves, place
+from .robots import Robot, moves, place, rests
 
 
-def test_a_sim_killed_while_driving_and_started_again_is_driven_on(wire: Wire) -> None:
+def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pressed_anew(wire: Wire) -> None:
     sim = start_sim(wire)
     robot = Robot(wire.bus())
-    terminal = wire.terminal("teleop", "--key-timeout", "0")
+    terminal = wire.terminal("teleop", "--mode", "latch")
     terminal.wait_for_text("listening")
     terminal.type("i")
     robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
     sim.kill()
     terminal.wait_for_text("ODOM IS STALE")
     assert terminal.process.returncode is None
+    terminal.wait_for_text("odom comes no more: stopped")
     start_sim(wire)
-    robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
-    terminal.wait_for_text("measured  x +0.500")
+    wait_for(lambda: "ODOM IS STALE" not in terminal.screen())
+    assert rests(robot.newest())
+    terminal.type("J")
+    robot.odom.next(lambda odom: moves(odom, 0, 0.5, 0))
     terminal.type("k")
     robot.stands()
 
@@ -188,7 +191,7 @@ def test_a_service_with_its_words_cut_off_ends_quietly(wire: Wire) -> None:
 
 def test_who_is_gone_answers_no_get_with_its_last_command(wire: Wire) -> None:
     start_sim(wire)
-    terminal = wire.terminal("teleop", "--key-timeout", "0")
+    terminal = wire.terminal("teleop", "--mode", "latch")
     terminal.wait_for_text("listening")
     terminal.type("i")
 

@@ -112,27 +112,27 @@ def test_a_person_who_puts_by_hand_with_a_stranger_s_tool_is_yielded_to(scene: S
 
 def test_the_teleops_r_hands_over(wire: Wire, scene: Scene) -> None:
     terminal = wire.terminal("teleop")
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
     terminal.type(",")
     scene.robot.odom.next(lambda odom: moves(odom, -0.5, 0, 0))
-    terminal.wait_for_text("driver    you")
+    terminal.wait_for_text("you drive")
     terminal.type("k")
     scene.controller.wait_for_line("yields to teleop@")
-    terminal.wait_for_text("driver    nobody; r lets the controller drive again")
+    terminal.wait_for_text("nobody drives; the autopilot is held")
     scene.robot.stands()
     terminal.type("r")
     scene.controller_drives()
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
 
 
 def test_the_teleops_r_hands_over_in_the_middle_of_a_drive(wire: Wire, scene: Scene) -> None:
     terminal = wire.terminal("teleop", "--key-timeout", "0")
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
     terminal.type(",")
-    terminal.wait_for_text("driver    you")
+    terminal.wait_for_text("you drive")
     terminal.type("r")
     scene.controller_drives()
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
 
 
 def test_it_stops_when_odom_stops_and_goes_on_when_the_sim_is_back(wire: Wire, scene: Scene) -> None:

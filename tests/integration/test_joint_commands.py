@@ -5,8 +5,8 @@ from collections.abc import Callable
 import pytest
 
 from holozen import entities
-from holozen.bus import Publisher
 from holozen.messages import JointState
+from holozen.publisher import Publisher
 from holozen.testing import Wire, wait_for
 
 from .robots import Record, Robot, place, record, speeds

@@ -71,7 +71,7 @@ def network() -> Iterator[Network]:
 def test_nothing_listens_beyond_loopback_and_no_multicast_is_joined(network: Network) -> None:
     before = network.groups()
     with Process(network.inside(*command("up"))) as up, Terminal(network.inside(*command("teleop"))) as teleop:
-        teleop.wait_for_text("driver    controller@")
+        teleop.wait_for_text("controller@")
         listeners = [(address, port) for address, port, state in network.sockets("tcp") if state == LISTENS]
         assert (LOOPBACK, 7447) in listeners
         assert {address for address, _ in listeners} == {LOOPBACK}

@@ -84,7 +84,7 @@ def test_who_overruled_fred_has_nothing_to_say_to_ann(town: Wire, fred: Robot, a
 def test_a_teleop_with_a_name_drives_that_robot(town: Wire, fred: Robot, ann: Robot) -> None:
     with town.terminal("teleop", "Ann") as terminal:
         terminal.wait_for_text("listening")
-        assert "holozen teleop Ann" in terminal.screen()
+        assert "holozen teleop   Ann   Tab: Fred" in terminal.screen()
         seen = len(fred.commands.messages())
         terminal.type("i")
         ann.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
@@ -123,7 +123,7 @@ WRONG = {
     "a limit of zero": (["--max-linear", "0"], 2, "'0'"),
     "a package without a folder": (["--package", "holo"], 2, "write NAME=DIR"),
     "an unknown flag": (["--rft", "1"], 2, "--rft"),
-    "an endpoint that is none": (["--connect", "nonsense"], 1, "nonsense"),
+    "an endpoint that is none": (["--connect", "nonsense"], 2, "nonsense"),
 }  # fmt: skip
 
 

@@ -62,7 +62,7 @@ def game(house: Path, wire: Wire) -> Iterator[Game]:
 def played(game: Game, name: str = "Fred") -> Robot:
     """The robot, once the teleop drives it."""
     robot = Robot(game.wire.bus(), name)
-    game.terminal.wait_for_text("cmd_vel")
+    game.terminal.wait_for_text("listening sim")
     game.terminal.type("i")
     robot.odom.next(lambda odom: speeds(odom)[0] > 0.1, within=20)
     return robot
@@ -137,7 +137,7 @@ def test_what_is_wrong_is_told_and_nothing_is_left(house: Path, wire: Wire, word
     game = Game(house, wire, *(str(house / word) if word.startswith("urdf") else word for word in words))
     game.terminal.process.wait(30)
     assert game.terminal.process.returncode in (1, 2)
-    assert told in game.terminal.raw
+    wait_for(lambda: told in game.terminal.raw)
     assert game.left() == ({}, [])
     game.terminal.close()
 

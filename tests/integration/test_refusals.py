@@ -53,7 +53,7 @@ BAD = {
     "msgpack called JSON": ("malformed", packed(1.0), JSON),
     "JSON called msgpack": ("malformed", b'{"linear":{"x":1}}', MSGPACK),
     "an encoding nobody knows": ("malformed", b'{"linear":{"x":1}}', "image/png"),
-    "CDR": ("malformed", b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0), "application/cdr"),
+    "CDR that is cut off": ("malformed", b"\0\1\0\0" + struct.pack("<5d", 1, 0, 0, 0, 0), "application/cdr"),
     "10 MB": ("oversized", b'{"linear":{"x":1}}' + b" " * 10_000_000, JSON),
     "just over the limit": ("oversized", b'{"linear":{"x":1}}'.ljust(65_537), JSON),
     "a stamp of yesterday": ("stale", stamped(time.time() - 86_400), JSON),

@@ -27,17 +27,20 @@ def pose_service(town: Wire, sim: Process) -> None:
 
 
 def test_service_list_names_every_service(town: Wire) -> None:
+    """Those of the table, and those by which each process tells its parameters."""
     services = {service.key: service.reply.ROS for service in SERVICES}
-    assert town.run("service", "list").stdout.split() == sorted(services)
+    shown = town.run("service", "list").stdout.split()
+    assert {key for key in shown if not key.endswith("_parameters")} == set(services)
+    assert shown == sorted(set(shown))
     lines = town.run("service", "list", "-t").stdout.splitlines()
-    assert lines == [f"{key} [{kind}]" for key, kind in sorted(services.items())]
+    assert {f"{key} [{kind}]" for key, kind in services.items()} <= set(lines)
     assert "resume [std_srvs/srv/Trigger]" in lines
 
 
 def test_service_list_of_nobody_says_so(wire: Wire) -> None:
     done = wire.run("service", "list")
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "no services: nobody is there; `holozen up` starts some\n"
+    assert done.stderr == f"no services: nobody is there at {wire.endpoint}; `holozen up` starts some\n"
 
 
 def test_service_call_prints_the_reply(town: Wire) -> None:
@@ -52,6 +55,12 @@ def test_service_call_prints_the_reply(town: Wire) -> None:
     }
     as_json = town.run("service", "call", "/next_goal", "request_goal: 3", "--json").stdout
     assert json.loads(as_json) == {"x_goal": 0.0, "y_goal": 0.0, "theta_goal": 0.0, "end_of_list": 1}
+
+
+def test_service_call_of_another_type_is_refused(town: Wire) -> None:
+    done = town.run("service", "call", "next_goal", "std_srvs/srv/Trigger", "{}")
+    assert_one_line(done, 1, "next_goal: its type is holozen/srv/NextGoal, not std_srvs/srv/Trigger")
+    assert town.run("service", "call", "next_goal", "holozen/NextGoal", "{}").returncode == 0
 
 
 def test_service_call_without_a_request_sends_zeros(town: Wire, robot: Robot) -> None:
@@ -83,7 +92,7 @@ def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
         (["call", "get_pose", '{"name": "Fred"}'], 1, "no Fred/odom has been heard"),
         (["call", "get_pose", '{"name": "*"}'], 1, "robot name '*': use a letter"),
         (["call", "Fred/resume", "--timeout", "0.3"], 1, "no reply from 'Fred/resume' within 0.3 s"),
-        (["call", "make_tea"], 1, "'make_tea' has no known type; known: next_goal, get_pose, resume"),
+        (["call", "make_tea"], 1, "'make_tea' has no known type; known: next_goal, get_pose, "),
         (["call", "next_goal", "--timeout", "0"], 2, "'0': use a number"),
         (["call"], 2, "key"),
         (["ring"], 2, "'ring'"),
@@ -105,7 +114,7 @@ def test_node_list_names_who_runs(town: Wire) -> None:
 def test_node_list_of_nobody_says_so(wire: Wire) -> None:
     done = wire.run("node", "list")
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "no nodes: nobody is there; `holozen up` starts some\n"
+    assert done.stderr == f"no nodes: nobody is there at {wire.endpoint}; `holozen up` starts some\n"
 
 
 def test_clients_meet_through_a_router(wire: Wire) -> None:
@@ -153,7 +162,7 @@ def test_a_router_whose_port_is_taken_says_so(town: Wire) -> None:
 
 
 def test_an_unknown_verb_names_those_that_exist(town: Wire) -> None:
-    assert_one_line(town.run("drive"), 2, "holozen: no verb 'drive'; there are up, sim, ")
+    assert_one_line(town.run("drive"), 2, "holozen: no verb 'drive'; there are up, ")
 
 
 def test_help_names_every_verb_and_every_verb_has_help() -> None:
@@ -190,3 +199,68 @@ def test_output_into_a_reader_that_is_gone_ends_quietly(town: Wire, verb: str, u
             command(*verb.split(), *flags), stdout=gone, stderr=subprocess.PIPE, text=True, cwd=ROOT, env=env
         )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_service_type_find_and_info(town: Wire) -> None:
+    assert town.run("service", "type", "resume").stdout == "std_srvs/srv/Trigger\n"
+    assert town.run("service", "find", "NextGoal").stdout == "next_goal\n"
+    lines = town.run("service", "info", "next_goal").stdout.splitlines()
+    assert lines[:2] == ["Type: holozen/srv/NextGoal", "Services count: 1"]
+    assert lines[2].startswith("  pose_service (")
+    told = json.loads(town.run("service", "info", "next_goal", "--json").stdout)
+    assert [server["node"] for server in told["servers"]] == ["pose_service"]
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ("service type next_gaol", "unknown key 'next_gaol'; did you mean 'next_goal'?; known: delete_entity, "),
+        ("service info next_gaol", "unknown key 'next_gaol'; did you mean 'next_goal'?"),
+        ("service find Triger", "no service of type 'Triger'"),
+        ("node info smi", "unknown node 'smi'; did you mean 'sim'?; known: pose_service, sim"),
+        ("topic type odmo", "unknown key 'odmo'; did you mean 'odom'?"),
+        ("topic find Odmetry", "no topic of type 'Odmetry'"),
+    ],
+)
+def test_what_is_not_there_is_told_with_the_closest(town: Wire, words: str, reason: str) -> None:
+    assert_one_line(town.run(*words.split()), 1, reason)
+
+
+def test_service_call_again_and_again(town: Wire) -> None:
+    call = town.start("service", "call", "next_goal", "--rate", "50", "--json")
+    wait_for(lambda: call.out.count("\n") >= 3)
+    call.signal(signal.SIGINT)
+    assert call.wait() == 130
+    assert set(call.out.splitlines()[:3]) == {call.out.splitlines()[0]}
+
+
+def test_node_info_tells_what_a_node_reads_writes_and_serves(town: Wire) -> None:
+    lines = town.run("node", "info", "sim").stdout.splitlines()
+    assert lines[1:3] == ["  Subscribers:", "    cmd_vel: geometry_msgs/msg/Twist"]
+    assert "    odom: nav_msgs/msg/Odometry" in lines[lines.index("  Publishers:") : lines.index("  Service Servers:")]
+    assert "    resume: std_srvs/srv/Trigger" in lines[lines.index("  Service Servers:") :]
+    told = json.loads(town.run("node", "info", "/sim", "--json").stdout)
+    assert {"key": "odom", "type": "nav_msgs/msg/Odometry"} in told["publishers"]
+
+
+def test_lists_count_and_write_json(town: Wire) -> None:
+    assert int(town.run("service", "list", "-c").stdout) >= len(SERVICES)
+    assert town.run("node", "list", "-c").stdout == "2\n"
+    rows = [json.loads(line) for line in town.run("service", "list", "--json").stdout.splitlines()]
+    assert {"key": "resume", "type": "std_srvs/srv/Trigger"} in rows
+    assert [json.loads(line)["node"] for line in town.run("node", "list", "--json").stdout.splitlines()] == [
+        "pose_service",
+        "sim",
+    ]
+
+
+def test_the_graph_shows_who_writes_and_reads(town: Wire) -> None:
+    lines = town.run("graph").stdout.splitlines()
+    assert "sim -> odom -> pose_service, test" in lines
+    assert "next_goal: pose_service" in lines
+    dot = town.run("graph", "--dot").stdout
+    assert dot.startswith("digraph holozen {\n")
+    assert '  "node sim" -> "odom";\n' in dot
+    assert '  "odom" -> "node pose_service";\n' in dot
+    ends = [json.loads(line) for line in town.run("graph", "--json").stdout.splitlines()]
+    assert {"odom"} <= {end["key"] for end in ends if end["kind"] == "pub" and end["node"] == "sim"}

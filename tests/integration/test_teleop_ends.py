@@ -12,20 +12,23 @@ from .conftest import deaf, start_sim
 from .robots import Robot, moves, planar
 
 ROOT = Path(__file__).parents[2]
-DRIVES_ON = ("--key-timeout", "0")
+DRIVES_ON = ("--mode", "latch")
 
 # A teleop with one part broken while it drives. BREAK is the statement that breaks it.
 BROKEN = """
 import sys
 sys.path.insert(0, {root!r})
-from services.teleop import __main__ as teleop, cockpit
-def breaks(*_):
+from services.teleop import __main__ as teleop, cockpit, dials
+from services.teleop.keys import Key
+def breaks(*_, **__):
     raise RuntimeError("broken on purpose")
-press = cockpit.Cockpit.press
-def press_and_break(self, key):
-    press(self, key)
-    {statement}
-cockpit.Cockpit.press = press_and_break
+take = cockpit.Cockpit.take
+def take_and_break(self, event, now):
+    done = take(self, event, now)
+    if isinstance(event, Key):
+        {statement}
+    return done
+cockpit.Cockpit.take = take_and_break
 sys.exit(teleop.main(sys.argv[1:]))
 """
 
@@ -98,7 +101,7 @@ def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> 
 @pytest.mark.parametrize(
     "statement",
     [
-        "cockpit.Cockpit.state = breaks",  # the next picture fails
+        "dials.Dials.state = breaks",  # the next picture fails
         "cockpit.Cockpit.tick = breaks",
         "breaks()",
     ],
@@ -149,7 +152,19 @@ def test_a_teleop_alone_says_that_nobody_listens(wire: Wire) -> None:
     screen = terminal.wait_for_text("NO ODOM")
     assert "NOBODY IS LISTENING on cmd_vel" in screen
     terminal.type("i")
-    terminal.wait_for_text("command   x +0.500")
+    terminal.wait_for_text("+0.500")
     start_sim(wire)
     terminal.wait_for_text("listening sim")
     wait_for(lambda: "NO ODOM" not in terminal.screen())
+
+
+@pytest.mark.parametrize(("flags", "env"), [(["--plain"], {}), ([], {"TERM": "dumb"})], ids=["asked for", "dumb"])
+def test_plain_it_writes_lines_and_moves_no_cursor(
+    town: Wire, robot: Robot, flags: list[str], env: dict[str, str]
+) -> None:
+    with town.terminal("teleop", *flags, env=env) as terminal:
+        wait_for(lambda: "odom" in terminal.raw)
+        terminal.type("\x03")
+        assert terminal.process.wait() == 0
+        assert not any(code in terminal.raw for code in ("\x1b[?1049h", "\x1b[?25l", "\x1b[?2026h"))
+        assert terminal.modes() == terminal.modes_before

@@ -42,7 +42,7 @@ def test_list_names_every_topic_once(town: Wire, robot: Robot) -> None:
 def test_list_of_nobody_says_so(wire: Wire) -> None:
     done = wire.run("topic", "list")
     assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == "no topics: nobody is there; `holozen up` starts a robot\n"
+    assert done.stderr == f"no topics: nobody is there at {wire.endpoint}; `holozen up` starts a robot\n"
 
 
 def test_info_tells_the_type_and_who_writes_and_reads(town: Wire, robot: Robot) -> None:
@@ -51,11 +51,14 @@ def test_info_tells_the_type_and_who_writes_and_reads(town: Wire, robot: Robot) 
     assert lines[1] == "Publisher count: 1"
     assert lines[2].startswith("  test (")
     assert lines[3] == "Subscription count: 2"
-    assert sorted(line.split()[0] for line in lines[4:]) == ["sim", "test"]
+    assert sorted(line.split()[0] for line in lines[4:-1]) == ["sim", "test"]
+    assert lines[-1].startswith("Obeyed: ")
 
 
 def test_info_of_an_unknown_key_names_the_known_ones(town: Wire, robot: Robot) -> None:
-    assert_one_line(town.run("topic", "info", "cmd_val"), 1, "unknown key 'cmd_val'; known: clock, cmd_vel, ")
+    assert_one_line(
+        town.run("topic", "info", "cmd_val"), 1, "unknown key 'cmd_val'; did you mean 'cmd_vel'?; known: clock, "
+    )
 
 
 def test_echo_prints_as_ros_does(town: Wire, robot: Robot) -> None:

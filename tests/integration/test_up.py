@@ -103,11 +103,11 @@ def test_killed_it_leaves_nothing(wire: Wire) -> None:
 def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> None:
     terminal = wire.terminal("up")
     robot = Robot(wire.bus())
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
     all_run(wire, {"teleop", *PARTS})
     terminal.type(",")
     robot.odom.next(lambda odom: moves(odom, -0.5, 0, 0))
-    terminal.wait_for_text("driver    you")
+    terminal.wait_for_text("you drive")
     terminal.type("\x03")
     assert terminal.process.wait(AT_MOST) == 0
     assert parts_at(wire) == {}
@@ -119,7 +119,7 @@ def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> No
 
 def test_a_terminal_that_is_closed_ends_all(wire: Wire) -> None:
     terminal = wire.terminal("up")
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
     terminal.hang_up()
     terminal.process.wait()
     wait_for(lambda: parts_at(wire) == {})
@@ -127,14 +127,14 @@ def test_a_terminal_that_is_closed_ends_all(wire: Wire) -> None:
 
 def test_killed_in_a_terminal_it_leaves_no_process(wire: Wire) -> None:
     terminal = wire.terminal("up")
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
     terminal.process.kill()
     wait_for(lambda: parts_at(wire) == {})
 
 
 def test_a_killed_teleop_ends_all_and_leaves_the_terminal_tidy(wire: Wire) -> None:
     terminal = wire.terminal("up")
-    terminal.wait_for_text("driver    controller@")
+    terminal.wait_for_text("controller@")
     os.kill(parts_at(wire)["teleop"], signal.SIGKILL)
     terminal.process.wait()
     assert parts_at(wire) == {}

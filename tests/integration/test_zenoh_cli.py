@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from holozen.messages import Header, Odometry, Time, Twist
 from holozen.testing import Process, Wire, wait_for
 
 from .robots import Robot, moves, time_of
@@ -68,3 +69,32 @@ def test_it_asks_for_a_goal(town: Wire, robot: Robot) -> None:
         return process.out
 
     assert '"y_goal": 1' in wait_for(asked)
+
+
+@pytest.mark.parametrize("form", ["json", "msgpack", "cdr"])
+def test_its_plugin_shows_any_wire_on_one_readable_line(wire: Wire, form: str) -> None:
+    publisher = wire.bus("sim", wire=form).publisher("Fred/odom", Odometry)
+    message = Odometry(Header(Time(12, 500_000_000), "odom"), "base")
+    message.pose.pose.position.x, message.twist.twist = 1.25, Twist.planar(x=0.3)
+    with zenoh(wire, "subscribe", "-k", "*/odom", "--decoder", "holozen", "--line", "{key} {value}") as process:
+
+        def shown() -> str:
+            publisher.put(message)
+            return process.out
+
+        wait_for(shown)
+        line = process.wait_for_line("Fred/odom")
+    for part in ("header.stamp=12.500000000", "pose.pose.position=(1.25, 0, 0)", "twist.twist.linear=(0.3, 0, 0)"):
+        assert part in line
+    assert process.err == ""
+
+
+def test_its_plugin_shows_replies(wire: Wire) -> None:
+    wire.start("pose-service", "--wire", "cdr").wait_for_line("goals")
+
+    def asked() -> str:
+        with zenoh(wire, "get", "-s", "next_goal?request_goal=1", "--decoder", "holozen") as process:
+            process.wait()
+        return process.out
+
+    assert wait_for(asked).startswith("x_goal=1 y_goal=1 theta_goal=3.14159 end_of_list=0")

@@ -8,7 +8,21 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+VERBS = {
+    verb: ["holozen", "python alone", "ratio"]
+    for verb in (
+        "topic list -t", "topic info odom", "topic info cmd_vel", "topic type odom", "topic find nav_msgs/msg/Odometry",
+        "topic pub cmd_vel {} --once", "service list", "service type resume", "service info resume",
+        "service call resume", "node list", "node info robot", "graph",
+    )
+}  # fmt: skip
 CASES = {
+    "cli": {
+        "first line, odom at 500 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
+        **VERBS,
+        "echo odom at 1 kHz, work": ["holozen json", "zenoh cli json", "holozen text", "ratio"],
+        **{f"decode Odometry, {wire}": ["holozen", "json loads", "ratio"] for wire in ("json", "msgpack", "cdr")},
+    },
     "latency": {
         "flat out": ["holozen", "raw zenoh", "ratio"],
         "paced at 50 Hz": ["holozen", "raw zenoh", "ratio"],
@@ -17,6 +31,11 @@ CASES = {
         "first line, odom at 500 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
         "first line, odom at 50 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
         "up to first odom": ["holozen"],
+    },
+    "record": {"50 topics at 100 Hz, sent to taken in": ["holozen"]},
+    "key_to_motion": {
+        "to motion": ["holozen", "step and raw zenoh", "ratio"],
+        "to rest": ["holozen", "step and raw zenoh", "ratio"],
     },
     "sim_loop": {
         "idle": ["holozen", "bare engine", "engine with our body", "ratio"],

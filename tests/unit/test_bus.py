@@ -13,12 +13,14 @@ from typing import Any
 
 import pytest
 
-from holozen import bus as module
-from holozen.bus import Bus, BusError, NoReply, Publisher, ServiceError
+from holozen import caller as module
+from holozen.bus import Bus
 from holozen.connection import Connection
 from holozen.door import is_free
+from holozen.errors import BusError, NoReply, ServiceError
 from holozen.graph import Endpoint
 from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
+from holozen.publisher import Publisher
 from holozen.testing import Wire, wait_for
 
 
@@ -80,7 +82,7 @@ def test_the_newest_are_kept_when_too_many_came(pair: tuple[Bus, Bus]) -> None:
     publisher: Publisher[Twist] = writer.publisher("cmd_vel", Twist)
     for x in range(10):
         publisher.put(Twist.planar(float(x)))
-    wait()
+        wait()  # on a busy machine Zenoh would drop some
     found = iter(commands.try_recv, None)
     assert [received.message for received in found] == [Twist.planar(float(x)) for x in (7, 8, 9)]
 
@@ -183,7 +185,7 @@ def test_a_service_that_is_not_there_yet_is_waited_for(wire: Wire, monkeypatch: 
 
 def test_a_service_that_is_not_there_is_named_with_the_time_it_had(wire: Wire) -> None:
     with pytest.raises(
-        NoReply, match=r"^no reply from 'resume' within 0\.05 s; `holozen service list` shows who serves$"
+        NoReply, match=r"^no reply from 'resume' within 0\.05 s at tcp/127.*; `holozen service list` shows who serves$"
     ):
         wire.bus().call("resume", TriggerRequest(), TriggerReply, timeout=0.05)
 
@@ -279,12 +281,12 @@ def test_a_bus_listens_on_loopback_only(wire: Wire) -> None:
         (Connection(connect=("pigeon/127.0.0.1:1",)), "cannot open Zenoh: Unicast not supported for pigeon"),
         (Connection(cfg=(("no/such", "1"),)), "Zenoh setting no/such:1: "),
         (Connection(cfg=(("mode", "["),)), "Zenoh setting mode:[: "),
-        (Connection("router", listen=("tcp/192.0.2.1:7447",)), "cannot open Zenoh: Can not create a new TCP listener"),
-        (Connection("client", connect=()), "cannot open Zenoh: No peer specified"),
+        (Connection("router", listen=("tcp/192.0.2.1:7447",)), "cannot open Zenoh: cannot listen at tcp/192.0.2.1"),
+        (Connection("client", connect=()), "cannot open Zenoh: a client needs --connect ENDPOINT"),
     ],
 )
 def test_a_wrong_connection_is_one_line(wire: Wire, connection: Connection, told: str) -> None:
-    listening = connection._replace(listen=connection.listen or (wire.endpoint,))
+    listening = connection.replace(listen=connection.listen or (wire.endpoint,))
     assert refusal(lambda: Bus("test", listening, patience=0)).startswith(told)
 
 
@@ -305,8 +307,7 @@ def test_a_configuration_file_is_read(wire: Wire, tmp_path: Path) -> None:
 
 def test_a_client_without_its_router_gives_up_after_its_patience(wire: Wire) -> None:
     told = refusal(lambda: Bus("test", Connection("client", connect=(wire.endpoint,)), patience=0))
-    assert told.startswith("cannot open Zenoh: Unable to connect to any of ")
-    assert wire.endpoint in told
+    assert told == f"cannot open Zenoh: no router answers at {wire.endpoint}; `holozen router` runs one"
 
 
 def test_a_client_that_waits_ends_in_peace_when_it_is_told_to(wire: Wire) -> None:

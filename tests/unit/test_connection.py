@@ -100,10 +100,13 @@ def test_a_setting_that_is_no_pair_is_wrong_usage(text: str, capsys: pytest.Capt
     assert f"{text!r}: write PATH:VALUE" in capsys.readouterr().err
 
 
+SHORT_TRIES = {"connect/timeout_ms": "500", "connect/exit_on_failure": "true"}  # a client looks at signals in between
+
+
 def test_a_configuration_file_decides_what_no_flag_names() -> None:
     assert Connection(config="zenoh.json5").settings() == {}
     given = Connection("client", config="zenoh.json5", connect=("tcp/h:1",), cfg=(("a", "1"),))
-    assert given.settings() == {"mode": '"client"', "connect/endpoints": '["tcp/h:1"]', "a": "1"}
+    assert given.settings() == {"mode": '"client"', "connect/endpoints": '["tcp/h:1"]', "a": "1", **SHORT_TRIES}
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.graph import ALL, Endpoint, Graph, includes, on_key, parse, token
+from holozen.graph import ALL, MOST_GONE, Endpoint, Graph, includes, on_key, parse, token
 
 chunks = st.text("ab%*$2A4.-_é", min_size=1, max_size=6).filter(lambda chunk: "*" not in chunk and "$" not in chunk)
 wild = chunks | st.sampled_from(["*", "**", "a$*b", "%2A", "%24", "%25"])
@@ -99,3 +99,33 @@ def test_a_settled_graph_knows_what_came_late() -> None:
 
 def test_nobody_there_is_an_empty_graph_after_the_patience() -> None:
     assert graph_of().settled(lambda: False, patience=0.01) == []
+
+
+def test_the_nodes_that_left_are_told_once_by_the_names_of_their_samples() -> None:
+    teleop = SIM._replace(node="teleop", session="0123456789")
+    came = [(token(e), True) for e in (SIM, teleop, ODOM)]
+    graph = graph_of(*came, (token(teleop), False), (token(ODOM), False), ("@holozen/x", False))
+    assert graph.left() == ["teleop@012345"]
+    assert graph.left() == []
+    assert graph.endpoints() == [SIM]
+
+
+def test_a_graph_that_nobody_asks_who_left_stays_small() -> None:
+    graph = graph_of(*((f"@holozen/{number}/sim/node", False) for number in range(MOST_GONE + 5)))
+    assert graph.endpoints() == []
+    assert len(graph.left()) == MOST_GONE
+
+
+def test_a_graph_is_settled_only_after_all_who_are_met_have_told_theirs() -> None:
+    changes: deque[tuple[str, bool]] = deque()
+    graph = Graph(lambda: changes.popleft() if changes else None, lambda: changes.append((token(ODOM), True)))
+    assert graph.settled(lambda: True, quiet=0.0) == [ODOM]
+
+
+def test_who_is_met_and_has_told_nothing_yet_is_waited_for_longer() -> None:
+    """The one of us who is met second, and comes when the first has been quiet for long enough."""
+    late = ODOM._replace(session="b2")
+    looks = iter([*[None] * 30, (token(late), True)])
+    changes = deque([(token(ODOM), True)])
+    graph = Graph(lambda: changes.popleft() if changes else next(looks, None), met=lambda: ["a1", "b2"])
+    assert graph.settled(lambda: True, patience=60) == [ODOM, late]

@@ -4,9 +4,10 @@ import math
 
 import pytest
 
-from holozen.bus import Bus, Publisher
-from holozen.codec import WIRES, CodecError
+from holozen.bus import Bus
+from holozen.codec import WIRES, CodecError, encoding
 from holozen.messages import Odometry, Twist, Vector3
+from holozen.publisher import Publisher
 from holozen.testing import Wire, wait_for
 
 
@@ -25,7 +26,7 @@ def test_what_is_put_arrives_with_encoding_priority_and_source(wire: Wire, name:
     received = subscription.recv()
     assert received.message == Twist.planar(0.5)
     sample = received.sample
-    assert (sample.key, sample.encoding) == ("cmd_vel", WIRES[name])
+    assert (sample.key, sample.encoding) == ("cmd_vel", encoding(name, Twist))
     assert (sample.priority, sample.source) == ("DATA_LOW", writer.source)
     assert writer.source.startswith("writer@")
 
@@ -74,3 +75,19 @@ def test_a_closed_publisher_leaves_nothing_of_its_key(wire: Wire) -> None:
     publisher.close()
     wait_for(lambda: not graph.endpoints())
     assert last(writer, "cmd_vel") == []
+
+
+def test_samples_are_numbered_by_their_publisher(wire: Wire) -> None:
+    bus, reader = wire.bus(), wire.bus()
+    tap = reader.tap("*")
+    first: Publisher[Twist] = bus.publisher("cmd_vel", Twist)
+    second: Publisher[Twist] = bus.publisher("cmd_vel", Twist)
+    wait_for(lambda: first.matched and second.matched)
+    for publisher in (first, first, second, first):
+        publisher.put(Twist())
+    bus.session.put("plain", b"{}")
+    numbers = [tap.recv().number for _ in range(5)]
+    told = [number for number in numbers if number]
+    assert [number for _, number in told] == [0, 1, 0, 2]
+    assert told[0][0] == told[1][0] == told[3][0] != told[2][0]
+    assert numbers[4] is None

@@ -4,8 +4,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
-from holozen.bus import Bus, NoReply, ServiceError
-from holozen.codec import WIRES
+from holozen.bus import Bus
+from holozen.caller import call_bytes
+from holozen.codec import WIRES, encoding
+from holozen.errors import NoReply, ServiceError
 from holozen.messages import NextGoalReply, NextGoalRequest, TriggerReply, TriggerRequest
 from holozen.server import MAX_REQUEST_BYTES, refusal
 from holozen.testing import Wire, wait_for
@@ -27,7 +29,7 @@ def caller(wire: Wire) -> Bus:
 
 def failure(caller: Bus, payload: bytes, encoding: str = "application/json") -> str:
     with pytest.raises(ServiceError) as error:
-        caller.call_bytes("next_goal", payload, encoding, 10)
+        call_bytes(caller, "next_goal", payload, encoding, 10)
     assert not isinstance(error.value, NoReply)
     return str(error.value)
 
@@ -43,7 +45,7 @@ def test_a_server_speaks_its_wire_and_understands_the_others(wire: Wire, name: s
     for other in WIRES:
         caller = wire.bus("caller", wire=other)
         assert caller.call("next_goal", NextGoalRequest(4), NextGoalReply) == NextGoalReply(2.5)
-    assert caller.call_bytes("next_goal", b'{"request_goal": 1}', "", 10).encoding == WIRES[name]
+    assert call_bytes(caller, "next_goal", b'{"request_goal": 1}', "", 10).encoding == encoding(name, NextGoalReply)
 
 
 def test_a_refusal_arrives_in_the_words_of_the_service(caller: Bus) -> None:
@@ -160,3 +162,18 @@ def test_a_closed_server_answers_no_more(wire: Wire) -> None:
 )
 def test_the_reason_of_ours_and_of_strangers_is_shown(payload: bytes, text: str) -> None:
     assert str(refusal(payload)) == text
+
+
+def test_a_server_knows_who_says_to_call(wire: Wire) -> None:
+    callers = list[str]()
+
+    def answer(_request: TriggerRequest) -> TriggerReply:
+        callers.append(server.caller)
+        return TriggerReply()
+
+    server = wire.bus("server").serve("stop", TriggerRequest, TriggerReply, answer)
+    server.start()
+    caller = wire.bus("caller")
+    caller.call("stop", TriggerRequest(), TriggerReply)
+    list(caller.session.get("stop"))
+    assert callers == [caller.source, ""]

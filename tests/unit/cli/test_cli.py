@@ -38,12 +38,24 @@ def test_an_unknown_verb_is_named_with_those_there_are(capsys: pytest.CaptureFix
     assert told == f"holozen: no verb 'drive'; there are {', '.join(cli.VERBS)}\n"
 
 
+NOUNS = ("topic", "service", "node", "param", "interface", "bag")
+
+
 @pytest.mark.parametrize("verb", cli.VERBS)
 def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         cli.main([verb, "--help"])
     assert end.value.code == 0
-    assert capsys.readouterr().out.startswith(f"usage: holozen {verb} ")
+    told = capsys.readouterr().out
+    assert told.startswith(f"usage: holozen {verb} ")
+    assert verb in NOUNS or "example: " in " ".join(told.split())
+
+
+@pytest.mark.parametrize("noun", NOUNS)
+def test_every_verb_of_a_noun_has_an_example(noun: str) -> None:
+    (verbs,) = (action for action in cli.module(noun).parser()._actions if isinstance(action.choices, dict))
+    for parser in verbs.choices.values():
+        assert (parser.epilog or "").startswith("example: "), parser.prog
 
 
 @pytest.mark.parametrize("verb", cli.VERBS)
@@ -67,7 +79,7 @@ def test_a_failure_of_the_bus_is_one_line(monkeypatch: pytest.MonkeyPatch, capsy
     assert capsys.readouterr().err == "holozen node: cannot open?Zenoh\n"
 
 
-@pytest.mark.parametrize("name", ["pybullet", "prompt_toolkit", "numpy", "xacro"])
+@pytest.mark.parametrize("name", ["pybullet", "numpy", "xacro"])
 def test_what_is_not_installed_is_named_with_its_extra(
     name: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -100,6 +112,15 @@ def test_a_reader_that_has_seen_enough_is_no_failure(links: int, tmp_path: Path)
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.parametrize("words", ["--help", "interface list", "interface proto std_msgs/msg/String"])
+def test_output_into_a_full_disk_is_one_line(words: str) -> None:
+    with open("/dev/full", "wb") as full:
+        line = [sys.executable, "-m", "holozen", *words.split()]
+        done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
+    assert done.returncode == 1
+    assert done.stderr == "holozen: cannot write what was asked for: No space left on device\n"
+
+
 @pytest.mark.parametrize("verb", cli.SERVICES)
 def test_a_service_is_found_in_the_tree(verb: str) -> None:
-    assert cli._module(verb).__name__ == f"services.{cli.SERVICES[verb]}.__main__"
+    assert cli.module(verb).__name__ == f"services.{cli.SERVICES[verb]}.__main__"

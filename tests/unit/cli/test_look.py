@@ -6,10 +6,13 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+import zenoh
 
-from holozen.bus import Bus, Publisher, ServiceError
+from holozen.bus import Bus
 from holozen.cli import main
+from holozen.errors import ServiceError
 from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, Twist
+from holozen.publisher import Publisher
 from holozen.testing import Wire
 
 Run = Callable[..., tuple[int, str, str]]
@@ -93,13 +96,15 @@ def test_echo_shows_a_message_of_a_key_or_an_expression(sim: Bus, run: Run) -> N
     assert code == 0
     assert "child_frame_id: base\n" in out
     assert out.endswith("---\n")
-    assert json.loads(run("topic", "echo", "*/odom", "--once", "--json")[1])["child_frame_id"] == "base"
+    assert json.loads(run("topic", "echo", "Fred/odom", "--once", "--json")[1])["child_frame_id"] == "base"
+    told = json.loads(run("topic", "echo", "*/odom", "--once", "--json")[1])
+    assert (told["key"], told["value"]["child_frame_id"]) == ("Fred/odom", "base")
+    assert run("topic", "echo", "*/odom", "--once")[1].startswith("# Fred/odom\nheader:\n")
 
 
-def test_echo_of_a_silent_key_ends_with_its_timeout(sim: Bus, run: Run) -> None:
-    assert run("topic", "echo", "odom", "--timeout", "0.1") == (
-        1, "", "holozen topic: nothing came on odom within 0.1 s\n",
-    )  # fmt: skip
+def test_echo_of_a_silent_key_ends_with_its_timeout(sim: Bus, run: Run, wire: Wire) -> None:
+    told = f"holozen topic: nothing came on odom within 0.1 s at {wire.endpoint}\n"
+    assert run("topic", "echo", "odom", "--timeout", "0.1") == (1, "", told)
 
 
 def test_echo_of_a_wrong_key_is_one_line(run: Run) -> None:
@@ -124,7 +129,7 @@ def test_services_are_listed_and_called(sim: Bus, run: Run) -> None:
         (("next_goal", "request_goal: 4"), "holozen service: goal 4: the list holds goals 0 to 3\n"),
         (("next_goal", "{gaol: 4}"), "holozen service call next_goal: refused: not a NextGoalRequest: Object contains"),
         (("get_pose", "--timeout", "0.05"), "holozen service: no reply from 'get_pose' within 0.05 s"),
-        (("nonsense",), "holozen service call: 'nonsense' has no known type; known: next_goal, get_pose, resume, "),
+        (("nonsense",), "holozen service call: 'nonsense' has no known type; known: next_goal, get_pose, "),
     ],
 )
 def test_a_call_that_fails_is_one_line(sim: Bus, run: Run, words: tuple[str, ...], told: str) -> None:
@@ -143,13 +148,14 @@ def test_nodes_are_listed(sim: Bus, run: Run, wire: Wire) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("topic", "list"), "no topics: nobody is there; `holozen up` starts a robot\n"),
-        (("service", "list"), "no services: nobody is there; `holozen up` starts some\n"),
-        (("node", "list"), "no nodes: nobody is there; `holozen up` starts some\n"),
+        ("topic list", "no topics: nobody is there at {}; `holozen up` starts a robot\n"),
+        ("service list", "no services: nobody is there at {}; `holozen up` starts some\n"),
+        ("node list", "no nodes: nobody is there at {}; `holozen up` starts some\n"),
+        ("graph", "no nodes: nobody is there at {}; `holozen up` starts some\n"),
     ],
 )
-def test_where_nobody_is_the_lists_are_empty_and_say_so(run: Run, words: tuple[str, ...], told: str) -> None:
-    assert run(*words) == (0, "", told)
+def test_where_nobody_is_the_lists_are_empty_and_say_so(run: Run, wire: Wire, words: str, told: str) -> None:
+    assert run(*words.split()) == (0, "", told.format(wire.endpoint))
 
 
 def test_publishing_what_is_no_message_never_reaches_the_wire(run: Run) -> None:
@@ -166,3 +172,17 @@ def test_a_wildcard_is_not_published_to(run: Run, key: str) -> None:
     code, out, err = run("topic", "pub", key, "{}")
     assert (code, out) == (1, "")
     assert err == f"holozen topic pub: {key!r}: write to one key; a wildcard would move every robot\n"
+
+
+def test_a_strangers_service_is_called_as_it_is_or_by_its_type(wire: Wire, run: Run) -> None:
+    def answer(query: zenoh.Query) -> None:
+        with query:
+            query.reply("tea", query.payload, encoding="application/json")
+
+    queryable = wire.bus("stranger").session.declare_queryable("tea", answer)
+    assert run("service", "call", "tea", "{sugar: 2}", "--any") == (0, "sugar: 2\n", "")
+    assert run("service", "call", "tea", "std_srvs/srv/SetBool", "{data: true}", "--json")[1] == '{"data": true}\n'
+    code, _, err = run("service", "call", "tea", "std_srvs/srv/SetBool", "{dta: true}")
+    assert code == 1
+    assert "dta" in err
+    queryable.undeclare()

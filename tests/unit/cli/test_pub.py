@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from holozen.cli.pub import LARGEST, read_message
+from holozen.cli.values import LARGEST, read_message
 from holozen.messages import NextGoalRequest, Twist, TwistStamped
 
 KINDS = (Twist, TwistStamped)

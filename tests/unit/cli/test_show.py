@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.cli.show import LONGEST, decode, lines
+from holozen.cli.show import LONGEST, Hex, decode, lines
 from holozen.codec import encode
 from holozen.messages import Odometry, Twist
 
@@ -66,18 +66,23 @@ def test_values_are_shown(value: Any, shown: list[str]) -> None:
     assert lines(value) == shown
 
 
-def test_a_long_list_is_cut_after_a_covariance() -> None:
-    assert lines([0] * LONGEST) == [f"[{', '.join(['0'] * 36)}]"]
-    assert lines(list(range(1000)))[0].endswith(", 34, 35, ... 964 more]")
+def test_a_long_list_is_cut_where_ros_2_cuts_it() -> None:
+    assert lines([0] * LONGEST) == [f"[{', '.join(['0'] * 128)}]"]
+    assert lines(list(range(1000)))[0].endswith(", 126, 127, ... 872 more]")
+    assert lines({"a": list(range(9))}, longest=2) == ["a: [0, 1, ... 7 more]"]
+    assert lines(list(range(1000)), longest=0)[0].endswith(", 998, 999]")
 
 
 def test_text_that_is_no_json_is_shown_as_it_is() -> None:
     assert decode(b"hello there", "text/plain") == "hello there"
     assert decode(b"", "zenoh/bytes") == ""
+    assert not isinstance(decode(b"hello", ""), Hex)
     assert decode(b"[" * 100_000, JSON) == "[" * 100_000
 
 
 def test_bytes_that_are_no_text_are_shown_as_a_hex_dump() -> None:
+    assert isinstance(decode(b"\x89PNG", "image/png"), Hex)
+    assert decode(b"\0\1\0\0\0\0", "zenoh/bytes") == "6 bytes of zenoh/bytes: 00 01 00 00 00 00"
     assert decode(b"\x89PNG", "image/png") == "4 bytes of image/png: 89 50 4e 47"
     assert decode(b"\xff" * 33, "zenoh/bytes") == f"33 bytes of zenoh/bytes: {'ff ' * 31}ff ..."
     assert decode(b"\xff" * 32, "zenoh/bytes").endswith(" ff")

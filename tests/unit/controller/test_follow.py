@@ -7,8 +7,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 
 import pytest
 
-from holozen.bus import Bus, Publisher, ServiceError, Subscription
+from holozen.bus import Bus
 from holozen.drive import to_world
+from holozen.errors import ServiceError
 from holozen.limits import STOP, Planar
 from holozen.messages import (
     CommandStatus,
@@ -24,6 +25,8 @@ from holozen.messages import (
     Twist,
     TwistWithCovariance,
 )  # fmt: skip
+from holozen.publisher import Publisher
+from holozen.readers import Subscription
 from holozen.testing import Wire, wait_for
 from services.controller.follow import Follower
 from services.controller.goto import Gains, Leg
@@ -182,6 +185,21 @@ def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) 
     case.robot.status(resumed=1)
     assert len(lap.result(30)) == 2
     assert "goes on" in case.said
+
+
+def test_a_stopped_robot_is_not_commanded_and_after_the_resume_it_begins_with_a_stop(case: Case) -> None:
+    """Whoever commanded a stopped robot has to let go of it first."""
+    case.goals()
+    lap = case.lap()
+    wait_for(lambda: case.robot.heard)
+    wait_for(lambda: case.robot.status(stopped="stop@9", held=True) and case.said)
+    assert case.said[-1].startswith("yields: the robot is stopped by stop@9; `holozen release` frees it")
+    wait_for(lambda: case.robot.status(held=True) and case.said[-1].startswith("yields to the stop by stop@9; "))
+    before = len(case.robot.heard)
+    case.robot.status(resumed=1)
+    assert len(lap.result(30)) == 2
+    assert case.robot.heard[before] == Twist()
+    assert case.robot.heard[before + 1] != Twist()
 
 
 def test_a_controller_that_drives_lets_go_without_a_word_when_another_takes_over(case: Case) -> None:

@@ -79,3 +79,25 @@ def test_a_sim_that_was_started_again_forgets_who_drove_but_the_controller_does_
     assert manners.yielded_to == PERSON
     manners.see(CommandStatus(resumed=1))
     assert manners.yielded_to == ""
+
+
+def test_it_yields_to_a_software_stop_and_says_what_frees_the_robot(manners: Manners) -> None:
+    manners.see(CommandStatus(obeyed=ME))
+    assert manners.reason == ""
+    manners.see(CommandStatus(held=True, stopped="stop@3"))
+    told = "yields: the robot is stopped by stop@3; `holozen release` frees it, and then `holozen controller --resume`"
+    assert manners.reason.startswith(told)
+
+
+def test_after_the_release_it_still_waits_for_the_resume(manners: Manners) -> None:
+    manners.see(CommandStatus(held=True, stopped="stop@3"))
+    manners.see(CommandStatus(held=True))
+    assert manners.reason.startswith("yields to the stop by stop@3; `holozen controller --resume`")
+    manners.see(CommandStatus(resumed=1))
+    assert manners.reason == ""
+
+
+def test_a_sim_that_was_started_again_forgets_the_stop_but_the_controller_does_not(manners: Manners) -> None:
+    manners.see(CommandStatus(held=True, stopped="stop@3"))
+    manners.see(CommandStatus())
+    assert manners.yielded_to == "the stop by stop@3"

@@ -4,9 +4,10 @@ import re
 
 import pytest
 
-from holozen.bus import Bus, Publisher
+from holozen.bus import Bus
 from holozen.errors import ServiceError
 from holozen.messages import GetPoseReply, GetPoseRequest, Odometry
+from holozen.publisher import Publisher
 from holozen.testing import Wire, wait_for
 from holozen.wire import TOPICS
 from services.pose_service.tracker import Tracker

@@ -1,0 +1,160 @@
+"""The command line: from process start to the first line, each verb's whole time, an echo's work, decoding.
+
+Beside raw zenoh (a subscriber of ten lines) and `zenoh`, the command of the package zenoh-cli, in the same interpreter.
+"""
+
+import compileall
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from benchmarks.company import beside, guest, host, meeting_point
+from benchmarks.latency import ODOM
+from benchmarks.report import Case, parser, publish
+from benchmarks.startup import HOLOZEN, ROOT, echo, meet_at, tell_for_ever
+from holozen import codec
+from holozen.bus import Bus
+from holozen.connection import LOOPBACK
+from holozen.messages import CommandStatus, Odometry, TriggerReply, TriggerRequest, Twist
+
+WALL_AIM, CPU_AIM, DECODE_AIM = (
+    "a verb's whole time <= 60 ms",
+    "less work than zenoh-cli",
+    "<= 6.7 us (150,000 a second)",
+)
+ZENOH = str(Path(sys.executable).with_name("zenoh"))
+VERBS = (
+    "topic list -t", "topic info odom", "topic info cmd_vel", "topic type odom", "topic find nav_msgs/msg/Odometry",
+    "topic pub cmd_vel {} --once", "service list", "service type resume", "service info resume", "service call resume",
+    "node list", "node info robot", "graph",
+)  # fmt: skip
+RATE = 1000.0  # Hz of the odom that is echoed
+BATCH = 2000  # messages that are decoded for one sample
+
+
+def company(endpoint: str, rate: float) -> None:
+    """A robot with all that the verbs look for; tells its odom at `rate` Hz."""
+    with Bus("robot", host(endpoint), lasting=True) as bus:
+        bus.publisher("cmd_vel_status", CommandStatus).put(CommandStatus())
+        bus.subscribe("cmd_vel", Twist)
+        bus.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply()).start()
+        tell_for_ever(bus, rate)
+
+
+def wall(*words: str) -> list[float]:
+    """Milliseconds from the start of a process to its end."""
+    start = time.perf_counter()
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+    took = time.perf_counter() - start
+    assert done.returncode == 0 and done.stdout + done.stderr, f"{' '.join(words)}: {done.stderr}"
+    return [took * 1000]
+
+
+def verbs(turns: int) -> list[Case]:
+    """Every verb beside Python that only prints."""
+    endpoint = meeting_point()
+    with beside(company, endpoint, 50.0):
+        _wait(endpoint)
+
+        def ours(verb: str) -> Callable[[], list[float]]:
+            return lambda: wall(HOLOZEN, *verb.split(), *meet_at(endpoint))
+
+        def alone() -> list[float]:
+            return wall(sys.executable, "-c", "print('up')")
+
+        return [Case(verb, "ms", WALL_AIM).take_turns(turns, holozen=ours(verb), python_alone=alone) for verb in VERBS]
+
+
+def work(seconds: float, *words: str) -> list[float]:
+    """Microseconds of processor time for each message that comes to an echo, without its start."""
+    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
+        assert process.stdout
+        reader = process.stdout.fileno()
+        assert os.read(reader, 1), f"nothing from: {' '.join(words)}"
+        before, deadline = _spent(process.pid), time.monotonic() + seconds
+        while time.monotonic() < deadline:
+            assert os.read(reader, 1 << 16), f"it ended: {' '.join(words)}"
+        spent = _spent(process.pid) - before
+        process.kill()
+    return [spent / (seconds * RATE) * 1e6]
+
+
+def _spent(pid: int) -> float:
+    """The processor time of a process so far, in seconds (proc(5), fields 14 and 15 of stat)."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def echoing(turns: int, seconds: float) -> Case:
+    """An echo of odom at 1 kHz."""
+    endpoint = meeting_point()
+    at = ("--connect", endpoint, "--listen", LOOPBACK)  # it cannot listen where another one does
+    with beside(company, endpoint, RATE):
+        _wait(endpoint)
+        # zenoh-cli prints a line a message, so the fair side of ours is --json; the text of 60 lines stands beside.
+        return Case("echo odom at 1 kHz, work", "us/msg", CPU_AIM).take_turns(
+            turns,
+            holozen_json=lambda: work(seconds, HOLOZEN, "topic", "echo", "odom", "--json", *meet_at(endpoint)),
+            zenoh_cli_json=lambda: work(seconds, ZENOH, *at, "subscribe", "-k", "odom", "--decoder", "json"),
+            holozen_text=lambda: work(seconds, HOLOZEN, "topic", "echo", "odom", *meet_at(endpoint)),
+        )
+
+
+def decoding(turns: int) -> list[Case]:
+    """An Odometry from bytes, in JSON, msgpack and CDR, beside json.loads of the same message."""
+    plain = codec.encode(ODOM)
+
+    def ours(wire: str) -> Callable[[], list[float]]:
+        payload, encoding = codec.encode(ODOM, wire), codec.encoding(wire, Odometry)
+        return lambda: _each(lambda: codec.decode(payload, encoding, (Odometry,)))
+
+    return [
+        Case(f"decode Odometry, {wire}", "us", DECODE_AIM).take_turns(
+            turns, holozen=ours(wire), json_loads=lambda: _each(lambda: json.loads(plain))
+        )
+        for wire in codec.WIRES
+    ]
+
+
+def _each(call: Callable[[], object]) -> list[float]:
+    start = time.perf_counter()
+    for _ in range(BATCH):
+        call()
+    return [(time.perf_counter() - start) / BATCH * 1e6]
+
+
+def _wait(endpoint: str) -> None:
+    with Bus("waits", guest(endpoint)) as bus:
+        assert bus.latest("odom", Odometry).wait(0, timeout=10), "the robot did not come up within 10 s"
+
+
+def loaded() -> list[str]:
+    """The modules that an echo has loaded when its first line is out."""
+    endpoint = meeting_point()
+    with beside(company, endpoint, 50.0):
+        _wait(endpoint)
+        code = "import sys; from holozen.cli import main; main(sys.argv[1:]); print(*sys.modules, file=sys.stderr)"
+        words = [sys.executable, "-c", code, "topic", "echo", "odom", "--once", *meet_at(endpoint)]
+        return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stderr.split()
+
+
+def main() -> int:
+    args = parser("cli", __doc__).parse_args()
+    for folder in ("holozen", "services"):
+        compileall.compile_dir(ROOT / folder, quiet=2)
+    quick = args.quick
+    cases = [echo(500.0, turns=2 if quick else 40), *verbs(1 if quick else 20)]
+    cases += [echoing(1 if quick else 5, 0.3 if quick else 3.0), *decoding(2 if quick else 20)]
+    modules = loaded()
+    publish("cli", cases, args.json, loaded_by_echo=modules)
+    heavy = {"numpy", "prompt_toolkit", "pybullet", "rich", "msgspec", "typing"} & set(modules)
+    print(f"an echo loads {len(modules)} modules; of the heavy ones: {', '.join(sorted(heavy)) or 'none'}")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

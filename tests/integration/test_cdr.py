@@ -1,0 +1,112 @@
+"""A whole system that writes CDR: an independent library reads what the sim tells and drives it; JSON drives it too."""
+
+import math
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+from rosbags.typesys import Stores, get_typestore
+
+from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest
+from holozen.testing import Process, Wire
+from holozen.wire import TOPICS
+
+from .conftest import start_sim, stranger_config
+from .robots import Robot, moves
+
+REPO = Path(__file__).parents[2]
+STORE = get_typestore(Stores.ROS2_JAZZY)
+TYPES = STORE.types
+
+
+@pytest.fixture(scope="module")
+def only_robot() -> Iterator[tuple[Wire, Robot]]:
+    with Wire() as wire:
+        start_sim(wire, "--wire", "cdr")
+        yield wire, Robot(wire.bus())
+
+
+@pytest.fixture
+def robot(only_robot: tuple[Wire, Robot]) -> Iterator[Robot]:
+    yield only_robot[1]
+    only_robot[1].stands()
+
+
+@pytest.fixture
+def stranger(only_robot: tuple[Wire, Robot]) -> Iterator[zenoh.Session]:
+    with zenoh.open(stranger_config(only_robot[0])) as session:
+        yield session
+
+
+def twist(x: float) -> bytes:
+    vector, kind = TYPES["geometry_msgs/msg/Vector3"], TYPES["geometry_msgs/msg/Twist"]
+    message = kind(linear=vector(x=x, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0))
+    return bytes(STORE.serialize_cdr(message, "geometry_msgs/msg/Twist"))
+
+
+@pytest.mark.parametrize("row", [row for row in TOPICS if "sim" in row.writers], ids=lambda row: str(row.key))
+def test_what_the_sim_tells_is_cdr_of_the_type_of_its_topic(row: Any, robot: Robot, stranger: zenoh.Session) -> None:
+    with stranger.declare_subscriber(row.key) as subscriber:
+        sample = subscriber.recv()
+    assert sample
+    assert str(sample.encoding) == f"application/cdr;{row.type.ROS}"
+    (reply,) = stranger.get(row.key)
+    assert reply.ok
+    assert str(reply.ok.encoding) == str(sample.encoding)
+    if row.type.ROS in TYPES:
+        message = STORE.deserialize_cdr(bytes(sample.payload), row.type.ROS)
+        assert bytes(STORE.serialize_cdr(message, row.type.ROS)) == bytes(sample.payload)
+
+
+@pytest.mark.parametrize("encoding", ["application/cdr", "application/cdr;geometry_msgs/msg/Twist", "zenoh/bytes"])
+def test_a_command_in_cdr_drives_whatever_its_encoding_says(
+    encoding: str, robot: Robot, stranger: zenoh.Session
+) -> None:
+    stranger.put("cmd_vel", twist(0.3), encoding=encoding)
+    robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
+
+
+def test_the_examples_of_the_docs_run(only_robot: tuple[Wire, Robot], robot: Robot) -> None:
+    drives, converts = re.findall(r"```python\n(.*?)```", (REPO / "docs" / "interfaces.md").read_text(), re.DOTALL)
+    exec(converts, {})
+    with Process([sys.executable, "-c", drives.replace("tcp/127.0.0.1:7447", only_robot[0].endpoint)]) as example:
+        robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
+        assert example.wait() == 0
+
+
+def test_json_still_drives(robot: Robot) -> None:
+    robot.put(0.2)
+    robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding", "kind", "reason"),
+    [
+        (twist(0.3)[:-1], "application/cdr", "malformed", "not a Twist: cut off after 51 bytes"),
+        (twist(0.3), "application/cdr;geometry_msgs/msg/Accel", "malformed", "encoding says geometry_msgs/msg/Accel"),
+        (twist(float("nan")), "application/cdr", "not finite", "linear.x is not a finite number"),
+        (twist(float("inf")), "application/cdr", "not finite", "linear.x is not a finite number"),
+        (b"\x00\x01\x00\x00" + b"\xff" * 600, "application/cdr", "malformed", "552 bytes too many"),
+    ],
+    ids=str,
+)  # fmt: skip
+def test_a_bad_command_is_refused_with_its_reason(
+    payload: bytes, encoding: str, kind: str, reason: str, robot: Robot, stranger: zenoh.Session
+) -> None:
+    before = robot.status().refused.get(kind, 0)
+    stranger.put("cmd_vel", payload, encoding=encoding)
+    status = robot.status_when(lambda status: status.refused.get(kind, 0) > before)
+    assert reason in status.last_refusal
+
+
+def test_services_answer_in_cdr(only_robot: tuple[Wire, Robot], robot: Robot) -> None:
+    wire = only_robot[0]
+    service = wire.start("pose-service", "--wire", "cdr")
+    service.wait_for_line("goals from")
+    goal = wire.bus("asker", wire="cdr").call("next_goal", NextGoalRequest(0), NextGoalReply)
+    assert goal == NextGoalReply(1.0, 0.0, math.pi / 2, 0)
+    assert wire.bus("json").call("get_pose", GetPoseRequest(), GetPoseReply).odom.child_frame_id == "footprint_link"

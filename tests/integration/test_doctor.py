@@ -1,0 +1,229 @@
+"""Each finding of the doctor, made to happen for real."""
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen import about
+from holozen.bus import Bus
+from holozen.messages import Odometry, Twist
+from holozen.testing import Process, Wire, wait_for
+from holozen.testing.wire import command
+
+REPO = Path(__file__).parents[2]
+HOLD = """
+import socket, sys, time
+held = socket.create_server(("127.0.0.1", int(sys.argv[1])))
+print("up", flush=True)
+time.sleep(999)
+"""
+Rows = list[dict[str, str]]
+
+
+def doctor(wire: Wire, *words: str) -> tuple[int, Rows]:
+    """Its exit code and findings, all of them with a mend unless all is well."""
+    done = wire.run("doctor", "--json", *words)
+    rows = [json.loads(line) for line in done.stdout.splitlines()]
+    assert done.stderr == ""
+    assert all(set(row) == {"check", "level", "text", "mend"} for row in rows)
+    assert all(row["mend"] for row in rows if row["level"] != "ok")
+    assert done.returncode == int(any(row["level"] == "error" for row in rows))
+    return done.returncode, rows
+
+
+def bad(rows: Rows, check: str) -> list[str]:
+    """What is wrong in one respect."""
+    return [f"{row['level']}: {row['text']}" for row in rows if row["check"] == check and row["level"] != "ok"]
+
+
+@pytest.fixture
+def door(wire: Wire) -> Bus:
+    """Somebody who holds the meeting point."""
+    return wire.bus("door", lasting=True)
+
+
+def test_with_a_robot_that_drives_all_is_well(wire: Wire) -> None:
+    wire.start("sim").wait_for_line("listens on")
+    wire.start("pose-service").wait_for_line("goals")
+    controller = wire.start("controller")
+    odom = wire.bus().latest("odom", Odometry)
+    wait_for(lambda: (now := odom.read()[0]) and not now.twist.twist.is_slow(0.1))
+    code, rows = doctor(wire)
+    assert (code, [row for row in rows if row["level"] == "error"]) == (0, [])
+    texts = " ".join(row["text"] for row in rows)
+    assert "3 of this version: controller (pid" in texts
+    assert "fresh on odom" in texts
+    assert "and speaks Zenoh" in texts
+    assert controller.returncode is None
+    assert controller.err == ""  # it drives on
+
+
+@pytest.mark.needs("ip", "unshare")
+def test_with_no_network_and_nothing_running_all_is_well() -> None:
+    words = ["unshare", "-rn", *command("doctor")]  # not even loopback is up
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "tcp/127.0.0.1:7447 is free: nothing runs here yet" in done.stdout
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
+def test_a_router_that_is_not_there_is_told(wire: Wire, mode: str) -> None:
+    code, rows = doctor(wire, "--mode", mode)
+    assert code == 1
+    assert bad(rows, "port") == [f"error: nobody is reached at {wire.endpoint}: Connection refused"]
+    assert f"--listen tcp/0.0.0.0:{wire.port}" in next(row["mend"] for row in rows if row["check"] == "port")
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
+def test_who_holds_the_port_and_speaks_no_zenoh_is_named(wire: Wire, mode: str) -> None:
+    with Process([sys.executable, "-c", HOLD, str(wire.port)]) as holder:
+        holder.wait_for_line("up")
+        _, rows = doctor(wire, "--mode", mode)
+    (text,) = bad(rows, "port")
+    assert f"(pid {holder.pid}), who does not answer as Zenoh does" in text
+    assert f"kill {holder.pid}" in next(row["mend"] for row in rows if row["check"] == "port")
+
+
+def test_who_holds_the_port_and_sleeps_is_to_be_woken(wire: Wire) -> None:
+    router = wire.start("router")
+    wait_for(lambda: "speaks Zenoh" in str(doctor(wire)[1]))
+    router.signal(signal.SIGSTOP)
+    _, rows = doctor(wire)
+    router.signal(signal.SIGCONT)
+    assert "asleep as after Ctrl-Z" in bad(rows, "port")[0]
+    assert f"kill -CONT {router.pid}" in str(rows)
+
+
+def test_two_sims_on_one_key_are_told_with_their_processes(wire: Wire) -> None:
+    sims = [wire.start("sim", "--empty") for _ in range(2)]
+    for sim in sims:
+        sim.wait_for_line("no robot yet")
+    code, rows = doctor(wire)
+    (text,) = bad(rows, "twins")
+    assert code == 1
+    assert all(f"sim (pid {sim.pid} on {os.uname().nodename})" in text for sim in sims)
+
+
+def test_odom_that_does_not_come_is_stale(wire: Wire, door: Bus) -> None:
+    publisher = wire.bus("sim").publisher("Fred/odom", Odometry)
+    code, rows = doctor(wire)
+    (text,) = bad(rows, "odom")
+    assert text.startswith("error: Fred/odom is stale: sim has told nothing for 1.")
+    assert code == 1
+    assert publisher.matched is False  # the doctor is gone without a trace
+
+
+def test_a_stopped_robot_is_told_and_is_no_error(wire: Wire) -> None:
+    wire.start("sim").wait_for_line("listens on")
+    assert wire.run("stop").returncode == 0
+    code, rows = doctor(wire)
+    assert (code, bad(rows, "cmd_vel")[0].startswith("warning: the robot is stopped by stop@")) == (0, True)
+
+
+@contextlib.contextmanager
+def commanding(*buses: Bus) -> Iterator[None]:
+    """Several scripts that command the robot at 20 Hz."""
+    ends = threading.Event()
+    publishers = [bus.publisher("cmd_vel", Twist) for bus in buses]
+
+    def command() -> None:
+        while not ends.wait(0.05):
+            for publisher in publishers:
+                publisher.put(Twist.planar(x=0.1))
+
+    thread = threading.Thread(target=command)
+    thread.start()
+    try:
+        yield
+    finally:
+        ends.set()
+        thread.join()
+
+
+def test_two_that_fight_for_a_robot_are_told(wire: Wire) -> None:
+    wire.start("sim").wait_for_line("listens on")
+    with commanding(wire.bus("left"), wire.bus("right")):
+        (text,) = wait_for(lambda: bad(doctor(wire)[1], "cmd_vel"), within=30)
+    assert text.startswith("error: 2 sources command the robot at once: left@")
+    assert "DATA" in text and "not obeyed" in text and "right@" in text
+
+
+def stranger(wire: Wire, change: Callable[[dict[str, Any]], None]) -> tuple[Any, Any]:
+    """A node that tells of itself as `change` has it."""
+    bus = wire.bus("stranger")
+    told = {"node": "stranger", "version": about.version("holozen"), "host": "elsewhere", "pid": 7}
+
+    def answer(query: Any) -> None:
+        with query:
+            row = told | {"time": time.time()}
+            change(row)
+            query.reply(about.key(bus.id), json.dumps(row))
+
+    return bus.session.declare_queryable(about.key(bus.id), answer), bus.announce("node")
+
+
+def test_a_clock_that_is_off_is_told(wire: Wire, door: Bus) -> None:
+    held = stranger(wire, lambda row: row.__setitem__("time", row["time"] + 3))
+    code, rows = doctor(wire)
+    (text,) = bad(rows, "clock")
+    assert (code, text.startswith("error: that of elsewhere is +3.0"), bool(held)) == (1, True, True)
+
+
+def test_another_version_is_told(wire: Wire, door: Bus) -> None:
+    held = stranger(wire, lambda row: row.__setitem__("version", "0.0.1"))
+    code, rows = doctor(wire)
+    (text,) = bad(rows, "peers")
+    told = f"warning: stranger (pid 7 on elsewhere) is holozen 0.0.1, this is {about.version('holozen')}"
+    assert (code, text, bool(held)) == (0, told, True)
+
+
+def test_a_node_that_does_not_answer_is_told(wire: Wire, door: Bus) -> None:
+    bus = wire.bus("mute")
+    held = bus.announce("node"), bus.session.declare_queryable(about.key(bus.id), lambda query: queries.append(query))
+    queries: list[Any] = []
+    _, rows = doctor(wire)
+    (text,) = bad(rows, "peers")
+    assert (text.startswith(f"warning: mute ({bus.id[:6]}) does not answer"), bool(held)) == (True, True)
+    queries.clear()
+
+
+@pytest.mark.parametrize(("lacks", "level"), [("pybullet", "warning"), ("zenoh", "error")])
+def test_a_wheel_that_lacks_is_told(wire: Wire, tmp_path: Path, lacks: str, level: str) -> None:
+    """A real environment without it: links to all else."""
+    there = next(Path(path) for path in sys.path if path.endswith("site-packages"))
+    for entry in there.iterdir():
+        if lacks not in entry.name and not entry.name.endswith(".pth"):
+            (tmp_path / entry.name).symlink_to(entry)
+    script = (
+        "import sys; sys.path[:0] = sys.argv[1:3]; del sys.argv[1:3]; from holozen.cli import main; sys.exit(main())"
+    )
+    words = [sys.executable, "-S", "-I", "-c", script, str(REPO), str(tmp_path), "doctor", *wire.flags]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=60)
+    assert done.stderr == ""
+    assert f"{level:<8} wheels: " in done.stdout
+    assert f"{lacks} is not installed" in done.stdout
+    assert "disk: " in done.stdout  # the rest is looked at all the same
+
+
+def test_a_configuration_that_is_wrong_is_told_in_one_line(wire: Wire) -> None:
+    code, rows = doctor(wire, "--config", "/nowhere.json5")
+    (text,) = bad(rows, "zenoh")
+    assert (code, "/nowhere.json5" in text) == (1, True)
+
+
+def test_it_ends_quietly_when_nobody_reads(wire: Wire) -> None:
+    words = " ".join(command("doctor", *wire.flags))
+    done = subprocess.run(
+        ["bash", "-o", "pipefail", "-c", f"{words} | head -1"], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -1,0 +1,107 @@
+"""When the process that drives a robot dies, the robot stands at once, long before the silence rule would stop it.
+
+The robots here have a watchdog of a minute, or none at all: what stops them within some seconds is nothing else.
+"""
+
+import sys
+from collections.abc import Iterator
+
+import pytest
+
+from holozen import entities
+from holozen.messages import Pose
+from holozen.robot.xacro import expand
+from holozen.testing import Process, Wire, wait_for
+
+from .conftest import start_sim
+from .robots import Robot, moves, speeds
+from .test_robots import URDF
+
+TAG = "<commandTopic>"
+WATCHDOGS = {"Slow": "60", "Never": "-1"}  # s
+
+DRIVER = """
+import sys, time
+from holozen.bus import Bus
+from holozen.connection import Connection
+from holozen.messages import Twist
+endpoint, key, lasting = sys.argv[1:]
+with Bus("driver", Connection(connect=(endpoint,), listen=()), lasting=bool(lasting)) as bus:
+    commands = bus.publisher(key, Twist)
+    print(bus.source, flush=True)
+    while True:
+        commands.put(Twist.planar(0.4))
+        time.sleep(0.02)
+"""
+
+
+@pytest.fixture(scope="module")
+def robots(town: Wire) -> dict[str, Robot]:
+    start_sim(town, "--robot", f"{URDF / 'hb_bot.urdf.xacro'}=Fred")
+    text = expand(URDF / "hb_bot.urdf.xacro")
+    assert TAG in text
+    bus, at = town.bus(), Pose()
+    for name, watchdog in WATCHDOGS.items():
+        at.position.y -= 3.0
+        entities.spawn(bus, name, text.replace(TAG, f"<cmdTimeout>{watchdog}</cmdTimeout>{TAG}"), at)
+    return {name: Robot(bus, name) for name in WATCHDOGS}
+
+
+@pytest.fixture(params=sorted(WATCHDOGS))
+def robot(robots: dict[str, Robot], request: pytest.FixtureRequest) -> Iterator[Robot]:
+    """It stands at the end too."""
+    robot = robots[request.param]
+    robot.resume()
+    yield robot
+    robot.stop()
+
+
+def driver(wire: Wire, robot: Robot, lasting: bool = True) -> Process:
+    """A program that drives the robot, and does so by now."""
+    process = Process([sys.executable, "-c", DRIVER, wire.endpoint, f"{robot.name}/cmd_vel", "yes" if lasting else ""])
+    robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+    assert robot.status().obeyed == process.wait_for_line("driver@")
+    return process
+
+
+def test_a_driver_that_is_killed_leaves_a_robot_that_stands(town: Wire, robot: Robot) -> None:
+    with driver(town, robot) as process:
+        process.kill()
+        robot.stands()
+
+
+def test_one_that_comes_back_is_obeyed_as_usual(town: Wire, robot: Robot) -> None:
+    for _ in range(2):
+        with driver(town, robot) as process:
+            process.kill()
+            robot.stands()
+
+
+def test_what_is_no_node_keeps_the_robots_own_watchdog(town: Wire, robot: Robot) -> None:
+    """`topic pub --once` and a plain `zenoh put` are gone as soon as they have spoken."""
+    with driver(town, robot, lasting=False) as process:
+        process.kill()
+        robot.pass_time(1.0)
+        assert moves(robot.newest(), 0.4, 0, 0)
+
+
+def test_a_stranger_that_is_killed_stops_nobody(town: Wire, robot: Robot, robots: dict[str, Robot]) -> None:
+    other = next(other for other in robots.values() if other is not robot)
+    graph = robot.bus.graph()
+    with driver(town, other) as process, driver(town, robot):
+        begin, source = len(robot.odom.messages()), other.status().obeyed
+        process.kill()
+        wait_for(lambda: source in graph.left(), what="the stranger's node to leave")
+        other.stands()
+        robot.pass_time(0.3)
+        assert all(moves(odom, 0.4, 0, 0) for odom in robot.odom.messages()[begin:])
+
+
+def test_so_does_the_controller_stop_when_it_is_killed(town: Wire, robots: dict[str, Robot]) -> None:
+    slow = robots["Slow"]
+    slow.resume()
+    town.start("pose-service").wait_for_line("goals")
+    controller = town.start("controller", "Slow", "--laps", "0")
+    slow.odom.next(lambda odom: max(map(abs, speeds(odom))) > 0.2)
+    controller.kill()
+    slow.stands()

@@ -1,0 +1,140 @@
+"""Parameters of real services take effect at once, and never make a robot jump."""
+
+import itertools
+import math
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from holozen import rcl_interfaces as r
+from holozen.bus import Bus
+from holozen.messages import NextGoalReply, NextGoalRequest, Twist
+from holozen.testing import Wire, wait_for
+
+from .robots import Robot, moves, rests, time_of
+
+DEFAULTS = {
+    "max_linear": 5.0, "max_angular": 10.0, "real_time_factor": 1.0, "command_timeout": 0.5, "odometry_rate": 50.0,
+}  # fmt: skip
+
+
+def put(bus: Bus, node: str, **values: r.Value) -> list[str]:
+    """Set parameters; the reasons why not."""
+    request = r.SetParametersRequest([r.Parameter(name, r.ParameterValue.of(value)) for name, value in values.items()])
+    results = bus.call(f"{node}/set_parameters", request, r.SetParametersReply).results
+    return [result.reason for result in results if not result.successful]
+
+
+@pytest.fixture(autouse=True)
+def as_it_was(robot: Robot) -> Iterator[None]:
+    """The sim's parameters are the defaults before and after a test."""
+    yield
+    assert put(robot.bus, "sim", **DEFAULTS) == []
+
+
+def test_a_lower_limit_applies_at_the_next_command(robot: Robot) -> None:
+    robot.drive(x=0.5)
+    assert put(robot.bus, "sim", max_linear=0.2) == []
+    robot.drive(x=0.5, until=lambda odom: moves(odom, 0.2, 0, 0))
+    assert "over the limits of 0.2 m/s" in robot.status().last_refusal
+
+
+def test_a_robot_that_is_not_commanded_stands_whatever_is_set(robot: Robot) -> None:
+    robot.drive(x=0.5)
+    robot.stop()
+    assert put(robot.bus, "sim", command_timeout=2.0, max_linear=50.0, real_time_factor=2.0, odometry_rate=200.0) == []
+    assert still(robot, 0.5)
+
+
+def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(robot: Robot) -> None:
+    robot.drive(x=0.3)
+    robot.stands()  # by silence, after 0.5 s
+    assert put(robot.bus, "sim", command_timeout=2.0) == []
+    assert still(robot, 0.3)
+
+
+def still(robot: Robot, seconds: float) -> bool:
+    """Whether it rests in all odoms of the next time."""
+    seen = len(robot.odom.messages())
+    robot.pass_time(seconds)
+    return all(map(rests, robot.odom.messages()[seen:]))
+
+
+def test_the_watchdog_can_be_shortened_but_not_switched_off(robot: Robot) -> None:
+    for value in (0.0, -1.0, 0.04, 3.0):
+        told = f"command_timeout: {value:g}: use a number from 0.05 to 2 s"
+        assert put(robot.bus, "sim", command_timeout=value) == [told]
+    assert put(robot.bus, "sim", command_timeout=0.1) == []
+    began = time_of(robot.drive(x=0.3)[-1])
+    assert time_of(robot.stands()) - began < 0.4  # of the sim's time; the default would take 0.5
+
+
+def test_odometry_comes_at_the_rate_that_is_set(robot: Robot) -> None:
+    assert put(robot.bus, "sim", odometry_rate=10.0) == []
+
+    def gap() -> float:
+        robot.newest()
+        first, second = robot.odom.messages()[-2:]
+        return time_of(second) - time_of(first)
+
+    wait_for(lambda: gap() == pytest.approx(0.1, abs=0.005))
+    assert put(robot.bus, "sim", odometry_rate=100.0) == []
+    wait_for(lambda: gap() == pytest.approx(0.01, abs=0.005))
+
+
+def test_simulated_time_goes_at_the_pace_that_is_set(robot: Robot) -> None:
+    assert put(robot.bus, "sim", real_time_factor=0.1) == []
+    robot.newest()
+    before, began = time_of(robot.newest()), time.monotonic()
+    after, ended = time_of(robot.newest()), time.monotonic()
+    assert after - before < 0.5 * (ended - began)  # 50 Hz of a tenth of the pace: 0.2 s between two
+    assert put(robot.bus, "sim", real_time_factor=0.0) == []
+    wait_for(lambda: time_of(robot.newest()) - after > 20 * (time.monotonic() - ended))
+
+
+def test_a_robot_with_a_name_has_its_own(town: Wire, robot: Robot) -> None:
+    assert town.run("spawn", "urdf/hb_bot.urdf.xacro", "--name", "Fred", "-x", "3").returncode == 0
+    try:
+        assert put(robot.bus, "sim", **{"Fred.command_timeout": 1.0}) == []
+        names = robot.bus.call("sim/list_parameters", r.ListParametersRequest(), r.ListParametersReply).result.names
+        assert {"Fred.command_timeout", "Fred.odometry_rate", "command_timeout"} <= set(names)
+    finally:
+        assert town.run("delete", "Fred").returncode == 0
+    assert put(robot.bus, "sim", **{"Fred.command_timeout": 1.0}) == [
+        "sim has no parameter 'Fred.command_timeout'; did you mean command_timeout?"
+    ]
+
+
+def speed(twist: Twist) -> float:
+    return math.hypot(twist.linear.x, twist.linear.y)
+
+
+def test_the_controller_slows_down_at_once_and_by_its_own_acceleration(town: Wire, robot: Robot) -> None:
+    town.start("pose-service", "--size", "100").wait_for_line("goals")
+    with town.start("controller", "--max-speed", "0.6"):
+        robot.commands.next(lambda twist: speed(twist) > 0.55)
+        seen = len(robot.commands.messages())
+        assert put(robot.bus, "controller", max_speed=0.2) == []
+        robot.commands.next(lambda twist: speed(twist) < 0.201)
+        speeds = [speed(twist) for twist in robot.commands.messages()[seen:]]
+        # 1 m/s^2, for at most two periods of 0.05 s between two commands
+        assert all(before - after <= 0.101 for before, after in itertools.pairwise(speeds))
+        assert put(robot.bus, "controller", gain=99) == ["gain: 99: use a number from 0.1 to 10 1/s"]
+
+
+def test_the_pose_service_hands_out_another_shape_at_once(wire: Wire) -> None:
+    wire.start("pose-service").wait_for_line("goals")
+    bus = wire.bus()
+    assert bus.call("next_goal", NextGoalRequest(0), NextGoalReply).x_goal == 1.0
+    assert put(bus, "pose_service", shape="hexagon", size=3.0) == []
+    assert bus.call("next_goal", NextGoalRequest(0), NextGoalReply).x_goal == 3.0
+    assert bus.call("next_goal", NextGoalRequest(5), NextGoalReply).end_of_list == 1
+
+
+def test_goals_of_a_file_can_only_be_read(wire: Wire, tmp_path: Path) -> None:
+    file = tmp_path / "goals.txt"
+    file.write_text("1 2 3\n")
+    wire.start("pose-service", "--goals", str(file)).wait_for_line("goals")
+    assert put(wire.bus(), "pose_service", goals="other.txt") == ["goals: it can only be read"]

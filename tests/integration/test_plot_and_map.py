@@ -1,0 +1,134 @@
+"""`holozen plot` and `holozen map` beside a live robot, in a terminal and in a pipe."""
+
+import json
+import subprocess
+
+import pytest
+
+from holozen import codec
+from holozen.messages import Odometry, Twist
+from holozen.testing import Wire, wait_for
+from holozen.testing.wire import command
+
+from .robots import Robot
+
+FIELD = "odom.pose.pose.position.x"
+
+
+def test_one_picture_of_live_numbers_fits_the_smallest_terminal(town: Wire, robot: Robot) -> None:
+    done = town.run("plot", FIELD, "odom.twist.twist.linear.x", "--once", "-w", "0.5")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) == 24
+    assert all(len(line) <= 80 for line in lines)
+    assert lines[0].startswith(f"{FIELD}: ")
+    assert lines[-1].split()[-1] == "now"
+    done = town.run("plot", FIELD, "--once", "-w", "0.5", "--ascii")
+    assert done.stdout.isascii()
+
+
+def test_numbers_come_as_json_until_the_reader_has_enough(town: Wire, robot: Robot) -> None:
+    words = " ".join(command("plot", FIELD, "--json", *town.flags))
+    done = subprocess.run(["bash", "-c", f"{words} | head -2"], capture_output=True, text=True, timeout=30)
+    assert done.stderr == ""
+    assert [list(json.loads(line)) for line in done.stdout.splitlines()] == [["time", FIELD]] * 2
+
+
+def test_numbers_of_one_window_come_as_json_and_end(town: Wire, robot: Robot) -> None:
+    done = town.run("plot", FIELD, "--json", "--once", "-w", "0.5", within=10)
+    assert done.returncode == 0, done.stderr
+    assert {FIELD, "time"} == set(json.loads(done.stdout.splitlines()[-1]))
+    done = town.run("plot", "nobody.x", "--json", "--once", "-w", "0.2", within=10)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert "nothing came" in done.stderr
+
+
+@pytest.mark.parametrize("words", [("map",), ("plot", FIELD)])
+def test_pictures_into_a_reader_that_has_seen_enough_end_quietly(
+    town: Wire, robot: Robot, words: tuple[str, ...]
+) -> None:
+    line = " ".join(command(*words, *town.flags))
+    done = subprocess.run(["bash", "-c", f"{line} | head -3; exit ${{PIPESTATUS[0]}}"], capture_output=True, timeout=30)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert len(done.stdout.splitlines()) == 3
+
+
+def test_every_wire_is_drawn(wire: Wire) -> None:
+    session = wire.bus().session
+    publisher = session.declare_publisher("cmd_vel")
+    plot = wire.start("plot", "cmd_vel.linear.x", "--json")
+    wait_for(lambda: publisher.matching_status.matching)
+    for name, x in (("json", 1.0), ("msgpack", 2.0), ("cdr", 3.0)):
+        publisher.put(codec.encode(Twist.planar(x=x), name), encoding=codec.encoding(name, Twist))
+    wait_for(lambda: plot.out.count("\n") == 3)
+    assert [json.loads(line)["cmd_vel.linear.x"] for line in plot.out.splitlines()] == [1.0, 2.0, 3.0]
+
+
+def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
+    for verb, words, text in (("plot", (FIELD,), FIELD), ("map", (), "robot x")):
+        terminal = town.terminal(verb, *words)
+        terminal.wait_for_text(text)
+        terminal.type("\x03")
+        assert terminal.process.wait() == 0
+        assert terminal.modes() == terminal.modes_before
+        assert terminal.raw.endswith("\x1b[?25h\x1b[?1049l")
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "part"),
+    [
+        (
+            ("odom.pose.pose.positon.x", "--once"),
+            1,
+            "odom.pose.pose.positon.x: no field 'positon'",
+        ),
+        (("odom.pose.pose", "--once"), 1, "odom.pose.pose: this is no number, it has position, orientation"),
+        (("odom", "--once"), 2, "write KEY.FIELD, such as odom.twist.twist.linear.x"),
+        (("nobody.x", "--once", "-w", "0.2"), 1, "nothing came; `holozen topic list` shows who publishes"),
+        ((), 2, "the following arguments are required: KEY.FIELD"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line(
+    town: Wire, robot: Robot, words: tuple[str, ...], code: int, part: str
+) -> None:
+    done = town.run("plot", *words)
+    assert done.returncode == code, done.stderr
+    assert part in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+
+
+def test_what_is_no_message_is_counted(wire: Wire) -> None:
+    session = wire.bus().session
+    publisher = session.declare_publisher("odom")
+    plot = wire.start("plot", FIELD, "--once", "-w", "1")
+    wait_for(lambda: publisher.matching_status.matching)
+    publisher.put(codec.encode(Odometry()))
+    publisher.put(b"\xff\x00", encoding="zenoh/bytes")
+    publisher.put(b"\0\1\0\0", encoding="application/cdr")
+    assert plot.wait() == 0
+    assert "2 messages could not be read" in plot.err
+
+
+def test_the_map_shows_the_robot_and_the_goals(town: Wire, robot: Robot) -> None:
+    service = town.start("pose-service")
+    service.wait_for_line("4 goals")
+    done = town.run("map", "--once")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) == 24
+    assert all(len(line) <= 80 for line in lines)
+    assert "robot x" in lines[-1]
+
+    def goals() -> int:
+        told = json.loads(town.run("map", "--json").stdout)
+        assert [one["name"] for one in told["robots"]] == [""]
+        assert told["objects"] == {}
+        return len(told["goals"])
+
+    wait_for(lambda: goals() == 4, what="the four corners of the square")
+
+
+def test_without_a_robot_the_map_says_so(wire: Wire) -> None:
+    done = wire.run("map", "--once", "-w", "0.2")
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr == "holozen map: no robot is there; `holozen up` starts one\n"

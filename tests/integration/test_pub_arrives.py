@@ -1,0 +1,158 @@
+"""`holozen topic pub` sees to it that what it writes arrives, is meant, and is obeyed, or says why not."""
+
+import json
+import signal
+import subprocess
+
+import pytest
+
+from holozen.messages import Twist
+from holozen.testing import Wire, wait_for
+from holozen.testing.wire import command
+
+from .robots import Robot, moves
+from .test_topic import assert_one_line
+
+AHEAD = '{"linear": {"x": 0.2}}'
+
+
+def test_it_says_how_many_subscribe(town: Wire, robot: Robot) -> None:
+    """The sim, and the test that listens to commands."""
+    done = town.run("topic", "pub", "cmd_vel", AHEAD, "--once")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "2 subscribers of cmd_vel\n")
+    told = json.loads(town.run("topic", "pub", "cmd_vel", "{}", "-t", "2", "--json").stdout)
+    assert told == {"key": "cmd_vel", "type": "geometry_msgs/msg/Twist", "subscribers": 2, "published": 2}
+
+
+def test_it_waits_for_as_many_subscribers_as_it_is_told(town: Wire, robot: Robot) -> None:
+    pub = town.start("topic", "pub", "cmd_vel", AHEAD, "--once", "-w", "3")
+    pub.wait_for_line("waiting for 3 subscribers of cmd_vel; 2 by now")
+    other = town.bus("other").subscribe("cmd_vel", Twist)
+    assert pub.wait() == 0
+    assert other.recv().message == Twist.planar(0.2)
+
+
+def test_it_gives_up_waiting_when_it_is_told_to(town: Wire) -> None:
+    done = town.run("topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "-1", "-w", "1", "--max-wait", "0.1")
+    assert done.returncode == 1
+    assert "nobody subscribes to nobody" in done.stderr
+
+
+def test_fewer_subscribers_than_it_is_told_to_wait_for_are_not_enough(town: Wire, robot: Robot) -> None:
+    done = town.run("topic", "pub", "cmd_vel", "{}", "-1", "-w", "9", "--max-wait", "0.2")
+    assert done.returncode == 1
+    assert "cmd_vel: 9 subscribers did not come in time, so nothing is published" in done.stderr
+
+
+def test_it_needs_nobody_where_it_does_not_wait(town: Wire) -> None:
+    done = town.run("topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "--once", "--no-wait")
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ('{"linaer": {}}', "unknown field `linaer`; did you mean 'linear'?"),
+        ('{"linear": {"X": 1}}', "unknown field `X` - at `$.linear`"),
+        ('{"angular": {"zz": 1}}', "unknown field `zz` - at `$.angular`; did you mean 'z'?"),
+        ("linear: {x: .inf}", "linear.x is not a finite number; --force sends it all the same"),
+    ],
+)
+def test_a_wrong_field_is_refused_with_the_closest_name(town: Wire, value: str, told: str) -> None:
+    assert_one_line(town.run("topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", told)
+
+
+def test_a_type_that_the_key_does_not_carry_is_refused(town: Wire) -> None:
+    words = ("topic", "pub", "cmd_vel", "nav_msgs/msg/Odometry", "{}", "--once", "--no-wait")
+    told = "cmd_vel: its type is geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped, not nav_msgs/msg/Odometry"
+    assert_one_line(town.run(*words), 1, told)
+    assert town.run(*words, "--force").returncode == 0
+
+
+@pytest.mark.parametrize("wire_name", ["json", "msgpack"])
+def test_force_sends_what_the_sim_then_refuses_and_says_so(town: Wire, robot: Robot, wire_name: str) -> None:
+    words = ["{linear: {x: .nan}}", "-r", "20", "--force", "--wire", wire_name]
+    pub = town.start("topic", "pub", "cmd_vel", *words)
+    pub.wait_for_line("not obeyed: ")
+    pub.signal(signal.SIGINT)
+    assert pub.wait() == 0
+    robot.stands()
+
+
+def test_it_tells_when_another_one_drives_and_when_it_is_obeyed(town: Wire, robot: Robot) -> None:
+    first = town.start("topic", "pub", "cmd_vel", AHEAD)
+    robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
+    second = town.start("topic", "pub", "cmd_vel", '{"linear": {"y": 0.1}}')
+    assert "drives" in second.wait_for_line("not obeyed: topic_pub@")
+    first.signal(signal.SIGINT)
+    second.wait_for_line("obeyed again")
+    robot.odom.next(lambda odom: moves(odom, 0, 0.1, 0))
+    second.signal(signal.SIGINT)
+    assert (first.wait(), second.wait()) == (0, 0)
+    robot.stands()
+
+
+def test_it_tells_that_the_sim_drives_slower_than_it_says(town: Wire, robot: Robot) -> None:
+    pub = town.start("topic", "pub", "cmd_vel", '{"linear": {"x": 99}}')
+    assert "clamped" in pub.wait_for_line("over the limits of")
+    pub.signal(signal.SIGINT)
+    assert pub.wait() == 0
+    robot.stands()
+
+
+def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(town: Wire, robot: Robot) -> None:
+    words = command("topic", "pub", "cmd_vel", "--stdin", *town.flags)
+    with subprocess.Popen(words, stdin=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as pub:
+        assert pub.stdin and pub.stderr
+        seen = robot.odom
+
+        def say(line: str, driven: tuple[float, ...]) -> None:
+            def driving() -> bool:
+                assert pub.stdin
+                print(line, file=pub.stdin, flush=True)
+                return moves(robot.newest(), *driven)
+
+            wait_for(driving)
+
+        say(AHEAD, (0.2, 0, 0))
+        say("linear: {y: 0.1}", (0, 0.1, 0))
+        pub.stdin.close()
+        assert pub.wait(20) == 0
+    assert seen
+    robot.stands()
+
+
+def test_a_wrong_line_ends_it_with_its_number(town: Wire, robot: Robot) -> None:
+    done = town.run("topic", "pub", "cmd_vel", "--stdin", given=f"{AHEAD}\n\n[]\n{AHEAD}\n")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith("holozen topic pub cmd_vel: line 3 refused: not a Twist: ")
+    robot.stands()
+
+
+def test_any_type_is_published_as_its_fields_say(town: Wire) -> None:
+    echo = town.start("topic", "echo", "scan", "--once", "--json")
+    words = ["scan", "sensor_msgs/msg/LaserScan", "{ranges: [1, 2.5]}", "-r", "50"]
+    for wire_name in ("json", "cdr"):
+        with town.start("topic", "pub", *words, "--wire", wire_name):
+            assert echo.wait() == 0
+            assert json.loads(echo.out)["ranges"] == [1.0, 2.5]
+        echo = town.start("topic", "echo", "scan", "--once", "--json")
+    echo.close()
+    told = "holozen topic pub scan: no type 'sensor_msgs/msg/LaserScn'; did you mean sensor_msgs/msg/LaserScan?"
+    assert_one_line(town.run("topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, told)
+
+
+def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
+    """A publisher of ours that loses five samples after each."""
+    publisher = town.bus("ours").publisher("holes", Twist)
+    hz = town.start("topic", "hz", "holes", "--json")
+
+    def told() -> str:
+        publisher.put(Twist())
+        for _ in range(5):
+            next(publisher._numbers)  # as if a sample had been sent and lost
+        return hz.out
+
+    wait_for(told)
+    report = json.loads(hz.out.splitlines()[0])
+    assert report["lost"] == 5 * (report["window"] - 1)

@@ -1,0 +1,257 @@
+"""`holozen record` and `holozen bag info`: all that came is in the file, whatever ends the recorder."""
+
+import json
+import random
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import cast
+
+import pytest
+import zenoh
+
+from holozen import codec
+from holozen.bag.reader import Bag, Message
+from holozen.messages import Odometry
+from holozen.testing import Process, Wire, wait_for
+from holozen.testing.wire import command
+
+from .robots import Robot
+
+BLOCK = zenoh.CongestionControl.BLOCK  # by default a burst loses some, before anybody receives it
+PAYLOADS = {  # by Zenoh Encoding
+    "application/json": b'{"a":   1.0, "b": [1,2]}',
+    "text/plain": "grüße\n".encode(),
+    "zenoh/bytes": bytes(range(256)),
+    "application/cdr": b"\x00\x01\x00\x00" + bytes(48),
+    "image/jpeg": b"\xff\xd8\xff",
+    "application/protobuf;of.some.Type": b"\x08\x01",
+}
+
+
+def read(path: Path) -> list[Message]:
+    with Bag(path) as bag:
+        return list(bag.messages())
+
+
+def info_of(path: Path, *flags: str) -> str:
+    """What `holozen bag info` says."""
+    words = command("bag", "info", str(path), *flags)
+    return subprocess.run(words, capture_output=True, text=True, timeout=30, check=True).stdout
+
+
+def listening(wire: Wire, key: str) -> zenoh.Session:
+    """A session on whose key a recorder listens."""
+    bus = wire.bus("writer")
+    publisher = bus.session.declare_publisher(key)
+    wait_for(lambda: publisher.matching_status.matching, what="the recorder to listen")
+    return cast(zenoh.Session, bus.session)
+
+
+def test_strangers_payloads_are_recorded_byte_for_byte_with_their_encodings(wire: Wire, tmp_path: Path) -> None:
+    recorder = wire.start("record", "any/**", "-o", str(tmp_path / "a"))
+    session = listening(wire, "any/thing")
+    for i, (encoding, payload) in enumerate(PAYLOADS.items()):
+        session.put(f"any/{i}", payload, encoding=encoding)
+    session.put("other", b"not asked for")
+    session.put("any/last", b"")
+    wait_for(lambda: len(read(tmp_path / "a.mcap")) == len(PAYLOADS) + 1, what="the messages to be flushed")
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0
+    assert f"{tmp_path / 'a.mcap'}: " in recorder.out
+    assert f"{len(PAYLOADS) + 1} messages" in recorder.out
+    assert "none dropped" in recorder.out
+    found = {m.channel.key: (m.channel.encoding, m.payload) for m in read(tmp_path / "a.mcap")}
+    assert list(found.values())[:-1] == list(PAYLOADS.items())
+
+
+def test_a_live_robot_is_recorded_with_the_types_of_ros(town: Wire, robot: Robot, tmp_path: Path) -> None:
+    done = town.run("record", "-a", "-o", str(tmp_path / "a"), "--max-duration", "1.5", "--json")
+    assert done.returncode == 0, done.stderr
+    *_, last = map(json.loads, done.stdout.splitlines())
+    assert last["files"] == [str(tmp_path / "a.mcap")]
+    assert (last["dropped"], last["overran"], last["error"]) == (0, 0, "")
+    info = json.loads(info_of(tmp_path / "a.mcap", "--json"))
+    types = {topic["key"]: topic["type"] for topic in info["topics"]}
+    assert types["odom"] == "nav_msgs/msg/Odometry"
+    assert types["tf"] == "tf2_msgs/msg/TFMessage"
+    assert info["messages"] == last["messages"]
+
+
+def test_a_killed_recorder_leaves_a_file_that_can_be_read(wire: Wire, tmp_path: Path) -> None:
+    recorder = wire.start("record", "a", "-o", str(tmp_path / "a"))
+    session = listening(wire, "a")
+    for i in range(500):
+        session.put("a", b"%d" % i, congestion_control=BLOCK)
+    path = tmp_path / "a.mcap"
+    wait_for(lambda: len(read(path)) == 500, what="the messages to be flushed")
+    for i in range(500, 600):
+        session.put("a", b"%d" % i, congestion_control=BLOCK)
+    assert recorder.kill() == -signal.SIGKILL
+    found = read(path)
+    assert [m.payload for m in found] == [b"%d" % i for i in range(len(found))]
+    assert len(found) >= 500
+    assert "the recording was cut off" in info_of(path)
+
+
+FULL = """
+set -e
+mount -t tmpfs -o size=12M tmpfs "$1"
+ip link set lo up
+shift
+exec "$@"
+"""
+
+
+@pytest.mark.needs("unshare", "ip")
+def test_on_a_full_disk_it_ends_with_a_file_that_is_whole(tmp_path: Path) -> None:
+    """The recorder's disk has 12 MB, of which it keeps 8 aside; it gets 20."""
+    disk = tmp_path / "disk"
+    disk.mkdir()
+    script = tmp_path / "script.py"
+    script.write_text(SCRIPT)
+    words = ["unshare", "-rmn", "bash", "-c", FULL, "-", str(disk), sys.executable, str(script), str(disk)]
+    with Process(words) as process:
+        assert process.wait(60) == 0, process.err
+    told = json.loads(process.out.splitlines()[-1])
+    assert told["code"] == 1
+    assert told["said"].count("holozen record: ended: No space left on device") == 1
+    assert 100 < told["readable"] == told["messages"]
+    assert told["mcap"] == told["messages"], "the mcap library wants an end"
+
+
+SCRIPT = """
+import json, os, sys
+from pathlib import Path
+from typing import cast
+from holozen.testing import Wire, wait_for
+from holozen.bag.reader import Bag
+from mcap.reader import make_reader
+
+path = Path(sys.argv[1]) / "a.mcap"
+with Wire() as wire:
+    recorder = wire.start("record", "a", "-o", str(path), "--json")
+    session = wire.bus("writer").session
+    publisher = session.declare_publisher("a")
+    wait_for(lambda: publisher.matching_status.matching)
+    for i in range(20_000):
+        if recorder.returncode is not None:
+            break
+        publisher.put(os.urandom(10_000))
+    code = recorder.wait(30)
+    out, err = recorder.out, recorder.err
+with Bag(path) as bag:
+    readable = len(list(bag.messages()))
+with path.open("rb") as stream:
+    summary = make_reader(stream).get_summary()
+last = json.loads(out.splitlines()[-1])
+told = {"code": code, "said": err, "readable": readable, "messages": last["messages"]}
+print(json.dumps(told | {"mcap": summary.statistics.message_count}))
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "part"),
+    [
+        ((), 2, "name the keys to record, or use -a for all"),
+        (("odom", "-a"), 2, "name the keys to record, or use -a for all"),
+        (("odom", "-o", "/nowhere/a"), 1, "cannot write /nowhere/a.mcap: No such file or directory"),
+        (("odom", "--max-size", "0"), 2, "use a number from 0.1"),
+        (("a//b", "-o", "a"), 1, "key 'a//b'"),
+        (("odom", "-o", "a", "--max-duration", "0.1"), 1, "nothing came, so no file is left"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line(
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], code: int, part: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    done = wire.run("record", *words)
+    assert done.returncode == code, done.stderr
+    assert part in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_file_that_exists_is_not_written_over(wire: Wire, tmp_path: Path) -> None:
+    (tmp_path / "a.mcap").write_text("precious")
+    done = wire.run("record", "a", "-o", str(tmp_path / "a"))
+    assert done.returncode == 1
+    assert done.stderr.endswith("a.mcap: File exists; choose another name with -o\n")
+    assert (tmp_path / "a.mcap").read_text() == "precious"
+
+
+def test_keys_that_include_each_other_are_recorded_once(wire: Wire, tmp_path: Path) -> None:
+    recorder = wire.start("record", "a/b", "a/*", "a/b", "-o", str(tmp_path / "a"))
+    listening(wire, "a/b").put("a/b", b"once")
+    wait_for(lambda: read(tmp_path / "a.mcap"))
+    recorder.signal(signal.SIGTERM)
+    assert recorder.wait() == 0
+    assert [m.payload for m in read(tmp_path / "a.mcap")] == [b"once"]
+
+
+def test_for_ros_the_robot_is_recorded_in_cdr_by_the_sims_own_clock(town: Wire, robot: Robot, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    words = ("odom", "tf", "-o", str(path), "--max-duration", "1", "--wire", "cdr", "--use-sim-time")
+    done = town.run("record", *words)
+    assert done.returncode == 0, done.stderr
+    stamps = []
+    for message in read(path):
+        assert message.channel.encoding == f"application/cdr;{message.channel.type}"
+        if message.channel.key == "odom":
+            odom = codec.decode(message.payload, message.channel.encoding, (Odometry,))
+            stamps.append((odom.header.stamp.seconds(), message.at / 1e9))
+    assert len(stamps) > 10
+    assert all(stamp == pytest.approx(at, abs=0.5) for stamp, at in stamps)
+
+
+def test_without_a_clock_there_is_no_time_of_the_sim(wire: Wire, tmp_path: Path) -> None:
+    recorder = wire.start("record", "a", "-o", str(tmp_path / "a"), "--use-sim-time", "--max-duration", "2")
+    listening(wire, "a").put("a", b"x")
+    assert recorder.wait() == 1
+    assert recorder.err.splitlines()[-1].endswith("nothing came on clock, so nobody knows the sim's time")
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("words", ["record -a --json -o a", "bag info a.mcap", "bag info a.mcap --json"])
+def test_a_reader_that_has_seen_enough_ends_it_quietly(
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    publisher = wire.start("topic", "pub", "tf", "{}", "-r", "100")
+    publisher.wait_for_line("nobody subscribes")
+    if words.startswith("bag"):
+        assert wire.run("record", "-a", "-o", "a", "--max-duration", "0.3").returncode == 0
+    flags = wire.flags if words.startswith("record") else []
+    line = " ".join([*command(*words.split()), *flags])
+    done = subprocess.run(["bash", "-c", f"{line} | head -1; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True)
+    assert done.returncode == 0
+    assert len(done.stdout.splitlines()) == 1
+    assert [line for line in done.stderr.splitlines() if not line.startswith("recording ")] == []
+    with Bag(tmp_path / "a.mcap") as bag:
+        assert list(bag.messages())
+        assert not bag.cut_off
+
+
+def test_a_long_recording_is_split(wire: Wire, tmp_path: Path) -> None:
+    recorder = wire.start("record", "a", "-o", str(tmp_path / "a"), "--max-size", "0.1", "--max-duration", "60")
+    session = listening(wire, "a")
+    for _ in range(200):
+        session.put("a", random.randbytes(20_000), congestion_control=BLOCK)
+    wait_for(lambda: len(list(tmp_path.iterdir())) > 1, what="a second file")
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0
+    files = sorted(tmp_path.iterdir())
+    assert [path.name for path in files] == [f"a_{i}.mcap" for i in range(len(files))]
+    assert sum(len(read(path)) for path in files) == 200
+    assert "200 messages" in recorder.out
+    assert recorder.out.startswith(", ".join(map(str, files)))
+
+
+def test_in_a_terminal_a_line_tells_how_far_it_is(wire: Wire, tmp_path: Path) -> None:
+    terminal = wire.terminal("record", "a", "-o", str(tmp_path / "a"))
+    listening(wire, "a").put("a", b"x")
+    terminal.wait_for_text("1 messages")
+    terminal.type("\x03")
+    assert terminal.process.wait() == 0
+    assert "1 messages" in terminal.screen()

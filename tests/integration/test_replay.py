@@ -1,0 +1,164 @@
+"""`holozen replay`: the same bytes on the same keys; robots are moved only if asked, and stopped at the end."""
+
+import json
+import signal
+from pathlib import Path
+
+import pytest
+
+from holozen import codec
+from holozen.bag.forms import form_of
+from holozen.bag.writer import BagWriter
+from holozen.messages import Message, Odometry, Twist
+from holozen.tap import Sample, Tap
+from holozen.testing import Wire, wait_for
+
+from .robots import Robot, moves
+from .test_record import PAYLOADS, read
+
+MS = 1_000_000  # ns
+FORWARD = codec.encode(Twist.planar(x=0.2))
+
+
+def bag(path: Path, *rows: tuple[str, bytes, str, float], types: tuple[type[Message], ...] = ()) -> str:
+    """A bag with rows of key, payload, Zenoh Encoding and time in ms."""
+    writer = BagWriter(str(path))
+    for key, payload, encoding, at in rows:
+        writer.write(key, form_of(payload, encoding, types)[0], payload, round(at * MS))
+    writer.close()
+    return str(path)
+
+
+def drain(tap: Tap) -> list[Sample]:
+    return list(iter(tap.try_recv, None))
+
+
+def commands(count: int, every: float = 50.0) -> list[tuple[str, bytes, str, float]]:
+    """Forward, again and again, for `count` times `every` ms."""
+    return [("cmd_vel", FORWARD, "application/json", i * every) for i in range(count)]
+
+
+def test_payloads_and_encodings_are_those_of_the_bag(wire: Wire, tmp_path: Path) -> None:
+    rows = [(f"any/{i}", payload, encoding, i * 5) for i, (encoding, payload) in enumerate(PAYLOADS.items())]
+    tap = wire.bus().tap("any/**")
+    done = wire.run("replay", bag(tmp_path / "a.mcap", *rows))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith(f"played {len(rows)} messages in ")
+    assert [(s.key, s.payload, s.encoding) for s in drain(tap)] == [(key, p, e) for key, p, e, _ in rows]
+
+
+def test_what_was_recorded_is_played_to_who_records_again(wire: Wire, tmp_path: Path) -> None:
+    rows = [("a", b"%d" % i, "text/plain", i) for i in range(300)]
+    first = bag(tmp_path / "first.mcap", *rows)
+    recorder = wire.start("record", "b", "-o", str(tmp_path / "again"))
+    recorder.wait_for_line("recording b")
+    done = wire.run("replay", first, "--remap", "a:=b", "--json", "--start-offset", "0.1", "--until", "0.199")
+    assert json.loads(done.stdout)["messages"] == 100, done.stderr
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0, recorder.err
+    found = [int(m.payload) for m in read(tmp_path / "again.mcap")]
+    assert found == sorted(found)
+    assert set(found) <= set(range(100, 200))  # Zenoh drops some on a machine that is too busy
+    assert found
+
+
+def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(town: Wire, robot: Robot, tmp_path: Path) -> None:
+    odom = ("odom", codec.encode(Odometry()), "application/json", 0.0)
+    path = bag(tmp_path / "a.mcap", odom, *commands(3), ("note", b"hello", "text/plain", 1.0))
+    tap = robot.bus.tap("note")
+    done = town.run("replay", path)
+    assert done.returncode == 0
+    assert done.stderr.splitlines() == [
+        "cmd_vel is left out: it moves robots; --commands plays it too",
+        "odom is left out: sim publishes it now; --remap odom:=NEW plays it elsewhere",
+    ]
+    assert [s.payload for s in drain(tap)] == [b"hello"]
+    done = town.run("replay", path, "--topics", "cmd_vel")
+    assert done.returncode == 1
+    assert done.stderr == "holozen replay: cmd_vel: it moves robots; --commands plays it too\n"
+
+
+def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot, tmp_path: Path) -> None:
+    path = bag(tmp_path / "a.mcap", *commands(8), types=(Twist,))
+    tap = robot.bus.tap("cmd_vel")
+    done = town.run("replay", path, "--commands")
+    assert done.returncode == 0, done.stderr
+    sent = drain(tap)
+    assert [s.payload for s in sent[:8]] == [FORWARD] * 8
+    assert {s.priority for s in sent} == {"DATA"}
+    assert all(s.source.startswith("replay@") for s in sent)
+    assert [s.payload for s in sent[8:]] == [codec.encode(Twist())] * 5
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_the_robot(town: Wire, robot: Robot, tmp_path: Path, number: int) -> None:
+    path = bag(tmp_path / "a.mcap", *commands(600), types=(Twist,))
+    tap = robot.bus.tap("cmd_vel")
+    player = town.start("replay", path, "--commands", "--loop")
+    wait_for(lambda: moves(robot.newest(), 0.2, 0, 0, tolerance=0.02), what="the robot to move")
+    player.signal(number)
+    assert player.wait() == 0, player.err
+    assert [s.payload for s in drain(tap)][-5:] == [codec.encode(Twist())] * 5
+    robot.stands()
+
+
+def test_in_a_terminal_space_pauses_and_the_arrow_steps(wire: Wire, tmp_path: Path) -> None:
+    rows = [("a", b"%d" % i, "text/plain", i * 20_000.0) for i in range(5)]
+    tap = wire.bus().tap("a")
+    terminal = wire.terminal("replay", bag(tmp_path / "a.mcap", *rows))
+    terminal.wait_for_text("space pauses")
+    terminal.type(" ")
+    terminal.wait_for_text("paused: space goes on")
+    terminal.type("\x1b[C")
+    terminal.wait_for_text("2 messages")
+    terminal.type("s")
+    terminal.wait_for_text("3 messages")
+    terminal.type("\x03")
+    terminal.wait_for_text("played 3 messages")
+    assert terminal.process.wait() == 0
+    assert terminal.modes() == terminal.modes_before
+    assert [s.payload for s in drain(tap)] == [b"0", b"1", b"2"]
+
+
+def test_a_pause_stops_the_robot(wire: Wire, tmp_path: Path) -> None:
+    tap = wire.bus().tap("cmd_vel")
+    terminal = wire.terminal("replay", bag(tmp_path / "a.mcap", *commands(600), types=(Twist,)), "--commands")
+    terminal.wait_for_text("space pauses")
+    terminal.type(" ")
+    terminal.wait_for_text("paused: space goes on")
+    assert [s.payload for s in drain(tap)][-6:] == [FORWARD] + 5 * [codec.encode(Twist())]
+    terminal.type("\x03")
+    assert terminal.process.wait() == 0
+
+
+def test_a_loop_plays_until_it_is_told_to_end(wire: Wire, tmp_path: Path) -> None:
+    tap = wire.bus().tap("a")
+    player = wire.start("replay", bag(tmp_path / "a.mcap", *[("a", b"x", "", i) for i in range(10)]), "--loop")
+    for _ in range(31):
+        assert tap.recv().payload == b"x"
+    player.signal(signal.SIGINT)
+    assert player.wait() == 0
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "part"),
+    [
+        (("none.mcap",), 1, "cannot read none.mcap: No such file or directory"),
+        (("text.mcap",), 1, "text.mcap is no MCAP file"),
+        (("a.mcap", "--topics", "odom"), 1, "there is no 'odom' in the bag; there is a"),
+        (("a.mcap", "--remap", "a"), 2, "write OLD:=NEW, such as odom:=old/odom"),
+        (("a.mcap", "-r", "0"), 2, "use a number from 0.001"),
+        (("a.mcap", "--start-offset", "9"), 1, "no message is between --start-offset and --until"),
+        ((), 2, "the following arguments are required: FILE"),
+    ],
+)
+def test_what_is_wrong_is_told_in_one_line(
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], code: int, part: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    bag(tmp_path / "a.mcap", ("a", b"x", "", 0.0))
+    (tmp_path / "text.mcap").write_text("hello, I am a text")
+    done = wire.run("replay", *words)
+    assert done.returncode == code, done.stderr
+    assert part in done.stderr.splitlines()[-1]
+    assert "Traceback" not in done.stderr

@@ -1,0 +1,284 @@
+"""A stopped robot stands, whatever is commanded, until it is released; and the release moves nothing by itself."""
+
+import json
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+import pytest
+import zenoh
+
+from holozen import entities
+from holozen.errors import ServiceError
+from holozen.messages import (
+    CommandSource,
+    CommandStatus,
+    JointState,
+    Message,
+    Odometry,
+    Pose,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+)
+from holozen.publisher import Publisher
+from holozen.robot.xacro import expand
+from holozen.testing import Process, Wire, wait_for
+from holozen.wire import key_for
+
+from .conftest import start_sim
+from .robots import Robot, distance, moves, rests, speeds
+from .test_robots import URDF
+
+PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
+BOT = URDF / "hb_bot.urdf.xacro"
+TAG = "<commandTopic>"
+# With a watchdog of a minute, who has to let go is silent as long, however slow the machine: a source that was not
+# scheduled for half a second has let go of the others.
+SLOW_BOT = expand(BOT).replace(TAG, f"<cmdTimeout>60</cmdTimeout>{TAG}")
+WHEELS = ["jFL", "jFR", "jBL", "jBR"]
+SLOW = 0.02  # m/s, rad/s; slower is standing, for what stands on wheels
+
+
+class Flood:
+    """Sources that command all the time, some hundred times a second each, while they are not paused."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire, self._end, self.paused = wire, threading.Event(), threading.Event()
+        self._threads: list[threading.Thread] = []
+
+    def add(self, key: str, message: Message, priority: str, node: str = "flood") -> Publisher[Message]:
+        publisher: Publisher[Message] = self._wire.bus(node).publisher(key, type(message), priority)
+
+        def run() -> None:
+            while not self._end.wait(4e-3):
+                if not self.paused.is_set():
+                    publisher.put(message)
+
+        self._threads.append(threading.Thread(target=run))
+        self._threads[-1].start()
+        return publisher
+
+    def close(self) -> None:
+        self._end.set()
+        for thread in self._threads:
+            thread.join()
+
+
+@pytest.fixture
+def flood(town: Wire) -> Iterator[Flood]:
+    flood = Flood(town)
+    yield flood
+    flood.close()
+
+
+@pytest.fixture(scope="module")
+def sim(town: Wire) -> Process:
+    files = {"Fred": BOT, "Rover": URDF / "rover.urdf.xacro", "Wheely": URDF / "wheely_boi.xacro"}
+    return start_sim(town, *(word for name, file in files.items() for word in ("--robot", f"{file}={name}")))
+
+
+@pytest.fixture(scope="module")
+def robots(town: Wire, sim: Process) -> dict[str, Robot]:
+    bus, at = town.bus(), Pose()
+    at.position.y = -5.0
+    entities.spawn(bus, "Slow", SLOW_BOT, at)
+    return {name: Robot(bus, name) for name in ("Fred", "Rover", "Wheely", "Slow")}
+
+
+@contextmanager
+def ready(robot: Robot) -> Iterator[Robot]:
+    """It stands, nobody is held, and who commanded it before has let go; at the end it is released."""
+    trigger(robot, "stop")
+    trigger(robot, "release")
+    robot.pass_time(0.7)
+    robot.resume()
+    yield robot
+    trigger(robot, "stop")
+    trigger(robot, "release")
+
+
+@pytest.fixture
+def fred(robots: dict[str, Robot]) -> Iterator[Robot]:
+    with ready(robots["Fred"]) as fred:
+        yield fred
+
+
+def trigger(robot: Robot, verb: str) -> TriggerReply:
+    return robot.bus.call(key_for(verb, robot.name), TriggerRequest(), TriggerReply)
+
+
+def stands_for(robot: Robot, seconds: float, slow: float = SLOW) -> list[Odometry]:
+    """Let that much sim time pass; the robot may not have moved meanwhile."""
+    begin = len(robot.odom.messages())
+    robot.pass_time(seconds)
+    odoms: list[Odometry] = robot.odom.messages()[begin:]
+    assert max(max(map(abs, speeds(odom))) for odom in odoms) < slow
+    assert distance(odoms[0], odoms[-1]) < 5e-3
+    return odoms
+
+
+def slows(robot: Robot, limit: float = SLOW) -> Callable[[], object]:
+    return lambda: max(map(abs, speeds(robot.newest()))) < limit
+
+
+@pytest.mark.parametrize("name", ["Fred", "Rover", "Wheely"])
+def test_whatever_is_commanded_a_stopped_robot_stands(
+    town: Wire, robots: dict[str, Robot], flood: Flood, name: str
+) -> None:
+    with ready(robots[name]) as robot:
+        for node, priority in (("person", PERSON), ("script", SCRIPT), ("autopilot", AUTOPILOT)):
+            flood.add(f"{name}/cmd_vel", Twist.planar(0.4), priority, node)
+        if name == "Rover":
+            flood.add(f"{name}/joint_command", JointState(name=WHEELS, velocity=[8.0] * 4), PERSON, "hands")
+        robot.odom.next(lambda odom: speeds(odom)[0] > 0.3)
+        assert town.run("stop", name).stdout == f"{name} is stopped\n"
+        wait_for(slows(robot), what="it to stand")
+        robot.pass_time(1.0)  # what balances sways for a moment
+        odoms = stands_for(robot, 0.5)
+        assert abs(odoms[-1].pose.pose.orientation.x) < 0.1
+        status = robot.status()
+        assert status.stopped.startswith("stop@")
+        assert status.refused["stopped"] > 100
+        assert (status.obeyed, status.held) == ("", True)
+
+
+def test_at_the_next_step_its_velocity_is_zero(fred: Robot) -> None:
+    fred.drive(0.5)
+    trigger(fred, "stop")
+    assert rests(fred.newest())
+
+
+SETTER = """
+import sys, time
+from holozen.bus import Bus
+from holozen.connection import Connection
+from holozen.messages import TriggerReply, TriggerRequest
+with Bus("setter", Connection(connect=(sys.argv[1],), listen=()), lasting=True) as bus:
+    bus.call("Fred/stop", TriggerRequest(), TriggerReply)
+    print("done", flush=True)
+    time.sleep(3600)
+"""
+
+
+def test_it_outlives_who_set_it(town: Wire, fred: Robot, flood: Flood) -> None:
+    with Process([sys.executable, "-c", SETTER, town.endpoint]) as setter:
+        setter.wait_for_line("done")
+        setter.signal(signal.SIGKILL)
+        setter.wait()
+    flood.add("Fred/cmd_vel", Twist.planar(0.4), PERSON)
+    stands_for(fred, 1.0, 1e-6)
+    assert fred.status().stopped.startswith("setter@")
+
+
+def test_any_zenoh_tool_can_set_it_and_ask_for_it(fred: Robot, stranger: zenoh.Session) -> None:
+    def get(key: str) -> dict[str, object]:
+        (reply,) = stranger.get(key)
+        assert reply.ok is not None
+        value: dict[str, object] = json.loads(bytes(reply.ok.payload))
+        return value
+
+    assert get("Fred/stop") == {"success": True, "message": "stopped by somebody"}
+    assert get("Fred/cmd_vel_status")["stopped"] == "somebody"
+    get("Fred/release")
+    assert get("Fred/cmd_vel_status")["stopped"] == ""
+
+
+def refuses(robot: Robot, reason: str) -> CommandStatus:
+    """Wait until more commands are refused for this reason."""
+    before = robot.status().refused.get(reason, 0)
+    return robot.status_when(lambda status: status.refused.get(reason, 0) > before + 10)
+
+
+def flooding(status: CommandStatus) -> CommandSource:
+    """The source that speaks most."""
+    return max(status.sources, key=lambda source: source.rate)
+
+
+@pytest.mark.parametrize("priority", [PERSON, SCRIPT])
+def test_a_source_that_goes_on_commanding_moves_nothing_until_it_sends_a_stop(
+    robots: dict[str, Robot], flood: Flood, priority: str
+) -> None:
+    with ready(robots["Slow"]) as slow:
+        source = flood.add("Slow/cmd_vel", Twist.planar(0.4), priority)
+        slow.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+        trigger(slow, "stop")
+        assert flooding(refuses(slow, "stopped")).held
+        trigger(slow, "release")
+        assert refuses(slow, "let go first").stopped == ""
+        stands_for(slow, 1.0, 1e-6)
+        source.put(Twist())
+        slow.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+        assert not flooding(slow.status_when(lambda status: flooding(status).obeyed)).held
+
+
+def test_a_silence_lets_go_too(fred: Robot, flood: Flood) -> None:
+    flood.add("Fred/cmd_vel", Twist.planar(0.4), SCRIPT)
+    trigger(fred, "stop")
+    refuses(fred, "stopped")
+    trigger(fred, "release")
+    flood.paused.set()
+    fred.pass_time(0.8)
+    flood.paused.clear()
+    fred.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+
+
+def test_an_autopilot_also_waits_for_resume_which_is_refused_meanwhile(fred: Robot, flood: Flood) -> None:
+    trigger(fred, "stop")
+    with pytest.raises(ServiceError, match=r"^stopped: by .*; `holozen release` lets it drive again$"):
+        fred.resume()
+    trigger(fred, "release")
+    fred.pass_time(0.8)
+    flood.add("Fred/cmd_vel", Twist.planar(0.4), AUTOPILOT)
+    assert refuses(fred, "held").held
+    stands_for(fred, 0.5, 1e-6)
+    fred.resume()
+    fred.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+
+
+def test_a_robot_in_the_place_of_a_stopped_one_is_stopped(town: Wire, sim: Process, flood: Flood) -> None:
+    bus, at = town.bus(), Pose()
+    at.position.y = -10.0
+    entities.spawn(bus, "Ann", SLOW_BOT, at)
+    ann = Robot(bus, "Ann")
+    trigger(ann, "stop")
+    entities.delete(bus, "Ann")
+    flood.add("Ann/cmd_vel", Twist.planar(0.4), PERSON)
+    entities.spawn(bus, "Ann", SLOW_BOT, at)
+    sim.wait_for_line("as the one before it was")
+    assert refuses(ann, "stopped").stopped.startswith("test@")
+    stands_for(ann, 0.5, 1e-6)
+    trigger(ann, "release")
+    assert refuses(ann, "let go first").stopped == ""
+    stands_for(ann, 0.5, 1e-6)
+    entities.delete(bus, "Ann")
+
+
+def test_one_command_stops_all_robots_beside_a_process_that_sleeps(town: Wire, robots: dict[str, Robot]) -> None:
+    sleeper = town.start("pose-service")
+    sleeper.wait_for_line("goals")
+    sleeper.signal(signal.SIGSTOP)
+    done = town.run("stop")
+    assert {f"{name} is stopped" for name in robots} <= set(done.stdout.splitlines())
+    assert (done.returncode, done.stderr) == (0, "")
+    assert all(robot.status().stopped for robot in robots.values())
+    assert town.run("release").returncode == 0
+    assert not any(robot.status().stopped for robot in robots.values())
+    sleeper.signal(signal.SIGCONT)
+
+
+def test_the_controller_yields_to_it_and_goes_on_after_release_and_resume(town: Wire, fred: Robot) -> None:
+    town.start("pose-service").wait_for_line("goals")
+    controller = town.start("controller", "Fred", "--laps", "0")
+    fred.odom.next(lambda odom: max(map(abs, speeds(odom))) > 0.1)
+    trigger(fred, "stop")
+    controller.wait_for_line("controller: yields: the robot is stopped by test@")
+    stands_for(fred, 0.5, 1e-6)
+    trigger(fred, "release")
+    controller.wait_for_line("controller: yields to the stop by test@")
+    stands_for(fred, 0.5, 1e-6)
+    fred.resume()
+    fred.odom.next(lambda odom: max(map(abs, speeds(odom))) > 0.1)
+    controller.terminate()

@@ -1,0 +1,193 @@
+"""The verbs that look, on keys of strangers: plain zenoh that publishes JSON, text, any bytes, and CDR by rosbags."""
+
+import json
+import os
+import signal
+import subprocess
+import threading
+from collections.abc import Iterator
+
+import pytest
+import zenoh
+from rosbags.typesys import Stores, get_typestore
+
+from holozen.testing import Wire, wait_for
+from holozen.testing.wire import command
+
+from .conftest import stranger_config
+from .test_topic import assert_one_line
+
+STORE = get_typestore(Stores.ROS2_HUMBLE)
+Twist, Vector3 = (STORE.types[f"geometry_msgs/msg/{name}"] for name in ("Twist", "Vector3"))
+CDR = bytes(STORE.serialize_cdr(Twist(Vector3(1.5, 0.0, -2.0), Vector3(0.0, 0.0, 0.25)), "geometry_msgs/msg/Twist"))
+SHOWN = "linear:\n  x: 1.5\n  y: 0.0\n  z: -2.0\nangular:\n  x: 0.0\n  y: 0.0\n  z: 0.25\n---\n"
+
+PUTS = {
+    "a/json": (b'{"speed": 1.5, "name": "x"}', "application/json"),
+    "a/lines": ('{\n "name": "\u00e9\u009b"\n}'.encode(), "application/json"),
+    "a/text": (b"red \x1b[31malert\x07", "text/plain"),
+    "a/bytes": (bytes(range(200, 256)), "zenoh/bytes"),
+    "a/cdr": (CDR, "application/cdr"),
+    "a/schema": (CDR, "application/cdr;geometry_msgs/msg/Twist"),
+    "a/plain": (CDR, "zenoh/bytes"),
+    "a/cut": (CDR[:20], "application/cdr;geometry_msgs/msg/Twist"),
+}
+
+
+@pytest.fixture(scope="module")
+def town() -> Iterator[Wire]:
+    """A place where a stranger puts all of PUTS at 100 Hz; nobody of ours is there but a door."""
+    with Wire() as wire:
+        wire.bus("door")
+        done = threading.Event()
+        with zenoh.open(stranger_config(wire)) as session:
+            talker = threading.Thread(target=_talk, args=(session, done))
+            talker.start()
+            yield wire
+            done.set()
+            talker.join()
+
+
+def _talk(session: zenoh.Session, done: threading.Event) -> None:
+    while not done.wait(0.01):
+        for key, (payload, encoding) in PUTS.items():
+            session.put(key, payload, encoding=encoding)
+
+
+@pytest.mark.parametrize(
+    ("words", "shown"),
+    [
+        ("a/json", "speed: 1.5\nname: x\n---\n"),
+        ("a/json --json", '{"speed": 1.5, "name": "x"}\n'),
+        ("a/lines --json", '{"name": "\\u00e9\\u009b"}\n'),
+        ("a/json --csv", "1.5,x\n"),
+        ("a/json --field speed", "1.5\n---\n"),
+        ("a/json --no-str", "speed: 1.5\nname: <1 characters>\n---\n"),
+        ("a/text", '"red \\u001b[31malert\\u0007"\n---\n'),
+        ("a/text --csv", "red \\u001b[31malert\\u0007\n"),
+        ("a/schema", SHOWN),
+        ("a/cdr --type geometry_msgs/msg/Twist", SHOWN),
+        ("a/cdr geometry_msgs/Twist", SHOWN),
+        ("a/plain geometry_msgs/msg/Twist", SHOWN),
+        ("a/schema --filter m.linear.x==1.5 --field angular.z --csv", "0.25\n"),
+        ("a/json --json --field speed", '{"value": 1.5}\n'),
+        ("a/js$* --json", '{"key": "a/json", "value": {"speed": 1.5, "name": "x"}}\n'),
+    ],
+)
+def test_what_a_stranger_puts_is_shown(town: Wire, words: str, shown: str) -> None:
+    done = town.run("topic", "echo", *words.split(), "--once")
+    assert (done.returncode, done.stdout, done.stderr) == (0, shown, "")
+
+
+@pytest.mark.parametrize(
+    ("words", "start"),
+    [
+        ("a/bytes", "56 bytes of zenoh/bytes: c8 c9 ca "),
+        ("a/cdr", f"{len(CDR)} bytes of application/cdr: 00 01 00 00 "),
+        ("a/plain", f"{len(CDR)} bytes of zenoh/bytes: 00 01 00 00 "),
+        ("a/cut", "20 bytes of application/cdr;geometry_msgs/msg/Twist: 00 01 "),
+        ("a/cdr nav_msgs/msg/Odometry", f"{len(CDR)} bytes of application/cdr: "),
+        ("a/bytes --json", '{"hex": "c8c9ca'),
+    ],
+)
+def test_what_cannot_be_decoded_is_a_hex_dump_and_counted(town: Wire, words: str, start: str) -> None:
+    done = town.run("topic", "echo", *words.split(), "--once")
+    assert done.returncode == 0
+    assert done.stdout.startswith(start)
+    assert done.stderr == "1 of 1 samples could not be decoded; for CDR give the type: --type T\n"
+
+
+def test_raw_gives_the_bytes_as_they_came(town: Wire) -> None:
+    words = command("topic", "echo", "a/bytes", "--raw", "--once", *town.flags)
+    assert subprocess.run(words, capture_output=True, timeout=30).stdout == PUTS["a/bytes"][0]
+
+
+@pytest.mark.parametrize("words", ["a/text --raw --once", "a/text --once", "a/text --csv --once", "** --filter m=='x'"])
+def test_a_strangers_control_characters_never_reach_a_terminal(town: Wire, words: str) -> None:
+    with town.terminal("topic", "echo", *words.split(), "--timeout", "2") as terminal:
+        terminal.process.wait()
+        assert "\x1b[31m" not in terminal.raw
+        assert "\x07" not in terminal.raw
+
+
+def test_every_key_of_an_expression_is_shown_with_its_name(town: Wire) -> None:
+    echo = town.start("topic", "echo", "**", "--json")
+    wait_for(lambda: {json.loads(line)["key"] for line in echo.out.splitlines()[:-1]} == set(PUTS))
+    echo.signal(signal.SIGINT)
+    assert echo.wait() == 130
+    assert "samples could not be decoded" in echo.err
+
+
+def test_a_type_is_told_by_the_publishers_token(town: Wire) -> None:
+    """A publisher of ours says its type; the bytes alone do not."""
+    bus = town.bus("ours", wire="cdr")
+    token = bus.announce("pub", "geometry_msgs/msg/Twist", "a/cdr")
+    assert town.run("topic", "echo", "a/cdr", "--once").stdout == SHOWN
+    token.undeclare()
+
+
+def test_a_filter_that_nothing_passes_ends_with_the_timeout(town: Wire) -> None:
+    done = town.run("topic", "echo", "a/json", "--filter", "speed > 2", "--timeout", "0.3")
+    assert_one_line(done, 1, "nothing that passes the filter came on a/json within 0.3 s")
+
+
+def test_an_expression_shows_the_field_of_those_that_have_it(town: Wire) -> None:
+    done = town.run("topic", "echo", "**", "--field", "speed", "--json", "--once")
+    assert json.loads(done.stdout) == {"key": "a/json", "value": 1.5}
+
+
+def test_an_unknown_field_of_a_key_is_an_error_with_the_closest(town: Wire) -> None:
+    told = "holozen topic echo a/json: no field 'sped'; did you mean 'speed'?; there are speed, name"
+    assert_one_line(town.run("topic", "echo", "a/json", "--field", "sped"), 1, told)
+
+
+@pytest.mark.parametrize("verb", ["hz", "bw"])
+def test_rates_and_sizes_of_strangers_are_told_without_losses(town: Wire, verb: str) -> None:
+    done = town.run("topic", verb, "a/json", "--once")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "lost" not in done.stdout
+    told = json.loads(town.run("topic", verb, "a/js$*", "--once", "--json").stdout)
+    assert (told["key"], told["lost"]) == ("a/json", None)
+    assert {"p50", "p95", "p99", "jitter", "window"} <= set(told)
+
+
+def test_delay_says_that_there_is_no_stamp(town: Wire) -> None:
+    done = town.run("topic", "delay", "a/json", "--timeout", "0.2")
+    assert done.returncode == 1
+    assert "messages have no header.stamp, and so no age" in done.stderr
+
+
+@pytest.mark.parametrize("verb", ["hz", "bw", "delay"])
+def test_a_silent_key_ends_with_the_timeout(town: Wire, verb: str) -> None:
+    done = town.run("topic", verb, "nothing", "--timeout", "0.2")
+    assert_one_line(done, 1, f"nothing came on nothing within 0.2 s at {town.endpoint}")
+
+
+def test_list_hears_strangers_if_it_listens(town: Wire) -> None:
+    assert town.run("topic", "list").stdout == ""
+    assert town.run("topic", "list", "--heard", "0.3").stdout.split() == sorted(PUTS)
+
+
+def test_info_tells_what_a_stranger_sends(town: Wire) -> None:
+    done = town.run("topic", "info", "a/json", "-v")
+    assert done.stdout.splitlines()[1:] == [
+        "Publisher count: 1",
+        "  anonymous  DATA  application/json  DROP when full",
+        "Subscription count: 0",
+    ]
+    assert_one_line(town.run("topic", "info", "a/json"), 1, "unknown key 'a/json': nobody is there at ")
+
+
+@pytest.mark.parametrize(
+    "words", ["echo **", "echo ** --csv", "echo a/bytes --raw", "hz **", "bw **", "list --heard 0.2"]
+)
+def test_a_reader_that_is_gone_ends_it_quietly(town: Wire, words: str) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    with open(writing, "wb") as gone:
+        done = subprocess.run(
+            command("topic", *words.split(), *town.flags), stdout=gone, stderr=subprocess.PIPE, text=True, timeout=30
+        )
+    assert done.returncode == 0
+    assert "Traceback" not in done.stderr
+    assert all("could not be decoded" in line for line in done.stderr.splitlines())

@@ -1,0 +1,50 @@
+"""`holozen bag`: info and plot, in text and JSON, and what they say of wrong files."""
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from holozen.cli import main
+
+from .bags import a_bag
+
+
+def test_info_is_told_for_people_and_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = str(a_bag(tmp_path / "a.mcap"))
+    assert main(["bag", "info", path]) == 0
+    assert "31 messages in 2.00 s" in capsys.readouterr().out
+    assert main(["bag", "info", path, path, "--json"]) == 0
+    first, second = map(json.loads, capsys.readouterr().out.splitlines())
+    assert first == second
+    assert [topic["messages"] for topic in first["topics"]] == [10, 1, 20]
+
+
+def test_plot_says_what_it_drew(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = a_bag(tmp_path / "a.mcap")
+    assert main(["bag", "plot", str(path)]) == 0
+    assert capsys.readouterr().out == f"{tmp_path / 'a.png'}: odom (20 messages), cmd_vel (10 messages)\n"
+    assert main(["bag", "plot", str(path), "-o", str(tmp_path / "b.svg"), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["topics"] == {"odom": 20, "cmd_vel": 10}
+    assert (tmp_path / "b.svg").exists()
+
+
+@pytest.mark.parametrize("verb", ["info", "plot"])
+def test_a_wrong_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str) -> None:
+    (tmp_path / "a.mcap").write_text("hello")
+    for path, why in (("a.mcap", "is no MCAP file"), ("none.mcap", "No such file or directory")):
+        assert main(["bag", verb, str(tmp_path / path)]) == 1
+        (line,) = capsys.readouterr().err.splitlines()
+        assert line.startswith("holozen bag: ")
+        assert why in line
+
+
+def test_a_missing_library_is_told_with_what_to_do(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = a_bag(tmp_path / "a.mcap")
+    monkeypatch.setitem(sys.modules, "matplotlib", None)
+    monkeypatch.delitem(sys.modules, "matplotlib.figure", raising=False)
+    assert main(["bag", "plot", str(path)]) == 1
+    assert capsys.readouterr().err == "holozen bag needs matplotlib; run: pip install 'holozen[bag]'\n"

@@ -1,0 +1,75 @@
+"""Pictures of bags."""
+
+import math
+import struct
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import pytest
+
+from holozen.bag.drawing import draw
+from holozen.bag.errors import BagError
+from holozen.bag.reader import Channel, Message
+from holozen.bag.tracks import MOST, Track, tracks
+from holozen.codec import encode
+from holozen.messages import Odometry, Twist, TwistStamped
+
+from .bags import a_bag
+
+JSON = "application/json"
+NOWHERE = encode(Twist.planar(x=1.0), "cdr").replace(struct.pack("<d", 1.0), struct.pack("<d", math.inf))
+
+
+def test_odometry_and_commands_become_rows_of_numbers() -> None:
+    odom = Odometry()
+    odom.pose.pose.position.y, odom.twist.twist.linear.x = 2.0, 0.3
+    stamped = TwistStamped(twist=Twist.planar(x=0.1, y=0.2, turn=0.3))
+    found = tracks(
+        [
+            Message(Channel("note", "text/plain", "text/plain", ""), 10**9, b"hello"),
+            Message(Channel("odom", JSON, "json", Odometry.ROS), 2 * 10**9, encode(odom)),
+            Message(Channel("cmd_vel", "application/cdr", "cdr", TwistStamped.ROS), 3 * 10**9, encode(stamped, "cdr")),
+            Message(Channel("odom", JSON, "json", ""), 4 * 10**9, b"no odometry"),
+            Message(Channel("cmd_vel", "application/cdr", "cdr", Twist.ROS), 5 * 10**9, NOWHERE),
+        ]
+    )
+    assert found.odometry["odom"].rows == [(1.0, 0.0, 2.0, 0.3, 0.0, 0.0)]
+    assert found.commands["cmd_vel"].rows == [(2.0, 0.0, 0.0, 0.1, 0.2, 0.3)]
+    assert found.bad == 2
+
+
+def test_a_long_track_is_thinned_out_and_keeps_its_ends() -> None:
+    track = Track("odom")
+    for i in range(5 * MOST):
+        track.add((float(i),))
+    assert MOST / 2 <= len(track.rows) < MOST
+    assert track.count == 5 * MOST
+    assert track.rows[0] == (0.0,)
+    assert track.rows[-1][0] >= 5 * MOST - 16
+    assert len({b[0] - a[0] for a, b in zip(track.rows, track.rows[1:], strict=False)}) == 1
+
+
+def test_a_bag_is_drawn_as_png_and_svg(tmp_path: Path) -> None:
+    bag = a_bag(tmp_path / "a.mcap")
+    assert draw(bag, tmp_path / "a.png") == {"odom": 20, "cmd_vel": 10}
+    assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
+    draw(bag, tmp_path / "a.svg", ["odom"])
+    assert ET.parse(tmp_path / "a.svg").getroot().tag.endswith("svg")
+
+
+@pytest.mark.parametrize(
+    ("target", "keys", "why"),
+    [
+        ("a.txt", None, "pictures end in .png or .svg"),
+        ("none/a.png", None, "cannot write .*No such file"),
+        ("a.png", ["Fred/odom"], "has no odometry on Fred/odom; on: odom"),
+    ],
+)
+def test_what_cannot_be_drawn_is_told(tmp_path: Path, target: str, keys: list[str] | None, why: str) -> None:
+    with pytest.raises(BagError, match=why):
+        draw(a_bag(tmp_path / "a.mcap"), tmp_path / target, keys)
+
+
+def test_a_bag_without_odometry_says_so(tmp_path: Path) -> None:
+    with pytest.raises(BagError, match="has no odometry to draw"):
+        draw(a_bag(tmp_path / "a.mcap", count=0), tmp_path / "a.png")

@@ -1,0 +1,165 @@
+"""A file may be cut off, damaged or hostile: one line, little memory, and all that was good before."""
+
+import io
+import struct
+import tracemalloc
+import zlib
+from pathlib import Path
+
+import lz4.frame
+import pytest
+import zstandard
+from hypothesis import given
+from hypothesis import strategies as st
+from mcap.writer import CompressionType, Writer
+
+from holozen.bag.errors import BagError
+from holozen.bag.reader import Bag, Message
+from holozen.bag.records import LARGEST, MAGIC
+
+from .bags import a_bag, read
+
+
+@pytest.fixture(scope="module")
+def good(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    return a_bag(tmp_path_factory.mktemp("good") / "a.mcap").read_bytes()
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("bad") / "a.mcap"
+
+
+def record(kind: int, body: bytes) -> bytes:
+    return struct.pack("<BQ", kind, len(body)) + body
+
+
+def text(word: str) -> bytes:
+    return struct.pack("<I", len(word)) + word.encode()
+
+
+def chunk(data: bytes, compression: str, packed: bytes, size: int | None = None, checksum: int = 0) -> bytes:
+    head = struct.pack("<QQQI", 0, 0, len(data) if size is None else size, checksum)
+    return record(0x06, head + text(compression) + struct.pack("<Q", len(packed)) + packed)
+
+
+CHANNEL = record(0x04, struct.pack("<HH", 1, 0) + text("a") + text("json") + struct.pack("<I", 0))
+MESSAGE = record(0x05, struct.pack("<HIQQ", 1, 0, 7, 7) + b"{}")
+
+
+def error_of(file: Path, content: bytes) -> str:
+    """The one line for a file with this content, which it may not read to its end."""
+    file.write_bytes(content)
+    with pytest.raises(BagError) as caught:
+        read(file)
+    (line,) = str(caught.value).splitlines()
+    assert line.startswith(str(file))
+    return line
+
+
+def test_a_file_cut_off_anywhere_gives_all_that_was_whole(good: bytes, file: Path) -> None:
+    file.write_bytes(good)
+    whole = read(file)
+    counts = set()
+    for length in range(len(MAGIC), len(good), 7):
+        file.write_bytes(good[:length])
+        with Bag(file) as bag:
+            found = list(bag.messages())
+        assert found == whole[: len(found)]
+        assert bag.cut_off or len(found) == len(whole)
+        counts.add(len(found))
+    assert counts == {0, len(whole)}
+
+
+def test_a_whole_file_is_not_cut_off(good: bytes, file: Path) -> None:
+    file.write_bytes(good)
+    with Bag(file) as bag:
+        assert len(list(bag.messages())) == 31
+        assert not bag.cut_off
+
+
+@given(st.data())
+def test_a_file_with_a_wrong_byte_is_read_or_told_in_one_line(good: bytes, file: Path, data: st.DataObject) -> None:
+    broken = bytearray(good)
+    for _ in range(data.draw(st.integers(1, 3))):
+        broken[data.draw(st.integers(len(MAGIC), len(good) - 1))] = data.draw(st.integers(0, 255))
+    file.write_bytes(broken)
+    try:
+        assert all(isinstance(message, Message) for message in read(file))
+    except BagError as error:
+        assert len(str(error).splitlines()) == 1
+
+
+@pytest.mark.parametrize("compression", list(CompressionType))
+def test_every_compression_of_the_mcap_library_is_read(compression: CompressionType, file: Path) -> None:
+    stream = io.BytesIO()
+    writer = Writer(stream, compression=compression)
+    writer.start("ros2")
+    channel = writer.register_channel("/odom", "cdr", writer.register_schema("nav_msgs/msg/Odometry", "ros2msg", b"x"))
+    for i in range(1000):
+        writer.add_message(channel, log_time=i, data=b"%d" % i * 20, publish_time=i)
+    writer.finish()  # type: ignore[no-untyped-call]
+    file.write_bytes(stream.getvalue())
+    found = read(file)
+    assert [(m.at, m.payload) for m in found] == [(i, b"%d" % i * 20) for i in range(1000)]
+    assert found[0].channel == ("odom", "application/cdr", "cdr", "nav_msgs/msg/Odometry")
+
+
+def test_a_file_without_chunks_is_read(file: Path) -> None:
+    file.write_bytes(MAGIC + CHANNEL + record(0x99, b"of a later version") + MESSAGE + record(0x0F, b"1234"))
+    assert [(m.channel.key, m.at, m.payload) for m in read(file)] == [("a", 7, b"{}")]
+
+
+@pytest.mark.parametrize(
+    ("content", "part"),
+    [
+        (b"", "is no MCAP file: it is empty"),
+        (b"hello, I am a text", "is no MCAP file"),
+        (MAGIC + MESSAGE, "damaged at byte 8: a message of no channel"),
+        (MAGIC + record(0x05, b"x"), "a message of no channel"),
+        (MAGIC + record(0x04, b"\x01\x00\x00\x00\xff\xff\xff\xff"), "damaged at byte 8: it ends too early"),
+        (MAGIC + chunk(b"abc", "rot13", b"nop"), "compression 'rot13' is not understood; known: zstd, lz4"),
+        (MAGIC + chunk(CHANNEL, "", CHANNEL, checksum=1), "the checksum is wrong"),
+        (MAGIC + chunk(b"", "zstd", b"no zstd at all", 10), "damaged"),
+        (MAGIC + chunk(b"", "lz4", b"no lz4 at all", 10), "damaged"),
+        (MAGIC + chunk(b"", "", b"", LARGEST + 1), f"at most {LARGEST} are read"),
+        (MAGIC + chunk(b"", "", record(0x05, b"x" * 9)[:-1], 17), "a record is longer than its chunk"),
+    ],
+)
+def test_what_is_wrong_with_a_file_is_told_in_one_line(content: bytes, part: str, file: Path) -> None:
+    assert part in error_of(file, content)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4"])
+def test_a_few_bytes_do_not_become_all_of_memory(compression: str, file: Path) -> None:
+    """A chunk that unpacks to 64 MB and says that it has 100 bytes is not unpacked."""
+    pack = {"zstd": zstandard.compress, "lz4": lz4.frame.compress}[compression]
+    bomb = pack(bytes(64 << 20))
+    assert len(bomb) < 1 << 20
+    tracemalloc.start()
+    try:
+        line = error_of(file, MAGIC + chunk(b"", compression, bomb, 100))
+        assert tracemalloc.get_traced_memory()[1] < 16 << 20
+    finally:
+        tracemalloc.stop()
+    assert "has not the size it says" in line
+
+
+def test_a_record_that_says_to_be_huge_is_not_read(file: Path) -> None:
+    with file.open("wb") as stream:
+        stream.write(MAGIC + struct.pack("<BQ", 0x06, LARGEST + 1))
+        stream.truncate(LARGEST + 100)  # a hole: it takes no room on the disk
+    with Bag(file) as bag, pytest.raises(BagError, match=f"at most {LARGEST} are read"):
+        list(bag.messages())
+
+
+def test_a_checksum_that_is_right_is_no_trouble(file: Path) -> None:
+    data = CHANNEL + MESSAGE
+    file.write_bytes(MAGIC + chunk(data, "zstd", zstandard.compress(data), checksum=zlib.crc32(data)))
+    assert [m.payload for m in read(file)] == [b"{}"]
+
+
+def test_a_file_that_is_not_there_or_is_a_folder_is_told(tmp_path: Path) -> None:
+    for path, why in ((tmp_path / "none.mcap", "No such file"), (tmp_path, "Is a directory")):
+        with pytest.raises(BagError, match=why):
+            Bag(path)

@@ -1,0 +1,116 @@
+"""The shell completes verbs, flags, and what is there now."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.cli.complete import SAFE, main
+from holozen.cli.completion import SCRIPTS
+from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, Twist
+from holozen.parameters import Parameters
+from holozen.testing import Wire
+
+Complete = Callable[..., list[str]]
+HERE = "<here>"
+
+
+@pytest.fixture
+def complete(wire: Wire, capsys: pytest.CaptureFixture[str]) -> Complete:
+    """What is offered for the last of some words; HERE among them stands for the flags of this wire."""
+
+    def complete(*words: str) -> list[str]:
+        assert main([flag for word in words for flag in (wire.flags if word == HERE else [word])]) == 0
+        out, err = capsys.readouterr()
+        assert err == ""
+        return out.split()
+
+    return complete
+
+
+@pytest.fixture
+def fred(wire: Wire) -> Iterator[Bus]:
+    """A node that tells Fred's odom, reads his commands and serves next_goal."""
+    bus = wire.bus("sim", lasting=True)
+    bus.publisher("Fred/odom", Odometry)
+    bus.subscribe("Fred/cmd_vel", Twist)
+    bus.subscribe("**/odom", Odometry)
+    bus.publisher("evil;rm`true`", Twist)
+    bus.serve("next_goal", NextGoalRequest, NextGoalReply, lambda _: NextGoalReply())
+    yield bus
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        (["to"], ["topic"]),
+        (["topic", "e"], ["echo"]),
+        (["topic", "echo", "odom", "--fi"], ["--field", "--filter"]),
+        (["topic", "list", "--mode", ""], ["peer", "client", "router"]),
+        (["completion", ""], ["bash", "zsh", "fish"]),
+        (["pose-service", "--shape", "sq"], ["square"]),
+        (["nonsense", ""], []),
+        (["topic", "echo", "x", "y", "z", ""], []),
+        (["spawn", "urdf/h"], []),
+    ],
+)
+def test_what_the_parsers_know_is_completed(complete: Complete, words: list[str], found: list[str]) -> None:
+    assert complete(*words) == found
+
+
+def test_nodes_with_parameters_are_completed_also_below_a_robot(complete: Complete, wire: Wire) -> None:
+    bus = wire.bus("controller")
+    Parameters(bus, "Fred/controller", lambda: [])
+    assert complete("param", "get", *wire.flags, "") == ["Fred/controller"]
+    assert complete("param", "d") == ["describe", "dump"]
+
+
+@pytest.mark.parametrize(
+    ("words", "found"),
+    [
+        ("topic echo <here> ", ["Fred/cmd_vel", "Fred/odom"]),
+        ("topic info <here> Fred/o", ["Fred/odom"]),
+        ("topic hz <here> Fred/odom Fred/c", ["Fred/cmd_vel"]),
+        ("topic find <here> nav", ["nav_msgs/msg/Odometry"]),
+        ("topic pub Fred/cmd_vel <here> geo", ["geometry_msgs/msg/Twist"]),
+        ("service call <here> ", ["next_goal"]),
+        ("service find <here> ", ["holozen/srv/NextGoal"]),
+        ("node info <here> ", ["sim"]),
+        ("teleop <here> ", ["Fred"]),
+        ("delete <here> ", ["Fred"]),
+        ("stop <here> ", ["Fred"]),
+        ("controller <here> ", ["Fred"]),
+        ("record <here> Fred/o", ["Fred/odom"]),
+    ],
+)
+def test_what_is_there_is_completed(complete: Complete, fred: Bus, words: str, found: list[str]) -> None:
+    assert complete(*words.split(" ")) == found
+
+
+def test_where_nobody_is_nothing_is_offered_or_said(complete: Complete) -> None:
+    assert complete("topic", "echo", HERE, "") == []
+
+
+@pytest.mark.parametrize("word", ["a;b", "a b", "$(true)", "`true`", "a|b", "a\nb", "*", "a>b", "a'b", ""])
+def test_a_key_that_a_shell_would_act_on_is_never_offered(word: str) -> None:
+    assert not SAFE.fullmatch(word)
+
+
+@pytest.mark.parametrize("shell", SCRIPTS)
+def test_a_script_asks_for_the_words_that_fit(shell: str, capsys: pytest.CaptureFixture[str]) -> None:
+    from holozen import cli
+
+    assert cli.main(["completion", shell]) == 0
+    assert "holozen __complete" in capsys.readouterr().out
+
+
+def test_bash_completes() -> None:
+    bash = (
+        "source <(holozen completion bash); COMP_WORDS=(holozen topic ec); COMP_CWORD=2; _holozen; echo ${COMPREPLY[@]}"
+    )
+    path = f"{os.path.dirname(sys.executable)}:{os.environ['PATH']}"
+    done = subprocess.run(["bash", "-c", bash], capture_output=True, text=True, env={**os.environ, "PATH": path})
+    assert (done.stdout, done.stderr) == ("echo\n", "")

@@ -1,0 +1,58 @@
+"""A verb that looks has loaded nothing that takes time when its first line is out."""
+
+import json
+import subprocess
+import sys
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.messages import Odometry, Twist
+from holozen.testing import Wire
+
+SLOW = {
+    "typing", "shutil", "msgspec", "numpy", "prompt_toolkit", "pybullet", "dataclasses", "inspect", "yaml",
+    "pathlib", "subprocess", "asyncio", "difflib", "ast", "holozen.codec", "holozen.messages", "holozen.readers",
+}  # fmt: skip
+
+
+@pytest.fixture
+def robot(wire: Wire) -> Bus:
+    bus = wire.bus("robot", lasting=True)
+    bus.publisher("odom", Odometry).put(Odometry())
+    bus.subscribe("cmd_vel", Twist)
+    return bus
+
+
+@pytest.mark.parametrize(
+    "words", ["topic list -t", "topic info odom", "topic type odom", "node list", "node info robot", "graph"]
+)
+def test_a_look_loads_nothing_slow(wire: Wire, robot: Bus, words: str) -> None:
+    assert loaded(wire, words) & SLOW == set()
+
+
+def test_an_echo_loads_nothing_slow(wire: Wire, robot: Bus) -> None:
+    publisher = robot.publisher("speed", Twist)
+    code = f"import sys; sys.argv[1:] = {['topic', 'echo', 'speed', '--once', *wire.flags]!r}"
+    words = [sys.executable, "-S", "-I", "-c", f"{PATHS}\n{code}\n{RUN}", json.dumps(sys.path)]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, text=True) as process:
+        while process.poll() is None:
+            publisher.put(Twist())
+        assert process.stdout
+        out = process.stdout.read()
+    assert out.startswith("linear:\n")
+    assert set(json.loads(out.splitlines()[-1])) & SLOW == set()
+
+
+PATHS = "import sys, json; sys.path[:0] = json.loads(sys.argv[1])"
+RUN = "from holozen.cli import main; main(sys.argv[1:]); print(json.dumps([*sys.modules]))"
+
+
+def loaded(wire: Wire, words: str) -> set[str]:
+    """The modules that a fresh interpreter has loaded after a verb, without what its site brings."""
+    code = f"{PATHS}\nsys.argv[1:] = {[*words.split(), *wire.flags]!r}\n{RUN}"
+    done = subprocess.run(
+        [sys.executable, "-S", "-I", "-c", code, json.dumps(sys.path)], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    return set(json.loads(done.stdout.splitlines()[-1]))

@@ -1,0 +1,198 @@
+"""`holozen param` reads and sets parameters as `ros2 param` does, in its words, and as JSON."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen.cli import param
+from holozen.parameters import Choice, Number, Parameter, Parameters
+from holozen.testing import Wire
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+class Node:
+    """The values behind a node's parameters."""
+
+    def __init__(self) -> None:
+        self.values: dict[str, Any] = {"speed": 1.0, "shape": "square"}
+
+    def declared(self) -> list[Parameter]:
+        def write(name: str) -> Any:
+            return lambda value: self.values.__setitem__(name, value)
+
+        return [
+            Number("speed", "how fast", "m/s", 0.1, 2.0, lambda: self.values["speed"], write("speed")),
+            Choice("shape", "form", ("square", "hexagon"), lambda: self.values["shape"], write("shape")),
+        ]
+
+
+@pytest.fixture
+def node(wire: Wire) -> Node:
+    """One that is called sim."""
+    node = Node()
+    Parameters(wire.bus("sim"), "sim", node.declared, lambda _: None).start()
+    return node
+
+
+@pytest.fixture
+def run(wire: Wire, capsys: pytest.CaptureFixture[str]) -> Run:
+    """`holozen param WORDS...`: its exit code, output and errors."""
+    from holozen.cli import main
+
+    def run(*words: str) -> tuple[int, str, str]:
+        code = main(["param", *words, *wire.flags])
+        return code, *capsys.readouterr()
+
+    return run
+
+
+def test_list_names_them_below_each_node(run: Run, node: Node, wire: Wire) -> None:
+    Parameters(wire.bus("pose_service"), "pose_service", node.declared, lambda _: None).start()
+    assert run("list") == (0, "pose_service:\n  shape\n  speed\nsim:\n  shape\n  speed\n", "")
+    assert run("list", "/sim", "--param-type") == (0, "  shape (type: string)\n  speed (type: double)\n", "")
+    assert run("list", "sim", "--param-prefixes", "speed") == (0, "  speed\n", "")
+    rows = [json.loads(line) for line in run("list", "sim", "--json")[1].splitlines()]
+    assert rows[1] == {"node": "sim", "name": "speed", "type": "double"}
+
+
+def test_list_with_nobody_there_says_so(run: Run, wire: Wire) -> None:
+    wire.bus("somebody_without_any")
+    assert run("list") == (0, "", "no parameters: nobody is there who has any; `holozen up` starts some\n")
+
+
+def test_get_tells_type_and_value(run: Run, node: Node) -> None:
+    assert run("get", "/sim", "speed") == (0, "Double value is: 1.0\n", "")
+    assert run("get", "sim", "shape") == (0, "String value is: square\n", "")
+    assert run("get", "sim", "shape", "--hide-type") == (0, "square\n", "")
+    row = {"node": "sim", "name": "speed", "type": "double", "value": 1.0}
+    assert json.loads(run("get", "sim", "speed", "--json")[1]) == row
+
+
+def test_set_sets_one_or_several(run: Run, node: Node) -> None:
+    assert run("set", "sim", "speed", "0.5") == (0, "Set parameter successful\n", "")
+    assert node.values["speed"] == 0.5
+    several = run("set", "sim", "speed", "2", "shape", "hexagon")
+    assert several == (0, "Set parameter speed successful\nSet parameter shape successful\n", "")
+    assert node.values == {"speed": 2.0, "shape": "hexagon"}
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("speed", "9"), "speed: 9: use a number from 0.1 to 2 m/s"),
+        (("speed", "nan"), "speed: 'nan': use a number from 0.1 to 2 m/s"),
+        (("speed", "1e999"), "speed: '1e999': use a number from 0.1 to 2 m/s"),
+        (("speed", "true"), "speed: True: use a number from 0.1 to 2 m/s"),
+        (("speed", ""), "speed: '': use a number from 0.1 to 2 m/s"),
+        (("speed", "99999999999999999999"), "speed: 1e+20: use a number from 0.1 to 2 m/s"),
+        (("sped", "1"), "sim has no parameter 'sped'; did you mean speed?"),
+    ],
+)
+def test_set_tells_in_one_line_why_not_and_what_is_allowed(
+    run: Run, node: Node, words: tuple[str, str], told: str
+) -> None:
+    assert run("set", "sim", *words) == (1, "", f"holozen param: setting parameter failed: {told}\n")
+    code, out, err = run("set", "sim", *words, "--json")
+    assert (code, err) == (1, "")
+    assert (json.loads(out)["successful"], json.loads(out)["reason"]) == (False, told)
+    assert node.values["speed"] == 1.0
+
+
+def test_a_text_that_is_not_unicode_is_told_in_one_line(run: Run, node: Node) -> None:
+    code, out, err = run("set", "sim", "shape", "\udcff")
+    assert (code, out, len(err.splitlines())) == (1, "", 1)
+
+
+def test_of_several_only_the_wrong_ones_are_told(run: Run, node: Node) -> None:
+    assert run("set", "sim", "shape", "hexagon", "speed", "9") == (
+        1, "", "holozen param: setting parameter speed failed: speed: 9: use a number from 0.1 to 2 m/s\n"
+        "holozen param: none of the 2 was set\n",
+    )  # fmt: skip
+    assert node.values["shape"] == "square"
+
+
+def test_a_name_without_a_value_is_wrong_usage(run: Run, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run("set", "sim", "speed", "1", "shape")
+    assert ended.value.code == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "'shape' has no value" in line
+
+
+@pytest.mark.parametrize("words", [("gett", "sim", "x"), ("get", "sim"), ("list", "--jsn"), ()])
+def test_wrong_usage_is_one_line(run: Run, capsys: pytest.CaptureFixture[str], words: tuple[str, ...]) -> None:
+    with pytest.raises(SystemExit) as ended:
+        run(*words) if words else param.main([])
+    assert ended.value.code == 2
+    assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+def test_describe_tells_what_is_allowed(run: Run, node: Node) -> None:
+    code, out, _ = run("describe", "sim", "speed", "shape")
+    assert code == 0
+    assert out.splitlines() == [
+        "Parameter name: speed", "  Type: double", "  Description: how fast, in m/s", "  Constraints:",
+        "    Min value: 0.1", "    Max value: 2.0",
+        "Parameter name: shape", "  Type: string", "  Description: form", "  Constraints:",
+        "    Additional constraints: one of square, hexagon",
+    ]  # fmt: skip
+    row = json.loads(run("describe", "sim", "speed", "--json")[1])
+    assert (row["min"], row["max"], row["read_only"]) == (0.1, 2.0, False)
+
+
+def test_what_dump_writes_load_reads(run: Run, node: Node, tmp_path: Path) -> None:
+    code, out, _ = run("dump", "sim")
+    assert (code, out) == (0, '/sim:\n  ros__parameters:\n    shape: "square"\n    speed: 1.0\n')
+    file = tmp_path / "sim.yaml"
+    file.write_text(out)
+    node.values = {"speed": 0.5, "shape": "hexagon"}
+    assert run("load", "sim", str(file)) == (
+        0, "Set parameter shape successful\nSet parameter speed successful\n", ""
+    )  # fmt: skip
+    assert node.values == {"speed": 1.0, "shape": "square"}
+    rows = [json.loads(line) for line in run("dump", "sim", "--json")[1].splitlines()]
+    assert [row["value"] for row in rows] == ["square", 1.0]
+
+
+def test_load_sets_nothing_of_a_file_with_a_mistake(run: Run, node: Node, tmp_path: Path) -> None:
+    file = tmp_path / "sim.yaml"
+    file.write_text("/sim:\n  ros__parameters:\n    shape: hexagon\n    sped: 1.0\n")
+    code, _, err = run("load", "sim", str(file))
+    assert (code, node.values["shape"]) == (1, "square")
+    assert "parameter sped failed: sim has no parameter 'sped'; did you mean speed?" in err
+
+
+@pytest.mark.parametrize("verb", ["get", "set", "describe"])
+def test_an_unknown_node_is_told_with_the_closest_one(run: Run, node: Node, verb: str) -> None:
+    words = ("smi", "speed") + (("1",) if verb == "set" else ())
+    assert run(verb, *words) == (
+        1, "", "holozen param: there is no node 'smi' with parameters; did you mean sim?\n"
+    )  # fmt: skip
+
+
+def test_two_nodes_of_the_same_name_are_not_asked(run: Run, node: Node, wire: Wire) -> None:
+    other, twin = Node(), wire.bus("sim")
+    Parameters(twin, "sim", other.declared, lambda _: None).start()
+    code, _, err = run("set", "sim", "speed", "0.5")
+    assert (code, node.values["speed"], other.values["speed"]) == (1, 1.0, 1.0)
+    assert "2 nodes are called 'sim' (" in err and twin.id[:6] in err
+    code, out, err = run("list")
+    assert (code, out) == (1, "sim:\n  shape\n  speed\n")
+    assert "only one of them is shown" in err
+
+
+def test_a_node_that_does_not_answer_is_told(run: Run, wire: Wire) -> None:
+    Parameters(wire.bus("sim"), "sim", lambda: [])  # nobody calls `answer`
+    code, _, err = run("get", "sim", "speed", "--timeout", "0.2")
+    assert code == 1
+    assert err.startswith("holozen param: no reply from 'sim/get_parameters' within 0.2 s")
+
+
+def test_help_shows_examples(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        param.main(["--help"])
+    assert "holozen param set sim max_linear 0.5" in capsys.readouterr().out

@@ -1,0 +1,174 @@
+"""`holozen stop` and `holozen release` reach every robot there is, and say so only when it confirmed."""
+
+import json
+import socket
+import threading
+from collections.abc import Callable
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.cli import stop as stop_module
+from holozen.errors import ServiceError
+from holozen.messages import TriggerReply, TriggerRequest
+from holozen.testing import Wire
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+class Robots:
+    """Robots that only remember that they were called; `refusals` are what they say before they obey."""
+
+    def __init__(self, wire: Wire) -> None:
+        self.wire, self.refusals = wire, list[str]()
+        self.told = set[tuple[str, str]]()  # keys, and the sims whose they are
+
+    def add(self, *keys: str, wire: str = "json", hangs: bool = False) -> Bus:
+        """A sim of its own that serves these keys, or holds them and does not answer."""
+        bus = self.wire.bus("sim", wire=wire)
+        for key in keys:
+            server = bus.serve(key, TriggerRequest, TriggerReply, self._answer(key, bus.id))
+            if not hangs:
+                server.start()
+        return bus
+
+    def _answer(self, key: str, sim: str) -> Callable[[TriggerRequest], TriggerReply]:
+        def answer(_request: TriggerRequest) -> TriggerReply:
+            if self.refusals:
+                raise ServiceError(self.refusals.pop())
+            self.told.add((key, sim))
+            return TriggerReply(True, "whatever")
+
+        return answer
+
+    def keys(self) -> set[str]:
+        return {key for key, _ in self.told}
+
+
+@pytest.fixture
+def robots(wire: Wire) -> Robots:
+    return Robots(wire)
+
+
+def test_without_a_name_all_robots_are_stopped_whatever_their_sims_speak(robots: Robots, run: Run) -> None:
+    robots.add("stop", "Fred/stop", "Fred/release", "Fred/resume", "next_goal")
+    robots.add("Ann/stop", wire="msgpack")
+    robots.add("lab/Bob/stop", wire="cdr")
+    code, out, err = run("stop")
+    assert (code, err) == (0, "")
+    names = ("Ann", "Fred", "lab/Bob", "the robot at the root")
+    assert sorted(out.splitlines()) == [f"{name} is stopped" for name in names]
+    assert robots.keys() == {"Ann/stop", "Fred/stop", "lab/Bob/stop", "stop"}
+
+
+def test_those_that_are_named_are_stopped_and_no_other(robots: Robots, run: Run) -> None:
+    robots.add("stop", "Fred/stop", "Ann/stop", "Bob/stop")
+    assert run("stop", "Fred", "/Ann")[0] == 0
+    assert robots.keys() == {"Ann/stop", "Fred/stop"}
+
+
+@pytest.mark.parametrize(("name", "told"), [("Fred", {"Fred/stop"}), ("", {"Ann/stop", "Fred/stop"})])
+def test_one_that_is_met_later_than_others_is_stopped_too(robots: Robots, run: Run, name: str, told: set[str]) -> None:
+    robots.add("Ann/stop")
+    late = threading.Timer(0.6, robots.add, ["Fred/stop"])
+    late.start()
+    try:
+        assert run("stop", *[name] * bool(name))[0] == 0
+        assert robots.keys() == told
+    finally:
+        late.join()
+
+
+def test_release_says_what_the_sim_says(robots: Robots, run: Run) -> None:
+    robots.add("Fred/stop", "Fred/release")
+    assert run("release") == (0, "Fred is released: whatever\n", "")
+    assert robots.keys() == {"Fred/release"}
+
+
+def test_as_json_it_is_one_object_a_robot(robots: Robots, run: Run) -> None:
+    robots.add("stop", "Fred/stop")
+    code, out, err = run("stop", "--json")
+    rows = sorted((json.loads(line) for line in out.splitlines()), key=lambda row: row["robot"])
+    told = [{"robot": name, "verb": "stop", "confirmed": True, "message": "whatever"} for name in ("", "Fred")]
+    assert (code, rows, err) == (0, told, "")
+
+
+def test_one_that_does_not_answer_holds_up_no_other_and_is_told(robots: Robots, run: Run) -> None:
+    robots.add("Ann/stop", hangs=True)
+    robots.add("Fred/stop")
+    code, out, err = run("stop", "--timeout", "0.8")
+    assert (code, out) == (1, "Fred is stopped\n")
+    assert err == "Ann did not confirm within 0.8 s; it may move\n"
+    code, out, _ = run("stop", "Ann", "--timeout", "0.8", "--json")
+    assert (code, json.loads(out)["confirmed"]) == (1, False)
+
+
+def test_where_two_sims_serve_one_robot_both_have_to_confirm(robots: Robots, run: Run) -> None:
+    robots.add("Fred/stop")
+    robots.add("Fred/stop")
+    assert run("stop") == (0, "Fred is stopped\n", "")
+    assert len(robots.told) >= 2  # on a busy machine they are asked again
+    robots.add("Fred/stop", hangs=True)
+    assert run("stop", "--timeout", "0.8")[0] == 1
+
+
+def test_a_robot_that_refuses_is_asked_again(robots: Robots, run: Run) -> None:
+    robots.refusals += ["not now", "not yet"]
+    robots.add("Fred/stop")
+    assert run("stop") == (0, "Fred is stopped\n", "")
+    robots.refusals += ["never"] * 10_000
+    told = "Fred did not confirm within 0.3 s (never); it may move\n"
+    assert run("stop", "--timeout", "0.3") == (1, "", told)
+
+
+@pytest.mark.parametrize("payload", [b"[]", b"{", b'{"success": 1, "message": ""}', b"\xff"])
+def test_a_reply_that_is_none_confirms_nothing(wire: Wire, run: Run, payload: bytes) -> None:
+    bus = wire.bus("sim")
+    token = bus.announce("srv", TriggerReply.ROS, "Fred/stop")
+    queries = bus.session.declare_queryable(
+        "Fred/stop", lambda query: query.reply("Fred/stop", payload, encoding="application/json")
+    )
+    code, out, err = run("stop", "--timeout", "0.3")
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith("Fred did not confirm within 0.3 s")
+    token.undeclare()
+    queries.undeclare()
+
+
+@pytest.mark.parametrize("name", ["Frd", "*", "**", "a b", "?"])
+def test_a_name_that_does_not_exist_names_those_that_do(
+    robots: Robots, run: Run, name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_module, "NOTICE", 0.5)
+    robots.add("Fred/stop", "stop")
+    told = f"holozen stop: there is no robot {name!r}; there are: the robot at the root, Fred\n"
+    assert run("stop", name) == (1, "", told)
+    assert robots.told == set()
+    assert run("stop", name, "Fred")[:2] == (1, "Fred is stopped\n")
+
+
+def test_without_a_robot_it_says_so(robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(stop_module, "NOTICE", 0.5)
+    code, out, err = run("stop")
+    assert (code, out) == (1, "")
+    assert err.startswith("holozen stop: nobody is there; ")
+    robots.add("next_goal")
+    code, _, err = run("release")
+    assert (code, err.count("\n")) == (1, 1)
+    assert err.startswith("holozen release: no robot was found; ")
+
+
+def test_without_a_router_it_says_so(run: Run) -> None:
+    code, out, err = run("stop", "--mode", "client", "--connect", "tcp/127.0.0.1:1", "--timeout", "0.1")
+    assert (code, out, err.count("\n")) == (1, "", 1)
+    assert err.startswith("holozen stop: nobody was reached: cannot open Zenoh: ")
+
+
+def test_a_process_that_sleeps_at_the_meeting_point_is_told(
+    run: Run, wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(stop_module, "NOTICE", 0.5)
+    with socket.create_server(("127.0.0.1", wire.port)):  # the kernel connects for it, and nobody speaks
+        code, out, err = run("stop")
+    told = f"holozen stop: who holds {wire.endpoint} does not answer, so nobody can be reached: end that process first"
+    assert (code, out, err.startswith(told), err.count("\n")) == (1, "", True, 1)

@@ -1,0 +1,47 @@
+"""A wrong word is one line with the closest right one, and exit code 2."""
+
+from collections.abc import Callable
+
+import pytest
+
+from holozen.cli import main
+
+Run = Callable[..., tuple[int, str, str]]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("topci list", "holozen: no verb 'topci'; did you mean 'topic'?; there are up, "),
+        ("topic ehco", "holozen topic: argument VERB: 'ehco'; did you mean 'echo'?; there are list, info, type, "),
+        (
+            "topic list --shwo",
+            "holozen topic list: no flag '--shwo'; did you mean '--show-types'?; `holozen topic list ",
+        ),
+        ("topic list odom", "holozen topic list: 'odom' is too much; "),
+        (
+            "topic list --mode pere",
+            "holozen topic list: argument --mode: 'pere'; did you mean 'peer'?; there are peer, ",
+        ),
+        ("topic list --connect nonsense", "holozen topic list: argument --connect: 'nonsense' is no endpoint: write "),
+        ("topic list --listen tcp/h", "holozen topic list: argument --listen: 'tcp/h' has no port from 0 to 65535: "),
+        ("topic echo odom --filter (", "holozen topic echo: filter '(': "),
+        ("topic echo odom --field a..b", "holozen topic echo: 'a..b' is no field; write names with dots"),
+        ("topic echo odom --type nav_msgs/msg/Odmetry", "holozen topic echo: no type 'nav_msgs/msg/Odmetry'; did you"),
+        ("service cal x", "holozen service: argument VERB: 'cal'; did you mean 'call'?; there are list, type, "),
+        ("node lits", "holozen node: argument VERB: 'lits'; did you mean 'list'?; there are list, info"),
+        ("completion tcsh", "holozen completion: argument shell: 'tcsh'; there are bash, zsh, fish; "),
+    ],
+)
+def test_a_wrong_word_is_told_with_the_closest(run: Run, words: str, told: str) -> None:
+    code, out, err = run(*words.split())
+    assert (code, out) == (2, "")
+    assert err.startswith(told)
+    assert err.count("\n") == 1
+
+
+def test_no_verb_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit, match="2"):
+        main(["topic"])
+    told = "holozen topic: the following arguments are required: VERB; `holozen topic --help` shows how\n"
+    assert capsys.readouterr().err == told
