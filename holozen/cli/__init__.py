@@ -40,6 +40,7 @@ EXTRAS = (
     "mcap",
     "numpy",
     "pybullet",
+    "transforms3d",
     "xacro",
     "zstandard",
 )  # what only some verbs need

@@ -15,7 +15,7 @@ OTHERS = [path for folder in ("examples", "meshes", "scripts") for path in REPO.
 PLACES = {
     "zenoh": ["holozen/bus.py"],
     "pybullet": ["services/sim/engine.py"],
-    "numpy": ["holozen/robot/", "services/sim/"],
+    "numpy": ["holozen/robot/", "holozen/ros/", "services/sim/"],
     "collada": [],
     "xacro": ["holozen/robot/xacro/child.py"],
     "pytest": ["holozen/testing/"],
