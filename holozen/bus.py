@@ -15,7 +15,7 @@ from functools import partial
 
 import zenoh
 
-from holozen import zenoh_words
+from holozen import threads, zenoh_words
 from holozen.connection import Connection
 from holozen.errors import BusError
 from holozen.tap import Sample, Tap, source
@@ -85,11 +85,7 @@ class Bus:
         self._closing.set()
         closer = threading.Thread(target=_close, args=(self.session,), daemon=True)
         closer.start()
-        deadline = time.monotonic() + CLOSE_LIMIT
-        # An interpreter that ends while a thread is inside Zenoh aborts.
-        for thread in (closer, self._door, *(reader.thread for reader in self._readers)):
-            if thread and thread is not threading.current_thread():
-                thread.join(max(0.0, deadline - time.monotonic()))
+        threads.wait((closer, self._door, *(reader.thread for reader in self._readers)), CLOSE_LIMIT)
 
     def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
         """Show a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
