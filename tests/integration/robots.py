@@ -6,6 +6,7 @@ from typing import Any
 
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, Message, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
+from holozen.rcl_interfaces import Parameter, ParameterValue, SetParametersReply, SetParametersRequest
 from holozen.readers import Received, Subscription
 from holozen.testing import wait_for
 from holozen.wire import key_for
@@ -48,6 +49,13 @@ class Robot:
         self._status = record(bus, key_for("cmd_vel_status", name), CommandStatus)
         self._publisher = bus.publisher(key_for("cmd_vel", name), Twist, priority)
         self.newest()
+
+    def wait_longer(self, seconds: float = 2.0) -> "Robot":
+        """Let it stop only after so much silence: a test that measures a drive may be held up. Itself."""
+        timeout = Parameter(f"{self.name}.command_timeout".lstrip("."), ParameterValue.of(seconds))
+        told = self.bus.call("sim/set_parameters", SetParametersRequest([timeout]), SetParametersReply)
+        assert told.results[0].successful, told
+        return self
 
     def newest(self) -> Odometry:
         """An odom that was told after this call."""

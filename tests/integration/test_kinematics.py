@@ -18,7 +18,7 @@ Planar = tuple[float, float, float]
 def quick(town: Wire) -> Robot:
     """A robot four times as fast as real time."""
     start_sim(town, "--rtf", "4")
-    return Robot(town.bus())
+    return Robot(town.bus()).wait_longer()
 
 
 def ahead(start: Planar, velocity: Planar, seconds: float) -> Planar:

@@ -76,7 +76,7 @@ class Driven:
         self.bus = wire.bus()
         spawned = wire.run("spawn", str(self.file), "--name", self.name, "-y", str(y))
         assert (spawned.returncode, spawned.stderr) == (0, ""), spawned
-        self.robot = Robot(self.bus, self.name)
+        self.robot = Robot(self.bus, self.name).wait_longer()
         self.joints = record(self.bus, key_for("joint_states", self.name), JointState)
 
     def steady(self, velocity: Planar, seconds: float) -> list[Odometry]:

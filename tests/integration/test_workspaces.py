@@ -26,7 +26,7 @@ def test_it_is_spawned_and_drives_by_its_plugin(wire: Wire, tmp_path: Path, bot:
     done = wire.run("spawn", str(file), "--name", "Fred")
     assert (done.returncode, done.stdout) == (0, "Fred listens on Fred/cmd_vel\n")
     assert done.stderr.count("\n") == ("chasis" in done.stderr)
-    fred = Robot(wire.bus(), "Fred")
+    fred = Robot(wire.bus(), "Fred").wait_longer()
     start = fred.stands()
     fred.drive(0.3, 0.4, until=lambda odom: distance(odom, start) > 1)
     end = fred.stop()

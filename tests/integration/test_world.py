@@ -45,7 +45,7 @@ def test_the_arena_holds_what_its_file_says_and_the_robot(wire: Wire, disc: str)
 
 def test_a_wall_stops_a_robot_that_drives_on(wire: Wire, disc: str) -> None:
     arena(wire, disc)
-    robot = Robot(wire.bus())
+    robot = Robot(wire.bus()).wait_longer()
     robot.drive(0, -1.5, until=lambda odom: place(odom)[1] < -3.8)
     begin = len(robot.odom.messages())
     robot.drive(0, -1.5, until=lambda _: len(robot.odom.messages()) > begin + 40)
@@ -56,7 +56,7 @@ def test_a_wall_stops_a_robot_that_drives_on(wire: Wire, disc: str) -> None:
 def test_a_robot_pushes_a_crate(wire: Wire, disc: str) -> None:
     arena(wire, disc)
     bus = wire.bus()
-    robot = Robot(bus)
+    robot = Robot(bus).wait_longer()
     before = where(bus, "ball")
     robot.drive(0, -1, until=lambda odom: place(odom)[1] < before[1] + 0.02)
     robot.drive(-1, 0, until=lambda odom: place(odom)[0] < before[0] - 0.3)
@@ -67,7 +67,7 @@ def test_a_robot_pushes_a_crate(wire: Wire, disc: str) -> None:
 def test_a_robot_climbs_the_ramp(wire: Wire, disc: str) -> None:
     arena(wire, disc)
     bus = wire.bus()
-    robot = Robot(bus)
+    robot = Robot(bus).wait_longer()
     x = where(bus, "ramp")[0]
     robot.drive(0.5, 0, until=lambda odom: odom.pose.pose.position.z > 0.15 or place(odom)[0] > x + 1)
     robot.put()
