@@ -31,6 +31,8 @@ _encode_msgpack = msgspec.msgpack.Encoder().encode
 def encode(message: Message, wire: str = "json") -> bytes:
     """The bytes of `message`. A NaN or an infinity raises CodecError: JSON would turn it into a null."""
     try:
+        if message.SETTLE:
+            message.SETTLE()
         payload, fine = _WRITERS[wire](message)
     except UnicodeEncodeError as error:
         raise CodecError(f"{type(message).__name__}: a text that is not Unicode: {error.reason}") from None

@@ -5,7 +5,7 @@ A field left out is zero; a field that does not exist is refused by name.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Annotated, Any, ClassVar
 
 import msgspec
@@ -19,6 +19,7 @@ class Message(Struct, forbid_unknown_fields=True):
     """What every message is: a Struct that knows its ROS name and refuses fields it does not have."""
 
     ROS: ClassVar[str] = ""
+    SETTLE: ClassVar[Callable[[Any], None] | None] = None  # checks what has to be before it is written
 
 
 class Time(Message):

@@ -1,4 +1,7 @@
-"""Our own messages as CDR: msgspec Structs, with the exact types of their definitions."""
+"""Messages as CDR: msgspec Structs, with the exact types of their definitions.
+
+Ours are found in ROS's tables by their names; a class that was made from a definition has it as `__interface__`.
+"""
 
 import struct
 import typing
@@ -6,6 +9,7 @@ from functools import cache, partial
 from typing import Any
 
 import msgspec
+from msgspec import StructMeta
 
 from holozen.cdr import CodecError
 from holozen.cdr.codec import Codec
@@ -22,13 +26,16 @@ _WRONG = (ArithmeticError, AttributeError, TypeError, ValueError, struct.error) 
 
 def ros_name(kind: type[Message]) -> str:
     """The full name of a message in ROS; of a service's, with the half it is: `std_srvs/srv/Trigger_Request`."""
+    if made := getattr(kind, "__interface__", None):
+        return str(made.name)
     halves = (half for end, half in _HALVES.items() if kind.__name__.endswith(end))
     return kind.ROS + (next(halves, "") if "/srv/" in kind.ROS else "")
 
 
 def interface(kind: type[Message]) -> Interface:
     """The definition of a message."""
-    return _REGISTRY.find(ros_name(kind))
+    made: Interface | None = getattr(kind, "__interface__", None)
+    return made or _REGISTRY.find(ros_name(kind))
 
 
 @cache
@@ -61,6 +68,7 @@ class Structs(Shape):
     def __init__(self, kind: type[Message]) -> None:
         super().__init__()
         self._classes: dict[str, type[Message]] = {}
+        self._makers: dict[str, str] = {}  # names of what makes them; two classes may have one name
         self._add(kind)
 
     def made(self, interface: Interface, values: list[str]) -> str:
@@ -70,7 +78,8 @@ class Structs(Shape):
             return f"({', '.join(values)})"
         hints = typing.get_type_hints(kind, include_extras=True)
         fields = zip(interface.fields, values, strict=True)
-        return f"{kind.__name__}({', '.join(self._value(hints[field.name], field, value) for field, value in fields)})"
+        maker = self._makers[interface.name]
+        return f"{maker}({', '.join(self._value(hints[field.name], field, value) for field, value in fields)})"
 
     def part(self, interface: Interface, field: Field, owner: str) -> str:
         """An attribute, or an item of such a tuple."""
@@ -81,7 +90,10 @@ class Structs(Shape):
         return f"list({owner}.{field.name}.items())" if typing.get_origin(hint) is dict else f"{owner}.{field.name}"
 
     def _add(self, kind: type[Message]) -> None:
-        self._classes[ros_name(kind)] = self.names[kind.__name__] = kind
+        name, maker = ros_name(kind), f"make_{len(self._makers)}"
+        self._classes[name], self._makers[name] = kind, maker
+        # A class whose own call checks what a script gives is made without: the reader has seen to it.
+        self.names[maker] = kind if type(kind) is StructMeta else partial(StructMeta.__call__, kind)
         for hint in typing.get_type_hints(kind).values():
             for inner in (hint, *typing.get_args(hint)):
                 if isinstance(inner, type) and issubclass(inner, Message) and ros_name(inner) not in self._classes:
@@ -96,8 +108,9 @@ class Structs(Shape):
             least = low if meta.ge is None else int(meta.ge)
             most = int(meta.le) if meta.le is not None else int(meta.lt) - 1 if meta.lt is not None else high
             if least > low or most < high:
-                self.names[f"limited_{field.name}"] = partial(_limited, field.name, least, most)
-                return f"limited_{field.name}({value})"
+                limited = f"limited_{len(self.names)}"
+                self.names[limited] = partial(_limited, field.name, least, most)
+                return f"{limited}({value})"
         return value
 
 
