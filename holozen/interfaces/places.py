@@ -4,7 +4,7 @@ import functools
 import os
 import re
 import stat
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from holozen.interfaces.definition import InterfaceError
@@ -14,6 +14,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 KINDS = ("msg", "srv")
 
 Folders = Mapping[str, "str | os.PathLike[str]"]
+Paths = Sequence["str | os.PathLike[str]"]
 
 
 class Source(NamedTuple):
@@ -46,17 +47,20 @@ def tables() -> list[str]:
 
 
 class Places:
-    """Finds the definitions of packages. `given` are the folders of some of them; the others are looked up once."""
+    """Finds the definitions of packages. `given` are the folders of some of them; the others are looked up once, around
+    the files or folders `near` and around the working folder.
+    """
 
-    def __init__(self, given: Folders) -> None:
+    def __init__(self, given: Folders, near: Paths = ()) -> None:
         self._given = {name: os.fspath(folder) for name, folder in given.items()}
+        self._near = near
         self._found: dict[str, str | None] = {}
 
     def source(self, package: str, name: str) -> Source | None:
         """The definition of `name` (such as `msg/Twist`) in a package; None if there is none. Raises InterfaceError."""
         if package not in self._given and (ours := table(package)):
             return ours.get(name)
-        path = self._folder(package)
+        path = self.folder(package)
         kind, _, last = name.partition("/")
         return None if path is None else _read(os.path.join(path, kind, f"{last}.{kind}"))
 
@@ -64,7 +68,7 @@ class Places:
         """The definitions of a package, such as `msg/Twist`. Raises InterfaceError."""
         if package not in self._given and (ours := table(package)):
             return sorted(ours)
-        path = self._folder(package)
+        path = self.folder(package)
         found = sorted(_names_in(path)) if path else []
         if package in self._given and not found:
             raise InterfaceError(f"--package {package}={path}: no .msg or .srv files in its folders msg and srv")
@@ -80,10 +84,11 @@ class Places:
                     self._found.setdefault(name, path)
         return sorted({*tables(), *self._given, *(name for name, path in self._found.items() if path)})
 
-    def _folder(self, package: str) -> str | None:
+    def folder(self, package: str) -> str | None:
+        """Where a package that is not ours lies; None if it is not found. Raises InterfaceError."""
         if package not in self._given:
             if package not in self._found:
-                self._found[package] = _look_up(package)
+                self._found[package] = _look_up(package, self._near)
             return self._found[package]
         path = self._given[package]
         if not os.path.isdir(path):
@@ -91,14 +96,15 @@ class Places:
         return path
 
 
-def _look_up(package: str) -> str | None:
+def _look_up(package: str, near: Paths) -> str | None:
     """The folder of a package that is not ours, looked up as those of robot files are. Raises InterfaceError."""
     from pathlib import Path
 
     from holozen.robot.packages import find_named
 
     try:
-        found = find_named(package, Path.cwd())
+        starts = [*map(Path, near), Path.cwd()]
+        found = next(filter(None, (find_named(package, start) for start in starts)), None)
     except OSError as error:  # the working folder is gone
         raise InterfaceError(f"package {package}: {error.strerror}") from None
     return str(found) if found else None

@@ -18,11 +18,11 @@ class Registry:
     """Finds types, each parsed once.
 
     A package is looked up among `packages` (name -> folder, as `--package NAME=DIR` gives), in our own tables, then in
-    AMENT_PREFIX_PATH, ROS_PACKAGE_PATH and around the working folder.
+    AMENT_PREFIX_PATH, ROS_PACKAGE_PATH, around the files or folders `near` and around the working folder.
     """
 
-    def __init__(self, packages: places.Folders = {}) -> None:
-        self._places = places.Places(packages)
+    def __init__(self, packages: places.Folders = {}, near: places.Paths = ()) -> None:
+        self.places = places.Places(packages, near)
         self._found: dict[str, Interface] = {}
         self._lost: dict[str, InterfaceError] = {}  # a stranger may name one with every sample
         self._open: list[str] = []  # those that are being parsed, to see one that holds itself
@@ -45,8 +45,8 @@ class Registry:
 
     def names(self) -> list[str]:
         """All types that can be listed, sorted."""
-        known = self._places.packages()
-        return [f"{package}/{name}" for package in known for name in self._places.names(package)]
+        known = self.places.packages()
+        return [f"{package}/{name}" for package in known for name in self.places.names(package)]
 
     def _find(self, name: str) -> Interface:
         if re.fullmatch(r"\w+", name):
@@ -62,7 +62,7 @@ class Registry:
         if full not in self._found:
             stem = next((name.removesuffix(half) for half in _HALVES if name.endswith(half)), name)
             whole = name if name.startswith("msg/") else stem
-            source = self._places.source(package, whole)
+            source = self.places.source(package, whole)
             if source is None:
                 return None
             self._keep(package, whole, source)
@@ -95,7 +95,7 @@ class Registry:
             if kind == "srv":
                 raise InterfaceError(f"{name}: a field is a message, not a service")
             return self.find(f"{home}/msg/{last}")
-        if name == "Header" and not self._places.source(package, "msg/Header"):
+        if name == "Header" and not self.places.source(package, "msg/Header"):
             package = "std_msgs"  # as ROS 1 wrote it
         return self.find(f"{package}/msg/{name}")
 
@@ -105,9 +105,9 @@ class Registry:
         return f"{name[:80]!r} is no type, it lacks the package; {hint}"
 
     def _unknown(self, name: str, package: str) -> str:
-        known = [f"{package}/{each}" for each in self._places.names(package)]
+        known = [f"{package}/{each}" for each in self.places.names(package)]
         if not known:
-            there = self._places.packages()
+            there = self.places.packages()
             hint = closest(package, there) or f"; known: {listed(there)}"
             return f"no package {package!r} with interfaces{hint}; say where it is: --package {package}=DIR"
         return f"no type {name!r}{closest(name, known) or '; known: ' + listed(known)}"

@@ -24,7 +24,7 @@ _build = StructMeta.__call__  # makes a message of values that are known to be r
 _store = Struct.__setattr__
 _made: dict[Interface, type["RosMessage"]] = {}
 _kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by what the definition says: another registry parses it anew
-_services: dict[Interface, type["RosService"]] = {}
+_services: dict[tuple[str, Any, Any], type["RosService"]] = {}
 _registry = Registry()
 
 
@@ -108,14 +108,15 @@ def make(interface: Interface) -> type[RosMessage]:
 
 
 def make_service(interface: Interface) -> type[RosService]:
-    """The class of a service, always the same one. Raises InterfaceError."""
-    if interface not in _services:
-        if not (interface.request and interface.response):
-            raise InterfaceError(f"{interface.name} is no service")
-        halves = {"Request": make(interface.request), "Response": make(interface.response)}
-        names = {"__module__": _module(interface), "ROS": interface.name, **halves}
-        _services[interface] = type(_last(interface), (RosService,), names)
-    return _services[interface]
+    """The class of a service: one for each definition. Raises InterfaceError."""
+    if not (interface.request and interface.response):
+        raise InterfaceError(f"{interface.name} is no service")
+    request, response = make(interface.request), make(interface.response)
+    key = (interface.name, request, response)
+    if key not in _services:
+        names = {"__module__": _module(interface), "ROS": interface.name, "Request": request, "Response": response}
+        _services[key] = type(_last(interface), (RosService,), names)
+    return _services[key]
 
 
 def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[RosMessage]:

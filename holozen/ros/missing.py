@@ -1,0 +1,60 @@
+"""What is told where a script asks for something that is not there: the name, what there is instead, and the page."""
+
+from collections.abc import Iterable
+from importlib import import_module
+
+from holozen.interfaces.registry import closest
+from holozen.ros.table import MODULES
+
+PAGE = "docs/coming-from-ros.md"
+ACTIONS = "there are no actions here; use a service, or a topic for the goal and one for the progress"
+ROS_1 = "this is of ROS 1; here is ROS 2's rclpy"
+
+HINTS = {
+    "actionlib": ACTIONS,
+    "ament_index_python.resources": "ament_index_python.packages finds the folders of packages",
+    "cv_bridge": "numpy.array(image.data, 'uint8').reshape(image.height, image.width, -1) is an rgb8 or bgr8 image",
+    "launch_xml": "launch files are in Python here",
+    "launch_yaml": "launch files are in Python here",
+    "message_filters": "keep the last message of each topic in its callback, and compare their stamps",
+    "rclpy.action": ACTIONS,
+    "rclpy.lifecycle": "there are no lifecycle nodes here; use rclpy.node.Node",
+    "rclpy.serialization": "holozen.codec.encode and holozen.codec.decode do this",
+    "rosbag2_py": "`holozen bag record` and `holozen bag play` do this",
+    "rosidl_runtime_py": "holozen.ros.generated.find gives the class of a name such as 'geometry_msgs/msg/Twist'",
+    "rospkg": "ament_index_python.packages finds the folders of packages",
+    "rospy": ROS_1,
+    "roslib": ROS_1,
+    "tf": f"{ROS_1}, tf2_ros and tf_transformations",
+    "tf2_py": "its exceptions and Buffer are in tf2_ros",
+}
+"""Module of ROS that is not here -> what there is instead."""
+
+
+def in_module(module: str, name: str, known: Iterable[str]) -> str:
+    """The line for a name that a module of ROS does not have here."""
+    full = f"{module}.{name}"
+    return f"{module} has no {name!r} here{_instead(full, name, module, known)}; see {PAGE}"
+
+
+def of_class(kind: str, name: str, known: Iterable[str]) -> str:
+    """The line for an attribute that a class of ROS, such as `Node`, does not have here."""
+    return f"{kind} has no {name!r} here{closest(name, (each for each in known if each[0] != '_'))}; see {PAGE}"
+
+
+def _instead(full: str, name: str, module: str, known: Iterable[str]) -> str:
+    if full in HINTS:
+        return f"; {HINTS[full]}"
+    if place := _elsewhere(name, module):
+        return f"; it is in {place}"
+    modules = (each for each in MODULES if each.startswith(f"{module}."))
+    return closest(name, [*known, *modules])
+
+
+def _elsewhere(name: str, module: str) -> str:
+    """The module of the same package that has this name."""
+    top = module.partition(".")[0]
+    for other, ours in MODULES.items():
+        if other != module and other.partition(".")[0] == top and name in import_module(ours).__all__:
+            return other
+    return ""
