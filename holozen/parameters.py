@@ -112,7 +112,7 @@ class Parameters:
 
     def _list(self, request: r.ListParametersRequest) -> r.ListParametersReply:
         """The names below some prefixes, and the prefixes that they have."""
-        names = [name for name in self._known() if _below(name, request.prefixes, request.depth)]
+        names = [name for name in self._known() if is_below(name, request.prefixes, request.depth)]
         prefixes = sorted({name.rpartition(".")[0] for name in names} - {""})
         return r.ListParametersReply(r.ListParametersResult(names, prefixes))
 
@@ -181,7 +181,7 @@ def _few(asked: list[r.Parameter] | list[str]) -> None:
         raise ServiceError(f"{len(asked)} parameters in one request; at most {MOST}")
 
 
-def _below(name: str, prefixes: list[str], depth: int) -> bool:
+def is_below(name: str, prefixes: list[str], depth: int) -> bool:
     """Whether ListParameters takes a name."""
     rests = [name[len(p) + 1 :] for p in prefixes if name.startswith(f"{p}.")] or [""] * (name in prefixes)
     rests = rests if prefixes else [name]

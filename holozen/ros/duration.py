@@ -86,9 +86,9 @@ Infinite = Duration(nanoseconds=LARGEST - 1)
 
 def message(name: str) -> Any:
     """The class of builtin_interfaces.msg of that name."""
-    from holozen.ros import generated
+    from holozen.ros.generated import find
 
-    return generated.find(f"builtin_interfaces/msg/{name}")
+    return find(f"builtin_interfaces/msg/{name}")
 
 
 def nanoseconds_of(msg: Any, name: str) -> int:

@@ -139,7 +139,8 @@ class InvalidParameterTypeException(ParameterException):
         name = getattr(desired_parameter, "name", desired_parameter)
         got = getattr(getattr(desired_parameter, "type_", None), "name", "unknown")
         value = getattr(desired_parameter, "value", None)
-        super().__init__(f"parameter {name!r} takes {expected_type}, and {value!r} is {got}")
+        hint = f"; write {value}.0" if (got, expected_type) == ("INTEGER", "DOUBLE") else ""
+        super().__init__(f"parameter {name!r} takes {expected_type}, and {value!r} is {got}{hint}")
         self.parameters = [name]
 
 

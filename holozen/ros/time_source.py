@@ -8,6 +8,7 @@ from holozen.messages import Clock as ClockMessage
 from holozen.ros import names
 from holozen.ros.clock import Clock, ROSClock
 from holozen.ros.clock_type import ClockType
+from holozen.ros.parameter import Parameter
 from holozen.ros.time import Time
 
 if TYPE_CHECKING:
@@ -32,6 +33,8 @@ class TimeSource:
         self._reader: Subscription[ClockMessage] | None = None
         self._shown = Time(clock_type=ClockType.ROS_TIME)
         self._active = False
+        node.add_post_set_parameters_callback(self._follow)
+        self._follow([node.get_parameter(USE_SIM_TIME)])
 
     @property
     def ros_time_is_active(self) -> bool:
@@ -68,6 +71,11 @@ class TimeSource:
     def close(self) -> None:
         """Read no more; the clocks show the system's time."""
         self.ros_time_is_active = False
+
+    def _follow(self, parameters: list[Parameter]) -> None:
+        for each in parameters:
+            if each.name == USE_SIM_TIME:
+                self.ros_time_is_active = bool(each.value)
 
     def _listen(self) -> None:
         node = self._node

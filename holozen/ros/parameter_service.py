@@ -1,0 +1,99 @@
+"""The services of a node's parameters, on ROS's names: `<node>/get_parameters` and so on. Answered while it spins."""
+
+from typing import Any
+
+from holozen.errors import ServiceError
+from holozen.parameters import ELSE, MOST
+from holozen.ros import names
+from holozen.ros.exceptions import ParameterNotDeclaredException, ParameterUninitializedException
+from holozen.ros.parameter import Parameter
+from holozen.ros.qos import qos_profile_parameters
+
+
+def serve(node: Any, fqn: str) -> None:
+    """Serve the parameters of a node with that absolute name."""
+    from holozen.ros.generated import find
+
+    answers = {
+        "DescribeParameters": _describe, "GetParameterTypes": _types, "GetParameters": _get, "SetParameters": _set,
+        "SetParametersAtomically": _set_atomically,
+        # Last: who sees its token knows that the others are there.
+        "ListParameters": _list,
+    }  # fmt: skip
+    for name, answer in answers.items():
+        snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("_")
+        node.create_service(
+            find(f"rcl_interfaces/srv/{name}"), names.join(fqn, snake), _bound(answer, node),
+            qos_profile=qos_profile_parameters,
+        )  # fmt: skip
+
+
+def _bound(answer: Any, node: Any) -> Any:
+    def answered(request: Any, response: Any) -> Any:
+        asked: list[Any] = getattr(request, "names", None) or getattr(request, "parameters", [])
+        if len(asked) > MOST:
+            raise ServiceError(f"{len(asked)} parameters in one request; at most {MOST}")
+        try:
+            answer(node, request, response)
+        except (ParameterNotDeclaredException, ParameterUninitializedException) as error:
+            raise ServiceError(str(error)) from None
+        return response
+
+    return answered
+
+
+def _describe(node: Any, request: Any, response: Any) -> None:
+    response.descriptors = node.describe_parameters(request.names)
+
+
+def _types(node: Any, request: Any, response: Any) -> None:
+    response.types = [kind.value for kind in node.get_parameter_types(request.names)]
+
+
+def _get(node: Any, request: Any, response: Any) -> None:
+    """A parameter that has no value yet is one of type NOT_SET."""
+    store = node._store
+    store.check_known(request.names)
+    response.values = [(store.values.get(name) or Parameter(name)).get_parameter_value() for name in request.names]
+
+
+def _list(node: Any, request: Any, response: Any) -> None:
+    response.result = node.list_parameters(request.prefixes, request.depth)
+
+
+def _set(node: Any, request: Any, response: Any) -> None:
+    """Set all or none, as every node of holozen does."""
+    from holozen.ros.parameters import result
+
+    reasons = _faults(node, request.parameters)
+    if not any(reasons):
+        reason = node._store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
+        reasons = [reason, *[reason and ELSE] * len(reasons[1:])] if reasons else []
+    elif len(reasons) > 1:
+        reasons = [reason or ELSE for reason in reasons]
+    response.results = [result(reason) for reason in reasons]
+
+
+def _set_atomically(node: Any, request: Any, response: Any) -> None:
+    from holozen.ros.parameters import result
+
+    reason = next(filter(None, _faults(node, request.parameters)), "")
+    response.result = result(
+        reason or node._store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
+    )
+
+
+def _faults(node: Any, asked: Any) -> list[str]:
+    """Why each cannot be set, as far as nobody needs to be asked."""
+    reasons, seen = [], set()
+    for each in asked:
+        reason = f"{each.name!r} is set twice in one request" if each.name in seen else ""
+        seen.add(each.name)
+        try:
+            parameter = Parameter.from_parameter_msg(each)
+            node._store.check_known([parameter.name])
+            reason = reason or node._store.fault(parameter)
+        except (ParameterNotDeclaredException, TypeError, ValueError, RuntimeError) as error:
+            reason = str(error)
+        reasons.append(reason)
+    return reasons
