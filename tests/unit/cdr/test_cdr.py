@@ -44,7 +44,7 @@ def values(interface: Interface) -> st.SearchStrategy[dict[str, Any]]:
     """Every value of a type, with short lists."""
 
     def of(field: Field) -> st.SearchStrategy[Any]:
-        most = field.bound if field.array == "fixed" else 3
+        most = field.bound if field.array == "fixed" else min(3, field.bound or 3)
         return (
             st.lists(elements(field), min_size=field.bound and most, max_size=most) if field.array else elements(field)
         )

@@ -1,0 +1,245 @@
+"""Generated messages are the same bytes as our own, as an independent library's CDR, and survive every wire."""
+
+import copy
+import operator
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from holozen import messages as m
+from holozen.codec import WIRES, CodecError, decode, encode, encoding
+from holozen.interfaces import Field, Interface, Registry
+from holozen.interfaces.values import prototype
+from holozen.ros import generated
+from tests.unit.cdr.conftest import Stranger
+from tests.unit.cdr.test_cdr import elements, values
+
+REGISTRY = Registry()
+NAMES = REGISTRY.names()
+PACKAGES = (
+    "geometry_msgs", "nav_msgs", "std_msgs", "std_srvs", "sensor_msgs", "builtin_interfaces", "rosgraph_msgs",
+    "tf2_msgs", "visualization_msgs", "rcl_interfaces",
+)  # fmt: skip
+MESSAGES = [name + half for name in NAMES for half in (("_Request", "_Response") if "/srv/" in name else ("",))]
+TF = m.TFMessage([m.TransformStamped(m.Header(m.Time(1, 2), "odom"), "base"), m.TransformStamped()])
+ODOM = m.Odometry(
+    m.Header(m.Time(-3, 999_999_999), "odom"), "base_link", twist=m.TwistWithCovariance(m.Twist.planar(1.0))
+)
+OURS: list[m.Message] = [
+    m.Twist.planar(0.3, -0.2, 1.5), m.TwistStamped(m.Header(frame_id="ä")), ODOM, TF, m.Clock(m.Time(7, 8)),
+    m.JointState(name=["a", "bcd"], position=[1.0, 2.0], effort=[0.5]), m.TriggerRequest(), m.Pose(),
+    m.TriggerReply(True, "done"), m.NextGoalReply(1.0, 2.0, 3.0, 1), m.GetPoseReply(ODOM, 0.25),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def stranger() -> Stranger:
+    return Stranger()
+
+
+def test_the_tables_hold_the_packages_of_the_lessons() -> None:
+    assert set(PACKAGES) <= {name.partition("/")[0] for name in NAMES}
+
+
+def twin(message: m.Message) -> Any:
+    """The generated class of a message of ours."""
+    end = {"Request": "_Request", "Reply": "_Response"}
+    name = type(message).__name__
+    half = next((half for word, half in end.items() if "/srv/" in message.ROS and name.endswith(word)), "")
+    return generated.find(message.ROS + half)
+
+
+@pytest.mark.parametrize("wire", WIRES)
+@pytest.mark.parametrize("message", OURS, ids=lambda message: type(message).__name__)
+def test_a_generated_message_and_ours_are_the_same_bytes(message: m.Message, wire: str) -> None:
+    payload, kind = encode(message, wire), twin(message)
+    read = decode(payload, encoding(wire, kind), (kind,))
+    assert encode(read, wire) == payload
+    assert encoding(wire, kind) == encoding(wire, type(message))
+    assert decode(encode(read, wire), encoding(wire, kind), (type(message),)) == message
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_every_type_is_made_and_survives_every_wire(name: str, stranger: Stranger) -> None:
+    interface, kind = REGISTRY.find(name), generated.find(name)
+    message = kind()
+    assert msgspec.to_builtins(message) == prototype(interface)
+    assert kind(**{field: getattr(message, field) for field in message.__struct_fields__}) == message
+    for wire in WIRES:
+        payload = encode(message, wire)
+        assert decode(payload, encoding(wire, kind), (kind,)) == message
+        assert wire != "cdr" or payload == stranger.write(interface, prototype(interface))
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=5)
+@given(data=st.data())
+def test_any_value_of_any_type_is_the_same_bytes_as_another_librarys(
+    name: str, stranger: Stranger, data: st.DataObject
+) -> None:
+    interface, kind = REGISTRY.find(name), generated.find(name)
+    value = data.draw(values(interface))
+    message = filled(interface, value)
+    assert msgspec.to_builtins(message) == value
+    try:
+        payload = encode(message, "cdr")
+    except CodecError as error:
+        assert str(error).endswith("is not a finite number")
+        return
+    assert payload == stranger.write(interface, value)
+    for wire in WIRES:
+        assert decode(encode(message, wire), encoding(wire, kind), (kind,)) == message
+
+
+def filled(interface: Interface, value: dict[str, Any]) -> Any:
+    """A message made as a script does, of messages made so."""
+
+    def of(field: Field) -> Any:
+        given, nested = value[field.name], field.nested
+        if not nested:
+            return given
+        return [filled(nested, each) for each in given] if field.array else filled(nested, given)
+
+    return generated.make(interface)(**{field.name: of(field) for field in interface.fields})
+
+
+FIELDS = [
+    Field("some", kind, array, bound)
+    for kind in ("bool", "byte", "int8", "uint64", "float32", "float64", "string")
+    for array, bound in (("", 0), ("fixed", 2), ("sequence", 0), ("bounded", 3))
+]
+
+
+@pytest.mark.parametrize("field", FIELDS, ids=lambda field: str(field.spelled()))
+@given(data=st.data())
+def test_what_a_field_takes_is_written_and_read(field: Field, data: st.DataObject) -> None:
+    most = field.bound or 3
+    one = elements(field)
+    value = data.draw(st.lists(one, min_size=2 if field.array == "fixed" else 0, max_size=most) if field.array else one)
+    kind = generated.make(Interface("t/msg/Some", "msg", (field,)))
+    message: Any = kind(some=value)
+    for wire in WIRES:
+        try:
+            assert decode(encode(message, wire), encoding(wire, kind), (kind,)) == message
+        except CodecError as error:
+            assert str(error).endswith("is not a finite number")
+
+
+@pytest.mark.parametrize("wire", WIRES)
+@pytest.mark.parametrize(
+    ("kind", "put", "held"),
+    [
+        ("float64", [1, True], [1.0, 1.0]),
+        ("float32", [0.5], [0.5]),
+        ("uint8", [True], [1]),
+        ("byte", [b"\x07"], [7]),
+        ("string", [type("Text", (str,), {})("x")], ["x"]),
+    ],
+)
+def test_what_was_put_into_a_list_is_written_as_its_field_says(wire: str, kind: str, put: Any, held: Any) -> None:
+    made: Any = generated.make(Interface("t/msg/L", "msg", (Field("some", kind, "sequence"),)))
+    message = made()
+    message.some.extend(put)
+    assert decode(encode(message, wire), encoding(wire, made), (made,)).some == held
+    assert all(type(one) is type(plain) for one, plain in zip(message.some, held, strict=True))
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_numbers_of_numpy_may_be_put_into_lists(wire: str) -> None:
+    import numpy as np
+
+    made: Any = generated.make(
+        Interface(
+            "t/msg/N", "msg",
+            (Field("f", "float64", "sequence"), Field("i", "int32", "sequence"), Field("b", "bool", "sequence")),
+        )
+    )  # fmt: skip
+    message = made()
+    message.f.extend([np.float64(0.5), np.float32(1.5), np.int64(2)])
+    message.i[:] = np.array([1, 2])
+    message.b.append(np.True_)
+    read = decode(encode(message, wire), encoding(wire, made), (made,))
+    assert (read.f, read.i, read.b) == ([0.5, 1.5, 2.0], [1, 2], [True])
+
+
+JOINTS, IMAGE = "sensor_msgs/msg/JointState", "sensor_msgs/msg/Image"
+MARKER = generated.find("visualization_msgs/msg/Marker")
+
+
+@pytest.mark.parametrize("wire", WIRES)
+@pytest.mark.parametrize(
+    ("name", "place", "put", "reason"),
+    [
+        (JOINTS, "name", 3, "JointState.name[0]: 3 of type 'int' is not what a string[] holds"),
+        (JOINTS, "effort", "1", "JointState.effort[0]: '1' of type 'str' is not what a float64[] holds"),
+        (JOINTS, "effort", None, "JointState.effort[0]: None of type 'NoneType' is not what a float64[] holds"),
+        (IMAGE, "data", 256, "Image.data[0]: 256 of type 'int' is not what a uint8[] holds"),
+        (IMAGE, "data", 1.5, "Image.data[0]: 1.5 of type 'float' is not what a uint8[] holds"),
+        ("nav_msgs/msg/Path", "poses", m.Pose(), "Path.poses[0]: Pose(position=Point(x=0.0, y=0.0, z=0.0), orie"),
+        ("nav_msgs/msg/Odometry", "pose.covariance", 0.0, "PoseWithCovariance.covariance: 37 values is not what a "),
+        (
+            "visualization_msgs/msg/MarkerArray",
+            "markers",
+            copy.deepcopy(MARKER()),
+            "Marker.points[0]: 1 of type 'int' is not what a geometry_msgs/Point[] holds",
+        ),
+    ],
+    ids=str,
+)
+def test_what_no_list_holds_is_refused_when_it_is_written(
+    wire: str, name: str, place: str, put: Any, reason: str
+) -> None:
+    message = generated.find(name)()
+    operator.attrgetter(place)(message).append(put)
+    if isinstance(put, MARKER):
+        put.points[:] = [1]
+    with pytest.raises(CodecError) as error:
+        encode(message, wire)
+    assert str(error.value).startswith(reason)
+    assert "\n" not in str(error.value)
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_two_types_with_one_name_in_one_message(wire: str) -> None:
+    one = Interface("a/msg/Part", "msg", (Field("x", "int8"),))
+    two = Interface("b/msg/Part", "msg", (Field("name", "string"),))
+    fields = (Field("a", one.name, nested=one), Field("b", two.name, "sequence", nested=two))
+    kind: Any = generated.make(Interface("c/msg/Part", "msg", fields))
+    message = kind(a=generated.make(one)(x=3), b=[generated.make(two)(name="n")])
+    read = decode(encode(message, wire), encoding(wire, kind), (kind,))
+    assert read == message
+    assert [type(part).__module__ for part in (read, read.a, read.b[0])] == ["c.msg", "a.msg", "b.msg"]
+
+
+@pytest.mark.parametrize(
+    ("wire", "payload", "reason"),
+    [
+        ("json", b'{"linaer": {}}', "not a Twist: Object contains unknown field `linaer`"),
+        ("json", b'{"linear": {"x": "a"}}', "not a Twist: Expected `float`, got `str` - at `$.linear.x`"),
+        ("cdr", b"\0\1\0\0\0", "not a Twist: cut off after 5 bytes"),
+    ],
+)
+def test_bad_bytes_are_told_as_for_ours(wire: str, payload: bytes, reason: str) -> None:
+    with pytest.raises(CodecError) as error:
+        decode(payload, WIRES[wire], (generated.find("geometry_msgs/msg/Twist"),))
+    assert str(error.value) == reason
+
+
+def test_a_range_holds_in_every_wire() -> None:
+    kind = generated.find("sensor_msgs/msg/Image")
+    for payload, reason in (
+        (b'{"height": -1}', "`$.height`"), (b'{"data": [256]}', "`$.data[0]`"), (b'{"height": 1.5}', "`$.height`")
+    ):  # fmt: skip
+        with pytest.raises(CodecError, match="not a Image") as error:
+            decode(payload, WIRES["json"], (kind,))
+        assert reason in str(error.value)
+
+
+def test_a_wstring_has_no_cdr() -> None:
+    kind: Any = generated.make(Interface("t/msg/Wide", "msg", (Field("text", "wstring"),)))
+    assert decode(encode(kind(text="x")), "", (kind,)).text == "x"
+    with pytest.raises(CodecError, match="do not agree how a wstring is written"):
+        encode(kind(text="x"), "cdr")
