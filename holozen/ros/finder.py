@@ -116,7 +116,7 @@ class _Front(_Finder):
         if top in self.tables:
             return self._ours(name, rest)
         if rest in (*KINDS, "action"):
-            return None if _is_real(PathFinder.find_spec(name, path)) else self._beside(name, top)
+            return self._beside(name, top)
         module = name.rpartition(".")[0]
         if module and isinstance(getattr(sys.modules.get(module), "__loader__", None), _Maker):
             raise self._no_type(name)
@@ -130,7 +130,7 @@ class _Front(_Finder):
         raise self._no_type(name)
 
     def _beside(self, name: str, top: str) -> ModuleSpec | None:
-        """The interfaces of a package whose Python modules may be another's."""
+        """The interfaces of a package whose Python modules may be another's. Those that a real ROS made are no use."""
         try:
             known = bool(self.places.names(top) or self.places.folder(top))
         except ValueError:

@@ -6,6 +6,7 @@ checked as ROS does; what is read was checked by its reader, so reading costs no
 
 import keyword
 import re
+import threading
 from collections.abc import Callable
 from copy import deepcopy
 from functools import partial
@@ -26,6 +27,7 @@ _made: dict[Interface, type["RosMessage"]] = {}
 _kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by what the definition says: another registry parses it anew
 _services: dict[tuple[str, Any, Any], type["RosService"]] = {}
 _registry = Registry()
+_lock = threading.RLock()  # callbacks of several threads may ask first
 
 
 class RosMeta(StructMeta):
@@ -91,8 +93,9 @@ def find(name: str) -> Any:
 
     Raises InterfaceError, with the closest name there is.
     """
-    interface = _registry.find(name)
-    return make_service(interface) if interface.kind == "srv" else make(interface)
+    with _lock:
+        interface = _registry.find(name)
+        return make_service(interface) if interface.kind == "srv" else make(interface)
 
 
 def make(interface: Interface) -> type[RosMessage]:

@@ -55,6 +55,6 @@ def _elsewhere(name: str, module: str) -> str:
     """The module of the same package that has this name."""
     top = module.partition(".")[0]
     for other, ours in MODULES.items():
-        if other != module and other.partition(".")[0] == top and name in import_module(ours).__all__:
+        if other.partition(".")[0] == top and name in import_module(ours).__all__:
             return other
     return ""

@@ -1,6 +1,7 @@
 """What a script imports is found, made when it is first used, and told in one line where it is not there."""
 
 import importlib
+import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -140,9 +141,27 @@ def test_modules_called_msg_that_are_pythons_stay_so(tmp_path: Path, monkeypatch
     monkeypatch.syspath_prepend(tmp_path)
     finder.install()
     assert ran("from my_pkg_mail.msg import HERE")["HERE"] == 1
+    assert ran("import email.message")
     assert refused("import my_pkg_mail.srv") == "No module named 'my_pkg_mail.srv'"
     assert refused("import my_pkg_other") == "No module named 'my_pkg_other'"
     assert importlib.util.find_spec("my_pkg_other") is None
+
+
+def test_our_own_modules_are_imported_as_ever() -> None:
+    load = "from holozen.ros import finder, generated; finder.install(); import holozen.braille, holozen.srv"
+    code = f"{load}; print(len(generated._made))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "0\n"
+
+
+def test_interfaces_made_by_a_real_ros_are_not_taken(package: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    theirs = package.parent / "site" / "my_pkg"
+    (theirs / "srv").mkdir(parents=True)
+    (theirs / "__init__.py").touch()
+    (theirs / "srv" / "__init__.py").write_text("raise RuntimeError\n")
+    monkeypatch.syspath_prepend(theirs.parent)
+    finder.install({"my_pkg": package})
+    assert ran("from my_pkg.srv import NextGoal")["NextGoal"].Request().request_goal == 0
 
 
 def test_an_unknown_package_is_told_with_the_nearest_and_where_was_looked(package: Path) -> None:
