@@ -8,15 +8,14 @@ import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from holozen.interfaces import InterfaceError, Registry
 from holozen.interfaces.places import tables
 from holozen.interfaces.registry import closest
-from holozen.robot.packages import folders_above, local_packages
 from holozen.ros import generated, missing, modules
 from holozen.ros.table import MODULES
 
@@ -24,7 +23,7 @@ KINDS = ("msg", "srv")
 _ENDS = ("_msgs", "_srvs", "_interfaces", "_interface", "_msg", "_srv")  # names that only interfaces have
 _TOPS = {name.partition(".")[0] for name in MODULES}
 _DEPTH = 30  # frames between an import and its finder; there are some ten
-_installed: list["_Finder"] = []
+_installed: list["_Front | _Back"] = []
 
 
 def install(packages: Mapping[str, Path] = {}, near: Sequence[Path] = ()) -> None:
@@ -36,9 +35,10 @@ def install(packages: Mapping[str, Path] = {}, near: Sequence[Path] = ()) -> Non
     remove()
     registry = Registry(packages, near)
     generated.use(registry)
-    _installed.extend((_Front(registry, near), _Back(registry, near)))
-    sys.meta_path.insert(0, _installed[0])
-    sys.meta_path.append(_installed[1])
+    front, back = _Front(registry, near), _Back(registry, near)
+    _installed.extend((front, back))
+    sys.meta_path.insert(0, front)
+    sys.meta_path.append(back)
 
 
 def remove() -> None:
@@ -51,11 +51,14 @@ def remove() -> None:
             del sys.modules[name]
 
 
-class _Maker(Loader):
-    """Makes one module."""
+class _Maker:
+    """Makes one module. The base class of the standard library's loaders takes 20 ms to import."""
 
     def __init__(self, fill: modules.Fill) -> None:
         self._fill = fill
+
+    def create_module(self, _spec: ModuleSpec) -> None:
+        """Python makes it."""
 
     def exec_module(self, module: ModuleType) -> None:
         """Fill it."""
@@ -64,10 +67,11 @@ class _Maker(Loader):
 
 def _spec(name: str, fill: modules.Fill) -> ModuleSpec:
     # Each is a package: then `from x import y` asks a finder for x.y, which can say why there is none.
-    return ModuleSpec(name, _Maker(fill), is_package=True)
+    maker: Any = _Maker(fill)
+    return ModuleSpec(name, maker, is_package=True)
 
 
-class _Finder(MetaPathFinder):
+class _Finder:
     def __init__(self, registry: Registry, near: Sequence[Path]) -> None:
         self.places, self._near = registry.places, near
         self.tables = {*tables()} - {"holozen"}  # that one is a package of Python's too
@@ -91,6 +95,8 @@ class _Finder(MetaPathFinder):
 
     def unknown(self, name: str) -> str:
         """The line for a package that is not found."""
+        from holozen.robot.packages import folders_above, local_packages
+
         starts = [*map(Path, self._near), Path(os.path.abspath(os.curdir))]
         known = {*self.places.packages(), *(found for start in starts for found in local_packages(start))} - {"holozen"}
         folders = list(dict.fromkeys(str(above[0]) for start in starts if (above := folders_above(start))))

@@ -20,7 +20,7 @@ HINTS = {
     "rclpy.action": ACTIONS,
     "rclpy.lifecycle": "there are no lifecycle nodes here; use rclpy.node.Node",
     "rclpy.serialization": "holozen.codec.encode and holozen.codec.decode do this",
-    "rosbag2_py": "`holozen bag record` and `holozen bag play` do this",
+    "rosbag2_py": "`holozen record` and `holozen replay` do this",
     "rosidl_runtime_py": "holozen.ros.generated.find gives the class of a name such as 'geometry_msgs/msg/Twist'",
     "rospkg": "ament_index_python.packages finds the folders of packages",
     "rospy": ROS_1,
