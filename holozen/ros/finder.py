@@ -46,6 +46,7 @@ def remove() -> None:
     for finder in _installed:
         sys.meta_path.remove(finder)
     _installed.clear()
+    generated.use(Registry())
     for name, module in list(sys.modules.items()):
         if isinstance(getattr(module, "__loader__", None), _Maker):
             del sys.modules[name]

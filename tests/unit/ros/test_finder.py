@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from holozen.interfaces import Registry
+from holozen.interfaces import InterfaceError
 from holozen.ros import finder, generated
 from holozen.ros.table import MODULES
 
@@ -27,7 +27,6 @@ def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     before = set(sys.modules)
     yield
     finder.remove()
-    generated.use(Registry())
     importlib.invalidate_caches()
     for name in set(sys.modules) - before:
         if "my_pkg" in name or "pretend" in name:
@@ -77,12 +76,14 @@ def test_our_tables_are_packages_whose_classes_are_made_when_they_are_used() -> 
     assert ran("from holozen.srv import NextGoal")["NextGoal"].ROS == "holozen/srv/NextGoal"
 
 
-def test_nothing_is_importable_before_and_after() -> None:
+def test_nothing_is_importable_before_and_after(package: Path) -> None:
     for _ in range(2):
         assert refused("import geometry_msgs.msg") == "No module named 'geometry_msgs'"
-        finder.install()
-        ran("from geometry_msgs.msg import Twist")
+        finder.install({"my_pkg": package})
+        ran("from geometry_msgs.msg import Twist\nfrom my_pkg.srv import NextGoal")
         finder.remove()
+    with pytest.raises(InterfaceError):
+        generated.find("my_pkg/srv/NextGoal")
     assert not any(name.startswith("geometry_msgs") for name in sys.modules)
 
 
