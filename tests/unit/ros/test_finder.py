@@ -251,6 +251,7 @@ def test_what_a_module_of_ros_lacks_is_told(pretend: ModuleType) -> None:
     assert refused("import rclpy.pretend\nrclpy.pretend.Thign", AttributeError) == told
     assert refused("from rclpy.pretend import hidden") == f"rclpy.pretend has no 'hidden' here{page}"
     assert refused("from rclpy.pretend import Other") == f"rclpy.pretend has no 'Other' here; it is in rclpy{page}"
+    assert refused("import rclpy\nrclpy.__file__", AttributeError) == "rclpy has no '__file__'"
     assert "did you mean rclpy.pretend?" in refused("import rclpy.pretens", ModuleNotFoundError)
     assert "this is of ROS 1; here is ROS 2's rclpy" in refused("import rospy", ModuleNotFoundError)
     assert "numpy.array(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
