@@ -1,0 +1,181 @@
+"""Clocks: what they show, how long one sleeps on them, and who is told when they jump."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+from holozen.ros.context import Context
+
+from holozen.ros.clock import Clock, ROSClock
+from holozen.ros.clock_type import ClockType
+from holozen.ros.duration import Duration
+from holozen.ros.exceptions import NotInitializedException
+from holozen.ros.jumps import ClockChange, JumpThreshold, TimeJump
+from holozen.ros.time import Time
+from holozen.testing import wait_for
+
+
+@pytest.fixture
+def context() -> Iterator[Context]:
+    context = Context()
+    context.init(args=[])
+    yield context
+    context.try_shutdown()
+
+
+def at(seconds: float) -> Time:
+    return Time(seconds=seconds, clock_type=ClockType.ROS_TIME)
+
+
+def simulated(seconds: float = 0.0) -> ROSClock:
+    clock = ROSClock()
+    clock._set_ros_time_is_active(True)
+    clock.set_ros_time_override(at(seconds))
+    return clock
+
+
+class Sleeper:
+    """Somebody who sleeps in a thread; `woken` is what the sleep returned."""
+
+    def __init__(self, sleep: Callable[[], bool]) -> None:
+        self.woken: bool | None = None
+        self._thread = threading.Thread(target=lambda: setattr(self, "woken", sleep()), daemon=True)
+        self._thread.start()
+
+    def result(self) -> bool | None:
+        self._thread.join(10)
+        return self.woken
+
+
+def test_clocks_show_the_systems_time_or_a_steady_one() -> None:
+    before = time.time_ns(), time.monotonic_ns()
+    shown = [Clock().now(), Clock(clock_type=ClockType.STEADY_TIME).now(), ROSClock().now()]
+    after = time.time_ns(), time.monotonic_ns()
+    assert before[0] <= shown[0].nanoseconds <= shown[2].nanoseconds <= after[0]
+    assert before[1] <= shown[1].nanoseconds <= after[1]
+    assert [each.clock_type for each in shown] == [ClockType.SYSTEM_TIME, ClockType.STEADY_TIME, ClockType.ROS_TIME]
+
+
+def test_a_clock_of_ros_time_is_a_ros_clock() -> None:
+    made = Clock(clock_type=ClockType.ROS_TIME)
+    assert isinstance(made, ROSClock)
+    assert repr(made) == "Clock(clock_type=ROS_TIME)"
+    for wrong in (1, ClockType.UNINITIALIZED):
+        with pytest.raises(TypeError, match="use ClockType"):
+            Clock(clock_type=wrong)  # type: ignore[arg-type]
+
+
+def test_simulated_time_begins_at_zero_and_is_what_was_given() -> None:
+    clock = ROSClock()
+    clock._set_ros_time_is_active(True)
+    assert clock.now() == at(0)
+    clock.set_ros_time_override(at(2.5))
+    assert (clock.ros_time_is_active, clock.now()) == (True, at(2.5))
+    clock._set_ros_time_is_active(False)
+    assert clock.now() > at(1e6)
+    with pytest.raises(TypeError, match="Time of ROS_TIME"):
+        clock.set_ros_time_override(Time())
+
+
+def test_it_says_how_long_a_time_is_away() -> None:
+    clock = simulated(1.0)
+    assert clock.wait_seconds(at(1).nanoseconds) == 0.0
+    assert clock.wait_seconds(at(2).nanoseconds) is None, "nobody knows how fast simulated time goes"
+    steady = Clock(clock_type=ClockType.STEADY_TIME)
+    wait = steady.wait_seconds(steady.nanoseconds() + 10**12)
+    assert wait is not None
+    assert 900 < wait <= 1000
+
+
+def test_one_sleeps_until_the_time_has_come(context: Context) -> None:
+    clock = Clock(clock_type=ClockType.STEADY_TIME)
+    until = clock.now() + Duration(seconds=0.02)
+    assert clock.sleep_until(until, context)
+    assert clock.now() >= until
+    assert clock.sleep_until(Time(clock_type=ClockType.STEADY_TIME), context)
+    assert clock.sleep_for(Duration(seconds=-1e6), context)
+
+
+def test_one_sleeps_in_simulated_time(context: Context) -> None:
+    clock = simulated(1.0)
+    sleeper = Sleeper(lambda: clock.sleep_for(Duration(seconds=2), context))
+    clock.set_ros_time_override(at(2.9))
+    assert sleeper.woken is None
+    clock.set_ros_time_override(at(3.0))
+    assert sleeper.result() is True
+
+
+@pytest.mark.parametrize("clock", [Clock(), Clock(clock_type=ClockType.STEADY_TIME), simulated()], ids=str)
+def test_a_sleep_ends_when_rclpy_is_shut_down(clock: Clock, context: Context) -> None:
+    sleeper = Sleeper(lambda: clock.sleep_for(Duration(seconds=1000), context))
+    context.shutdown()
+    assert sleeper.result() is False
+
+
+def test_a_sleep_ends_when_simulated_time_begins_or_ends(context: Context) -> None:
+    clock = ROSClock()
+    sleeper = Sleeper(lambda: clock.sleep_for(Duration(seconds=1000), context))
+
+    def woken_by_a_change() -> bool:
+        clock._set_ros_time_is_active(not clock.ros_time_is_active)
+        return sleeper.woken is False
+
+    wait_for(woken_by_a_change)
+
+
+def test_who_sleeps_wrongly_is_told(context: Context) -> None:
+    with pytest.raises(NotInitializedException):
+        Clock().sleep_for(Duration(seconds=1), Context())
+    with pytest.raises(ValueError, match="clock of SYSTEM_TIME, and the time of ROS_TIME"):
+        Clock().sleep_until(at(1), context)
+    with pytest.raises(TypeError, match=r"sleeps until a Time, and 1\.0 is a float"):
+        Clock().sleep_until(1.0, context)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match=r"sleeps for a Duration, and 1\.0 is a float"):
+        Clock().sleep_for(1.0, context)  # type: ignore[arg-type]
+
+
+def test_watchers_are_called_when_simulated_time_moves() -> None:
+    clock, seen = ROSClock(), list[int]()
+    clock.watchers.add(lambda: seen.append(clock.nanoseconds()))
+    clock.set_ros_time_override(at(1e-9))
+    clock._set_ros_time_is_active(True)
+    clock._set_ros_time_is_active(True)
+    clock.set_ros_time_override(at(2e-9))
+    assert seen == [1, 2]
+
+
+def test_jumps_beyond_a_threshold_are_told_before_and_after() -> None:
+    clock, told = simulated(10), list[object]()
+    threshold = JumpThreshold(min_forward=Duration(seconds=5), min_backward=Duration(seconds=-1))
+    handle = clock.create_jump_callback(
+        threshold, pre_callback=lambda: told.append(clock.now()), post_callback=told.append
+    )
+    for second in (14, 13.5, 20, 18):
+        clock.set_ros_time_override(at(second))
+    assert told == [
+        at(13.5), TimeJump(ClockChange.ROS_TIME_NO_CHANGE, Duration(seconds=6.5)),
+        at(20), TimeJump(ClockChange.ROS_TIME_NO_CHANGE, Duration(seconds=-2)),
+    ]  # fmt: skip
+    clock._set_ros_time_is_active(False)
+    assert isinstance(told[-1], TimeJump)
+    assert told[-1].clock_change == ClockChange.ROS_TIME_DEACTIVATED
+    handle.unregister()
+    handle.unregister()
+    clock._set_ros_time_is_active(True)
+    assert len(told) == 6
+
+
+def test_a_wrong_threshold_is_refused() -> None:
+    for forward, backward, told in (
+        (Duration(), None, "min_forward is more than zero"),
+        (None, Duration(), "min_backward is less than zero"),
+    ):
+        with pytest.raises(ValueError, match=told):
+            JumpThreshold(min_forward=forward, min_backward=backward)
+    with pytest.raises(ValueError, match="tell no jump"):
+        JumpThreshold(min_forward=None, min_backward=None, on_clock_change=False)
+    with pytest.raises(TypeError, match="min_forward is a Duration"):
+        JumpThreshold(min_forward=1.0, min_backward=None)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="give a pre_callback"):
+        ROSClock().create_jump_callback(JumpThreshold(min_forward=None, min_backward=None))
