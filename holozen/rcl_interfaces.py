@@ -7,11 +7,11 @@ from msgspec import Meta, field
 
 from holozen.messages import Message
 
-Value = bool | int | float | str
+Value = bool | int | float | str | list[bool] | list[int] | list[float] | list[str]
 Byte = Annotated[int, Meta(ge=0, le=255)]
 Count = Annotated[int, Meta(ge=0)]
 
-NOT_SET, BOOL, INTEGER, DOUBLE, STRING = range(5)
+NOT_SET, BOOL, INTEGER, DOUBLE, STRING, BYTE_ARRAY, BOOL_ARRAY = range(7)
 WORDS = (
     "not set", "boolean", "integer", "double", "string", "byte array", "boolean array", "integer array", "double array",
     "string array",
@@ -41,7 +41,12 @@ class ParameterValue(Message):
 
     @classmethod
     def of(cls, value: Value) -> "ParameterValue":
-        """The message that holds `value`."""
+        """The message that holds `value`; a list has values of one type."""
+        if isinstance(value, list):
+            kind = BYTE_ARRAY if not value else BOOL_ARRAY + cls.of(value[0]).type - BOOL
+            made = cls(kind)
+            setattr(made, _FIELDS[kind], value)
+            return made
         if isinstance(value, bool):
             return cls(BOOL, bool_value=value)
         if isinstance(value, int):

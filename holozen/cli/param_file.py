@@ -20,11 +20,27 @@ HERE = "ros__parameters"
 _EXPONENT = re.compile(r"[+-]?[0-9]+[eE][+-]?[0-9]+")  # a number for everybody but YAML 1.1
 _PLAIN = re.compile(r"/?[A-Za-z][A-Za-z0-9_./]*")
 _NO_NAMES = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")  # to YAML 1.1
-Value = bool | int | float | str
+Word = bool | int | float | str
+Value = Word | list[bool] | list[int] | list[float] | list[str]
 
 
 def typed(text: str) -> Value:
-    """The value that a word means. What is no finite number stays text, which a node that wants a number refuses."""
+    """The value that a word means, or a list such as `[1.0, 2.5]`.
+
+    What is no finite number, or no list of one type, stays text, which a node that wants another type refuses.
+    """
+    if text.startswith("["):
+        from holozen.ros import yaml_values
+
+        try:
+            found = yaml_values.value(text)
+        except ValueError:
+            return text
+        return found if isinstance(found, list) else text
+    return _word(text)
+
+
+def _word(text: str) -> Word:
     if text.lower() in ("true", "false"):
         return text.lower() == "true"
     if re.fullmatch(r"[+-]?[0-9]{1,18}", text):
@@ -116,11 +132,23 @@ def _flat(values: dict[Any, Any], prefix: str, where: str, depth: int = 0) -> It
         elif isinstance(value, bool):
             yield full, value
         elif isinstance(value, str):
-            yield full, typed(value) if _EXPONENT.fullmatch(value) else value
+            yield full, _word(value) if _EXPONENT.fullmatch(value) else value
         elif isinstance(value, int | float):
             yield full, value if math.isfinite(value) and abs(value) < 2**63 else str(value)
+        elif isinstance(value, list):
+            yield full, _listed(value, f"{where}: {full}")
         else:
-            raise BusError(f"{where}: {full} is a {type(value).__name__}; write a number, a word, true or false")
+            wanted = "write a number, a word, true or false, or a list of one of them"
+            raise BusError(f"{where}: {full} is a {type(value).__name__}; {wanted}")
+
+
+def _listed(values: list[Any], where: str) -> Any:
+    words = [_word(each) if isinstance(each, str) and _EXPONENT.fullmatch(each) else each for each in values]
+    kinds = sorted({type(each).__name__ for each in words})
+    if len(kinds) > 1 or not set(kinds) <= {"bool", "int", "float", "str"}:
+        wanted = "write a list of numbers, of words, or of true and false"
+        raise BusError(f"{where} is a list of {', '.join(kinds)}; {wanted}")
+    return words
 
 
 def _name(name: str) -> str:
@@ -128,6 +156,8 @@ def _name(name: str) -> str:
 
 
 def _written(value: Value) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_written, value))}]"
     if isinstance(value, str):
         quoted = json.dumps(value, ensure_ascii=False)
         return "".join(c if c.isascii() and c.isprintable() else f"\\U{ord(c):08x}" for c in quoted)

@@ -38,6 +38,7 @@ def file(tmp_path: Path) -> Path:
     [
         ("1", 1), ("-1", -1), ("1.5", 1.5), ("1e-3", 0.001), (".5", 0.5), ("true", True), ("False", False),
         ("square", "square"), ("nan", "nan"), (".inf", ".inf"), ("1_000", "1_000"), ("", ""), ("1" + "0" * 19, 1e19),
+        ("[1, 2]", [1, 2]), ("[0.5, 1e3]", [0.5, 1000.0]), ("[a, b]", ["a", "b"]), ("[1, a]", "[1, a]"), ("[1", "[1"),
     ],
 )  # fmt: skip
 def test_a_word_is_the_value_that_it_looks_like(word: str, value: Any) -> None:
@@ -68,7 +69,8 @@ def test_a_file_may_come_from_standard_input(monkeypatch: pytest.MonkeyPatch) ->
         ("sim: {max_linear: 1}", "section 'sim/max_linear' has no names with values"),
         ("sim: {ros__parameters: 1}", "ros__parameters of 'sim' has no names with values"),
         ("sim: {ros__parameters: {}}", "it has no parameter for the node 'sim'"),
-        ("sim: {ros__parameters: {a: [1, 2]}}", "sim: a is a list; write a number, a word, true or false"),
+        ("sim: {ros__parameters: {a: [1, b]}}", "sim: a is a list of int, str; write a list of numbers"),
+        ("sim: {ros__parameters: {a: [[1]]}}", "sim: a is a list of list; write a list of numbers"),
         ("sim: {ros__parameters: {a: null}}", "sim: a is a NoneType"),
         ("!!python/object:os.system {}", "it is no YAML: "),
         ("[" * 50_000, "it is "),
@@ -93,7 +95,8 @@ def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
 
 
 NAMES = st.from_regex(r"[A-Za-z][A-Za-z0-9_-]{0,6}(\.[a-z]+)?", fullmatch=True)
-VALUES = st.booleans() | st.integers(-(2**63), 2**63 - 1) | st.floats(allow_nan=False, allow_infinity=False) | st.text()
+KINDS = (st.booleans(), st.integers(-(2**63), 2**63 - 1), st.floats(allow_nan=False, allow_infinity=False), st.text())
+VALUES = st.one_of(*KINDS, *(st.lists(kind, max_size=3) for kind in KINDS))
 
 
 @given(st.dictionaries(NAMES, VALUES, max_size=5))

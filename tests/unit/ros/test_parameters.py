@@ -1,6 +1,6 @@
 """The parameters of a node: declared, read, described and set; each as ROS does, or refused."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import pytest
@@ -120,13 +120,14 @@ def test_what_is_no_entry_is_told() -> None:
 
 def test_an_undeclared_one_is_refused_unless_that_is_allowed() -> None:
     strict, free = Node(), Node(allow_undeclared=True)
-    for access in (
+    accesses: list[Callable[[Node], Any]] = [
         lambda node: node.get_parameter("x"),
         lambda node: node.set_parameters([Parameter("x", value=1)]),
         lambda node: node.set_parameters_atomically([Parameter("x", value=1)]),
         lambda node: node.describe_parameter("x"),
         lambda node: node.get_parameter_type("x"),
-    ):
+    ]
+    for access in accesses:
         with pytest.raises(e.ParameterNotDeclaredException, match="parameter x: not declared"):
             access(strict)
         access(free)
