@@ -1,5 +1,8 @@
 """ROS's names: expanded, checked, remapped, and as keys."""
 
+from collections.abc import Callable
+from typing import Any
+
 import pytest
 
 from holozen.ros import names
@@ -77,7 +80,12 @@ def test_a_namespace_gets_its_slash() -> None:
 
 
 def test_a_name_that_is_no_text_is_a_type_error() -> None:
-    for check in (names.check_node_name, names.check_namespace, lambda name: names.expand(name, "tom", "/")):
+    checks: list[Callable[[Any], str]] = [
+        names.check_node_name,
+        names.check_namespace,
+        lambda name: names.expand(name, "tom", "/"),
+    ]
+    for check in checks:
         with pytest.raises(TypeError, match=r"is a str, and 5 is a int"):
             check(5)
 

@@ -57,7 +57,7 @@ def test_numbers_are_policies_and_fields_can_be_changed() -> None:
     with pytest.raises(ValueError, match="9 is not a valid"):
         profile.history = 9  # type: ignore[assignment]
     with pytest.raises(AttributeError, match="has no deepth"):
-        profile.deepth = 1  # type: ignore[attr-defined]
+        profile.deepth = 1
 
 
 def test_keep_last_of_nothing_is_warned_of() -> None:
