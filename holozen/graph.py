@@ -1,7 +1,7 @@
 """The graph: who is there and what they read, write and serve, told by Zenoh liveliness tokens.
 
 A token's key is `@holozen/<session>/<node>/<kind>/<package>/<msg or srv>/<Type>/<key>`; a `node` token ends after its
-kind. The `@` keeps them out of reach of a plain `**`.
+kind. A slash in a node's name stands as `%2F`. The `@` keeps them out of reach of a plain `**`.
 """
 
 from __future__ import annotations
@@ -34,12 +34,16 @@ class Endpoint(namedtuple("Endpoint", "key kind type node session")):  # of text
         return source(self.node, self.session)
 
 
+def quoted(key: str) -> str:
+    """A key as it stands in a token, which must name one thing also where an endpoint reads many keys."""
+    return key.replace("%", "%25").replace("*", "%2A").replace("$", "%24")
+
+
 def token(endpoint: Endpoint) -> str:
     """The token's key for an endpoint."""
-    start = f"@holozen/{endpoint.session}/{endpoint.node}/{endpoint.kind}"
-    # A token's key must name one thing, also where the endpoint reads many keys.
-    key = endpoint.key.replace("%", "%25").replace("*", "%2A").replace("$", "%24")
-    return start if endpoint.kind == "node" else f"{start}/{endpoint.type}/{key}"
+    node = quoted(endpoint.node).replace("/", "%2F")
+    start = f"@holozen/{endpoint.session}/{node}/{endpoint.kind}"
+    return start if endpoint.kind == "node" else f"{start}/{endpoint.type}/{quoted(endpoint.key)}"
 
 
 @functools.lru_cache(maxsize=4096)  # who shows the graph looks at the same tokens again and again
@@ -47,11 +51,14 @@ def parse(text: str) -> Endpoint | None:
     """The endpoint a token names; None if the key is no such token."""
     parts = text.split("/", 7)
     if len(parts) == 4 and parts[0] == "@holozen" and parts[3] == "node":
-        return Endpoint("", "node", "", parts[2], parts[1])
+        return Endpoint("", "node", "", _unquoted(parts[2]), parts[1])
     if len(parts) == 8 and parts[0] == "@holozen" and parts[3] in KINDS:
-        key = parts[7].replace("%24", "$").replace("%2A", "*").replace("%25", "%")
-        return Endpoint(key, parts[3], "/".join(parts[4:7]), parts[2], parts[1])
+        return Endpoint(_unquoted(parts[7]), parts[3], "/".join(parts[4:7]), _unquoted(parts[2]), parts[1])
     return None
+
+
+def _unquoted(text: str) -> str:
+    return text.replace("%2F", "/").replace("%24", "$").replace("%2A", "*").replace("%25", "%")
 
 
 def on_key(endpoints: Iterable[Endpoint], key: str, kind: str) -> list[Endpoint]:

@@ -22,7 +22,7 @@ endpoints = st.builds(
     key=st.lists(wild, min_size=1, max_size=4).map(canonical),
     kind=st.sampled_from(["pub", "sub", "srv"]),
     type=st.tuples(names, st.sampled_from(["msg", "srv"]), names).map("/".join),
-    node=names,
+    node=st.lists(names | st.just("%2F"), min_size=1, max_size=3).map("/".join),  # a node of a namespace has slashes
     session=names,
 )
 ODOM = Endpoint("odom", "pub", "nav_msgs/msg/Odometry", "sim", "a1")
@@ -47,6 +47,12 @@ def test_a_nodes_token_ends_after_its_kind() -> None:
 def test_other_keys_are_no_tokens(text: str) -> None:
     endpoint = parse(text)
     assert endpoint is None or token(endpoint) == text
+
+
+def test_a_node_of_a_namespace_stands_in_one_part_of_its_token() -> None:
+    node = SIM._replace(node="Fred/talker")
+    assert token(node) == "@holozen/a1/Fred%2Ftalker/node"
+    assert parse(token(node)) == node
 
 
 def test_a_token_of_an_unknown_kind_is_none() -> None:
