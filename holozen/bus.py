@@ -1,4 +1,4 @@
-"""The bus: one Zenoh session, typed. The only file that imports zenoh.
+"""The bus: one Zenoh session, typed. Only this file and session.py import zenoh.
 
 Nothing here works in Zenoh's threads: samples wait in ring channels, so a slow reader delays nobody but itself.
 Only a process that names a type loads the codec.
@@ -6,18 +6,15 @@ Only a process that names a type loads the codec.
 
 from __future__ import annotations
 
-import contextlib
-import sys
 import threading
-import time
 from collections.abc import Callable, Iterator
 from functools import partial
 
 import zenoh
 
-from holozen import threads, zenoh_words
+from holozen import threads
 from holozen.connection import Connection
-from holozen.errors import BusError
+from holozen.session import close, one_line, open_door, open_session
 from holozen.tap import Sample, Tap, source
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms, which a verb that only looks at bytes would wait for
@@ -58,7 +55,7 @@ class Bus:
     ) -> None:
         connection = connection or Connection()
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
-        self.session = _open(connection, patience, stop)
+        self.session = open_session(connection, patience, stop)
         self.id = str(self.session.zid())
         self.source = source(node, self.id)  # how others name the sender of our samples
         self._readers: set[Tap | Server | About] = set()  # they live until the bus is closed
@@ -72,7 +69,7 @@ class Bus:
         if lasting and connection.door:
             from holozen import door
 
-            self._door = door.keep(connection.door, self._closing, _open_door)
+            self._door = door.keep(connection.door, self._closing, open_door)
 
     def __enter__(self) -> Self:
         return self
@@ -83,7 +80,7 @@ class Bus:
     def close(self) -> None:
         """Leave. Returns within 0.2 s, whatever the other side does."""
         self._closing.set()
-        closer = threading.Thread(target=_close, args=(self.session,), daemon=True)
+        closer = threading.Thread(target=close, args=(self.session,), daemon=True)
         closer.start()
         threads.wait((closer, self._door, *(reader.thread for reader in self._readers)), CLOSE_LIMIT)
 
@@ -92,22 +89,25 @@ class Bus:
         from holozen import graph
 
         endpoint = graph.Endpoint(key, kind, type_name, self.node, self.id)
-        with _one_line(f"key {key!r}"):
+        with one_line(f"key {key!r}"):
             _ = kind == "node" or zenoh.KeyExpr(key)  # the token's own error would name the token
             return self.session.liveliness().declare_token(graph.token(endpoint))
 
-    def publisher(self, key: str, kind: type[M], priority: str = "DATA") -> Publisher[M]:
-        """A writer of `kind` on `key`."""
+    def publisher(self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False) -> Publisher[M]:
+        """A writer of `kind` on `key`. Where a link is full it waits (`block`), or else drops what it is to send."""
         from holozen import codec
         from holozen.publisher import Publisher
 
-        token = self.announce("pub", kind.ROS, key)
-        publisher = self.session.declare_publisher(
-            key, encoding=codec.encoding(self.wire, kind), priority=getattr(zenoh.Priority, priority), express=True
-        )
+        with one_line(f"key {key!r}"):
+            publisher = self.session.declare_publisher(
+                key, encoding=codec.encoding(self.wire, kind), priority=getattr(zenoh.Priority, priority), express=True,
+                congestion_control=zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP,
+            )  # fmt: skip
         number = partial(zenoh.SourceInfo, publisher.id)
         writer: Publisher[M] = Publisher(publisher, self.wire, self.source, number)
-        writer.ends += [self.session.declare_queryable(key, writer.answer), token]
+        queryable = self.session.declare_queryable(key, writer.answer)
+        # Last, so that who learns of it may ask it at once.
+        writer.ends += [queryable, self.announce("pub", kind.ROS, key)]
         return writer
 
     def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> Subscription[M]:
@@ -126,7 +126,7 @@ class Bus:
 
     def tap(self, key: str, depth: int = 1024, limit: int = 0) -> Tap:
         """A reader of bytes on any key expression. Raises BusError for one that is none."""
-        with _one_line(f"key {key!r}"):
+        with one_line(f"key {key!r}"):
             tap = Tap(self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth)), limit)
         self._readers.add(tap)
         return tap
@@ -158,17 +158,33 @@ class Bus:
 
     def ask(self, key: str, timeout: float, **request: Any) -> Iterator[Sample | bytes]:
         """Ask once, without waiting for the service: its replies, each a sample or the bytes of an error."""
-        with _one_line(f"key {key!r}"):
+        with one_line(f"key {key!r}"):
             replies = self.session.get(key, timeout=timeout, attachment=self.source, **request)
         return (Sample(reply.ok) if reply.ok else bytes(reply.err.payload) for reply in replies)
 
+    def served(self, key: str) -> Callable[[], bool]:
+        """A function that says whether anyone answers on `key` by now, a stranger as well."""
+        with one_line(f"key {key!r}"):
+            querier = self.session.declare_querier(key)
+        return lambda: bool(querier.matching_status.matching)
+
+    def writers(self, key: str) -> Tap:
+        """A reader that gets something whenever a publisher of ours on `key` is there, comes or goes."""
+        from holozen import graph
+
+        tokens = f"@holozen/*/*/pub/*/*/*/{graph.quoted(key)}"
+        tap = Tap(self.session.liveliness().declare_subscriber(tokens, zenoh.handlers.RingChannel(64), history=True))
+        self._readers.add(tap)
+        return tap
+
     def ask_all(self, key: str, timeout: float) -> Any:
         """Ask all who serve `key` without a payload, ahead of other traffic: the channel of their replies."""
-        return self.session.get(
-            key, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE, timeout=timeout,
-            priority=zenoh.Priority.REAL_TIME, congestion_control=zenoh.CongestionControl.BLOCK, express=True,
-            attachment=self.source,
-        )  # fmt: skip
+        with one_line(f"key {key!r}"):
+            return self.session.get(
+                key, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE, timeout=timeout,
+                priority=zenoh.Priority.REAL_TIME, congestion_control=zenoh.CongestionControl.BLOCK, express=True,
+                attachment=self.source,
+            )  # fmt: skip
 
     def graph(self, keys: str = "@holozen/**") -> Graph:
         """The endpoints of all nodes, or those with tokens like `keys`, kept up to date."""
@@ -189,57 +205,3 @@ class Bus:
 
 def _token_change(sample: Any) -> tuple[str, bool] | None:
     return sample and (str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
-
-
-def _open(connection: Connection, patience: float | None, stop: threading.Event | None) -> Any:
-    """A peer opens at once and connects when it can. A client has nothing without its router, and waits for it.
-
-    Ends the process, in peace, when `stop` is set meanwhile.
-    """
-    deadline = None if patience is None else time.monotonic() + patience
-    stop = stop or threading.Event()
-    told = connection.mode != "client" or patience is not None
-    while True:
-        try:
-            return zenoh.open(_config(connection))
-        except zenoh.ZError as error:
-            if connection.mode != "client" or (deadline and time.monotonic() > deadline):
-                raise BusError(zenoh_words.opening(error, connection.mode, connection.where, patience)) from None
-        if not told:
-            print(f"waiting for a Zenoh router at {connection.where}", file=sys.stderr, flush=True)
-            told = True
-        if stop.wait(0.05):
-            raise SystemExit(0)
-
-
-def _config(connection: Connection) -> zenoh.Config:
-    with _one_line(f"Zenoh configuration {connection.config}"):
-        config = zenoh.Config.from_file(connection.config) if connection.config else zenoh.Config()
-    for path, value in connection.settings().items():
-        with _one_line(f"Zenoh setting {path}:{value}"):
-            config.insert_json5(path, value)
-    return config
-
-
-def _open_door(endpoint: str) -> Callable[[], None] | None:
-    """A session that only listens at `endpoint`: how to close it, or None if another process was faster."""
-    cfg = (("listen/endpoints", f'["{endpoint}"]'), ("listen/exit_on_failure", "true"))
-    try:
-        session = zenoh.open(_config(Connection(connect=(), listen=(), cfg=cfg)))
-    except zenoh.ZError:
-        return None
-    token = session.liveliness().declare_token(f"@holozen/{session.zid()}/door/door")  # no stranger, and no node
-    return partial(_close, session, token)
-
-
-def _close(session: Any, *_kept: Any) -> None:
-    with contextlib.suppress(zenoh.ZError):
-        session.close()
-
-
-@contextlib.contextmanager
-def _one_line(what: str) -> Iterator[None]:
-    try:
-        yield
-    except zenoh.ZError as error:
-        raise BusError(f"{what}: {zenoh_words.reason(error)}") from None

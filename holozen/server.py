@@ -5,7 +5,7 @@ import threading
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from holozen.errors import ServiceError
+from holozen.errors import BusError, ServiceError
 from holozen.tap import source_in
 from holozen.tell import say
 
@@ -46,6 +46,18 @@ class Server:
             self._reply(query)
             most -= 1
 
+    def try_recv(self) -> Any:
+        """The next request that waits, or None, for who answers it later with `read`, `reply` or `refuse`."""
+        return self._queries.try_recv()
+
+    def recv(self) -> Any:
+        """The next request; waits for it. Raises BusError once the bus or this service is closed."""
+        self.thread = threading.current_thread()
+        try:
+            return self._queries.recv()
+        except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+            raise BusError("closed") from None
+
     def start(self) -> None:
         """Answer from a thread of its own, until the bus is closed."""
         self.thread = threading.Thread(target=self._serve, daemon=True)
@@ -59,29 +71,36 @@ class Server:
     def _serve(self) -> None:
         while True:
             try:
-                query = self._queries.recv()
-            except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+                query = self.recv()
+            except BusError:
                 return
             self._reply(query)
 
     def _reply(self, query: Any) -> None:
         with query:
-            if str(query.key_expr) != self._key:
-                return  # a wildcard looks around; it asks nobody to do anything
+            if not self.is_meant(query):
+                return
             self.caller = source_in(query.attachment)
             try:
-                answer = self._answer(self._read(query))
-                reply = self._codec.encode(answer, self._wire)
-                query.reply(self._key, reply, encoding=self._codec.encoding(self._wire, type(answer)))
+                self.reply(query, self._answer(self.read(query)))
             except ServiceError as error:
-                _refuse(query, str(error), error.fields)
+                refuse(query, str(error), error.fields)
             except self._codec.CodecError as error:
-                _refuse(query, str(error))
+                refuse(query, str(error))
             except Exception as error:
                 say(f"{self._key}: {type(error).__name__}: {error}")
-                _refuse(query, f"{self._key}: internal error, see the server's log")
+                refuse(query, f"{self._key}: internal error, see the server's log")
 
-    def _read(self, query: Any) -> Any:
+    def is_meant(self, query: Any) -> bool:
+        """Whether it is asked to do something: a wildcard only looks around."""
+        return str(query.key_expr) == self._key
+
+    def reply(self, query: Any, answer: "Message") -> None:
+        """Answer a request."""
+        reply = self._codec.encode(answer, self._wire)
+        query.reply(self._key, reply, encoding=self._codec.encoding(self._wire, type(answer)))
+
+    def read(self, query: Any) -> Any:
         """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`)."""
         if query.payload is None:
             values = dict(query.parameters)
@@ -91,5 +110,6 @@ class Server:
         return self._codec.decode(bytes(query.payload), str(query.encoding), (self._request,))
 
 
-def _refuse(query: Any, text: str, fields: Mapping[str, object] = {}) -> None:
+def refuse(query: Any, text: str, fields: Mapping[str, object] = {}) -> None:
+    """Answer a request with an error."""
     query.reply_err(json.dumps({"error": text, **fields}), encoding="application/json")

@@ -13,7 +13,7 @@ OTHERS = [path for folder in ("examples", "meshes", "scripts") for path in REPO.
 
 # Library -> the only places of it in holozen/ and services/.
 PLACES = {
-    "zenoh": ["holozen/bus.py"],
+    "zenoh": ["holozen/bus.py", "holozen/session.py"],
     "pybullet": ["services/sim/engine.py"],
     "numpy": ["holozen/robot/", "holozen/ros/", "services/sim/"],
     "collada": [],
