@@ -2,12 +2,12 @@
 
 from typing import Any
 
-from holozen.errors import ServiceError
 from holozen.parameters import ELSE, MOST
 from holozen.ros import names
 from holozen.ros.exceptions import ParameterNotDeclaredException, ParameterUninitializedException
 from holozen.ros.parameter import Parameter
 from holozen.ros.qos import qos_profile_parameters
+from holozen.ros.service import Refusal
 
 
 def serve(node: Any, fqn: str) -> None:
@@ -32,11 +32,11 @@ def _bound(answer: Any, node: Any) -> Any:
     def answered(request: Any, response: Any) -> Any:
         asked: list[Any] = getattr(request, "names", None) or getattr(request, "parameters", [])
         if len(asked) > MOST:
-            raise ServiceError(f"{len(asked)} parameters in one request; at most {MOST}")
+            raise Refusal(f"{len(asked)} parameters in one request; at most {MOST}")
         try:
             answer(node, request, response)
         except (ParameterNotDeclaredException, ParameterUninitializedException) as error:
-            raise ServiceError(str(error)) from None
+            raise Refusal(str(error)) from None
         return response
 
     return answered

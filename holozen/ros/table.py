@@ -14,6 +14,7 @@ MODULES = {
     "rclpy.duration": "holozen.ros.duration",
     "rclpy.exceptions": "holozen.ros.exceptions",
     "rclpy.executors": "holozen.ros.executors",
+    "rclpy.guard_condition": "holozen.ros.guard_condition",
     "rclpy.impl": "holozen.ros.severity",
     "rclpy.impl.logging_severity": "holozen.ros.severity",
     "rclpy.impl.rcutils_logger": "holozen.ros.logging",

@@ -1,0 +1,64 @@
+"""What publishers sent before a TRANSIENT_LOCAL subscription was there."""
+
+import threading
+from collections import deque
+from typing import Any
+
+from holozen.bus import Bus
+from holozen.errors import BusError
+from holozen.ros.inbox import Waker
+from holozen.tap import Sample
+
+PATIENCE = 1.0  # s for the publishers to answer
+KEPT = 100  # messages of which it is known that they came
+
+
+class Latched:
+    """Asks the publishers of a key for their last message: those that are there, and each that comes later.
+
+    One that comes later may have published before anybody read it. What came the usual way is not given twice.
+    """
+
+    def __init__(self, bus: Bus, key: str) -> None:
+        self._bus, self._key = bus, key
+        self._late: deque[Sample] = deque(maxlen=KEPT)
+        self._seen: deque[bytes] = deque(maxlen=KEPT)
+        self._waker = Waker()
+        self._writers = bus.writers(key)
+        threading.Thread(target=self._keep_asking, daemon=True).start()
+
+    def saw(self, sample: Sample) -> Sample:
+        """The sample, which is known from now on."""
+        self._seen.append(sample.payload)
+        return sample
+
+    def take(self) -> Sample | None:
+        """The next that is not known, or None."""
+        while self._late:
+            sample = self._late.popleft()
+            if sample.payload not in self._seen:
+                return self.saw(sample)
+        return None
+
+    def arm(self, waker: Waker) -> None:
+        """Wake `waker` for the next one."""
+        self._waker = waker
+
+    def close(self) -> None:
+        """Ask no more."""
+        self._bus.drop(self._writers)
+
+    def _keep_asking(self) -> None:
+        try:
+            while True:
+                self._ask()
+                self._writers.recv()
+        except BusError:
+            return
+
+    def _ask(self) -> None:
+        replies: Any = self._bus.ask_all(self._key, PATIENCE)
+        for reply in replies:
+            if reply.ok:
+                self._late.append(Sample(reply.ok))
+                self._waker.wake()

@@ -1,0 +1,75 @@
+"""Publisher: writes messages on a topic."""
+
+from typing import TYPE_CHECKING, Any
+
+from holozen.ros.callback_groups import CallbackGroup
+from holozen.ros.exceptions import InvalidHandle
+from holozen.ros.qos import HistoryPolicy, QoSProfile
+
+if TYPE_CHECKING:
+    from holozen.ros.node import Node
+
+__all__ = ["Publisher"]
+
+
+class Publisher:
+    """Made by `Node.create_publisher`. Sends with Zenoh's priority DATA, and gives the last message to who comes late.
+
+    Where a link is full a message is dropped; with a history of KEEP_ALL the publisher waits.
+    """
+
+    def __init__(self, node: "Node", msg_type: Any, topic: str, key: str, qos_profile: QoSProfile) -> None:
+        self.msg_type, self.topic, self.qos_profile = msg_type, topic, qos_profile
+        self._node = node
+        block = qos_profile.history == HistoryPolicy.KEEP_ALL
+        self._writer: Any = node.bus.publisher(key, msg_type, block=block)
+        self.callback_group: CallbackGroup | None = None
+
+    @property
+    def topic_name(self) -> str:
+        """Its topic, absolute and remapped."""
+        return self.topic
+
+    @property
+    def logger_name(self) -> str:
+        """The name of its node's logger."""
+        return str(self._node.get_logger().name)
+
+    def publish(self, msg: Any) -> None:
+        """Send a message, or the bytes of one. Raises TypeError for another type, CodecError for a NaN or infinity."""
+        self._node.context.check_may_speak()
+        writer = self._writer
+        if writer is None:
+            raise InvalidHandle(f"the publisher of {self.topic} was destroyed")
+        if not isinstance(msg, self.msg_type | bytes):
+            given = msg.__name__ if isinstance(msg, type) else type(msg).__name__
+            hint = f"; write {given}()" if isinstance(msg, type) else ""
+            raise TypeError(f"{self.topic}: expected a {self.msg_type.__name__}, and got a {given}{hint}")
+        try:
+            (writer.put_bytes if isinstance(msg, bytes) else writer.put)(msg)
+        except Exception:
+            if self._writer is None:  # destroyed by another thread meanwhile
+                raise InvalidHandle(f"the publisher of {self.topic} was destroyed") from None
+            raise
+
+    def get_subscription_count(self) -> int:
+        """How many of our nodes' subscriptions read its topic; at least 1 if any stranger does."""
+        count = self._node.count_subscribers(self.topic)
+        return count or int(self._writer is not None and self._writer.matched)
+
+    def assert_liveliness(self) -> None:
+        """Nothing has to be done: Zenoh knows who is there."""
+
+    def wait_for_all_acked(self, timeout: Any = None) -> bool:
+        """Whether all was sent: Zenoh has taken in what `publish` was given."""
+        return True
+
+    def silence(self) -> None:
+        """Write no more; the bus is about to close."""
+        self._writer = None
+
+    def destroy(self) -> None:
+        """Write no more."""
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()
