@@ -152,7 +152,7 @@ class Parameters:
 
     def _fault(self, asked: r.Parameter, known: dict[str, Parameter]) -> str:
         if asked.name not in known:
-            return self._unknown(asked.name, known)
+            return unknown(self._node, asked.name, known)
         try:
             known[asked.name].checked(asked.value.plain())
         except ValueError as error:
@@ -164,16 +164,18 @@ class Parameters:
         known = self._known()
         for name in names:
             if name not in known:
-                raise ServiceError(self._unknown(name, known))
+                raise ServiceError(unknown(self._node, name, known))
         return [known[name] for name in names]
 
     def _known(self) -> dict[str, Parameter]:
         return {parameter.name: parameter for parameter in self._declared()}
 
-    def _unknown(self, name: str, known: dict[str, Parameter]) -> str:
-        close = difflib.get_close_matches(name, known, 1)
-        hint = f"did you mean {close[0]}?" if close else f"it has {', '.join(list(known)[:20])}"
-        return f"{self._node} has no parameter {name[:LONGEST]!r}; {hint}"
+
+def unknown(node: str, name: str, known: Iterable[str]) -> str:
+    """That a node has no parameter of that name, with the closest one or those that it has."""
+    close = difflib.get_close_matches(name, list(known), 1)
+    hint = f"did you mean {close[0]}?" if close else f"it has {', '.join(list(known)[:20])}"
+    return f"{node} has no parameter {name[:LONGEST]!r}; {hint}"
 
 
 def _few(asked: list[r.Parameter] | list[str]) -> None:

@@ -2,9 +2,8 @@
 
 from typing import Any
 
-from holozen.parameters import ELSE, MOST
+from holozen.parameters import ELSE, MOST, unknown
 from holozen.ros import names
-from holozen.ros.exceptions import ParameterNotDeclaredException, ParameterUninitializedException
 from holozen.ros.parameter import Parameter
 from holozen.ros.qos import qos_profile_parameters
 from holozen.ros.service import Refusal
@@ -33,13 +32,20 @@ def _bound(answer: Any, node: Any) -> Any:
         asked: list[Any] = getattr(request, "names", None) or getattr(request, "parameters", [])
         if len(asked) > MOST:
             raise Refusal(f"{len(asked)} parameters in one request; at most {MOST}")
-        try:
-            answer(node, request, response)
-        except (ParameterNotDeclaredException, ParameterUninitializedException) as error:
-            raise Refusal(str(error)) from None
+        for name in getattr(request, "names", ()):
+            if reason := _stranger(node, name):
+                raise Refusal(reason)
+        answer(node, request, response)
         return response
 
     return answered
+
+
+def _stranger(node: Any, name: str) -> str:
+    """That the node has no parameter of that name, and takes none; empty if it has or would."""
+    store = node._store
+    is_taken = name in store.values or store.allow_undeclared
+    return "" if is_taken else unknown(names.key(node._fqn), name, store.values)
 
 
 def _describe(node: Any, request: Any, response: Any) -> None:
@@ -52,9 +58,8 @@ def _types(node: Any, request: Any, response: Any) -> None:
 
 def _get(node: Any, request: Any, response: Any) -> None:
     """A parameter that has no value yet is one of type NOT_SET."""
-    store = node._store
-    store.check_known(request.names)
-    response.values = [(store.values.get(name) or Parameter(name)).get_parameter_value() for name in request.names]
+    values = node._store.values
+    response.values = [(values.get(name) or Parameter(name)).get_parameter_value() for name in request.names]
 
 
 def _list(node: Any, request: Any, response: Any) -> None:
@@ -87,13 +92,11 @@ def _faults(node: Any, asked: Any) -> list[str]:
     """Why each cannot be set, as far as nobody needs to be asked."""
     reasons, seen = [], set()
     for each in asked:
-        reason = f"{each.name!r} is set twice in one request" if each.name in seen else ""
+        reason = f"{each.name!r} is set twice in one request" if each.name in seen else _stranger(node, each.name)
         seen.add(each.name)
         try:
-            parameter = Parameter.from_parameter_msg(each)
-            node._store.check_known([parameter.name])
-            reason = reason or node._store.fault(parameter)
-        except (ParameterNotDeclaredException, TypeError, ValueError, RuntimeError) as error:
+            reason = reason or node._store.fault(Parameter.from_parameter_msg(each))
+        except (TypeError, ValueError, RuntimeError) as error:
             reason = str(error)
         reasons.append(reason)
     return reasons

@@ -5,10 +5,10 @@ import time
 from collections.abc import Callable, Iterator
 
 import pytest
-from holozen.ros.context import Context
 
 from holozen.ros.clock import Clock, ROSClock
 from holozen.ros.clock_type import ClockType
+from holozen.ros.context import Context
 from holozen.ros.duration import Duration
 from holozen.ros.exceptions import NotInitializedException
 from holozen.ros.jumps import ClockChange, JumpThreshold, TimeJump
