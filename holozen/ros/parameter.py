@@ -79,8 +79,8 @@ class Parameter:
     @classmethod
     def from_parameter_msg(cls, param_msg: Any) -> "Parameter":
         """Of a rcl_interfaces.msg.Parameter."""
-        value = param_msg.value
-        return cls(param_msg.name, cls.Type(value.type), parameter_value_to_python(value))
+        value = parameter_value_to_python(param_msg.value)
+        return cls(param_msg.name, cls.Type(param_msg.value.type), value)
 
     @property
     def name(self) -> str:
