@@ -25,6 +25,7 @@ class Place(NamedTuple):
     file: str
     function: str
     line: int
+    offset: int = 0  # in Python's code: a line may hold two calls
 
 
 def write(severity: LoggingSeverity, name: str, message: str, place: Place) -> None:

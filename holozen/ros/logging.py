@@ -57,15 +57,15 @@ class RcutilsLogger:
     ) -> bool:
         """Print a line; whether it was shown.
 
-        `once`, `skip_first` and `throttle_duration_sec` count by the place of the call in the script; the seconds are
-        of the steady clock, or of the Clock given.
+        `once`, `skip_first` and `throttle_duration_sec` count by the logger and the place of the call in the script;
+        the seconds are of the steady clock, or of the Clock given.
         """
         level = _severity(severity)
         if not self.is_enabled_for(level):
             return False
         place = _caller()
         if (once or skip_first or throttle_duration_sec is not None) and not _filters.passes(
-            place, level, once=once, skip_first=skip_first, seconds=throttle_duration_sec,
+            self.name, place, level, once=once, skip_first=skip_first, seconds=throttle_duration_sec,
             clock=throttle_time_source_type,
         ):  # fmt: skip
             return False
@@ -170,4 +170,4 @@ def _caller() -> Place:
     frame = sys._getframe(1)
     while frame.f_code.co_filename == __file__ and frame.f_back:
         frame = frame.f_back
-    return Place(frame.f_code.co_filename, frame.f_code.co_name, frame.f_lineno)
+    return Place(frame.f_code.co_filename, frame.f_code.co_name, frame.f_lineno, frame.f_lasti)

@@ -78,6 +78,14 @@ def test_once_and_skip_first_count_by_the_place_in_the_script(capsys: Capture) -
     assert shown == ["once 0", "later 1", "later 2"]
 
 
+def test_each_logger_and_each_call_on_a_line_counts_by_itself(capsys: Capture) -> None:
+    for name in ("tom", "anna", "tom"):
+        logger = logging.get_logger(name)
+        _ = logger.info("a", once=True), logger.info("b", once=True)
+    shown = [line.rpartition("[")[2] for line in capsys.readouterr().err.splitlines()]
+    assert shown == ["tom]: a", "tom]: b", "anna]: a", "anna]: b"]
+
+
 def test_a_throttle_counts_on_the_clock_it_is_given(capsys: Capture) -> None:
     clock = ROSClock()
     clock._set_ros_time_is_active(True)
