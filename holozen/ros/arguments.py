@@ -11,6 +11,7 @@ from holozen.ros.exceptions import NameValidationException, RCLInvalidROSArgsErr
 from holozen.ros.parameter_file import Section
 from holozen.ros.severity import LoggingSeverity
 from holozen.ros.yaml_values import Value
+from holozen.tell import printable
 
 START, END = "--ros-args", "--"
 REMAP, PARAM, FILE, LEVEL = "--remap", "--param", "--params-file", "--log-level"
@@ -127,7 +128,7 @@ class _Found:
         try:
             self._read(full, text)
         except (ValueError, NameValidationException) as error:
-            raise RCLInvalidROSArgsError(f"{flag} {text}: {error}") from None
+            raise RCLInvalidROSArgsError(printable(f"{flag} {text}: {error}")) from None
 
     def _read(self, flag: str, text: str) -> None:
         readers: dict[str, Callable[[str], Any]] = {

@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
 
 from holozen.ros import arguments
 from holozen.ros.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
@@ -124,3 +126,33 @@ def test_an_unknown_flag_is_told_with_the_nearest() -> None:
         parse("--ros-args", "goal.txt")
     with pytest.raises(TypeError, match="a list of str"):
         arguments.parse([5])  # type: ignore[list-item]
+
+
+WORDS = (
+    "--ros-args",
+    "-r",
+    "-p",
+    "--",
+    "--log-level",
+    "a:=b",
+    "/a:=~/b",
+    "x:=[1,2]",
+    "x:={a: 1}",
+    "t:__node:=n",
+    "a:b:=c",
+)
+
+
+@given(st.lists(st.sampled_from(WORDS) | st.text(max_size=20), max_size=8))
+@example(["--ros-args", "-r", "a\nb"])
+@example(["--ros-args", "-p", "x:=" + "1" * 5000])
+def test_any_words_are_taken_or_refused_in_one_line(words: list[str]) -> None:
+    try:
+        found = arguments.parse(words)
+    except (RCLInvalidROSArgsError, UnknownROSArgsError) as error:
+        assert "\n" not in str(error)
+    else:
+        name = found.node_name("n")
+        assert found.namespace("/", name).startswith("/")
+        assert found.remap("/x/a", name, "/x").startswith("/")
+        assert isinstance(found.parameters_for("/x/n"), dict)

@@ -40,7 +40,7 @@ def refuse(_parameters: list[Parameter]) -> Any:
 
 
 def test_a_default_is_the_value_unless_another_one_was_given() -> None:
-    node = Node("-p", "speed:=0.5", "-p", "tom:size:=9")
+    node = Node("-p", "speed:=0.5", "-p", "speed2:=0.5", "-p", "tom:size:=9")
     assert node.declare_parameter("speed", 1.0).value == 0.5
     assert node.declare_parameter("size", 3).value == 3, "that one was for /tom"
     assert node.declare_parameter("speed2", 1.0, ignore_override=True).value == 1.0
