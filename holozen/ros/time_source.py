@@ -1,6 +1,7 @@
 """Where simulated time comes from: messages on `clock`, while the parameter `use_sim_time` is true."""
 
 import threading
+import traceback
 from typing import TYPE_CHECKING, Any
 
 from holozen.errors import BusError
@@ -43,6 +44,7 @@ class TimeSource:
 
     @ros_time_is_active.setter
     def ros_time_is_active(self, active: bool) -> None:
+        """Show simulated time from now on, or the system's."""
         with self._lock:
             if active == self._active:
                 return
@@ -100,5 +102,8 @@ class TimeSource:
             self._shown = Time(
                 seconds=message.clock.sec, nanoseconds=message.clock.nanosec, clock_type=ClockType.ROS_TIME
             )
-            for clock in list(self._clocks):
-                clock.set_ros_time_override(self._shown)
+            try:
+                for clock in list(self._clocks):
+                    clock.set_ros_time_override(self._shown)
+            except Exception:  # of a callback for jumps: time must go on
+                self._node.get_logger().error(f"a callback for a jump of the clock failed:\n{traceback.format_exc()}")

@@ -10,6 +10,8 @@ from holozen.messages import Time as TimeMessage
 from holozen.messages import Twist
 from holozen.ros import arguments
 from holozen.ros.clock import Clock, ROSClock
+from holozen.ros.duration import Duration
+from holozen.ros.jumps import JumpThreshold
 from holozen.ros.logging import RcutilsLogger, get_logger
 from holozen.ros.parameter import Parameter
 from holozen.ros.parameters import NodeParameters
@@ -121,3 +123,16 @@ def test_what_is_no_time_is_told_and_changes_nothing(wire: Wire, capsys: pytest.
     assert "[tom]: no time on /clock: " in "".join(told)
     assert "".join(told).count("\n") == 1
     assert node.clock.now() == Time(seconds=2, clock_type=node.clock.clock_type)
+
+
+def test_time_goes_on_when_a_callback_for_jumps_fails(wire: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+    node, sim = Node(wire, "-p", "use_sim_time:=true"), Sim(wire)
+
+    def fail(_jump: object) -> None:
+        raise RuntimeError("oh")
+
+    threshold = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1))
+    node.clock.create_jump_callback(threshold, post_callback=fail)
+    for seconds in (2.0, 1.0, 3.0):
+        sim.tell(node, seconds)
+    assert capsys.readouterr().err.count("RuntimeError: oh") == 1
