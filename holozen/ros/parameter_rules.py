@@ -11,7 +11,9 @@ def fault(parameter: Parameter, descriptor: Any) -> str:
     """Why a parameter may not be set to that; empty if it may."""
     if descriptor.read_only:
         return f"{parameter.name} is read-only"
-    return type_fault(parameter, descriptor) or range_fault(parameter, descriptor)
+    if reason := range_fault(parameter, descriptor):
+        return f"{parameter.name}: {parameter.value}: {reason}"
+    return type_fault(parameter, descriptor)
 
 
 def type_fault(parameter: Parameter, descriptor: Any) -> str:
@@ -28,7 +30,7 @@ def type_fault(parameter: Parameter, descriptor: Any) -> str:
 
 
 def range_fault(parameter: Parameter, descriptor: Any) -> str:
-    """Why its number is none of the descriptor's range; empty if it is, or if there is no range."""
+    """What numbers are in the descriptor's range; empty if its own is, or if there is no range."""
     value = parameter.value
     if parameter.type_ == Parameter.Type.INTEGER and descriptor.integer_range:
         limits = descriptor.integer_range[0]
@@ -39,9 +41,9 @@ def range_fault(parameter: Parameter, descriptor: Any) -> str:
     low, high, step = limits.from_value, limits.to_value, limits.step
     within = f"use a number from {low} to {high}"
     if not low <= value <= high:
-        return f"{parameter.name}: {value}: {within}"
+        return within
     if step and value not in (low, high):
         steps = (value - low) / step
         if abs(steps - round(steps)) > NEAR * max(1.0, abs(steps)):
-            return f"{parameter.name}: {value}: {within} in steps of {step}"
+            return f"{within} in steps of {step}"
     return ""

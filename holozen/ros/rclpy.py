@@ -9,11 +9,12 @@ from holozen.ros.arguments import remove_ros_args
 from holozen.ros.context import Context, get_default_context
 from holozen.ros.executors import Executor, SingleThreadedExecutor
 from holozen.ros.node import Node
+from holozen.ros.parameter import Parameter
 from holozen.ros.signals import SignalHandlerOptions
 from holozen.ros.task import Future
 
 __all__ = [
-    "Context", "Executor", "Future", "InitContextManager", "Node", "SignalHandlerOptions", "create_node",
+    "Context", "Executor", "Future", "InitContextManager", "Node", "Parameter", "SignalHandlerOptions", "create_node",
     "get_default_context", "get_global_executor", "get_rmw_implementation_identifier", "init", "logging", "ok",
     "remove_ros_args", "shutdown", "spin", "spin_once", "spin_until_future_complete", "timeout_sec_to_nsec",
     "try_shutdown",
