@@ -1,5 +1,6 @@
 """Files of parameters, of the form that ROS has."""
 
+import sys
 from pathlib import Path
 
 import pytest
@@ -95,3 +96,14 @@ def test_a_file_that_is_no_text_is_told(file: Path) -> None:
     file.write_text("#" * 1_000_001)
     with pytest.raises(RCLInvalidROSArgsError, match="longer than 1000000"):
         arguments.parse(["--ros-args", "--params-file", str(file)])
+
+
+def test_words_need_no_yaml_library_and_lists_say_that_they_do(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
+    monkeypatch.setitem(sys.modules, "yaml", None)
+    assert parameter_file.assigned("x:=1.5").values == {"x": 1.5}
+    assert parameter_file.assigned("x:=/dev/ttyUSB0").values == {"x": "/dev/ttyUSB0"}
+    with pytest.raises(ValueError, match="pip install pyyaml"):
+        parameter_file.assigned("x:=[1, 2]")
+    file.write_text("tom: {ros__parameters: {x: 1}}")
+    with pytest.raises(ValueError, match=r"params\.yaml: reading it needs YAML: pip install pyyaml"):
+        parameter_file.read(str(file))
