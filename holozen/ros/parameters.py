@@ -80,12 +80,12 @@ class NodeParameters:
 
     def get_parameter(self, name: str) -> Parameter:
         """A parameter. Raises ParameterUninitializedException where only its type was declared, and no value given."""
-        with self._store.lock:
-            self._store.check_known([name])
-            found = self._store.values.get(name) or Parameter(name)
-            if found.value is None and self.has_parameter(name) and not self._store.descriptors[name].dynamic_typing:
-                raise ParameterUninitializedException(name)
-        return found
+        # Without the lock: a callback that is asked whether to set one may wait for a thread that reads another.
+        self._store.check_known([name])
+        found, descriptor = self._store.values.get(name), self._store.descriptors.get(name)
+        if found and found.value is None and descriptor and not descriptor.dynamic_typing:
+            raise ParameterUninitializedException(name)
+        return found or Parameter(name)
 
     def get_parameters(self, names: Sequence[str]) -> list[Parameter]:
         """Some parameters, see `get_parameter`."""
@@ -101,9 +101,8 @@ class NodeParameters:
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
         """The parameters below `prefix`, by the rest of their names; all for an empty one."""
         start = prefix + PARAMETER_SEPARATOR_STRING if prefix else ""
-        with self._store.lock:
-            names = [name for name in self._store.values if name.startswith(start)]
-            return {name.removeprefix(start): self.get_parameter(name) for name in names}
+        names = [name for name in list(self._store.values) if name.startswith(start)]
+        return {name.removeprefix(start): self.get_parameter(name) for name in names}
 
     def get_parameter_type(self, name: str) -> Parameter.Type:
         """The type of a parameter."""

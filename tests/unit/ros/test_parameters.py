@@ -1,5 +1,6 @@
 """The parameters of a node: declared, read, described and set; each as ROS does, or refused."""
 
+import threading
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -197,6 +198,21 @@ def test_callbacks_change_refuse_and_hear_what_is_set() -> None:
     assert (node.set(x=70), node.values("x"), len(heard)) == ([""], [70], 3)
     with pytest.raises(ValueError, match="not in list"):
         node.remove_on_set_parameters_callback(check)
+
+
+def test_others_read_while_a_callback_is_asked() -> None:
+    node, seen = Node(), list[Any]()
+    node.declare_parameter("x", 1)
+
+    def check(_parameters: list[Parameter]) -> Any:
+        reader = threading.Thread(target=lambda: seen.extend(node.values("x")), daemon=True)
+        reader.start()
+        reader.join(10)
+        return result("")
+
+    node.add_on_set_parameters_callback(check)
+    assert node.set(x=2) == [""]
+    assert seen == [1]
 
 
 def test_a_callback_refuses_a_declaration_too() -> None:
