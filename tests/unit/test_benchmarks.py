@@ -33,6 +33,10 @@ CASES = {
         "up to first odom": ["holozen"],
     },
     "record": {"50 topics at 100 Hz, sent to taken in": ["holozen"]},
+    "rclpy": {
+        "latency at 1000 Hz": ["rclpy node", "bus subscriber", "ratio"],
+        "work at 1000 Hz": ["rclpy node", "bus subscriber", "ratio"],
+    },
     "key_to_motion": {
         "to motion": ["holozen", "step and raw zenoh", "ratio"],
         "to rest": ["holozen", "step and raw zenoh", "ratio"],
