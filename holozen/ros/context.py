@@ -92,7 +92,7 @@ class Context:
     def shutdown(self) -> None:
         """End. Raises RuntimeError if it has not begun, or ended already by another way than a signal."""
         with self._lock:
-            if not (self._running or self._over):
+            if not (self._running or self._over or self._interrupted):
                 raise RuntimeError("Context must be initialized before it can be shutdown; call rclpy.init() first")
             if self._over and not self._interrupted:
                 raise RCLError("failed to shutdown: the context was shut down already")

@@ -12,6 +12,8 @@ from holozen.ros.inbox import Waker
 from holozen.ros.task import Future, Task, Tasks
 from holozen.ros.timer import Timer
 
+SHARED = 0.001  # s between two tries
+
 
 class TimeoutException(Exception):
     """Nothing came in time."""
@@ -221,13 +223,13 @@ class Executor:
             entity = entities[self._turn % len(entities)]
             self._turn = (self._turn + 1) % len(entities)
             group = entity.callback_group
-            if group is not None and not group.beginning_execution(entity):
+            if group is not None and not group.can_execute(entity):
                 continue
             work = entity.take()
             if work is not None:
+                while group is not None and not group.beginning_execution(entity):
+                    time.sleep(SHARED)  # another executor was faster, with a group that both have
                 return entity, work
-            if group is not None:
-                group.ending_execution(entity)
         return None
 
 

@@ -53,9 +53,10 @@ class Publisher:
             raise
 
     def get_subscription_count(self) -> int:
-        """How many of our nodes' subscriptions read its topic; at least 1 if any stranger does."""
-        count = self._node.count_subscribers(self.topic)
-        return count or int(self._writer is not None and self._writer.matched)
+        """How many subscriptions of our nodes read its topic, 1 if only strangers do: what is sent now reaches them."""
+        if self._writer is None or not self._writer.matched:
+            return 0  # a token may be here before the way to its subscription is
+        return max(1, self._node.count_subscribers(self.topic))
 
     def assert_liveliness(self) -> None:
         """Nothing has to be done: Zenoh knows who is there."""

@@ -1,0 +1,137 @@
+"""Calls wait for their service and their reply, with and without spin."""
+
+import threading
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from holozen.errors import ServiceError
+from holozen.messages import TriggerReply, TriggerRequest
+from holozen.ros import rclpy
+from holozen.ros.exceptions import InvalidHandle
+from holozen.ros.generated import find
+from holozen.testing import Wire, wait_for
+
+Trigger: Any = find("std_srvs/srv/Trigger")
+Spin = Callable[..., Any]
+
+
+def serve(wire: Wire, text: str = "done") -> None:
+    """A service of our bus that answers, or refuses with "no"."""
+
+    def answer(_request: TriggerRequest) -> TriggerReply:
+        if text == "no":
+            raise ServiceError("no, not now")
+        return TriggerReply(True, text)
+
+    wire.bus("server").serve("go", TriggerRequest, TriggerReply, answer).start()
+
+
+def test_a_call_that_is_made_before_its_service_is_there_is_answered(ros: Wire) -> None:
+    node = rclpy.create_node("tom")
+    client = node.create_client(Trigger, "go")
+    future = client.call_async(Trigger.Request())
+    rclpy.spin_until_future_complete(node, future, timeout_sec=0.05)
+    assert not future.done()
+    serve(ros)
+    rclpy.spin_until_future_complete(node, future, timeout_sec=10)
+    assert future.result() == Trigger.Response(success=True, message="done")
+
+
+def test_a_synchronous_call_needs_nobody_who_spins(ros: Wire) -> None:
+    serve(ros)
+    client = rclpy.create_node("tom").create_client(Trigger, "go")
+    assert client.call(Trigger.Request()).message == "done"
+
+
+def test_a_call_in_a_callback_of_the_same_node_is_answered(ros: Wire, spin_for: Spin) -> None:
+    serve(ros)
+    node, got = rclpy.create_node("tom"), list[str]()
+    client = node.create_client(Trigger, "go")
+
+    def ask() -> None:
+        got.append(client.call(Trigger.Request()).message)
+
+    node.create_timer(0.001, ask)
+    spin_for(lambda: got, node)
+    assert got[0] == "done"
+
+
+def test_a_synchronous_call_gives_up_in_time(ros: Wire) -> None:
+    client = rclpy.create_node("tom").create_client(Trigger, "go")
+    with pytest.raises(TimeoutError, match=r"^no reply from /go within 0\.05 s$"):
+        client.call(Trigger.Request(), timeout_sec=0.05)
+    wait_for(lambda: not any(thread.is_alive() for thread in client.threads()))
+
+
+def test_a_refusal_is_raised_with_the_services_reason(ros: Wire) -> None:
+    serve(ros, "no")
+    node = rclpy.create_node("tom")
+    future = node.create_client(Trigger, "go").call_async(Trigger.Request())
+    rclpy.spin_until_future_complete(node, future, timeout_sec=10)
+    assert isinstance(future.exception(), ServiceError)
+    with pytest.raises(ServiceError, match=r"^no, not now$"):
+        future.result()
+
+
+def test_done_callbacks_run_in_spin(ros: Wire, spin_for: Spin) -> None:
+    serve(ros)
+    node, threads = rclpy.create_node("tom"), list[threading.Thread]()
+    future = node.create_client(Trigger, "go").call_async(Trigger.Request())
+    future.add_done_callback(lambda _: threads.append(threading.current_thread()))
+    wait_for(future.done)
+    assert threads == []
+    spin_for(lambda: threads, node)
+    assert threads == [threading.main_thread()]
+
+
+def test_the_service_is_waited_for_also_a_strangers(ros: Wire) -> None:
+    client = rclpy.create_node("tom").create_client(Trigger, "go")
+    assert not client.service_is_ready()
+    assert not client.wait_for_service(timeout_sec=0.02)
+    assert not client.wait_for_service(0)
+    stranger = ros.bus("stranger").session.declare_queryable("go", lambda query: query.drop())
+    assert client.wait_for_service(timeout_sec=10)
+    assert client.service_is_ready()
+    stranger.undeclare()
+    wait_for(lambda: not client.service_is_ready())
+
+
+def test_a_wait_for_a_service_ends_with_rclpy(ros: Wire) -> None:
+    client, ended = rclpy.create_node("tom").create_client(Trigger, "go"), list[bool]()
+    thread = threading.Thread(target=lambda: ended.append(client.wait_for_service()))
+    thread.start()
+    rclpy.shutdown()
+    thread.join(10)
+    assert ended == [False]
+
+
+def test_a_request_of_another_type_is_told(ros: Wire) -> None:
+    client = rclpy.create_node("tom").create_client(Trigger, "go")
+    for wrong, given in ((3, "int"), (Trigger.Request, "Trigger_Request"), (Trigger.Response(), "Trigger_Response")):
+        with pytest.raises(TypeError, match=rf"^/go: expected a Trigger\.Request, and got a {given}$"):
+            client.call_async(wrong)
+
+
+def test_a_destroyed_client_cancels_what_it_asked(ros: Wire) -> None:
+    node = rclpy.create_node("tom")
+    client = node.create_client(Trigger, "go")
+    futures = [client.call_async(Trigger.Request()) for _ in range(3)]
+    client.remove_pending_request(futures[0])
+    assert futures[0].cancelled()
+    assert node.destroy_client(client)
+    wait_for(lambda: all(future.cancelled() for future in futures))
+    with pytest.raises(InvalidHandle):
+        client.call_async(Trigger.Request())
+
+
+def test_a_call_that_waits_for_its_reply_ends_with_its_node(ros: Wire) -> None:
+    server, node = rclpy.create_node("server"), rclpy.create_node("tom")
+    server.create_service(Trigger, "go", lambda _request, response: response)  # and nobody spins
+    client = node.create_client(Trigger, "go")
+    future = client.call_async(Trigger.Request())
+    assert client.wait_for_service(10)
+    node.destroy_node()
+    wait_for(future.cancelled)
+    wait_for(lambda: not any(thread.is_alive() for thread in client.threads()))

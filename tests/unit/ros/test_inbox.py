@@ -1,0 +1,103 @@
+"""What comes while an executor is busy waits in the ring, in order, the newest of it."""
+
+import threading
+from collections import deque
+from functools import partial
+
+from holozen.bus import Bus
+from holozen.ros.inbox import Inbox, Waker
+from holozen.tap import Sample
+from holozen.testing import Wire, wait_for
+
+
+def boxed(bus: Bus, depth: int) -> Inbox[Sample]:
+    tap = bus.tap("a", depth)
+    return Inbox(tap.recv, tap.try_recv, depth)
+
+
+def taken(inbox: Inbox[Sample]) -> list[bytes]:
+    return [sample.payload for sample in iter(inbox.take, None)]
+
+
+def test_nobody_reads_until_somebody_waits(wire: Wire) -> None:
+    bus = wire.bus()
+    inbox = boxed(bus, 3)
+    for number in range(5):
+        bus.session.put("a", str(number))
+    assert taken(inbox) == [b"2", b"3", b"4"]
+    assert inbox.thread is None
+
+
+def test_who_waits_is_woken_and_finds_what_came(wire: Wire) -> None:
+    bus, waker = wire.bus(), Waker()
+    inbox = boxed(bus, 3)
+    waker.waiting = True
+    inbox.arm(waker)
+    for text in ("x", "y"):
+        bus.session.put("a", text)
+        waker.wait(10)
+        assert wait_for(partial(taken, inbox)) == [text.encode()]
+
+
+def test_the_thread_stops_reading_while_nobody_waits(wire: Wire) -> None:
+    bus, waker = wire.bus(), Waker()
+    inbox = boxed(bus, 2)
+    waker.waiting = True
+    inbox.arm(waker)
+    waker.waiting = False
+    bus.session.put("a", "0")
+    wait_for(lambda: inbox._parked)
+    for number in range(1, 6):
+        bus.session.put("a", str(number))
+    assert taken(inbox) == [b"4", b"5"]
+
+
+def test_nothing_is_lost_or_turned_round_while_waits_and_looks_take_turns(wire: Wire) -> None:
+    bus, waker = wire.bus(), Waker()
+    inbox = boxed(bus, 10_000)
+    count = 3000
+
+    def write() -> None:
+        for number in range(count):
+            bus.session.put("a", str(number))
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    got: list[bytes] = []
+    while len(got) < count:
+        waker.waiting = True
+        inbox.arm(waker)
+        found = taken(inbox)
+        if not found:
+            waker.wait(10)
+        waker.waiting = False
+        got += [*found, *taken(inbox)]
+    writer.join()
+    assert got == [str(number).encode() for number in range(count)]
+
+
+def test_a_closed_one_lets_its_thread_end_wherever_it_waits(wire: Wire) -> None:
+    for waits_in_the_ring in (True, False):
+        bus, waker = wire.bus(), Waker()
+        inbox = boxed(bus, 2)
+        waker.waiting = True
+        inbox.arm(waker)
+        if not waits_in_the_ring:
+            waker.waiting = False
+            bus.session.put("a", "0")
+            wait_for(partial(getattr, inbox, "_parked"))
+        inbox.close()
+        bus.close()
+        assert inbox.thread
+        inbox.thread.join(10)
+        assert not inbox.thread.is_alive()
+        inbox.arm(waker)
+        assert inbox._parked or waits_in_the_ring
+
+
+def test_a_wake_is_kept_for_the_next_wait_but_not_counted() -> None:
+    waker, waits = Waker(), deque([None, 0.0])
+    waker.wake()
+    waker.wake()
+    while waits:
+        waker.wait(waits.popleft())  # the first would last for ever

@@ -1,0 +1,76 @@
+"""A publisher sends what is a message of its type, until it is destroyed or rclpy has ended."""
+
+from typing import Any
+
+import pytest
+
+from holozen.codec import CodecError
+from holozen.ros import context, qos, rclpy
+from holozen.ros.context import ExternalShutdownException
+from holozen.ros.exceptions import InvalidHandle, RCLError
+from holozen.ros.generated import find
+from holozen.ros.qos import QoSProfile
+from holozen.testing import Wire, wait_for
+
+Twist: Any = find("geometry_msgs/msg/Twist")
+
+
+@pytest.mark.parametrize("keep", list(qos.HistoryPolicy)[:3])
+def test_what_it_sends_has_priority_data_and_waits_only_to_keep_all(ros: Wire, keep: qos.HistoryPolicy) -> None:
+    profile = QoSProfile(history=keep, depth=3)
+    publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", profile)
+    tap = ros.bus().tap("cmd_vel")
+    wait_for(publisher.get_subscription_count)
+    publisher.publish(Twist())
+    publisher.publish(b"{}")
+    whole, raw = tap.recv(), tap.recv()
+    assert raw.payload == b"{}"
+    is_all = keep == qos.HistoryPolicy.KEEP_ALL
+    assert (whole.priority, whole.delivery) == ("DATA", ("BLOCK" if is_all else "DROP", True))
+    assert (publisher.topic_name, publisher.qos_profile, publisher.logger_name) == ("/cmd_vel", profile, "tom")
+    assert publisher.wait_for_all_acked()
+
+
+def test_another_type_is_told(ros: Wire) -> None:
+    publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", 1)
+    for wrong, told in ((3, "int"), (Twist, "Twist; write Twist()"), (find("std_msgs/msg/String")(), "String")):
+        with pytest.raises(TypeError) as error:
+            publisher.publish(wrong)
+        assert str(error.value) == f"/cmd_vel: expected a Twist, and got a {told}"
+    message = Twist()
+    message.linear.x = float("nan")
+    with pytest.raises(CodecError, match=r"linear\.x is not a finite number"):
+        publisher.publish(message)
+
+
+def test_a_destroyed_one_sends_nothing(ros: Wire) -> None:
+    node = rclpy.create_node("tom")
+    publisher = node.create_publisher(Twist, "cmd_vel", 1)
+    assert node.destroy_publisher(publisher)
+    assert (publisher.get_subscription_count(), node.count_publishers("cmd_vel")) == (0, 0)
+    with pytest.raises(InvalidHandle, match="the publisher of /cmd_vel was destroyed"):
+        publisher.publish(Twist())
+    other = node.create_publisher(Twist, "cmd_vel", 1)
+    node.destroy_node()
+    with pytest.raises(InvalidHandle):
+        other.publish(Twist())
+
+
+def test_nothing_is_sent_after_rclpy_has_ended(ros: Wire) -> None:
+    publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", 1)
+    rclpy.shutdown()
+    with pytest.raises(RCLError, match="failed to publish: rclpy was shut down"):
+        publisher.publish(Twist())
+
+
+def test_after_a_signal_there_is_time_for_a_stop_and_no_more(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", 1)
+    tap = ros.bus().tap("cmd_vel")
+    wait_for(publisher.get_subscription_count)
+    rclpy.get_default_context().interrupt()
+    assert not rclpy.ok()
+    publisher.publish(Twist())
+    assert tap.recv().priority == "DATA"
+    monkeypatch.setattr(context, "LAST_WORDS", 0.0)
+    with pytest.raises(ExternalShutdownException):
+        publisher.publish(Twist())

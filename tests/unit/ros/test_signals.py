@@ -1,0 +1,128 @@
+"""Scripts in processes of their own: whatever they hold, they end, with the exit code that Python gives."""
+
+import signal
+import sys
+
+import pytest
+
+from holozen.messages import Twist
+from holozen.testing import Process, Wire, wait_for
+
+START = """
+import sys, threading, time
+from holozen.connection import Connection
+from holozen.ros import context, rclpy
+from holozen.ros.callback_groups import ReentrantCallbackGroup
+from holozen.ros.context import ExternalShutdownException
+from holozen.ros.executors import MultiThreadedExecutor
+from holozen.ros.generated import find
+context.connection = Connection(connect=({endpoint!r},), listen=({endpoint!r},))
+Twist, Trigger = find("geometry_msgs/msg/Twist"), find("std_srvs/srv/Trigger")
+rclpy.init()
+node = rclpy.create_node("script")
+pub = node.create_publisher(Twist, "cmd_vel", 1)
+node.create_subscription(Twist, "odom", print, 1)
+service = node.create_service(Trigger, "mine", lambda _, response: response)
+def up(): print("up", flush=True)
+timer = node.create_timer(0.01, up)
+"""
+SPIN = "rclpy.spin(node)"
+POLITE = """
+try:
+    rclpy.spin(node)
+except (KeyboardInterrupt, ExternalShutdownException):
+    pub.publish(Twist())
+    print("stopped", flush=True)
+finally:
+    node.destroy_node()
+    rclpy.shutdown()
+"""
+LOOP = "up()\nwhile True:\n    pub.publish(Twist())\n    time.sleep(0.01)"
+OK = "up()\nwhile rclpy.ok():\n    time.sleep(0.01)\nrclpy.try_shutdown()"
+RATE = """
+threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+rate = node.create_rate(50)
+while rclpy.ok():
+    rate.sleep()
+"""
+THREAD = "threading.Thread(target=rclpy.spin, args=(node,)).start()"
+PENDING = """
+future = node.create_client(Trigger, "nobody").call_async(Trigger.Request())
+node.create_client(Trigger, "mine").call_async(Trigger.Request())
+rclpy.spin_until_future_complete(node, future)
+"""
+CALL = "up()\nnode.create_client(Trigger, 'nobody').call(Trigger.Request())"
+WAIT = "up()\nassert not node.create_client(Trigger, 'nobody').wait_for_service()"
+MANY = """
+executor = MultiThreadedExecutor(4)
+executor.add_node(node)
+def block():
+    blocker.cancel()
+    time.sleep(1000)
+blocker = node.create_timer(0, block, callback_group=ReentrantCallbackGroup())
+executor.spin()
+"""
+NODES = "nodes = [rclpy.create_node(f'node{i}') for i in range(5)]\nrclpy.spin(node)"
+EXTERNAL = "ExternalShutdownException: rclpy was shut down, by a signal or from elsewhere"
+CASES = {
+    "spin, SIGINT": (SPIN, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
+    "spin, SIGTERM": (SPIN, signal.SIGTERM, 1, EXTERNAL),
+    "polite, SIGINT": (POLITE, signal.SIGINT, 0, ""),
+    "polite, SIGTERM": (POLITE, signal.SIGTERM, 0, ""),
+    "publish for ever, SIGINT": (LOOP, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
+    "publish for ever, SIGTERM": (LOOP, signal.SIGTERM, 1, EXTERNAL),
+    "while ok, SIGTERM": (OK, signal.SIGTERM, 0, ""),
+    "rate, SIGINT": (RATE, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
+    "a thread spins, SIGINT": (THREAD, signal.SIGINT, 0, "KeyboardInterrupt"),
+    "calls wait, SIGINT": (PENDING, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
+    "a call, SIGINT": (CALL, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
+    "wait for a service, SIGTERM": (WAIT, signal.SIGTERM, 0, ""),
+    "many threads, SIGINT": (MANY, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
+    "many threads, SIGTERM": (MANY, signal.SIGTERM, 1, EXTERNAL),
+    "many nodes, SIGINT": (NODES, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
+}
+
+
+def script(wire: Wire, text: str) -> Process:
+    return Process([sys.executable, "-c", START.format(endpoint=wire.endpoint) + text])
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_signal_ends_it(wire: Wire, case: str) -> None:
+    text, number, code, told = CASES[case]
+    with script(wire, text) as process:
+        process.wait_for_line("up")
+        process.signal(number)
+        assert process.wait(5) == code, process.err
+        assert told in process.err if told else not process.err
+        assert "Fatal Python error" not in process.err
+        assert ("stopped" in process.out) == (text == POLITE)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "told"),
+    [
+        ("pub.publish(Twist())", 0, ""),
+        ("sys.exit(3)", 3, ""),
+        ("node.create_timer(0.01, lambda: sys.exit(4))\nrclpy.spin(node)", 4, ""),
+        ("def mine(): 1 / 0\nnode.create_timer(0.01, mine)\nrclpy.spin(node)", 1, "in mine\nZeroDivisionError"),
+        ("node.create_timer(0.1, rclpy.shutdown)\nrclpy.spin(node)", 0, ""),
+        ("threading.Timer(0.05, rclpy.shutdown).start()\nrclpy.spin(node)", 0, ""),
+        ("node.create_client(Trigger, 'nobody').call_async(Trigger.Request())", 0, ""),
+        ("threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\nup()", 0, None),
+    ],
+)
+def test_it_ends_by_itself(wire: Wire, text: str, code: int, told: str | None) -> None:
+    with script(wire, text) as process:
+        assert process.wait(10) == code, process.err
+        assert told is None or (told in process.err if told else not process.err)
+        assert "Fatal Python error" not in process.err
+
+
+def test_a_script_that_never_spins_publishes_and_leaves(wire: Wire) -> None:
+    bus = wire.bus()
+    commands, graph = bus.subscribe("cmd_vel", Twist), bus.graph()
+    with script(wire, "while not pub.get_subscription_count(): pass\npub.publish(Twist())") as process:
+        assert commands.recv().sample.source.startswith("script@")
+        wait_for(lambda: any(source.startswith("script@") for source in graph.left()))
+        assert process.wait() == 0
