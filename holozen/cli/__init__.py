@@ -20,7 +20,7 @@ VERBS = {
     "list": "the robots and objects in the sim, and where they are",
     "xacro": "expand a xacro file",
     "check": "say what is wrong with a robot file",
-    "topic": "list, info, type, find, echo, hz, bw, delay, pub",
+    "topic": "list, info, type, find, echo, hz, bw, delay, pub, plot",
     "service": "list, type, find, info, call",
     "node": "list, info",
     "param": "list, get, set, describe, dump, load",
@@ -30,10 +30,11 @@ VERBS = {
     "interface": "list, show, proto",
     "record": "write what comes on the keys into a bag (MCAP)",
     "replay": "publish what is in a bag again, in time",
-    "bag": "info, plot",
+    "bag": "info, plot, record, play",
     "plot": "draw numbers of live messages in the terminal",
     "map": "draw the robots, their ways and their goals in the terminal",
 }
+NOUNS = ("topic", "service", "node", "param", "interface", "bag")  # whose first word is a verb
 EXTRAS = (
     "lz4",
     "matplotlib",
@@ -48,10 +49,19 @@ SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run one verb; returns the exit code (0 good, 1 failed, 2 wrong usage)."""
+    """Run one verb; returns the exit code (0 good, 1 failed, 2 wrong usage). Without `argv` it ends the process."""
+    code = _guarded(sys.argv[1:] if argv is None else argv)
+    if argv is None and "zenoh" in sys.modules:
+        from holozen.process import leave
+
+        leave(code)
+    return code
+
+
+def _guarded(words: list[str]) -> int:
     try:
         try:
-            return _main(sys.argv[1:] if argv is None else argv)
+            return _main(words)
         finally:
             _ = sys.stdout and sys.stdout.flush()  # a reader that is gone shows here, and not at the interpreter's end
     except KeyboardInterrupt:
@@ -103,7 +113,7 @@ def _run(verb: str, words: list[str]) -> int:
     try:
         return int(module(verb).main(words))
     except BusError as error:
-        say(f"holozen {verb}: {error}")
+        say(f"holozen {' '.join([verb, *words[: verb in NOUNS]])}: {error}")
         return 1
     except ModuleNotFoundError as error:  # some verbs import what they need late
         name = (error.name or "").partition(".")[0]
