@@ -7,15 +7,16 @@ Only a process that names a type loads the codec.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import partial
 
 import zenoh
 
 from holozen import threads
 from holozen.connection import Connection
+from holozen.replies import Replies
 from holozen.session import close, one_line, open_door, open_session
-from holozen.tap import Sample, Tap, source
+from holozen.tap import Tap, source
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms, which a verb that only looks at bytes would wait for
 if TYPE_CHECKING:
@@ -156,11 +157,11 @@ class Bus:
 
         return caller.call(self, key, request, reply, timeout)
 
-    def ask(self, key: str, timeout: float, **request: Any) -> Iterator[Sample | bytes]:
-        """Ask once, without waiting for the service: its replies, each a sample or the bytes of an error."""
+    def ask(self, key: str, timeout: float, **request: Any) -> Replies:
+        """Ask once, without waiting for the service."""
         with one_line(f"key {key!r}"):
             replies = self.session.get(key, timeout=timeout, attachment=self.source, **request)
-        return (Sample(reply.ok) if reply.ok else bytes(reply.err.payload) for reply in replies)
+        return Replies(replies)
 
     def served(self, key: str) -> Callable[[], bool]:
         """A function that says whether anyone answers on `key` by now, a stranger as well."""
@@ -177,14 +178,12 @@ class Bus:
         self._readers.add(tap)
         return tap
 
-    def ask_all(self, key: str, timeout: float) -> Any:
-        """Ask all who serve `key` without a payload, ahead of other traffic: the channel of their replies."""
-        with one_line(f"key {key!r}"):
-            return self.session.get(
-                key, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE, timeout=timeout,
-                priority=zenoh.Priority.REAL_TIME, congestion_control=zenoh.CongestionControl.BLOCK, express=True,
-                attachment=self.source,
-            )  # fmt: skip
+    def ask_all(self, key: str, timeout: float) -> Replies:
+        """Ask all who serve `key` without a payload, ahead of other traffic."""
+        return self.ask(
+            key, timeout, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE,
+            priority=zenoh.Priority.REAL_TIME, express=True, congestion_control=zenoh.CongestionControl.BLOCK,
+        )  # fmt: skip
 
     def graph(self, keys: str = "@holozen/**") -> Graph:
         """The endpoints of all nodes, or those with tokens like `keys`, kept up to date."""

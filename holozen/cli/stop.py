@@ -3,13 +3,17 @@
 import argparse
 import json
 import time
-from typing import Any
+from typing import TYPE_CHECKING
 
 from holozen import connection
 from holozen.bus import Bus
 from holozen.errors import TIMEOUT, BusError
-from holozen.flags import number
+from holozen.flags import Parser, number
+from holozen.tap import Sample
 from holozen.tell import printable, say
+
+if TYPE_CHECKING:
+    from holozen.replies import Replies
 
 TOKENS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/{verb}"
 DONE = {"stop": "is stopped", "release": "is released"}
@@ -26,7 +30,7 @@ def main(argv: list[str]) -> int:
 
 def parser(verb: str = "stop") -> argparse.ArgumentParser:
     what = {"stop": "Stop robots until `holozen release`.", "release": "Let robots drive again after `holozen stop`."}
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog=f"holozen {verb}",
         description=what[verb],
         epilog=f"example: holozen {verb} Fred",
@@ -79,7 +83,7 @@ class Order:
         self.robot, self.key, self.confirmed = robot, key, False
         self.servers: set[str] = set()
         self.message = ""
-        self._replies: Any = None
+        self._replies: Replies | None = None
         self._good, self._due = 0, 0.0
 
     def look(self, bus: Bus, now: float) -> bool:
@@ -91,20 +95,19 @@ class Order:
         try:
             while reply := self._replies.try_recv():
                 self._read(reply)
-        except Exception:  # zenoh's own error type, which only bus.py may name: there will be no more replies
+        except BusError:  # all have replied
             self._replies, self._due = None, now + PAUSE
         self.confirmed = self._good >= max(len(self.servers), 1)
         return self.confirmed
 
-    def _read(self, reply: Any) -> None:
-        if reply.ok is None:
+    def _read(self, reply: Sample | bytes) -> None:
+        if isinstance(reply, Sample):
+            success, self.message = _read(reply.payload, reply.encoding)
+            self._good += success
+        elif reply != TIMEOUT:
             from holozen.server import refusal
 
-            if (payload := bytes(reply.err.payload)) != TIMEOUT:
-                self.message = str(refusal(payload))
-            return
-        success, self.message = _read(bytes(reply.ok.payload), str(reply.ok.encoding))
-        self._good += success
+            self.message = str(refusal(reply))
 
 
 def _read(payload: bytes, encoding: str) -> tuple[bool, str]:

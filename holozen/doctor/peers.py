@@ -11,6 +11,7 @@ from holozen import about
 from holozen.bus import Bus
 from holozen.doctor.finding import ERROR, OK, WARNING, Finding
 from holozen.graph import Endpoint
+from holozen.tap import Sample
 
 PATIENCE = 0.4  # s for all to answer
 ROUNDS = 3  # the answer that came the fastest says the most about a clock
@@ -42,7 +43,7 @@ def ask(bus: Bus) -> dict[str, Peer]:
         waited = time.monotonic()
         for reply in bus.ask_all(about.EVERYBODY, PATIENCE):
             now = time.time()
-            if reply.ok and (peer := read(str(reply.ok.key_expr), bytes(reply.ok.payload), before, now)):
+            if isinstance(reply, Sample) and (peer := read(reply.key, reply.payload, before, now)):
                 known = found.get(peer.session)
                 found[peer.session] = peer if known is None or peer.error < known.error else known
         if time.monotonic() - waited > PATIENCE / 2:

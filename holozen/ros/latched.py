@@ -2,7 +2,6 @@
 
 import threading
 from collections import deque
-from typing import Any
 
 from holozen.bus import Bus
 from holozen.errors import BusError
@@ -57,8 +56,7 @@ class Latched:
             return
 
     def _ask(self) -> None:
-        replies: Any = self._bus.ask_all(self._key, PATIENCE)
-        for reply in replies:
-            if reply.ok:
-                self._late.append(Sample(reply.ok))
+        for reply in self._bus.ask_all(self._key, PATIENCE):
+            if isinstance(reply, Sample):
+                self._late.append(reply)
                 self._waker.wake()
