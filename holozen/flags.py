@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import sys
 from collections.abc import Callable, Iterable
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms
@@ -30,20 +31,41 @@ class Parser(argparse.ArgumentParser):
     """A parser that tells a mistake in one line, with the closest right word."""
 
     def __init__(self, **options: Any) -> None:
+        self._words: list[str] = []  # what is parsed
         super().__init__(**{"formatter_class": Formatter, **options})
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse does, which all its other ways to parse go through."""
+        self._words = list(sys.argv[1:] if args is None else args)
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong, and end with exit code 2."""
         from holozen.tell import say
 
-        unknown, _, words = message.partition("unrecognized arguments: ")
-        if words and not unknown:
-            flag = words.split()[0]
+        verbs = [action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        for choices in verbs:
+            if self._words and self._words[0] in choices:
+                choices[self._words[0]].error(message)  # whose flags they are
+        before, _, left = message.partition("unrecognized arguments: ")
+        if left and not before:
+            message = f"{left!r} is too much"
+        if not verbs and (flag := self._unknown_flag(message, [] if before else left.split())):
             message = f"no flag {flag!r}{nearest(flag, self._option_string_actions)}"
-            if not flag.startswith("-"):
-                message = f"{words!r} is too much"
         say(f"{self.prog}: {message}; `{self.prog} --help` shows how")
         raise SystemExit(2)
+
+    def _unknown_flag(self, message: str, left: list[str]) -> str:
+        """The flag that there is not: the first that was `left`, or one whose value is what `message` complains of, or
+        whose place something else should have.
+        """
+        place = "are required: " in message
+        for word, value in [(word, word) for word in left] or zip(self._words, [*self._words[1:], ""], strict=False):
+            flag = word.partition("=")[0]
+            unknown = flag[:1] == "-" and not any(name.startswith(flag) for name in self._option_string_actions)
+            if unknown and (left or place or repr(value) in message):
+                return flag
+        return ""
 
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:

@@ -1,18 +1,22 @@
-"""`holozen bag`: info, plot."""
+"""`holozen bag`: info, plot; record and play, as ROS 2 calls them."""
 
 import argparse
 import json
 from typing import TYPE_CHECKING
 
+from holozen import cli
 from holozen.flags import Parser
 from holozen.tell import printable, say
 
 if TYPE_CHECKING:
     from pathlib import Path
 
+VERBS = {"record": "record", "play": "replay"}  # the same as `holozen record` and `holozen replay`
+EXAMPLES = {"record": "record odom cmd_vel -o square", "play": "play square.mcap -r 2"}
+
 
 def parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="holozen bag", description="Look into bags: MCAP files with messages.")
+    parser = Parser(prog="holozen bag", description="Write, play and look into bags: MCAP files with messages.")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
     help_line = "what is in a bag: counts, rates, gaps"
     add = verbs.add_parser(
@@ -28,6 +32,10 @@ def parser() -> argparse.ArgumentParser:
     add.add_argument("-o", "--output", type=_file, metavar="PICTURE", help=".png or .svg (default: FILE with .png)")
     add.add_argument("--topics", nargs="+", metavar="KEY", help="only these keys of odometry")
     add.add_argument("--json", action="store_true", help="what was drawn, as one JSON object")
+    for name, verb in VERBS.items():
+        same = f"the same as `holozen {verb}`"
+        verbs.add_parser(name, help=same, description=same, epilog=f"example: holozen bag {EXAMPLES[name]}",
+            parents=[cli.module(verb).parser()], add_help=False)  # fmt: skip
     return parser
 
 
@@ -38,13 +46,16 @@ def _file(text: str) -> "Path":
 
 
 def main(argv: list[str]) -> int:
+    if argv and argv[0] in VERBS:
+        code: int = cli.module(VERBS[argv[0]]).main(argv[1:])
+        return code
     args = parser().parse_args(argv)
     from holozen.bag.errors import BagError
 
     try:
         return {"info": info, "plot": plot}[args.verb](args)
     except BagError as error:
-        say(f"holozen bag: {error}")
+        say(f"holozen bag {args.verb}: {error}")
         return 1
 
 

@@ -14,11 +14,13 @@ a comment. example: holozen check my_bot.urdf.xacro"""
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = flags.Parser(
         prog="holozen check", description="Say what is wrong with a xacro, URDF or SDF robot.", epilog=AFTER
     )
     parser.add_argument("file", type=Path, help="a xacro, URDF or SDF file")
-    parser.add_argument("args", type=_pair, nargs="*", metavar="name:=value", help="values of its xacro:arg")
+    parser.add_argument(
+        "args", type=_pair, nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg"
+    )
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR")
     parser.add_argument("--fits", type=_size, default=(), metavar="LxW[xH]", help="most metres along x, y, z: 0.4x0.2")
     parser.add_argument("--require", type=Path, metavar="FILE", help="links and joints that have to be there")

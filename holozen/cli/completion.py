@@ -1,5 +1,7 @@
 """`holozen completion`: a script for the shell, which asks `holozen __complete` for the words that fit."""
 
+import json
+
 from holozen.flags import Parser
 
 BASH = """\
@@ -28,9 +30,12 @@ def parser() -> Parser:
     about = "Print a script that completes verbs, flags, and the keys, types, services, nodes and robots there are."
     parser = Parser(prog="holozen completion", description=about, epilog="example: source <(holozen completion bash)")
     parser.add_argument("shell", choices=SCRIPTS, help="for which shell")
+    parser.add_argument("--json", action="store_true", help="the script as one JSON object")
     return parser
 
 
 def main(argv: list[str]) -> int:
-    print(SCRIPTS[parser().parse_args(argv).shell], end="")
+    args = parser().parse_args(argv)
+    script = SCRIPTS[args.shell]
+    print(json.dumps({"shell": args.shell, "script": script}) + "\n" if args.json else script, end="")
     return 0

@@ -49,7 +49,7 @@ class Delays:
         self._bus, self._reader, self._sim = bus, Reader(), SimClock()
         self._clock: threading.Thread | None = None
         self.by: set[str] = set()  # the clocks that were used
-        self.unstamped = 0
+        self.unstamped = self.clockless = 0  # messages without a stamp, and with one by a clock that is not heard
 
     def measure(self, sample: "Sample", now: float) -> float | None:
         """The age of a sample in seconds; None where it has no stamp, or no clock is known for it yet."""
@@ -64,9 +64,17 @@ class Delays:
         self._hear_the_sim()
         told = self._sim.time(now)
         if told is None:
+            self.clockless += 1
             return None
         self.by.add("the sim's clock (key clock)")
         return told - stamp
+
+    def excuse(self) -> str:
+        """Why messages have no age; empty if all have."""
+        if self.unstamped:
+            return f"{self.unstamped} messages have no header.stamp, and so no age"
+        told = f"{self.clockless} messages have stamps by another clock than this machine's, and nothing comes on clock"
+        return told if self.clockless else ""
 
     def _hear_the_sim(self) -> None:
         if self._clock is None:
@@ -109,9 +117,9 @@ def delay(args: "argparse.Namespace") -> int:
             ages = list(window.values)
             return {**spread(ages), "jitter": jitter(ages), "window": len(ages), "clock": ", ".join(sorted(delays.by))}
 
-        code = Watch(args, delays.measure, report).run(bus, text)
-    if delays.unstamped:
-        say(f"{delays.unstamped} messages have no header.stamp, and so no age")
+        code = Watch(args, delays.measure, report, delays.excuse).run(bus, text)
+    if delays.unstamped and not code:
+        say(delays.excuse())
     return code
 
 

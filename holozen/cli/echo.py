@@ -52,7 +52,7 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Any", printer: "Printer"
             try:
                 sample = tap.recv()
             except BusError:
-                say(f"holozen topic: {what} came on {args.key} within {args.timeout:g} s at {bus.where}")
+                say(f"holozen topic echo: {what} came on {args.key} within {args.timeout:g} s at {bus.where}")
                 return 1
             if not args.filter:
                 late.cancel()
@@ -61,10 +61,10 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Any", printer: "Printer"
                 if args.once:
                     return 0
     except LookupError as error:
-        say(f"holozen topic echo {args.key}: {error.args[0]}")
+        say(f"holozen topic echo: {args.key}: {error.args[0]}")
         return 1
     finally:
-        printer.tell()
+        printer.tell(reader.why)
 
 
 class Printer:
@@ -151,10 +151,11 @@ class Printer:
             sys.stdout.buffer.write(payload if self._args.once else payload + b"\n")
             sys.stdout.buffer.flush()
 
-    def tell(self) -> None:
-        """Say what could not be shown, if there was any."""
+    def tell(self, why: str) -> None:
+        """Say what could not be shown, if there was any, and `why` the last of it could not."""
         if self._undecoded:
-            say(f"{self._undecoded} of {self._count} samples could not be decoded; for CDR give the type: --type T")
+            last = "the last: " * (self._undecoded > 1)
+            say(f"{self._undecoded} of {self._count} samples could not be decoded; {last}{why}")
         if self._fieldless:
             say(f"{self._fieldless} of {self._count} samples have no field {self._args.field}")
 

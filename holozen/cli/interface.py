@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
     try:
         return {"list": list_types, "show": show, "proto": proto}[args.verb](args)
     except InterfaceError as error:
-        say(f"holozen interface: {error}")
+        say(f"holozen interface {args.verb}: {error}")
         return 1
 
 

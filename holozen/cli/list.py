@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from holozen import connection
 from holozen.bus import Bus
 from holozen.errors import NoReply, ServiceError
+from holozen.flags import Parser
 from holozen.tell import printable, say
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ TILTED = 5.0  # degrees; less is a robot on a slope, or one that balances
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="holozen list",
         description="Show the robots and objects in the sim.",
         epilog="example: holozen list --json",

@@ -96,7 +96,7 @@ def list_names(args: argparse.Namespace, nodes: Nodes) -> int:
     code = 0
     for node in [nodes.only(args.node)] if args.node else sorted(nodes.sessions):
         if len(nodes.sessions[node]) > 1:
-            say(f"holozen param: {nodes.twins(node)}; only one of them is shown: end the others")
+            say(f"holozen param {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
             code = 1
         names = nodes.names(node, args.param_prefixes)
         kinds = _kinds(nodes, node, names) if args.param_type or args.json else {}
@@ -129,10 +129,10 @@ def set_values(args: argparse.Namespace, nodes: Nodes, node: str, wanted: dict[s
         if result.successful or args.json:
             _show(args, row, f"{what} successful")
         elif not result.reason.startswith("not set"):  # which says no more than that another one was refused
-            say(f"holozen param: {what.replace('Set', 'setting')} failed: {result.reason}")
+            say(f"holozen param {args.verb}: {what.replace('Set', 'setting')} failed: {result.reason}")
     done = all(result.successful for result in results)
     if not done and len(wanted) > 1:
-        say(f"holozen param: none of the {len(wanted)} was set")
+        say(f"holozen param {args.verb}: none of the {len(wanted)} was set")
     return 0 if done else 1
 
 

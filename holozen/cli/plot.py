@@ -30,6 +30,7 @@ TICK = 0.02  # s between two looks at what came
 def parser() -> argparse.ArgumentParser:
     parser = Parser(prog="holozen plot", description=ABOUT, epilog=f"example: holozen plot {EXAMPLE}")
     arguments(parser)
+    parser.set_defaults(node="plot")
     parser.add_argument("--json", action="store_true", help="the numbers as they come, one JSON object a line")
     connection.add_arguments(parser)
     return parser
@@ -71,14 +72,18 @@ def plot(args: argparse.Namespace) -> int:
         try:
             (_json if args.json else _draw)(lines, args, stop)
         except LookupError as error:
-            say(f"holozen plot: {error.args[0]}")
+            say(f"{_named(args)}: {error.args[0]}")
             return 1
     if lines.bad:
         print(f"{lines.bad} messages could not be read", file=sys.stderr)
     if not any(lines.points.values()):
-        say("holozen plot: nothing came; `holozen topic list` shows who publishes")
+        say(f"{_named(args)}: nothing came; `holozen topic list` shows who publishes")
         return 1
     return 0
+
+
+def _named(args: argparse.Namespace) -> str:
+    return f"holozen {args.node.replace('_', ' ')}"
 
 
 class Lines:

@@ -49,7 +49,7 @@ def pub(args: "argparse.Namespace") -> int:
             form = form or _form_of_listener(bus, args)
             return _run(bus, args, form, payload or _payload(form, args), stop)
     except Refused as error:
-        say(f"holozen topic pub {error}")
+        say(f"holozen topic pub: {error}")
         return error.code
 
 

@@ -1,7 +1,7 @@
 """Samples of anybody as plain values: JSON, msgpack, text, and CDR where the type is known."""
 
 from holozen.bus import Bus
-from holozen.cli.show import decode, hex_dump
+from holozen.cli.show import Hex, decode, hex_dump
 from holozen.graph import on_key
 from holozen.tap import Sample
 
@@ -21,6 +21,7 @@ class Reader:
     """
 
     def __init__(self, type_name: str = "") -> None:
+        self.why = ""  # the last sample could not be read that could not
         self._given = type_name
         self._interfaces: dict[str, Any] = {}
         self._registry: Any = None
@@ -32,12 +33,17 @@ class Reader:
         """The value of a sample; a show.Hex where its bytes cannot be decoded."""
         name, _, schema = sample.encoding.partition(";")
         if name != CDR and (name not in SAYS_NOTHING or sample.payload[:2] not in CDR_STARTS):
-            return decode(sample.payload, sample.encoding)
+            value = decode(sample.payload, sample.encoding)
+            self.why = "neither text, JSON, msgpack nor CDR" if isinstance(value, Hex) else self.why
+            return value
         try:
-            kind = self._given or schema or self._type_told(sample.key, bus)
-            return self._cdr(kind, sample.payload) if kind else hex_dump(sample.payload, sample.encoding)
-        except ValueError:  # bytes of another type, or a type that is not known here
-            return hex_dump(sample.payload, sample.encoding)
+            if kind := self._given or schema or self._type_told(sample.key, bus):
+                return self._cdr(kind, sample.payload)
+            self.why = "for CDR give the type: --type T"
+        except ValueError as error:  # bytes of another type, or a type that is not known here
+            told = f", its encoding says {schema}" if schema not in ("", self._given) else ""
+            self.why = f"{error}; --type is wrong, or the bytes are{told}" if self._given else str(error)
+        return hex_dump(sample.payload, sample.encoding)
 
     def _cdr(self, kind: str, payload: bytes) -> "Any":
         from holozen import cdr

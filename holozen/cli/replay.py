@@ -39,7 +39,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "-r", "--rate", type=number(0.001, 1e6), default=1.0, metavar="X", help="times as fast (default: 1)"
     )
-    parser.add_argument("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
+    parser.add_argument("-l", "--loop", action="store_true", help="begin again at the end, until Ctrl-C")
     parser.add_argument("--start-offset", type=number(0, 1e9, "s"), default=0.0, metavar="S", help="begin S seconds in")
     parser.add_argument("--until", type=number(0, 1e9, "s"), metavar="S", help="end S seconds after the bag's start")
     parser.add_argument("--topics", nargs="+", type=key, metavar="KEY", help="only these keys or key expressions")

@@ -4,12 +4,13 @@ import argparse
 
 from holozen import connection
 from holozen.bus import Bus
+from holozen.flags import Parser
 from holozen.process import stop_event, wait_for_end
 from holozen.tell import say
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="holozen router",
         description="Run a Zenoh router.",
         epilog="example: holozen router --listen tcp/0.0.0.0:7447",

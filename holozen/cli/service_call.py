@@ -22,12 +22,12 @@ def call(args: "argparse.Namespace") -> int:
     words = list(args.words)
     given = words.pop(0) if words and TYPE.fullmatch(words[0]) else ""
     if len(words) > 1:
-        say(f"holozen service call {args.key}: {words[-1]!r} is too much; write KEY [TYPE] REQUEST")
+        say(f"holozen service call: {args.key}: {words[-1]!r} is too much; write KEY [TYPE] REQUEST")
         return 2
     row = wire.service(args.key)
     row = row or next((each for each in wire.SERVICES if given and each.reply.ROS.endswith(given)), None)
     if row and given and given.replace("/srv/", "/") != row.reply.ROS.replace("/srv/", "/"):
-        say(f"holozen service call {args.key}: its type is {row.reply.ROS}, not {given}")
+        say(f"holozen service call: {args.key}: its type is {row.reply.ROS}, not {given}")
         return 1
     if not (row or given or args.any):
         known = ", ".join(service.key for service in wire.SERVICES)
@@ -36,7 +36,7 @@ def call(args: "argparse.Namespace") -> int:
     try:
         request = _payload(words[0] if words else "{}", row, given)
     except ValueError as error:
-        say(f"holozen service call {args.key}: refused: {error}")
+        say(f"holozen service call: {args.key}: refused: {error}")
         return 1
     with open_bus(args) as bus:
         _ask(bus, args, request)

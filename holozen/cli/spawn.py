@@ -1,6 +1,7 @@
 """`holozen spawn`: put a robot or object into the running sim."""
 
 import argparse
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -36,6 +37,27 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
+class Spawned:
+    """What was put into the world: where it listens (nowhere: an empty key), where it stands, and advice."""
+
+    name: str
+    key: str
+    pose: "Pose"
+    hint: str = ""
+
+    def __str__(self) -> str:
+        at = self.pose.position
+        where = f"listens on {self.key}" if self.key else f"stands at {at.x:.3f} {at.y:.3f} {at.z:.3f}"
+        return f"{self.name} {where}{self.hint and f'; {self.hint}'}"
+
+    def as_json(self) -> str:
+        """The same as one JSON object."""
+        from msgspec import to_builtins
+
+        return json.dumps({"name": self.name, "key": self.key, "pose": to_builtins(self.pose), "hint": self.hint})
+
+
+@dataclass(frozen=True, slots=True)
 class Candidate:
     """A robot that was read without error: its name to be, what is sent, and what it is."""
 
@@ -45,7 +67,7 @@ class Candidate:
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = flags.Parser(
         prog="holozen spawn",
         usage="%(prog)s [options] FILE [name:=value ...]",
         description="Put a robot or object (xacro, URDF or SDF) into the running sim.",
@@ -64,6 +86,7 @@ def parser() -> argparse.ArgumentParser:
         help="the folder of package NAME, for $(find NAME) and package://NAME")  # fmt: skip
     parser.add_argument("--strict", action="store_true", help="a missing or bad mesh is an error")
     parser.add_argument("-urdf", "-sdf", action="store_true", help=argparse.SUPPRESS)  # the file says which it is
+    parser.add_argument("--json", action="store_true", help="its name, key and pose as one JSON object")
     connection.add_arguments(parser)
     return parser
 
@@ -82,7 +105,8 @@ def main(argv: list[str]) -> int:
     try:
         candidate = read(file, args.name, values, dict(args.package), args.drive or "", args.strict)
         with Bus("spawn", connection.from_arguments(args), patience=3.0) as bus:
-            print(put(bus, candidate, place, args.replace))
+            spawned = put(bus, candidate, place, args.replace)
+        print(spawned.as_json() if args.json else spawned)
     except RobotError as error:
         say(f"holozen spawn: {error}")
         return 1
@@ -99,8 +123,8 @@ def spawn_file(
     packages: Mapping[str, Path] = {},
     drive: str = "",
     strict: bool = False,
-) -> str:
-    """Read a file, tell its warnings, and spawn it; returns one line that says where it is or listens.
+) -> Spawned:
+    """Read a file, tell its warnings, and spawn it.
 
     With `replace` one with that name is deleted, after the new file was read without error; the new one takes its
     pose unless a `place` is given. Raises RobotError for the file and ServiceError for what the sim says.
@@ -133,7 +157,7 @@ def read(
     return Candidate(name, text, model)
 
 
-def put(bus: Bus, candidate: Candidate, place: Place, replace: bool) -> str:
+def put(bus: Bus, candidate: Candidate, place: Place, replace: bool) -> Spawned:
     """Spawn what was read. Raises ServiceError."""
     from holozen import entities
 
@@ -214,12 +238,11 @@ def _first(value: float | None, other: float | None) -> float:
     return value if value is not None else other or 0.0
 
 
-def _told(name: str, model: "RobotModel", pose: "Pose") -> str:
+def _told(name: str, model: "RobotModel", pose: "Pose") -> Spawned:
     from holozen.wire import key_for
 
     if model.drive is not None:
-        return f"{name} listens on {key_for(model.drive.command_topic, name)}"
-    at = pose.position
+        return Spawned(name, key_for(model.drive.command_topic, name), pose)
     wheels = any(joint.kind == "continuous" for joint in model.joints.values())
-    hint = "; nothing drives it: spawn it with --drive planar_move to move it as a whole" if wheels else ""
-    return f"{name} stands at {at.x:.3f} {at.y:.3f} {at.z:.3f}{hint}"
+    hint = "nothing drives it: spawn it with --drive planar_move to move it as a whole" if wheels else ""
+    return Spawned(name, "", pose, hint)

@@ -7,7 +7,7 @@ NOUN = Noun(
     "Look at topics, and write to them.",
     {
         "list": "topics", "info": "topic_info", "type": "topics", "find": "topics", "echo": "echo",
-        "hz": "hz", "bw": "bw", "delay": "delay", "pub": "pub",
+        "hz": "hz", "bw": "bw", "delay": "delay", "pub": "pub", "plot": "plot",
     },
 )  # fmt: skip
 parser, main = NOUN.parser, NOUN.main

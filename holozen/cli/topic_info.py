@@ -5,6 +5,7 @@ import time
 
 from holozen.bus import Bus
 from holozen.cli.noun import Verb, open_bus
+from holozen.cli.strangers import type_in
 from holozen.cli.topics import topics, unknown
 from holozen.flags import key
 from holozen.graph import Endpoint, on_key
@@ -33,9 +34,11 @@ def info(args: "argparse.Namespace") -> int:
         status = _status(bus, args.key, endpoints)
         if args.verbose:
             _add_heard(publishers, _listen(bus, args.key))
+        if not publishers + subscriptions:
+            _add_stranger(publishers, bus, args.key)
     _add_status(publishers, status)
     if not publishers + subscriptions:
-        say(f"holozen topic: {unknown(args.key, [topic.key for topic in topics(endpoints)], bus.where)}")
+        say(f"holozen topic info: {unknown(args.key, [topic.key for topic in topics(endpoints)], bus.where)}")
         return 1
     types = sorted({row["type"] for row in publishers + subscriptions} - {"", "any/msg/Any"})
     if args.json:
@@ -106,8 +109,19 @@ def _add_heard(publishers: "list[Row]", heard: "dict[str, list[Sample]]") -> Non
         if row is None:
             publishers.append(row := {"node": name, "session": "", "type": "", "source": name})
         last = samples[-1]
+        row["type"] = row["type"] or type_in(last.encoding)
         congestion, express = last.delivery
         row |= {"priority": last.priority, "encoding": last.encoding, "congestion": congestion, "express": express}
+
+
+def _add_stranger(publishers: "list[Row]", bus: Bus, name: str) -> None:
+    """Who has no token, and sends on a key or answers when it is asked for."""
+    from holozen.cli.strangers import met
+
+    if found := met(bus, name):
+        sample, answered = found
+        _add_heard(publishers, {sample.source: [sample]})
+        publishers[-1]["node"] += ", when asked" * answered
 
 
 def _line(row: "Row") -> str:

@@ -78,12 +78,19 @@ def _print_verbose(found: list[Topic]) -> None:
 
 def type_of(args: "argparse.Namespace") -> int:
     """Print a key's type; exit code 1 if nobody says it."""
+    from holozen.cli import strangers
+
     with open_bus(args) as bus:
         found = topics(bus.graph().settled(bus.connected))
-    types = next((topic.types for topic in found if topic.key == args.key), [])
+        types = next((topic.types for topic in found if topic.key == args.key), [])
+        met = None if types else strangers.met(bus, args.key)
+    if met and (told := strangers.type_in(met[0].encoding)):
+        types = [told]
     for name in types:
         print(json.dumps({"key": args.key, "type": name}) if args.json else printable(name))
-    if not types:
+    if met and not types:
+        say(f"holozen topic type: {args.key!r} has no type that anybody tells; what comes is {met[0].encoding}")
+    elif not types:
         say(f"holozen topic type: {unknown(args.key, [topic.key for topic in found], bus.where)}")
     return 0 if types else 1
 

@@ -26,7 +26,7 @@ SCREEN_LEFT = "\x1b[<u\x1b[?2026l\x1b[?7h\x1b[?1004l\x1b[?2004l\x1b[?25h\x1b[?10
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = flags.Parser(
         prog="holozen up",
         description="Start the sim, the controller, the pose service, and the teleop if there is a terminal.",
         epilog="example: holozen up --robot my_bot.urdf.xacro",

@@ -88,7 +88,7 @@ def _yaml(text: str, why_no_json: ValueError) -> Any:
 
 
 def _meant(reason: str, value: Any, kinds: Kinds) -> str:
-    """The closest right name for an unknown field that `reason` tells of."""
+    """The right names for an unknown field that `reason` tells of, the closest first."""
     word = reason.partition("unknown field `")[2].partition("`")[0]
     if not word:
         return ""
@@ -100,4 +100,5 @@ def _meant(reason: str, value: Any, kinds: Kinds) -> str:
             known = known.get(name, {}) if isinstance(known, dict) else {}
         if known:
             break
-    return nearest(word, known) if isinstance(known, dict) else ""
+    names = list(known) if isinstance(known, dict) else []
+    return f"{nearest(word, names)}; there are {', '.join(names) or 'none'}"

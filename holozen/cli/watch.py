@@ -50,10 +50,18 @@ class Window:
 
 
 class Watch:
-    """Listens to the keys of a verb. `measure` gives a sample's value, or None for one that has none."""
+    """Listens to the keys of a verb. `measure` gives a sample's value, or None for one that has none; `excuse` says
+    what is wrong with those, if there were any.
+    """
 
-    def __init__(self, args: "argparse.Namespace", measure: "Measure", report: "Callable[[Window], Report]") -> None:
-        self._args, self._measure, self._report = args, measure, report
+    def __init__(
+        self,
+        args: "argparse.Namespace",
+        measure: "Measure",
+        report: "Callable[[Window], Report]",
+        excuse: "Callable[[], str]" = str,
+    ) -> None:
+        self._args, self._measure, self._report, self._excuse = args, measure, report, excuse
         self._windows: dict[str, Window] = {}
         self._lock = threading.Lock()
 
@@ -63,7 +71,10 @@ class Watch:
         for name in self._args.keys:
             threading.Thread(target=self._listen, args=(bus.tap(name),), daemon=True).start()
         deadline = self._args.timeout and time.monotonic() + self._args.timeout
-        many = len(self._args.keys) > 1 or any("*" in name for name in self._args.keys)
+        many, keys = (
+            len(self._args.keys) > 1 or any("*" in name for name in self._args.keys),
+            ", ".join(self._args.keys),
+        )
         while not stop.wait(EVERY):
             reports = self._reports()
             for name, told in reports.items():
@@ -72,10 +83,11 @@ class Watch:
             if reports and self._args.once:
                 return 0
             if not reports and deadline and time.monotonic() > deadline:
-                say(f"nothing came on {', '.join(self._args.keys)} within {self._args.timeout:g} s at {bus.where}")
+                nothing = f"nothing came on {keys} within {self._args.timeout:g} s at {bus.where}"
+                say(f"holozen {self._args.node.replace('_', ' ')}: {self._excuse() or nothing}")
                 return 1
             if not reports:
-                say(f"no new messages on {', '.join(self._args.keys)}")
+                say(self._excuse() or f"no new messages on {keys}")
         return 0
 
     def _listen(self, tap: "Tap") -> None:

@@ -1,6 +1,7 @@
 """`holozen xacro`: expand a xacro file, without ROS."""
 
 import argparse
+import json
 import os
 import sys
 from pathlib import Path
@@ -12,16 +13,18 @@ from holozen.tell import say
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = flags.Parser(
         prog="holozen xacro",
         description="Expand a xacro file to URDF.",
         epilog="example: holozen xacro my_bot.urdf.xacro -o my_bot.urdf",
     )
     parser.add_argument("file", type=Path, help="the xacro file")
-    parser.add_argument("args", nargs="*", metavar="name:=value", help="values of its xacro:arg")
+    parser.add_argument("args", nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg")
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="the folder of package NAME, for $(find NAME)")  # fmt: skip
+    told = "one JSON object a line: the URDF, or with --watch what became of each save"
+    parser.add_argument("--json", action="store_true", help=told)
     watch = parser.add_argument_group("watch", "Expand again on every save, and put the robot anew into a running sim.")
     watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
     watch.add_argument("--name", type=flags.robot, metavar="NAME", help="the robot's name (default: as in the file)")
@@ -39,15 +42,24 @@ def main(argv: list[str]) -> int:
             from holozen.cli.xacro_watch import watch
 
             return watch(args, *given)
-        text = expand_xacro(args.file, *given)
-        if args.output:
-            write(args.output, text)
-        else:
-            _print(text)
+        _give(args, expand_xacro(args.file, *given))
     except RobotError as error:
         say(f"holozen xacro: {error}")
         return 1
     return 0
+
+
+def _give(args: argparse.Namespace, text: str) -> None:
+    row = {"file": str(args.file)}
+    if args.output:
+        write(args.output, text)
+        row["output"] = str(args.output)
+    else:
+        row["urdf"] = text
+    if args.json:
+        _print(json.dumps(row) + "\n")
+    elif not args.output:
+        _print(text)
 
 
 def write(out: Path, text: str) -> None:

@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import json
 import threading
 from collections.abc import Mapping
 from pathlib import Path
@@ -24,7 +25,7 @@ SETTLED = 0.05  # s without a change: an editor may empty a file before it fills
 
 
 def watch(args: argparse.Namespace, values: Mapping[str, str], packages: Mapping[str, Path]) -> int:
-    """Expand until told to stop. Says one line each time; what is wrong is mended by the next save."""
+    """Expand until told to stop. Tells it each time; what is wrong is mended by the next save."""
     stop = stop_event()
     with contextlib.ExitStack() as ends:
         bus = None
@@ -36,7 +37,7 @@ def watch(args: argparse.Namespace, values: Mapping[str, str], packages: Mapping
         while not stop.is_set():
             before = now(inputs, args.file, packages)  # what is saved from here on is seen
             outcome = _expanded(args.file, values, packages)
-            say(f"holozen xacro: {outcome.error or _used(args, outcome, values, packages, bus)}")
+            _tell(args, *((outcome.error, False) if outcome.error else _used(args, outcome, values, packages, bus)))
             inputs = outcome.inputs or before
             inputs["file"].setdefault(str(args.file), before["file"].get(str(args.file)))
             _wait_for_save(inputs, args.file, packages, stop)
@@ -56,7 +57,8 @@ def _used(
     values: Mapping[str, str],
     packages: Mapping[str, Path],
     bus: "Bus | None",
-) -> str:
+) -> tuple[str, bool]:
+    """What became of a save, and whether all of it was done."""
     told = f"{args.file} expanded"
     try:
         if args.output:
@@ -68,8 +70,15 @@ def _used(
             name, drive = args.name or "", args.drive
             told += f", {spawn_file(bus, args.file, name, None, True, values, packages, drive)}"
     except (RobotError, BusError) as error:
-        told += f", but {error}"
-    return told
+        return f"{told}, but {error}", False
+    return told, True
+
+
+def _tell(args: argparse.Namespace, text: str, done: bool) -> None:
+    if args.json:
+        print(json.dumps({"file": str(args.file), "done": done, "text": text}), flush=True)
+    else:
+        say(f"holozen xacro: {text}")
 
 
 def _wait_for_save(inputs: Inputs, path: Path, packages: Mapping[str, Path], stop: threading.Event) -> None:

@@ -20,7 +20,7 @@ from .knobs import KNOBS, declared
 
 def parser() -> argparse.ArgumentParser:
     default = Gains()
-    parser = argparse.ArgumentParser(
+    parser = flags.Parser(
         prog="holozen controller",
         description="Drive a robot to the goals of next_goal.",
         epilog="example: holozen controller --laps 0",

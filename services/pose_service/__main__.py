@@ -7,7 +7,7 @@ from pathlib import Path
 from holozen import connection
 from holozen.bus import Bus
 from holozen.errors import BusError
-from holozen.flags import number
+from holozen.flags import Parser, number
 from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest, Odometry
 from holozen.parameters import Parameters
 from holozen.process import stop_event, wait_for_end
@@ -19,7 +19,7 @@ from .tracker import Tracker
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog="holozen pose-service",
         description="Answer next_goal and get_pose.",
         epilog="example: holozen pose-service --shape hexagon --size 2",

@@ -15,7 +15,7 @@ from . import intake, pace, worldfile
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = flags.Parser(
         prog="holozen sim",
         description="Simulate robots in a world.",
         epilog="example: holozen sim --robot my_bot.urdf.xacro=Fred",

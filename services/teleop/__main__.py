@@ -29,7 +29,7 @@ class Mode(argparse.Action):
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = flags.Parser(
         prog="holozen teleop",
         description="Drive a robot from the keyboard, with the keys of teleop_twist_keyboard.",
         epilog="example: holozen teleop Fred --speed 0.3",

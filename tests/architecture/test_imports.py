@@ -43,6 +43,12 @@ def absolute(path: Path) -> set[str]:
     return {module.partition(".")[0] for level, module in imports(path) if not level}
 
 
+def made(path: Path) -> set[str]:
+    """The names of what a file makes by a call: `Parser` of `Parser(...)` and of `flags.Parser(...)`."""
+    calls = [node.func for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.Call)]
+    return {call.attr if isinstance(call, ast.Attribute) else getattr(call, "id", "") for call in calls}
+
+
 def test_there_is_something_to_look_at() -> None:
     assert len(LIBRARY) > 30
     assert {path.parent.name for path in SERVICES} == {"sim", "teleop", "controller", "pose_service"}
@@ -58,6 +64,12 @@ def test_a_library_is_imported_in_its_one_place(library: str) -> None:
 @pytest.mark.parametrize("path", [*LIBRARY, *SERVICES, *OTHERS], ids=name)
 def test_nobody_imports_services_but_tests_and_benchmarks(path: Path) -> None:
     assert "services" not in absolute(path)
+
+
+@pytest.mark.parametrize("path", [*LIBRARY, *SERVICES], ids=name)
+def test_every_verb_tells_a_mistake_in_one_line(path: Path) -> None:
+    """Which holozen.flags.Parser does, and argparse's own does not."""
+    assert "ArgumentParser" not in made(path)
 
 
 @pytest.mark.parametrize("path", SERVICES, ids=name)

@@ -125,7 +125,7 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
 def test_a_wrong_line_ends_it_with_its_number(town: Wire, robot: Robot) -> None:
     done = town.run("topic", "pub", "cmd_vel", "--stdin", given=f"{AHEAD}\n\n[]\n{AHEAD}\n")
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith("holozen topic pub cmd_vel: line 3 refused: not a Twist: ")
+    assert done.stderr.splitlines()[-1].startswith("holozen topic pub: cmd_vel: line 3 refused: not a Twist: ")
     robot.stands()
 
 
@@ -138,7 +138,7 @@ def test_any_type_is_published_as_its_fields_say(town: Wire) -> None:
             assert json.loads(echo.out)["ranges"] == [1.0, 2.5]
         echo = town.start("topic", "echo", "scan", "--once", "--json")
     echo.close()
-    told = "holozen topic pub scan: no type 'sensor_msgs/msg/LaserScn'; did you mean sensor_msgs/msg/LaserScan?"
+    told = "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn'; did you mean sensor_msgs/msg/LaserScan?"
     assert_one_line(town.run("topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, told)
 
 

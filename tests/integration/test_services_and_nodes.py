@@ -81,7 +81,7 @@ def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
 @pytest.mark.parametrize(
     ("words", "code", "reason"),
     [
-        (["call", "next_goal", '{"request_goal": 7}'], 1, "holozen service: goal 7: the list holds goals 0 to 3"),
+        (["call", "next_goal", '{"request_goal": 7}'], 1, "holozen service call: goal 7: the list holds goals 0 to 3"),
         (
             ["call", "next_goal", '{"goal": 7}'],
             1,

@@ -11,6 +11,7 @@ import pytest
 import zenoh
 from rosbags.typesys import Stores, get_typestore
 
+from holozen.messages import TriggerReply, TriggerRequest
 from holozen.testing import Wire, wait_for
 from holozen.testing.wire import command
 
@@ -31,6 +32,7 @@ PUTS = {
     "a/schema": (CDR, "application/cdr;geometry_msgs/msg/Twist"),
     "a/plain": (CDR, "zenoh/bytes"),
     "a/cut": (CDR[:20], "application/cdr;geometry_msgs/msg/Twist"),
+    "a/stamped": (b'{"header": {"stamp": {"sec": 7, "nanosec": 0}}}', "application/json"),
 }
 
 
@@ -79,22 +81,36 @@ def test_what_a_stranger_puts_is_shown(town: Wire, words: str, shown: str) -> No
     assert (done.returncode, done.stdout, done.stderr) == (0, shown, "")
 
 
+NEITHER = "neither text, JSON, msgpack nor CDR"
+NO_TYPE = "for CDR give the type: --type T"
+ODOMETRY = "not a nav_msgs/msg/Odometry: cut off after 52 bytes; --type is wrong, or the bytes are"
+
+
 @pytest.mark.parametrize(
-    ("words", "start"),
+    ("words", "start", "why"),
     [
-        ("a/bytes", "56 bytes of zenoh/bytes: c8 c9 ca "),
-        ("a/cdr", f"{len(CDR)} bytes of application/cdr: 00 01 00 00 "),
-        ("a/plain", f"{len(CDR)} bytes of zenoh/bytes: 00 01 00 00 "),
-        ("a/cut", "20 bytes of application/cdr;geometry_msgs/msg/Twist: 00 01 "),
-        ("a/cdr nav_msgs/msg/Odometry", f"{len(CDR)} bytes of application/cdr: "),
-        ("a/bytes --json", '{"hex": "c8c9ca'),
+        ("a/bytes", "56 bytes of zenoh/bytes: c8 c9 ca ", NEITHER),
+        ("a/cdr", f"{len(CDR)} bytes of application/cdr: 00 01 00 00 ", NO_TYPE),
+        ("a/plain", f"{len(CDR)} bytes of zenoh/bytes: 00 01 00 00 ", NO_TYPE),
+        (
+            "a/cut",
+            "20 bytes of application/cdr;geometry_msgs/msg/Twist: 00 01 ",
+            "not a geometry_msgs/msg/Twist: cut off after 20 bytes",
+        ),
+        ("a/cdr nav_msgs/msg/Odometry", f"{len(CDR)} bytes of application/cdr: ", ODOMETRY),
+        (
+            "a/schema --type nav_msgs/msg/Odometry",
+            f"{len(CDR)} bytes of application/cdr;geometry_msgs/msg/Twist: ",
+            f"{ODOMETRY}, its encoding says geometry_msgs/msg/Twist",
+        ),
+        ("a/bytes --json", '{"hex": "c8c9ca', NEITHER),
     ],
 )
-def test_what_cannot_be_decoded_is_a_hex_dump_and_counted(town: Wire, words: str, start: str) -> None:
+def test_what_cannot_be_decoded_is_a_hex_dump_and_counted(town: Wire, words: str, start: str, why: str) -> None:
     done = town.run("topic", "echo", *words.split(), "--once")
     assert done.returncode == 0
     assert done.stdout.startswith(start)
-    assert done.stderr == "1 of 1 samples could not be decoded; for CDR give the type: --type T\n"
+    assert done.stderr == f"1 of 1 samples could not be decoded; {why}\n"
 
 
 def test_raw_gives_the_bytes_as_they_came(town: Wire) -> None:
@@ -137,7 +153,7 @@ def test_an_expression_shows_the_field_of_those_that_have_it(town: Wire) -> None
 
 
 def test_an_unknown_field_of_a_key_is_an_error_with_the_closest(town: Wire) -> None:
-    told = "holozen topic echo a/json: no field 'sped'; did you mean 'speed'?; there are speed, name"
+    told = "holozen topic echo: a/json: no field 'sped'; did you mean 'speed'?; there are speed, name"
     assert_one_line(town.run("topic", "echo", "a/json", "--field", "sped"), 1, told)
 
 
@@ -153,8 +169,15 @@ def test_rates_and_sizes_of_strangers_are_told_without_losses(town: Wire, verb: 
 
 def test_delay_says_that_there_is_no_stamp(town: Wire) -> None:
     done = town.run("topic", "delay", "a/json", "--timeout", "0.2")
-    assert done.returncode == 1
-    assert "messages have no header.stamp, and so no age" in done.stderr
+    assert_one_line(done, 1, "holozen topic delay: ", " messages have no header.stamp, and so no age")
+    delay = town.start("topic", "delay", "a/json")
+    delay.wait_for_line("messages have no header.stamp, and so no age")
+    assert "no new messages" not in delay.err
+
+
+def test_delay_says_that_no_clock_is_heard(town: Wire) -> None:
+    done = town.run("topic", "delay", "a/stamped", "--timeout", "0.2")
+    assert_one_line(done, 1, " messages have stamps by another clock than this machine's, and nothing comes on clock")
 
 
 @pytest.mark.parametrize("verb", ["hz", "bw", "delay"])
@@ -175,7 +198,42 @@ def test_info_tells_what_a_stranger_sends(town: Wire) -> None:
         "  anonymous  DATA  application/json  DROP when full",
         "Subscription count: 0",
     ]
-    assert_one_line(town.run("topic", "info", "a/json"), 1, "unknown key 'a/json': nobody is there at ")
+    assert town.run("topic", "info", "a/json").stdout == done.stdout
+    assert town.run("topic", "info", "a/schema").stdout.startswith(
+        "Type: geometry_msgs/msg/Twist\nPublisher count: 1\n"
+    )
+    assert_one_line(town.run("topic", "info", "a/nothing"), 1, "unknown key 'a/nothing': nobody is there at ")
+
+
+def test_type_tells_what_comes_of_a_stranger(town: Wire) -> None:
+    assert town.run("topic", "type", "a/schema").stdout == "geometry_msgs/msg/Twist\n"
+    told = "holozen topic type: 'a/json' has no type that anybody tells; what comes is application/json"
+    assert_one_line(town.run("topic", "type", "a/json"), 1, told)
+
+
+def test_a_stranger_who_only_answers_is_told_too(town: Wire) -> None:
+    with zenoh.open(stranger_config(town)) as session:
+        queryable = session.declare_queryable(
+            "b/asked", lambda query: query.reply("b/asked", b"{}", encoding="application/json")
+        )
+        told = "'b/asked' has no type that anybody tells; what comes is application/json"
+        assert_one_line(town.run("topic", "type", "b/asked"), 1, told)
+        lines = town.run("topic", "info", "b/asked").stdout.splitlines()
+        assert lines[:2] == ["Type: unknown", "Publisher count: 1"]
+        assert lines[2].startswith("  anonymous, when asked  DATA  application/json  ")
+        del queryable
+
+
+def test_who_looks_for_a_stranger_calls_no_service(town: Wire) -> None:
+    asked: list[TriggerRequest] = []
+
+    def answer(request: TriggerRequest) -> TriggerReply:
+        asked.append(request)
+        return TriggerReply(True, "")
+
+    town.bus("sim").serve("stop", TriggerRequest, TriggerReply, answer).start()
+    assert_one_line(town.run("topic", "info", "stop"), 1, "unknown key 'stop'")
+    assert asked == []
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ def assert_one_line(done: subprocess.CompletedProcess[str], code: int, *parts: s
     """It failed with this code and one line that holds these parts."""
     assert done.returncode == code, done.stderr
     assert done.stdout == ""
-    said = [line for line in done.stderr.splitlines() if not line.startswith(("usage:", "   "))]
+    said = done.stderr.splitlines()
     assert len(said) == 1, done.stderr
     assert all(part in said[0] for part in parts), said[0]
 
@@ -226,7 +226,7 @@ def test_pub_says_it_as_often_as_told_and_stops_after_more_than_one(
 def test_pub_refuses_what_is_no_command_with_a_reason(town: Wire, robot: Robot, value: str, reason: str) -> None:
     seen = len(robot.commands.all())
     done = town.run("topic", "pub", "cmd_vel", value)
-    assert_one_line(done, 1, "holozen topic pub cmd_vel: refused: ", reason)
+    assert_one_line(done, 1, "holozen topic pub: cmd_vel: refused: ", reason)
     robot.newest()
     assert len(robot.commands.all()) == seen
 
@@ -267,7 +267,7 @@ def test_a_client_without_a_router_gives_up_with_a_reason() -> None:
     done = subprocess.run(
         command("topic", "list", "--mode", "client", "--connect", "tcp/127.0.0.1:9"), capture_output=True, text=True
     )
-    assert_one_line(done, 1, "holozen topic: cannot open Zenoh: ")
+    assert_one_line(done, 1, "holozen topic list: cannot open Zenoh: ")
 
 
 @pytest.mark.parametrize("verb", ["echo odom", "echo nothing", "hz odom", "pub cmd_vel {}"])

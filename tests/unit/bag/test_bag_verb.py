@@ -36,7 +36,7 @@ def test_a_wrong_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[
     for path, why in (("a.mcap", "is no MCAP file"), ("none.mcap", "No such file or directory")):
         assert main(["bag", verb, str(tmp_path / path)]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert line.startswith("holozen bag: ")
+        assert line.startswith(f"holozen bag {verb}: ")
         assert why in line
 
 

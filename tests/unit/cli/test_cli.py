@@ -76,7 +76,7 @@ def failing(monkeypatch: pytest.MonkeyPatch, failure: BaseException) -> None:
 def test_a_failure_of_the_bus_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     failing(monkeypatch, BusError("cannot open\nZenoh"))
     assert cli.main(["node", "list"]) == 1
-    assert capsys.readouterr().err == "holozen node: cannot open?Zenoh\n"
+    assert capsys.readouterr().err == "holozen node list: cannot open?Zenoh\n"
 
 
 @pytest.mark.parametrize("name", ["pybullet", "numpy", "xacro"])

@@ -63,6 +63,17 @@ def test_an_unknown_one_is_told_in_the_sim_s_words_and_the_others_go(sim: FakeSi
     assert run("delete", "nobody", "Bob") == (1, "Bob is deleted\n", told)
 
 
+def test_deleted_ones_are_an_object_a_line_as_json(sim: FakeSim, run: Run) -> None:
+    sim.put("Fred")
+    code, out, err = run("delete", "nobody", "Fred", "--json")
+    reason = "there is no entity 'nobody'; there are Fred"
+    assert [json.loads(line) for line in out.splitlines()] == [
+        {"name": "nobody", "deleted": False, "reason": reason},
+        {"name": "Fred", "deleted": True, "reason": ""},
+    ]
+    assert (code, err) == (1, f"holozen delete: {reason}\n")
+
+
 @pytest.mark.parametrize("name", ["*", "a/b", "", "9"])
 def test_an_illegal_name_is_wrong_usage_and_asks_nothing(sim: FakeSim, run: Run, name: str) -> None:
     sim.put("Fred")

@@ -129,7 +129,7 @@ def test_what_is_wrong_is_one_line_and_exit_code_1(
     words: tuple[str, ...], told: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert cli.main(["interface", *words]) == 1
-    assert capsys.readouterr() == ("", f"holozen interface: {told}\n")
+    assert capsys.readouterr() == ("", f"holozen interface {words[0]}: {told}\n")
 
 
 @pytest.mark.parametrize("words", [(), ("shwo",), ("show",), ("list", "--package", "a"), ("list", "x")], ids=str)

@@ -88,7 +88,7 @@ def test_info_shows_type_writers_and_readers_also_those_of_an_expression(sim: Bu
 def test_info_of_an_unknown_key_names_those_known(sim: Bus, run: Run) -> None:
     code, out, err = run("topic", "info", "odmo")
     assert (code, out) == (1, "")
-    assert err == "holozen topic: unknown key 'odmo'; known: Fred/odom, cmd_vel\n"
+    assert err == "holozen topic info: unknown key 'odmo'; known: Fred/odom, cmd_vel\n"
 
 
 def test_echo_shows_a_message_of_a_key_or_an_expression(sim: Bus, run: Run) -> None:
@@ -103,14 +103,14 @@ def test_echo_shows_a_message_of_a_key_or_an_expression(sim: Bus, run: Run) -> N
 
 
 def test_echo_of_a_silent_key_ends_with_its_timeout(sim: Bus, run: Run, wire: Wire) -> None:
-    told = f"holozen topic: nothing came on odom within 0.1 s at {wire.endpoint}\n"
+    told = f"holozen topic echo: nothing came on odom within 0.1 s at {wire.endpoint}\n"
     assert run("topic", "echo", "odom", "--timeout", "0.1") == (1, "", told)
 
 
 def test_echo_of_a_wrong_key_is_one_line(run: Run) -> None:
     code, out, err = run("topic", "echo", "a//b")
     assert (code, out) == (1, "")
-    assert err.startswith("holozen topic: key 'a//b': ")
+    assert err.startswith("holozen topic echo: key 'a//b': ")
     assert err.count("\n") == 1
 
 
@@ -126,9 +126,9 @@ def test_services_are_listed_and_called(sim: Bus, run: Run) -> None:
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("next_goal", "request_goal: 4"), "holozen service: goal 4: the list holds goals 0 to 3\n"),
-        (("next_goal", "{gaol: 4}"), "holozen service call next_goal: refused: not a NextGoalRequest: Object contains"),
-        (("get_pose", "--timeout", "0.05"), "holozen service: no reply from 'get_pose' within 0.05 s"),
+        (("next_goal", "request_goal: 4"), "holozen service call: goal 4: the list holds goals 0 to 3\n"),
+        (("next_goal", "{gaol: 4}"), "holozen service call: next_goal: refused: not a NextGoalRequest: Object"),
+        (("get_pose", "--timeout", "0.05"), "holozen service call: no reply from 'get_pose' within 0.05 s"),
         (("nonsense",), "holozen service call: 'nonsense' has no known type; known: next_goal, get_pose, "),
     ],
 )
@@ -162,7 +162,7 @@ def test_publishing_what_is_no_message_never_reaches_the_wire(run: Run) -> None:
     for value in ('{"linear":{"x":NaN}}', '{"linaer":{}}', "[]"):
         code, out, err = run("topic", "pub", "cmd_vel", value)
         assert (code, out) == (1, "")
-        assert err.startswith("holozen topic pub cmd_vel: refused: ")
+        assert err.startswith("holozen topic pub: cmd_vel: refused: ")
         assert err.count("\n") == 1
     assert "has no known type; known keys: cmd_vel, odom" in run("topic", "pub", "nonsense", "{}")[2]
 

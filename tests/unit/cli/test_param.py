@@ -95,7 +95,7 @@ def test_set_sets_one_or_several(run: Run, node: Node) -> None:
 def test_set_tells_in_one_line_why_not_and_what_is_allowed(
     run: Run, node: Node, words: tuple[str, str], told: str
 ) -> None:
-    assert run("set", "sim", *words) == (1, "", f"holozen param: setting parameter failed: {told}\n")
+    assert run("set", "sim", *words) == (1, "", f"holozen param set: setting parameter failed: {told}\n")
     code, out, err = run("set", "sim", *words, "--json")
     assert (code, err) == (1, "")
     assert (json.loads(out)["successful"], json.loads(out)["reason"]) == (False, told)
@@ -109,8 +109,8 @@ def test_a_text_that_is_not_unicode_is_told_in_one_line(run: Run, node: Node) ->
 
 def test_of_several_only_the_wrong_ones_are_told(run: Run, node: Node) -> None:
     assert run("set", "sim", "shape", "hexagon", "speed", "9") == (
-        1, "", "holozen param: setting parameter speed failed: speed: 9: use a number from 0.1 to 2 m/s\n"
-        "holozen param: none of the 2 was set\n",
+        1, "", "holozen param set: setting parameter speed failed: speed: 9: use a number from 0.1 to 2 m/s\n"
+        "holozen param set: none of the 2 was set\n",
     )  # fmt: skip
     assert node.values["shape"] == "square"
 
@@ -170,7 +170,7 @@ def test_load_sets_nothing_of_a_file_with_a_mistake(run: Run, node: Node, tmp_pa
 def test_an_unknown_node_is_told_with_the_closest_one(run: Run, node: Node, verb: str) -> None:
     words = ("smi", "speed") + (("1",) if verb == "set" else ())
     assert run(verb, *words) == (
-        1, "", "holozen param: there is no node 'smi' with parameters; did you mean sim?\n"
+        1, "", f"holozen param {verb}: there is no node 'smi' with parameters; did you mean sim?\n"
     )  # fmt: skip
 
 
@@ -189,7 +189,7 @@ def test_a_node_that_does_not_answer_is_told(run: Run, wire: Wire) -> None:
     Parameters(wire.bus("sim"), "sim", lambda: [])  # nobody calls `answer`
     code, _, err = run("get", "sim", "speed", "--timeout", "0.2")
     assert code == 1
-    assert err.startswith("holozen param: no reply from 'sim/get_parameters' within 0.2 s")
+    assert err.startswith("holozen param get: no reply from 'sim/get_parameters' within 0.2 s")
 
 
 def test_help_shows_examples(capsys: pytest.CaptureFixture[str]) -> None:

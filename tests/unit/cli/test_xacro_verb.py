@@ -1,5 +1,6 @@
 """`holozen xacro` prints what a file expands to, or one line."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -29,6 +30,16 @@ def test_arguments_and_an_output_file_are_taken(file: Path, capsys: pytest.Captu
     assert main(["xacro", str(file), "name:=Fred", "-o", str(out)]) == 0
     assert capsys.readouterr() == ("", "")
     assert parse(out.read_text(), out).root == "Fred_link"
+
+
+def test_as_json_it_is_one_object(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["xacro", str(file), "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert (told["file"], parse(told["urdf"], file).root) == (str(file), "base_link")
+    out = file.with_name("robot.urdf")
+    assert main(["xacro", str(file), "-o", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out) == {"file": str(file), "output": str(out)}
+    assert parse(out.read_text(), out).root == "base_link"
 
 
 @pytest.mark.parametrize(
