@@ -13,12 +13,13 @@ PATIENCE = 30.0  # s for all it has to do
 R = TypeVar("R", si.SpawnEntityReply, si.DeleteEntityReply, si.GetEntityStateReply, si.GetEntitiesReply)
 
 
-def names(bus: Bus) -> list[str]:
-    """The names of all entities, sorted. Raises ServiceError, also when there is no sim."""
+def names(bus: Bus, notice: float = 0.0) -> list[str]:
+    """The names of all entities, sorted. Raises ServiceError, also when no sim is there within `notice` seconds (3)."""
+    notice = notice or NOTICE
     try:
-        return sorted(_ask(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, NOTICE).entities)
+        return sorted(_ask(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice).entities)
     except NoReply:
-        raise ServiceError(f"no sim answered within {NOTICE:g} s; start one in another terminal: holozen sim") from None
+        raise ServiceError(f"no sim answered within {notice:g} s; start one in another terminal: holozen sim") from None
 
 
 def pose(bus: Bus, name: str) -> Pose:
@@ -31,9 +32,13 @@ def delete(bus: Bus, name: str) -> None:
     _ask(bus, "delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, PATIENCE)
 
 
-def spawn(bus: Bus, name: str, text: str, at: Pose) -> str:
-    """Puts a robot or object, URDF or SDF text, into the world; returns its name there. Raises ServiceError."""
-    request = si.SpawnEntityRequest(name=name, resource_string=text, initial_pose=si.PoseStamped(pose=at))
+def spawn(bus: Bus, name: str, text: str, at: Pose, namespace: str = "") -> str:
+    """Puts a robot or object, URDF or SDF text, into the world; returns its name there. Raises ServiceError.
+
+    Its keys are below `namespace`: by default its name, the root for a slash.
+    """
+    place = si.PoseStamped(pose=at)
+    request = si.SpawnEntityRequest(name, resource_string=text, entity_namespace=namespace, initial_pose=place)
     return _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE).entity_name or name
 
 

@@ -77,8 +77,9 @@ class EntityFilters(Message):
 class SpawnEntityRequest(Message):
     """A robot or object from `resource_string`, URDF or SDF text (xacro is expanded by who asks).
 
-    `name` is also where its keys are; with `allow_renaming`, or without a name, one is made that is free. A zero in
-    `initial_pose.position.z` with an empty `header.frame_id` is a height like any other.
+    `name` is also where its keys are, unless there is an `entity_namespace`; a slash there is the root. With
+    `allow_renaming`, or without a name, one is made that is free. A zero in `initial_pose.position.z` with an empty
+    `header.frame_id` is a height like any other.
     """
 
     ROS: ClassVar[str] = "simulation_interfaces/srv/SpawnEntity"

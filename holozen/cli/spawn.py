@@ -3,7 +3,7 @@
 import argparse
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from holozen.robot.model import RobotModel
 
 FAR = 1e6  # m
+PATIENCE = 3.0  # s for a router, and for a sim to say that it is there
 ROUND = 6.2832  # rad; whoever writes more means degrees
 PLUGIN = '<gazebo><plugin name="planar_move" filename="libgazebo_ros_planar_move.so"/></gazebo>'
 ENDS = {"</robot>": PLUGIN, "</model>": PLUGIN.removeprefix("<gazebo>").removesuffix("</gazebo>")}
@@ -59,11 +60,15 @@ class Spawned:
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A robot that was read without error: its name to be, what is sent, and what it is."""
+    """A robot that was read without error: its name to be, what is sent, and what it is.
+
+    Its keys are below `namespace`: by default its name, the root for a slash.
+    """
 
     name: str
     text: str
     model: "RobotModel"
+    namespace: str = ""
 
 
 def parser() -> argparse.ArgumentParser:
@@ -80,6 +85,10 @@ def parser() -> argparse.ArgumentParser:
         parser.add_argument(f"-{flag}", type=flags.number(-FAR, FAR, "m"), metavar="m", help=PLACES[flag])
     for flag in "RPY":
         parser.add_argument(f"-{flag}", type=flags.number(-ROUND, ROUND, "rad"), metavar="rad", help=PLACES[flag])
+    parser.add_argument("--namespace", "-robot_namespace", default="", metavar="NAME",
+        help="its keys are below this; / is the root (default: its name)")  # fmt: skip
+    parser.add_argument("--timeout", "-timeout", type=flags.number(0.1, 3600, "s"), default=0.0, metavar="S",
+        help=f"wait as long for a sim (default: {PATIENCE:g})")  # fmt: skip
     parser.add_argument("--replace", action="store_true", help="put it in the place of the one with that name")
     parser.add_argument("--drive", choices=("planar_move",), help="how to move a robot whose file has no drive")
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
@@ -104,8 +113,9 @@ def main(argv: list[str]) -> int:
     place = Place(args.x, args.y, args.z, args.R, args.P, args.Y)
     try:
         candidate = read(file, args.name, values, dict(args.package), args.drive or "", args.strict)
-        with Bus("spawn", connection.from_arguments(args), patience=3.0) as bus:
-            spawned = put(bus, candidate, place, args.replace)
+        candidate = replace(candidate, namespace=args.namespace)
+        with Bus("spawn", connection.from_arguments(args), patience=args.timeout or PATIENCE) as bus:
+            spawned = put(bus, candidate, place, args.replace, args.timeout)
         print(spawned.as_json() if args.json else spawned)
     except RobotError as error:
         say(f"holozen spawn: {error}")
@@ -157,15 +167,15 @@ def read(
     return Candidate(name, text, model)
 
 
-def put(bus: Bus, candidate: Candidate, place: Place, replace: bool) -> Spawned:
-    """Spawn what was read. Raises ServiceError."""
+def put(bus: Bus, candidate: Candidate, place: Place, replace: bool, notice: float = 0.0) -> Spawned:
+    """Spawn what was read; waits `notice` seconds for a sim. Raises ServiceError."""
     from holozen import entities
 
-    there = candidate.name in entities.names(bus)
+    there = candidate.name in entities.names(bus, notice)
     old = entities.pose(bus, candidate.name) if replace and there else None
     pose = _kept(candidate.model, old) if old and place == Place() else _chosen(candidate.model, place)
     try:
-        name = entities.spawn(bus, candidate.name, candidate.text, pose)
+        name = entities.spawn(bus, candidate.name, candidate.text, pose, candidate.namespace)
     except ServiceError as error:
         # The sim finds what is wrong with a robot before it looks at the name: the old one goes only for a good one.
         if entities.is_taken(error) and not replace:
@@ -173,8 +183,8 @@ def put(bus: Bus, candidate: Candidate, place: Place, replace: bool) -> Spawned:
         if not old or not entities.is_taken(error):
             raise
         entities.delete(bus, candidate.name)
-        name = entities.spawn(bus, candidate.name, candidate.text, pose)
-    return _told(name, candidate.model, pose)
+        name = entities.spawn(bus, candidate.name, candidate.text, pose, candidate.namespace)
+    return _told(name, candidate, pose)
 
 
 def _joined(words: list[str]) -> list[str]:
@@ -238,11 +248,12 @@ def _first(value: float | None, other: float | None) -> float:
     return value if value is not None else other or 0.0
 
 
-def _told(name: str, model: "RobotModel", pose: "Pose") -> Spawned:
+def _told(name: str, candidate: Candidate, pose: "Pose") -> Spawned:
     from holozen.wire import key_for
 
+    model, prefix = candidate.model, candidate.namespace.strip("/") if candidate.namespace else name
     if model.drive is not None:
-        return Spawned(name, key_for(model.drive.command_topic, name), pose)
+        return Spawned(name, key_for(model.drive.command_topic, prefix), pose)
     wheels = any(joint.kind == "continuous" for joint in model.joints.values())
     hint = "nothing drives it: spawn it with --drive planar_move to move it as a whole" if wheels else ""
     return Spawned(name, "", pose, hint)

@@ -56,7 +56,8 @@ class EntityServices:
         if request.allow_renaming or not request.name:
             name = self._entities.free_name(name)
         place = _place(request.initial_pose.header, request.initial_pose.pose)
-        entity = self._entities.add(name, model, place, request.entity_namespace or None)
+        namespace = request.entity_namespace  # a slash alone is the root
+        entity = self._entities.add(name, model, place, namespace.strip("/") if namespace else None)
         for warning in model.warnings:
             say(f"sim: {name}: {warning}")
         say(f"sim: {name} was put into the world")
