@@ -1,15 +1,17 @@
-"""rclpy within a test, on a wire of its own."""
+"""rclpy within a test, on a wire of its own; and packages as students write them, where no other is found."""
 
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holozen.ros import context, rclpy
+from holozen.ros import context, packages, rclpy
 from holozen.ros.node import Node
 from holozen.testing import Wire
 
+Write = Callable[..., Path]
 PATIENCE = 10.0  # s
 
 
@@ -38,3 +40,38 @@ def spin_for() -> Callable[..., Any]:
         return value
 
     return spin
+
+
+@pytest.fixture
+def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty working folder; the one above it is shared as /tmp is, so the search for packages ends here."""
+    for variable in ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", "ROS_DISTRO"):
+        monkeypatch.delenv(variable, raising=False)
+    tmp_path.chmod(0o1777)
+    (tmp_path / "home").mkdir()
+    monkeypatch.chdir(tmp_path / "home")
+    return tmp_path / "home"
+
+
+@pytest.fixture
+def write(home: Path) -> Write:
+    """`write("src/my_bot/scripts/a.py", text)`: a file below the working folder."""
+
+    def write(name: str, text: str = "") -> Path:
+        path = home / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    return write
+
+
+@pytest.fixture
+def my_bot(home: Path, write: Write) -> Iterator[Path]:
+    """The package my_bot in a workspace's src, known to this process."""
+    write("src/my_bot/package.xml", "<package><name>my_bot</name></package>")
+    packages.use({})
+    yield home / "src" / "my_bot"
+    packages.given.clear()
+    packages.starts.clear()
+    packages.stand_ins.clear()

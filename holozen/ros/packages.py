@@ -1,0 +1,72 @@
+"""The packages of this process: what `--package` gave, and what lies around the script and the working folder.
+
+`holozen run` and `holozen launch` set them once, before a line of the user's code runs.
+"""
+
+import os
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from holozen.robot.errors import RobotError, listed, near
+from holozen.robot.packages import find_named, local_packages, nearest_robot_folder
+
+MOST = 200  # folders below a workspace in which packages are looked for
+
+given: dict[str, Path] = {}
+starts: list[Path] = []
+stand_ins: dict[str, Path] = {}
+"""Packages of ROS that `holozen launch` stands in for, and folders that are only names: nothing is there to be read."""
+
+
+def use(packages: Mapping[str, Path], *places: Path) -> None:
+    """Set the packages of `--package`, and the folders around which others are looked for, besides the working one."""
+    given.clear()
+    given.update(packages)
+    starts[:] = [*places, Path.cwd()]
+
+
+def find(name: str) -> Path:
+    """The folder of a package: where its `package.xml` is, or `<prefix>/share/<name>`. Raises RobotError."""
+    for place in _places():
+        if found := find_named(name, place, given):
+            return found
+    if name in stand_ins:
+        return stand_ins[name]
+    for start in starts:  # a repository may be cloned under any name, and say none
+        folder = nearest_robot_folder(start)
+        if folder and not (folder / "package.xml").exists():
+            return folder
+    known = [*around(), *stand_ins]
+    hint = near(name, known) or f"; packages found: {listed(known)}"
+    looked = ", ".join(dict.fromkeys(map(str, starts)))
+    raise RobotError(f"no package {name!r} around {looked}{hint}; say where it is: --package {name[:80]}=DIR")
+
+
+def around() -> dict[str, Path]:
+    """Name -> folder of the packages given, and of those around the places of `use`; the nearest wins."""
+    found: dict[str, Path] = {}
+    for place in reversed(list(_places())):
+        found |= local_packages(place)
+    return found | given
+
+
+def prefix(folder: Path) -> Path:
+    """Where a package is installed: above `share` if there is one, else its own folder."""
+    return folder.parents[1] if folder.parent.name == "share" else folder
+
+
+def _places() -> Iterator[Path]:
+    """The folders around which `find_named` looks: each start, and the sources below a workspace."""
+    for start in dict.fromkeys(starts):
+        yield start
+        for folder in (start, start / "src"):
+            yield from [folder, *_children(folder)] if folder != start else _children(folder)
+
+
+def _children(folder: Path) -> list[Path]:
+    try:
+        with os.scandir(folder) as entries:
+            names = [entry.name for entry in entries if entry.is_dir() and not entry.name.startswith(".")]
+    except OSError:
+        return []
+    return [folder / name for name in sorted(names)[:MOST]]

@@ -1,0 +1,56 @@
+"""A traceback of the user's code alone: what Python prints, without the frames of this package in between."""
+
+import sys
+from pathlib import Path
+from types import TracebackType
+
+from holozen.ros import missing
+from holozen.ros.ament_index_python import PackageNotFoundError
+
+_OURS = str(Path(__file__).resolve().parents[1]) + "/"
+_MACHINERY = ("<frozen importlib", "<frozen runpy")
+
+
+def show(error: BaseException) -> None:
+    """Print the traceback of an error to standard error as Python does at the end of a script.
+
+    The user's own sys.excepthook is asked. With `python -X dev` every frame is shown.
+    """
+    if not sys.flags.dev_mode:
+        _strip(error, set())
+    sys.excepthook(type(error), error, error.__traceback__)
+
+
+def in_one_line(error: Exception) -> str:
+    """An error that says all by itself, after the user's file and line: what cannot be imported, a package that is not
+    there, a name that ROS has and this has not. Empty for any other.
+    """
+    if not isinstance(error, ImportError | PackageNotFoundError) and missing.PAGE not in str(error):
+        return ""
+    trace = users_own(error.__traceback__)
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    place = f"{trace.tb_frame.f_code.co_filename}:{trace.tb_lineno}: " if trace else ""
+    return f"{place}{' '.join(str(error).split())}"
+
+
+def _strip(error: BaseException, seen: set[int]) -> None:
+    seen.add(id(error))
+    error.__traceback__ = users_own(error.__traceback__)
+    for other in (error.__cause__, error.__context__):
+        if other is not None and id(other) not in seen:
+            _strip(other, seen)
+
+
+def users_own(trace: TracebackType | None) -> TracebackType | None:
+    """A traceback without our frames and without those of the import system."""
+    frames = []
+    while trace is not None:
+        name = trace.tb_frame.f_code.co_filename
+        if not name.startswith((_OURS, *_MACHINERY)):
+            frames.append(trace)
+        trace = trace.tb_next
+    found: TracebackType | None = None
+    for frame in reversed(frames):
+        found = TracebackType(found, frame.tb_frame, frame.tb_lasti, frame.tb_lineno)
+    return found

@@ -1,0 +1,142 @@
+"""`holozen run PACKAGE EXECUTABLE` finds what `ros2 run` would, in sources and where it is installed."""
+
+from pathlib import Path
+
+import pytest
+
+from holozen.ros import packages
+from holozen.ros.executables import NotFound, find, from_file
+
+from .conftest import Write
+
+
+@pytest.mark.parametrize("folder", ["scripts", "my_bot", "nodes", "src"])
+@pytest.mark.parametrize("name", ["controller", "controller.py"])
+def test_a_script_is_found_with_and_without_its_ending(my_bot: Path, write: Write, folder: str, name: str) -> None:
+    path = write(f"src/my_bot/{folder}/controller.py")
+    script = find("my_bot", name)
+    assert (script.path, script.root, script.function) == (path, path.parent, "")
+
+
+def test_a_script_without_ending_has_to_be_executable_and_python(my_bot: Path, write: Write) -> None:
+    path = write("src/my_bot/scripts/drive", "#!/usr/bin/env python3\n")
+    with pytest.raises(NotFound, match="no executable 'drive'"):
+        find("my_bot", "drive")
+    path.chmod(0o755)
+    assert find("my_bot", "drive").path == path
+    path.write_text("\x7fELF\0")
+    with pytest.raises(NotFound, match="drive is no Python script, and only those run here"):
+        find("my_bot", "drive")
+
+
+def test_a_link_runs_beside_what_it_leads_to(my_bot: Path, write: Write) -> None:
+    """As Python does: `import helper` is looked up where the file really lies."""
+    real = write("elsewhere/controller.py")
+    (my_bot / "scripts").mkdir()
+    (my_bot / "scripts" / "controller.py").symlink_to(real)
+    assert find("my_bot", "controller.py").root == real.parent
+
+
+SETUP_PY = """
+from setuptools import setup
+package_name = 'my_bot'
+setup(name=package_name, entry_points={'console_scripts': [
+    'drive = my_bot.controller:main',
+    f'shape = {package_name}.shape:run',
+    'pose = ' + package_name + '.pose:Pose.start',
+]})
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "module", "function"),
+    [
+        ("drive", "my_bot.controller", "main"),
+        ("shape", "my_bot.shape", "run"),
+        ("pose", "my_bot.pose", "Pose.start"),
+    ],
+)
+def test_console_scripts_are_read_from_setup_py_without_running_it(
+    my_bot: Path, write: Write, name: str, module: str, function: str
+) -> None:
+    write("src/my_bot/setup.py", SETUP_PY + "raise SystemExit('this was run')")
+    path = write(f"src/my_bot/{module.replace('.', '/')}.py")
+    script = find("my_bot", name)
+    assert (script.module, script.function, script.path, script.root) == (module, function, path, my_bot)
+
+
+def test_console_scripts_are_read_from_setup_cfg(my_bot: Path, write: Write) -> None:
+    write("src/my_bot/setup.cfg", "[options.entry_points]\nconsole_scripts =\n  drive = my_bot.controller:main\n")
+    write("src/my_bot/my_bot/controller.py")
+    assert find("my_bot", "drive").function == "main"
+
+
+def test_a_console_script_without_its_module_is_told(my_bot: Path, write: Write) -> None:
+    write("src/my_bot/setup.py", SETUP_PY)
+    with pytest.raises(NotFound, match=r"'drive' is my_bot.controller:main in its setup file, but there is no .*\.py"):
+        find("my_bot", "drive")
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "told"),
+    [
+        ("setup.py", "setup(\n  entry_points={'console", r"setup.py:2: unterminated string"),
+        ("setup.cfg", "[options.entry_points", r"setup.cfg: File contains no section headers"),
+    ],
+)
+def test_a_setup_file_that_cannot_be_read_is_told(my_bot: Path, write: Write, file: str, text: str, told: str) -> None:
+    write(f"src/my_bot/{file}", text)
+    with pytest.raises(NotFound, match=told) as error:
+        find("my_bot", "drive")
+    assert str(error.value).isprintable()
+
+
+def test_where_it_is_installed_lib_is_looked_into(home: Path, write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
+    (home / "install/share/my_bot").mkdir(parents=True)
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(home / "install"))
+    path = write("install/lib/my_bot/controller.py")
+    packages.use({})
+    assert find("my_bot", "controller.py").path == path
+
+
+def test_an_unknown_executable_is_told_with_all_there_are(my_bot: Path, write: Write) -> None:
+    write("src/my_bot/setup.py", SETUP_PY)
+    write("src/my_bot/scripts/service_node.py")
+    write("src/my_bot/my_bot/__init__.py")
+    with pytest.raises(NotFound) as error:
+        find("my_bot", "servce_node.py")
+    told = f"no executable 'servce_node.py'; did you mean 'service_node.py'?; in {my_bot} there are: "
+    assert str(error.value).endswith(f"{told}drive, pose, service_node.py, shape")
+    with pytest.raises(NotFound, match=r"^give one; in"):
+        find("my_bot", "")
+
+
+def test_an_unknown_package_is_told_with_those_around(my_bot: Path) -> None:
+    with pytest.raises(NotFound, match=r"no package 'my_boot' around .*; did you mean 'my_bot'\?; say .* --package"):
+        find("my_boot", "controller.py")
+
+
+@pytest.mark.parametrize("where", [".", "src", "src/my_bot", "src/my_bot/scripts"])
+def test_a_package_is_found_from_anywhere_in_its_workspace(
+    my_bot: Path, write: Write, monkeypatch: pytest.MonkeyPatch, where: str
+) -> None:
+    write("src/my_bot/scripts/a.py")
+    monkeypatch.chdir(where)
+    packages.use({})
+    assert find("my_bot", "a").path == my_bot / "scripts" / "a.py"
+
+
+def test_a_package_in_a_repository_of_packages_is_found(my_bot: Path, write: Write) -> None:
+    write("src/repo/arm/package.xml", "<package><name>arm</name></package>")
+    write("src/repo/arm/scripts/a.py")
+    assert find("arm", "a").path.parts[-4:] == ("repo", "arm", "scripts", "a.py")
+
+
+def test_a_file_that_is_not_there_is_told_with_its_neighbours(write: Write) -> None:
+    path = write("scripts/controller.py")
+    with pytest.raises(NotFound, match=r"no file '.*/controler.py'; did you mean 'controller.py'\?"):
+        from_file(path.with_name("controler.py"))
+    with pytest.raises(NotFound, match=r"Python files there: controller\.py"):
+        from_file(path.with_name("x.py"))
+    with pytest.raises(NotFound, match="is a folder; give a Python file, or PACKAGE EXECUTABLE"):
+        from_file(path.parent)

@@ -1,0 +1,186 @@
+"""`holozen run`: a script runs as by `python3`, with ROS's packages, and ends as it would there."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen.testing import Process, Wire
+
+from .conftest import Write
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+REPO = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def run(home: Path, wire: Wire) -> Run:
+    """`run("controller.py", "--x")`: run it to its end, in the working folder."""
+
+    def run(*words: str, flags: tuple[str, ...] = (), **env: str) -> subprocess.CompletedProcess[str]:
+        line = [sys.executable, "-m", "holozen", "run", *wire.flags, *flags, *words]
+        return subprocess.run(line, capture_output=True, text=True, timeout=60, env=environment(**env))
+
+    return run
+
+
+def environment(**more: str) -> dict[str, str]:
+    """That of the test, with this tree importable from any folder."""
+    return {**os.environ, "PYTHONPATH": str(REPO), **more}
+
+
+def test_a_script_is_main_with_its_own_words_and_folder_first(run: Run, write: Write) -> None:
+    write("scripts/helper.py", "word = 'helped'")
+    told = "print(__name__, sys.argv, __file__, sys.modules['__main__'].__dict__ is globals(), helper.word)"
+    path = write("scripts/a.py", f"import sys, helper\n{told}")
+    done = run("scripts/a.py", "x", "--connect", "-h", "--ros-args", "-r", "a:=b")
+    words = [str(path), "x", "--connect", "-h", "--ros-args", "-r", "a:=b"]
+    assert done.stdout == f"__main__ {words} {path} True helped\n"
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_it_has_what_python_gives_every_script(run: Run, write: Write) -> None:
+    """The names that a script of its own finds in its module."""
+    path = write("a.py", "print(sorted(globals()), __doc__, __package__, __spec__)")
+    plain = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=60)
+    assert run("a.py").stdout == plain.stdout
+
+
+def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Path) -> None:
+    write("src/my_bot/scripts/a.py", "print('a script')")
+    write("src/my_bot/setup.py", "setup(entry_points={'console_scripts': ['b = my_bot.b:Main.start']})")
+    write("src/my_bot/my_bot/__init__.py")
+    write("src/my_bot/my_bot/b.py", "class Main:\n  def start():\n    print('a function', __name__)\n    return 7")
+    assert run("my_bot", "a").stdout == "a script\n"
+    done = run("my_bot", "b")
+    assert (done.stdout, done.returncode) == ("a function my_bot.b\n", 7)
+
+
+@pytest.mark.parametrize(
+    ("end", "code", "told"),
+    [
+        ("", 0, ""),
+        ("sys.exit()", 0, ""),
+        ("sys.exit(3)", 3, ""),
+        ("sys.exit('no robot')", 1, "no robot\n"),
+        ("raise KeyboardInterrupt", 130, ""),
+        ("os.kill(os.getpid(), 2); time.sleep(60)", 130, ""),
+    ],
+)
+def test_the_exit_code_is_the_scripts(run: Run, write: Write, end: str, code: int, told: str) -> None:
+    write("a.py", f"import os, sys, time\n{end}")
+    done = run("a.py")
+    assert (done.returncode, done.stderr) == (code, told)
+
+
+def test_a_traceback_is_the_users_and_shows_none_of_ours(run: Run, write: Write) -> None:
+    path = write(
+        "a.py", "def f():\n    return 1 / 0\n\n\ntry:\n    f()\nexcept Exception as e:\n    raise OSError('b') from e"
+    )
+    done = run("a.py")
+    plain = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (plain.returncode, plain.stderr)
+
+
+@pytest.mark.parametrize("text", ["def f(:\n  pass", "a = 1\n  b = 2", "x = '\0'"])
+def test_what_is_no_python_is_told_as_python_does(run: Run, write: Write, text: str) -> None:
+    write("a.py", text)
+    done = run("a.py")
+    assert done.returncode == 1
+    assert "holozen" not in done.stderr
+    assert "Error: " in done.stderr.splitlines()[-1]
+
+
+def test_frames_of_ours_between_those_of_the_user_are_left_out(run: Run, write: Write) -> None:
+    write("a.py", """
+import rclpy
+rclpy.init()
+node = rclpy.create_node("a")
+node.create_timer(0.001, lambda: {}["lost"])
+rclpy.spin(node)
+""")  # fmt: skip
+    done = run("a.py")
+    assert done.returncode == 1
+    assert "holozen" not in done.stderr
+    assert done.stderr.splitlines()[-1] == "KeyError: 'lost'"
+    assert done.stderr.count("  File ") == 2
+
+
+def test_a_name_that_is_not_there_is_told_in_the_users_traceback(run: Run, write: Write) -> None:
+    write("a.py", "from geometry_msgs.msg import Twost\n")
+    done = run("a.py")
+    assert "holozen/ros" not in done.stderr
+    assert "Twist" in done.stderr.splitlines()[-1]
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["q.py"], "no file 'q.py'; Python files there: controller.py"),
+        (["scripts/b.py"], "no file 'scripts/b.py'"),
+        (["my_boot", "a.py"], "no package 'my_boot' around "),
+        (["my_bot", "c.py"], "package 'my_bot' has no executable 'c.py'"),
+        (["my_bot"], "give one; in "),
+        (["my_bot", "--ros-args"], "give one; in "),
+    ],
+)
+def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path, words: list[str], told: str) -> None:
+    write("controller.py")
+    done = run(*words)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert told in done.stderr
+    assert done.stderr.startswith("holozen run: ")
+
+
+def test_where_ros_is_sourced_it_refuses_unless_forced(run: Run, write: Write) -> None:
+    write("a.py", "import rclpy; print(rclpy.init.__module__)")
+    done = run("a.py", ROS_DISTRO="humble")
+    told = "ROS is sourced in this terminal (ROS_DISTRO=humble)"
+    assert (
+        done.stderr == f"holozen run: {told}: start the script with ROS's own `ros2 run`, or over Zenoh with --force\n"
+    )
+    assert done.returncode == 1
+    assert run("a.py", flags=("--force",), ROS_DISTRO="humble").stdout.startswith("holozen.")
+
+
+def test_where_ros_can_be_imported_it_refuses_unless_forced(run: Run, write: Write, home: Path) -> None:
+    write("a.py", "import rclpy; print(rclpy.init.__module__)")
+    write("ros/rclpy/__init__.py", "init = 7")
+    path = f"{REPO}{os.pathsep}{home / 'ros'}"
+    done = run("a.py", PYTHONPATH=path)
+    assert "ROS's own rclpy can be imported here (" in done.stderr
+    assert done.returncode == 1
+    assert run("a.py", flags=("--force",), PYTHONPATH=path).stdout.startswith("holozen.")
+
+
+def test_under_python_alone_it_fails_as_ever(write: Write) -> None:
+    path = write("a.py", "import rclpy")
+    done = subprocess.run([sys.executable, str(path)], capture_output=True, text=True, timeout=60)
+    assert done.stderr.splitlines()[-1] == "ModuleNotFoundError: No module named 'rclpy'"
+
+
+def test_the_connection_is_that_of_the_flags(run: Run, write: Write, wire: Wire) -> None:
+    write("a.py", "from holozen.ros import context; print(context.connection.connect, context.connection.wire)")
+    assert run("a.py", flags=("--wire", "cdr")).stdout == f"('{wire.endpoint}',) cdr\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_script_that_spins(wire: Wire, write: Write, number: int) -> None:
+    path = write("a.py", "import rclpy\nrclpy.init()\nnode = rclpy.create_node('a')\nprint('spins')\nrclpy.spin(node)")
+    line = [sys.executable, "-u", "-m", "holozen", "run", *wire.flags, str(path)]
+    with Process(line, env=environment()) as process:
+        process.wait_for_line("spins")
+        process.signal(number)
+        process.wait(within=10)
+        assert "holozen/" not in process.err
+        assert process.returncode in ((130,) if number == signal.SIGINT else (1, -15, 143))
+
+
+def test_a_srv_of_the_script_s_own_package_is_there(run: Run, write: Write, my_bot: Path) -> None:
+    write("src/my_bot/srv/NextGoal.srv", "int32 request_goal\n---\nfloat64 x_goal\n")
+    path = write("src/my_bot/scripts/a.py", "from my_bot.srv import NextGoal; print(NextGoal.Response(x_goal=1.5))")
+    assert run(str(path)).stdout == "my_bot.srv.NextGoal_Response(x_goal=1.5)\n"
