@@ -7,8 +7,10 @@ import os
 import signal
 import sys
 import threading
+from collections.abc import Callable
 from types import FrameType
 
+_PR_SET_PDEATHSIG = 1  # prctl(2)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 LOOK = 0.5  # s
 
@@ -44,3 +46,11 @@ def leave(code: int) -> None:
         with contextlib.suppress(OSError, ValueError, AttributeError):  # it is gone, closed or was never there
             stream.flush()
     os._exit(code)
+
+
+def dies_with_parent() -> Callable[[], None]:
+    """For subprocess's `preexec_fn`: have the kernel end the child when this process is killed."""
+    import ctypes
+
+    libc = ctypes.CDLL(None)  # here, and not in the child: an import between fork and exec may hang
+    return lambda: libc.prctl(_PR_SET_PDEATHSIG, signal.SIGTERM) and None

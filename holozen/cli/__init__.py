@@ -15,6 +15,8 @@ VERBS = {
     "controller": "drive a robot to the goals of next_goal",
     "pose-service": "answer next_goal and get_pose",
     "router": "run a Zenoh router",
+    "run": "run a Python script that was written for ROS 2",
+    "launch": "follow a Python launch file that was written for ROS 2",
     "spawn": "put a robot or object into the sim",
     "delete": "take it out again",
     "list": "the robots and objects in the sim, and where they are",

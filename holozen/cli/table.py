@@ -32,7 +32,9 @@ def _row(parser: argparse.ArgumentParser) -> str:
     does = " ".join((parser.description or "").split())
     example = (parser.epilog or "").partition("example: ")[2]
     told = f"{does}<br>`{example}`" if example else does
-    return " | ".join((f"| `{' '.join([parser.prog, *places])}`", _cell(told), " ".join(map(_cell, flags)))) + " |"
+    return (
+        " | ".join((f"| `{_cell(' '.join([parser.prog, *places]))}`", _cell(told), " ".join(map(_cell, flags)))) + " |"
+    )
 
 
 def _place(action: argparse.Action) -> str:

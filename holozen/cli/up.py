@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import ctypes
 import signal
 import subprocess
 import sys
@@ -13,14 +12,13 @@ import time
 from typing import IO, Any
 
 from holozen import connection, flags
-from holozen.process import stop_event
+from holozen.process import dies_with_parent, stop_event
 from holozen.tell import say
 
 GRACE = 1.2  # s for the commanding processes to stop the robot; the sim comes after them
 SIM_GRACE = 0.5  # s
 LOOK = 0.05  # s
 LAST_LINES = 20
-_PR_SET_PDEATHSIG = 1  # prctl(2)
 # Plain keys, no update under way, lines wrap, no reports of focus and pastes, a cursor, the main screen.
 SCREEN_LEFT = "\x1b[<u\x1b[?2026l\x1b[?7h\x1b[?1004l\x1b[?2004l\x1b[?25h\x1b[?1049l"
 
@@ -85,7 +83,7 @@ class Team:
             stdout=None if in_terminal else self._log,
             stderr=None if in_terminal else self._log,
             start_new_session=not in_terminal,
-            preexec_fn=_die_with_parent,
+            preexec_fn=dies_with_parent(),
         )
 
     def watch(self, stop: threading.Event) -> bool:
@@ -129,11 +127,6 @@ def _end(running: dict[str, subprocess.Popen[bytes]], grace: float) -> None:
             say(f"up: {verb} did not end within {grace} s and was killed")
             process.kill()
             process.wait()
-
-
-def _die_with_parent() -> None:
-    """Have the kernel end this process when `up` is killed, so that nothing is left behind."""
-    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGTERM)
 
 
 def _flags(args: argparse.Namespace, *names: str) -> list[str]:

@@ -1,0 +1,95 @@
+"""A stage on which nothing is started: what would be is kept."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen.ros.launch import gazebo
+from holozen.ros.launch.context import LaunchContext, Program
+from holozen.ros.launch.entity import Entities, LaunchDescription
+from holozen.ros.launch.text import LaunchError
+
+Follow = Callable[..., "Kept"]
+
+
+class Kept:
+    """What a launch file did: the programs, in order."""
+
+    def __init__(self, values: dict[str, str], path: Path) -> None:
+        self.context = LaunchContext(self, ["--wire", "cdr"])
+        self.context.scope = self.context.scope.within(path)
+        self.context.scope.configurations.update(values)
+        self.programs: list[Program] = []
+        self.left: list[tuple[Any, bool]] = []
+        self.timers: list[tuple[float, Entities]] = []
+        self.handlers: list[Any] = []
+        self.reason = ""
+        self._later: list[Any] = []
+
+    def follow(self, entities: Any) -> None:
+        """Do what the entities say, each with the scope that it has."""
+        scope = self.context.scope
+        for entity in entities:
+            self.context.scope = scope
+            try:
+                found = entity.visit(self.context)
+            except LaunchError as error:
+                raise error.at(entity.place) from None
+            self.follow(found)
+
+    def start(self, _action: Any, program: Program) -> None:
+        self.programs.append(program)
+
+    def left_out(self, action: Any, ends: bool) -> None:
+        self.left.append((action, ends))
+
+    def after(self, seconds: float, actions: Entities) -> object:
+        self.timers.append((seconds, actions))
+        return self.timers[-1]
+
+    def cancel(self, timer: Any) -> None:
+        self.timers.remove(timer)
+
+    def last(self, action: Any) -> bool:
+        if action in self._later:
+            return False
+        self._later.append(action)
+        return True
+
+    def handle(self, handler: Any) -> None:
+        self.handlers.append(handler)
+
+    def unhandle(self, handler: Any) -> None:
+        self.handlers.remove(handler)
+
+    def stop(self, reason: str) -> None:
+        self.reason = reason
+
+    def words(self, number: int = 0) -> list[str]:
+        """Those of a program of ours from its verb on, without packages and connection."""
+        found = list(self.programs[number].words)
+        assert found[1:3] == ["-m", "holozen"], found
+        for flag in ("--package", "--wire"):
+            while flag in found:
+                at = found.index(flag)
+                del found[at : at + 2]
+        return found[3:]
+
+
+@pytest.fixture
+def follow(my_bot: Path) -> Follow:
+    """`follow([actions], name="value")`: what they do in a launch file of my_bot, with values of its arguments."""
+    gazebo.stand_in()
+
+    def follow(actions: list[Any], **values: str) -> Kept:
+        kept = Kept(values, my_bot / "launch" / "a.launch.py")
+        kept.follow([LaunchDescription(actions)])
+        while kept._later:
+            later, kept._later = kept._later, list(kept._later)
+            kept.follow(later)
+            break
+        return kept
+
+    return follow

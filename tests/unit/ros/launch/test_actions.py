@@ -1,0 +1,217 @@
+"""The other actions of a launch file, and programs that it starts."""
+
+import os
+import sys
+from typing import Any
+
+import pytest
+
+from holozen.ros.launch import actions as a
+from holozen.ros.launch.entity import LaunchDescription
+from holozen.ros.launch.events import OnProcessExit, OnProcessStart, OnShutdown, ProcessExited, ProcessStarted
+from holozen.ros.launch.events import Shutdown as ShutdownEvent
+from holozen.ros.launch.sources import PythonLaunchDescriptionSource
+from holozen.ros.launch.substitutions import EnvironmentVariable, LaunchConfiguration, ThisLaunchFileDir
+from holozen.ros.launch.text import LaunchError
+
+from ..conftest import Write
+from .conftest import Follow
+
+WHO = LaunchConfiguration("who")
+SAY = a.LogInfo(msg=["I am ", WHO])
+
+
+def said(capsys: pytest.CaptureFixture[str]) -> list[str]:
+    return capsys.readouterr().err.splitlines()
+
+
+def test_an_argument_has_the_value_given_or_its_default(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    declared = a.DeclareLaunchArgument("who", default_value=["no", "body"], description="a name")
+    follow([declared, SAY])
+    follow([declared, SAY], who="Fred")
+    assert said(capsys) == ["I am nobody", "I am Fred"]
+
+
+@pytest.mark.parametrize(
+    ("declared", "told"),
+    [
+        (a.DeclareLaunchArgument("which"), "launch argument 'which' has no value; give which:=VALUE"),
+        (a.DeclareLaunchArgument("who", choices=["Ann", "Bob"]), "who:=Fred: it has to be one of Ann, Bob"),
+    ],
+)
+def test_an_argument_without_a_good_value_is_told(follow: Follow, declared: Any, told: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+        follow([declared], who="Fred")
+
+
+def test_values_and_the_environment_can_be_set(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = follow([
+        a.SetLaunchConfiguration("who", "Ann"), SAY, a.UnsetLaunchConfiguration("who"),
+        a.SetEnvironmentVariable("WHO", "Ann"), a.AppendEnvironmentVariable("WHO", "Bob"),
+        a.AppendEnvironmentVariable("WHO", "Eve", prepend=True), a.LogInfo(msg=EnvironmentVariable("WHO")),
+        a.ExecuteProcess(cmd=["true"], additional_env={"MORE": "1"}), a.UnsetEnvironmentVariable("WHO"),
+        a.ExecuteProcess(cmd=["true"], env={"ALONE": "1"}),
+    ])  # fmt: skip
+    assert said(capsys) == ["I am Ann", "Eve:Ann:Bob"]
+    first, second = (program.environment for program in kept.programs)
+    assert (first["WHO"], first["MORE"], first["PATH"]) == ("Eve:Ann:Bob", "1", os.environ["PATH"])
+    assert second == {"ALONE": "1"}
+    assert "WHO" not in os.environ
+
+
+def test_a_launch_file_is_included_with_values(
+    follow: Follow, write: Write, capsys: pytest.CaptureFixture[str]
+) -> None:
+    text = """
+from holozen.ros.launch.actions import DeclareLaunchArgument, LogInfo
+from holozen.ros.launch.entity import LaunchDescription
+from holozen.ros.launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
+def generate_launch_description():
+    who = DeclareLaunchArgument("who", default_value="nobody")
+    return LaunchDescription([who, LogInfo(msg=[ThisLaunchFileDir(), " ", LaunchConfiguration("who")])])
+"""
+    path = write("other/b.launch.py", text)
+    source = PythonLaunchDescriptionSource(str(path))
+    include = a.IncludeLaunchDescription(source, launch_arguments={"who": ["Fr", "ed"]}.items())
+    kept = follow([include, a.LogInfo(msg=ThisLaunchFileDir())])
+    assert said(capsys) == [f"{path.parent} Fred", str(kept.context.file.parent)]
+    assert kept.context.launch_configurations["who"] == "Fred"  # as in ROS, where includes are not scoped
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "told"),
+    [
+        ("b.launch.xml", "<launch/>", "only launch files in Python are read here"),
+        ("b.launch.py", "x = 1", "has no function generate_launch_description"),
+        ("b.launch.py", "def generate_launch_description(): return 7", r"returned 7, not a LaunchDescription"),
+        ("c.launch.py", "", r"no launch file '.*/b.launch.py'; did you mean 'c.launch.py'"),
+    ],
+)
+def test_a_file_that_cannot_be_included_is_told(follow: Follow, write: Write, name: str, text: str, told: str) -> None:
+    path = write(f"other/{name}", text)
+    wanted = path if name[0] == "b" else path.with_name("b.launch.py")
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+        follow([a.IncludeLaunchDescription(wanted)])
+
+
+def test_files_that_include_themselves_are_told(follow: Follow, write: Write) -> None:
+    text = """
+from holozen.ros.launch.actions import IncludeLaunchDescription
+from holozen.ros.launch.entity import LaunchDescription
+def generate_launch_description():
+    return LaunchDescription([IncludeLaunchDescription(__file__)])
+"""
+    with pytest.raises(LaunchError, match="launch files within launch files, more than 30 deep"):
+        follow([a.IncludeLaunchDescription(write("b.launch.py", text))])
+
+
+def test_a_function_is_called_and_what_it_returns_is_done(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    def choose(context: Any, *args: str, again: str) -> Any:
+        name = WHO.perform(context)
+        assert context.perform_substitution(WHO) == context.launch_configurations["who"] == name
+        return [a.LogInfo(msg=f"{name} {args} {again}")] if name == "Fred" else None
+
+    def actions() -> list[Any]:
+        return [a.OpaqueFunction(function=choose, args=["x"], kwargs={"again": "y"})]
+
+    follow(actions(), who="Fred")
+    follow(actions(), who="Ann")
+    assert said(capsys) == ["Fred ('x',) y"]
+
+
+@pytest.mark.parametrize("function", [lambda _context: [7], lambda _context: 7])
+def test_a_function_that_returns_no_actions_is_told(follow: Follow, function: Any) -> None:
+    with pytest.raises(LaunchError, match=r"7 is no action; actions are such as Node"):
+        follow([a.OpaqueFunction(function=function)])
+
+
+def test_timers_and_handlers_are_kept_for_later(follow: Follow) -> None:
+    timer, handler = a.TimerAction(period=WHO, actions=[SAY]), OnShutdown(on_shutdown=[SAY])
+    kept = follow([timer, a.RegisterEventHandler(handler), a.TimerAction(period=1, actions=[])], who="2.5")
+    assert (kept.timers[0], kept.handlers) == ((2.5, [SAY]), [handler])
+    timer.cancel()
+    assert [seconds for seconds, _ in kept.timers] == [1.0]
+    assert follow([a.RegisterEventHandler(handler), a.UnregisterEventHandler(handler)]).handlers == []
+
+
+@pytest.mark.parametrize("action", [a.Shutdown(reason="done"), a.EmitEvent(event=ShutdownEvent(reason="done"))])
+def test_the_launch_can_be_ended(follow: Follow, action: Any) -> None:
+    assert follow([action]).reason == "done"
+
+
+def test_a_handler_answers_for_its_own_action(follow: Follow) -> None:
+    mine, other = a.ExecuteProcess(cmd=["true"]), a.ExecuteProcess(cmd=["true"])
+    context = follow([]).context
+    ended, started = ProcessExited(mine, "true-1", 3), ProcessStarted(mine, "true-1")
+    assert list(OnProcessExit(target_action=mine, on_exit=[SAY]).answer(ended, context)) == [SAY]
+    assert list(OnProcessExit(target_action=mine, on_exit=SAY).answer(started, context)) == []
+    assert list(OnProcessStart(target_action=other, on_start=[SAY]).answer(started, context)) == []
+    assert list(OnProcessStart(on_start=[SAY]).answer(started, context)) == [SAY]
+    said: list[Any] = []
+    OnProcessExit(on_exit=lambda event, _context: said.append(event.returncode)).answer(ended, context)
+    OnProcessExit(target_action=lambda action: action is other, on_exit=[SAY])
+    assert said == [3]
+
+
+def test_scripts_of_python_and_verbs_of_ros2_are_ours(follow: Follow, write: Write) -> None:
+    write("src/my_bot/scripts/c.py")
+    kept = follow([
+        a.ExecuteProcess(cmd=["python3", "a.py", "-x"], output="screen"),
+        a.ExecuteProcess(cmd=[sys.executable, ["a", ".py"]]),
+        a.ExecuteProcess(cmd=["ros2", "topic", "pub", "-1", "/cmd_vel", "geometry_msgs/msg/Twist", "{}"]),
+        a.ExecuteProcess(cmd=["ros2", "run", "my_bot", "c.py", "--fast"]),
+    ])  # fmt: skip
+    words = [kept.words(number) for number in range(4)]
+    assert words[:2] == [["run", "a.py", "-x"], ["run", "a.py"]]
+    assert words[2] == ["topic", "pub", "-1", "/cmd_vel", "geometry_msgs/msg/Twist", "{}"]
+    assert words[3] == ["run", "my_bot", "c.py", "--fast"]
+    assert [program.name for program in kept.programs] == ["a.py", "a.py", "ros2 topic", "ros2 run"]
+
+
+def test_a_verb_of_ros2_that_is_not_ours_is_left_out(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    action = a.ExecuteProcess(cmd=["ros2", "control", "load_controller", "arm"])
+    assert follow([action]).left == [(action, True)]
+    assert said(capsys) == ["launch: `ros2 control load_controller arm` is left out: there is no verb 'control' here"]
+
+
+def test_other_programs_are_started_as_they_are(follow: Follow) -> None:
+    kept = follow([
+        a.ExecuteProcess(cmd=["echo", WHO], name="say"), a.ExecuteProcess(cmd=["echo", WHO, "|", "cat"], shell=True),
+        a.ExecuteProcess(cmd=["sleep", "1"], respawn=True, respawn_delay=2),
+    ], who="Fred")  # fmt: skip
+    first, second, third = kept.programs
+    assert (list(first.words), first.name, first.shell) == (["echo", "Fred"], "say", False)
+    assert (list(second.words), second.shell) == (["echo Fred | cat"], True)
+    assert third.respawn == 2.0
+
+
+@pytest.mark.parametrize(
+    ("make", "told"),
+    [
+        (
+            lambda: a.ExecuteProcess(cmd="echo a"),
+            "cmd='echo a' is one text; write a list of words",
+        ),
+        (lambda: a.LogInfo(msg="", mesg=""), "LogInfo has no argument 'mesg'; did you mean 'msg'"),
+        (lambda: LaunchDescription(["x"]), "'x' is no action; actions are such as Node"),
+        (lambda: a.GroupAction([None]), "None is no action"),
+        (lambda: a.OpaqueFunction(function="f"), "function='f' is no function"),
+        (lambda: a.EmitEvent(event="stop"), r"only launch.events.Shutdown\(\) is known here"),
+    ],
+)
+def test_what_is_written_wrong_is_told_with_its_place(make: Any, told: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+        make()
+
+
+@pytest.mark.parametrize(
+    ("action", "told"),
+    [
+        (lambda: a.ExecuteProcess(), "ExecuteProcess has no cmd"),
+        (lambda: a.TimerAction(period=-1, actions=[]), "period is '-1'; it has to be a number from 0 up"),
+        (lambda: a.GroupAction([], scoped="perhaps"), "scoped is 'perhaps'; it has to be true or false"),
+    ],
+)
+def test_what_cannot_be_done_is_told_with_its_place(follow: Follow, action: Any, told: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+        follow([action()])

@@ -1,0 +1,180 @@
+"""Gazebo in a launch file is our sim, and its spawn_entity.py is `holozen spawn`."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen import data
+from holozen.ros.ament_index_python import get_package_share_directory
+from holozen.ros.launch.actions import ExecuteProcess, IncludeLaunchDescription
+from holozen.ros.launch.nodes import Node, ParameterValue
+from holozen.ros.launch.sources import PythonLaunchDescriptionSource
+from holozen.ros.launch.substitutions import Command, FindPackageShare, LaunchConfiguration, PathJoinSubstitution
+from holozen.ros.launch.text import LaunchError
+
+from ..conftest import Write
+from .conftest import Follow
+
+EMPTY = str(data.find("worlds", "empty.world"))
+ARENA = str(data.find("worlds", "arena.world"))
+ROBOT = '<robot name="r"><link name="base"/></robot>'
+
+
+def included(package: str, name: str, **arguments: str) -> IncludeLaunchDescription:
+    path = PathJoinSubstitution([FindPackageShare(package), "launch", name])
+    return IncludeLaunchDescription(PythonLaunchDescriptionSource([path]), launch_arguments=arguments.items())
+
+
+def spawn(*words: Any, **more: Any) -> Node:
+    return Node(package="gazebo_ros", executable="spawn_entity.py", arguments=list(words), **more)
+
+
+def publisher(robot: Any, **more: Any) -> Node:
+    texts = [{"robot_description": robot, "use_sim_time": True}]
+    return Node(package="robot_state_publisher", executable="robot_state_publisher", parameters=texts, **more)
+
+
+@pytest.mark.parametrize(
+    ("package", "name", "arguments", "world"),
+    [
+        ("gazebo_ros", "gazebo.launch.py", {}, EMPTY),
+        ("gazebo_ros", "gazebo.launch.py", {"world": "", "gui": "false"}, EMPTY),
+        ("gazebo_ros", "gzserver.launch.py", {"world": "worlds/empty.world"}, EMPTY),
+        ("gazebo_ros", "gazebo.launch.py", {"world": "arena.world"}, ARENA),
+        ("gazebo_ros", "gazebo.launch.py", {"world": "nowhere.world"}, "nowhere.world"),
+        ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": "-r -v 4 empty.sdf"}, EMPTY),
+        ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": "-r my.sdf -v4"}, "my.sdf"),
+        ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": ""}, EMPTY),
+        ("ros_ign_gazebo", "ign_gazebo.launch.py", {"ign_args": "-r arena.sdf"}, ARENA),
+    ],
+)
+def test_gazebos_launch_files_start_the_sim(
+    follow: Follow, package: str, name: str, arguments: dict[str, str], world: str
+) -> None:
+    kept = follow([included(package, name, **arguments)])
+    assert kept.words() == ["sim", "--empty", "--world", world]
+    assert kept.programs[0].required
+
+
+def test_a_world_of_the_package_is_used_as_it_is(follow: Follow, write: Write) -> None:
+    world = str(write("src/my_bot/worlds/empty.world", "<sdf/>"))
+    assert follow([included("gazebo_ros", "gazebo.launch.py", world=world)]).words()[-1] == world
+
+
+def test_the_folder_of_gazebo_ros_is_asked_for_in_python_too(follow: Follow) -> None:
+    path = f"{get_package_share_directory('gazebo_ros')}/launch/gzserver.launch.py"
+    assert follow([IncludeLaunchDescription(path)]).words()[0] == "sim"
+
+
+def test_server_and_window_are_one_sim(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    kept = follow([included("gazebo_ros", name) for name in ("gzserver.launch.py", "gzclient.launch.py")])
+    assert len(kept.programs) == 1
+    assert "Gazebo's window is left out; `holozen map`" in capsys.readouterr().err
+    both = follow([included("gazebo_ros", "gazebo.launch.py"), included("gazebo_ros", "gzserver.launch.py")])
+    assert len(both.programs) == 1
+
+
+@pytest.mark.parametrize(
+    ("command", "world"),
+    [
+        (["gazebo", "--verbose", "-s", "libgazebo_ros_factory.so", "arena.world"], ARENA),
+        (["gzserver", "-s", "libgazebo_ros_init.so"], EMPTY),
+        (["/usr/bin/gazebo", "my.world"], "my.world"),
+        (["gz", "sim", "-r", "empty.sdf"], EMPTY),
+        (["ign", "gazebo", "-r", "arena.sdf"], ARENA),
+    ],
+)
+def test_gazebo_as_a_program_is_the_sim(follow: Follow, command: list[str], world: str) -> None:
+    assert follow([ExecuteProcess(cmd=command, output="screen")]).words() == ["sim", "--empty", "--world", world]
+
+
+@pytest.mark.parametrize(
+    ("package", "name", "told"),
+    [
+        ("gazebo_ros", "gazeb.launch.py", "has no 'launch/gazeb.launch.py'; did you mean 'gazebo.launch.py'"),
+        (
+            "ros_gz_sim",
+            "ros_gz_spawn_model.launch.py",
+            "has no 'launch/ros_gz_spawn_model.launch.py'; did you mean 'gz_sim",
+        ),
+        ("nav2_bringup", "x.launch.py", "no package 'nav2_bringup'"),
+    ],
+)
+def test_a_launch_file_that_nobody_stands_in_for_is_told(follow: Follow, package: str, name: str, told: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+        follow([included(package, name)])
+
+
+def test_a_file_is_spawned_at_the_root_of_the_keys(follow: Follow) -> None:
+    words = ["-entity", "hb_bot", "-file", "a.urdf", "-x", "1", "-z", "-0.5", "-Y", "1.57", "-unpause"]
+    kept = follow([spawn(*words, "-reference_frame", "world", "--ros-args", "--log-level", "info")])
+    places = ["-x=1", "-z=-0.5", "-Y=1.57"]
+    assert kept.words() == [
+        "spawn",
+        "--name",
+        "hb_bot",
+        "-file",
+        "a.urdf",
+        *places,
+        "--namespace",
+        "/",
+        "--timeout",
+        "60",
+    ]
+
+
+def test_a_namespace_and_a_timeout_are_kept(follow: Follow) -> None:
+    words = ["-file", "a.urdf", "-robot_namespace", "fred", "-timeout", "9"]
+    assert follow([spawn(*words)]).words() == ["spawn", "-file", "a.urdf", "--namespace", "fred", "--timeout", "9"]
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_topic_robot_description_is_what_robot_state_publisher_has(follow: Follow, write: Write, first: bool) -> None:
+    """Whichever of the two comes first in the launch file."""
+    path = write("src/my_bot/urdf/r.urdf.xacro", ROBOT)
+    robot = ParameterValue(Command(["xacro ", str(path), " who:=", LaunchConfiguration("who")]), value_type=str)
+    actions = [publisher(robot), spawn("-topic", "robot_description", "-entity", "r")]
+    kept = follow(actions if first else actions[::-1], who="me")
+    assert kept.words()[:5] == ["spawn", "--name", "r", str(path), "who:=me"]
+
+
+def test_a_text_that_no_file_holds_is_written_into_one(follow: Follow) -> None:
+    kept = follow([publisher(ROBOT, namespace="fred"), spawn("-topic", "/fred/robot_description")])
+    path = Path(kept.words()[1])
+    assert path.read_text() == ROBOT
+    assert kept.context.made == [path]
+    path.unlink()
+
+
+def test_robot_state_publisher_may_have_the_file_as_its_word(follow: Follow, write: Write) -> None:
+    path = str(write("r.urdf", ROBOT))
+    state = Node(package="robot_state_publisher", executable="robot_state_publisher", arguments=[path])
+    assert follow([state, spawn("-topic", "robot_description")]).words()[:2] == ["spawn", path]
+
+
+def test_the_spawner_of_new_gazebo_takes_texts_too(follow: Follow) -> None:
+    words = ["-name", "r", "-string", ROBOT, "-world", "empty", "-allow_renaming", "true", "-x", "2"]
+    kept = follow([Node(package="ros_gz_sim", executable="create", arguments=words)])
+    assert kept.words()[:4] == ["spawn", "--name", "r", "-x=2"]
+    assert Path(kept.words()[4]).read_text() == ROBOT
+    texts = [{"robot_description": ROBOT}]
+    words = ["-param", "robot_description"]
+    kept = follow([Node(package="ros_gz_sim", executable="create", arguments=words, parameters=texts)])
+    assert Path(kept.words()[1]).read_text() == ROBOT
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (["-topic", "robot_description"], "-topic robot_description: nothing in this launch file tells a robot there"),
+        (["-param", "robot"], "-param robot: this Node has no parameter 'robot'"),
+        (["-entity", "r"], "give -file FILE or -topic robot_description"),
+        (["-enttiy", "r"], "'-enttiy' means nothing here; did you mean '-entity'"),
+        (["-database", "r"], "'-database' means nothing here"),
+        (["-file"], "-file needs a word after it"),
+    ],
+)
+def test_a_robot_that_cannot_be_found_is_one_line(follow: Follow, words: list[str], told: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+        follow([spawn(*words)])

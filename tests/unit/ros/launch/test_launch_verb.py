@@ -1,0 +1,177 @@
+"""`holozen launch` with launch files as they are written, all of it but the sim."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen.testing import Process, Wire
+
+from ..conftest import Write
+
+Launch = Callable[..., subprocess.CompletedProcess[str]]
+REPO = Path(__file__).parents[4]
+HEAD = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction, LogInfo
+from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
+from launch_ros.actions import Node
+"""
+
+
+def line(wire: Wire, *words: str) -> list[str]:
+    return [sys.executable, "-m", "holozen", "launch", *wire.flags, *words]
+
+
+def environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": str(REPO)}
+
+
+@pytest.fixture
+def launch(my_bot: Path, wire: Wire) -> Launch:
+    """`launch("my_bot", "a.launch.py")`: follow it to its end, in the workspace."""
+
+    def launch(*words: str) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(line(wire, *words), capture_output=True, text=True, timeout=60, env=environment())
+
+    return launch
+
+
+def described(*entities: str) -> str:
+    return f"{HEAD}\ndef generate_launch_description():\n    return LaunchDescription([{', '.join(entities)}])\n"
+
+
+CONTROLLER = """#!/usr/bin/env python3
+import sys
+import rclpy
+from rclpy.node import Node
+rclpy.init()
+node = Node("nobody")
+node.declare_parameter("kp", 0.0)
+name = node.get_namespace(), node.get_name()
+print(*name, node.get_parameter("kp").value, node.resolve_topic_name("cmd_vel"), sys.argv[1])
+"""
+NODE = """Node(package='my_bot', executable='controller.py', name='controller', namespace='fred', arguments=['--fast'],
+    parameters=[{'kp': LaunchConfiguration('kp')}], remappings=[('cmd_vel', '/drive')], output='screen')"""
+ARGUMENTS = ("DeclareLaunchArgument('kp', default_value='1.5', description='how eager')",)
+
+
+@pytest.mark.parametrize("words", [["my_bot", "a.launch.py"], ["src/my_bot/launch/a.launch.py"]])
+def test_a_node_runs_with_its_words(launch: Launch, write: Write, words: list[str]) -> None:
+    write("src/my_bot/scripts/controller.py", CONTROLLER)
+    write("src/my_bot/launch/a.launch.py", described(*ARGUMENTS, NODE))
+    done = launch(*words, "kp:=2.5")
+    assert (done.stdout, done.stderr) == ("[controller.py-1] /fred controller 2.5 /drive --fast\n", "")
+    assert done.returncode == 0
+
+
+def test_show_args_tells_the_arguments_and_starts_nothing(launch: Launch, write: Write) -> None:
+    gui = "DeclareLaunchArgument('gui', default_value=PathJoinSubstitution(['a', 'b']), choices=['a', 'b'])"
+    others = "DeclareLaunchArgument('world')", "ExecuteProcess(cmd=['false'])"
+    write("a.launch.py", described(*ARGUMENTS, f"GroupAction([{gui}])", *others))
+    done = launch("-s", "a.launch.py")
+    lines = [
+        "kp:= how eager (default: 1.5)",
+        "gui:= (default: <a/b>; one of a, b)",
+        "world:= (it has to be given)",
+    ]
+    assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, lines, "")
+    write("a.launch.py", described())
+    assert launch("a.launch.py", "--show-args").stdout == "it has no arguments\n"
+
+
+def test_a_value_that_nothing_uses_is_told(launch: Launch, write: Write) -> None:
+    write("a.launch.py", described(*ARGUMENTS))
+    told = "holozen launch: a.launch.py does not use 'kpp'; did you mean 'kp'?\n"
+    assert (launch("a.launch.py", "kpp:=3").stderr) == told
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("from launch.actions import ExecuteLocal", "a.launch.py:1: launch.actions has no 'ExecuteLocal' here"),
+        ("import launch.frontend", "a.launch.py:1: launch has no 'frontend' here"),
+        ("import launch_testing", "a.launch.py:1: "),
+        ("import launch\nlaunch.actions.Foo()", "a.launch.py:2: launch.actions has no 'Foo' here"),
+        (
+            "from launch_ros.actions import LifecycleNode",
+            "a.launch.py:1: launch_ros.actions has no 'LifecycleNode' here",
+        ),
+        (
+            "from ament_index_python.packages import get_package_share_directory\nget_package_share_directory('nav2')",
+            "a.launch.py:2: no package 'nav2' around ",
+        ),
+        (
+            described("Node(package='my_bot', executable='x', nam='y')"),
+            "a.launch.py:8: Node has no argument 'nam'; did",
+        ),
+        (described("Node(package='nav2', executable='x')"), "a.launch.py:8: no package 'nav2' around "),
+        (described("'x'"), "a.launch.py:8: 'x' is no action"),
+        ("", "/a.launch.py has no function generate_launch_description()"),
+    ],
+)
+def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write, text: str, told: str) -> None:
+    write("a.launch.py", text)
+    done = launch(str(Path("a.launch.py").absolute()))
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+    assert done.stderr.startswith("holozen launch: ")
+    assert told in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("words", "code", "told"),
+    [
+        (["b.launch.py"], 1, "no launch file 'b.launch.py'"),
+        (["my_bot", "b.launch.py"], 1, "no launch file 'b.launch.py' in "),
+        (["my_boot", "a.launch.py"], 1, "no package 'my_boot' around "),
+        (["a", "b", "c"], 2, "give FILE, or PACKAGE FILE, not 'a b c'"),
+        (["x:=1"], 2, "give FILE, or PACKAGE FILE, not 'nothing'"),
+    ],
+)
+def test_a_file_that_is_not_there_is_one_line(launch: Launch, words: list[str], code: int, told: str) -> None:
+    done = launch(*words)
+    assert (done.returncode, done.stderr.count("\n")) == (code, 1)
+    assert told in done.stderr
+
+
+def test_an_error_of_the_launch_file_is_told_by_its_own_traceback(launch: Launch, write: Write) -> None:
+    write("a.launch.py", "def generate_launch_description():\n    return {}['lost']\n")
+    done = launch("a.launch.py")
+    assert done.returncode == 1
+    assert "holozen" not in done.stderr
+    assert done.stderr.splitlines()[-1] == "KeyError: 'lost'"
+
+
+def test_a_node_that_fails_makes_the_launch_fail(launch: Launch, write: Write) -> None:
+    write("src/my_bot/scripts/controller.py", "import sys; sys.exit(4)")
+    write("a.launch.py", described("Node(package='my_bot', executable='controller.py')"))
+    done = launch("a.launch.py")
+    assert (done.returncode, done.stderr) == (1, "launch: controller.py-1 failed with exit code 4\n")
+
+
+SPINNER = """
+import rclpy
+rclpy.init()
+node = rclpy.create_node("spinner")
+print("spins")
+try:
+    rclpy.spin(node)
+finally:
+    print("ends")
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda n: n.name)
+def test_a_signal_ends_the_nodes_and_the_launch(wire: Wire, write: Write, my_bot: Path, number: int) -> None:
+    write("src/my_bot/scripts/controller.py", SPINNER)
+    write("a.launch.py", described("Node(package='my_bot', executable='controller.py')"))
+    with Process(line(wire, "a.launch.py"), env=environment()) as process:
+        process.wait_for_line("[controller.py-1] spins")
+        process.signal(number)
+        assert process.wait(within=10) == 0
+        assert "[controller.py-1] ends" in process.out
+        assert "Traceback" not in process.err.replace("[controller.py-1] Traceback", "")

@@ -1,0 +1,166 @@
+"""A Node becomes `holozen run` with ROS's own words; what is ROS's own is done otherwise, or left out with a word."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen.ros import arguments
+from holozen.ros.launch.actions import GroupAction, SetLaunchConfiguration
+from holozen.ros.launch.nodes import (
+    Node,
+    Parameter,
+    ParameterFile,
+    ParameterValue,
+    PushROSNamespace,
+    SetParameter,
+    SetParametersFromFile,
+    SetRemap,
+    SetUseSimTime,
+)
+from holozen.ros.launch.substitutions import LaunchConfiguration
+from holozen.ros.launch.text import LaunchError
+
+from ..conftest import Write
+from .conftest import Follow, Kept
+
+VALUE = LaunchConfiguration("value")
+
+
+@pytest.fixture(autouse=True)
+def controller(my_bot: Path, write: Write) -> Path:
+    return write("src/my_bot/scripts/controller.py")
+
+
+def node(**words: Any) -> Node:
+    return Node(package="my_bot", executable="controller.py", **words)
+
+
+def parameters(kept: Kept) -> dict[str, Any]:
+    """What the node reads off its command line."""
+    return dict(arguments.parse(kept.words()).parameters_for("/any"))
+
+
+def test_a_node_runs_where_the_launch_meets(follow: Follow, my_bot: Path) -> None:
+    kept = follow([node(name="c", namespace="fred", arguments=["--fast", VALUE], output="screen")], value="9")
+    (program,) = kept.programs
+    assert program.name == "controller.py"
+    assert list(program.words)[3:8] == ["run", "--wire", "cdr", "--package", f"my_bot={my_bot}"]
+    ros = ["--ros-args", "-r", "__node:=c", "-r", "__ns:=/fred"]
+    assert kept.words() == ["run", "my_bot", "controller.py", "--fast", "9", *ros]
+
+
+def test_a_node_without_words_gets_none(follow: Follow) -> None:
+    assert follow([node(exec_name="c")]).words() == ["run", "my_bot", "controller.py"]
+
+
+def test_remappings_are_its_own_before_those_of_its_group(follow: Follow) -> None:
+    kept = follow([SetRemap("b", "c"), node(remappings=[("/cmd_vel", ["fred/", VALUE])])], value="cmd_vel")
+    assert kept.words()[3:] == ["--ros-args", "-r", "/cmd_vel:=fred/cmd_vel", "-r", "b:=c"]
+
+
+@pytest.mark.parametrize(
+    ("given", "read"),
+    [
+        (1, 1), (1.0, 1.0), (1e-7, 1e-7), (1e30, 1e30), (math.inf, math.inf), (True, True), ("1", "1"), ("", ""),
+        ("a: 'b' \"c\"\n#", "a: 'b' \"c\"\n#"), ([1, 2], [1, 2]), ([0.5, 1.0], [0.5, 1.0]), (["a", "b"], ["a", "b"]),
+        (("true", "x"), ["true", "x"]), (VALUE, 7), ([VALUE, ".5"], 7.5), (ParameterValue(VALUE, value_type=str), "7"),
+        (ParameterValue(VALUE, value_type=float), 7.0), (ParameterValue(VALUE), 7),
+        (ParameterValue([VALUE, "0"], value_type=int), 70), (LaunchConfiguration("yes"), True),
+        (LaunchConfiguration("list"), [1, 2]), (LaunchConfiguration("broken"), "[1, 2"),
+    ],
+)  # fmt: skip
+def test_a_parameter_arrives_as_it_was_meant(follow: Follow, given: Any, read: Any) -> None:
+    values = {"value": "7", "yes": "true", "list": "[1, 2]", "broken": "[1, 2"}
+    found = parameters(follow([node(parameters=[{"p": given}])], **values))["p"]
+    assert (found, type(found)) == (read, type(read))
+
+
+def test_parameters_come_from_maps_files_and_the_group(follow: Follow, write: Write) -> None:
+    path = write("p.yaml", "/**:\n  ros__parameters:\n    kp: 3.0\n    ki: 1.0\n")
+    other = write("q.yaml", "/**: {ros__parameters: {kd: 9.0, ki: 8.0}}")
+    kept = follow([
+        SetUseSimTime(True),
+        SetParameter("kp", 1.0),
+        SetParametersFromFile(str(other)),
+        node(parameters=[path, {"pid": {"low": 1, VALUE: "x"}}, ParameterFile(str(other)), Parameter("n", 2)]),
+    ], value="high")  # fmt: skip
+    want = {"use_sim_time": True, "kp": 3.0, "ki": 8.0, "kd": 9.0, "pid.low": 1, "pid.high": "x", "n": 2}
+    assert parameters(kept) == want
+
+
+@pytest.mark.parametrize(
+    ("wrong", "told"),
+    [
+        ({"parameters": {"a": 1}}, r"parameters={'a': 1} is no list; write \[{'name': value}, 'file.yaml'\]"),
+        ({"parameters": [{"a": None}]}, "a parameter cannot be None; it is a bool, a number, a text"),
+        ({"parameters": [{"a": ParameterValue("x", value_type=int)}]}, "the parameter is 'x', no int"),
+        ({"arguments": "-x 1"}, "arguments='-x 1' is one text; write a list of words"),
+        ({"condition": "true"}, "condition='true' is no condition"),
+        ({"paramters": []}, "Node has no argument 'paramters'; did you mean 'parameters'"),
+        ({"cwd": "nowhere"}, "cwd='nowhere' is no folder"),
+        ({"respawn": "often"}, "respawn is 'often'; it has to be true or false"),
+    ],
+)
+def test_a_wrong_node_is_one_line_with_its_place(follow: Follow, wrong: dict[str, Any], told: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+        follow([node(**wrong)])
+
+
+@pytest.mark.parametrize(
+    ("package", "executable", "told"),
+    [
+        (
+            "my_bot",
+            "controler.py",
+            r"package 'my_bot' has no executable 'controler.py'; did you mean 'controller.py'\?",
+        ),
+        ("my_boot", "controller.py", "no package 'my_boot' around "),
+        ("nav2_bringup", "bt_navigator", "no package 'nav2_bringup' around "),
+    ],
+)
+def test_a_node_that_is_not_there_is_told_before_anything_runs(
+    follow: Follow, package: str, executable: str, told: str
+) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+        follow([Node(package=package, executable=executable)])
+
+
+def test_a_group_holds_what_is_set_in_it(follow: Follow) -> None:
+    inner = GroupAction([PushROSNamespace("a"), GroupAction([PushROSNamespace("b"), node()]), node(namespace="c")])
+    kept = follow([inner, node(), node(namespace="/d")])
+    spaces = [program.words[-1].partition("__ns:=")[2] for program in kept.programs]
+    assert spaces == ["/a/b", "/a/c", "", "/d"]
+
+
+def test_a_group_that_is_not_scoped_lets_it_out(follow: Follow) -> None:
+    group = GroupAction([SetLaunchConfiguration("value", "2")], scoped=False)
+    assert follow([group, node(arguments=[VALUE])], value="1").words()[-1] == "2"
+    group = GroupAction([SetLaunchConfiguration("value", "2")])
+    assert follow([group, node(arguments=[VALUE])], value="1").words()[-1] == "1"
+
+
+@pytest.mark.parametrize(
+    ("package", "executable", "told"),
+    [
+        ("rviz2", "rviz2", "rviz2 rviz2 is left out: `holozen map` in another terminal"),
+        ("rqt_graph", "rqt_graph", "is left out: `holozen plot`"),
+        ("joint_state_publisher_gui", "joint_state_publisher_gui", "is left out: the sim itself tells joint_states"),
+        ("ros_gz_bridge", "parameter_bridge", "is left out: the sim is on the keys itself"),
+        ("teleop_twist_keyboard", "teleop_twist_keyboard", "`holozen teleop` in another one"),
+        ("robot_state_publisher", "robot_state_publisher", "the sim itself tells joint_states and tf"),
+    ],
+)
+def test_what_is_left_out_is_named_with_what_to_use(
+    follow: Follow, capsys: pytest.CaptureFixture[str], package: str, executable: str, told: str
+) -> None:
+    action = Node(package=package, executable=executable)
+    kept = follow([action])
+    assert told in capsys.readouterr().err
+    assert (kept.programs, kept.left) == ([], [(action, False)])
+
+
+def test_a_spawner_of_controllers_is_as_good_as_over(follow: Follow) -> None:
+    spawner = Node(package="controller_manager", executable="spawner", arguments=["joint_state_broadcaster"])
+    assert follow([spawner]).left == [(spawner, True)]
