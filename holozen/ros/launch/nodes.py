@@ -9,7 +9,7 @@ from holozen.ros.launch.context import LaunchContext
 from holozen.ros.launch.entity import Action, Entities
 from holozen.ros.launch.processes import ExecuteProcess
 from holozen.ros.launch.simulation import given, ours
-from holozen.ros.launch.stand_ins import Wanted, stand_in
+from holozen.ros.launch.stand_ins import SCRIPTS, Wanted, stand_in
 from holozen.ros.launch.text import LaunchError, Text, text
 from holozen.ros.launch.values import Parameter, ParameterFile, ParameterValue
 
@@ -63,9 +63,11 @@ class Node(ExecuteProcess):
         return text(context, self.name) or executable.rpartition("/")[2]
 
     def _words(self, context: LaunchContext, package: str, executable: str, words: list[str]) -> list[str]:
-        target = [package, executable] if package else [executable]
+        own = SCRIPTS.get(f"{package}/{executable}")
+        target = [str(own)] if own else [package, executable] if package else [executable]
         try:
-            _ = package and executables.find(package, executable)  # here, where the line of the launch file is known
+            if package and not own:
+                executables.find(package, executable)  # here, where the line of the launch file is known
         except executables.NotFound as error:
             raise LaunchError(str(error), self.place) from None
         return ours(context, "run", *given(), *target, *words, *self._ros_words(context))

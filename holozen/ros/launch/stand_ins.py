@@ -116,6 +116,9 @@ DONE: dict[str, Callable[[LaunchContext, Wanted], Entities]] = {
 }
 """package/executable -> what is done instead."""
 
+SCRIPTS = {"tf2_ros/static_transform_publisher": Path(__file__).parents[1] / "static_transform_publisher.py"}
+"""package/executable -> a script of ours that does the same."""
+
 PROGRAMS: dict[str, Callable[[LaunchContext, Wanted], Entities]] = {
     "gazebo": _classic,
     "gzserver": _classic,

@@ -51,6 +51,13 @@ def test_a_robot_is_sent_under_its_name_and_put_on_the_ground(sim: FakeSim, run:
     assert parse(text, Path("/elsewhere")).drive is not None and "${" not in text
 
 
+@pytest.mark.parametrize(("namespace", "key"), [("/", "cmd_vel"), ("lab", "lab/cmd_vel")])
+@pytest.mark.parametrize("flag", ["--namespace", "-robot_namespace"])
+def test_its_keys_may_be_elsewhere(sim: FakeSim, run: Run, flag: str, namespace: str, key: str) -> None:
+    assert run("spawn", HB_BOT, "--name", "Fred", flag, namespace) == (0, f"Fred listens on {key}\n", "")
+    assert sim.entities["Fred"].entity_namespace == namespace
+
+
 def test_without_a_name_it_has_that_of_its_file(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     assert run("spawn", ball(tmp_path)) == (0, "ball stands at 0.000 0.000 0.500\n", "")
     assert list(sim.entities) == ["ball"]
@@ -210,6 +217,7 @@ def test_without_a_sim_it_says_how_to_start_one(run: Run, tmp_path: Path, monkey
     monkeypatch.setattr("holozen.entities.NOTICE", 0.2)
     told = "no sim answered within 0.2 s; start one in another terminal: holozen sim"
     assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {told}\n")
+    assert run("spawn", ball(tmp_path), "-timeout", "0.1")[2] == f"holozen spawn: {told.replace('0.2', '0.1')}\n"
     assert run("list") == (1, "", f"holozen list: {told}\n")
     assert run("delete", "Fred", "Bob") == (1, "", f"holozen delete: {told}\n")
 

@@ -99,6 +99,11 @@ def test_a_namespace_in_the_request_is_where_the_keys_are(town: Town) -> None:
     assert town.refusal(lambda: town.spawn("Ann", entity_namespace="a/*"))[0] == si.NAMESPACE_INVALID
 
 
+def test_a_slash_as_namespace_is_the_root(town: Town) -> None:
+    assert town.spawn("Fred", entity_namespace="/").name == "Fred"
+    assert {"cmd_vel", "odom"} <= town.tokens()
+
+
 def test_two_robots_never_share_a_key_whatever_their_files_say(town: Town) -> None:
     tag = "<commandTopic>cmd_vel</commandTopic>"
     town.spawn("Ann")

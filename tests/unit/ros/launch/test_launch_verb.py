@@ -9,7 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from holozen.testing import Process, Wire
+from holozen.codec import decode
+from holozen.messages import TFMessage
+from holozen.testing import Process, Wire, wait_for
 
 from ..conftest import Write
 
@@ -175,3 +177,24 @@ def test_a_signal_ends_the_nodes_and_the_launch(wire: Wire, write: Write, my_bot
         assert process.wait(within=10) == 0
         assert "[controller.py-1] ends" in process.out
         assert "Traceback" not in process.err.replace("[controller.py-1] Traceback", "")
+
+
+def test_a_static_transform_is_told(wire: Wire, write: Write, my_bot: Path) -> None:
+    words = "arguments=['1', '0', '0', '0', '0', '0', 'map', 'odom'], name='still'"
+    write("a.launch.py", described(f"Node(package='tf2_ros', executable='static_transform_publisher', {words})"))
+    with Process(line(wire, "a.launch.py"), env=environment()):
+        bus = wire.bus()
+        (told,) = wait_for(lambda: list(bus.ask("tf_static", 5.0)), within=20)  # by who comes late
+        (transform,) = decode(told.payload, told.encoding, (TFMessage,)).transforms
+        assert (transform.header.frame_id, transform.child_frame_id) == ("map", "odom")
+        assert transform.transform.translation.x == 1.0
+        assert "still" in {end.node for end in bus.graph().settled(bus.connected)}
+
+
+def test_killed_it_leaves_nothing(wire: Wire, write: Write, my_bot: Path) -> None:
+    write("src/my_bot/scripts/controller.py", "import os, time; print(os.getpid()); time.sleep(60)")
+    write("a.launch.py", described("Node(package='my_bot', executable='controller.py')"))
+    with Process(line(wire, "a.launch.py"), env=environment()) as process:
+        pid = int(process.wait_for_line("[controller.py-1] ").split()[-1])
+        process.kill()
+        wait_for(lambda: not Path(f"/proc/{pid}/cmdline").exists() or not Path(f"/proc/{pid}/cmdline").read_text())

@@ -1,0 +1,42 @@
+"""static_transform_publisher takes its words in both of ROS's ways."""
+
+import math
+
+import pytest
+
+from holozen.ros.static_transform_publisher import read, transform
+
+HALF = math.sqrt(0.5)
+
+
+@pytest.mark.parametrize(
+    ("words", "place", "turn"),
+    [
+        ("1 -2 3 1.5707963 0 0 map odom", (1, -2, 3), (0, 0, HALF, HALF)),
+        ("1 2 3 0 0 0.6 0.8 map odom", (1, 2, 3), (0, 0, 0.6, 0.8)),
+        ("--x 1 --z -1e-3 --frame-id map --child-frame-id odom", (1, 0, -0.001), (0, 0, 0, 1)),
+        ("--roll 3.14159265 --frame-id map --child-frame-id odom", (0, 0, 0), (1, 0, 0, 0)),
+        ("--frame-id map --child-frame-id odom --qw 0 --qy 1", (0, 0, 0), (0, 1, 0, 0)),
+    ],
+)
+def test_the_words_are_a_transform(words: str, place: tuple[float, ...], turn: tuple[float, ...]) -> None:
+    message = transform(read(words.split()))
+    t, q = message.transform.translation, message.transform.rotation
+    assert (message.header.frame_id, message.child_frame_id) == ("map", "odom")
+    assert (t.x, t.y, t.z) == place
+    assert [q.x, q.y, q.z, q.w] == pytest.approx(turn, abs=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        ("1 2 3", "are required: --frame-id, --child-frame-id"),
+        ("a 2 3 0 0 0 map odom", "argument --x: invalid float value: 'a'"),
+        ("--frame-id map --child-frame-id odom --yow 1", "no flag '--yow'; did you mean '--yaw'?"),
+    ],
+)
+def test_wrong_words_are_one_line(words: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        read(words.split())
+    said = capsys.readouterr().err
+    assert (end.value.code, said.count("\n"), told in said) == (2, 1, True)
