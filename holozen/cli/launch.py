@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
     try:
         path = _file([word for word in args.words if ":=" not in word], options)
         packages.use(given, path.resolve().parent)
-        finder.install(packages.around(), [path.resolve().parent])
+        finder.install(packages.given, [path.resolve().parent])
         description = sources.read(path)
         return _show(description) if args.show_args else _follow(path.absolute(), description, values, where)
     except (LaunchError, RobotError, executables.NotFound) as error:

@@ -44,7 +44,7 @@ def main(argv: list[str]) -> int:
     from holozen.ros import context, finder
 
     context.connection = connection.from_arguments(args)
-    finder.install(packages.around())
+    finder.install(packages.given, [script.root])
     return runner.run(script, words)
 
 

@@ -48,7 +48,7 @@ def nearest_robot_folder(start: Path) -> Path | None:
 
 def local_packages(start: Path) -> dict[str, Path]:
     """Name -> folder of every package whose package.xml is in the folders above `start` or their children."""
-    return _packages_of(folders_above(start))
+    return packages_in(folders_above(start))
 
 
 def folders_above(start: Path) -> list[Path]:
@@ -85,7 +85,8 @@ def _named(name: str, folders: list[Path]) -> Path | None:
     return next((folder for found, folder in _packages(folders) if found == name), None)
 
 
-def _packages_of(folders: list[Path]) -> dict[str, Path]:
+def packages_in(folders: list[Path]) -> dict[str, Path]:
+    """Name -> folder of every package whose package.xml is in these folders or their children; the first wins."""
     # Backwards, so that the nearest of two packages with one name wins.
     return dict(reversed(list(_packages(folders))))
 
@@ -120,7 +121,7 @@ def _name_in_package_xml(folder: Path) -> str | None:
 
 def _unknown(name: str, start: Path, given: Mapping[str, Path]) -> str:
     searched = [*_environment("AMENT_PREFIX_PATH"), *_environment("ROS_PACKAGE_PATH"), *folders_above(start)]
-    known = _packages_of(_environment("ROS_PACKAGE_PATH")) | local_packages(start) | dict(given)
+    known = packages_in(_environment("ROS_PACKAGE_PATH")) | local_packages(start) | dict(given)
     return (
         f"{start}: there is no package {cut(name)}; packages found: {listed(list(known))};"
         f" looked in {', '.join(map(str, searched)) or 'no folder'}; say where it is: --package {name[:80]}=DIR"

@@ -4,11 +4,11 @@
 """
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from holozen.robot.errors import RobotError, listed, near
-from holozen.robot.packages import find_named, local_packages, nearest_robot_folder
+from holozen.robot.packages import find_named, folders_above, nearest_robot_folder, packages_in
 
 MOST = 200  # folders below a workspace in which packages are looked for
 
@@ -27,11 +27,13 @@ def use(packages: Mapping[str, Path], *places: Path) -> None:
 
 def find(name: str) -> Path:
     """The folder of a package: where its `package.xml` is, or `<prefix>/share/<name>`. Raises RobotError."""
-    for place in _places():
-        if found := find_named(name, place, given):
+    for start in starts:
+        if found := find_named(name, start, given):
             return found
     if name in stand_ins:
         return stand_ins[name]
+    if found := packages_in(_below()).get(name):
+        return found
     for start in starts:  # a repository may be cloned under any name, and say none
         folder = nearest_robot_folder(start)
         if folder and not (folder / "package.xml").exists():
@@ -44,10 +46,8 @@ def find(name: str) -> Path:
 
 def around() -> dict[str, Path]:
     """Name -> folder of the packages given, and of those around the places of `use`; the nearest wins."""
-    found: dict[str, Path] = {}
-    for place in reversed(list(_places())):
-        found |= local_packages(place)
-    return found | given
+    above = [folder for start in starts for folder in folders_above(start)]
+    return packages_in([*above, *_below()]) | given
 
 
 def prefix(folder: Path) -> Path:
@@ -55,12 +55,9 @@ def prefix(folder: Path) -> Path:
     return folder.parents[1] if folder.parent.name == "share" else folder
 
 
-def _places() -> Iterator[Path]:
-    """The folders around which `find_named` looks: each start, and the sources below a workspace."""
-    for start in dict.fromkeys(starts):
-        yield start
-        for folder in (start, start / "src"):
-            yield from [folder, *_children(folder)] if folder != start else _children(folder)
+def _below() -> list[Path]:
+    """The folders below a workspace, and below its src, that may hold packages or repositories of packages."""
+    return [each for start in starts for folder in (start / "src", start) for each in (folder, *_children(folder))]
 
 
 def _children(folder: Path) -> list[Path]:

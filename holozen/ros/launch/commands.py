@@ -33,7 +33,7 @@ def output(context: LaunchContext, command: str) -> str:
         raise LaunchError(f"Command {command!r:.200}: write `xacro FILE name:=value ...`")
     values = [word for word in words if ":=" in word]
     pairs = dict(word.split(":=", 1) for word in values)
-    return _kept(context, expand_xacro(Path(files[0]), pairs, packages.around()), [files[0], *values])
+    return _kept(context, expand_xacro(Path(files[0]), pairs, packages.given), [files[0], *values])
 
 
 def _kept(context: LaunchContext, text: str, origin: list[str]) -> str:

@@ -70,7 +70,7 @@ class Node(ExecuteProcess):
                 executables.find(package, executable)  # here, where the line of the launch file is known
         except executables.NotFound as error:
             raise LaunchError(str(error), self.place) from None
-        return ours(context, "run", *given(), *target, *words, *self._ros_words(context))
+        return ours(context, "run", *given(*([] if own else [package])), *target, *words, *self._ros_words(context))
 
     def _ros_words(self, context: LaunchContext) -> list[str]:
         """ROS's own words: name, namespace, remappings and parameters, the group's first."""

@@ -1,5 +1,7 @@
 """Our sim in the place of Gazebo, and robots that are put into it."""
 
+import contextlib
+import re
 import shlex
 import sys
 import tempfile
@@ -8,6 +10,7 @@ from pathlib import Path
 
 from holozen import data
 from holozen.flags import nearest
+from holozen.robot.errors import RobotError
 from holozen.ros import packages
 from holozen.ros.launch.context import LaunchContext, Program
 from holozen.ros.launch.entity import Action, Entities
@@ -27,6 +30,7 @@ DROPPED = {
     "-package_to_model": 0, "-b": 0, "-bond": 0, "-allow_renaming": 1, "-urdf": 0, "-sdf": 0,
 }  # fmt: skip
 """Flags that change nothing here, and how many words follow each."""
+_MENTIONED = re.compile(r"package://([\w-]+)")
 
 
 def ours(context: LaunchContext, verb: str, *words: str) -> list[str]:
@@ -36,9 +40,13 @@ def ours(context: LaunchContext, verb: str, *words: str) -> list[str]:
     return [sys.executable, "-m", "holozen", verb, *before, *words, *after]
 
 
-def given() -> list[str]:
-    """The flags that name all packages around."""
-    return [word for name, folder in packages.around().items() for word in ("--package", f"{name}={folder}")]
+def given(*names: str) -> list[str]:
+    """The flags that name the packages given, and those with these names if they are found."""
+    found = dict(packages.given)
+    for name in names:
+        with contextlib.suppress(RobotError):
+            found[name] = packages.find(name)
+    return [word for name, folder in found.items() for word in ("--package", f"{name}={folder}")]
 
 
 class Simulation(Action):
@@ -102,12 +110,12 @@ class Spawning(Action):
             text = robot[1] if robot[0] == "-string" else self.texts.get(robot[1])
         if robot[0] and text is None:
             raise LaunchError(_unknown(context, *robot), self.place)
-        words = [*spawned, *(_file(context, text) if text is not None else [])]
+        words = [*spawned, *(_file(context, text) if text is not None else []), *given(*_MENTIONED.findall(text or ""))]
         if "--namespace" not in words:
             words += ["--namespace", ROOT]
         if "--timeout" not in words:
             words += ["--timeout", PATIENCE]
-        words = ours(context, "spawn", *words, *given())
+        words = ours(context, "spawn", *words)
         context.stage.start(self.target, Program("spawn", words, environment=context.environment))
         return None
 

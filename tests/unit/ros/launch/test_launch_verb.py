@@ -11,6 +11,7 @@ import pytest
 
 from holozen.codec import decode
 from holozen.messages import TFMessage
+from holozen.tap import Sample
 from holozen.testing import Process, Wire, wait_for
 
 from ..conftest import Write
@@ -185,6 +186,7 @@ def test_a_static_transform_is_told(wire: Wire, write: Write, my_bot: Path) -> N
     with Process(line(wire, "a.launch.py"), env=environment()):
         bus = wire.bus()
         (told,) = wait_for(lambda: list(bus.ask("tf_static", 5.0)), within=20)  # by who comes late
+        assert isinstance(told, Sample)
         (transform,) = decode(told.payload, told.encoding, (TFMessage,)).transforms
         assert (transform.header.frame_id, transform.child_frame_id) == ("map", "odom")
         assert transform.transform.translation.x == 1.0
