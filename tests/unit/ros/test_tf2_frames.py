@@ -113,6 +113,18 @@ def test_a_frame_that_changes_its_parent_keeps_both(frames):
     assert frames.lookup("odom", "base", 4 * S)[1] == moved(3.0)
 
 
+@pytest.mark.parametrize("static", [True, False])
+def test_what_was_told_last_says_whether_it_moves(frames: Frames, static: bool) -> None:
+    frames.put("odom", "base", 4 * S, moved(4.0), static=not static)
+    frames.put("odom", "base", 5 * S, moved(5.0), static=static)
+    assert frames.histories()["base"].stamps == [5 * S]
+    if static:
+        assert frames.lookup("odom", "base", 99 * S)[1] == moved(5.0)
+    else:
+        with pytest.raises(ExtrapolationException):
+            frames.lookup("odom", "base", 99 * S)
+
+
 def test_a_slash_before_a_name_means_nothing(frames):
     assert frames.lookup("/map", "/odom")[1] == moved(10.0)
 
