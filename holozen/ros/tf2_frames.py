@@ -149,7 +149,7 @@ class Frames:
         way = [name]
         while (history := self._of.get(way[-1])) is not None:
             way.append(history.parent(when))
-            if len(way) > DEEPEST or way[-1] in way[:-1]:
+            if len(way) > DEEPEST:
                 raise LookupException(f"the frames {' > '.join(way[:8])} ... go round in a circle")
         return way
 

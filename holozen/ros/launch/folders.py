@@ -18,6 +18,10 @@ class FindPackageShare(Substitution):
         """The folder. Raises LaunchError."""
         return str(self._folder(context))
 
+    def find(self, package_name: str) -> str:
+        """The folder of any package, at once. Raises LaunchError."""
+        return type(self)(package_name).perform(LaunchContext())
+
     def _folder(self, context: LaunchContext) -> Path:
         try:
             return packages.find(text(context, self.package)).absolute()

@@ -7,9 +7,9 @@ from holozen.ros import executables
 from holozen.ros.launch import values
 from holozen.ros.launch.context import LaunchContext
 from holozen.ros.launch.entity import Action, Entities
-from holozen.ros.launch.processes import ExecuteProcess
+from holozen.ros.launch.processes import TERMINALS, ExecuteProcess
 from holozen.ros.launch.simulation import given, ours
-from holozen.ros.launch.stand_ins import SCRIPTS, Wanted, stand_in
+from holozen.ros.launch.stand_ins import SCRIPTS, Wanted, leave_out, stand_in
 from holozen.ros.launch.text import LaunchError, Text, text
 from holozen.ros.launch.values import Parameter, ParameterFile, ParameterValue
 
@@ -54,6 +54,11 @@ class Node(ExecuteProcess):
             done = stand_in(context, Wanted(self, package, executable, words, texts, namespace))
             if done is not None:
                 return done
+            prefix = text(context, self.prefix or "").partition(" ")[0]
+            if prefix.rpartition("/")[2] in TERMINALS:
+                where = f"run it in another terminal: holozen run {package} {executable}"
+                leave_out(context, self, f"{package} {executable}", where)
+                return None
             self._start(context, self._words(context, package, executable, words), self._called(context, executable))
         except RobotError as error:
             raise LaunchError(str(error), self.place) from None

@@ -1,5 +1,7 @@
 """launch's ExecuteProcess: a program, or the verb of ours that does what the program of ROS would."""
 
+import re
+import shlex
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +13,8 @@ from holozen.ros.launch.stand_ins import LEFT_OUT, PROGRAMS, Wanted, leave_out
 from holozen.ros.launch.text import LaunchError, Text, number, text, truth
 
 SHELL_WORD = "sh"
+TERMINALS = ("gnome-terminal", "xterm", "konsole", "xfce4-terminal", "terminator", "lxterminal", "x-terminal-emulator")
+_OF_THE_SHELL = re.compile(r"[|&;<>()$`*?]")
 _AS_PYTHON = ("python", "python3")
 
 
@@ -44,13 +48,19 @@ class ExecuteProcess(Action):
         if not words:
             raise LaunchError(f"{type(self).__name__} has no cmd", self.place)
         if truth(context, self.shell, "shell"):
-            self._start(context, [" ".join(words)], text(context, self.name) or SHELL_WORD, shell=True)
-            return None
+            line = " ".join(words)
+            words = _plain(line)
+            if not words:
+                self._start(context, [line], text(context, self.name) or SHELL_WORD, shell=True)
+                return None
         return self._do(context, words)
 
     def _do(self, context: LaunchContext, words: list[str]) -> Entities | None:
         program = Path(words[0]).name
         node = Wanted(self, "", program, words[1:])
+        if program in TERMINALS:
+            leave_out(context, self, program, f"run this in another terminal: {_inside(words)}")
+            return None
         if program in PROGRAMS:
             return PROGRAMS[program](context, node)
         if program == "ros2" and len(words) > 1:
@@ -89,6 +99,24 @@ class ExecuteProcess(Action):
         if where is not None and not Path(where).is_dir():
             raise LaunchError(f"cwd={where!r} is no folder", self.place)
         context.stage.start(self, Program(name, words, where, environment, shell, respawn=delay))
+
+
+def _plain(line: str) -> list[str]:
+    """The words of a line for the shell that needs none, as it starts one of ROS's programs; else none."""
+    try:
+        words = shlex.split(line)
+    except ValueError:
+        return []
+    known = bool(words) and Path(words[0]).name in (*PROGRAMS, "ros2")
+    return words if known and not _OF_THE_SHELL.search(line) else []
+
+
+def _inside(words: list[str]) -> str:
+    """What a terminal is told to run, as a verb of ours where it is ROS's."""
+    words = words[1:]
+    while words and words[0].startswith("-"):
+        words = words[1:]
+    return shlex.join(["holozen", *words[1:]] if words[:1] == ["ros2"] else words)
 
 
 def _performed(context: LaunchContext, variables: Any) -> dict[str, str]:

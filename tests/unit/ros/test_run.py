@@ -86,6 +86,15 @@ def test_a_traceback_is_the_users_and_shows_none_of_ours(run: Run, write: Write)
     assert (done.returncode, done.stderr) == (plain.returncode, plain.stderr)
 
 
+def test_ours_is_left_out_of_what_an_error_came_from(run: Run, write: Write) -> None:
+    write(
+        "a.py", "import rclpy\ntry:\n    rclpy.create_node('a')\nexcept Exception as e:\n    raise OSError('b') from e"
+    )
+    told = run("a.py").stderr
+    assert "direct cause" in told
+    assert "holozen/" not in told
+
+
 @pytest.mark.parametrize("text", ["def f(:\n  pass", "a = 1\n  b = 2", "x = '\0'"])
 def test_what_is_no_python_is_told_as_python_does(run: Run, write: Write, text: str) -> None:
     write("a.py", text)

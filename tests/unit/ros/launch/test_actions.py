@@ -10,6 +10,7 @@ from holozen.ros.launch import actions as a
 from holozen.ros.launch.entity import LaunchDescription
 from holozen.ros.launch.events import OnProcessExit, OnProcessStart, OnShutdown, ProcessExited, ProcessStarted
 from holozen.ros.launch.events import Shutdown as ShutdownEvent
+from holozen.ros.launch.nodes import Node
 from holozen.ros.launch.sources import PythonLaunchDescriptionSource
 from holozen.ros.launch.substitutions import EnvironmentVariable, LaunchConfiguration, ThisLaunchFileDir
 from holozen.ros.launch.text import LaunchError
@@ -172,6 +173,27 @@ def test_a_verb_of_ros2_that_is_not_ours_is_left_out(follow: Follow, capsys: pyt
     action = a.ExecuteProcess(cmd=["ros2", "control", "load_controller", "arm"])
     assert follow([action]).left == [(action, True)]
     assert said(capsys) == ["launch: `ros2 control load_controller arm` is left out: there is no verb 'control' here"]
+
+
+def test_a_line_for_the_shell_may_be_ours_too(follow: Follow) -> None:
+    line = ["ros2 service call ", "/spawn ", "turtlesim/srv/Spawn ", '"{x: 2, y: 2}"']
+    kept = follow([
+        a.ExecuteProcess(cmd=[line], shell=True), a.ExecuteProcess(cmd=["ros2 topic list | wc -l"], shell=True),
+    ])  # fmt: skip
+    assert kept.words() == ["service", "call", "/spawn", "turtlesim/srv/Spawn", "{x: 2, y: 2}"]
+    assert list(kept.programs[1].words) == ["ros2 topic list | wc -l"]
+
+
+def test_a_terminal_is_left_out_with_what_to_run_in_one(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    script = {"package": "my_bot", "executable": "teleop.py"}
+    kept = follow([
+        a.ExecuteProcess(cmd=["xterm", "-e", "ros2", "run", "my_bot", "teleop.py"]), Node(prefix="xterm -e", **script),
+    ])  # fmt: skip
+    assert kept.programs == []
+    assert said(capsys) == [
+        "launch: xterm is left out: run this in another terminal: holozen run my_bot teleop.py",
+        "launch: my_bot teleop.py is left out: run it in another terminal: holozen run my_bot teleop.py",
+    ]
 
 
 def test_other_programs_are_started_as_they_are(follow: Follow) -> None:

@@ -61,6 +61,7 @@ def test_places_of_the_launch_file_and_of_packages(context: LaunchContext, my_bo
     assert text(context, [s.FindPackageShare("my_bot"), "/urdf"]) == f"{my_bot}/urdf"
     assert text(context, s.FindPackagePrefix(package="my_bot")) == str(my_bot)
     assert text(context, s.ExecutableInPackage("a.py", "my_bot")) == str(my_bot / "scripts" / "a.py")
+    assert s.FindPackageShare("other").find("my_bot") == str(my_bot)
     assert text(context, s.FileContent("notes.txt")) == "hello"
     assert text(context, s.FindExecutable(name=sys.executable)) == sys.executable
 
