@@ -87,9 +87,8 @@ def test_a_traceback_is_the_users_and_shows_none_of_ours(run: Run, write: Write)
 
 
 def test_ours_is_left_out_of_what_an_error_came_from(run: Run, write: Write) -> None:
-    write(
-        "a.py", "import rclpy\ntry:\n    rclpy.create_node('a')\nexcept Exception as e:\n    raise OSError('b') from e"
-    )
+    failing = "try:\n    rclpy.create_node('a')\nexcept Exception as e:\n    raise OSError('b') from e"
+    write("a.py", f"import rclpy\n{failing}")
     told = run("a.py").stderr
     assert "direct cause" in told
     assert "holozen/" not in told
