@@ -31,7 +31,7 @@ def line(wire: Wire, *words: str) -> list[str]:
 
 
 def environment() -> dict[str, str]:
-    return {**os.environ, "PYTHONPATH": str(REPO)}
+    return {**os.environ, "PYTHONPATH": str(REPO), "PYTHONUNBUFFERED": ""}
 
 
 @pytest.fixture

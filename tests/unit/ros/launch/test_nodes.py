@@ -26,6 +26,7 @@ from ..conftest import Write
 from .conftest import Follow, Kept
 
 VALUE = LaunchConfiguration("value")
+ROBOT = "<robot name='r'><!-- link: 1 --></robot>"  # which YAML takes for a map
 
 
 @pytest.fixture(autouse=True)
@@ -69,10 +70,11 @@ def test_remappings_are_its_own_before_those_of_its_group(follow: Follow) -> Non
         (ParameterValue(VALUE, value_type=float), 7.0), (ParameterValue(VALUE), 7),
         (ParameterValue([VALUE, "0"], value_type=int), 70), (LaunchConfiguration("yes"), True),
         (LaunchConfiguration("list"), [1, 2]), (LaunchConfiguration("broken"), "[1, 2"),
+        (LaunchConfiguration("robot"), ROBOT),
     ],
 )  # fmt: skip
 def test_a_parameter_arrives_as_it_was_meant(follow: Follow, given: Any, read: Any) -> None:
-    values = {"value": "7", "yes": "true", "list": "[1, 2]", "broken": "[1, 2"}
+    values = {"value": "7", "yes": "true", "list": "[1, 2]", "broken": "[1, 2", "robot": ROBOT}
     found = parameters(follow([node(parameters=[{"p": given}])], **values))["p"]
     assert (found, type(found)) == (read, type(read))
 
@@ -128,10 +130,11 @@ def test_a_node_that_is_not_there_is_told_before_anything_runs(
 
 
 def test_a_group_holds_what_is_set_in_it(follow: Follow) -> None:
-    inner = GroupAction([PushROSNamespace("a"), GroupAction([PushROSNamespace("b"), node()]), node(namespace="c")])
+    nodes = [node(namespace="c"), node(namespace="/d")]
+    inner = GroupAction([PushROSNamespace("a"), GroupAction([PushROSNamespace("b"), node()]), *nodes])
     kept = follow([inner, node(), node(namespace="/d")])
     spaces = [program.words[-1].partition("__ns:=")[2] for program in kept.programs]
-    assert spaces == ["/a/b", "/a/c", "", "/d"]
+    assert spaces == ["/a/b", "/a/c", "/d", "", "/d"]
 
 
 def test_a_group_that_is_not_scoped_lets_it_out(follow: Follow) -> None:
