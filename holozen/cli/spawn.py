@@ -1,7 +1,6 @@
 """`holozen spawn`: put a robot or object into the running sim."""
 
 import argparse
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from holozen import connection, flags
 from holozen.bus import Bus
+from holozen.cli.spawned import Spawned
 from holozen.errors import ServiceError
 from holozen.robot.errors import RobotError
 from holozen.tell import say
@@ -35,27 +35,6 @@ class Place:
     roll: float | None = None
     pitch: float | None = None
     yaw: float | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Spawned:
-    """What was put into the world: where it listens (nowhere: an empty key), where it stands, and advice."""
-
-    name: str
-    key: str
-    pose: "Pose"
-    hint: str = ""
-
-    def __str__(self) -> str:
-        at = self.pose.position
-        where = f"listens on {self.key}" if self.key else f"stands at {at.x:.3f} {at.y:.3f} {at.z:.3f}"
-        return f"{self.name} {where}{self.hint and f'; {self.hint}'}"
-
-    def as_json(self) -> str:
-        """The same as one JSON object."""
-        from msgspec import to_builtins
-
-        return json.dumps({"name": self.name, "key": self.key, "pose": to_builtins(self.pose), "hint": self.hint})
 
 
 @dataclass(frozen=True, slots=True)
