@@ -66,6 +66,8 @@ VERBS = {
     "controller": row(None, ("--laps x", 2, "'x': use a whole"), endless=Endless("", "waiting for goal 0")),
     "pose-service": row(None, ("--goals {tmp}/none", *NO_FILE), endless=Endless("", "4 goals from square")),
     "router": row(None, endless=Endless("", "listens at")),
+    "run": row(None, ("{tmp}/none.py", 1, "none.py'")),  # what else it does is in tests/unit/ros
+    "launch": row(None, ("{tmp}/none.launch.py", 1, "no launch file '")),
     "spawn": row("{ball} --name New{n} -x 5", ("{tmp}/none.urdf", *NO_FILE), silent=("{ball}", *NO_SIM)),
     "delete": row("Doomed{n}", ("Nobody", 1, "there is no entity 'Nobody'"), silent=("Fred", *NO_SIM)),
     "list": row("", silent=("", *NO_SIM)),
