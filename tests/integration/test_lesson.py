@@ -1,0 +1,131 @@
+"""Scripts as students of the lesson write them, for ROS 2, drive hb_bot here as they are."""
+
+import importlib.metadata
+import math
+import signal
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from holozen.messages import NextGoalReply, NextGoalRequest, Odometry
+from holozen.ros.generated import find
+from holozen.testing import Process, Terminal, Wire
+from holozen.testing.wire import command
+
+from .conftest import start_sim
+from .robots import Robot, moves, place, record, rests
+
+LESSON = Path(__file__).parents[2] / "examples" / "lesson"
+SCRIPTS = LESSON / "hb_control" / "scripts"
+TURN = 1.0  # rad/s, the default of teleop_keys
+ROS = {"rclpy", "geometry_msgs", "std_msgs", "nav_msgs", "tf2_ros", "tf_transformations", "launch"}
+
+
+@pytest.fixture
+def robot(wire: Wire) -> Robot:
+    start_sim(wire)
+    return Robot(wire.bus())
+
+
+def words(wire: Wire, script: str, *rest: str) -> list[str]:
+    return command("run", *wire.flags, str(SCRIPTS / script), *rest)
+
+
+def goals(wire: Wire) -> list[NextGoalReply]:
+    bus = wire.bus("asker")
+    found: list[NextGoalReply] = []
+    while not found or not found[-1].end_of_list:
+        found.append(bus.call("next_goal", NextGoalRequest(len(found)), NextGoalReply))
+    return found
+
+
+def is_at(odom: Odometry, goal: NextGoalReply) -> bool:
+    x, y, yaw = place(odom)
+    off = math.remainder(yaw - goal.theta_goal, math.tau)
+    return math.hypot(x - goal.x_goal, y - goal.y_goal) < 0.05 and abs(off) < 0.1
+
+
+def test_the_controller_drives_round_the_shape_of_the_service_node(wire: Wire, robot: Robot) -> None:
+    shapes = record(wire.bus("reader"), "shape", find("std_msgs/msg/String"))
+    with Process(words(wire, "controller.py", "--ros-args", "-p", "kp_linear:=3.0")) as controller:
+        controller.wait_for_line("waiting for next_goal")
+        with Process(words(wire, "service_node.py")) as service:
+            shape = shapes.next().data
+            assert f"[service_node]: the shape is a {shape}" in service.wait_for_line("the shape is a")
+            corners = goals(wire)
+            assert len(corners) == {"triangle": 3, "square": 4, "hexagon": 6}[shape]
+            for corner in [*corners, corners[0]]:
+                robot.odom.next(partial(is_at, goal=corner), within=60)
+            service.signal(signal.SIGINT)
+            assert service.wait() == 0
+        controller.signal(signal.SIGINT)
+        assert controller.wait() == 130
+    assert "Traceback" not in controller.err + service.err
+    robot.stands()
+
+
+def test_a_bare_node_drives_a_square_by_time(wire: Wire, robot: Robot) -> None:
+    with Process(words(wire, "square.py")) as square:
+        for x, y in ((0.3, 0), (0, 0.3), (-0.3, 0), (0, -0.3)):
+            robot.odom.next(partial(moves, x=x, y=y, turn=0), within=20)
+        assert square.wait() == 0
+    assert "[square]: done" in square.err
+    robot.stands()
+
+
+@pytest.mark.parametrize("stamped", ["False", "True"])
+def test_a_teleop_of_ros_drives_from_a_terminal_and_its_end_stops_the_robot(
+    wire: Wire, robot: Robot, stamped: str
+) -> None:
+    parameters = ["-p", f"stamped:={stamped}", "-p", "speed:=0.4"]
+    commands = wire.bus("reader").tap("cmd_vel")
+    with Terminal(words(wire, "teleop_keys.py", "--ros-args", *parameters)) as teleop:
+        teleop.wait_for_text("drive, k stops")
+        for key, (x, y, turn) in (("i", (0.4, 0, 0)), ("J", (0, 0.4, 0)), ("l", (0, 0, -TURN)), ("k", (0, 0, 0))):
+            teleop.type(key)
+            robot.odom.next(partial(moves, x=x, y=y, turn=turn))
+        assert commands.recv().priority == "DATA"
+        teleop.type("i")
+        robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
+        teleop.type("\x03")
+        assert teleop.process.wait() == 0
+    robot.stands()
+
+
+def test_its_node_is_seen_and_its_parameters_set_like_those_of_any_other(wire: Wire, robot: Robot) -> None:
+    with Process(words(wire, "controller.py")):
+        wire.start("pose-service")
+        robot.odom.next(lambda odom: not rests(odom), within=20)
+        assert "hb_controller" in wire.run("node", "list").stdout.split()
+        assert "hb_controller" in wire.run("topic", "info", "-v", "cmd_vel").stdout
+        told = wire.run("param", "set", "hb_controller", "kp_linear", "0.75")
+        assert told.returncode == 0, told.stderr
+        assert "0.75" in wire.run("param", "get", "hb_controller", "kp_linear").stdout
+
+
+def test_names_are_remapped_as_in_ros(wire: Wire) -> None:
+    rest = ("--ros-args", "-r", "cmd_vel:=Fred/cmd_vel", "-r", "__node:=quadrat", "-r", "__ns:=/class")
+    commands = record(wire.bus(), "class/Fred/cmd_vel", find("geometry_msgs/msg/Twist"))
+    with Process(words(wire, "square.py", *rest)):
+        assert commands.next().linear.x == 0.3
+        assert "class/quadrat" in wire.run("node", "list").stdout.split()
+
+
+def test_without_holozen_run_they_fail_as_ever(tmp_path: Path) -> None:
+    alone = subprocess.run(
+        [sys.executable, str(SCRIPTS / "square.py")], cwd=tmp_path, capture_output=True, text=True, timeout=30
+    )
+    assert alone.returncode == 1
+    assert "ModuleNotFoundError: No module named 'rclpy'" in alone.stderr
+    assert not ROS & set(importlib.metadata.packages_distributions())
+
+
+def test_a_script_that_hangs_gets_what_everyone_gets(wire: Wire, robot: Robot) -> None:
+    with Process(words(wire, "square.py")) as square:
+        robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0), within=20)
+        square.signal(signal.SIGSTOP)
+        robot.stands()
+        square.signal(signal.SIGCONT)
