@@ -6,6 +6,7 @@ Only a process that names a type loads the codec.
 
 from __future__ import annotations
 
+import contextlib
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -14,6 +15,8 @@ import zenoh
 
 from holozen import threads
 from holozen.connection import Connection
+from holozen.errors import BusError
+from holozen.meanwhile import at_once, meanwhile
 from holozen.replies import Replies
 from holozen.session import close, one_line, open_door, open_session
 from holozen.tap import Tap, source
@@ -41,7 +44,8 @@ class Bus:
 
     `wire` is "json" or "msgpack", by default as the connection says. `patience` is how many seconds a client waits for
     its router (None: for ever, or until `stop`). `lasting` is for what runs long: it stands in the graph, and keeps
-    the meeting point open when its holder is gone.
+    the meeting point open when its holder is gone. `early`: open in a thread, while the caller loads and checks what
+    it needs; the first use waits for it, and raises its error.
     """
 
     def __init__(
@@ -52,15 +56,15 @@ class Bus:
         wire: str = "",
         patience: float | None = None,
         lasting: bool = False,
+        early: bool = False,
         stop: threading.Event | None = None,
     ) -> None:
         connection = connection or Connection()
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
-        self.session = open_session(connection, patience, stop)
-        self.id = str(self.session.zid())
-        self.source = source(node, self.id)  # how others name the sender of our samples
         self._readers: set[Tap | Server | About] = set()  # they live until the bus is closed
         self._closing = threading.Event()
+        opening = partial(open_session, connection, patience, stop or self._closing)
+        self._opened = meanwhile(opening) if early else at_once(opening)
         self._door: threading.Thread | None = None
         if lasting:
             from holozen.about import About
@@ -72,6 +76,21 @@ class Bus:
 
             self._door = door.keep(connection.door, self._closing, open_door)
 
+    @property
+    def session(self) -> Any:
+        """Zenoh's session. Raises BusError if it could not be opened."""
+        return self._opened()
+
+    @property
+    def id(self) -> str:
+        """The session's id."""
+        return str(self.session.zid())
+
+    @property
+    def source(self) -> str:
+        """How others name the sender of our samples."""
+        return source(self.node, self.id)
+
     def __enter__(self) -> Self:
         return self
 
@@ -81,9 +100,13 @@ class Bus:
     def close(self) -> None:
         """Leave. Returns within 0.2 s, whatever the other side does."""
         self._closing.set()
-        closer = threading.Thread(target=close, args=(self.session,), daemon=True)
+        closer = threading.Thread(target=self._leave, daemon=True)
         closer.start()
         threads.wait((closer, self._door, *(reader.thread for reader in self._readers)), CLOSE_LIMIT)
+
+    def _leave(self) -> None:
+        with contextlib.suppress(BusError, SystemExit):  # that it could not be opened was told already
+            close(self.session)
 
     def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
         """Show a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
@@ -198,7 +221,9 @@ class Bus:
         )
 
     def connected(self) -> bool:
-        """Whether this session has a link to any other."""
+        """Whether this session has a link to any other. Raises BusError once the bus is closed."""
+        if self._closing.is_set():
+            raise BusError("closed")
         return bool(self.session.info.peers_zid() or self.session.info.routers_zid())
 
 

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 R = TypeVar("R", bound="Message")
 
+FIRST_PAUSE, LONGEST_PAUSE = 0.001, 0.02  # s before it is asked again
+
 
 def call(bus: "Bus", key: str, request: "Message", reply: type[R], timeout: float) -> R:
     """See Bus.call."""
@@ -26,13 +28,14 @@ def call(bus: "Bus", key: str, request: "Message", reply: type[R], timeout: floa
 
 def call_bytes(bus: "Bus", key: str, payload: bytes, encoding: str, timeout: float) -> Sample:
     """`call` without types: the sample of the reply."""
-    deadline = time.monotonic() + timeout
+    deadline, pause = time.monotonic() + timeout, FIRST_PAUSE
     while (left := deadline - time.monotonic()) > 0:
         for answer in bus.ask(key, left, payload=payload, encoding=encoding):
             if isinstance(answer, Sample):
                 return answer
             if answer != TIMEOUT:
                 raise refusal(answer)
-        time.sleep(min(0.01, max(left, 0)))
+        time.sleep(min(pause, max(left, 0)))
+        pause = min(2 * pause, LONGEST_PAUSE)
     told = f"no reply from {key!r} within {timeout:g} s at {bus.where}; `holozen service list` shows who serves"
     raise NoReply(told)

@@ -3,9 +3,12 @@
 Without flags nothing leaves this machine: peers on loopback meet at tcp/127.0.0.1:7447; no router, no multicast.
 """
 
-import argparse
-
 from holozen.endpoints import fault
+from holozen.flags import refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import argparse
 
 DOOR = "tcp/127.0.0.1:7447"  # where the processes of one machine meet; Zenoh's own port
 LOOPBACK = "tcp/127.0.0.1:0"  # any free port, on loopback only
@@ -112,7 +115,7 @@ _ALWAYS: dict[str, object] = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
+def add_arguments(parser: "argparse.ArgumentParser") -> None:
     """Zenoh's own flags, with the names that its other tools use."""
     group = parser.add_argument_group("zenoh", f"where to meet; by default peers on loopback at {DOOR}")
     group.add_argument("--mode", choices=("peer", "client", "router"), default="peer", help="Zenoh session mode")
@@ -124,7 +127,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--cfg", action="append", type=_pair, default=[], metavar="PATH:VALUE", help="one setting of it")
 
 
-def from_arguments(args: argparse.Namespace) -> Connection:
+def from_arguments(args: "argparse.Namespace") -> Connection:
     """The Connection that the flags of `add_arguments` describe."""
     return Connection(
         mode=args.mode,
@@ -139,7 +142,7 @@ def from_arguments(args: argparse.Namespace) -> Connection:
 def endpoint(text: str) -> str:
     """A parser for an endpoint."""
     if wrong := fault(text):
-        raise argparse.ArgumentTypeError(wrong)
+        raise refused(wrong)
     return text
 
 
@@ -157,5 +160,5 @@ def _json(value: object) -> str:
 def _pair(text: str) -> tuple[str, str]:
     path, colon, value = text.partition(":")
     if not colon or not path:
-        raise argparse.ArgumentTypeError(f"{text!r}: write PATH:VALUE, such as transport/link/tx/lease:2000")
+        raise refused(f"{text!r}: write PATH:VALUE, such as transport/link/tx/lease:2000")
     return path, value

@@ -1,76 +1,32 @@
-"""Flags: a parser that tells what is wrong in one line and starts fast, and checked values."""
+"""Flags: checked values, and the parser, which is loaded when it is asked for."""
 
 from __future__ import annotations
 
-import argparse
 import math
-import os
-import sys
 from collections.abc import Callable, Iterable
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms
 if TYPE_CHECKING:
     from pathlib import Path
-    from typing import Any, NoReturn
+    from typing import Any
 
-WIDTH = 100  # characters of a line of help where there is no terminal
-
-
-class Formatter(argparse.HelpFormatter):
-    """Help as wide as the terminal. argparse's own way to find that out loads shutil, and so takes 3 ms."""
-
-    def __init__(self, prog: str) -> None:
-        try:
-            width = os.get_terminal_size().columns
-        except OSError:
-            width = WIDTH
-        super().__init__(prog, width=max(40, min(width, 120)), max_help_position=30)
+    from holozen.parser import Formatter as Formatter
+    from holozen.parser import Parser as Parser
 
 
-class Parser(argparse.ArgumentParser):
-    """A parser that tells a mistake in one line, with the closest right word."""
+def __getattr__(name: str) -> Any:
+    if name not in ("Formatter", "Parser"):
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from holozen import parser
 
-    def __init__(self, **options: Any) -> None:
-        self._words: list[str] = []  # what is parsed
-        super().__init__(**{"formatter_class": Formatter, **options})
+    return getattr(parser, name)
 
-    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """As argparse does, which all its other ways to parse go through."""
-        self._words = list(sys.argv[1:] if args is None else args)
-        return super().parse_known_args(args, namespace)
 
-    def error(self, message: str) -> NoReturn:
-        """Say what is wrong, and end with exit code 2."""
-        from holozen.tell import say
+def refused(text: str) -> Exception:
+    """The error of a parser for a value, with what is wrong."""
+    from argparse import ArgumentTypeError
 
-        verbs = [action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction)]
-        for choices in verbs:
-            if self._words and self._words[0] in choices:
-                choices[self._words[0]].error(message)  # whose flags they are
-        before, _, left = message.partition("unrecognized arguments: ")
-        if left and not before:
-            message = f"{left!r} is too much"
-        if not verbs and (flag := self._unknown_flag(message, [] if before else left.split())):
-            message = f"no flag {flag!r}{nearest(flag, self._option_string_actions)}"
-        say(f"{self.prog}: {message}; `{self.prog} --help` shows how")
-        raise SystemExit(2)
-
-    def _unknown_flag(self, message: str, left: list[str]) -> str:
-        """The flag that there is not: the first that was `left`, or one whose value is what `message` complains of, or
-        whose place something else should have.
-        """
-        place = "are required: " in message
-        for word, value in [(word, word) for word in left] or zip(self._words, [*self._words[1:], ""], strict=False):
-            flag = word.partition("=")[0]
-            unknown = flag[:1] == "-" and not any(name.startswith(flag) for name in self._option_string_actions)
-            if unknown and (left or place or repr(value) in message):
-                return flag
-        return ""
-
-    def _check_value(self, action: argparse.Action, value: Any) -> None:
-        if action.choices is not None and value not in action.choices:
-            words = [str(choice) for choice in action.choices]
-            raise argparse.ArgumentError(action, f"{value!r}{nearest(value, words)}; there are {', '.join(words)}")
+    return ArgumentTypeError(text)
 
 
 def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
@@ -82,7 +38,7 @@ def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
         except ValueError:
             value = math.nan
         if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"{text!r}: use a number from {low:g} to {high:g} {unit}".rstrip())
+            raise refused(f"{text!r}: use a number from {low:g} to {high:g} {unit}".rstrip())
         return value
 
     return parse
@@ -93,7 +49,7 @@ def count(low: int = 0) -> Callable[[str], int]:
 
     def parse(text: str) -> int:
         if not text.isdecimal() or int(text) < low:
-            raise argparse.ArgumentTypeError(f"{text!r}: use a whole number from {low} up")
+            raise refused(f"{text!r}: use a whole number from {low} up")
         return int(text)
 
     return parse
@@ -124,7 +80,7 @@ def robot(text: str) -> str:
     try:
         return robot_name(text) if text else ""
     except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
+        raise refused(str(error)) from None
 
 
 def package(text: str) -> tuple[str, Path]:
@@ -133,7 +89,7 @@ def package(text: str) -> tuple[str, Path]:
 
     name, equals, folder = text.partition("=")
     if not (name and equals and folder):
-        raise argparse.ArgumentTypeError(f"{text!r}: write NAME=DIR, such as holo=~/ws/src/holo")
+        raise refused(f"{text!r}: write NAME=DIR, such as holo=~/ws/src/holo")
     return name, Path(folder).expanduser()
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -17,16 +16,16 @@ from holozen.errors import BusError
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms, which a verb that only looks at bytes would wait for
 if TYPE_CHECKING:
+    import threading
     from typing import Any
 
 
-def open_session(connection: Connection, patience: float | None, stop: threading.Event | None) -> Any:
+def open_session(connection: Connection, patience: float | None, stop: threading.Event) -> Any:
     """The open session. A peer opens at once and connects when it can; a client waits for its router.
 
     Ends the process, in peace, when `stop` is set meanwhile.
     """
     deadline = None if patience is None else time.monotonic() + patience
-    stop = stop or threading.Event()
     told = connection.mode != "client" or patience is not None
     while True:
         try:

@@ -4,7 +4,7 @@ README, tests, the command line and the services read it from here.
 """
 
 import re
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from holozen import messages as m
 from holozen import rcl_interfaces as r
@@ -18,8 +18,7 @@ PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
 """Zenoh priority of each command source. Anyone else has DATA, as a plain `zenoh put`."""
 
 
-@dataclass(frozen=True, slots=True)
-class Topic:
+class Topic(NamedTuple):
     """A key with a stream of messages. `rate` in Hz; `silence` in seconds: when readers call it stale."""
 
     key: str
@@ -36,8 +35,7 @@ class Topic:
         return self.types[0]
 
 
-@dataclass(frozen=True, slots=True)
-class Service:
+class Service(NamedTuple):
     """A key that answers a request with one reply, or with an error that says why."""
 
     key: str

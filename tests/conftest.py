@@ -5,10 +5,14 @@
 In CI (CI=true) every skip is a failure: a test that did not run has shown nothing.
 """
 
+import fcntl
 import os
 import shutil
+import signal
 import subprocess
+import tempfile
 from collections.abc import Generator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -33,6 +37,10 @@ IN_CI = os.environ.get("CI") == "true"
 
 
 def pytest_configure(config: pytest.Config) -> None:
+    # A run in the background, or under nohup, ignores these, and so would all that it starts.
+    for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, handler)
     config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
 
 
@@ -83,5 +91,7 @@ def _install(packages: list[str]) -> None:
     if not packages or not shutil.which("apt-get"):
         return
     quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-    for words in (["update"], ["install", "--yes", *packages]):
-        subprocess.run(["apt-get", *words], env=quiet, stdin=subprocess.DEVNULL, capture_output=True, timeout=600)
+    with (Path(tempfile.gettempdir()) / "holozen-tests-apt-get").open("w") as door:
+        fcntl.flock(door, fcntl.LOCK_EX)  # two cannot install at once, and what the other one did need not be done
+        for words in (["update"], ["install", "--yes", *packages]):
+            subprocess.run(["apt-get", *words], env=quiet, stdin=subprocess.DEVNULL, capture_output=True, timeout=600)

@@ -13,35 +13,33 @@ if TYPE_CHECKING:
     from typing import Any
 
     from holozen.bus import Bus
+    from holozen.cli.reading import Reader
+    from holozen.tap import Tap
 
 WAITING = 1.0  # s without anything until that is said
 
 
 def echo(args: "argparse.Namespace") -> int:
     """Print every message of a key, until interrupted."""
-    try:
-        printer = Printer(args)
-    except ValueError as error:
-        say(f"holozen topic echo: {error}")
-        return 2
-    with open_bus(args) as bus:
+    with open_bus(args, early=True) as bus:
+        from holozen.cli.reading import Reader
+
+        try:
+            printer, reader = Printer(args), Reader(args.type_flag or args.type or "")
+        except ValueError as error:
+            say(f"holozen topic echo: {error}")
+            return 2
         tap = bus.tap(args.key)
         tap.ends.append(bus.announce("sub", "any/msg/Any", args.key))
-        return _echo(args, bus, tap, printer)
+        return _echo(args, bus, tap, printer, reader)
 
 
-def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Any", printer: "Printer") -> int:
+def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Tap", printer: "Printer", reader: "Reader") -> int:
     import threading
     from functools import partial
 
-    from holozen.cli.reading import Reader
     from holozen.errors import BusError
 
-    try:
-        reader = Reader(args.type_flag or args.type or "")
-    except ValueError as error:
-        say(f"holozen topic echo: {error}")
-        return 2
     what = "nothing that passes the filter" if args.filter else "nothing"
     say_so = partial(say, f"waiting for {args.key}; {what} came yet")
     late = threading.Timer(args.timeout or WAITING, tap.close if args.timeout else say_so)

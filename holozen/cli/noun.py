@@ -6,13 +6,15 @@ import importlib
 
 from holozen import connection
 from holozen.bus import Bus
-from holozen.flags import Parser
+from holozen.cli import quick
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms
 if TYPE_CHECKING:
     import argparse
     from collections.abc import Callable
     from typing import Any
+
+    from holozen.parser import Parser
 
 PATIENCE = 3.0  # s; a client waits this long for its router
 
@@ -39,16 +41,23 @@ class Noun:
     def main(self, argv: list[str]) -> int:
         """Run the verb that `argv` starts with. Its parser alone is ready sooner than that of all."""
         if argv and argv[0] in self.modules:
-            return self.verb(argv[0]).run(self.one(argv[0]).parse_args(argv[1:]))
+            args = quick.parsed(lambda parser: self._fill(parser, argv[0]), argv[1:])
+            return self.verb(argv[0]).run(args or self.one(argv[0]).parse_args(argv[1:]))
         self.parser().parse_args(argv)
         return 2
 
     def one(self, verb: str) -> Parser:
         """The parser of one verb alone."""
-        return self._fill(Parser(**self._words(verb)), verb)
+        from holozen.parser import Parser
+
+        parser = Parser(**self._words(verb))
+        self._fill(parser, verb)
+        return parser
 
     def parser(self) -> Parser:
         """The parser of all verbs."""
+        from holozen.parser import Parser
+
         parser = Parser(prog=f"holozen {self.name}", description=self.about)
         verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
         for name in self.modules:
@@ -65,17 +74,16 @@ class Noun:
         prog = f"holozen {self.name} {name}"
         return {"prog": prog, "description": verb.about, "epilog": f"example: {verb.example}"}
 
-    def _fill(self, parser: Parser, name: str) -> Parser:
+    def _fill(self, parser: Any, name: str) -> None:
         parser.set_defaults(node=f"{self.name}_{name}")
         self.verb(name).arguments(parser)
         parser.add_argument("--json", action="store_true", help="one JSON object a line")
         connection.add_arguments(parser)
-        return parser
 
 
-def open_bus(args: argparse.Namespace) -> Bus:
-    """The bus of a verb, where its flags say."""
-    return Bus(args.node, connection.from_arguments(args), patience=PATIENCE)
+def open_bus(args: argparse.Namespace, early: bool = False) -> Bus:
+    """The bus of a verb, where its flags say. `early` is that of Bus."""
+    return Bus(args.node, connection.from_arguments(args), patience=PATIENCE, early=early)
 
 
 def nobody(what: str, where: str, mend: str) -> str:

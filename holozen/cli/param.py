@@ -1,18 +1,33 @@
 """`holozen param`: list, get, set, describe, dump, load."""
 
-import argparse
+from __future__ import annotations
+
 import json
-from typing import TYPE_CHECKING, Any
 
 from holozen import connection
 from holozen.bus import Bus
+from holozen.cli import quick
 from holozen.cli.param_nodes import Nodes
 from holozen.errors import BusError
-from holozen.flags import Parser, key, number
+from holozen.flags import key, number
 from holozen.tell import printable, say
 
+TYPE_CHECKING = False  # importing `typing` takes 3 ms
 if TYPE_CHECKING:
+    import argparse
+    from typing import Any
+
     from holozen import rcl_interfaces as r
+    from holozen.parser import Parser
+
+VERBS = {
+    "list": "the parameters of all nodes, or of one",
+    "get": "the value of one",
+    "set": "set one or more, all or none of them",
+    "describe": "what parameters are, and which values they take",
+    "dump": "all values of a node, as YAML that `load` reads",
+    "load": "set what a file of `dump` says, all or nothing",
+}
 
 EXAMPLES = """examples:
   holozen param list
@@ -23,54 +38,61 @@ EXAMPLES = """examples:
   holozen param load controller controller.yaml"""
 
 
-def parser() -> argparse.ArgumentParser:
+def parser() -> Parser:
+    """The parser of all verbs."""
+    from argparse import RawDescriptionHelpFormatter
+
+    from holozen.parser import Parser
+
     parser = Parser(
         prog="holozen param", description="Read and set the parameters of running nodes.", epilog=EXAMPLES,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=RawDescriptionHelpFormatter,
     )  # fmt: skip
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
-    add = _plain(verbs, "list", "the parameters of all nodes, or of one")
-    add.add_argument("node", nargs="?", type=key, metavar="NODE")
-    add.add_argument("--param-type", action="store_true", help="with their types")
-    add.add_argument("--param-prefixes", nargs="+", default=[], metavar="PREFIX", help="only those below: PREFIX.name")
-    add = _verb(verbs, "get", "the value of one")
-    add.add_argument("name", metavar="NAME")
-    add.add_argument("--hide-type", action="store_true", help="the value alone")
-    add = _verb(verbs, "set", "set one or more, all or none of them")
-    add.add_argument("pairs", nargs="+", metavar="NAME VALUE")
-    add = _verb(verbs, "describe", "what parameters are, and which values they take")
-    add.add_argument("names", nargs="+", metavar="NAME")
-    _verb(verbs, "dump", "all values of a node, as YAML that `load` reads")
-    add = _verb(verbs, "load", "set what a file of `dump` says, all or nothing")
-    add.add_argument("file", metavar="FILE", help="YAML, or JSON; - for standard input")
-    add.add_argument("--no-use-wildcard", action="store_true", help="leave out what the file says for /**")
-    for sub in verbs.choices.values():
-        sub.add_argument("--json", action="store_true", help="one JSON object a line")
-        sub.add_argument("--timeout", type=number(0.01, 1e6, "s"), default=3.0, metavar="S",
-            help="seconds to wait for a reply (default: 3)")  # fmt: skip
-        connection.add_arguments(sub)
+    for name, text in VERBS.items():
+        example = next(line.strip() for line in EXAMPLES.splitlines() if line.startswith(f"  holozen param {name}"))
+        _arguments(verbs.add_parser(name, help=text, description=text, epilog=f"example: {example}"), name)
     return parser
 
 
-def _verb(verbs: Any, name: str, text: str) -> Parser:
-    add = _plain(verbs, name, text)
-    add.add_argument("node", type=key, metavar="NODE")
-    return add
+def _arguments(parser: Any, verb: str) -> None:
+    add = parser.add_argument
+    if verb == "list":
+        add("node", nargs="?", type=key, metavar="NODE")
+        add("--param-type", action="store_true", help="with their types")
+        add("--param-prefixes", nargs="+", default=[], metavar="PREFIX", help="only those below: PREFIX.name")
+    else:
+        add("node", type=key, metavar="NODE")
+    if verb == "get":
+        add("name", metavar="NAME")
+        add("--hide-type", action="store_true", help="the value alone")
+    elif verb == "set":
+        add("pairs", nargs="+", metavar="NAME VALUE")
+    elif verb == "describe":
+        add("names", nargs="+", metavar="NAME")
+    elif verb == "load":
+        add("file", metavar="FILE", help="YAML, or JSON; - for standard input")
+        add("--no-use-wildcard", action="store_true", help="leave out what the file says for /**")
+    add("--json", action="store_true", help="one JSON object a line")
+    told = "seconds to wait for a reply (default: 3)"
+    add("--timeout", type=number(0.01, 1e6, "s"), default=3.0, metavar="S", help=told)
+    parser.set_defaults(verb=verb)
+    connection.add_arguments(parser)
 
 
-def _plain(verbs: Any, name: str, text: str) -> Parser:
-    example = next(line.strip() for line in EXAMPLES.splitlines() if line.startswith(f"  holozen param {name}"))
-    add: Parser = verbs.add_parser(name, help=text, description=text, epilog=f"example: {example}")
-    return add
+def _parsed(argv: list[str]) -> Any:
+    """The flags; those of one verb alone are ready sooner than those of all."""
+    if argv and argv[0] in VERBS and (args := quick.parsed(lambda words: _arguments(words, argv[0]), argv[1:])):
+        return args
+    return parser().parse_args(argv)
 
 
 def main(argv: list[str]) -> int:
-    words = parser()
-    args = words.parse_args(argv)
+    args = _parsed(argv)
     if args.verb == "set" and len(args.pairs) % 2:
-        words.error(f"{args.pairs[-1]!r} has no value; write NAME VALUE, or more such pairs")
-    wanted = _wanted(args) if args.verb in ("set", "load") else {}
-    with Bus(f"param_{args.verb}", connection.from_arguments(args), patience=3.0) as bus:
+        parser().error(f"{args.pairs[-1]!r} has no value; write NAME VALUE, or more such pairs")
+    with Bus(f"param_{args.verb}", connection.from_arguments(args), patience=3.0, early=True) as bus:
+        wanted = _wanted(args) if args.verb in ("set", "load") else {}
         nodes = Nodes(bus, args.timeout)
         if args.verb == "list":
             return list_names(args, nodes)
@@ -172,7 +194,7 @@ def _kinds(nodes: Nodes, node: str, names: list[str]) -> dict[str, str]:
     return {row.name: _word(row.type) for row in nodes.descriptors(node, names)} if names else {}
 
 
-def _row(node: str, name: str, value: "r.ParameterValue") -> dict[str, Any]:
+def _row(node: str, name: str, value: r.ParameterValue) -> dict[str, Any]:
     return {"node": node, "name": name, "type": _word(value.type), "value": value.plain()}
 
 

@@ -1,12 +1,16 @@
 """The nodes that have parameters, and what `holozen param` asks of them."""
 
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
 
-from holozen.bus import Bus
 from holozen.errors import BusError
+from holozen.meanwhile import meanwhile
 
+TYPE_CHECKING = False  # importing `typing` takes 3 ms
 if TYPE_CHECKING:
+    from typing import Any
+
     from holozen import rcl_interfaces as r
+    from holozen.bus import Bus
 
 LIST = "/list_parameters"
 TOKENS = "@holozen/*/*/srv/rcl_interfaces/srv/ListParameters/**"
@@ -18,7 +22,10 @@ class Nodes:
     def __init__(self, bus: Bus, timeout: float) -> None:
         self._bus, self._timeout = bus, timeout
         self.sessions: dict[str, list[str]] = {}
-        for endpoint in bus.graph(TOKENS).settled(bus.connected):
+        looking = meanwhile(lambda: bus.graph(TOKENS).settled(bus.connected))
+        from holozen import codec, rcl_interfaces  # noqa: F401 - loaded while the nodes are looked for
+
+        for endpoint in looking():
             if endpoint.kind == "srv" and endpoint.key.endswith(LIST):
                 self.sessions.setdefault(endpoint.key.removesuffix(LIST), []).append(endpoint.session[:6])
 
@@ -43,14 +50,14 @@ class Nodes:
         request = r.ListParametersRequest(prefixes)
         return sorted(self._call(node, "list_parameters", request, r.ListParametersReply).result.names)
 
-    def values(self, node: str, names: list[str]) -> "list[r.ParameterValue]":
+    def values(self, node: str, names: list[str]) -> list[r.ParameterValue]:
         """The values of some."""
         from holozen import rcl_interfaces as r
 
         reply = self._call(node, "get_parameters", r.GetParametersRequest(names), r.GetParametersReply)
         return _as_many(reply.values, names, node)
 
-    def descriptors(self, node: str, names: list[str]) -> "list[r.ParameterDescriptor]":
+    def descriptors(self, node: str, names: list[str]) -> list[r.ParameterDescriptor]:
         """What some are."""
         from holozen import rcl_interfaces as r
 
@@ -58,7 +65,7 @@ class Nodes:
         reply = self._call(node, "describe_parameters", request, r.DescribeParametersReply)
         return _as_many(reply.descriptors, names, node)
 
-    def set(self, node: str, wanted: dict[str, Any]) -> "list[r.SetParametersResult]":
+    def set(self, node: str, wanted: dict[str, Any]) -> list[r.SetParametersResult]:
         """Set some, all or none of them."""
         from holozen import rcl_interfaces as r
 

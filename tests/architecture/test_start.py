@@ -45,6 +45,16 @@ def test_an_echo_gets_as_far_as_its_first_message_without_anything_heavy() -> No
     assert loaded_by(code) & HEAVY == set()
 
 
+@pytest.mark.parametrize(("noun", "verb"), [("topic", "echo"), ("topic", "pub"), ("service", "call"), ("node", "list")])
+def test_plain_flags_are_read_without_argparse(noun: str, verb: str) -> None:
+    code = (
+        f"from holozen.cli import quick, {noun} as noun\n"
+        f"words = {['odom', '--json'] if noun != 'node' else ['--json']}\n"
+        f"assert quick.parsed(lambda parser: noun.NOUN._fill(parser, {verb!r}), words).json is True\n"
+    )
+    assert loaded_by(code) & (HEAVY | {"argparse"}) == set()
+
+
 @pytest.mark.parametrize(
     ("module", "may"),
     [
@@ -53,6 +63,8 @@ def test_an_echo_gets_as_far_as_its_first_message_without_anything_heavy() -> No
         ("holozen.cli.router", set()),
         ("holozen.cli.release", set()),
         ("holozen.cli.param", set()),
+        ("holozen.cli.pub", set()),
+        ("holozen.cli.service_call", set()),
         ("holozen.cli.doctor", set()),
         ("holozen.cli.bag", set()),
         ("holozen.cli.map", set()),

@@ -152,7 +152,7 @@ def test_a_client_that_waits_for_its_router_ends_on_a_signal(wire: Wire) -> None
     with Process(command("sim", "--mode", "client", "--connect", wire.endpoint)) as sim:
         sim.wait_for_line("waiting for a Zenoh router")
         sim.signal(signal.SIGTERM)
-        sim.wait(within=5)
+        sim.wait()
         assert "Traceback" not in sim.err
 
 

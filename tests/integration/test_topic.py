@@ -7,7 +7,7 @@ import subprocess
 import pytest
 import zenoh
 
-from holozen.cli.pub import STOPS
+from holozen.cli.publishing import STOPS
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 

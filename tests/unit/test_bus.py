@@ -324,3 +324,33 @@ def test_a_client_waits_for_its_router_and_says_so(wire: Wire, capsys: pytest.Ca
         wait_for(lambda: wire.endpoint in capsys.readouterr().err)
         with Bus("router", Connection("router", listen=(wire.endpoint,))), client.result(10) as bus:
             wait_for(bus.connected)
+
+
+def test_an_early_bus_opens_meanwhile_and_its_first_use_waits(wire: Wire) -> None:
+    with wire.bus("early", early=True) as early, wire.bus("other") as other:
+        odom = early.subscribe("odom", Odometry)
+        publisher = other.publisher("odom", Odometry)
+        wait_for(lambda: publisher.matched)
+        publisher.put(Odometry())
+        assert odom.recv().message == Odometry()
+        assert early.source.startswith("early@")
+
+
+def test_an_early_bus_that_cannot_open_says_so_at_its_first_use_and_closes(wire: Wire) -> None:
+    nowhere = Connection("client", connect=(wire.endpoint,))
+    with Bus("early", nowhere, patience=0.1, early=True) as bus:
+        for _ in range(2):
+            with pytest.raises(BusError, match="no router answers"):
+                bus.tap("odom")
+
+
+def test_an_early_bus_may_be_closed_before_it_is_open(wire: Wire) -> None:
+    with Bus("early", Connection("client", connect=(wire.endpoint,)), early=True):
+        pass
+
+
+def test_a_closed_bus_has_no_link_to_ask_for(wire: Wire) -> None:
+    with wire.bus("one") as bus:
+        bus.connected()
+    with pytest.raises(BusError, match="closed"):
+        bus.connected()

@@ -1,0 +1,40 @@
+"""Work done in a thread of its own while its caller loads what it needs next."""
+
+from __future__ import annotations
+
+import threading
+
+TYPE_CHECKING = False  # importing `typing` takes 3 ms
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from typing import TypeVar
+
+    T = TypeVar("T")
+
+
+def meanwhile(work: Callable[[], T]) -> Callable[[], T]:
+    """Begin `work` now. The function returned waits for its end, and gives its result or raises its error."""
+    results: list[T] = []
+    errors: list[BaseException] = []
+
+    def run() -> None:
+        try:
+            results.append(work())
+        except BaseException as error:  # SystemExit as well: it is meant for who waits
+            errors.append(error)
+
+    def result() -> T:
+        thread.join()
+        if errors:
+            raise errors[0]
+        return results[0]
+
+    thread = threading.Thread(target=run)
+    thread.start()
+    return result
+
+
+def at_once(work: Callable[[], T]) -> Callable[[], T]:
+    """`meanwhile` for what cannot wait: `work` is done, or has raised its error, when this returns."""
+    result = work()
+    return lambda: result
