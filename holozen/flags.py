@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms
@@ -36,7 +35,7 @@ def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
         try:
             value = float(text)
         except ValueError:
-            value = math.nan
+            value = float("nan")
         if not low <= value <= high:
             raise refused(f"{text!r}: use a number from {low:g} to {high:g} {unit}".rstrip())
         return value

@@ -1,6 +1,6 @@
 """Values as people read them: the layout of `ros2 topic echo`."""
 
-import json
+from holozen import plain_json
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def decode(payload: bytes, encoding: str) -> "Any":
     if "\0" in text:  # no text has one; small numbers in binary do
         return hex_dump(payload, encoding)
     try:
-        return json.loads(text)
+        return plain_json.loads(text)
     except (ValueError, RecursionError):
         return text
 
@@ -54,7 +54,7 @@ def lines(value: "Any", indent: str = "", longest: int | None = None) -> list[st
     try:
         return _lines(value, indent, LONGEST if longest is None else longest)
     except RecursionError:
-        return [json.dumps(value)]
+        return [_json(value)]
 
 
 def _lines(value: "Any", indent: str, longest: int) -> list[str]:
@@ -81,14 +81,26 @@ def _is_flat(value: "Any") -> bool:
 
 
 def _scalar(value: "Any", longest: int = 0) -> str:
-    if type(value) is float and value - value == 0:
+    if type(value) is int or (type(value) is float and value - value == 0):
         return repr(value)  # what json writes too, but sooner
     if isinstance(value, list):
         kept = value[:longest] if longest else value
-        shown = ", ".join(map(_scalar, kept)) if str in map(type, kept) else json.dumps(kept)[1:-1]
+        shown = ", ".join(map(_scalar, kept)) if str in map(type, kept) else _numbers(kept)
         return f"[{shown}{f', ... {len(value) - len(kept)} more' if len(kept) < len(value) else ''}]"
     if isinstance(value, str):
-        return value if value.isprintable() and value else json.dumps(value)
+        return value if value.isprintable() and value else _json(value)
+    return _json(value)
+
+
+def _numbers(values: "list[Any]") -> str:
+    text = repr(values)[1:-1]
+    # Python writes them as JSON does, but for None, nan and inf, True and False.
+    return _json(values)[1:-1] if any(letter in text for letter in "nTF") else text
+
+
+def _json(value: "Any") -> str:
+    import json  # not sooner: it takes 3 ms, and most messages are of numbers and names
+
     return json.dumps(value)
 
 

@@ -1,6 +1,5 @@
 """The command line starts fast, because it loads little: only what the verb at hand needs."""
 
-import json
 import subprocess
 import sys
 from pathlib import Path
@@ -17,10 +16,10 @@ HEAVY = {
 def loaded_by(code: str) -> set[str]:
     """The modules that a fresh interpreter loads for `code`, without what its site brings."""
     packages = [path for path in sys.path if path.endswith("site-packages")]
-    script = f"import sys; sys.path[:0] = sys.argv[1:]\n{code}\nimport json; print(json.dumps(sorted(sys.modules)))"
+    script = f"import sys; sys.path[:0] = sys.argv[1:]\n{code}\nprint(*sys.modules)"
     words = [sys.executable, "-S", "-I", "-c", script, str(REPO), *packages]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60, check=True)
-    return set(json.loads(done.stdout.splitlines()[-1]))
+    return set(done.stdout.splitlines()[-1].split())
 
 
 def test_looking_at_topics_loads_nothing_heavy() -> None:
@@ -42,7 +41,8 @@ def test_an_echo_gets_as_far_as_its_first_message_without_anything_heavy() -> No
         "    sample = tap.recv()\n"
         "    assert lines(decode(sample.payload, 'application/json')) == ['x: 1']\n"
     )
-    assert loaded_by(code) & HEAVY == set()
+    # Patterns are what `json` and `argparse` compile; the modules of them alone take a sixth of the start.
+    assert loaded_by(code) & (HEAVY | {"argparse", "json", "re"}) == set()
 
 
 @pytest.mark.parametrize(("noun", "verb"), [("topic", "echo"), ("topic", "pub"), ("service", "call"), ("node", "list")])
