@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,7 @@ def imports(path: Path) -> Iterator[tuple[int, str]]:
             yield node.level, node.module or ""
 
 
+@cache  # every library is looked for in all of them
 def absolute(path: Path) -> set[str]:
     """The top-level packages that a file imports."""
     return {module.partition(".")[0] for level, module in imports(path) if not level}
