@@ -21,6 +21,9 @@ __all__ = ["Context", "ExternalShutdownException", "get_default_context"]
 
 LAST_WORDS = 0.5  # s after a signal in which a script may still publish, such as a stop
 
+CALLBACK_THREAD = "pyo3-closure"  # how Zenoh calls the threads of its callbacks
+CALLBACKS_END = 0.3  # s for them to end after their session
+
 connection = Connection()
 
 _contexts: "weakref.WeakSet[Context]" = weakref.WeakSet()
@@ -52,6 +55,7 @@ class Context:
         self._interrupted = 0.0  # when a signal came
         self._callbacks: list[weakref.ref[Any] | Callable[[], object]] = []
         self._open: list[Closable] = []
+        self._closing = threading.RLock()
 
     def __enter__(self) -> Self:
         if not self._running:
@@ -141,15 +145,16 @@ class Context:
 
     def close_all(self) -> None:
         """Close what is open, all at the same time: each may take as long as a bus does."""
-        with self._lock:
-            waiting, self._open = self._open, []
-        threads = [threading.Thread(target=one.close, daemon=True) for one in waiting[1:]]
-        for thread in threads:
-            thread.start()
-        if waiting:
-            waiting[0].close()
-        for thread in threads:
-            thread.join()
+        with self._closing:  # who comes second leaves when all is closed
+            with self._lock:
+                waiting, self._open = self._open, []
+            threads = [threading.Thread(target=one.close, daemon=True) for one in waiting[1:]]
+            for thread in threads:
+                thread.start()
+            if waiting:
+                waiting[0].close()
+            for thread in threads:
+                thread.join()
 
     def _end(self) -> None:
         with self._lock:
@@ -188,6 +193,15 @@ def end_all() -> None:
         context.try_shutdown()
 
 
+def _last_look() -> None:
+    """A second Ctrl-C, or one at the end of the script, lets the interpreter wait for no thread."""
+    end_all()
+    deadline = time.monotonic() + CALLBACKS_END
+    for thread in threading.enumerate():
+        if CALLBACK_THREAD in thread.name:
+            thread.join(max(0.0, deadline - time.monotonic()))
+
+
 def _watch_the_end() -> None:
     """Close everything when the script has ended.
 
@@ -199,7 +213,7 @@ def _watch_the_end() -> None:
             # No daemon, so that the interpreter waits until all is closed.
             _watcher = threading.Thread(target=_wait_for_the_end, name="rclpy end", daemon=False)
             _watcher.start()
-            atexit.register(end_all)
+            atexit.register(_last_look)
 
 
 def _wait_for_the_end() -> None:
@@ -212,4 +226,4 @@ def _wait_for_the_end() -> None:
 def _holds_the_script(thread: threading.Thread) -> bool:
     """Whether the script goes on in that thread. The threads of Zenoh's callbacks end with their session."""
     mine = thread is threading.current_thread() or thread is threading.main_thread()
-    return not (mine or thread.daemon or "pyo3-closure" in thread.name)
+    return not (mine or thread.daemon or CALLBACK_THREAD in thread.name)

@@ -182,7 +182,7 @@ class Executor:
             left = None if deadline is None else deadline - time.monotonic()
             if left is not None and left <= 0:
                 raise TimeoutException
-            if found := self._block(left, reached):
+            if found := self._block(left):
                 return found
 
     def _check(self, reached: Callable[[], bool]) -> None:
@@ -193,7 +193,7 @@ class Executor:
         if reached():
             raise ConditionReachedException
 
-    def _block(self, seconds: float | None, reached: Callable[[], bool]) -> Work | None:
+    def _block(self, seconds: float | None) -> Work | None:
         """Wait until something may be there to do; the work if it came in the last moment."""
         self._waker.waiting = True
         try:
@@ -201,7 +201,7 @@ class Executor:
                 entity.arm(self._waker)
             if found := self._next():
                 return found
-            self._check(reached)
+            # Who shuts down or finishes what is waited for from here on wakes this wait, even before it begins.
             self._waker.wait(_soonest([seconds, *(timer.wait_seconds() for timer in self._timers)]))
         finally:
             self._waker.waiting = False

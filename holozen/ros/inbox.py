@@ -32,9 +32,9 @@ class Waker:
         except RuntimeError:  # somebody was faster
             pass
 
-    def wait(self, seconds: float | None) -> None:
-        """Wait until somebody wakes, at most so long."""
-        self._lock.acquire(timeout=LONGEST if seconds is None else min(seconds, LONGEST))
+    def wait(self, seconds: float | None) -> bool:
+        """Wait until somebody wakes, at most so long; whether somebody did."""
+        return self._lock.acquire(timeout=LONGEST if seconds is None else min(seconds, LONGEST))
 
 
 class Inbox(Generic[T]):

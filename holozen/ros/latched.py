@@ -9,6 +9,7 @@ from holozen.ros.inbox import Waker
 from holozen.tap import Sample
 
 PATIENCE = 1.0  # s for the publishers to answer
+AGAIN = (0.0, 0.03, 0.1, 0.5)  # s between the questions after somebody came; the way to him may be longer than news
 KEPT = 100  # messages of which it is known that they came
 
 
@@ -23,8 +24,10 @@ class Latched:
         self._late: deque[Sample] = deque(maxlen=KEPT)
         self._seen: deque[bytes] = deque(maxlen=KEPT)
         self._waker = Waker()
+        self._closed = threading.Event()
         self._writers = bus.writers(key)
-        threading.Thread(target=self._keep_asking, daemon=True).start()
+        self._writers.thread = threading.Thread(target=self._keep_asking, daemon=True)  # which the bus waits for
+        self._writers.thread.start()
 
     def saw(self, sample: Sample) -> Sample:
         """The sample, which is known from now on."""
@@ -43,14 +46,21 @@ class Latched:
         """Wake `waker` for the next one."""
         self._waker = waker
 
+    def silence(self) -> None:
+        """Let the thread end with the bus."""
+        self._closed.set()
+
     def close(self) -> None:
         """Ask no more."""
+        self.silence()
         self._bus.drop(self._writers)
 
     def _keep_asking(self) -> None:
         try:
-            while True:
-                self._ask()
+            while not self._closed.is_set():
+                for pause in AGAIN:
+                    self._closed.wait(pause)
+                    self._ask()
                 self._writers.recv()
         except BusError:
             return

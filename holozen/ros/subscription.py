@@ -80,8 +80,10 @@ class Subscription:
             self._latched.arm(waker)
 
     def silence(self) -> None:
-        """Let its thread end with the bus."""
+        """Let its threads end with the bus."""
         self._inbox.close()
+        if self._latched:
+            self._latched.silence()
 
     def destroy(self) -> None:
         """Listen no more."""

@@ -80,6 +80,15 @@ def test_what_is_open_is_closed_at_the_end_but_not_by_a_signal() -> None:
     assert [one.closed for one in [*opened, closed]] == [1, 1, 1, 0]
 
 
+def test_an_end_right_after_a_signal_is_welcome(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("_thread.start_new_thread", lambda *_: None)  # it has not run yet
+    context = Context()
+    context.init([])
+    context.interrupt()
+    context.shutdown()
+    assert not context.ok()
+
+
 def test_a_block_begins_and_ends_it() -> None:
     with Context() as context:
         assert context.ok()

@@ -12,7 +12,7 @@ from holozen.ros.context import Context
 from holozen.ros.exceptions import RCLError
 from holozen.ros.executors import ExternalShutdownException, SingleThreadedExecutor
 from holozen.ros.generated import find
-from holozen.testing import Wire
+from holozen.testing import Wire, wait_for
 
 Twist: Any = find("geometry_msgs/msg/Twist")
 Spin = Callable[..., Any]
@@ -27,6 +27,13 @@ def test_entities_take_turns_however_much_one_has_to_do(ros: Wire) -> None:
     assert order == ["a", "b", "c"] * 3
 
 
+def test_nobody_is_woken_while_callbacks_run(ros: Wire, spin_for: Spin) -> None:
+    node, waits, executor = rclpy.create_node("tom"), list[bool](), rclpy.get_global_executor()
+    node.create_timer(0.001, lambda: waits.append(executor._waker.waiting))
+    spin_for(lambda: len(waits) > 5, node)
+    assert not any(waits)
+
+
 def test_a_timeout_is_kept_and_zero_waits_for_nothing(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
     executor = SingleThreadedExecutor()
     executor.add_node(rclpy.create_node("tom"))
@@ -39,10 +46,16 @@ def test_a_timeout_is_kept_and_zero_waits_for_nothing(ros: Wire, monkeypatch: py
 
 
 def test_a_future_that_another_thread_sets_ends_the_wait(ros: Wire) -> None:
-    node, future = rclpy.create_node("tom"), rclpy.Future()
-    thread = threading.Thread(target=lambda: future.set_result(5))
-    rclpy.get_global_executor().create_task(thread.start)
+    node, future, executor = rclpy.create_node("tom"), rclpy.Future(), rclpy.get_global_executor()
+
+    def finish() -> None:
+        wait_for(lambda: executor._waker.waiting)
+        future.set_result(5)
+
+    thread = threading.Thread(target=finish)
+    thread.start()
     rclpy.spin_until_future_complete(node, future)
+    thread.join()
     assert future.result() == 5
 
 

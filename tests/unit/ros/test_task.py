@@ -110,7 +110,7 @@ def test_a_coroutine_goes_on_when_what_it_awaits_is_done() -> None:
     assert run(tasks) == 0
     tasks.arm(waker)
     future.set_result(21)
-    waker.wait(10)
+    assert waker.wait(10)
     assert run(tasks) == 1
     assert task.result() == 42
 

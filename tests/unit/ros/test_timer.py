@@ -117,7 +117,7 @@ def test_a_move_of_simulated_time_wakes_who_waits(clock: Watch) -> None:
     timer.arm(waker)
     assert timer.wait_seconds() is None
     clock.set(110)
-    waker.wait(10)
+    assert waker.wait(10)
     assert timer.take()
 
 
