@@ -79,3 +79,11 @@ def test_the_profile_tells_where_a_step_of_the_sim_goes(tmp_path: Path) -> None:
     for part in ("step: the engine", "move: read the body, set its velocity", "all of it"):
         assert any(line.endswith(f"us/step  {part}") for line in lines)
         assert 0 < shares[part] <= shares["all of it"]
+
+
+def test_the_one_beside_ros_1_says_what_it_needs() -> None:
+    words = [sys.executable, str(ROOT / "benchmarks" / "ros1.py")]
+    done = subprocess.run(words, env={"PATH": "", "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "needs rosmaster, rostopic, rosservice of ROS 1; run: apt-get install" in done.stderr
+    assert done.stderr.count("\n") == 1
