@@ -16,21 +16,22 @@ def meanwhile(work: Callable[[], T]) -> Callable[[], T]:
     """Begin `work` now. The function returned waits for its end, and gives its result or raises its error."""
     results: list[T] = []
     errors: list[BaseException] = []
+    done = threading.Event()  # Thread.join takes a thread for ended once Ctrl-C has interrupted it
 
     def run() -> None:
         try:
             results.append(work())
         except BaseException as error:  # SystemExit as well: it is meant for who waits
             errors.append(error)
+        done.set()
 
     def result() -> T:
-        thread.join()
+        done.wait()
         if errors:
             raise errors[0]
         return results[0]
 
-    thread = threading.Thread(target=run)
-    thread.start()
+    threading.Thread(target=run).start()
     return result
 
 

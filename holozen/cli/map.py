@@ -43,7 +43,7 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str]) -> int:
     args = parser().parse_args(argv)
     stop = stop_event()
-    with Bus("map", connection.from_arguments(args), patience=3.0) as bus:
+    with Bus("map", connection.from_arguments(args), patience=3.0, stop=stop) as bus:
         watcher = Watcher(bus)
         try:
             return _watch(watcher, args, stop)

@@ -67,7 +67,7 @@ def main(argv: list[str]) -> int:
 def plot(args: argparse.Namespace) -> int:
     """Draw, or print as JSON, what comes on the fields of `args`, until interrupted."""
     stop = stop_event()
-    with Bus("plot", connection.from_arguments(args), patience=3.0) as bus:
+    with Bus("plot", connection.from_arguments(args), patience=3.0, stop=stop) as bus:
         lines = Lines(bus, args.fields)
         try:
             (_json if args.json else _draw)(lines, args, stop)

@@ -42,6 +42,7 @@ def publish(bus: Bus, args: "argparse.Namespace", looking: "Callable[[], list[En
     try:
         form = _form(args)
         payload = _payload(form, args) if form else None
+        _ = bus.session  # once it is open: Ctrl-C ends the wait for a router as well
         stop = stop_event()
         form = form or _form_of_listener(looking(), args)
         return _run(bus, args, form, payload or _payload(form, args), stop, looking)

@@ -72,7 +72,7 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
 
     failed = ""
     try:
-        with Bus("record", connection.from_arguments(args), patience=3.0) as bus, Intake() as intake:
+        with Bus("record", connection.from_arguments(args), patience=3.0, stop=stop) as bus, Intake() as intake:
             for expression in _expressions(args):
                 tap = bus.tap(expression, DEPTH)
                 tap.ends.append(bus.announce("sub", "any/msg/Any", expression))

@@ -93,7 +93,7 @@ def _replay(args: argparse.Namespace, summaries: list["Summary"], stop: threadin
     wire = connection.from_arguments(args)
     # Zenoh drops a sample after a millisecond in a full queue. Here it may wait: a bag is in no hurry.
     wire = wire.replace(cfg=(WAIT, *wire.cfg))
-    with Bus("replay", wire, patience=3.0) as bus:
+    with Bus("replay", wire, patience=3.0, stop=stop) as bus:
         others = [endpoint for endpoint in bus.graph().settled(bus.connected) if endpoint.session != bus.id]
         made = plan(channels, others, topics=args.topics, remap=dict(args.remap), commands=args.commands)
         for name, why in made.left_out.items():

@@ -81,7 +81,10 @@ class Driven:
 
     def steady(self, velocity: Planar, seconds: float) -> list[Odometry]:
         """Odoms over that much sim time at a velocity, after the time that the robot takes to come to it."""
-        begin = time_of(self.robot.newest()) + self.stated.settling
+        start = time_of(self.robot.newest())
+        # A second is enough to see that it does not move: some cannot move sideways.
+        begun = self.robot.drive(*velocity, until=lambda odom: not self.rests(odom) or time_of(odom) > start + 1)
+        begin = time_of(begun[-1]) + self.stated.settling
         odoms = self.robot.drive(*velocity, until=lambda odom: time_of(odom) >= begin + seconds)
         return [odom for odom in odoms if time_of(odom) >= begin]
 

@@ -1,5 +1,7 @@
 """Work goes on in a thread, and who waits for it gets its result or its error, as often as they ask."""
 
+import os
+import signal
 import threading
 
 import pytest
@@ -24,6 +26,16 @@ def test_its_error_is_for_who_waits(error: BaseException) -> None:
     for _ in range(2):
         with pytest.raises(type(error)):
             result()
+
+
+def test_who_is_interrupted_while_waiting_may_wait_again() -> None:
+    go = threading.Event()
+    result = meanwhile(lambda: go.wait(10))
+    threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        result()
+    go.set()
+    assert result() is True
 
 
 def test_at_once_has_done_its_work_when_it_returns() -> None:
