@@ -7,11 +7,13 @@ from typing import Any, TypeVar
 
 import msgspec
 
+from holozen import arrays
 from holozen.cdr import CodecError
-from holozen.messages import Message, not_finite
+from holozen.finite import not_finite
+from holozen.messages import Message
 from holozen.tell import printable
 
-__all__ = ["WIRES", "CodecError", "convert", "decode", "encode", "encoding"]
+__all__ = ["WIRES", "CodecError", "convert", "decode", "encode", "encoding", "written"]
 
 M = TypeVar("M", bound=Message)
 Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
@@ -24,21 +26,41 @@ _JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "applicat
 
 LONGEST = 200  # characters of a reason
 
-_encode_json = msgspec.json.Encoder().encode
-_encode_msgpack = msgspec.msgpack.Encoder().encode
+_encode_json = msgspec.json.Encoder(enc_hook=arrays.listed).encode
+_encode_msgpack = msgspec.msgpack.Encoder(enc_hook=arrays.listed).encode
+
+
+class NotFinite(CodecError):
+    """A NaN or an infinity in a message."""
 
 
 def encode(message: Message, wire: str = "json") -> bytes:
-    """The bytes of `message`. A NaN or an infinity raises CodecError: JSON would turn it into a null."""
+    """The bytes of `message`. A NaN or an infinity raises CodecError: JSON would turn it into a null.
+
+    As CDR, a type that takes any number is written with them.
+    """
     try:
         if message.SETTLE:
             message.SETTLE()
         payload, fine = _WRITERS[wire](message)
     except UnicodeEncodeError as error:
         raise CodecError(f"{type(message).__name__}: a text that is not Unicode: {error.reason}") from None
-    if not fine and (bad := not_finite(message)):
-        raise CodecError(f"{type(message).__name__}.{bad} is not a finite number")
+    if not fine and not (wire == "cdr" and message.ANY_NUMBER) and (bad := not_finite(message)):
+        raise NotFinite(f"{type(message).__name__}.{bad} is not a finite number")
     return payload
+
+
+def written(message: Message, wire: str) -> tuple[bytes, str]:
+    """The bytes of `message`, and the wire they are for: CDR for one that holds what no other wire has."""
+    try:
+        return encode(message, wire), wire
+    except NotFinite as error:
+        if not message.ANY_NUMBER:
+            raise
+        try:
+            return encode(message, "cdr"), "cdr"
+        except CodecError as reason:
+            raise CodecError(f"{error}, and CDR, which has such numbers, cannot hold it: {reason}") from None
 
 
 def encoding(wire: str, kind: type[Message]) -> str:

@@ -5,10 +5,9 @@ A field left out is zero; a field that does not exist is refused by name.
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Annotated, Any, ClassVar
 
-import msgspec
 from msgspec import Meta, Struct, field
 
 Covariance = Annotated[list[float], Meta(min_length=36, max_length=36)]
@@ -20,6 +19,7 @@ class Message(Struct, forbid_unknown_fields=True):
 
     ROS: ClassVar[str] = ""
     SETTLE: ClassVar[Callable[[Any], None] | None] = None  # checks what has to be before it is written
+    ANY_NUMBER: ClassVar[bool] = False  # whether one with a NaN or an infinity is sent, as CDR, or else refused
 
 
 class Time(Message):
@@ -231,19 +231,3 @@ class TriggerReply(Message):
     ROS: ClassVar[str] = "std_srvs/srv/Trigger"
     success: bool = True
     message: str = ""
-
-
-def not_finite(message: Message) -> str:
-    """The path of the first number in `message` that is NaN or infinite, such as `linear.x`; else empty."""
-    return next(_bad_numbers(msgspec.to_builtins(message), ""), "")
-
-
-def _bad_numbers(value: Any, path: str) -> Iterator[str]:
-    if isinstance(value, float) and not math.isfinite(value):
-        yield path
-    elif isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _bad_numbers(inner, f"{path}.{name}" if path else name)
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            yield from _bad_numbers(inner, f"{path}[{index}]")

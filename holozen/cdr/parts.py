@@ -5,12 +5,15 @@ Readers take the bytes, where to begin and where they end, and give the value an
 """
 
 import struct
+import sys
+from array import array
 from collections.abc import Callable, Sequence
 from math import isfinite
 from typing import Any
 
 START = 4  # bytes before the first field; alignment is counted from here
 SIZES = {code: struct.calcsize(f"<{code}") for code in "?bBhHiIqQfd"}
+NATIVE = "<" if sys.byteorder == "little" else ">"
 MANY = 2**32 - 1  # the largest count
 
 Read = Callable[[bytes, int, int], tuple[Any, int]]
@@ -59,13 +62,20 @@ def read_text(order: str, longest: int, b: bytes, p: int, e: int) -> tuple[str, 
 
 def read_numbers(order: str, code: str, bound: int, b: bytes, p: int, e: int) -> tuple[list[Any], int]:
     """A sequence of numbers."""
-    size = SIZES[code]
-    n, p = _read_length(order, bound, size, b, p, e)
-    p += pad(p, size) if n else 0
-    end = p + n * size
+    n, p, end = _read_span(order, code, bound, b, p, e)
     if code == "B":
         return list(_cut(b, p, n)), end
     return list(struct.unpack_from(f"{order}{n}{code}", b, p)), end
+
+
+def read_array(order: str, code: str, bound: int, b: bytes, p: int, e: int) -> tuple["array[Any]", int]:
+    """A sequence of numbers, as an array."""
+    _, p, end = _read_span(order, code, bound, b, p, e)
+    made: array[Any] = array(code)
+    made.frombytes(_cut(b, p, end - p))
+    if order != NATIVE:
+        made.byteswap()
+    return made, end
 
 
 def read_many(order: str, read: Read, least: int, bound: int, b: bytes, p: int, e: int) -> tuple[list[Any], int]:
@@ -81,6 +91,14 @@ def read_row(read: Read, n: int, b: bytes, p: int, e: int) -> tuple[list[Any], i
         value, p = read(b, p, e)
         values.append(value)
     return values, p
+
+
+def _read_span(order: str, code: str, bound: int, b: bytes, p: int, e: int) -> tuple[int, int, int]:
+    """How many numbers, where they begin and where they end."""
+    size = SIZES[code]
+    n, p = _read_length(order, bound, size, b, p, e)
+    p += pad(p, size) if n else 0
+    return n, p, p + n * size
 
 
 def _read_length(order: str, bound: int, least: int, b: bytes, p: int, e: int) -> tuple[int, int]:
@@ -113,10 +131,16 @@ def write_numbers(code: str, bound: int, values: Sequence[Any], p: int, out: lis
     """A sequence of numbers, and where it ended."""
     p, n, size = _write_length(bound, values, p, out), len(values), SIZES[code]
     gap = pad(p, size) if n else 0
-    out.append(b"\0" * gap + struct.pack(f"<{n}{code}", *values))
+    out.append(b"\0" * gap + _packed(code, values))
     if code in "fd" and not isfinite(sum(values)):
         odd.append(values)
     return p + gap + n * size
+
+
+def _packed(code: str, values: Sequence[Any]) -> bytes:
+    if isinstance(values, array) and values.typecode == code and NATIVE == "<":
+        return values.tobytes()
+    return struct.pack(f"<{len(values)}{code}", *values)
 
 
 def write_many(write: Write, bound: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]) -> int:

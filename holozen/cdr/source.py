@@ -9,19 +9,21 @@ from itertools import count
 from math import isfinite
 from typing import Any
 
+from holozen import arrays
 from holozen.cdr import parts
 from holozen.interfaces.definition import Field, Interface, InterfaceError, least
 
-CODES = {
-    "bool": "?", "byte": "B", "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i",
-    "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
-}  # fmt: skip
+CODES = {"bool": "?", "byte": "B", **arrays.CODES}
 
 
 class Shape:
-    """What values look like: by default a message is a dict. `names` are those that its expressions use."""
+    """What values look like: by default a message is a dict. `names` are those that its expressions use.
+
+    With `arrays`, sequences of numbers are read as arrays, else as lists.
+    """
 
     def __init__(self) -> None:
+        self.arrays = False
         self.names: dict[str, Any] = {}
 
     def made(self, interface: Interface, values: list[str]) -> str:
@@ -119,6 +121,8 @@ class _Reading(_Body):
 
     def call(self, field: Field) -> Any:
         if field.type in CODES:
+            if self.shape.arrays and field.type in arrays.CODES:
+                return partial(parts.read_array, self.order, CODES[field.type], field.bound)
             return partial(parts.read_numbers, self.order, CODES[field.type], field.bound)
         text = partial(parts.read_text, self.order, field.longest)
         one = reader(field.nested, self.shape, self.order) if field.nested else text

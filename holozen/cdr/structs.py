@@ -11,6 +11,7 @@ from typing import Any
 import msgspec
 from msgspec import StructMeta
 
+from holozen import arrays
 from holozen.cdr import CodecError
 from holozen.cdr.codec import Codec
 from holozen.cdr.source import Shape
@@ -56,7 +57,7 @@ def write(message: Message) -> tuple[bytes, bool]:
 
 def _reason(message: Message) -> str:
     try:
-        completed(interface(type(message)), msgspec.to_builtins(message))
+        completed(interface(type(message)), msgspec.to_builtins(message, enc_hook=arrays.listed))
     except _WRONG as error:
         return str(error)
     return ""
@@ -67,6 +68,7 @@ class Structs(Shape):
 
     def __init__(self, kind: type[Message]) -> None:
         super().__init__()
+        self.arrays = hasattr(kind, "__interface__")
         self._classes: dict[str, type[Message]] = {}
         self._makers: dict[str, str] = {}  # names of what makes them; two classes may have one name
         self._add(kind)

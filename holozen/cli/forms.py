@@ -6,7 +6,8 @@ from typing import Any
 
 from holozen import codec
 from holozen.cli import values
-from holozen.messages import Message, not_finite
+from holozen.finite import not_finite
+from holozen.messages import Message
 
 TYPE = re.compile(r"\w+/((msg|srv)/)?\w+")
 FORCE = "; --force sends it all the same"

@@ -2,6 +2,7 @@
 
 import math
 import operator
+import struct
 from collections.abc import Callable, Sequence, Set
 from typing import Annotated, Any
 
@@ -11,6 +12,7 @@ from holozen.cdr import CodecError
 from holozen.interfaces import Field
 from holozen.interfaces.definition import FLOATS, INTEGERS, TEXTS
 from holozen.interfaces.values import FLOAT32
+from holozen.ros import arrays
 
 Check = Callable[[Any], Any]
 """Takes what is assigned to a field and gives what is stored, or raises AssertionError."""
@@ -48,7 +50,8 @@ def check(owner: str, field: Field, nested: type | None) -> Check:
     """The check of a field of the message called `owner`."""
     one = _element(field, nested)
     if field.array:
-        return _of_list(owner, field, nested, one)
+        listed = _of_list(owner, field, nested, one)
+        return arrays.check(field, listed) if arrays.code(field) else listed
     exact = nested or (float if field.type == "float64" else bool if field.type == "bool" else None)
 
     def checked(value: Any) -> Any:
@@ -67,6 +70,8 @@ def settled(owner: str, field: Field, nested: type | None) -> Check:
 
     Numbers of another class are taken as an array of them would: a whole number for a float, those of numpy.
     """
+    if arrays.code(field):
+        return arrays.settled(owner, field)
     exact, one = nested or _CLASSES[field.type], _element(field, nested, _LOOSE.get(field.type, _same))
 
     def of(values: Any) -> list[Any]:
@@ -178,11 +183,21 @@ def _is_plain(field: Field, values: list[Any], exact: type) -> bool:
     """Whether all values are seen at once to be right: of the exact class and in its range."""
     if not values:
         return True
-    if field.type == "float32" or field.longest or not set(map(type, values)) <= {exact}:
+    if field.longest or not set(map(type, values)) <= {exact}:
         return False
+    if field.type == "float32":
+        return _are_float32(values)
     if exact is int:
         low, high = INTEGERS[field.type]
         return bool(low <= min(values) and max(values) <= high)
+    return True
+
+
+def _are_float32(values: list[float]) -> bool:
+    try:
+        struct.pack(f"={len(values)}f", *values)
+    except OverflowError:
+        return False
     return True
 
 

@@ -7,6 +7,7 @@ checked as ROS does; what is read was checked by its reader, so reading costs no
 import keyword
 import re
 import threading
+from array import array
 from collections.abc import Callable
 from copy import deepcopy
 from functools import partial
@@ -19,7 +20,7 @@ from holozen.interfaces import Field, Interface, InterfaceError, Registry
 from holozen.interfaces.definition import FLOATS, TEXTS
 from holozen.interfaces.registry import closest
 from holozen.messages import Message
-from holozen.ros import fields
+from holozen.ros import arrays, fields
 
 _build = StructMeta.__call__  # makes a message of values that are known to be right
 _store = Struct.__setattr__
@@ -47,6 +48,7 @@ class RosMeta(StructMeta):
 class RosMessage(Message, metaclass=RosMeta):
     """What every generated message is."""
 
+    ANY_NUMBER: ClassVar[bool] = True  # an infinite range of a LaserScan is nothing wrong
     __interface__: ClassVar[Interface]
     __checks__: ClassVar[dict[str, fields.Check]] = {}
 
@@ -61,7 +63,7 @@ class RosMessage(Message, metaclass=RosMeta):
         _store(self, name, self.__checks__[name](value))
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={getattr(self, name)!r}" for name in self.__struct_fields__)
+        values = ", ".join(f"{name}={_shown(getattr(self, name))!r}" for name in self.__struct_fields__)
         return f"{type(self).__module__}.{type(self).__name__}({values})"
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "RosMessage":
@@ -130,6 +132,8 @@ def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[Ros
     names: dict[str, Any] = {"__annotations__": hints, "__module__": _module(interface), "__doc__": interface.name}
     for field in interface.fields:
         names[field.name] = msgspec.field(default_factory=_default(field, nested.get(field.name)))
+    if codes := {field.name: arrays.code(field) for field in interface.fields if arrays.code(field)}:
+        names["__post_init__"] = _filler(codes)
     kind: Any = RosMeta(_last(interface), (RosMessage,), names)
     kind.ROS = re.sub("_(Request|Response)$", "", interface.name) if "/srv/" in interface.name else interface.name
     kind.__interface__ = interface
@@ -147,11 +151,31 @@ def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[Ros
 
 def _default(field: Field, nested: type | None) -> Callable[[], Any]:
     one: Callable[[], Any] = partial(_build, nested) if nested else partial(_same, _zero(field))
+    if code := arrays.code(field):
+        return partial(array, code, field.default or ())
     if isinstance(field.default, list):
         return partial(list, tuple(field.default))
     if not field.array or field.array != "fixed":
         return list if field.array else one
     return partial(_row, one, field.bound) if nested else partial(list, (one(),) * field.bound)
+
+
+def _filler(codes: dict[str, str]) -> Callable[[Any], None]:
+    """Makes arrays of the lists that a reader gave."""
+    each = tuple(codes.items())
+
+    def fill(self: Any) -> None:
+        for name, code in each:
+            values = getattr(self, name)
+            if type(values) is not array:
+                _store(self, name, arrays.filled(name, code, values))
+
+    return fill
+
+
+def _shown(value: Any) -> Any:
+    """What stands in a repr: of an array its numbers, as in ROS."""
+    return value.tolist() if type(value) is array else value
 
 
 def _zero(field: Field) -> Any:
@@ -171,15 +195,17 @@ def _row(one: Callable[[], Any], many: int) -> list[Any]:
 def _settle(owner: str, interface: Interface, nested: dict[str, type[RosMessage]]) -> Any:
     """Checks the lists of a message, and those within it, before it is written; None where there are none."""
     lists = [
-        (field.name, fields.settled(owner, field, nested.get(field.name))) for field in interface.fields if field.array
+        (field.name, fields.settled(owner, field, nested.get(field.name)))
+        for field in interface.fields
+        if field.array and not (field.array == "sequence" and arrays.code(field))
     ]
     inner = [(field.name, field.array) for field in interface.fields if field.nested and nested[field.name].SETTLE]
 
     def settle(self: Any) -> None:
         for name, check in lists:
             _store(self, name, check(getattr(self, name)))
-        for name, array in inner:
-            for part in getattr(self, name) if array else (getattr(self, name),):
+        for name, many in inner:
+            for part in getattr(self, name) if many else (getattr(self, name),):
                 part.SETTLE()
 
     return settle if lists or inner else None

@@ -6,8 +6,9 @@ from pathlib import Path
 
 from holozen import simulation_interfaces as si
 from holozen.bus import Bus
+from holozen.finite import not_finite
 from holozen.graph import on_key
-from holozen.messages import Header, Point, Pose, Quaternion, Time, Twist, Vector3, not_finite
+from holozen.messages import Header, Point, Pose, Quaternion, Time, Twist, Vector3
 from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel, parse
 from holozen.tell import say

@@ -5,7 +5,8 @@ from collections import Counter
 from collections.abc import Callable
 from typing import TypeVar
 
-from holozen.messages import Message, not_finite
+from holozen.finite import not_finite
+from holozen.messages import Message
 from holozen.readers import Received
 from holozen.tell import say
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from holozen import messages as m
 from holozen.codec import WIRES, CodecError, convert, decode, encode
+from holozen.finite import not_finite
 from holozen.wire import SERVICES, TOPICS
 
 TYPES = {kind for row in TOPICS for kind in row.types} | {kind for row in SERVICES for kind in (row.request, row.reply)}
@@ -109,7 +110,7 @@ def test_numbers_that_are_not_finite_are_not_written(wire: str, bad: float) -> N
 
 def test_a_nan_in_msgpack_reaches_the_reader_who_has_to_look() -> None:
     payload = msgspec.msgpack.encode(m.Twist.planar(math.nan))
-    assert m.not_finite(decode(payload, WIRES["msgpack"], (m.Twist,))) == "linear.x"
+    assert not_finite(decode(payload, WIRES["msgpack"], (m.Twist,))) == "linear.x"
 
 
 def test_a_text_that_is_no_unicode_is_not_written() -> None:

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen import messages as m
+from holozen.finite import not_finite
 from holozen.robot.rotation import matrix_of, quaternion_of
 
 CLASSES = [kind for _, kind in inspect.getmembers(m, inspect.isclass)]
@@ -161,11 +162,11 @@ def test_the_first_number_that_is_not_finite_is_named_by_its_path(bad: float) ->
     still = m.TransformStamped()
     moved = m.TransformStamped(transform=m.Transform(rotation=m.Quaternion(w=bad)))
     spread = m.PoseWithCovariance(covariance=[0.0] * 7 + [bad] + [0.0] * 28)
-    assert m.not_finite(m.Twist(linear=m.Vector3(y=bad), angular=m.Vector3(x=bad))) == "linear.y"
-    assert m.not_finite(spread) == "covariance[7]"
-    assert m.not_finite(m.TFMessage([still, moved])) == "transforms[1].transform.rotation.w"
+    assert not_finite(m.Twist(linear=m.Vector3(y=bad), angular=m.Vector3(x=bad))) == "linear.y"
+    assert not_finite(spread) == "covariance[7]"
+    assert not_finite(m.TFMessage([still, moved])) == "transforms[1].transform.rotation.w"
 
 
 @pytest.mark.parametrize("kind", ALL)
 def test_a_message_of_nothing_is_finite(kind: type[m.Message]) -> None:
-    assert m.not_finite(kind()) == ""
+    assert not_finite(kind()) == ""

@@ -11,6 +11,7 @@ from holozen import messages as m
 from holozen import simulation_interfaces as s
 from holozen.cdr import structs
 from holozen.codec import WIRES, CodecError, decode, encode, encoding
+from holozen.finite import not_finite
 from tests.unit.cdr.conftest import Stranger
 
 TF = m.TFMessage(
@@ -86,7 +87,7 @@ def test_numbers_within_a_field_are_held_to_its_range() -> None:
 
 def test_a_nan_in_cdr_reaches_the_reader_who_has_to_look() -> None:
     payload = cdr.write(structs.interface(m.Twist), {"linear": {"x": math.nan}})
-    assert m.not_finite(decode(payload, "application/cdr", (m.Twist,))) == "linear.x"
+    assert not_finite(decode(payload, "application/cdr", (m.Twist,))) == "linear.x"
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])

@@ -10,9 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from holozen import messages as m
-from holozen.codec import WIRES, CodecError, decode, encode, encoding
+from holozen.arrays import listed
+from holozen.codec import WIRES, CodecError, decode, encode, encoding, written
 from holozen.interfaces import Field, Interface, Registry
-from holozen.interfaces.values import prototype
+from holozen.interfaces.values import completed, prototype
 from holozen.ros import generated
 from tests.unit.cdr.conftest import Stranger
 from tests.unit.cdr.test_cdr import elements, values
@@ -44,6 +45,19 @@ def test_the_tables_hold_the_packages_of_the_lessons() -> None:
     assert set(PACKAGES) <= {name.partition("/")[0] for name in NAMES}
 
 
+def plain(message: m.Message) -> Any:
+    return msgspec.to_builtins(message, enc_hook=listed)
+
+
+def survived(message: m.Message) -> None:
+    """Each wire carries it, or CDR in its stead; a NaN equals nothing, so it is what they show that is compared."""
+    kind = type(message)
+    for wire in WIRES:
+        payload, used = written(message, wire)
+        assert used in (wire, "cdr")
+        assert repr(decode(payload, encoding(used, kind), (kind,))) == repr(message)
+
+
 def twin(message: m.Message) -> Any:
     """The generated class of a message of ours."""
     end = {"Request": "_Request", "Reply": "_Response"}
@@ -66,7 +80,7 @@ def test_a_generated_message_and_ours_are_the_same_bytes(message: m.Message, wir
 def test_every_type_is_made_and_survives_every_wire(name: str, stranger: Stranger) -> None:
     interface, kind = REGISTRY.find(name), generated.find(name)
     message = kind()
-    assert msgspec.to_builtins(message) == prototype(interface)
+    assert plain(message) == prototype(interface)
     assert kind(**{field: getattr(message, field) for field in message.__struct_fields__}) == message
     for wire in WIRES:
         payload = encode(message, wire)
@@ -80,18 +94,12 @@ def test_every_type_is_made_and_survives_every_wire(name: str, stranger: Strange
 def test_any_value_of_any_type_is_the_same_bytes_as_another_librarys(
     name: str, stranger: Stranger, data: st.DataObject
 ) -> None:
-    interface, kind = REGISTRY.find(name), generated.find(name)
+    interface = REGISTRY.find(name)
     value = data.draw(values(interface))
     message = filled(interface, value)
-    assert msgspec.to_builtins(message) == value
-    try:
-        payload = encode(message, "cdr")
-    except CodecError as error:
-        assert str(error).endswith("is not a finite number")
-        return
-    assert payload == stranger.write(interface, value)
-    for wire in WIRES:
-        assert decode(encode(message, wire), encoding(wire, kind), (kind,)) == message
+    assert repr(plain(message)) == repr(completed(interface, value))
+    assert encode(message, "cdr") == stranger.write(interface, value)
+    survived(message)
 
 
 def filled(interface: Interface, value: dict[str, Any]) -> Any:
@@ -120,21 +128,13 @@ def test_what_a_field_takes_is_written_and_read(field: Field, data: st.DataObjec
     one = elements(field)
     value = data.draw(st.lists(one, min_size=2 if field.array == "fixed" else 0, max_size=most) if field.array else one)
     kind = generated.make(Interface("t/msg/Some", "msg", (field,)))
-    message: Any = kind(some=value)
-    for wire in WIRES:
-        try:
-            assert decode(encode(message, wire), encoding(wire, kind), (kind,)) == message
-        except CodecError as error:
-            assert str(error).endswith("is not a finite number")
+    survived(kind(some=value))
 
 
 @pytest.mark.parametrize("wire", WIRES)
 @pytest.mark.parametrize(
     ("kind", "put", "held"),
     [
-        ("float64", [1, True], [1.0, 1.0]),
-        ("float32", [0.5], [0.5]),
-        ("uint8", [True], [1]),
         ("byte", [b"\x07"], [7]),
         ("string", [type("Text", (str,), {})("x")], ["x"]),
     ],
@@ -154,18 +154,20 @@ def test_numbers_of_numpy_may_be_put_into_lists(wire: str) -> None:
     made: Any = generated.make(
         Interface(
             "t/msg/N", "msg",
-            (Field("f", "float64", "sequence"), Field("i", "int32", "sequence"), Field("b", "bool", "sequence")),
+            (Field("f", "float64", "fixed", 3), Field("i", "int32", "fixed", 2), Field("b", "bool", "sequence"),
+             Field("a", "float64", "sequence")),
         )
     )  # fmt: skip
     message = made()
-    message.f.extend([np.float64(0.5), np.float32(1.5), np.int64(2)])
+    message.a.extend([np.float64(0.5), np.float32(1.5), np.int64(2)])
+    message.f[:] = message.a
     message.i[:] = np.array([1, 2])
     message.b.append(np.True_)
     read = decode(encode(message, wire), encoding(wire, made), (made,))
-    assert (read.f, read.i, read.b) == ([0.5, 1.5, 2.0], [1, 2], [True])
+    assert (read.f, read.i, read.b, read.a.tolist()) == ([0.5, 1.5, 2.0], [1, 2], [True], [0.5, 1.5, 2.0])
 
 
-JOINTS, IMAGE = "sensor_msgs/msg/JointState", "sensor_msgs/msg/Image"
+JOINTS, VALUE, ODOMETRY = "sensor_msgs/msg/JointState", "rcl_interfaces/msg/ParameterValue", "nav_msgs/msg/Odometry"
 MARKER = generated.find("visualization_msgs/msg/Marker")
 
 
@@ -174,12 +176,17 @@ MARKER = generated.find("visualization_msgs/msg/Marker")
     ("name", "place", "put", "reason"),
     [
         (JOINTS, "name", 3, "JointState.name[0]: 3 of type 'int' is not what a string[] holds"),
-        (JOINTS, "effort", "1", "JointState.effort[0]: '1' of type 'str' is not what a float64[] holds"),
-        (JOINTS, "effort", None, "JointState.effort[0]: None of type 'NoneType' is not what a float64[] holds"),
-        (IMAGE, "data", 256, "Image.data[0]: 256 of type 'int' is not what a uint8[] holds"),
-        (IMAGE, "data", 1.5, "Image.data[0]: 1.5 of type 'float' is not what a uint8[] holds"),
+        (
+            ODOMETRY,
+            "pose.covariance",
+            "1",
+            "PoseWithCovariance.covariance[36]: '1' of type 'str' is not what a float64[",
+        ),
+        (ODOMETRY, "pose.covariance", None, "PoseWithCovariance.covariance[36]: None of type 'NoneType' is not what a"),
+        (VALUE, "byte_array_value", 256, "ParameterValue.byte_array_value[0]: 256 of type 'int' is not what a byte["),
+        (VALUE, "byte_array_value", 1.5, "ParameterValue.byte_array_value[0]: 1.5 of type 'float' is not what a byte["),
         ("nav_msgs/msg/Path", "poses", m.Pose(), "Path.poses[0]: Pose(position=Point(x=0.0, y=0.0, z=0.0), orie"),
-        ("nav_msgs/msg/Odometry", "pose.covariance", 0.0, "PoseWithCovariance.covariance: 37 values is not what a "),
+        (ODOMETRY, "pose.covariance", 0.0, "PoseWithCovariance.covariance: 37 values is not what a "),
         (
             "visualization_msgs/msg/MarkerArray",
             "markers",
