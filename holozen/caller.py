@@ -19,7 +19,8 @@ FIRST_PAUSE, LONGEST_PAUSE = 0.001, 0.02  # s before it is asked again
 
 def call(bus: "Bus", key: str, request: "Message", reply: type[R], timeout: float) -> R:
     """See Bus.call."""
-    answer = call_bytes(bus, key, codec.encode(request, bus.wire), codec.encoding(bus.wire, type(request)), timeout)
+    payload, wire = codec.written(request, bus.wire)
+    answer = call_bytes(bus, key, payload, codec.encoding(wire, type(request)), timeout)
     try:
         return codec.decode(answer.payload, answer.encoding, (reply,))
     except codec.CodecError as error:

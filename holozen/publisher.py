@@ -22,8 +22,8 @@ class Publisher(Generic[M]):
 
         self.ends = [publisher]  # what stands on the wire for this publisher
         self._publisher, self._wire, self._source = publisher, wire, source.encode()
-        self._encode, self._encoding = codec.encode, publisher.encoding
-        self._last: bytes | None = None
+        self._written, self._named, self._encoding = codec.written, codec.encoding, publisher.encoding
+        self._last: tuple[bytes, Any] | None = None  # with its Encoding
         self._numbers = map(number, count())
 
     @property
@@ -32,19 +32,23 @@ class Publisher(Generic[M]):
         return bool(self._publisher.matching_status.matching)
 
     def put(self, message: M) -> None:
-        """Send one message. Raises codec.CodecError if it holds a number that is not finite."""
-        self.put_bytes(self._encode(message, self._wire))
+        """Send one message. A number that is not finite raises codec.CodecError, or the message is sent as CDR, as its
+        type says.
+        """
+        payload, wire = self._written(message, self._wire)
+        self.put_bytes(payload, None if wire == self._wire else self._named(wire, type(message)))
 
-    def put_bytes(self, payload: bytes) -> None:
-        """Send what is encoded already."""
-        self._last = payload
-        self._publisher.put(payload, attachment=self._source, source_info=next(self._numbers))
+    def put_bytes(self, payload: bytes, encoding: str | None = None) -> None:
+        """Send what is encoded already, by default for the wire of this publisher."""
+        self._last = payload, encoding or self._encoding
+        self._publisher.put(payload, encoding=encoding, attachment=self._source, source_info=next(self._numbers))
 
     def answer(self, query: Any) -> None:
         """Reply with the last message. Runs in Zenoh's thread, and so does nothing else."""
         with query:
             if self._last is not None:
-                query.reply(self._publisher.key_expr, self._last, encoding=self._encoding)
+                payload, encoding = self._last
+                query.reply(self._publisher.key_expr, payload, encoding=encoding)
 
     def close(self) -> None:
         """Stop writing and answering; nothing of this key stays."""

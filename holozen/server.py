@@ -97,8 +97,8 @@ class Server:
 
     def reply(self, query: Any, answer: "Message") -> None:
         """Answer a request."""
-        reply = self._codec.encode(answer, self._wire)
-        query.reply(self._key, reply, encoding=self._codec.encoding(self._wire, type(answer)))
+        reply, wire = self._codec.written(answer, self._wire)
+        query.reply(self._key, reply, encoding=self._codec.encoding(wire, type(answer)))
 
     def read(self, query: Any) -> Any:
         """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`)."""

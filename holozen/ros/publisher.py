@@ -36,7 +36,10 @@ class Publisher:
         return str(self._node.get_logger().name)
 
     def publish(self, msg: Any) -> None:
-        """Send a message, or the bytes of one. Raises TypeError for another type, CodecError for a NaN or infinity."""
+        """Send a message, or the bytes of one. Raises TypeError for another type.
+
+        One with a NaN or an infinity goes out as CDR, whatever the wire: no other one has them.
+        """
         self._node.context.check_may_speak()
         writer = self._writer
         if writer is None:
