@@ -142,7 +142,7 @@ def test_all_services_of_ros_answer_on_every_wire(wire: Wire, robot: Robot, form
         snake = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in name).lstrip("_")
         return caller.call(f"lab/tom/{snake}", kind.Request(**fields), kind.Response)
 
-    assert call("GetParameterTypes", names=["speed", "names", "later"]).types == [3, 9, 0]
+    assert call("GetParameterTypes", names=["speed", "names", "later"]).types.tolist() == [3, 9, 0]
     assert call("ListParameters", prefixes=["speed"]).result.names == ["speed"]
     values = call("GetParameters", names=["names", "later"]).values
     assert [Parameter.from_parameter_msg(_named(each)).value for each in values] == [["a", "b"], None]
