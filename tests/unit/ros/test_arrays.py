@@ -13,6 +13,9 @@ import numpy as np
 import pytest
 
 from holozen import messages as m
+from holozen.cdr import structs
+from holozen.cdr.codec import Codec
+from holozen.cdr.source import Shape
 from holozen.codec import WIRES, CodecError, convert, decode, encode, encoding
 from holozen.ros import generated
 from tests.unit.ros.test_generated import made, refused
@@ -185,6 +188,13 @@ def test_both_byte_orders_of_cdr_are_read(kind: str, order: str) -> None:
             b"\0" + (b"\0" if order == ">" else b"\1") + b"\0\0" + before + numbers, WIRES["cdr"], (reader,)
         )
         assert same(read.some, code, held)
+
+
+def test_cdr_is_read_into_an_array_without_a_list_between() -> None:
+    shape = Shape()
+    shape.arrays = True
+    read = Codec(structs.interface(SCAN), shape).read(encode(SCAN(ranges=[0.5]), "cdr"))
+    assert same(read["ranges"], "f", [0.5])
 
 
 @pytest.mark.parametrize("wire", WIRES)
