@@ -30,37 +30,42 @@ _encode_json = msgspec.json.Encoder(enc_hook=arrays.listed).encode
 _encode_msgpack = msgspec.msgpack.Encoder(enc_hook=arrays.listed).encode
 
 
-class NotFinite(CodecError):
-    """A NaN or an infinity in a message."""
-
-
 def encode(message: Message, wire: str = "json") -> bytes:
     """The bytes of `message`. A NaN or an infinity raises CodecError: JSON would turn it into a null.
 
     As CDR, a type that takes any number is written with them.
     """
-    try:
-        if message.SETTLE:
-            message.SETTLE()
-        payload, fine = _WRITERS[wire](message)
-    except UnicodeEncodeError as error:
-        raise CodecError(f"{type(message).__name__}: a text that is not Unicode: {error.reason}") from None
+    payload, fine = _write(message, wire)
     if not fine and not (wire == "cdr" and message.ANY_NUMBER) and (bad := not_finite(message)):
-        raise NotFinite(f"{type(message).__name__}.{bad} is not a finite number")
+        raise CodecError(f"{type(message).__name__}.{bad} is not a finite number")
     return payload
 
 
 def written(message: Message, wire: str) -> tuple[bytes, str]:
     """The bytes of `message`, and the wire they are for: CDR for one that holds what no other wire has."""
-    try:
+    if not message.ANY_NUMBER or wire == "cdr":
         return encode(message, wire), wire
-    except NotFinite as error:
-        if not message.ANY_NUMBER:
-            raise
-        try:
-            return encode(message, "cdr"), "cdr"
-        except CodecError as reason:
-            raise CodecError(f"{error}, and CDR, which has such numbers, cannot hold it: {reason}") from None
+    payload, fine = _write(message, wire)
+    if fine:
+        return payload, wire
+    try:
+        cdr, fine = _structs().write(message)  # sees it sooner than `not_finite`
+    except CodecError as error:
+        if bad := not_finite(message):
+            told = f"{type(message).__name__}.{bad} is not a finite number, which takes CDR"
+            raise CodecError(f"{told}, and that cannot hold the rest: {error}") from None
+        return payload, wire
+    return (payload, wire) if fine else (cdr, "cdr")
+
+
+def _write(message: Message, wire: str) -> tuple[bytes, bool]:
+    """The bytes, and whether all its numbers are finite for certain."""
+    try:
+        if message.SETTLE:
+            message.SETTLE()
+        return _WRITERS[wire](message)
+    except UnicodeEncodeError as error:
+        raise CodecError(f"{type(message).__name__}: a text that is not Unicode: {error.reason}") from None
 
 
 def encoding(wire: str, kind: type[Message]) -> str:

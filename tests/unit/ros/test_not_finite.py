@@ -97,5 +97,15 @@ def test_what_cdr_cannot_hold_is_told() -> None:
     assert written(kind(x=[1.0]), "json")[1] == "json"
     with pytest.raises(CodecError) as error:
         written(kind(x=[1.0, math.nan]), "json")
-    assert str(error.value).startswith("Wide.x[1] is not a finite number, and CDR, which has such numbers, cannot hold")
+    told = "Wide.x[1] is not a finite number, which takes CDR, and that cannot hold the rest: "
+    assert str(error.value).startswith(told)
     assert "wstring" in str(error.value)
+    for finite in (kind(x=[1.0], text="null"), kind(x=[1.0])):
+        for wire in ("json", "msgpack"):
+            assert written(finite, wire) == (encode(finite, wire), wire)
+
+
+def test_a_text_that_reads_like_no_number_changes_nothing() -> None:
+    scan = Scan(ranges=[1.0])
+    scan.header.frame_id = "null"
+    assert written(scan, "json") == (encode(scan), "json")
