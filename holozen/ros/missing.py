@@ -13,7 +13,7 @@ ROS_1 = "this is of ROS 1; here is ROS 2's rclpy"
 HINTS = {
     "actionlib": ACTIONS,
     "ament_index_python.resources": "ament_index_python.packages finds the folders of packages",
-    "cv_bridge": "numpy.array(image.data, 'uint8').reshape(image.height, image.width, -1) is an rgb8 or bgr8 image",
+    "cv_bridge": "numpy.frombuffer(image.data, 'uint8').reshape(image.height, image.width, -1) is a colour image",
     "launch_xml": "launch files are in Python here",
     "launch_yaml": "launch files are in Python here",
     "message_filters": "keep the last message of each topic in its callback, and compare their stamps",

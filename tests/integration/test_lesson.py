@@ -12,7 +12,7 @@ import pytest
 
 from holozen.messages import NextGoalReply, NextGoalRequest, Odometry
 from holozen.ros.generated import find
-from holozen.testing import Process, Terminal, Wire
+from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.testing.wire import command
 
 from .conftest import start_sim
@@ -40,6 +40,12 @@ def goals(wire: Wire) -> list[NextGoalReply]:
     while not found or not found[-1].end_of_list:
         found.append(bus.call("next_goal", NextGoalRequest(len(found)), NextGoalReply))
     return found
+
+
+def is_heard(teleop: Terminal, robot: Robot) -> bool:
+    """Whether the sim knows it by a key that moves nothing."""
+    teleop.type("k")
+    return any("teleop_keys" in source.source for source in robot.status().sources)
 
 
 def is_at(odom: Odometry, goal: NextGoalReply) -> bool:
@@ -84,6 +90,7 @@ def test_a_teleop_of_ros_drives_from_a_terminal_and_its_end_stops_the_robot(
     commands = wire.bus("reader").tap("cmd_vel")
     with Terminal(words(wire, "teleop_keys.py", "--ros-args", *parameters)) as teleop:
         teleop.wait_for_text("drive, k stops")
+        wait_for(partial(is_heard, teleop, robot), what="the sim to hear it")
         for key, (x, y, turn) in (("i", (0.4, 0, 0)), ("J", (0, 0.4, 0)), ("l", (0, 0, -TURN)), ("k", (0, 0, 0))):
             teleop.type(key)
             robot.odom.next(partial(moves, x=x, y=y, turn=turn))
