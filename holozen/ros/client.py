@@ -40,7 +40,7 @@ class Client:
         self.callback_group = callback_group
         self.tasks = Tasks(callback_group)  # the done callbacks of its futures
         self._node, self._key, self._closed = node, key, threading.Event()
-        self._is_served = node.bus.served(key)
+        self._is_served = node._holozen.bus.served(key)
         self._threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
 
     @property
@@ -116,7 +116,7 @@ class Client:
                 if not self._is_served():
                     self._closed.wait(LOOK)
                     continue
-                reply = self._node.bus.call(self._key, request, self.srv_type.Response, LONGEST)
+                reply = self._node._holozen.bus.call(self._key, request, self.srv_type.Response, LONGEST)
                 return future.set_result(reply)
             except NoReply:
                 continue

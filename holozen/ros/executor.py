@@ -211,7 +211,7 @@ class Executor:
         entities = self._entities
         if entities is None:
             # Set first: a node that changes meanwhile sets it back to None.
-            found: list[Entity] = [self._tasks, *(one for node in self.get_nodes() for one in node.entities())]
+            found: list[Entity] = [self._tasks, *(one for node in self.get_nodes() for one in node._holozen.entities())]
             entities = self._entities = tuple(found)
             self._timers = [one for one in found if isinstance(one, Timer)]
         return entities

@@ -30,6 +30,22 @@ HINTS = {
 }
 """Module of ROS that is not here -> what there is instead."""
 
+WAITABLES = "what is not a topic, service or timer wakes the spin with create_guard_condition(callback).trigger()"
+CLIENTS = "who asks does not stand in the graph, only who serves: count_services, get_service_names_and_types"
+
+OF_NODE = {
+    "add_waitable": WAITABLES,
+    "count_clients": CLIENTS,
+    "get_client_names_and_types_by_node": CLIENTS,
+    "get_clients_info_by_service": CLIENTS,
+    "get_node_names_and_namespaces_with_enclaves": "there are no enclaves; use get_node_names_and_namespaces",
+    "get_servers_info_by_service": "get_service_names_and_types_by_node says what a node serves",
+    "handle": "there is no C library below it",
+    "remove_waitable": WAITABLES,
+    "waitables": WAITABLES,
+}
+"""Attribute of ROS's Node that is not here -> what there is instead."""
+
 
 def in_module(module: str, name: str, known: Iterable[str]) -> str:
     """The line for a name that a module of ROS does not have here."""
@@ -37,9 +53,13 @@ def in_module(module: str, name: str, known: Iterable[str]) -> str:
     return f"{module} has no {name!r} here{_instead(full, name, module, known)}; see {PAGE}"
 
 
-def of_class(kind: str, name: str, known: Iterable[str]) -> str:
-    """The line for an attribute that a class of ROS, such as `Node`, does not have here."""
-    return f"{kind} has no {name!r} here{closest(name, (each for each in known if each[0] != '_'))}; see {PAGE}"
+def of_node(kind: str, name: str) -> str:
+    """The line for an attribute that a node, of that class, does not have."""
+    if name == "_holozen":
+        return f"call super().__init__('name_of_the_node') in the __init__ of {kind} before anything of Node is used"
+    if name in OF_NODE:
+        return f"Node has no {name!r} here; {OF_NODE[name]}; see {PAGE}"
+    return f"{kind!r} object has no attribute {name!r}"
 
 
 def _instead(full: str, name: str, module: str, known: Iterable[str]) -> str:

@@ -1,14 +1,13 @@
 """What a node makes and destroys: publishers, subscriptions, clients, services, timers, rates, guard conditions."""
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, Any, cast
 
 from holozen.messages import Message
 from holozen.ros import names
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.client import Client
 from holozen.ros.clock import Clock
-from holozen.ros.context import Context
 from holozen.ros.guard_condition import GuardCondition
 from holozen.ros.publisher import Publisher
 from holozen.ros.qos import QoSProfile, checked, qos_profile_services_default
@@ -18,16 +17,13 @@ from holozen.ros.timer import Rate, Timer
 
 if TYPE_CHECKING:
     from holozen.ros.node import Node
-
-T = TypeVar("T")
+    from holozen.ros.node_core import Core
 
 
 class NodeMakers:
     """The `create_*` and `destroy_*` of a Node. All raise InvalidHandle where it was destroyed."""
 
-    context: Context
-    default_callback_group: CallbackGroup
-    _clock: Clock
+    _holozen: "Core"
 
     def create_publisher(
         self,
@@ -41,10 +37,12 @@ class NodeMakers:
         publisher_class: type[Publisher] = Publisher,
     ) -> Publisher:
         """A writer of messages on a topic."""
-        self._check_open()
+        self._holozen.check_open()
         _check_message(msg_type)
         full = self.resolve_topic_name(topic)
-        return self._own(publisher_class(cast("Node", self), msg_type, full, names.key(full), checked(qos_profile)))
+        return self._holozen.own(
+            publisher_class(cast("Node", self), msg_type, full, names.key(full), checked(qos_profile))
+        )
 
     def create_subscription(
         self,
@@ -59,13 +57,13 @@ class NodeMakers:
         raw: bool = False,
     ) -> Subscription:
         """Call `callback(message)` for each message on a topic, while the node is spun."""
-        self._check_open()
+        self._holozen.check_open()
         _check_message(msg_type)
-        full, group = self.resolve_topic_name(topic), callback_group or self.default_callback_group
+        full, group = self.resolve_topic_name(topic), callback_group or self._holozen.group
         made = Subscription(
             cast("Node", self), msg_type, full, names.key(full), callback, group, checked(qos_profile), raw
         )
-        return self._own(made)
+        return self._holozen.own(made)
 
     def create_client(
         self,
@@ -76,11 +74,11 @@ class NodeMakers:
         callback_group: CallbackGroup | None = None,
     ) -> Client:
         """A caller of a service."""
-        self._check_open()
+        self._holozen.check_open()
         _check_service(srv_type)
-        full, group = self.resolve_service_name(srv_name), callback_group or self.default_callback_group
+        full, group = self.resolve_service_name(srv_name), callback_group or self._holozen.group
         made = Client(cast("Node", self), srv_type, full, names.key(full), group, checked(qos_profile))
-        return self._own(made)
+        return self._holozen.own(made)
 
     def create_service(
         self,
@@ -92,10 +90,10 @@ class NodeMakers:
         callback_group: CallbackGroup | None = None,
     ) -> Service:
         """Answer requests with what `callback(request, response)` returns, while the node is spun."""
-        self._check_open()
+        self._holozen.check_open()
         _check_service(srv_type)
-        full, group = self.resolve_service_name(srv_name), callback_group or self.default_callback_group
-        return self._own(
+        full, group = self.resolve_service_name(srv_name), callback_group or self._holozen.group
+        return self._holozen.own(
             Service(cast("Node", self), srv_type, full, names.key(full), callback, group, checked(qos_profile))
         )
 
@@ -108,70 +106,65 @@ class NodeMakers:
         autostart: bool = True,
     ) -> Timer:
         """Call `callback()` every so many seconds of a clock, by default the node's, while the node is spun."""
-        period, group = int(float(timer_period_sec) * 1e9), callback_group or self.default_callback_group
-        return self._own(
-            Timer(callback, group, period, clock or self._clock, context=self.context, autostart=autostart)
+        period, group = int(float(timer_period_sec) * 1e9), callback_group or self._holozen.group
+        return self._holozen.own(
+            Timer(
+                callback,
+                group,
+                period,
+                clock or self._holozen.clock,
+                context=self._holozen.context,
+                autostart=autostart,
+            )
         )
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
         """What sleeps so that a loop goes round `frequency` times a second, without spin."""
         if frequency <= 0:
             raise ValueError(f"frequency must be > 0, and {frequency} is not")
-        return self._own(Rate(int(1e9 / frequency), clock or self._clock, self.context))
+        return self._holozen.own(Rate(int(1e9 / frequency), clock or self._holozen.clock, self._holozen.context))
 
     def create_guard_condition(
         self, callback: Callable[[], Any], callback_group: CallbackGroup | None = None
     ) -> GuardCondition:
         """What lets any thread run `callback()` while the node is spun."""
-        return self._own(GuardCondition(callback, callback_group or self.default_callback_group))
+        return self._holozen.own(GuardCondition(callback, callback_group or self._holozen.group))
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
         """Write no more; whether it was this node's."""
-        return self._disown(publisher)
+        return self._holozen.disown(publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
         """Listen no more; whether it was this node's."""
-        return self._disown(subscription)
+        return self._holozen.disown(subscription)
 
     def destroy_client(self, client: Client) -> bool:
         """Ask no more; whether it was this node's."""
-        return self._disown(client)
+        return self._holozen.disown(client)
 
     def destroy_service(self, service: Service) -> bool:
         """Answer no more; whether it was this node's."""
-        return self._disown(service)
+        return self._holozen.disown(service)
 
     def destroy_timer(self, timer: Timer) -> bool:
         """Call no more; whether it was this node's."""
-        return self._disown(timer)
+        return self._holozen.disown(timer)
 
     def destroy_rate(self, rate: Rate) -> bool:
         """Sleep no more; whether it was this node's."""
-        return self._disown(rate)
+        return self._holozen.disown(rate)
 
     def destroy_guard_condition(self, guard: GuardCondition) -> bool:
         """Call no more; whether it was this node's."""
-        return self._disown(guard)
+        return self._holozen.disown(guard)
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
         """The absolute name of a topic of this node, remapped unless `only_expand`."""
-        return self._resolve(topic, "topic", only_expand)
+        return self._holozen.resolve(topic, "topic", only_expand)
 
     def resolve_service_name(self, service: str, *, only_expand: bool = False) -> str:
         """The absolute name of a service of this node, remapped unless `only_expand`."""
-        return self._resolve(service, "service", only_expand)
-
-    def _resolve(self, name: str, kind: str, only_expand: bool) -> str:
-        raise NotImplementedError
-
-    def _own(self, made: T) -> T:
-        raise NotImplementedError
-
-    def _disown(self, made: Any) -> bool:
-        raise NotImplementedError
-
-    def _check_open(self) -> None:
-        raise NotImplementedError
+        return self._holozen.resolve(service, "service", only_expand)
 
 
 def _check_message(kind: Any) -> None:

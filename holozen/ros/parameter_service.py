@@ -43,9 +43,9 @@ def _bound(answer: Any, node: Any) -> Any:
 
 def _stranger(node: Any, name: str) -> str:
     """That the node has no parameter of that name, and takes none; empty if it has or would."""
-    store = node._store
+    store = node._holozen.store
     is_taken = name in store.values or store.allow_undeclared
-    return "" if is_taken else unknown(names.key(node._fqn), name, store.values)
+    return "" if is_taken else unknown(names.key(node._holozen.fqn), name, store.values)
 
 
 def _describe(node: Any, request: Any, response: Any) -> None:
@@ -58,7 +58,7 @@ def _types(node: Any, request: Any, response: Any) -> None:
 
 def _get(node: Any, request: Any, response: Any) -> None:
     """A parameter that has no value yet is one of type NOT_SET."""
-    values = node._store.values
+    values = node._holozen.store.values
     response.values = [(values.get(name) or Parameter(name)).get_parameter_value() for name in request.names]
 
 
@@ -72,7 +72,7 @@ def _set(node: Any, request: Any, response: Any) -> None:
 
     reasons = _faults(node, request.parameters)
     if not any(reasons):
-        reason = node._store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
+        reason = node._holozen.store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
         reasons = [reason, *[reason and ELSE] * len(reasons[1:])] if reasons else []
     elif len(reasons) > 1:
         reasons = [reason or ELSE for reason in reasons]
@@ -84,7 +84,7 @@ def _set_atomically(node: Any, request: Any, response: Any) -> None:
 
     reason = next(filter(None, _faults(node, request.parameters)), "")
     response.result = result(
-        reason or node._store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
+        reason or node._holozen.store.set([Parameter.from_parameter_msg(each) for each in request.parameters])
     )
 
 
@@ -95,7 +95,7 @@ def _faults(node: Any, asked: Any) -> list[str]:
         reason = f"{each.name!r} is set twice in one request" if each.name in seen else _stranger(node, each.name)
         seen.add(each.name)
         try:
-            reason = reason or node._store.fault(Parameter.from_parameter_msg(each))
+            reason = reason or node._holozen.store.fault(Parameter.from_parameter_msg(each))
         except (TypeError, ValueError, RuntimeError) as error:
             reason = str(error)
         reasons.append(reason)

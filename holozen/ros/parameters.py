@@ -2,10 +2,9 @@
 
 import warnings
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from holozen.parameters import is_below
-from holozen.ros.arguments import Arguments
 from holozen.ros.exceptions import (
     ParameterImmutableException,
     ParameterNotDeclaredException,
@@ -15,34 +14,16 @@ from holozen.ros.parameter import PARAMETER_SEPARATOR_STRING, Parameter
 from holozen.ros.parameter_store import Callback, Store, no_descriptor
 from holozen.ros.time_source import USE_SIM_TIME
 
+if TYPE_CHECKING:
+    from holozen.ros.node_core import Core
+
 __all__ = ["NodeParameters"]
 
 
 class NodeParameters:
     """What a Node can do with parameters. Unknown names raise ParameterNotDeclaredException unless they are allowed."""
 
-    _fqn: str
-
-    def _init_parameters(
-        self,
-        arguments: Arguments,
-        overrides: Sequence[Parameter] | None = None,
-        allow_undeclared: bool = False,
-        automatic: bool = False,
-        start_services: bool = True,
-    ) -> None:
-        """Take the values that were given, declare `use_sim_time`, and serve all."""
-        found = {name: Parameter(name, value=value) for name, value in arguments.parameters_for(self._fqn).items()}
-        found |= {each.name: each for each in _parameters(overrides or ())}
-        self._store = Store(found, allow_undeclared)
-        if automatic:
-            self.declare_parameters("", [(name, each.value) for name, each in found.items()], ignore_override=True)
-        if USE_SIM_TIME not in self._store.values:
-            self.declare_parameter(USE_SIM_TIME, False)
-        if start_services:
-            from holozen.ros import parameter_service
-
-            parameter_service.serve(self, self._fqn)
+    _holozen: "Core"
 
     def declare_parameter(
         self, name: str, value: Any = None, descriptor: Any = None, ignore_override: bool = False
@@ -61,28 +42,28 @@ class NodeParameters:
     ) -> list[Parameter]:
         """Add parameters, each of (name), (name, value) or (name, value, descriptor). Raises as `declare_parameter`."""
         entries = [_entry(each, namespace) for each in parameters]
-        with self._store.lock:
-            self._store.check_new([name for name, _, _ in entries])
-            return [self._store.declare(*entry, ignore_override) for entry in entries]
+        with self._holozen.store.lock:
+            self._holozen.store.check_new([name for name, _, _ in entries])
+            return [self._holozen.store.declare(*entry, ignore_override) for entry in entries]
 
     def undeclare_parameter(self, name: str) -> None:
         """Remove a parameter. Raises ParameterNotDeclaredException, ParameterImmutableException."""
-        with self._store.lock:
+        with self._holozen.store.lock:
             if not self.has_parameter(name):
                 raise ParameterNotDeclaredException(name)
-            if self._store.descriptors[name].read_only:
+            if self._holozen.store.descriptors[name].read_only:
                 raise ParameterImmutableException(name)
-            self._store.forget(name)
+            self._holozen.store.forget(name)
 
     def has_parameter(self, name: str) -> bool:
         """Whether it is declared."""
-        return name in self._store.values
+        return name in self._holozen.store.values
 
     def get_parameter(self, name: str) -> Parameter:
         """A parameter. Raises ParameterUninitializedException where only its type was declared, and no value given."""
         # Without the lock: a callback that is asked whether to set one may wait for a thread that reads another.
-        self._store.check_known([name])
-        found, descriptor = self._store.values.get(name), self._store.descriptors.get(name)
+        self._holozen.store.check_known([name])
+        found, descriptor = self._holozen.store.values.get(name), self._holozen.store.descriptors.get(name)
         if found and found.value is None and descriptor and not descriptor.dynamic_typing:
             raise ParameterUninitializedException(name)
         return found or Parameter(name)
@@ -95,13 +76,13 @@ class NodeParameters:
 
     def get_parameter_or(self, name: str, alternative_value: Parameter | None = None) -> Parameter:
         """A parameter, or the other one where it is not declared or has no value."""
-        found = self._store.values.get(name)
+        found = self._holozen.store.values.get(name)
         return found if found and found.value is not None else alternative_value or Parameter(name)
 
     def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
         """The parameters below `prefix`, by the rest of their names; all for an empty one."""
         start = prefix + PARAMETER_SEPARATOR_STRING if prefix else ""
-        names = [name for name in list(self._store.values) if name.startswith(start)]
+        names = [name for name in list(self._holozen.store.values) if name.startswith(start)]
         return {name.removeprefix(start): self.get_parameter(name) for name in names}
 
     def get_parameter_type(self, name: str) -> Parameter.Type:
@@ -110,22 +91,22 @@ class NodeParameters:
 
     def get_parameter_types(self, names: Sequence[str]) -> list[Parameter.Type]:
         """The types of some parameters."""
-        self._store.check_known(names)
-        return [(self._store.values.get(name) or Parameter(name)).type_ for name in names]
+        self._holozen.store.check_known(names)
+        return [(self._holozen.store.values.get(name) or Parameter(name)).type_ for name in names]
 
     def set_parameters(self, parameter_list: Sequence[Parameter]) -> list[Any]:
         """Set each by itself: a SetParametersResult for each, with the reason why not."""
         parameters = _parameters(parameter_list)
-        self._store.check_known(each.name for each in parameters)
-        return [result(self._store.set([each])) for each in parameters]
+        self._holozen.store.check_known(each.name for each in parameters)
+        return [result(self._holozen.store.set([each])) for each in parameters]
 
     def set_parameters_atomically(self, parameter_list: Sequence[Parameter]) -> Any:
         """Set all or none: one SetParametersResult."""
-        return result(self._store.set(_parameters(parameter_list)))
+        return result(self._holozen.store.set(_parameters(parameter_list)))
 
     def list_parameters(self, prefixes: Sequence[str], depth: int) -> Any:
         """The ListParametersResult of the names below `prefixes` with at most `depth` parts after them (0: any)."""
-        names = [name for name in list(self._store.values) if is_below(name, list(prefixes), depth)]
+        names = [name for name in list(self._holozen.store.values) if is_below(name, list(prefixes), depth)]
         places = sorted({name.rpartition(PARAMETER_SEPARATOR_STRING)[0] for name in names} - {""})
         return _message("ListParametersResult")(names=names, prefixes=places)
 
@@ -135,48 +116,71 @@ class NodeParameters:
 
     def describe_parameters(self, names: Sequence[str]) -> list[Any]:
         """The ParameterDescriptor of each."""
-        self._store.check_known(names)
-        return [self._store.descriptors.get(name) or no_descriptor(name) for name in names]
+        self._holozen.store.check_known(names)
+        return [self._holozen.store.descriptors.get(name) or no_descriptor(name) for name in names]
 
     def set_descriptor(self, name: str, descriptor: Any, alternative_value: Any = None) -> Any:
         """Change what a parameter takes; its ParameterValue then, which is `alternative_value` if one is given.
 
         Raises InvalidParameterValueException for a value that it does not take, ParameterImmutableException.
         """
-        with self._store.lock:
+        with self._holozen.store.lock:
             if not self.has_parameter(name):
                 raise ParameterNotDeclaredException(name)
-            if self._store.descriptors[name].read_only:
+            if self._holozen.store.descriptors[name].read_only:
                 raise ParameterImmutableException(name)
             new = self.get_parameter(name)
             if alternative_value is not None:
                 new = Parameter.from_parameter_msg(_message("Parameter")(name=name, value=alternative_value))
-            self._store.describe(name, descriptor, new)
+            self._holozen.store.describe(name, descriptor, new)
         return new.get_parameter_value()
 
     def add_pre_set_parameters_callback(self, callback: Callback) -> None:
         """Call with a list of Parameter before it is set; what it returns is set instead."""
-        self._store.pre.insert(0, callback)
+        self._holozen.store.pre.insert(0, callback)
 
     def add_on_set_parameters_callback(self, callback: Callback) -> None:
         """Call with a list of Parameter that is to be set; it returns a SetParametersResult."""
-        self._store.on.insert(0, callback)
+        self._holozen.store.on.insert(0, callback)
 
     def add_post_set_parameters_callback(self, callback: Callback) -> None:
         """Call with a list of Parameter that was set."""
-        self._store.post.insert(0, callback)
+        self._holozen.store.post.insert(0, callback)
 
     def remove_pre_set_parameters_callback(self, callback: Callback) -> None:
         """Raises ValueError for one that was not added."""
-        self._store.pre.remove(callback)
+        self._holozen.store.pre.remove(callback)
 
     def remove_on_set_parameters_callback(self, callback: Callback) -> None:
         """Raises ValueError for one that was not added."""
-        self._store.on.remove(callback)
+        self._holozen.store.on.remove(callback)
 
     def remove_post_set_parameters_callback(self, callback: Callback) -> None:
         """Raises ValueError for one that was not added."""
-        self._store.post.remove(callback)
+        self._holozen.store.post.remove(callback)
+
+
+def begin(
+    node: NodeParameters,
+    overrides: Sequence[Parameter] | None = None,
+    allow_undeclared: bool = False,
+    automatic: bool = False,
+    start_services: bool = True,
+) -> None:
+    """Take the values that a node was given, declare `use_sim_time`, and serve all."""
+    core = node._holozen
+    given = core.arguments.parameters_for(core.fqn)
+    found = {name: Parameter(name, value=value) for name, value in given.items()}
+    found |= {each.name: each for each in _parameters(overrides or ())}
+    core.store = Store(found, allow_undeclared)
+    if automatic:
+        node.declare_parameters("", [(name, each.value) for name, each in found.items()], ignore_override=True)
+    if USE_SIM_TIME not in core.store.values:
+        node.declare_parameter(USE_SIM_TIME, False)
+    if start_services:
+        from holozen.ros import parameter_service
+
+        parameter_service.serve(node, core.fqn)
 
 
 def _entry(entry: tuple[Any, ...], namespace: str) -> tuple[str, Any, Any]:

@@ -22,7 +22,7 @@ class Publisher:
         self.msg_type, self.topic, self.qos_profile = msg_type, topic, qos_profile
         self._node = node
         block = qos_profile.history == HistoryPolicy.KEEP_ALL
-        self._writer: Any = node.bus.publisher(key, msg_type, block=block)
+        self._writer: Any = node._holozen.bus.publisher(key, msg_type, block=block)
         self.callback_group: CallbackGroup | None = None
 
     @property

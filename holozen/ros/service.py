@@ -43,7 +43,7 @@ class Service:
         self.srv_type, self.srv_name, self.qos_profile = srv_type, srv_name, qos_profile
         self.callback, self.callback_group = callback, callback_group
         self._node, self._closed = node, False
-        self._server = node.bus.serve(key, srv_type.Request, srv_type.Response, _nobody)
+        self._server = node._holozen.bus.serve(key, srv_type.Request, srv_type.Response, _nobody)
         self._inbox: Inbox[Any] = Inbox(self._server.recv, self._server.try_recv, DEPTH)
 
     @property
@@ -87,7 +87,7 @@ class Service:
         """Serve no more."""
         if not self._closed:
             self._closed = True
-            self._node.bus.drop(self._server)
+            self._node._holozen.bus.drop(self._server)
             self._inbox.close()
 
     def _answer(self, query: Any, request: Any) -> Any:

@@ -42,12 +42,12 @@ class Subscription:
         self.bad = 0
         self._node, self._kinds = node, (msg_type,)
         depth = kept(qos_profile)
-        self._reader = node.bus.subscribe(key, msg_type, depth=depth)
+        self._reader = node._holozen.bus.subscribe(key, msg_type, depth=depth)
         tap = self._reader.tap
         self._inbox: Inbox[Sample] = Inbox(tap.recv, tap.try_recv, depth)
         self._closed = False
         is_late = qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        self._latched = Latched(node.bus, key) if is_late else None
+        self._latched = Latched(node._holozen.bus, key) if is_late else None
 
     @property
     def callback(self) -> Callable[..., Any]:
@@ -89,7 +89,7 @@ class Subscription:
         """Listen no more."""
         if not self._closed:
             self._closed = True
-            self._node.bus.drop(self._reader)
+            self._node._holozen.bus.drop(self._reader)
             if self._latched:
                 self._latched.close()
             self._inbox.close()

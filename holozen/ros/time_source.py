@@ -24,7 +24,7 @@ __all__ = ["USE_SIM_TIME", "TimeSource"]
 class TimeSource:
     """Gives a node's clocks simulated time, from a thread of its own: time passes while nobody spins.
 
-    `node` is one with a `bus`, and with a boolean parameter `use_sim_time` that was declared.
+    `node` is one whose boolean parameter `use_sim_time` was declared.
     """
 
     def __init__(self, node: Any) -> None:
@@ -52,7 +52,7 @@ class TimeSource:
             if active:
                 self._listen()
             elif self._reader:
-                self._node.bus.drop(self._reader)
+                self._node._holozen.bus.drop(self._reader)
                 self._reader = None
         for clock in self._clocks:
             clock._set_ros_time_is_active(active)
@@ -82,7 +82,7 @@ class TimeSource:
     def _listen(self) -> None:
         node = self._node
         topic = node.resolve_topic_name(TOPIC)
-        reader = node.bus.subscribe(names.key(topic), ClockMessage, depth=1)
+        reader = node._holozen.bus.subscribe(names.key(topic), ClockMessage, depth=1)
         self._reader = reader
         threading.Thread(target=self._read, args=(reader,), daemon=True, name="ros clock").start()
 

@@ -44,11 +44,11 @@ def test_a_publisher_that_comes_later_is_heard_from_its_first_message_and_each_o
 
 def test_a_volatile_one_gets_nothing_old(ros: Wire, spin_for: Spin) -> None:
     node, got = rclpy.create_node("tom"), list[str]()
-    other, end = rclpy.create_node("one"), node.bus.tap("end")
+    other, end = rclpy.create_node("one"), node._holozen.bus.tap("end")
     writer = other.create_publisher(String, "map", LATCHED)
     writer.publish(String(data="old"))
     # What was sent before it has come by now, to nobody.
-    wait_for(lambda: other.bus.session.put("end", b"") or end.try_recv())
+    wait_for(lambda: other._holozen.bus.session.put("end", b"") or end.try_recv())
     node.create_subscription(String, "map", lambda message: got.append(message.data), 10)
     wait_for(writer.get_subscription_count)
     writer.publish(String(data="new"))

@@ -114,7 +114,7 @@ def test_a_destroyed_node_has_left_and_makes_nothing_more(ros: Wire) -> None:
     node.destroy_node()
     node.destroy_node()
     wait_for(lambda: graph.endpoints() == [])
-    assert graph.left() == [node.bus.source]
+    assert graph.left() == [node._holozen.bus.source]
     wait_for(lambda: threading.active_count() <= before)
     with pytest.raises(exceptions.InvalidHandle, match="node /tom was destroyed, or rclpy shut down"):
         node.create_publisher(Twist, "a", 1)

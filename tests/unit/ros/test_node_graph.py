@@ -8,7 +8,8 @@ from holozen.messages import Odometry, TriggerReply, TriggerRequest, Twist
 from holozen.ros import rclpy
 from holozen.ros.generated import find
 from holozen.ros.node import Node
-from holozen.ros.node_graph import TopicEndpointInfo
+from holozen.ros.qos import qos_profile_default
+from holozen.ros.topic_endpoint_info import TopicEndpointInfo, TopicEndpointTypeEnum
 from holozen.testing import Wire, wait_for
 
 TWIST, ODOM, TRIGGER = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry", "std_srvs/srv/Trigger"
@@ -24,7 +25,7 @@ def node(ros: Wire) -> Node:
     other = Node("talker", namespace="Fred", start_parameter_services=False)
     other.create_publisher(find(TWIST), "/cmd_vel", 1)
     node = Node("tom", start_parameter_services=False)
-    wait_for(lambda: len(node._ends()) == 7)
+    wait_for(lambda: len(node._holozen.graph.ends()) == 7)
     return node
 
 
@@ -54,6 +55,9 @@ def test_who_writes_and_who_reads(node: Node) -> None:
     assert isinstance(writer, TopicEndpointInfo)
     (reader,) = node.get_subscriptions_info_by_topic("cmd_vel")
     assert reader[:2] == ("sim", "/")
+    kinds = (writer.endpoint_type, reader.endpoint_type)
+    assert kinds == (TopicEndpointTypeEnum.PUBLISHER, TopicEndpointTypeEnum.SUBSCRIPTION)
+    assert writer.qos_profile == qos_profile_default
 
 
 def test_what_a_node_has(node: Node) -> None:
@@ -64,5 +68,7 @@ def test_what_a_node_has(node: Node) -> None:
 
 def test_a_node_is_waited_for(node: Node) -> None:
     assert not node.wait_for_node("/late", 0.02)
-    threading.Timer(0.02, lambda: rclpy.create_node("late")).start()
+    late = threading.Timer(0.02, lambda: rclpy.create_node("late"))
+    late.start()
     assert node.wait_for_node("late", 10)
+    late.join()  # it is in the graph before all that it has is made

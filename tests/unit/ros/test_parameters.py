@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -10,7 +11,7 @@ from holozen.ros import arguments
 from holozen.ros import exceptions as e
 from holozen.ros.generated import find
 from holozen.ros.parameter import Parameter
-from holozen.ros.parameters import NodeParameters, result
+from holozen.ros.parameters import NodeParameters, begin, result
 
 Type = Parameter.Type
 Descriptor = find("rcl_interfaces/msg/ParameterDescriptor")
@@ -21,11 +22,10 @@ FloatRange = find("rcl_interfaces/msg/FloatingPointRange")
 class Node(NodeParameters):
     """A node's parameters, without services."""
 
-    _fqn = "/lab/tom"
-
     def __init__(self, *words: str, overrides: Sequence[Parameter] = (), **options: Any) -> None:
-        given = arguments.parse(["--ros-args", *words])
-        self._init_parameters(given, overrides, start_services=False, **options)
+        core: Any = SimpleNamespace(fqn="/lab/tom", arguments=arguments.parse(["--ros-args", *words]))
+        self._holozen = core
+        begin(self, overrides, start_services=False, **options)
 
     def set(self, **values: Any) -> list[str]:
         results = self.set_parameters([Parameter(name, value=value) for name, value in values.items()])

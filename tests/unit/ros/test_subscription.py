@@ -31,7 +31,7 @@ def numbers(messages: list[Any]) -> list[float]:
 
 def meet(writer: Bus, node: Node) -> Callable[[], object]:
     """A function that waits until all that `writer` has put so far is here."""
-    end, marks = node.bus.tap("end"), iter(range(10_000))
+    end, marks = node._holozen.bus.tap("end"), iter(range(10_000))
 
     def arrived(mark: bytes) -> bool:
         writer.session.put("end", mark)
@@ -52,7 +52,7 @@ def test_a_message_of_our_bus_comes_as_rosss_and_the_other_way_round(ros: Wire, 
     mine.publish(twist(0.25))
     received = here.recv()
     assert received.message == OurTwist.planar(0.25)
-    assert (received.sample.priority, received.sample.source) == ("DATA", node.bus.source)
+    assert (received.sample.priority, received.sample.source) == ("DATA", node._holozen.bus.source)
 
 
 @pytest.mark.parametrize(("profile", "kept"), [(3, 3), (QoSProfile(depth=4), 4), (qos.qos_profile_sensor_data, 5)])

@@ -1,5 +1,6 @@
 """Simulated time: from the clock key, while `use_sim_time` is true, whoever spins or not."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,7 +15,7 @@ from holozen.ros.duration import Duration
 from holozen.ros.jumps import JumpThreshold
 from holozen.ros.logging import RcutilsLogger, get_logger
 from holozen.ros.parameter import Parameter
-from holozen.ros.parameters import NodeParameters
+from holozen.ros.parameters import NodeParameters, begin
 from holozen.ros.time import Time
 from holozen.ros.time_source import TimeSource
 from holozen.testing import Wire, wait_for
@@ -23,12 +24,11 @@ from holozen.testing import Wire, wait_for
 class Node(NodeParameters):
     """What of a node gives it simulated time."""
 
-    _fqn = "/tom"
-
     def __init__(self, wire: Wire, *words: str) -> None:
-        self.bus = wire.bus("tom", lasting=True)
         self._given = arguments.parse(["--ros-args", *words])
-        self._init_parameters(self._given, start_services=False)
+        core: Any = SimpleNamespace(fqn="/tom", arguments=self._given, bus=wire.bus("tom", lasting=True))
+        self._holozen = core
+        begin(self, start_services=False)
         self.clock, self.source = ROSClock(), TimeSource(self)
         self.source.attach_clock(self.clock)
 
