@@ -7,7 +7,7 @@ from typing import Any
 
 from holozen.interfaces.places import tables
 from holozen.ros.missing import HINTS
-from holozen.ros.table import MODULES
+from holozen.ros.table import IMPORTED, MODULES, imported
 
 INNER = {
     "arm", "beginning_execution", "changed", "check_may_speak", "close_all", "closed", "ending_execution", "entities",
@@ -19,12 +19,14 @@ INNER = {
 def table() -> str:
     """The modules, their classes, the packages of interfaces and what there is instead of others, as Markdown."""
     modules = [_row(_aliases(ours), _names(ours)) for ours in dict.fromkeys(MODULES.values())]
+    imports = [_row(f"`{module}`", sorted(imported(module))) for module in IMPORTED]
     classes = [_row(f"`{kind.__name__}`", _public(kind)) for kind in _classes()]
     packages = ", ".join(f"`{name}`" for name in sorted({*tables()} - {"holozen"}))
     instead = [f"| `{name}` | {_escaped(hint)} |" for name, hint in sorted(HINTS.items())]
     return "\n".join(
         [
             *("| module | what it has |", "|---|---|", *modules, ""),
+            *("| module | what it has too, as ROS's does |", "|---|---|", *imports, ""),
             *("| class | what it has |", "|---|---|", *classes, ""),
             f"Interfaces: {packages}, and those of any package that is found.",
             *("", "| not here | instead |", "|---|---|", *instead),

@@ -8,7 +8,7 @@ from typing import Any
 from holozen.interfaces import InterfaceError
 from holozen.interfaces.places import Places
 from holozen.ros import generated, missing
-from holozen.ros.table import MODULES
+from holozen.ros.table import MODULES, imported
 
 Fill = Callable[[ModuleType], None]
 
@@ -21,15 +21,19 @@ def library(module: ModuleType) -> None:
         value = module.__dict__[each] = getattr(ours, each)
         if isinstance(value, type) and issubclass(value, BaseException) and value.__module__ == ours.__name__:
             value.__module__ = name  # a traceback shows it
+    others = imported(name)
 
     def lacking(wanted: str) -> Any:
+        if wanted in others:
+            value = module.__dict__[wanted] = getattr(import_module(others[wanted]), wanted)
+            return value
         if f"{name}.{wanted}" in MODULES:
             return import_module(f"{name}.{wanted}")
         if wanted.startswith("__"):  # who walks over all modules asks for these
             raise AttributeError(f"{name} has no {wanted!r}")
         raise AttributeError(missing.in_module(name, wanted, ours.__all__))
 
-    _finish(module, ours.__doc__ or "", list(ours.__all__), lacking)
+    _finish(module, ours.__doc__ or "", [*ours.__all__, *others], lacking)
 
 
 def package(module: ModuleType) -> None:

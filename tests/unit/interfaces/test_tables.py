@@ -28,8 +28,8 @@ KINDS = sorted(
     key=ros_name,
 )
 OF_ROS = {
-    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "rosgraph_msgs", "sensor_msgs", "std_msgs",
-    "tf2_msgs", "trajectory_msgs", "visualization_msgs",
+    "builtin_interfaces", "diagnostic_msgs", "geometry_msgs", "nav_msgs", "rcl_interfaces", "rosgraph_msgs",
+    "sensor_msgs", "std_msgs", "tf2_msgs", "trajectory_msgs", "visualization_msgs",
 }  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from holozen.ros.api import table
 from holozen.ros.missing import HINTS
-from holozen.ros.table import MODULES
+from holozen.ros.table import IMPORTED, MODULES, imported
 from holozen.testing.wire import command
 
 PAGE = Path(__file__).parents[3] / "docs" / "coming-from-ros.md"
@@ -25,10 +25,22 @@ def test_every_row_has_as_many_cells_as_its_head() -> None:
 def test_a_script_can_import_every_name(tmp_path: Path) -> None:
     script = tmp_path / "all.py"
     lines = [f"from {module} import {name}" for module, ours in MODULES.items() for name in import_module(ours).__all__]
-    assert len(lines) > 300
+    lines += [f"from {module} import {name}" for module in IMPORTED for name in imported(module)]
+    assert len(lines) > 400
     script.write_text("\n".join([*lines, "print('all')"]))
     done = subprocess.run(command("run", str(script)), capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout, done.stderr) == (0, "all\n", "")
+
+
+def test_a_star_brings_what_the_module_imports(tmp_path: Path) -> None:
+    script = tmp_path / "star.py"
+    script.write_text(
+        "from rclpy.node import *\nfrom tf2_ros import *\nimport rclpy.publisher, rclpy.parameter\n"
+        "assert Publisher is rclpy.publisher.Publisher\n"
+        "print(rclpy.parameter.ParameterType.PARAMETER_BOOL, SetParametersResult.__name__, TransformStamped.__name__)\n"
+    )
+    done = subprocess.run(command("run", str(script)), capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.stderr) == ("1 SetParametersResult TransformStamped\n", "")
 
 
 @pytest.mark.parametrize("name", HINTS)
