@@ -54,16 +54,23 @@ class Client:
         return str(self._node.get_logger().name)
 
     def service_is_ready(self) -> bool:
-        """Whether somebody serves it by now."""
-        return not self._closed.is_set() and self._is_served()
+        """Whether somebody serves it by now. Raises RCLError after `rclpy.shutdown()`, InvalidHandle if destroyed."""
+        self._node.context.check_may_speak(f"look for {self.srv_name}")
+        self._check_open()
+        return self._is_served()
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until somebody serves it, at most so many seconds; whether somebody does."""
+        """Wait until somebody serves it, at most so many seconds; whether somebody does.
+
+        Raises as `service_is_ready`, and ExternalShutdownException when a signal ends rclpy meanwhile.
+        """
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         while not self.service_is_ready():
+            self._node.context.check_running(f"wait for {self.srv_name}")
             left = LOOK if deadline is None else min(LOOK, deadline - time.monotonic())
-            if left <= 0 or not self._node.context.ok() or self._closed.wait(left):
+            if left <= 0:
                 return False
+            self._closed.wait(left)
         return True
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
@@ -76,7 +83,7 @@ class Client:
             if left <= 0:
                 future.cancel()
                 raise TimeoutError(f"no reply from {self.srv_name} within {timeout_sec:g} s")
-            self._node.context.check_may_speak()
+            self._node.context.check_may_speak(f"ask {self.srv_name}")
             done.wait(left)
         return future.result()
 
@@ -85,9 +92,8 @@ class Client:
         if not isinstance(request, self.srv_type.Request):
             given = request.__name__ if isinstance(request, type) else type(request).__name__
             raise TypeError(f"{self.srv_name}: expected a {self.srv_type.__name__}.Request, and got a {given}")
-        if self._closed.is_set():
-            raise InvalidHandle(f"the client of {self.srv_name} was destroyed")
-        self._node.context.check_may_speak()
+        self._node.context.check_may_speak(f"ask {self.srv_name}")
+        self._check_open()
         future = Future(executor=self.tasks)
         thread = threading.Thread(target=self._ask, args=(request, future), daemon=True)
         self._threads.add(thread)
@@ -109,6 +115,10 @@ class Client:
     def threads(self) -> list[threading.Thread]:
         """Those that wait for replies, which end with the bus."""
         return list(self._threads)
+
+    def _check_open(self) -> None:
+        if self._closed.is_set():
+            raise InvalidHandle(f"the client of {self.srv_name} was destroyed")
 
     def _ask(self, request: Any, future: Future) -> None:
         while not (future.done() or self._closed.is_set()):

@@ -133,15 +133,18 @@ class Context:
         with self._lock:
             self._open = [one for one in self._open if one is not something]
 
-    def check_may_speak(self) -> None:
+    def check_may_speak(self, what: str = "publish") -> None:
         """Raises ExternalShutdownException for who goes on as if no signal had come, RCLError after `shutdown`."""
-        if self._running:
+        if self._running or (self._interrupted and time.monotonic() - self._interrupted <= LAST_WORDS):
             return
+        self.check_running(what)
+
+    def check_running(self, what: str) -> None:
+        """Raises ExternalShutdownException after a signal, RCLError after `shutdown`."""
         if self._interrupted:
-            if time.monotonic() - self._interrupted > LAST_WORDS:
-                raise ExternalShutdownException
-        elif self._over:
-            raise RCLError("failed to publish: rclpy was shut down")
+            raise ExternalShutdownException
+        if self._over:
+            raise RCLError(f"failed to {what}: rclpy was shut down")
 
     def close_all(self) -> None:
         """Close what is open, all at the same time: each may take as long as a bus does."""

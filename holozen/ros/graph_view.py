@@ -1,6 +1,7 @@
 """What a node sees of the graph: who writes, reads and serves what."""
 
 import threading
+from collections.abc import Callable
 
 from holozen.bus import Bus
 from holozen.graph import Endpoint, Graph, on_key
@@ -10,16 +11,18 @@ from holozen.ros import names
 class GraphView:
     """Looks at the graph, with the names as a node says them.
 
-    The first look waits until those who are connected have told theirs, the later ones for nothing.
+    The first look waits until those who are connected have told theirs, the later ones for nothing. `check` raises
+    where nobody may look any more.
     """
 
-    def __init__(self, bus: Bus, name: str, namespace: str) -> None:
-        self._bus, self._name, self._namespace = bus, name, namespace
+    def __init__(self, bus: Bus, name: str, namespace: str, check: Callable[[], None]) -> None:
+        self._bus, self._name, self._namespace, self._check = bus, name, namespace, check
         self._graph: Graph | None = None
         self._lock = threading.Lock()
 
     def ends(self) -> list[Endpoint]:
         """All that is there by now."""
+        self._check()
         with self._lock:
             if self._graph is None:
                 self._graph = self._bus.graph()

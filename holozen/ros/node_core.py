@@ -53,7 +53,7 @@ class Core:
         self._closing, self._closed = threading.Lock(), False
         self.bus = Bus(names.key(self.fqn), contexts.connection, lasting=True)
         self.context.opened(self)
-        self.graph = GraphView(self.bus, self.name, self.namespace)
+        self.graph = GraphView(self.bus, self.name, self.namespace, self.check_may_look)
 
     def all(self, kind: type[T]) -> list[T]:
         """What it made of a kind."""
@@ -85,6 +85,11 @@ class Core:
         """Raises InvalidHandle for a node that has left."""
         if self._closed:
             raise InvalidHandle(f"node {self.fqn} was destroyed, or rclpy shut down")
+
+    def check_may_look(self) -> None:
+        """Raises what `publish` does where rclpy has ended, InvalidHandle for a node that has left."""
+        self.context.check_may_speak("look at the graph")
+        self.check_open()
 
     def resolve(self, name: str, kind: str, only_expand: bool) -> str:
         """The absolute name of a "topic" or a "service", remapped unless `only_expand`."""

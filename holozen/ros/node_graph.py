@@ -78,10 +78,11 @@ class NodeGraph:
         return [f"/{end.node}" for end in self._holozen.graph.ends() if end.kind == "node"]
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
-        """Wait for a node, at most `timeout` seconds; whether it is there."""
+        """Wait for a node, at most `timeout` seconds; whether it is there. Raises as `Client.wait_for_service`."""
         deadline = time.monotonic() + timeout
         wanted = names.expand(fully_qualified_node_name, self._holozen.name, self._holozen.namespace)
         while wanted not in self.get_fully_qualified_node_names():
+            self._holozen.context.check_running(f"wait for {wanted}")
             if time.monotonic() > deadline:
                 return False
             time.sleep(LOOK)

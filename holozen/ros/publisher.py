@@ -57,6 +57,7 @@ class Publisher:
 
     def get_subscription_count(self) -> int:
         """How many subscriptions of our nodes read its topic, 1 if only strangers do: what is sent now reaches them."""
+        self._node.context.check_may_speak(f"count who reads {self.topic}")
         if self._writer is None or not self._writer.matched:
             return 0  # a token may be here before the way to its subscription is
         return max(1, self._node.count_subscribers(self.topic))

@@ -32,6 +32,7 @@ MODULES = {
     "rclpy.timer": "holozen.ros.timer",
     "rclpy.topic_endpoint_info": "holozen.ros.topic_endpoint_info",
     "rclpy.utilities": "holozen.ros.rclpy",
+    "rclpy.wait_for_message": "holozen.ros.wait_for_message",
     "tf2_ros": "holozen.ros.tf2_ros",
     "tf2_ros.buffer": "holozen.ros.tf2_ros",
     "tf2_ros.static_transform_broadcaster": "holozen.ros.tf2_ros",

@@ -9,7 +9,8 @@ import pytest
 from holozen.errors import ServiceError
 from holozen.messages import TriggerReply, TriggerRequest
 from holozen.ros import rclpy
-from holozen.ros.exceptions import InvalidHandle
+from holozen.ros.context import ExternalShutdownException
+from holozen.ros.exceptions import InvalidHandle, RCLError
 from holozen.ros.generated import find
 from holozen.testing import Wire, wait_for
 
@@ -99,12 +100,37 @@ def test_the_service_is_waited_for_also_a_strangers(ros: Wire) -> None:
 
 
 def test_a_wait_for_a_service_ends_with_rclpy(ros: Wire) -> None:
-    client, ended = rclpy.create_node("tom").create_client(Trigger, "go"), list[bool]()
-    thread = threading.Thread(target=lambda: ended.append(client.wait_for_service()))
+    client, ended = rclpy.create_node("tom").create_client(Trigger, "go"), list[str]()
+
+    def wait() -> None:
+        with pytest.raises(RCLError) as caught:
+            client.wait_for_service()
+        ended.append(str(caught.value))
+
+    thread = threading.Thread(target=wait)
     thread.start()
     rclpy.shutdown()
     thread.join(10)
-    assert ended == [False]
+    assert ended[0].endswith("/go: rclpy was shut down")
+    for look in (client.service_is_ready, lambda: client.wait_for_service(0)):
+        with pytest.raises(RCLError, match="failed to look for /go: rclpy was shut down"):
+            look()
+
+
+def test_nobody_waits_for_a_service_after_a_signal(ros: Wire) -> None:
+    client = rclpy.create_node("tom").create_client(Trigger, "go")
+    rclpy.get_default_context().interrupt()
+    assert not client.service_is_ready()  # there is time for last words
+    with pytest.raises(ExternalShutdownException):
+        client.wait_for_service(10)
+
+
+def test_a_destroyed_client_waits_for_nothing(ros: Wire) -> None:
+    node = rclpy.create_node("tom")
+    client = node.create_client(Trigger, "go")
+    node.destroy_client(client)
+    with pytest.raises(InvalidHandle, match="the client of /go was destroyed"):
+        client.wait_for_service(10)
 
 
 def test_a_request_of_another_type_is_told(ros: Wire) -> None:

@@ -6,6 +6,7 @@ import pytest
 
 from holozen.messages import Odometry, TriggerReply, TriggerRequest, Twist
 from holozen.ros import rclpy
+from holozen.ros.exceptions import InvalidHandle, RCLError
 from holozen.ros.generated import find
 from holozen.ros.node import Node
 from holozen.ros.qos import qos_profile_default
@@ -72,3 +73,14 @@ def test_a_node_is_waited_for(node: Node) -> None:
     late.start()
     assert node.wait_for_node("late", 10)
     late.join()  # it is in the graph before all that it has is made
+
+
+def test_nobody_looks_after_the_end(node: Node) -> None:
+    other = Node("other")
+    other.destroy_node()
+    with pytest.raises(InvalidHandle, match="node /other was destroyed"):
+        other.count_publishers("cmd_vel")
+    rclpy.shutdown()
+    for look in (node.get_node_names, lambda: node.count_subscribers("cmd_vel"), lambda: node.wait_for_node("x", 10)):
+        with pytest.raises(RCLError, match="failed to look at the graph: rclpy was shut down"):
+            look()

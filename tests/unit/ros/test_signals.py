@@ -52,7 +52,16 @@ node.create_client(Trigger, "mine").call_async(Trigger.Request())
 rclpy.spin_until_future_complete(node, future)
 """
 CALL = "up()\nnode.create_client(Trigger, 'nobody').call(Trigger.Request())"
-WAIT = "up()\nassert not node.create_client(Trigger, 'nobody').wait_for_service()"
+WAIT = """
+client = node.create_client(Trigger, 'nobody')
+up()
+while not client.wait_for_service(timeout_sec=0.05):
+    pass
+"""
+WAITS = "from holozen.ros.wait_for_message import wait_for_message\nup()\nwait_for_message(Twist, node, 'x')"
+COUNT = "up()\nwhile pub.get_subscription_count() == 0:\n    time.sleep(0.01)"
+LOOK = "up()\nwhile node.count_publishers('odom') == 0:\n    time.sleep(0.01)"
+NODE = "up()\nwhile not node.wait_for_node('nobody', 0.05):\n    pass"
 MANY = """
 executor = MultiThreadedExecutor(4)
 executor.add_node(node)
@@ -76,7 +85,11 @@ CASES = {
     "a thread spins, SIGINT": (THREAD, signal.SIGINT, 0, "KeyboardInterrupt"),
     "calls wait, SIGINT": (PENDING, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
     "a call, SIGINT": (CALL, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
-    "wait for a service, SIGTERM": (WAIT, signal.SIGTERM, 0, ""),
+    "wait for a service, SIGTERM": (WAIT, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a message, SIGTERM": (WAITS, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a reader, SIGTERM": (COUNT, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a writer, SIGTERM": (LOOK, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a node, SIGTERM": (NODE, signal.SIGTERM, 1, EXTERNAL),
     "many threads, SIGINT": (MANY, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
     "many threads, SIGTERM": (MANY, signal.SIGTERM, 1, EXTERNAL),
     "many nodes, SIGINT": (NODES, signal.SIGINT, -signal.SIGINT, "KeyboardInterrupt"),
