@@ -10,9 +10,14 @@ import threading
 from collections.abc import Callable
 from types import FrameType
 
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    from typing import NoReturn
+
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 LOOK = 0.5  # s
+INTERRUPTED = 130
 
 
 def stop_event() -> threading.Event:
@@ -34,13 +39,15 @@ def wait_for_end(stop: threading.Event) -> None:
         pass
 
 
-def leave(code: int) -> None:
-    """End this process now, with all that is due at its end; returns where a thread keeps it.
+def leave(code: int) -> "NoReturn":
+    """End this process now, as Python would: after the threads that are no daemons, with all that is due at its end.
 
-    In the usual end a thread of Zenoh's that still runs may meet statics that are gone, and panics.
+    In Python's own end a thread of Zenoh's that still runs may meet statics that are gone, and panics.
     """
-    if any(not thread.daemon for thread in threading.enumerate() if thread is not threading.main_thread()):
-        return
+    try:
+        threading._shutdown()  # type: ignore[attr-defined]  # it waits for them, and ends those of thread pools
+    except KeyboardInterrupt:
+        code = code or INTERRUPTED
     atexit._run_exitfuncs()
     for stream in (sys.stdout, sys.stderr):
         with contextlib.suppress(OSError, ValueError, AttributeError):  # it is gone, closed or was never there

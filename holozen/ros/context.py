@@ -35,6 +35,8 @@ _watcher: threading.Thread | None = None
 class ExternalShutdownException(Exception):
     """The context was shut down by a signal or from elsewhere while something waited in it."""
 
+    __module__ = "rclpy.executors"  # where scripts find it
+
     def __init__(self) -> None:
         super().__init__("rclpy was shut down, by a signal or from elsewhere")
 

@@ -47,12 +47,13 @@ Work = tuple[Entity, Callable[[], Any]]
 class Executor:
     """Looks at the entities of its nodes in turn, one callback each. Subclasses say in which thread they run.
 
-    Raises RCLError where the context was not begun or has ended.
+    Raises RCLError where the context was not begun or has ended, ExternalShutdownException after a signal.
     """
 
     def __init__(self, *, context: Context | None = None) -> None:
         self._context = context or get_default_context()
         if not self._context.ok():
+            self._context.check_running("make an executor")
             raise RCLError("failed to make an executor: rclpy is not running; call rclpy.init() first")
         self._nodes: list[Any] = []
         self._tasks = Tasks()

@@ -19,7 +19,7 @@ def library(module: ModuleType) -> None:
     ours = import_module(MODULES[name])
     for each in ours.__all__:
         value = module.__dict__[each] = getattr(ours, each)
-        if isinstance(value, type) and issubclass(value, BaseException) and value.__module__ == ours.__name__:
+        if isinstance(value, type) and issubclass(value, BaseException) and value.__module__.startswith("holozen."):
             value.__module__ = name  # a traceback shows it
     others = imported(name)
 

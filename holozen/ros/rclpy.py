@@ -103,7 +103,7 @@ def create_node(
 def get_global_executor() -> Executor:
     """The executor of `spin` where none is given."""
     global _executor
-    if _executor is None or not _executor.context.ok():
+    if _executor is None or not (_executor.context.ok() or _executor.context is get_default_context()):
         _executor = SingleThreadedExecutor()
     return _executor
 

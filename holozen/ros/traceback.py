@@ -1,11 +1,14 @@
 """A traceback of the user's code alone: what Python prints, without the frames of this package in between."""
 
 import sys
+import threading
 from pathlib import Path
 from types import TracebackType
 
 from holozen.ros import missing
 from holozen.ros.ament_index_python import PackageNotFoundError
+from holozen.ros.context import ExternalShutdownException
+from holozen.ros.table import MODULES
 
 _OURS = str(Path(__file__).resolve().parents[1]) + "/"
 _MACHINERY = ("<frozen importlib", "<frozen runpy")
@@ -19,6 +22,16 @@ def show(error: BaseException) -> None:
     if not sys.flags.dev_mode:
         _strip(error, set())
     sys.excepthook(type(error), error, error.__traceback__)
+
+
+def show_of_thread(args: threading.ExceptHookArgs) -> None:
+    """For threading.excepthook: what `show` does. A thread that ends because rclpy did has nothing to tell."""
+    if isinstance(args.exc_value, ExternalShutdownException):
+        return
+    if args.exc_value is not None and not sys.flags.dev_mode:
+        _strip(args.exc_value, set())
+        args = threading.ExceptHookArgs((args.exc_type, args.exc_value, args.exc_value.__traceback__, args.thread))
+    threading.__excepthook__(args)
 
 
 def in_one_line(error: Exception) -> str:
@@ -37,9 +50,16 @@ def in_one_line(error: Exception) -> str:
 def _strip(error: BaseException, seen: set[int]) -> None:
     seen.add(id(error))
     error.__traceback__ = users_own(error.__traceback__)
+    _name(type(error))
     for other in (error.__cause__, error.__context__):
         if other is not None and id(other) not in seen:
             _strip(other, seen)
+
+
+def _name(kind: type) -> None:
+    """Let a class of ours be shown by the name that ROS has for it; what ROS has not, by its own alone."""
+    if kind.__module__.startswith("holozen."):
+        kind.__module__ = next((name for name, ours in MODULES.items() if ours == kind.__module__), "builtins")
 
 
 def users_own(trace: TracebackType | None) -> TracebackType | None:

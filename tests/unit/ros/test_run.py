@@ -1,5 +1,6 @@
 """`holozen run`: a script runs as by `python3`, with ROS's packages, and ends as it would there."""
 
+import gzip
 import os
 import signal
 import subprocess
@@ -67,6 +68,9 @@ def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Pat
         ("sys.exit()", 0, ""),
         ("sys.exit(3)", 3, ""),
         ("sys.exit('no robot')", 1, "no robot\n"),
+        ("sys.exit(-1)", 255, ""),
+        ("import rclpy; rclpy.init(); sys.exit(3)", 3, ""),
+        ("import rclpy; rclpy.init(); node = rclpy.create_node('a'); sys.exit('no robot')", 1, "no robot\n"),
         ("raise KeyboardInterrupt", 130, ""),
         ("os.kill(os.getpid(), 2); time.sleep(60)", 130, ""),
     ],
@@ -192,3 +196,80 @@ def test_a_srv_of_the_script_s_own_package_is_there(run: Run, write: Write, my_b
     write("src/my_bot/srv/NextGoal.srv", "int32 request_goal\n---\nfloat64 x_goal\n")
     path = write("src/my_bot/scripts/a.py", "from my_bot.srv import NextGoal; print(NextGoal.Response(x_goal=1.5))")
     assert run(str(path)).stdout == "my_bot.srv.NextGoal_Response(x_goal=1.5)\n"
+
+
+@pytest.mark.parametrize("init", ["", "import rclpy; rclpy.init(); node = rclpy.create_node('a')"])
+def test_what_was_written_is_there_at_the_end(run: Run, write: Write, home: Path, init: str) -> None:
+    write("a.py", f"""
+import atexit, gzip, sys, threading
+{init}
+log, zipped, raw = open("log.csv", "w"), gzip.open("log.gz", "wt"), open("log.bin", "wb")
+log.write("1, 2"); zipped.write("3, 4"); raw.write(b"5")
+threading.Timer(0.05, print, ["a thread"], dict(end=" ")).start()
+atexit.register(lambda: log.write(", 9") and print("what was due", end=""))
+""")  # fmt: skip
+    done = run("a.py")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "a thread what was due", "")
+    assert (home / "log.csv").read_text() == "1, 2, 9"
+    assert gzip.decompress((home / "log.gz").read_bytes()) == b"3, 4"
+    assert (home / "log.bin").read_bytes() == b"5"
+
+
+THREAD = """
+import rclpy, threading, time
+rclpy.init()
+node = rclpy.create_node("a")
+thread = threading.Thread(target=rclpy.spin, args=(node,), daemon=True)
+thread.start()
+print("spins")
+try:
+    thread.join()
+except KeyboardInterrupt:
+    node.destroy_node()
+    rclpy.shutdown()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_thread_that_spins_ends_without_a_word(wire: Wire, write: Write, number: int) -> None:
+    line = [sys.executable, "-u", "-m", "holozen", "run", *wire.flags, str(write("a.py", THREAD))]
+    with Process(line, env=environment()) as process:
+        process.wait_for_line("spins")
+        process.signal(number)
+        assert (process.wait(within=10), process.err) == (0, "")
+
+
+def test_an_error_in_a_thread_is_told_with_the_users_frames(run: Run, write: Write) -> None:
+    write("a.py", """
+import rclpy, threading
+rclpy.init()
+node = rclpy.create_node("a")
+node.create_timer(0.001, lambda: {}["lost"])
+thread = threading.Thread(target=lambda: rclpy.spin(node))
+thread.start()
+""")  # fmt: skip
+    done = run("a.py")
+    assert done.stderr.startswith("Exception in thread Thread-")
+    assert done.stderr.splitlines()[-1] == "KeyError: 'lost'"
+    assert "holozen/" not in done.stderr
+    assert done.stderr.count("a.py") == 2
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        (
+            "rclpy.get_default_context().interrupt(); rclpy.spin_once(node)",
+            "rclpy.executors.ExternalShutdownException: ",
+        ),
+        ("rclpy.shutdown(); rclpy.shutdown(); rclpy.create_node('b')", "RuntimeError: "),
+        ("rclpy.shutdown(); rclpy.create_node('b')", "rclpy.exceptions.NotInitializedException: "),
+        ("import tf2_ros; raise tf2_ros.LookupException('no')", "tf2_ros.LookupException: no"),
+        ("from holozen.codec import CodecError; raise CodecError('no')", "CodecError: no"),
+    ],
+)
+def test_an_error_of_ours_is_called_as_in_ros(run: Run, write: Write, line: str, told: str) -> None:
+    write("a.py", f"import rclpy\nrclpy.init()\nnode = rclpy.create_node('a')\n{line}\n")
+    done = run("a.py")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith(told)
