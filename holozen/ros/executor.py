@@ -3,10 +3,12 @@
 import inspect
 import time
 from collections.abc import Callable, Iterable
-from typing import Any, Protocol, Self
+from functools import partial
+from typing import Any, Self
 
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.context import Context, ExternalShutdownException, get_default_context
+from holozen.ros.entity import Entity, Work
 from holozen.ros.exceptions import RCLError
 from holozen.ros.inbox import Waker
 from holozen.ros.task import Future, Task, Tasks
@@ -25,23 +27,6 @@ class ShutdownException(Exception):
 
 class ConditionReachedException(Exception):
     """What was waited for has come."""
-
-
-class Entity(Protocol):
-    """What an executor looks at: a subscription, timer, service, guard condition, or tasks."""
-
-    callback_group: CallbackGroup | None
-
-    def take(self) -> Callable[[], Any] | None:
-        """The next callback with its arguments, or None. Takes it out, so the caller runs it."""
-        ...
-
-    def arm(self, waker: Waker) -> None:
-        """Wake `waker` when there is something to take."""
-        ...
-
-
-Work = tuple[Entity, Callable[[], Any]]
 
 
 class Executor:
@@ -134,6 +119,18 @@ class Executor:
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Run one callback. Waits for it, at most so many seconds (None: for ever, 0: not at all)."""
         self._spin_once(timeout_sec, _never)
+
+    def wait_for_ready_callbacks(
+        self, timeout_sec: float | None = None, nodes: Any = None, condition: Callable[[], bool] | None = None
+    ) -> tuple[Callable[[], None], Entity, Any]:
+        """(what runs the next callback, its subscription or timer or so, its node), for executors of a script's own.
+
+        `nodes` does nothing. Raises TimeoutException, ShutdownException, and ConditionReachedException once
+        `condition()` holds.
+        """
+        entity, work = self._wait_for_work(timeout_sec, condition or _never)
+        owners = (node for node in self.get_nodes() if entity in node._holozen.entities())
+        return partial(self._run, entity, work), entity, next(owners, None)
 
     def spin_once_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """`spin_once` that ends as well when a future is done."""

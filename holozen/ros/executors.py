@@ -4,9 +4,9 @@ from collections.abc import Callable
 from typing import Any
 
 from holozen.ros.context import ExternalShutdownException
+from holozen.ros.entity import Entity
 from holozen.ros.executor import (
     ConditionReachedException,
-    Entity,
     Executor,
     ShutdownException,
     TimeoutException,

@@ -114,6 +114,8 @@ class _Front(_Finder):
     def find_spec(self, name: str, path: Sequence[str] | None, target: ModuleType | None = None) -> ModuleSpec | None:
         """The module to make; None if it is somebody else's."""
         top, _, rest = name.partition(".")
+        if spec := self._of_one(name):
+            return spec
         if name in MODULES:
             return _spec(name, modules.library)
         if top in _TOPS:
@@ -125,8 +127,20 @@ class _Front(_Finder):
         if rest in (*KINDS, "action"):
             return self._beside(name, top)
         module = name.rpartition(".")[0]
-        if module and isinstance(getattr(sys.modules.get(module), "__loader__", None), _Maker):
+        if module and _is_made(module):
             raise self._no_type(name)
+        return None
+
+    def _of_one(self, name: str) -> ModuleSpec | None:
+        """The module of `geometry_msgs.msg._twist`, where that is a type."""
+        module, _, last = name.rpartition(".")
+        top, _, kind = module.partition(".")
+        if kind not in KINDS or not last.startswith("_") or not _is_made(module):
+            return None
+        ends = ("", "_Request", "_Response") if kind == "srv" else ("",)
+        for each in self.places.names(top):
+            if each.startswith(f"{kind}/") and f"_{_snake(each.partition('/')[2])}" == last:
+                return _spec(name, modules.of_one([f"{top}/{each}{end}" for end in ends]))
         return None
 
     def _ours(self, name: str, rest: str) -> ModuleSpec:
@@ -184,6 +198,17 @@ def _python(name: str, folder: str) -> ModuleSpec | None:
     """The Python package of a ROS package, which lies in its folder or in src."""
     spec = PathFinder.find_spec(name, [folder, os.path.join(folder, "src")])
     return spec if spec and _is_real(spec) and spec.submodule_search_locations else None
+
+
+def _snake(name: str) -> str:
+    """PointCloud2 as point_cloud2, the name of the file that ROS makes for a type."""
+    parted = re.sub("(.)([A-Z][a-z]+)", r"\1_\2", name)
+    return re.sub("([a-z0-9])([A-Z])", r"\1_\2", parted).lower()
+
+
+def _is_made(module: str) -> bool:
+    """Whether a module that was imported is one of a finder here."""
+    return isinstance(getattr(sys.modules.get(module), "__loader__", None), _Maker)
 
 
 def _is_real(spec: ModuleSpec | None) -> bool:

@@ -74,6 +74,21 @@ def interfaces(places: Places) -> Fill:
     return fill
 
 
+def of_one(names: list[str]) -> Fill:
+    """Fills a module such as geometry_msgs.msg._twist, where ROS keeps one class; editors write imports from there."""
+
+    def fill(module: ModuleType) -> None:
+        found = {name.rpartition("/")[2]: generated.find(name) for name in names}
+        module.__dict__.update(found)
+
+        def lacking(wanted: str) -> Any:
+            raise AttributeError(f"{module.__name__} has no {wanted!r}; it has {', '.join(found)}")
+
+        _finish(module, f"{', '.join(names)}.", [*found], lacking)
+
+    return fill
+
+
 def _finish(module: ModuleType, says: str, names: list[str], lacking: Callable[[str], Any]) -> None:
     module.__dict__.update(
         {

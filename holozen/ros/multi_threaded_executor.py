@@ -8,7 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from holozen.ros.context import Context
-from holozen.ros.executor import Entity, Executor, Work
+from holozen.ros.entity import Entity, Work
+from holozen.ros.executor import Executor
 
 
 class MultiThreadedExecutor(Executor):

@@ -12,8 +12,9 @@ from holozen.ros.callback_groups import CallbackGroup, MutuallyExclusiveCallback
 from holozen.ros.client import Client
 from holozen.ros.clock import ROSClock
 from holozen.ros.context import Context
+from holozen.ros.entity import Entity
 from holozen.ros.exceptions import InvalidHandle, NotInitializedException
-from holozen.ros.executor import Entity, Executor
+from holozen.ros.executor import Executor
 from holozen.ros.graph_view import GraphView
 from holozen.ros.guard_condition import GuardCondition
 from holozen.ros.logging import get_logger

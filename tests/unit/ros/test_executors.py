@@ -10,7 +10,7 @@ import pytest
 from holozen.ros import rclpy
 from holozen.ros.context import Context
 from holozen.ros.exceptions import RCLError
-from holozen.ros.executors import ExternalShutdownException, SingleThreadedExecutor
+from holozen.ros.executors import Executor, ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from holozen.ros.generated import find
 from holozen.testing import Wire, wait_for
 
@@ -165,3 +165,42 @@ def test_data_that_come_while_things_are_made_and_destroyed_harm_nobody(ros: Wir
     spin_for(lambda: len(got) > 200, node)
     stop.set()
     thread.join()
+
+
+class Mine(Executor):
+    """An executor as scripts write them."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.of: list[Any] = []
+
+    def spin_once(self, timeout_sec: float | None = None) -> None:
+        """Run one callback, and note whose it was."""
+        handler, entity, node = self.wait_for_ready_callbacks(timeout_sec=timeout_sec)
+        self.of.append((entity, node))
+        handler()
+
+
+def test_an_executor_of_the_scripts_own_is_given_callbacks(ros: Wire) -> None:
+    tom, jerry, called = rclpy.create_node("tom"), rclpy.create_node("jerry"), list[str]()
+    executor = Mine()
+    executor.add_node(tom)
+    executor.add_node(jerry)
+    with pytest.raises(TimeoutException):
+        executor.spin_once(0)
+    timer = jerry.create_timer(0.001, lambda: called.append("jerry"))
+    executor.spin_once(10)
+    assert (called, executor.of) == (["jerry"], [(timer, jerry)])
+    executor.spin_once(10)  # its group is free again
+    assert called == ["jerry"] * 2
+    executor.shutdown()
+
+
+def test_a_signal_between_two_spins_is_told_by_the_next(ros: Wire) -> None:
+    node = rclpy.create_node("tom")
+    rclpy.spin_once(node, timeout_sec=0)
+    rclpy.get_default_context().interrupt()
+    with pytest.raises(ExternalShutdownException):
+        rclpy.spin_once(node, timeout_sec=0)
+    with pytest.raises(ExternalShutdownException):
+        SingleThreadedExecutor()

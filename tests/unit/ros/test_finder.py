@@ -263,3 +263,31 @@ def test_actions_are_told_to_be_missing(package: Path, pretend: ModuleType) -> N
         told = refused(line, ModuleNotFoundError)
         assert "there are no actions here; use a service" in told
         assert told.endswith("; see docs/coming-from-ros.md")
+
+
+@pytest.mark.parametrize(
+    ("module", "names"),
+    [
+        ("geometry_msgs.msg._twist", ["Twist"]),
+        ("geometry_msgs.msg._pose_with_covariance_stamped", ["PoseWithCovarianceStamped"]),
+        ("sensor_msgs.msg._point_cloud2", ["PointCloud2"]),
+        ("std_msgs.msg._u_int8_multi_array", ["UInt8MultiArray"]),
+        ("std_srvs.srv._set_bool", ["SetBool", "SetBool_Request", "SetBool_Response"]),
+        ("my_pkg.srv._next_goal", ["NextGoal", "NextGoal_Request", "NextGoal_Response"]),
+    ],
+)
+def test_the_module_of_one_type_has_the_same_class(package: Path, module: str, names: list[str]) -> None:
+    finder.install({"my_pkg": package})
+    made = importlib.import_module(module)
+    assert made.__all__ == names
+    kind = importlib.import_module(module.rpartition(".")[0])
+    assert getattr(made, names[0]) is getattr(kind, names[0])
+
+
+def test_the_module_of_no_type_is_not_there(package: Path) -> None:
+    finder.install({"my_pkg": package})
+    for module in ("geometry_msgs.msg._twost", "my_pkg.msg._next_goal", "geometry_msgs.msg._Twist"):
+        with pytest.raises(ImportError):
+            importlib.import_module(module)
+    with pytest.raises(ImportError, match="_twist"):
+        exec("from geometry_msgs.msg._twist import Twost")
