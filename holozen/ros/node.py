@@ -145,9 +145,8 @@ class Node(NodeParameters, NodeGraph, NodeMakers):
         return iter(self._holozen.all(GuardCondition))
 
     def destroy_node(self) -> None:
-        """Leave: all that it has is destroyed."""
+        """Leave: all that it has is destroyed. The others see so in a moment, at the latest when rclpy has ended."""
         core = self._holozen
         if core.executor is not None:
             core.executor.remove_node(self)
-        core.context.closed(core)
-        core.close()
+        core.leave()

@@ -51,7 +51,9 @@ class Core:
         self.executor: Executor | None = None
         self.owned: list[Any] = []  # publishers, subscriptions, timers ... in the order they were made
         self.group: CallbackGroup = MutuallyExclusiveCallbackGroup()
-        self._closing, self._closed = threading.Lock(), False
+        self._closing = threading.Lock()
+        self._closed = self._has_left = False
+        self._calls: list[threading.Thread] = []
         self.bus = Bus(names.key(self.fqn), contexts.connection, lasting=True)
         self.context.opened(self)
         self.graph = GraphView(self.bus, self.name, self.namespace, self.check_may_look)
@@ -97,15 +99,30 @@ class Core:
         full = names.expand(name, self.name, self.namespace, kind=kind)
         return full if only_expand else self.arguments.remap(full, self.name, self.namespace, kind=kind)
 
+    def leave(self) -> None:
+        """Leave the wire, in a thread that the context waits for at its end.
+
+        Many nodes of one process leave side by side so: one after the other, each would tell all others that it goes.
+        """
+        self._silence()
+        threading.Thread(target=self._leave, daemon=True).start()
+
     def close(self) -> None:
-        """Leave the wire. Returns within half a second, whatever the others do."""
+        """Leave the wire. Returns within half a second, whatever the others do, and not before who began it is done."""
+        self._silence()
         with self._closing:
-            if self._closed:
-                return
-            self._closed = True
+            if not self._has_left:
+                self.bus.close()
+                threads.wait(self._calls, CLOSE_LIMIT)
+                self._has_left = True
+
+    def _leave(self) -> None:
+        self.close()
+        self.context.closed(self)
+
+    def _silence(self) -> None:
+        self._closed = True
         owned, self.owned = self.owned, []
-        calls = [thread for one in owned if isinstance(one, Client) for thread in one.threads()]
+        self._calls += [thread for one in owned if isinstance(one, Client) for thread in one.threads()]
         for one in owned:
             one.silence()
-        self.bus.close()
-        threads.wait(calls, CLOSE_LIMIT)

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from holozen.bus import Bus
 from holozen.messages import Twist as OurTwist
 from holozen.ros import exceptions, rclpy
 from holozen.ros.context import Context
@@ -127,6 +128,25 @@ def test_shutdown_lets_all_nodes_leave_at_once(ros: Wire) -> None:
     rclpy.shutdown()
     wait_for(lambda: graph.endpoints() == [])
     nodes[0].destroy_node()
+
+
+def test_nodes_that_are_destroyed_leave_side_by_side_and_before_the_end(
+    ros: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nodes = [rclpy.create_node(f"tom{number}", start_parameter_services=False) for number in range(3)]
+    meeting, leave, left = threading.Barrier(3, timeout=10), Bus.close, list[Bus]()
+
+    def close(bus: Bus) -> None:
+        meeting.wait()
+        leave(bus)
+        left.append(bus)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Bus, "close", close)
+        for node in nodes:
+            node.destroy_node()
+        rclpy.shutdown()
+    assert len(left) == 3
 
 
 def test_it_lists_what_it_has(ros: Wire) -> None:
