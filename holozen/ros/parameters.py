@@ -1,5 +1,6 @@
 """The parameters of a node, as its script sees them."""
 
+import sys
 import warnings
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
@@ -18,6 +19,8 @@ if TYPE_CHECKING:
     from holozen.ros.node_core import Core
 
 __all__ = ["NodeParameters"]
+
+_OURS = __file__.removesuffix("parameters.py")
 
 
 class NodeParameters:
@@ -193,13 +196,22 @@ def _entry(entry: tuple[Any, ...], namespace: str) -> tuple[str, Any, Any]:
     full = f"{namespace}{PARAMETER_SEPARATOR_STRING}{name}" if namespace and name else name
     value, descriptor = [*rest, None, None][:2]
     if not rest:
-        warnings.warn(f"parameter {name!r} takes any type: give it a default, or a Parameter.Type", stacklevel=4)
+        told = f"parameter {name!r} takes any type: give it a default, or a Parameter.Type"
+        warnings.warn(told, stacklevel=_to_the_script())
         return full, None, no_descriptor(full, dynamic_typing=True)
     if descriptor is None:
         descriptor = no_descriptor(full)
     elif getattr(descriptor, "ROS", "") != "rcl_interfaces/msg/ParameterDescriptor":
         raise TypeError(f"parameter {name!r}: {descriptor!r} is no ParameterDescriptor of rcl_interfaces.msg")
     return full, value, descriptor
+
+
+def _to_the_script() -> int:
+    """How many frames above its caller the script's own is, as `warnings.warn` counts them."""
+    frame, level = sys._getframe(1), 1
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(_OURS):
+        frame, level = frame.f_back, level + 1
+    return level
 
 
 def _parameters(given: Sequence[Parameter]) -> list[Parameter]:

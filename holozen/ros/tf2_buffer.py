@@ -7,7 +7,7 @@ from typing import Any
 
 from holozen.ros import generated
 from holozen.ros.task import Future
-from holozen.ros.tf2_frames import KEPT, Frames, TransformException, seconds
+from holozen.ros.tf2_frames import KEPT, Frames, InvalidArgumentException, TransformException, seconds
 from holozen.ros.tf2_math import Rigid
 from holozen.ros.time import Duration, Time
 
@@ -152,6 +152,8 @@ class Buffer:
             while True:
                 try:
                     return look()
+                except InvalidArgumentException:
+                    raise  # it will be wrong for ever
                 except TransformException:
                     left = deadline - clock.monotonic()
                     if left <= 0.0:

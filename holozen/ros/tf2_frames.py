@@ -78,7 +78,7 @@ class History:
 
 
 class Frames:
-    """Every frame that was named, by its name without a slash before it."""
+    """Every frame that was named, by its name without a slash before it, which nobody may ask with."""
 
     def __init__(self, kept: int = KEPT) -> None:
         self._kept = kept
@@ -129,7 +129,8 @@ class Frames:
         return first.then(second)
 
     def _known(self, name: str, role: str) -> str:
-        name = _name(name)
+        if _name(name) != name:
+            raise InvalidArgumentException(f"the {role} frame {name!r} begins with a slash; write {_name(name)!r}")
         if name not in self._of and name not in self._parents:
             there = self.names()
             hint = nearest(name, there) or f"; there are {', '.join(there[:20])}" if there else "; no frame is, as yet"

@@ -82,8 +82,10 @@ def test_a_declared_type_needs_a_value_before_it_is_read() -> None:
 
 def test_declaring_by_name_alone_is_warned_of() -> None:
     node = Node("-p", "x:=[1, 2]")
-    with pytest.warns(UserWarning, match="'x' takes any type: give it a default"):
+    with pytest.warns(UserWarning, match="'.' takes any type: give it a default") as told:
         assert node.declare_parameter("x").value == [1, 2]
+        node.declare_parameters("", [("y",)])
+    assert [each.filename for each in told] == [__file__] * 2
     assert node.set(x="a") == [""]
     assert node.describe_parameter("x").dynamic_typing
 

@@ -125,8 +125,12 @@ def test_what_was_told_last_says_whether_it_moves(frames: Frames, static: bool) 
             frames.lookup("odom", "base", 99 * S)
 
 
-def test_a_slash_before_a_name_means_nothing(frames):
-    assert frames.lookup("/map", "/odom")[1] == moved(10.0)
+def test_a_slash_before_a_name_is_left_out_of_what_comes_and_refused_in_what_is_asked(frames):
+    frames.put("/map", "/other", 0, moved(1.0), static=True)
+    assert frames.lookup("map", "other")[1] == moved(1.0)
+    for names in (("/map", "odom"), ("map", "/odom")):
+        with pytest.raises(InvalidArgumentException, match=r"frame '/.*' begins with a slash; write '[a-z]*'$"):
+            frames.lookup(*names)
 
 
 def test_clear_keeps_what_is_static(frames):

@@ -191,3 +191,8 @@ def test_what_is_known_can_be_shown_and_forgotten(buffer: tf2_ros.Buffer) -> Non
     buffer.clear()
     assert buffer.can_transform("map", "odom", NEWEST)
     assert not buffer.can_transform("odom", "base", NEWEST)
+
+
+def test_a_frame_that_cannot_be_is_not_waited_for() -> None:
+    with pytest.raises(tf2_ros.InvalidArgumentException, match="the target frame '/map' begins with a slash"):
+        tf2_ros.Buffer().lookup_transform("/map", "odom", NEWEST, timeout=Duration(seconds=10_000))
