@@ -10,7 +10,7 @@ from holozen.ros.missing import HINTS
 from holozen.ros.table import IMPORTED, MODULES, imported
 
 INNER = {
-    "arm", "beginning_execution", "changed", "check_may_speak", "check_running", "close_all", "closed",
+    "arm", "beginning_execution", "changed", "check_may_speak", "check_running", "check_signal", "close_all", "closed",
     "ending_execution", "entities", "interrupt", "is_passed", "opened", "silence", "take", "threads", "unwatch",
     "watch",
 }  # fmt: skip

@@ -143,10 +143,14 @@ class Context:
 
     def check_running(self, what: str) -> None:
         """Raises ExternalShutdownException after a signal, RCLError after `shutdown`."""
-        if self._interrupted:
-            raise ExternalShutdownException
+        self.check_signal()
         if self._over:
             raise RCLError(f"failed to {what}: rclpy was shut down")
+
+    def check_signal(self) -> None:
+        """Raises ExternalShutdownException after a signal."""
+        if self._interrupted:
+            raise ExternalShutdownException
 
     def close_all(self) -> None:
         """Close what is open, all at the same time: each may take as long as a bus does."""

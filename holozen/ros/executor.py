@@ -103,9 +103,10 @@ class Executor:
         return True
 
     def spin(self) -> None:
-        """Run callbacks until rclpy or the executor is shut down."""
+        """Run callbacks until rclpy or the executor is shut down. Raises ExternalShutdownException after a signal."""
         while self._context.ok() and not self._is_shutdown:
             self.spin_once()
+        self._context.check_signal()  # it came between two waits
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
         """Run callbacks until a future is done, at most so many seconds."""
@@ -115,6 +116,8 @@ class Executor:
             self.spin_once_until_future_complete(future, None if left is None else max(left, 0.0))
             if left is not None and left <= 0:
                 return
+        if not future.done():
+            self._context.check_signal()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
         """Run one callback. Waits for it, at most so many seconds (None: for ever, 0: not at all)."""

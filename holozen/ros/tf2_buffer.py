@@ -5,11 +5,14 @@ import time as clock
 from collections.abc import Callable
 from typing import Any
 
+from holozen.ros import context as contexts
 from holozen.ros import generated
 from holozen.ros.task import Future
 from holozen.ros.tf2_frames import KEPT, Frames, InvalidArgumentException, TransformException, seconds
 from holozen.ros.tf2_math import Rigid
 from holozen.ros.time import Duration, Time
+
+LOOK = 0.1  # s between two looks whether a signal has ended rclpy
 
 Do = Callable[[Any, Any], Any]
 
@@ -62,7 +65,7 @@ class Buffer:
         """The TransformStamped that takes points of `source_frame` into `target_frame`.
 
         `Time()` asks for the newest. Raises LookupException, ConnectivityException or ExtrapolationException, after
-        `timeout` (a Duration) if one is given.
+        `timeout` (a Duration) if one is given; ExternalShutdownException where a signal has ended rclpy.
         """
         when = nanoseconds(time)
         stamp, rigid = self._within(timeout, lambda: self._frames.lookup(target_frame, source_frame, when))
@@ -158,7 +161,8 @@ class Buffer:
                     left = deadline - clock.monotonic()
                     if left <= 0.0:
                         raise
-                    self._changed.wait(left)
+                    contexts.get_default_context().check_running("wait for a transform")
+                    self._changed.wait(min(left, LOOK))
 
     def _later(self, look: Callable[[], Any]) -> Future:
         future = Future()

@@ -202,5 +202,8 @@ def test_a_signal_between_two_spins_is_told_by_the_next(ros: Wire) -> None:
     rclpy.get_default_context().interrupt()
     with pytest.raises(ExternalShutdownException):
         rclpy.spin_once(node, timeout_sec=0)
+    for spin in (rclpy.spin, lambda node: rclpy.spin_until_future_complete(node, rclpy.Future(), timeout_sec=1)):
+        with pytest.raises(ExternalShutdownException):
+            spin(node)
     with pytest.raises(ExternalShutdownException):
         SingleThreadedExecutor()

@@ -61,6 +61,13 @@ WAITS = "up()\nwait_for_message(Twist, node, 'x')"
 COUNT = "up()\nwhile pub.get_subscription_count() == 0:\n    time.sleep(0.01)"
 LOOK = "up()\nwhile node.count_publishers('odom') == 0:\n    time.sleep(0.01)"
 NODE = "up()\nwhile not node.wait_for_node('nobody', 0.05):\n    pass"
+FRAME = """
+from tf2_ros import Buffer
+buffer, long = Buffer(), rclpy.duration.Duration(seconds=1000)
+up()
+while not buffer.can_transform("map", "odom", rclpy.time.Time(), timeout=long):
+    pass
+"""
 MANY = """
 executor = MultiThreadedExecutor(4)
 executor.add_node(node)
@@ -88,6 +95,7 @@ CASES = {
     "wait for a message, SIGTERM": (WAITS, signal.SIGTERM, 1, EXTERNAL),
     "wait for a reader, SIGTERM": (COUNT, signal.SIGTERM, 1, EXTERNAL),
     "wait for a writer, SIGTERM": (LOOK, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a frame, SIGTERM": (FRAME, signal.SIGTERM, 1, EXTERNAL),
     "wait for a node, SIGTERM": (NODE, signal.SIGTERM, 1, EXTERNAL),
     "many threads, SIGINT": (MANY, signal.SIGINT, 130, ""),
     "many threads, SIGTERM": (MANY, signal.SIGTERM, 1, EXTERNAL),
