@@ -8,7 +8,7 @@ import pytest
 
 from holozen.errors import ServiceError
 from holozen.messages import TriggerReply, TriggerRequest
-from holozen.ros import rclpy
+from holozen.ros import context, rclpy
 from holozen.ros.context import ExternalShutdownException
 from holozen.ros.exceptions import InvalidHandle, RCLError
 from holozen.ros.generated import find
@@ -117,7 +117,8 @@ def test_a_wait_for_a_service_ends_with_rclpy(ros: Wire) -> None:
             look()
 
 
-def test_nobody_waits_for_a_service_after_a_signal(ros: Wire) -> None:
+def test_nobody_waits_for_a_service_after_a_signal(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(context, "LAST_WORDS", 1000.0)
     client = rclpy.create_node("tom").create_client(Trigger, "go")
     rclpy.get_default_context().interrupt()
     assert not client.service_is_ready()  # there is time for last words
