@@ -254,7 +254,7 @@ def test_what_a_module_of_ros_lacks_is_told(pretend: ModuleType) -> None:
     assert refused("import rclpy\nrclpy.__file__", AttributeError) == "rclpy has no '__file__'"
     assert "did you mean rclpy.pretend?" in refused("import rclpy.pretens", ModuleNotFoundError)
     assert "this is of ROS 1; here is ROS 2's rclpy" in refused("import rospy", ModuleNotFoundError)
-    assert "numpy.array(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
+    assert "numpy.frombuffer(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
 
 
 def test_actions_are_told_to_be_missing(package: Path, pretend: ModuleType) -> None:
