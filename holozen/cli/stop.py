@@ -82,12 +82,15 @@ class Order:
     def __init__(self, robot: str, key: str) -> None:
         self.robot, self.key, self.confirmed = robot, key, False
         self.servers: set[str] = set()
+        self.told = False  # that it was confirmed
         self.message = ""
         self._replies: Replies | None = None
         self._good, self._due = 0, 0.0
 
     def look(self, bus: Bus, now: float) -> bool:
         """Ask, or see what was answered; whether it was confirmed just now."""
+        if self.confirmed and self._good < len(self.servers):  # another sim was met since
+            self.confirmed, self._replies = False, None
         if self.confirmed or (self._replies is None and now < self._due):
             return False
         if self._replies is None:
@@ -142,11 +145,12 @@ class Orders:
         """Tell every robot as soon as it is found, and print each that confirms."""
         begin = changed = now = time.monotonic()
         while now - begin < self._args.timeout and not self._is_over(now - begin, now - changed):
-            known = len(self.there)
+            known = self._known()
             self._find()
-            changed = changed if len(self.there) == known else now
+            changed = changed if self._known() == known else now
             for order in self._orders.values():
-                if order.look(self._bus, now):
+                if order.look(self._bus, now) and not order.told:
+                    order.told = True
                     self._print(order)
             time.sleep(EVERY)
             now = time.monotonic()
@@ -171,6 +175,10 @@ class Orders:
             if not self._wanted or robot in self._wanted:
                 order = self._orders.setdefault(robot, Order(robot, endpoint.key))
                 order.servers.add(endpoint.session)
+
+    def _known(self) -> tuple[int, int]:
+        """How many robots there are, and in how many sims those that are told."""
+        return len(self.there), sum(len(order.servers) for order in self._orders.values())
 
     def _is_over(self, since: float, quiet: float) -> bool:
         if not all(order.confirmed for order in self._orders.values()):

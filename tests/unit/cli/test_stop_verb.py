@@ -22,6 +22,7 @@ class Robots:
     def __init__(self, wire: Wire) -> None:
         self.wire, self.refusals = wire, list[str]()
         self.told = set[tuple[str, str]]()  # keys, and the sims whose they are
+        self.first_told = threading.Event()
 
     def add(self, *keys: str, wire: str = "json", hangs: bool = False) -> Bus:
         """A sim of its own that serves these keys, or holds them and does not answer."""
@@ -37,6 +38,7 @@ class Robots:
             if self.refusals:
                 raise ServiceError(self.refusals.pop())
             self.told.add((key, sim))
+            self.first_told.set()
             return TriggerReply(True, "whatever")
 
         return answer
@@ -110,6 +112,20 @@ def test_where_two_sims_serve_one_robot_both_have_to_confirm(robots: Robots, run
     assert len(robots.told) >= 2  # on a busy machine they are asked again
     robots.add("Fred/stop", hangs=True)
     wait_for(lambda: run("stop", "--timeout", "0.8")[0] == 1, 30)  # on a busy machine it may be met too late
+
+
+def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_told_too(robots: Robots, run: Run) -> None:
+    robots.add("stop")
+
+    def add() -> None:
+        robots.first_told.wait()
+        robots.add("stop")
+
+    late = threading.Thread(target=add)
+    late.start()
+    assert run("stop") == (0, "the robot at the root is stopped\n", "")
+    late.join()
+    assert len(robots.told) == 2
 
 
 def test_a_robot_that_refuses_is_asked_again(robots: Robots, run: Run) -> None:
