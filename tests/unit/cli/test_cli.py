@@ -124,3 +124,12 @@ def test_output_into_a_full_disk_is_one_line(words: str) -> None:
 @pytest.mark.parametrize("verb", cli.SERVICES)
 def test_a_service_is_found_in_the_tree(verb: str) -> None:
     assert cli.module(verb).__name__ == f"services.{cli.SERVICES[verb]}.__main__"
+
+
+@pytest.mark.parametrize("words", ["param load sim -", "topic pub cmd_vel -", "teleop --script -", "teleop"])
+def test_closed_standard_input_is_an_empty_one(words: str) -> None:
+    flags = ["--connect", "tcp/127.0.0.1:1", "--listen", "tcp/127.0.0.1:0"]
+    line = [sys.executable, "-m", "holozen", *words.split(), *flags]
+    done = subprocess.run(["sh", "-c", 'exec "$@" <&-', "sh", *line], capture_output=True, text=True, timeout=60)
+    assert done.returncode != 0
+    assert "Traceback" not in done.stderr

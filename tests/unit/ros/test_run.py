@@ -81,6 +81,12 @@ def test_the_exit_code_is_the_scripts(run: Run, write: Write, end: str, code: in
     assert (done.returncode, done.stderr) == (code, told)
 
 
+def test_what_a_script_wrote_to_a_file_that_it_left_open_is_there(run: Run, write: Write, home: Path) -> None:
+    write("a.py", "import rclpy\nfile = open('measured.csv', 'w')\nfile.write('1,2')")
+    assert run("a.py").returncode == 0
+    assert Path("measured.csv").read_text() == "1,2"
+
+
 def test_a_traceback_is_the_users_and_shows_none_of_ours(run: Run, write: Write) -> None:
     path = write(
         "a.py", "def f():\n    return 1 / 0\n\n\ntry:\n    f()\nexcept Exception as e:\n    raise OSError('b') from e"
