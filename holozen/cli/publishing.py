@@ -178,10 +178,13 @@ def _lines(form: Form, args: "argparse.Namespace", stop: "threading.Event") -> "
     import threading
 
     lines: queue.Queue[str] = queue.Queue(maxsize=1000)
+    number = sys.stdin.fileno()
 
     def read() -> None:
-        while line := sys.stdin.readline(values.LARGEST + 1):
-            lines.put(line)
+        # What is no UTF-8 comes as text that no form takes, so that its line is told.
+        with open(number, encoding="utf-8", errors="surrogateescape", closefd=False) as source:
+            while line := source.readline(values.LARGEST + 1):
+                lines.put(line)
         lines.put("")
 
     threading.Thread(target=read, daemon=True).start()

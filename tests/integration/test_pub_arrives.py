@@ -1,6 +1,7 @@
 """`holozen topic pub` sees to it that what it writes arrives, is meant, and is obeyed, or says why not."""
 
 import json
+import os
 import signal
 import subprocess
 
@@ -127,6 +128,14 @@ def test_a_wrong_line_ends_it_with_its_number(town: Wire, robot: Robot) -> None:
     assert done.returncode == 1
     assert done.stderr.splitlines()[-1].startswith("holozen topic pub: cmd_vel: line 3 refused: not a Twist: ")
     robot.stands()
+
+
+def test_a_line_that_is_no_text_ends_it_too(wire: Wire) -> None:
+    words = command("topic", "pub", "cmd_vel", "--stdin", "--no-wait", *wire.flags)
+    strict = {**os.environ, "PYTHONIOENCODING": "utf-8:strict"}
+    done = subprocess.run(words, input=b"{}\n\xff\n", capture_output=True, timeout=60, env=strict)
+    assert (done.returncode, done.stderr.count(b"\n")) == (1, 1)
+    assert done.stderr.startswith(b"holozen topic pub: cmd_vel: line 2 refused: ")
 
 
 def test_any_type_is_published_as_its_fields_say(town: Wire) -> None:
