@@ -60,8 +60,6 @@ class Inbox(Generic[T]):
     def arm(self, waker: Waker) -> None:
         """Let the thread wait for the next one, and wake `waker` then. `waker.waiting` is set before."""
         self._waker = waker
-        if not self._parked:
-            return
         with self._lock:
             if not self._parked or self._closed:
                 return

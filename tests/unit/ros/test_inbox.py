@@ -75,6 +75,34 @@ def test_nothing_is_lost_or_turned_round_while_waits_and_looks_take_turns(wire: 
     assert got == [str(number).encode() for number in range(count)]
 
 
+def test_who_begins_to_wait_in_the_moment_when_the_thread_gives_up_is_waited_for(wire: Wire) -> None:
+    bus = wire.bus()
+    inbox = boxed(bus, 2)
+    arms: list[threading.Thread] = []
+
+    class Asked(Waker):
+        @property
+        def waiting(self) -> bool:
+            """Nobody waits, and then somebody does at once."""
+            arms.append(threading.Thread(target=inbox.arm, args=(last,)))
+            arms[0].start()
+            arms[0].join(0.2)  # no longer, as it may rightly wait for the reader to be done
+            return False
+
+        @waiting.setter
+        def waiting(self, value: bool) -> None: ...
+
+    last = Waker()
+    last.waiting = True
+    inbox.arm(Asked())
+    bus.session.put("a", "0")
+    assert wait_for(partial(taken, inbox)) == [b"0"]
+    wait_for(lambda: arms)
+    arms[0].join(10)
+    bus.session.put("a", "1")
+    assert last.wait(10)
+
+
 def test_a_closed_one_lets_its_thread_end_wherever_it_waits(wire: Wire) -> None:
     for waits_in_the_ring in (True, False):
         bus, waker = wire.bus(), Waker()
