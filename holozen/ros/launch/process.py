@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import select
 import subprocess
 import sys
 from collections.abc import Callable
@@ -13,13 +14,19 @@ from holozen.ros.launch.entity import Action
 from holozen.ros.launch.text import LaunchError
 
 CHUNK = 65536  # bytes
+LOOK = 0.05  # s between two looks whether who reads nothing is waited for
 LONGEST = 1_000_000  # bytes of a line that is kept until its end comes
 
 
 class Running:
-    """A process. It is the leader of a group of its own: no key of the terminal reaches it."""
+    """A process. It is the leader of a group of its own: no key of the terminal reaches it.
 
-    def __init__(self, action: Action, program: Program, name: str) -> None:
+    Once `hurried` says so, what nobody reads is dropped.
+    """
+
+    def __init__(
+        self, action: Action, program: Program, name: str, hurried: Callable[[], bool] = lambda: False
+    ) -> None:
         self.action, self.program, self.name = action, program, name
         words = program.words[0] if program.shell else list(program.words)
         try:
@@ -38,7 +45,7 @@ class Running:
             told = getattr(error, "strerror", "") or error
             raise LaunchError(f"cannot start {program.words[0]!r:.200}: {told}", action.place) from None
         streams = ((self._popen.stdout, sys.stdout), (self._popen.stderr, sys.stderr))
-        self.pipes = [Pipe(name, source, sink) for source, sink in streams if source is not None]
+        self.pipes = [Pipe(name, source, sink, hurried) for source, sink in streams if source is not None]
 
     @property
     def has_ended(self) -> bool:
@@ -66,8 +73,9 @@ class Running:
 class Pipe:
     """One of the two outputs of a process, and where it goes."""
 
-    def __init__(self, name: str, source: IO[bytes], sink: IO[str]) -> None:
+    def __init__(self, name: str, source: IO[bytes], sink: IO[str], hurried: Callable[[], bool]) -> None:
         self.source, self._sink, self._mark = source, sink, f"[{name}] ".encode()
+        self._hurried = hurried
         self._rest = b""
         os.set_blocking(source.fileno(), False)
 
@@ -93,13 +101,18 @@ class Pipe:
         if lines:
             self._sink.flush()
             text = b"".join(self._mark + line + b"\n" for line in lines)
-            _whole(self._sink, text)
+            _pass_on(self._sink, text, self._hurried)
 
 
-def _whole(sink: IO[str], text: bytes) -> None:
-    write: Callable[[bytes], int] | None = getattr(getattr(sink, "buffer", None), "write", None)
-    if write is None:
+def _pass_on(sink: IO[str], text: bytes, hurried: Callable[[], bool]) -> None:
+    """Write all of it, or what is read until `hurried`: a launch that waits for its reader would end no process."""
+    try:
+        number = sink.fileno()
+    except (OSError, ValueError):  # it is no file
         sink.write(text.decode(errors="replace"))
-    else:
-        write(text)
-    sink.flush()
+        return
+    while text:
+        if select.select([], [number], [], LOOK)[1]:
+            text = text[os.write(number, text[: select.PIPE_BUF]) :]  # for so many there is room
+        elif hurried():
+            return

@@ -79,7 +79,7 @@ class Stage:
         """Start a process. Raises LaunchError."""
         if self._stopping:
             return
-        running = Running(action, program, f"{program.name}-{next(self._numbers)}")
+        running = Running(action, program, f"{program.name}-{next(self._numbers)}", self._stop.is_set)
         self._running.append(running)
         for pipe in running.pipes:
             self._selector.register(pipe.source, selectors.EVENT_READ, pipe)
@@ -200,8 +200,8 @@ class Stage:
             while self._running and time.monotonic() < deadline:
                 self._drain(deadline)
         for running in list(self._running):
-            say(f"launch: {running.name} did not end and was killed")
             running.signal(signal.SIGKILL)
+            say(f"launch: {running.name} did not end and was killed")
             self._close(running)
 
     def _drain(self, deadline: float) -> None:

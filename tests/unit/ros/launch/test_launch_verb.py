@@ -180,6 +180,18 @@ def test_a_signal_ends_the_nodes_and_the_launch(wire: Wire, write: Write, my_bot
         assert "Traceback" not in process.err.replace("[controller.py-1] Traceback", "")
 
 
+def test_a_signal_ends_it_also_where_nobody_reads_what_it_writes(wire: Wire, write: Write, my_bot: Path) -> None:
+    write("a.launch.py", described("ExecuteProcess(cmd=['yes'])"))
+    with subprocess.Popen(line(wire, "a.launch.py"), env=environment(), stdout=subprocess.PIPE) as process:
+        assert process.stdout
+        process.stdout.read(100_000)  # and no more, so that the pipe is full at once
+        process.send_signal(signal.SIGTERM)
+        try:
+            assert process.wait(60) == 0
+        finally:
+            process.kill()
+
+
 def test_a_static_transform_is_told(wire: Wire, write: Write, my_bot: Path) -> None:
     words = "arguments=['1', '0', '0', '0', '0', '0', 'map', 'odom'], name='still'"
     write("a.launch.py", described(f"Node(package='tf2_ros', executable='static_transform_publisher', {words})"))
