@@ -10,7 +10,7 @@ from holozen.tap import Sample
 
 PATIENCE = 1.0  # s for the publishers to answer
 AGAIN = (0.0, 0.03, 0.1, 0.5)  # s between the questions after somebody came; the way to him may be longer than news
-KEPT = 100  # messages of which it is known that they came
+KEPT = 100  # messages of which it is known that they came, by their hashes: a map may have megabytes
 
 
 class Latched:
@@ -22,7 +22,7 @@ class Latched:
     def __init__(self, bus: Bus, key: str) -> None:
         self._bus, self._key = bus, key
         self._late: deque[Sample] = deque(maxlen=KEPT)
-        self._seen: deque[bytes] = deque(maxlen=KEPT)
+        self._seen: deque[int] = deque(maxlen=KEPT)
         self._waker = Waker()
         self._closed = threading.Event()
         self._writers = bus.writers(key)
@@ -31,14 +31,14 @@ class Latched:
 
     def saw(self, sample: Sample) -> Sample:
         """The sample, which is known from now on."""
-        self._seen.append(sample.payload)
+        self._seen.append(hash(sample.payload))
         return sample
 
     def take(self) -> Sample | None:
         """The next that is not known, or None."""
         while self._late:
             sample = self._late.popleft()
-            if sample.payload not in self._seen:
+            if hash(sample.payload) not in self._seen:
                 return self.saw(sample)
         return None
 

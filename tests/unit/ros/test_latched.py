@@ -1,5 +1,6 @@
 """A transient local subscription gets what was sent before it, once."""
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -12,6 +13,7 @@ from holozen.testing import Wire, wait_for
 String: Any = find("std_msgs/msg/String")
 LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 Spin = Callable[..., Any]
+LARGE = 1_000_000  # bytes
 
 
 def test_who_comes_late_gets_the_last_of_each_publisher(ros: Wire, spin_for: Spin) -> None:
@@ -40,6 +42,16 @@ def test_a_publisher_that_comes_later_is_heard_from_its_first_message_and_each_o
     writer.publish(String(data="third"))
     spin_for(lambda: "third" in got, node)
     assert got == ["first", "second", "third"]
+
+
+def test_what_came_does_not_stay_in_memory(ros: Wire, spin_for: Spin) -> None:
+    node, got = rclpy.create_node("tom"), list[int]()
+    reader = node.create_subscription(String, "map", lambda message: got.append(len(message.data)), LATCHED)
+    writer = rclpy.create_node("one").create_publisher(String, "map", LATCHED)
+    writer.publish(String(data=LARGE * "x"))
+    spin_for(lambda: got == [LARGE], node)
+    assert reader._latched
+    assert sum(map(sys.getsizeof, reader._latched._seen)) < LARGE
 
 
 def test_a_volatile_one_gets_nothing_old(ros: Wire, spin_for: Spin) -> None:
