@@ -36,12 +36,15 @@ class Shutdown(Event):
 
 
 class Handler:
-    """Has actions done when something happens to the process of `target_action`, or to any if that is None."""
+    """Has actions done when something happens to the process of `target_action`, or to any if that is None.
+
+    With `handle_once` that is done the first time only.
+    """
 
     event: type[Event] = Event
 
-    def __init__(self, target_action: Any, actions: Any) -> None:
-        self.place = here()
+    def __init__(self, target_action: Any, actions: Any, handle_once: bool = False) -> None:
+        self.place, self._once, self._done = here(), handle_once, False
         is_filter = callable(target_action) and not isinstance(target_action, Action)
         self.target: Any = None if is_filter else target_action
         self.filter: Any = target_action if is_filter else None
@@ -54,6 +57,9 @@ class Handler:
         action = getattr(event, "action", None)
         if self.target not in (None, action) or (self.filter and not self.filter(action)):
             return ()
+        if self._once and self._done:
+            return ()
+        self._done = True
         if callable(self.actions):
             found = self.actions(event, context)
             return checked(found, self.place) if found is not None else ()
@@ -66,7 +72,7 @@ class OnProcessExit(Handler):
     event = ProcessExited
 
     def __init__(self, *, target_action: Any = None, on_exit: Any, handle_once: bool = False) -> None:
-        super().__init__(target_action, on_exit)
+        super().__init__(target_action, on_exit, handle_once)
 
 
 class OnExecutionComplete(Handler):
@@ -75,7 +81,7 @@ class OnExecutionComplete(Handler):
     event = ProcessExited
 
     def __init__(self, *, target_action: Any = None, on_completion: Any, handle_once: bool = False) -> None:
-        super().__init__(target_action, on_completion)
+        super().__init__(target_action, on_completion, handle_once)
 
 
 class OnProcessStart(Handler):
@@ -84,7 +90,7 @@ class OnProcessStart(Handler):
     event = ProcessStarted
 
     def __init__(self, *, target_action: Any = None, on_start: Any, handle_once: bool = False) -> None:
-        super().__init__(target_action, on_start)
+        super().__init__(target_action, on_start, handle_once)
 
 
 class OnShutdown(Handler):
@@ -93,4 +99,4 @@ class OnShutdown(Handler):
     event = Shutdown
 
     def __init__(self, *, on_shutdown: Any, handle_once: bool = True) -> None:
-        super().__init__(None, on_shutdown)
+        super().__init__(None, on_shutdown, handle_once)

@@ -99,6 +99,11 @@ def test_what_waits_for_a_start_or_an_end_is_done_then(play: Play) -> None:
     assert err == ["begun", "over", "ended", "all over"]
 
 
+def test_what_is_handled_once_is_done_for_the_first_of_them(play: Play) -> None:
+    once = OnProcessExit(on_exit=[log("one has ended")], handle_once=True)
+    assert play(a.RegisterEventHandler(once), sh("true"), sh("true"))[2] == ["one has ended"]
+
+
 def test_on_exit_shutdown_ends_the_others(play: Play) -> None:
     good, _, err = play(sh("sleep 60"), sh("true", on_exit=a.Shutdown(reason="the window is closed")))
     assert (good, err) == (True, ["launch: ends: the window is closed"])
