@@ -11,6 +11,8 @@ from holozen.flags import nearest
 from holozen.ros.tf2_math import Rigid, between, unit
 
 KEPT = 10 * 10**9  # ns
+BACK = 10**9  # ns behind the newest; so many in a row are no stragglers:
+IN_A_ROW = 3  # the clock was set back, as that of a sim that was started again
 DEEPEST = 1000  # frames from one to the root
 
 
@@ -45,9 +47,16 @@ class History:
     static: bool = False
     stamps: list[int] = field(default_factory=list)
     values: list[tuple[str, Rigid]] = field(default_factory=list)
+    behind: int = 0  # how many in a row came long after newer ones
 
     def put(self, stamp: int, parent: str, rigid: Rigid, kept: int) -> None:
-        """Add a transform; those older than `kept` before the newest are forgotten, and it too if it is as old."""
+        """Add a transform; those older than `kept` before the newest are forgotten, and it too if it is as old.
+
+        Where the clock was set back, all that came before is forgotten.
+        """
+        self.behind = self.behind + 1 if self.stamps and stamp < self.stamps[-1] - BACK else 0
+        if self.behind == IN_A_ROW:
+            self.stamps, self.values, self.behind = [], [], 0
         at = bisect_left(self.stamps, stamp)
         if at < len(self.stamps) and self.stamps[at] == stamp:
             self.values[at] = parent, rigid

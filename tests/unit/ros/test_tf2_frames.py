@@ -100,6 +100,21 @@ def test_older_than_ten_seconds_is_forgotten(frames):
     assert frames.histories()["base"].stamps[0] == 2 * S
 
 
+def test_a_clock_that_was_set_back_begins_anew(frames: Frames) -> None:
+    for tenth in range(5):
+        frames.put("odom", "base", tenth * S // 10, moved(-tenth))
+    assert frames.lookup("odom", "base") == (4 * S // 10, moved(-4))
+    with pytest.raises(ExtrapolationException):
+        frames.lookup("odom", "base", 2 * S)
+
+
+def test_a_straggler_is_no_clock_that_was_set_back(frames: Frames) -> None:
+    for _ in range(5):
+        for stamp in (12 * S, S, 2 * S):  # of two who tell, one is late
+            frames.put("odom", "base", stamp, moved(stamp / S))
+    assert frames.lookup("odom", "base") == (12 * S, moved(12.0))
+
+
 def test_late_ones_are_put_in_order_and_the_last_of_two_with_one_stamp_counts(frames):
     frames.put("odom", "base", 5 * S // 2, moved(9.0))
     frames.put("odom", "base", 5 * S // 2, moved(7.0))
