@@ -98,17 +98,7 @@ class Clock:
             raise TypeError(f"it sleeps until a Time, and {until!r} is a {type(until).__name__}")
         if until.clock_type != self._clock_type:
             raise ValueError(f"it is a clock of {self._clock_type.name}, and the time of {until.clock_type.name}")
-        context = _running(context)
-        source = self._source()
-        while True:
-            seen = _moves.count
-            if not context.ok() or self._source() != source:
-                return False
-            wait = self.wait_seconds(until.nanoseconds)
-            if wait == 0.0:
-                return True
-            # The system's clock may be set meanwhile, so nobody sleeps for long without looking.
-            _moves.wait(seen, None if wait is None else min(wait, 1.0))
+        return self._sleep(until.nanoseconds, context)
 
     def sleep_for(self, rel_time: Duration, context: Any = None) -> bool:
         """Wait for some time, see `sleep_until`."""
@@ -116,6 +106,20 @@ class Clock:
             raise TypeError(f"it sleeps for a Duration, and {rel_time!r} is a {type(rel_time).__name__}")
         until = max(0, self.nanoseconds() + rel_time.nanoseconds)
         return self.sleep_until(Time(nanoseconds=until, clock_type=self._clock_type), context)
+
+    def _sleep(self, until: int, context: Any, since: int = 0) -> bool:
+        """`sleep_until`, in nanoseconds; it ends, with False, also where the clock was set back below `since`."""
+        context = _running(context)
+        source = self._source()
+        while True:
+            seen = _moves.count
+            if not context.ok() or self._source() != source or self.nanoseconds() < since:
+                return False
+            wait = self.wait_seconds(until)
+            if wait == 0.0:
+                return True
+            # The system's clock may be set meanwhile, so nobody sleeps for long without looking.
+            _moves.wait(seen, None if wait is None else min(wait, 1.0))
 
     def _source(self) -> bool:
         """Whether its time is simulated."""

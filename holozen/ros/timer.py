@@ -8,7 +8,6 @@ from holozen.ros.clock import Clock
 from holozen.ros.context import Context
 from holozen.ros.exceptions import InvalidHandle, ROSInterruptException
 from holozen.ros.inbox import Waker
-from holozen.ros.time import Time
 
 __all__ = ["Rate", "Timer"]
 
@@ -124,7 +123,10 @@ class Rate:
         self._destroyed = False
 
     def sleep(self) -> None:
-        """Sleep until the period is over. Raises ROSInterruptException when rclpy is shut down."""
+        """Sleep until the period is over, or the clock is set back, as that of a sim that is started again.
+
+        Raises ROSInterruptException when rclpy is shut down.
+        """
         if self._destroyed:
             raise RuntimeError("Rate cannot sleep because it has been destroyed")
         if not self._context.ok():
@@ -132,7 +134,7 @@ class Rate:
         now = self._clock.nanoseconds()
         if self._next - now > self._period or now - self._next > self._period:  # set back, or the loop was late
             self._next = now if now > self._next else now + self._period
-        self._clock.sleep_until(Time(nanoseconds=self._next, clock_type=self._clock.clock_type), self._context)
+        self._clock._sleep(self._next, self._context, since=now)
         self._next += self._period
         if not self._context.ok():
             raise ROSInterruptException

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from itertools import count
 from typing import Any
 
 import pytest
@@ -161,6 +162,27 @@ def test_a_rate_sleeps_without_spin_and_catches_up_with_a_late_loop(ros: Wire) -
     after = clock.nanoseconds()
     rate.sleep()
     assert clock.nanoseconds() - after >= 4_000_000
+
+
+def test_a_rate_does_not_wait_for_the_time_of_a_clock_that_was_set_back(ros: Wire) -> None:
+    clock = Watch()
+    clock.set(3600 * 10**9)
+    rate = rclpy.create_node("tom").create_rate(1, clock)
+    times, rounds = count(10**9, 10**7), list[int]()
+
+    def loop() -> None:
+        for number in range(2):
+            rate.sleep()
+            rounds.append(number)
+
+    def has_ended() -> bool:
+        clock.set(next(times))
+        return rounds == [0, 1]
+
+    thread = threading.Thread(target=loop)
+    thread.start()
+    wait_for(has_ended)
+    thread.join()
 
 
 def rclpy_duration(seconds: float) -> Any:
