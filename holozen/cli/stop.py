@@ -20,7 +20,7 @@ DONE = {"stop": "is stopped", "release": "is released"}
 EVERY = 0.002  # s between two looks
 AGAIN = 0.5  # s after which one that does not answer is asked again
 PAUSE = 0.02  # s before one that refused is
-QUIET = 1.0  # s without another robot, and all are known; a sim that is held up is met late
+QUIET = 1.0  # s without another robot or sim, and all are known; a sim that is held up is met late
 NOTICE = 2.0  # s for the first one to be found, and for those that are named
 
 
@@ -185,7 +185,7 @@ class Orders:
             return False
         if not self.there or self._wanted - self.there:  # a sim that is busy is met late
             return since > NOTICE
-        return quiet > QUIET or bool(self._wanted)
+        return quiet > QUIET
 
     def _print(self, order: Order) -> None:
         name, confirmed, message = order.robot, order.confirmed, order.message

@@ -114,16 +114,19 @@ def test_where_two_sims_serve_one_robot_both_have_to_confirm(robots: Robots, run
     wait_for(lambda: run("stop", "--timeout", "0.8")[0] == 1, 30)  # on a busy machine it may be met too late
 
 
-def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_told_too(robots: Robots, run: Run) -> None:
-    robots.add("stop")
+@pytest.mark.parametrize("names", [(), ("Fred",)], ids=["all", "named"])
+def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_told_too(
+    robots: Robots, run: Run, names: tuple[str, ...]
+) -> None:
+    robots.add("Fred/stop")
 
     def add() -> None:
         robots.first_told.wait()
-        robots.add("stop")
+        robots.add("Fred/stop")
 
     late = threading.Thread(target=add)
     late.start()
-    assert run("stop") == (0, "the robot at the root is stopped\n", "")
+    assert run("stop", *names) == (0, "Fred is stopped\n", "")
     late.join()
     assert len(robots.told) == 2
 
