@@ -1,6 +1,6 @@
 """A stage on which nothing is started: what would be is kept."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -79,12 +79,14 @@ class Kept:
 
 
 @pytest.fixture
-def follow(my_bot: Path) -> Follow:
+def follow(my_bot: Path) -> Iterator[Follow]:
     """`follow([actions], name="value")`: what they do in a launch file of my_bot, with values of its arguments."""
     gazebo.stand_in()
+    made: list[Path] = []
 
     def follow(actions: list[Any], **values: str) -> Kept:
         kept = Kept(values, my_bot / "launch" / "a.launch.py")
+        kept.context.made = made
         kept.follow([LaunchDescription(actions)])
         while kept._later:
             later, kept._later = kept._later, list(kept._later)
@@ -92,4 +94,6 @@ def follow(my_bot: Path) -> Follow:
             break
         return kept
 
-    return follow
+    yield follow
+    for path in made:
+        path.unlink(missing_ok=True)
