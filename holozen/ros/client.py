@@ -42,6 +42,7 @@ class Client:
         self._node, self._key, self._closed = node, key, threading.Event()
         self._is_served = node._holozen.bus.served(key)
         self._threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+        self._asked: weakref.WeakSet[Future] = weakref.WeakSet()
 
     @property
     def service_name(self) -> str:
@@ -74,7 +75,10 @@ class Client:
         return True
 
     def call(self, request: Any, timeout_sec: float | None = None) -> Any:
-        """Ask, and wait for the reply. Raises TimeoutError, or ServiceError with the service's reason."""
+        """Ask, and wait for the reply.
+
+        Raises TimeoutError, ServiceError with the service's reason, or InvalidHandle if it is destroyed meanwhile.
+        """
         future, done = self.call_async(request), threading.Event()
         future.watch(done.set)
         deadline = None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
@@ -85,6 +89,8 @@ class Client:
                 raise TimeoutError(f"no reply from {self.srv_name} within {timeout_sec:g} s")
             self._node.context.check_may_speak(f"ask {self.srv_name}")
             done.wait(left)
+        if future.cancelled():
+            raise InvalidHandle(f"the client of {self.srv_name} was destroyed while it waited for the reply")
         return future.result()
 
     def call_async(self, request: Any) -> Future:
@@ -95,6 +101,7 @@ class Client:
         self._node.context.check_may_speak(f"ask {self.srv_name}")
         self._check_open()
         future = Future(executor=self.tasks)
+        self._asked.add(future)
         thread = threading.Thread(target=self._ask, args=(request, future), daemon=True)
         self._threads.add(thread)
         thread.start()
@@ -111,6 +118,8 @@ class Client:
     def destroy(self) -> None:
         """Ask no more; what was asked is cancelled."""
         self.silence()
+        for future in list(self._asked):
+            future.cancel()
 
     def threads(self) -> list[threading.Thread]:
         """Those that wait for replies, which end with the bus."""

@@ -2,6 +2,7 @@
 
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 import pytest
@@ -151,6 +152,21 @@ def test_a_destroyed_client_cancels_what_it_asked(ros: Wire) -> None:
     wait_for(lambda: all(future.cancelled() for future in futures))
     with pytest.raises(InvalidHandle):
         client.call_async(Trigger.Request())
+
+
+def test_a_call_that_waits_for_its_reply_ends_with_its_client(ros: Wire) -> None:
+    server, node = rclpy.create_node("server"), rclpy.create_node("tom")
+    server.create_service(Trigger, "go", lambda _request, response: response)  # and nobody spins
+    client = node.create_client(Trigger, "go")
+    assert client.wait_for_service(10)
+    future = client.call_async(Trigger.Request())
+    with ThreadPoolExecutor() as pool:
+        waiting = pool.submit(client.call, Trigger.Request())
+        wait_for(lambda: len(client.threads()) == 2)
+        node.destroy_client(client)
+        with pytest.raises(InvalidHandle, match=r"^the client of /go was destroyed while it waited for the reply$"):
+            waiting.result(10)
+    assert future.cancelled()
 
 
 def test_a_call_that_waits_for_its_reply_ends_with_its_node(ros: Wire) -> None:
