@@ -47,7 +47,6 @@ EXTRAS = (
     "xacro",
     "zstandard",
 )  # what only some verbs need
-OF_USERS = (["run"], ["launch"])  # what their scripts wrote to files reaches those in Python's usual end only
 SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-service": "pose_service"}
 
 
@@ -56,9 +55,8 @@ def main(argv: list[str] | None = None) -> int:
     if sys.stdin is None:  # closed by who started it
         sys.stdin = open(os.devnull)  # noqa: SIM115 - kept as long as the process
     words = sys.argv[1:] if argv is None else argv
-    usual = words[:1] in OF_USERS
     code = _guarded(words)
-    if argv is None and "zenoh" in sys.modules and not usual:
+    if argv is None and "zenoh" in sys.modules:
         from holozen.process import leave
 
         leave(code)

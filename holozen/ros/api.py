@@ -6,15 +6,8 @@ from importlib import import_module
 from typing import Any
 
 from holozen.interfaces.places import tables
-from holozen.ros.missing import HINTS
+from holozen.ros.missing import HINTS, INNER
 from holozen.ros.table import IMPORTED, MODULES, imported
-
-INNER = {
-    "arm", "beginning_execution", "changed", "check_may_speak", "check_running", "check_signal", "close_all", "closed",
-    "ending_execution", "entities", "interrupt", "is_passed", "opened", "silence", "take", "threads", "unwatch",
-    "watch",
-}  # fmt: skip
-"""What classes have for one another, and not for scripts."""
 
 
 def table() -> str:

@@ -9,6 +9,7 @@ from holozen.codec import CodecError
 from holozen.errors import BusError, NoReply, ServiceError
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.exceptions import InvalidHandle
+from holozen.ros.missing import Told
 from holozen.ros.qos import QoSProfile
 from holozen.ros.task import Future, Tasks
 
@@ -21,7 +22,7 @@ LOOK = 0.01  # s between two looks whether the service is there
 LONGEST = 86_400.0  # s for a service to answer
 
 
-class Client:
+class Client(Told):
     """Made by `Node.create_client`. A call waits for the service, and for its reply, in a thread of its own.
 
     So `call` needs nobody who spins. A service that refuses makes its future raise ServiceError with the reason.

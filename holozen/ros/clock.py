@@ -11,6 +11,7 @@ from holozen.ros.clock_type import ClockType
 from holozen.ros.duration import Duration
 from holozen.ros.exceptions import NotInitializedException
 from holozen.ros.jumps import ClockChange, JumpHandle, JumpThreshold, TimeJump
+from holozen.ros.missing import Told
 from holozen.ros.time import Time
 
 __all__ = [
@@ -39,7 +40,7 @@ _moves = _Moves()
 _watched: WeakSet[Any] = WeakSet()  # contexts that tell when they are shut down
 
 
-class Clock:
+class Clock(Told):
     """A clock of one type. ROS_TIME makes a ROSClock. Raises TypeError for no ClockType."""
 
     def __new__(cls, *, clock_type: ClockType = ClockType.SYSTEM_TIME) -> "Clock":

@@ -3,6 +3,8 @@
 import functools
 from typing import Any
 
+from holozen.ros.missing import Told
+
 __all__ = ["S_TO_NS", "Duration", "Infinite"]
 
 S_TO_NS = 1_000_000_000
@@ -18,7 +20,7 @@ def whole(seconds: float, nanoseconds: float, what: str) -> int:
 
 
 @functools.total_ordering
-class Duration:
+class Duration(Told):
     """A span of time; it may be negative. Raises OverflowError beyond 292 years."""
 
     __slots__ = ("_nanoseconds",)

@@ -11,6 +11,7 @@ from holozen.ros.context import Context, ExternalShutdownException, get_default_
 from holozen.ros.entity import Entity, Work
 from holozen.ros.exceptions import RCLError
 from holozen.ros.inbox import Waker
+from holozen.ros.missing import Told
 from holozen.ros.task import Future, Task, Tasks
 from holozen.ros.timer import Timer
 
@@ -29,7 +30,7 @@ class ConditionReachedException(Exception):
     """What was waited for has come."""
 
 
-class Executor:
+class Executor(Told):
     """Looks at the entities of its nodes in turn, one callback each. Subclasses say in which thread they run.
 
     Raises RCLError where the context was not begun or has ended, ExternalShutdownException after a signal.

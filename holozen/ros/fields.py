@@ -225,6 +225,8 @@ def _limits(field: Field) -> str:
 
 def _remedy(field: Field, wanted: str, value: Any, place: str) -> str:
     """How to write it, where that is plain."""
+    if field.nested and hasattr(value, "to_msg"):
+        return "; write .to_msg() behind it"
     if field.nested or (field.array and not place):
         return ""
     if wanted == "float" and type(value) is int:

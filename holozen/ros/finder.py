@@ -161,6 +161,10 @@ class _Front(_Finder):
         return self.kind(name)
 
     def _no_type(self, name: str) -> ImportError:
+        top, _, last = name.rpartition(".")
+        known = self.places.names(top) if "." not in top else []
+        if kinds := [kind for kind in KINDS if f"{kind}/{last}" in known]:
+            return ImportError(f"{top} has no {last}; write: from {top}.{kinds[0]} import {last}", name=name)
         try:
             generated.find(name.replace(".", "/"))
         except InterfaceError as error:

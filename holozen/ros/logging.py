@@ -7,6 +7,7 @@ from typing import Any
 from holozen.ros import log_line
 from holozen.ros.log_filters import Filters
 from holozen.ros.log_line import Place
+from holozen.ros.missing import Told
 from holozen.ros.severity import LoggingSeverity
 
 __all__ = [
@@ -21,7 +22,7 @@ _quiet = False
 _filters = Filters()
 
 
-class RcutilsLogger:
+class RcutilsLogger(Told):
     """A logger of one name. Its parents are the names before each dot."""
 
     def __init__(self, name: str = "") -> None:

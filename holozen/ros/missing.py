@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
 from holozen.interfaces.registry import closest
 from holozen.ros.table import MODULES
@@ -46,6 +47,25 @@ OF_NODE = {
 }
 """Attribute of ROS's Node that is not here -> what there is instead."""
 
+INNER = {
+    "arm", "beginning_execution", "changed", "check_may_speak", "check_running", "check_signal", "close_all", "closed",
+    "ending_execution", "entities", "interrupt", "is_passed", "opened", "silence", "take", "threads", "unwatch",
+    "watch",
+}  # fmt: skip
+"""What classes have for one another, and not for scripts."""
+
+
+class Told:
+    """A class of ROS whose objects say what there is instead of an attribute that is not here."""
+
+    __slots__ = ()
+
+    if not TYPE_CHECKING:  # else every name would do
+
+        def __getattr__(self, name: str) -> Any:
+            # Without its name: Python would guess once more.
+            raise AttributeError(of_object(type(self), name), name="")
+
 
 def in_module(module: str, name: str, known: Iterable[str]) -> str:
     """The line for a name that a module of ROS does not have here."""
@@ -53,13 +73,19 @@ def in_module(module: str, name: str, known: Iterable[str]) -> str:
     return f"{module} has no {name!r} here{_instead(full, name, module, known)}; see {PAGE}"
 
 
-def of_node(kind: str, name: str) -> str:
-    """The line for an attribute that a node, of that class, does not have."""
+def of_object(kind: type, name: str) -> str:
+    """The line for an attribute that objects of a class do not have, which may be a script's own."""
     if name == "_holozen":
-        return f"call super().__init__('name_of_the_node') in the __init__ of {kind} before anything of Node is used"
-    if name in OF_NODE:
-        return f"Node has no {name!r} here; {OF_NODE[name]}; see {PAGE}"
-    return f"{kind!r} object has no attribute {name!r}"
+        begin = "call super().__init__('name_of_the_node') in the __init__"
+        return f"{begin} of {kind.__name__} before anything of Node is used"
+    ours = next(base for base in kind.__mro__ if base.__module__.startswith("holozen."))
+    lacks = f"{kind.__name__!r} object has no attribute {name!r}"
+    if name.startswith("_"):
+        return lacks
+    if name in OF_NODE and ours.__name__ == "Node":
+        return f"{lacks}; {OF_NODE[name]}; see {PAGE}"
+    known = (each for each in dir(kind) if each[0] != "_" and each not in INNER)
+    return f"{lacks}{closest(name, known)}; what {ours.__name__} has here: {PAGE}"
 
 
 def _instead(full: str, name: str, module: str, known: Iterable[str]) -> str:

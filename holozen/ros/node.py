@@ -1,9 +1,9 @@
 """Node: what of a script stands on the wire. Each is a session of its own, and in the graph like any other."""
 
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any, Self
+from typing import Any, Self
 
-from holozen.ros import arguments, missing, parameters
+from holozen.ros import arguments, parameters
 from holozen.ros import context as contexts
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.client import Client
@@ -12,6 +12,7 @@ from holozen.ros.context import Context
 from holozen.ros.executor import Executor
 from holozen.ros.guard_condition import GuardCondition
 from holozen.ros.logging import RcutilsLogger
+from holozen.ros.missing import Told
 from holozen.ros.node_core import Core
 from holozen.ros.node_graph import NodeGraph
 from holozen.ros.node_makers import NodeMakers
@@ -27,7 +28,7 @@ __all__ = ["HIDDEN_NODE_PREFIX", "Node"]
 HIDDEN_NODE_PREFIX = "_"
 
 
-class Node(NodeParameters, NodeGraph, NodeMakers):
+class Node(NodeParameters, NodeGraph, NodeMakers, Told):
     """A node of ROS. Raises NotInitializedException before `rclpy.init()`."""
 
     def __init__(
@@ -55,11 +56,6 @@ class Node(NodeParameters, NodeGraph, NodeMakers):
         )  # fmt: skip
         core.time_source = TimeSource(self)
         core.time_source.attach_clock(core.clock)
-
-    if not TYPE_CHECKING:  # else every name would do
-
-        def __getattr__(self, name: str) -> Any:
-            raise AttributeError(missing.of_node(type(self).__name__, name), name=name, obj=self)
 
     def __enter__(self) -> Self:
         return self

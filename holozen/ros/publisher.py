@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.exceptions import InvalidHandle
+from holozen.ros.missing import Told
 from holozen.ros.qos import HistoryPolicy, QoSProfile
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 __all__ = ["Publisher"]
 
 
-class Publisher:
+class Publisher(Told):
     """Made by `Node.create_publisher`. Sends with Zenoh's priority DATA, and gives the last message to who comes late.
 
     Where a link is full a message is dropped; with a history of KEEP_ALL the publisher waits.

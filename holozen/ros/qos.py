@@ -9,6 +9,7 @@ from enum import Enum, IntEnum
 from typing import Any
 
 from holozen.ros.duration import Duration
+from holozen.ros.missing import Told
 from holozen.ros.qos_policies import (
     DurabilityPolicy,
     HistoryPolicy,
@@ -47,7 +48,7 @@ class InvalidQoSProfileException(Exception):
         super().__init__("; ".join(["invalid QoSProfile", *map(str, args)]))
 
 
-class QoSProfile:
+class QoSProfile(Told):
     """How messages of a topic wait and travel. All arguments by keyword; `history` or `depth` is needed.
 
     Raises InvalidQoSProfileException without them, AssertionError for an argument that there is not or of another type.

@@ -9,6 +9,7 @@ from holozen.codec import CodecError
 from holozen.errors import ServiceError
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.inbox import Inbox, Waker
+from holozen.ros.missing import Told
 from holozen.ros.qos import QoSProfile
 from holozen.server import refuse
 
@@ -24,7 +25,7 @@ class Refusal(ServiceError):
     """What a callback of our own raises to refuse a request. It does not end the spin."""
 
 
-class Service:
+class Service(Told):
     """Made by `Node.create_service`. Requests wait until its node is spun.
 
     An exception in the callback ends the spin, and the caller is told.

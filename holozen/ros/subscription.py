@@ -10,6 +10,7 @@ from holozen import codec
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.inbox import Inbox, Waker
 from holozen.ros.latched import Latched
+from holozen.ros.missing import Told
 from holozen.ros.qos import DurabilityPolicy, QoSProfile, kept
 from holozen.tap import Sample
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 __all__ = ["Subscription"]
 
 
-class Subscription:
+class Subscription(Told):
     """Made by `Node.create_subscription`. Keeps the newest `depth` messages until its node is spun, in order.
 
     What cannot be read is told and not given to the callback; `bad` counts it.

@@ -9,11 +9,12 @@ from typing import Any
 
 from holozen.ros.callback_groups import CallbackGroup
 from holozen.ros.inbox import Waker
+from holozen.ros.missing import Told
 
 __all__ = ["Future", "Task"]
 
 
-class Future:
+class Future(Told):
     """A result that comes later, as `Client.call_async` gives. Done callbacks run in the executor, if there is one."""
 
     def __init__(self, *, executor: Any = None) -> None:

@@ -7,6 +7,7 @@ from typing import Any
 
 from holozen.ros import context as contexts
 from holozen.ros import generated
+from holozen.ros.missing import Told
 from holozen.ros.task import Future
 from holozen.ros.tf2_frames import KEPT, Frames, InvalidArgumentException, TransformException, seconds
 from holozen.ros.tf2_math import Rigid
@@ -40,7 +41,7 @@ class TransformRegistration:
         return _by_type[type_]
 
 
-class Buffer:
+class Buffer(Told):
     """Transforms by their frames, for `cache_time` (10 s). Any thread may ask, and put.
 
     A lookup with a timeout waits for what comes meanwhile, on this machine's clock: in a callback that nobody else

@@ -5,6 +5,7 @@ from typing import Any
 
 from holozen.ros.clock_type import ClockType
 from holozen.ros.duration import S_TO_NS, Duration, message, nanoseconds_of, whole
+from holozen.ros.missing import Told
 
 __all__ = ["CONVERSION_CONSTANT", "S_TO_NS", "ClockType", "Duration", "Time"]
 
@@ -12,7 +13,7 @@ CONVERSION_CONSTANT = S_TO_NS
 
 
 @functools.total_ordering
-class Time:
+class Time(Told):
     """A moment of a clock, from its zero on.
 
     Raises ValueError for negative ones, OverflowError after 292 years, TypeError for no ClockType.

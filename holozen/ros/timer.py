@@ -8,11 +8,12 @@ from holozen.ros.clock import Clock
 from holozen.ros.context import Context
 from holozen.ros.exceptions import InvalidHandle, ROSInterruptException
 from holozen.ros.inbox import Waker
+from holozen.ros.missing import Told
 
 __all__ = ["Rate", "Timer"]
 
 
-class Timer:
+class Timer(Told):
     """Made by `Node.create_timer`. A call that is late is made once; the next keeps to the period's own beat."""
 
     def __init__(
@@ -114,7 +115,7 @@ class Timer:
         self._waker.wake()
 
 
-class Rate:
+class Rate(Told):
     """Made by `Node.create_rate`: `sleep()` in a loop makes it go round that often. Needs nobody who spins."""
 
     def __init__(self, period_ns: int, clock: Clock, context: Context) -> None:

@@ -243,6 +243,12 @@ def test_a_module_of_ros_has_what_ours_exports(pretend: ModuleType) -> None:
     assert set(ran("from rclpy.pretend import *")) == {"__builtins__", "Thing", "PretendError"}
 
 
+def test_a_type_that_is_imported_from_its_package_is_told_where_it_is() -> None:
+    finder.install()
+    told = "geometry_msgs has no Twist; write: from geometry_msgs.msg import Twist"
+    assert refused("from geometry_msgs import Twist", ImportError) == told
+
+
 def test_what_a_module_of_ros_lacks_is_told(pretend: ModuleType) -> None:
     finder.install()
     page = "; see docs/coming-from-ros.md"

@@ -125,9 +125,9 @@ class Early(Node):
 def test_what_a_node_lacks_is_told(ros: Wire) -> None:
     node: Any = Closes("tom")
     assert not hasattr(node, "nothing")
-    with pytest.raises(AttributeError, match=r"^'Closes' object has no attribute 'nothing'$"):
+    with pytest.raises(AttributeError, match=r"^'Closes' object has no attribute 'nothing'; what Node has here: "):
         _ = node.nothing
-    with pytest.raises(AttributeError, match="Node has no 'count_clients' here; who asks does not stand in the graph"):
+    with pytest.raises(AttributeError, match="has no attribute 'count_clients'; who asks does not stand in the graph"):
         node.count_clients("go")
     with pytest.raises(AttributeError, match=r"call super\(\).__init__\('name_of_the_node'\) in .* Early before"):
         Early()
