@@ -1,6 +1,5 @@
 """Work goes on in a thread, and who waits for it gets its result or its error, as often as they ask."""
 
-import os
 import signal
 import threading
 
@@ -31,7 +30,7 @@ def test_its_error_is_for_who_waits(error: BaseException) -> None:
 def test_who_is_interrupted_while_waiting_may_wait_again() -> None:
     go = threading.Event()
     result = meanwhile(lambda: go.wait(10))
-    threading.Timer(0.05, os.kill, (os.getpid(), signal.SIGINT)).start()
+    threading.Timer(0.05, signal.pthread_kill, (threading.get_ident(), signal.SIGINT)).start()
     with pytest.raises(KeyboardInterrupt):
         result()
     go.set()

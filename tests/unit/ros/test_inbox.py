@@ -84,9 +84,10 @@ def test_who_begins_to_wait_in_the_moment_when_the_thread_gives_up_is_waited_for
         @property
         def waiting(self) -> bool:
             """Nobody waits, and then somebody does at once."""
-            arms.append(threading.Thread(target=inbox.arm, args=(last,)))
-            arms[0].start()
-            arms[0].join(0.2)  # no longer, as it may rightly wait for the reader to be done
+            arm = threading.Thread(target=inbox.arm, args=(last,))
+            arm.start()
+            arms.append(arm)
+            arm.join(0.2)  # no longer, as it may rightly wait for the reader to be done
             return False
 
         @waiting.setter
