@@ -3,11 +3,11 @@
 import json
 import time
 
-from holozen import wire
 from holozen.bus import Bus
-from holozen.cli import values
+from holozen.cli import request
 from holozen.cli.forms import TYPE
-from holozen.cli.show import decode, lines
+from holozen.cli.reading import CDR, Reader
+from holozen.cli.show import Hex, lines
 from holozen.tell import say
 
 TYPE_CHECKING = False
@@ -22,42 +22,26 @@ def call(bus: Bus, args: "argparse.Namespace") -> int:
     if len(words) > 1:
         say(f"holozen service call: {args.key}: {words[-1]!r} is too much; write KEY [TYPE] REQUEST")
         return 2
-    row = wire.service(args.key)
-    row = row or next((each for each in wire.SERVICES if given and each.reply.ROS.endswith(given)), None)
-    if row and given and given.replace("/srv/", "/") != row.reply.ROS.replace("/srv/", "/"):
-        say(f"holozen service call: {args.key}: its type is {row.reply.ROS}, not {given}")
-        return 1
-    if not (row or given or args.any):
-        known = ", ".join(service.key for service in wire.SERVICES)
-        say(f"holozen service call: {args.key!r} has no known type; known: {known}; give the type, or --any")
-        return 1
     try:
-        request = _payload(words[0] if words else "{}", row, given)
+        payload, kind = request.written(bus, args, words[0] if words else "{}", given)
     except ValueError as error:
-        say(f"holozen service call: {args.key}: refused: {error}")
+        say(f"holozen service call: {error}")
         return 1
-    _ask(bus, args, request)
+    reader = Reader(packages=args.package)
+    _ask(bus, args, payload, reader, kind)
     while args.rate:
         time.sleep(1 / args.rate)
-        _ask(bus, args, request)
+        _ask(bus, args, payload, reader, kind)
     return 0
 
 
-def _payload(text: str, row: wire.Service | None, given: str) -> bytes:
-    """The request as JSON, which every service reads; of a type if there is one. Raises ValueError."""
-    from holozen import codec
-    from holozen.cli import forms
-
-    if row:
-        return codec.encode(values.read_message(text, (row.request,)))
-    if given:
-        return forms.Foreign(f"{given}_Request", "json", force=False).payload(text)
-    return json.dumps(values.plain(text)).encode()
-
-
-def _ask(bus: Bus, args: "argparse.Namespace", request: bytes) -> None:
+def _ask(bus: Bus, args: "argparse.Namespace", payload: bytes, reader: Reader, kind: str) -> None:
     from holozen.caller import call_bytes
 
-    reply = call_bytes(bus, args.key, request, "application/json", args.timeout)
-    value = decode(reply.payload, reply.encoding)
+    reply = call_bytes(bus, args.key, payload, "application/json", args.timeout)
+    if kind and reply.encoding == CDR:  # it does not say of which type
+        reply.encoding = f"{CDR};{kind}_Response"
+    value = reader.read(reply, bus)
     print(json.dumps(value) if args.json else "\n".join([*lines(value), *(["---"] if args.rate else [])]), flush=True)
+    if isinstance(value, Hex):
+        say(f"holozen service call: {args.key}: the reply could not be decoded: {reader.why}")

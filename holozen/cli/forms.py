@@ -2,12 +2,16 @@
 
 import json
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from holozen import codec
 from holozen.cli import values
 from holozen.finite import not_finite
 from holozen.messages import Message
+
+if TYPE_CHECKING:
+    from holozen.cli.reading import Packages
+    from holozen.interfaces import Interface
 
 TYPE = re.compile(r"\w+/((msg|srv)/)?\w+")
 FORCE = "; --force sends it all the same"
@@ -37,13 +41,11 @@ class Ours:
 
 
 class Foreign:
-    """A form of any type for which there is a definition. Raises ValueError where there is none."""
+    """A form of any type for which there is a definition."""
 
-    def __init__(self, name: str, wire: str, force: bool) -> None:
-        from holozen.interfaces import Registry
-
-        self._interface, self._wire, self._force = Registry().find(name), wire, force
-        self.kind: type[Message] = type("Foreign", (Message,), {"ROS": self._interface.name, "__module__": __name__})
+    def __init__(self, interface: "Interface", wire: str, force: bool) -> None:
+        self._interface, self._wire, self._force = interface, wire, force
+        self.kind: type[Message] = type("Foreign", (Message,), {"ROS": interface.name, "__module__": __name__})
 
     def payload(self, text: str) -> bytes:
         """The bytes of a written value. Raises ValueError with the reason."""
@@ -70,7 +72,13 @@ class Foreign:
 Form = Ours | Foreign
 
 
-def named(name: str, wire: str, force: bool) -> Form:
-    """The form of a type. Raises ValueError for one that nobody knows, with the closest there is."""
-    kinds = values.kinds_named(name)
-    return Ours(kinds, wire, force) if kinds else Foreign(name, wire, force)
+def named(name: str, wire: str, force: bool, packages: "Packages" = ()) -> Form:
+    """The form of a type, `packages` being those of `--package`. Raises ValueError for one that nobody knows, with the
+    closest there is.
+    """
+    given = dict(packages)
+    if name.partition("/")[0] not in given and (kinds := values.kinds_named(name)):
+        return Ours(kinds, wire, force)
+    from holozen.interfaces import Registry
+
+    return Foreign(Registry(given).find(name), wire, force)

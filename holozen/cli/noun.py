@@ -7,6 +7,7 @@ import importlib
 from holozen import connection
 from holozen.bus import Bus
 from holozen.cli import quick
+from holozen.flags import package
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms
 if TYPE_CHECKING:
@@ -84,6 +85,12 @@ class Noun:
 def open_bus(args: argparse.Namespace, early: bool = False) -> Bus:
     """The bus of a verb, where its flags say. `early` is that of Bus."""
     return Bus(args.node, connection.from_arguments(args), patience=PATIENCE, early=early)
+
+
+def add_packages(parser: argparse.ArgumentParser) -> None:
+    """Add the flag `--package`, for verbs that look types up."""
+    parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR",
+        help="the folder of package NAME, whose msg and srv files tell its types")  # fmt: skip
 
 
 def nobody(what: str, where: str, mend: str) -> str:

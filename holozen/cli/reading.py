@@ -7,7 +7,11 @@ from holozen.tap import Sample
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+    from pathlib import Path
     from typing import Any
+
+    Packages = Iterable[tuple[str, Path]]
 
 CDR = "application/cdr"
 SAYS_NOTHING = ("", "zenoh/bytes", "application/octet-stream")
@@ -15,14 +19,15 @@ CDR_STARTS = (b"\0\0", b"\0\1")  # the encapsulation of plain CDR: big and littl
 
 
 class Reader:
-    """Reads the samples of a bus. `type_name` is that of CDR, where a sample or its publisher does not say it.
+    """Reads the samples of a bus. `type_name` is that of CDR, where a sample or its publisher does not say it;
+    `packages` are those of `--package`.
 
     Raises ValueError for a type that nobody knows.
     """
 
-    def __init__(self, type_name: str = "") -> None:
+    def __init__(self, type_name: str = "", packages: "Packages" = ()) -> None:
         self.why = ""  # the last sample could not be read that could not
-        self._given = type_name
+        self._given, self._packages = type_name, packages
         self._interfaces: dict[str, Any] = {}
         self._registry: Any = None
         self._told: dict[str, str] = {}  # key -> the type that its publishers told
@@ -54,7 +59,7 @@ class Reader:
         if name not in self._interfaces:
             from holozen.interfaces import Registry
 
-            self._registry = self._registry or Registry()
+            self._registry = self._registry or Registry(dict(self._packages))
             self._interfaces[name] = self._registry.find(name)
         return self._interfaces[name]
 

@@ -1,6 +1,6 @@
 """`holozen service call`: its flags. What it does is loaded while the session opens."""
 
-from holozen.cli.noun import Verb, open_bus
+from holozen.cli.noun import Verb, add_packages, open_bus
 from holozen.flags import key, number
 
 TYPE_CHECKING = False
@@ -21,6 +21,7 @@ def _arguments(parser: "argparse.ArgumentParser") -> None:
     add("key", type=key)
     add("words", nargs="*", metavar="[TYPE] REQUEST", help="JSON or YAML (default: all zeros)")
     add("--any", action="store_true", help="send the request as it is where nobody knows the type")
+    add_packages(parser)
     add("-r", "--rate", type=number(0.01, 1000, "Hz"), metavar="HZ", help="again and again, so often")
     add("--timeout", type=number(0.01, 1e6, "s"), default=5.0, metavar="S", help="seconds to wait (default: 5)")
 

@@ -39,7 +39,11 @@ def read_message(text: str, kinds: Kinds) -> Message:
 
 def draft(text: str, kinds: Kinds) -> Message:
     """`read_message` that lets numbers pass which are not finite."""
-    value = plain(text)
+    return message(plain(text), kinds)
+
+
+def message(value: Any, kinds: Kinds) -> Message:
+    """`draft` of a plain value."""
     try:
         return codec.convert(value, kinds)
     except CodecError as error:

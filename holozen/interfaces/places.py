@@ -100,11 +100,13 @@ def _look_up(package: str, near: Paths) -> str | None:
     """The folder of a package that is not ours, looked up as those of robot files are. Raises InterfaceError."""
     from pathlib import Path
 
-    from holozen.robot.packages import find_named
+    from holozen.robot.packages import find_named, folders_above, folders_below, packages_in
 
     try:
         starts = [*map(Path, near), Path.cwd()]
         found = next(filter(None, (find_named(package, start) for start in starts)), None)
+        below = (each for start in starts if folders_above(start) for each in folders_below(start))
+        found = found or packages_in(list(below)).get(package)
     except OSError as error:  # the working folder is gone
         raise InterfaceError(f"package {package}: {error.strerror}") from None
     return str(found) if found else None

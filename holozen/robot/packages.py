@@ -11,6 +11,7 @@ from pathlib import Path
 from holozen.robot.errors import RobotError, cut, listed, near
 
 PACKAGE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
+MOST = 200  # folders below a workspace in which packages are looked for
 _LARGEST = 1_000_000  # bytes of a package.xml
 
 
@@ -60,6 +61,20 @@ def folders_above(start: Path) -> list[Path]:
     start = Path(os.path.abspath(start))
     folders = [start, *start.parents] if os.path.isdir(start) else list(start.parents)
     return list(takewhile(lambda folder: folder != folder.parent and not _is_shared(folder), folders))
+
+
+def folders_below(start: Path) -> list[Path]:
+    """The folders below a workspace, and below its src, that may hold packages or repositories of packages."""
+    return [each for folder in (start / "src", start) for each in (folder, *_folders_in(folder)[:MOST])]
+
+
+def _folders_in(folder: Path) -> list[Path]:
+    try:
+        with os.scandir(folder) as entries:
+            names = [entry.name for entry in entries if entry.is_dir() and not entry.name.startswith(".")]
+    except OSError:
+        return []
+    return [folder / name for name in sorted(names)]
 
 
 def _given_folder(name: str, folder: Path) -> Path:

@@ -3,14 +3,11 @@
 `holozen run` and `holozen launch` set them once, before a line of the user's code runs.
 """
 
-import os
 from collections.abc import Mapping
 from pathlib import Path
 
 from holozen.robot.errors import RobotError, listed, near
-from holozen.robot.packages import find_named, folders_above, nearest_robot_folder, packages_in
-
-MOST = 200  # folders below a workspace in which packages are looked for
+from holozen.robot.packages import find_named, folders_above, folders_below, nearest_robot_folder, packages_in
 
 given: dict[str, Path] = {}
 starts: list[Path] = []
@@ -56,14 +53,4 @@ def prefix(folder: Path) -> Path:
 
 
 def _below() -> list[Path]:
-    """The folders below a workspace, and below its src, that may hold packages or repositories of packages."""
-    return [each for start in starts for folder in (start / "src", start) for each in (folder, *_children(folder))]
-
-
-def _children(folder: Path) -> list[Path]:
-    try:
-        with os.scandir(folder) as entries:
-            names = [entry.name for entry in entries if entry.is_dir() and not entry.name.startswith(".")]
-    except OSError:
-        return []
-    return [folder / name for name in sorted(names)[:MOST]]
+    return [each for start in starts for each in folders_below(start)]

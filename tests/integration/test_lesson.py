@@ -73,6 +73,19 @@ def test_the_controller_drives_round_the_shape_of_the_service_node(wire: Wire, r
     robot.stands()
 
 
+def test_the_lesson_s_own_command_asks_its_service_and_ours(wire: Wire) -> None:
+    asked = ("service", "call", "/next_goal", "hb_interfaces/srv/NextGoal", "{request_goal: 1}", "--package")
+    package = f"hb_interfaces={LESSON / 'hb_interfaces'}"
+    with Process(words(wire, "service_node.py")) as service:
+        service.wait_for_line("the shape is a")
+        assert wire.run(*asked, package).stdout.startswith("x_goal: ")
+        told = wire.run(*asked, package, "--json").stdout
+        assert told == wire.run("service", "call", "next_goal", "request_goal: 1", "--json").stdout
+    wire.start("pose-service").wait_for_line("4 goals from square")
+    assert wire.run(*asked, package).stdout.startswith("x_goal: ")
+    assert wire.run(*asked, package).stdout == wire.run("service", "call", "next_goal", "request_goal: 1").stdout
+
+
 def test_a_bare_node_drives_a_square_by_time(wire: Wire, robot: Robot) -> None:
     with Process(words(wire, "square.py")) as square:
         for x, y in ((0.3, 0), (0, 0.3), (-0.3, 0), (0, -0.3)):

@@ -94,8 +94,9 @@ def test_a_package_of_the_environment_is_read(variable: str, lesson: Path, monke
 
 
 def test_a_package_around_the_working_folder_is_read(lesson: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(lesson)
-    assert Registry().find("lesson/srv/NextGoal").kind == "srv"
+    for folder in (lesson, lesson.parent, lesson.parents[1]):
+        monkeypatch.chdir(folder)
+        assert Registry().find("lesson/srv/NextGoal").kind == "srv"
 
 
 def test_a_package_that_is_given_comes_before_ours(lesson: Path) -> None:
