@@ -2,7 +2,7 @@
 
 import sys
 
-from holozen.cli.noun import Verb, open_bus
+from holozen.cli.noun import Verb, add_packages, open_bus
 from holozen.flags import count, key, number
 from holozen.tap import Sample
 from holozen.tell import printable, say
@@ -25,7 +25,7 @@ def echo(args: "argparse.Namespace") -> int:
         from holozen.cli.reading import Reader
 
         try:
-            printer, reader = Printer(args), Reader(args.type_flag or args.type or "")
+            printer, reader = Printer(args), Reader(args.type_flag or args.type or "", args.package)
         except ValueError as error:
             say(f"holozen topic echo: {error}")
             return 2
@@ -164,6 +164,7 @@ def _arguments(parser: "argparse.ArgumentParser") -> None:
     add("type", nargs="?", metavar="TYPE", help="the same as --type")
     told = "the type of CDR payloads, where nobody tells it, such as geometry_msgs/msg/Twist"
     add("--type", dest="type_flag", metavar="TYPE", help=told)
+    add_packages(parser)
     add("--once", action="store_true", help="end after the first message")
     add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without any")
     add("--field", metavar="A.B", help="only this field, such as pose.pose.position or transforms[0].child_frame_id")

@@ -11,7 +11,7 @@ from typing import Any
 from holozen import connection
 from holozen.bus import Bus
 from holozen.cli.fields import path, pick
-from holozen.cli.noun import Verb
+from holozen.cli.noun import Verb, add_packages
 from holozen.cli.reading import Reader
 from holozen.flags import Parser, number
 from holozen.process import stop_event
@@ -45,6 +45,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--once", action="store_true", help="watch for one window, print one picture (or its numbers) and end"
     )
+    add_packages(parser)
     parser.add_argument("--ascii", action="store_true", help="without braille")
 
 
@@ -68,7 +69,7 @@ def plot(args: argparse.Namespace) -> int:
     """Draw, or print as JSON, what comes on the fields of `args`, until interrupted."""
     stop = stop_event()
     with Bus("plot", connection.from_arguments(args), patience=3.0, stop=stop) as bus:
-        lines = Lines(bus, args.fields)
+        lines = Lines(bus, args.fields, Reader(packages=args.package))
         try:
             (_json if args.json else _draw)(lines, args, stop)
         except LookupError as error:
@@ -89,10 +90,10 @@ def _named(args: argparse.Namespace) -> str:
 class Lines:
     """The points of each field, as they come."""
 
-    def __init__(self, bus: Bus, fields: list[Field]) -> None:
+    def __init__(self, bus: Bus, fields: list[Field], reader: Reader) -> None:
         self.points: dict[str, deque[tuple[float, float]]] = {name: deque(maxlen=MOST) for name, _, _ in fields}
         self.bad = 0  # messages that nobody can read
-        self._fields, self._bus, self._reader = fields, bus, Reader()
+        self._fields, self._bus, self._reader = fields, bus, reader
         self._taps: dict[str, Tap] = {}
         for key in dict.fromkeys(key for _, key, _ in fields):
             self._taps[key] = bus.tap(key)

@@ -1,6 +1,6 @@
 """`holozen topic pub`: its flags. What it does is loaded while the session opens and looks around."""
 
-from holozen.cli.noun import Verb, open_bus
+from holozen.cli.noun import Verb, add_packages, open_bus
 from holozen.flags import count, key, number
 from holozen.meanwhile import meanwhile
 
@@ -39,6 +39,7 @@ def _arguments(parser: "argparse.ArgumentParser") -> None:
     add("--max-wait", "--max-wait-time-secs", type=number(0.01, 1e6, "s"), metavar="S", help="wait at most S seconds")
     add("--no-wait", action="store_true", help="do not wait for a subscriber")
     add("--force", action="store_true", help="send numbers too that are not finite")
+    add_packages(parser)
     add("--stdin", action="store_true", help="one value a line on standard input")
 
 

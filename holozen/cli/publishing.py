@@ -1,5 +1,6 @@
 """What `holozen topic pub` does: write checked messages to a key, and see that they arrive."""
 
+import contextlib
 import json
 import sys
 import time
@@ -103,7 +104,7 @@ def _form(args: "argparse.Namespace") -> Form | None:
     row = wire.topic(args.key)
     if given:
         try:
-            form = forms.named(given, args.wire, args.force)
+            form = forms.named(given, args.wire, args.force, args.package)
         except ValueError as error:
             raise Refused(f"{args.key}: {error}") from None
         right = [kind.ROS for kind in row.types] if row else [form.kind.ROS]
@@ -118,6 +119,9 @@ def _form_of_listener(found: list[Endpoint], args: "argparse.Namespace") -> Form
     wanted = {end.type for end in on_key(found, args.key, "sub")}
     if kinds := values.kinds_of(wanted):
         return Ours(kinds, args.wire, args.force)
+    for name in sorted(wanted):
+        with contextlib.suppress(ValueError):
+            return forms.named(name, args.wire, args.force, args.package)
     known = ", ".join(topic.key for topic in wire.TOPICS)
     raise Refused(
         f"{args.key!r} has no known type; known keys: {known}, each also as ROBOT/key;"
