@@ -51,9 +51,9 @@ def from_file(path: Path) -> Script:
     return Script(path, path.resolve().parent)
 
 
-def find(package: str, name: str) -> Script:
-    """The executable `name` of a package, with or without `.py`. Raises NotFound."""
-    folder = _folder(package)
+def find(package: str, name: str, nameless: bool = False) -> Script:
+    """The executable `name` of a package, with or without `.py`; `nameless` is that of packages. Raises NotFound."""
+    folder = _folder(package, nameless)
     declared = _declared(folder)
     if name in declared:
         return _console_script(folder, declared[name], name)
@@ -70,9 +70,9 @@ def _there(words: str, names: list[str]) -> str:
     return f"; {words}: {listed(names, 20)}"
 
 
-def _folder(package: str) -> Path:
+def _folder(package: str, nameless: bool) -> Path:
     try:
-        return packages.find(package)
+        return packages.find(package, nameless)
     except RobotError as error:
         raise NotFound(str(error)) from None
 

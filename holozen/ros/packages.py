@@ -22,8 +22,11 @@ def use(packages: Mapping[str, Path], *places: Path) -> None:
     starts[:] = [*places, Path.cwd()]
 
 
-def find(name: str) -> Path:
-    """The folder of a package: where its `package.xml` is, or `<prefix>/share/<name>`. Raises RobotError."""
+def find(name: str, nameless: bool = True) -> Path:
+    """The folder of a package: where its `package.xml` is, or `<prefix>/share/<name>`. Raises RobotError.
+
+    Else, if `nameless`, and no package is called nearly so: the nearest folder with a robot that says no name.
+    """
     for start in starts:
         if found := find_named(name, start, given):
             return found
@@ -31,12 +34,13 @@ def find(name: str) -> Path:
         return stand_ins[name]
     if found := packages_in(_below()).get(name):
         return found
-    for start in starts:  # a repository may be cloned under any name, and say none
+    known = [*around(), *stand_ins]
+    meant = near(name, known)
+    for start in starts if nameless and not meant else []:  # a repository may be cloned under any name, and say none
         folder = nearest_robot_folder(start)
         if folder and not (folder / "package.xml").exists():
             return folder
-    known = [*around(), *stand_ins]
-    hint = near(name, known) or f"; packages found: {listed(known)}"
+    hint = meant or f"; packages found: {listed(known)}"
     looked = ", ".join(dict.fromkeys(map(str, starts)))
     raise RobotError(f"no package {name!r} around {looked}{hint}; say where it is: --package {name[:80]}=DIR")
 

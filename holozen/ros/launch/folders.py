@@ -53,6 +53,7 @@ class ExecutableInPackage(Substitution):
     def perform(self, context: LaunchContext) -> str:
         """The path. Raises LaunchError."""
         try:
-            return str(executables.find(text(context, self.package), text(context, self.executable)).path)
+            package, executable = text(context, self.package), text(context, self.executable)
+            return str(executables.find(package, executable, nameless=True).path)
         except executables.NotFound as error:
             raise LaunchError(str(error), self.place) from None

@@ -72,7 +72,7 @@ class Node(ExecuteProcess):
         target = [str(own)] if own else [package, executable] if package else [executable]
         try:
             if package and not own:
-                executables.find(package, executable)  # here, where the line of the launch file is known
+                executables.find(package, executable, nameless=True)  # here, where the line of the launch file is known
         except executables.NotFound as error:
             raise LaunchError(str(error), self.place) from None
         return ours(context, "run", *given(*([] if own else [package])), *target, *words, *self._ros_words(context))

@@ -36,6 +36,14 @@ def test_a_repository_that_says_no_name_is_taken_for_any(home: Path, write: Writ
     assert ament.get_package_share_path("holo") == home
 
 
+def test_a_wrong_name_is_not_that_of_a_repository_that_says_none(my_bot: Path, write: Write) -> None:
+    write("urdf/hb_bot.urdf.xacro")
+    packages.use({})
+    with pytest.raises(ament.PackageNotFoundError, match="did you mean 'my_bot'"):
+        ament.get_package_share_path("my_bto")
+    assert ament.get_package_share_path("holo") != my_bot
+
+
 def test_an_unknown_package_is_an_error_that_says_how_to_mend_it(my_bot: Path, write: Write) -> None:
     write("src/my_bot/urdf/a.urdf")
     packages.use({}, my_bot)

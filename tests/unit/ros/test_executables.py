@@ -116,6 +116,15 @@ def test_an_unknown_package_is_told_with_those_around(my_bot: Path) -> None:
         find("my_boot", "controller.py")
 
 
+def test_a_folder_that_says_no_name_is_no_package_to_be_run(home: Path, write: Write) -> None:
+    write("urdf/hb_bot.urdf.xacro")
+    path = write("scripts/controller.py")
+    packages.use({})
+    with pytest.raises(NotFound, match=rf"^no package 'hb_contrl' around {home}; packages found: none; say .*"):
+        find("hb_contrl", "controller.py")
+    assert find("hb_contrl", "controller.py", nameless=True).path == path
+
+
 @pytest.mark.parametrize("where", [".", "src", "src/my_bot", "src/my_bot/scripts"])
 def test_a_package_is_found_from_anywhere_in_its_workspace(
     my_bot: Path, write: Write, monkeypatch: pytest.MonkeyPatch, where: str
