@@ -48,7 +48,7 @@ def main(argv: list[str]) -> int:
     except (LaunchError, RobotError, executables.NotFound) as error:
         say(f"holozen launch: {error}")
     except Exception as error:
-        if not (told := traceback.in_one_line(error)):
+        if not (told := traceback.in_one_line(error) or traceback.of_an_argument(error)):
             traceback.show(error)
         else:
             say(f"holozen launch: {told}")
@@ -57,17 +57,29 @@ def main(argv: list[str]) -> int:
 
 def _follow(path: Path, description: "LaunchDescription", values: dict[str, str], where: connection.Connection) -> int:
     from holozen.process import stop_event
+    from holozen.ros.launch import asked
     from holozen.ros.launch.stage import Stage
 
     with Stage(where.arguments(), stop_event()) as stage:
         context = stage.context
         context.scope.configurations.update(values)
         context.scope = context.scope.within(path)
+        left = set(values)
+        stage.begun = lambda: _tell_unused(path, context.used, left, set(asked.names(stage.pending, set())))
         stage.run([description])
-        for name in values.keys() - context.used:
-            hint = flags.nearest(name, context.used) or f"; it has {', '.join(sorted(context.used)) or 'no arguments'}"
-            say(f"holozen launch: {path.name} does not use {name!r}{hint}")
+        _tell_unused(path, context.used, left, set())
     return 1 if stage.failed else 0
+
+
+def _tell_unused(path: Path, used: set[str], left: set[str], later: set[str]) -> None:
+    """Tell the values among `left` that nothing has used and, as far as `later` says, nothing will."""
+    from holozen.ros.launch import asked
+
+    unused = left - used - later if asked.ANY not in later else set()
+    left -= unused
+    for name in sorted(unused):
+        hint = flags.nearest(name, used) or f"; it has {', '.join(sorted(used)) or 'no arguments'}"
+        say(f"holozen launch: {path.name} does not use {name!r}{hint}")
 
 
 def _file(words: list[str], options: argparse.ArgumentParser) -> Path:
@@ -81,10 +93,10 @@ def _file(words: list[str], options: argparse.ArgumentParser) -> Path:
         options.error(f"give FILE, or PACKAGE FILE, not {' '.join(words) or 'nothing'!r}")
     package, name = words
     folder = packages.find(package)
-    there = sorted(each for each in (folder / "launch").rglob("*") if each.suffix == ".py") if folder.is_dir() else []
+    there = sorted(each for each in (folder / "launch").rglob("*") if each.is_file()) if folder.is_dir() else []
     found = next((each for each in there if each.name == name), None)
     if found is None:
-        names = [each.name for each in there]
+        names = [each.name for each in there if each.suffix == ".py"]
         hint = flags.nearest(name, names) or f"; there are {', '.join(names) or 'none'}"
         raise NotFound(f"no launch file {name!r} in {folder / 'launch'}{hint}")
     return found

@@ -38,8 +38,20 @@ def in_one_line(error: Exception) -> str:
     """An error that says all by itself, after the user's file and line: what cannot be imported, a package that is not
     there, a name that ROS has and this has not. Empty for any other.
     """
-    if not isinstance(error, ImportError | PackageNotFoundError) and missing.PAGE not in str(error):
-        return ""
+    told = isinstance(error, ImportError | PackageNotFoundError) or missing.PAGE in str(error)
+    return _placed(error) if told else ""
+
+
+def of_an_argument(error: Exception) -> str:
+    """An error of ours about what a launch file gave us, after its file and line. Empty for any other."""
+    trace = error.__traceback__
+    while trace is not None and trace.tb_next is not None:
+        trace = trace.tb_next
+    inner = trace is not None and trace.tb_frame.f_code.co_filename.startswith(_OURS)
+    return _placed(error) if inner and isinstance(error, TypeError | ValueError) else ""
+
+
+def _placed(error: Exception) -> str:
     trace = users_own(error.__traceback__)
     while trace is not None and trace.tb_next is not None:
         trace = trace.tb_next

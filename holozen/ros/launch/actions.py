@@ -16,7 +16,7 @@ from holozen.ros.launch.settings import (
     UnsetLaunchConfiguration,
 )
 from holozen.ros.launch.sources import PythonLaunchDescriptionSource
-from holozen.ros.launch.text import LaunchError, Text, number, text, truth
+from holozen.ros.launch.text import LaunchError, Text, number, pairs, text, truth
 from holozen.tell import say
 
 __all__ = [
@@ -68,8 +68,7 @@ class IncludeLaunchDescription(Action):
         super().__init__(**others)
         source = launch_description_source
         self.source = source if hasattr(source, "load") else PythonLaunchDescriptionSource(source)
-        pairs = launch_arguments.items() if hasattr(launch_arguments, "items") else launch_arguments or ()
-        self.launch_arguments = list(pairs)
+        self.launch_arguments = pairs(launch_arguments, "launch_arguments", self.place)
 
     def execute(self, context: LaunchContext) -> Entities:
         """What the file says. Raises LaunchError, and what the file itself does."""

@@ -83,6 +83,8 @@ def checked(entities: Any, place: str) -> list[LaunchDescriptionEntity]:
 
 def _unknown(kind: type, word: str) -> str:
     names = {name for each in kind.__mro__[:-1] for name in _arguments(each)} - {"self", "others"}
+    if (new := word.removeprefix("node_")) != word and new in names:
+        return f"{kind.__name__} has no argument {word!r}, which is ROS's old word; write {new}=..."
     return f"{kind.__name__} has no argument {word!r}{nearest(word, names)}; it has {', '.join(sorted(names))}"
 
 

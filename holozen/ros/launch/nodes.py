@@ -10,7 +10,7 @@ from holozen.ros.launch.entity import Action, Entities
 from holozen.ros.launch.processes import TERMINALS, ExecuteProcess
 from holozen.ros.launch.simulation import given, ours
 from holozen.ros.launch.stand_ins import SCRIPTS, Wanted, leave_out, stand_in
-from holozen.ros.launch.text import LaunchError, Text, text
+from holozen.ros.launch.text import LaunchError, Text, pairs, text
 from holozen.ros.launch.values import Parameter, ParameterFile, ParameterValue
 
 __all__ = [
@@ -31,15 +31,17 @@ class Node(ExecuteProcess):
     """Starts a Python script of a package by `holozen run`; for ROS's own nodes there are stand-ins."""
 
     def __init__(
-        self, *, executable: Text, package: Text = "", name: Text = "", namespace: Text = "", exec_name: Text = "",
+        self, *, executable: Text = "", package: Text = "", name: Text = "", namespace: Text = "", exec_name: Text = "",
         parameters: Any = (), remappings: Any = (), ros_arguments: Any = (), arguments: Any = (),
         name_of_process: str = "", **others: Any,
     ) -> None:  # fmt: skip
         super().__init__(name=exec_name or name_of_process, **others)
         self.package, self.executable, self.node_name = package, executable, name
         self.namespace, self.parameters = namespace, parameters or ()
-        self.remappings, self.arguments = list(remappings or ()), arguments or ()
+        self.remappings, self.arguments = pairs(remappings, "remappings", self.place), arguments or ()
         self.ros_arguments = ros_arguments or ()
+        if not executable:
+            raise LaunchError("Node lacks executable='...'", self.place)
         for what in ("arguments", "ros_arguments"):
             if isinstance(getattr(self, what), str):
                 told = f"{what}={getattr(self, what)!r} is one text; write a list of words"

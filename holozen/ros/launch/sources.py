@@ -51,6 +51,8 @@ def read(path: Path) -> LaunchDescription:
         there = sorted(each.name for each in folder.iterdir() if each.is_file()) if folder.is_dir() else []
         hint = nearest(path.name, there) or (f"; there are {', '.join(there[:20])}" if there else "")
         raise LaunchError(f"no launch file {str(path)!r}{hint}")
+    if path.suffix in (".xml", ".yaml", ".yml"):
+        raise LaunchError(f"{path}: launch files in XML and YAML are not read; Python only")
     if path.suffix != ".py":
         raise LaunchError(f"{path}: only launch files in Python are read here, whose names end with .py")
     try:

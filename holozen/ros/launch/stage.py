@@ -7,7 +7,7 @@ import signal
 import threading
 import time
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from itertools import count
 from typing import Any
 
@@ -16,6 +16,7 @@ from holozen.ros.launch.entity import Action, Entities, LaunchDescriptionEntity
 from holozen.ros.launch.events import Event, Handler, ProcessExited, ProcessStarted, Shutdown
 from holozen.ros.launch.process import Running
 from holozen.ros.launch.text import LaunchError
+from holozen.ros.traceback import users_own
 from holozen.tell import say
 
 LOOK = 0.05  # s
@@ -40,6 +41,7 @@ class Stage:
     def __init__(self, flags: Sequence[str], stop: threading.Event) -> None:
         self.context = LaunchContext(self, flags)
         self._stop, self._stopping, self.failed = stop, False, False
+        self.begun: Callable[[], None] = lambda: None  # what is called once all is done that waits for nothing
         self._queue: deque[tuple[Scope, LaunchDescriptionEntity]] = deque()
         self._later: list[tuple[Scope, Action]] = []  # what waits until all else was done
         self._delayed: set[int] = set()
@@ -65,6 +67,7 @@ class Stage:
         """
         self._first(self.context.scope, entities)
         self._work()
+        self.begun()
         while not self._stopping and (self._running or self._timers):
             if self._stop.is_set():
                 self.stop("")
@@ -74,6 +77,12 @@ class Stage:
         self._tell(Shutdown())
         self._work()
         return not self.failed
+
+    @property
+    def pending(self) -> list[Any]:
+        """What may be done later: when processes start or end, and when timers are due."""
+        later = [getattr(running.action, "on_exit", None) for running in self._running]
+        return [*later, *(handler.actions for _, handler in self._handlers), *(timer[3] for timer in self._timers)]
 
     def start(self, action: Action, program: Program) -> None:
         """Start a process. Raises LaunchError."""
@@ -142,6 +151,10 @@ class Stage:
                 found = entity.visit(self.context)
             except LaunchError as error:
                 raise error.at(entity.place) from None
+            except (TypeError, ValueError, AttributeError) as error:
+                if users_own(error.__traceback__):  # an error of the launch file's own function
+                    raise
+                raise LaunchError(f"{type(entity).__name__}: {error}", entity.place) from None
             self._first(self.context.scope, found)
 
     def _look(self) -> None:

@@ -56,6 +56,14 @@ def text(context: "LaunchContext", value: Text) -> str:
     raise LaunchError(f"{value!r} is no text; write a str, a substitution, or a list of both")
 
 
+def pairs(value: Any, what: str, place: str) -> list[tuple[Any, Any]]:
+    """A dict, or a list of pairs, as a list of pairs. Raises LaunchError for anything else."""
+    found = list(value.items() if hasattr(value, "items") else value or ())
+    if any(isinstance(each, str) or not isinstance(each, list | tuple) or len(each) != 2 for each in found):
+        raise LaunchError(f"{what}={value!r:.80} is no list of pairs; write such as [('cmd_vel', '/drive')]", place)
+    return [(each[0], each[1]) for each in found]
+
+
 def shown(value: Text) -> str:
     """A text as it can be shown before the launch file runs."""
     if isinstance(value, str | os.PathLike):

@@ -82,7 +82,8 @@ def generate_launch_description():
 @pytest.mark.parametrize(
     ("name", "text", "told"),
     [
-        ("b.launch.xml", "<launch/>", "only launch files in Python are read here"),
+        ("b.launch.xml", "<launch/>", "launch files in XML and YAML are not read; Python only"),
+        ("b.launch.txt", "", "only launch files in Python are read here"),
         ("b.launch.py", "x = 1", "has no function generate_launch_description"),
         ("b.launch.py", "def generate_launch_description(): return 7", r"returned 7, not a LaunchDescription"),
         ("c.launch.py", "", r"no launch file '.*/b.launch.py'; did you mean 'c.launch.py'"),

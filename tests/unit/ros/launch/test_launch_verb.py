@@ -19,8 +19,8 @@ from ..conftest import Write
 Launch = Callable[..., subprocess.CompletedProcess[str]]
 REPO = Path(__file__).parents[4]
 HEAD = """
-from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction, LogInfo
+from launch import LaunchDescription; from launch.event_handlers import OnProcessExit
+from launch.actions import *
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
 """
@@ -93,6 +93,40 @@ def test_a_value_that_nothing_uses_is_told(launch: Launch, write: Write) -> None
     assert (launch("a.launch.py", "kpp:=3").stderr) == told
 
 
+NAP = "ExecuteProcess(cmd=['sleep', '60'])"
+LATER = "RegisterEventHandler(OnProcessExit(on_exit=[LogInfo(msg=LaunchConfiguration('{}', default='x'))]))"
+
+
+@pytest.mark.parametrize(
+    "actions", [(NAP,), (LATER.format("kp"), NAP), (f"TimerAction(period=99.0, actions=[{NAP}])",)]
+)
+def test_a_value_that_nothing_uses_is_told_while_the_launch_goes_on(
+    my_bot: Path, wire: Wire, write: Write, actions: tuple[str, ...]
+) -> None:
+    write("a.launch.py", described(*ARGUMENTS, *actions))
+    with Process(line(wire, "a.launch.py", "kpp:=3"), env=environment()) as going:
+        assert going.wait_for_line("does not use 'kpp'; did you mean 'kp'?")
+        going.signal(signal.SIGINT)
+        assert going.wait() == 0
+    assert going.err.count("kpp") == 1
+
+
+@pytest.mark.parametrize(
+    "later",
+    [LATER.format("kpp"), "TimerAction(period=0.1, actions=[OpaqueFunction(function=lambda c: c.used.add('kpp'))])"],
+)
+def test_a_value_that_may_be_used_later_is_not_told(launch: Launch, write: Write, later: str) -> None:
+    write("a.launch.py", described(*ARGUMENTS, later, "ExecuteProcess(cmd=['true'])"))
+    assert "kpp" not in launch("a.launch.py", "kpp:=3").stderr.replace("launch: x", "")
+
+
+def test_a_launch_file_of_a_package_in_xml_is_not_read(launch: Launch, write: Write) -> None:
+    write("src/my_bot/launch/a.launch.xml", "<launch/>")
+    done = launch("my_bot", "a.launch.xml")
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert done.stderr.endswith("a.launch.xml: launch files in XML and YAML are not read; Python only\n")
+
+
 @pytest.mark.parametrize(
     ("text", "told"),
     [
@@ -112,6 +146,21 @@ def test_a_value_that_nothing_uses_is_told(launch: Launch, write: Write) -> None
             described("Node(package='my_bot', executable='x', nam='y')"),
             "a.launch.py:8: Node has no argument 'nam'; did",
         ),
+        (
+            described("Node(package='my_bot', node_executable='x')"),
+            "a.launch.py:8: Node has no argument 'node_executable', which is ROS's old word; write executable=...",
+        ),
+        (described("Node(package='my_bot')"), "a.launch.py:8: Node lacks executable='...'"),
+        (
+            described("Node(package='my_bot', executable='x', remappings=['cmd_vel', '/drive'])"),
+            "a.launch.py:8: remappings=['cmd_vel', '/drive'] is no list of pairs; write such as [(",
+        ),
+        (
+            described("IncludeLaunchDescription('b.launch.py', launch_arguments=['ab'])"),
+            "a.launch.py:8: launch_arguments=['ab'] is no list of pairs",
+        ),
+        (described("GroupAction([], launch_configurations=[1])"), "a.launch.py:8: "),
+        (described("ExecuteProcess(cmd=['true'], env=['ab', 'c'])"), "a.launch.py:8: ExecuteProcess: "),
         (described("Node(package='nav2', executable='x')"), "a.launch.py:8: no package 'nav2' around "),
         (described("'x'"), "a.launch.py:8: 'x' is no action"),
         ("", "/a.launch.py has no function generate_launch_description()"),
