@@ -8,6 +8,7 @@ from holozen.cli import request
 from holozen.cli.forms import TYPE
 from holozen.cli.reading import CDR, Reader
 from holozen.cli.show import Hex, lines
+from holozen.errors import NoReply
 from holozen.tell import say
 
 TYPE_CHECKING = False
@@ -28,10 +29,15 @@ def call(bus: Bus, args: "argparse.Namespace") -> int:
         say(f"holozen service call: {error}")
         return 1
     reader = Reader(packages=args.package)
-    _ask(bus, args, payload, reader, kind)
-    while args.rate:
-        time.sleep(1 / args.rate)
+    try:
         _ask(bus, args, payload, reader, kind)
+        while args.rate:
+            time.sleep(1 / args.rate)
+            _ask(bus, args, payload, reader, kind)
+    except NoReply as error:
+        from holozen.cli.near import meant
+
+        raise NoReply(f"{error}{meant(bus, [args.key], ('srv',))}") from None
     return 0
 
 

@@ -41,8 +41,7 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Tap", printer: "Printer"
     from holozen.errors import BusError
 
     what = "nothing that passes the filter" if args.filter else "nothing"
-    say_so = partial(say, f"waiting for {args.key}; {what} came yet")
-    late = threading.Timer(args.timeout or WAITING, tap.close if args.timeout else say_so)
+    late = threading.Timer(args.timeout or WAITING, tap.close if args.timeout else partial(_wait, args, bus, what))
     late.daemon = True
     late.start()
     try:
@@ -50,7 +49,8 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Tap", printer: "Printer"
             try:
                 sample = tap.recv()
             except BusError:
-                say(f"holozen topic echo: {what} came on {args.key} within {args.timeout:g} s at {bus.where}")
+                told = f"{what} came on {args.key} within {args.timeout:g} s at {bus.where}"
+                say(f"holozen topic echo: {told}{_meant(args, bus)}")
                 return 1
             if not args.filter:
                 late.cancel()
@@ -63,6 +63,19 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Tap", printer: "Printer"
         return 1
     finally:
         printer.tell(reader.why)
+
+
+def _wait(args: "argparse.Namespace", bus: "Bus", what: str) -> None:
+    try:
+        say(f"waiting for {args.key}; {what} came yet{_meant(args, bus)}")
+    except Exception:  # the session was closed meanwhile, which zenoh tells by an error of its own
+        return
+
+
+def _meant(args: "argparse.Namespace", bus: "Bus") -> str:
+    from holozen.cli.near import meant
+
+    return meant(bus, [args.key])
 
 
 class Printer:

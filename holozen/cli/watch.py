@@ -5,6 +5,7 @@ import threading
 import time
 from collections import deque
 
+from holozen.cli.near import meant
 from holozen.cli.noun import open_bus
 from holozen.cli.spread import lost
 from holozen.errors import BusError
@@ -75,6 +76,7 @@ class Watch:
             len(self._args.keys) > 1 or any("*" in name for name in self._args.keys),
             ", ".join(self._args.keys),
         )
+        near: str | None = None  # looked up when nothing came
         while not stop.wait(EVERY):
             reports = self._reports()
             for name, told in reports.items():
@@ -82,12 +84,14 @@ class Watch:
                 print(json.dumps({"key": name, **told}) if self._args.json else head + text(told), flush=True)
             if reports and self._args.once:
                 return 0
+            if not reports and near is None:
+                near = meant(bus, self._args.keys)
             if not reports and deadline and time.monotonic() > deadline:
-                nothing = f"nothing came on {keys} within {self._args.timeout:g} s at {bus.where}"
+                nothing = f"nothing came on {keys} within {self._args.timeout:g} s at {bus.where}{near}"
                 say(f"holozen {self._args.node.replace('_', ' ')}: {self._excuse() or nothing}")
                 return 1
             if not reports:
-                say(self._excuse() or f"no new messages on {keys}")
+                say(self._excuse() or f"no new messages on {keys}{near or ''}")
         return 0
 
     def _listen(self, tap: "Tap") -> None:

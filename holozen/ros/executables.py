@@ -1,5 +1,6 @@
 """What `holozen run` runs: a file, or the executable of a package."""
 
+import contextlib
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -15,6 +16,10 @@ _HEAD = 200  # bytes of a file that tell whether it is a script
 
 class NotFound(ValueError):
     """There is no such file, package or executable, or it is no Python script. One line that says what there is."""
+
+
+class PackageLost(NotFound):
+    """There is no such package."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,8 +57,20 @@ def from_file(path: Path) -> Script:
 
 
 def find(package: str, name: str, nameless: bool = False) -> Script:
-    """The executable `name` of a package, with or without `.py`; `nameless` is that of packages. Raises NotFound."""
-    folder = _folder(package, nameless)
+    """The executable `name` of a package, with or without `.py`. Raises NotFound.
+
+    If `nameless`, a folder that says no name of a package is taken for this one too, where it has the executable.
+    """
+    try:
+        return _found(_folder(package, nameless=False), package, name)
+    except PackageLost:
+        with contextlib.suppress(NotFound):
+            if nameless:
+                return _found(_folder(package, nameless=True), package, name)
+        raise
+
+
+def _found(folder: Path, package: str, name: str) -> Script:
     declared = _declared(folder)
     if name in declared:
         return _console_script(folder, declared[name], name)
@@ -74,7 +91,7 @@ def _folder(package: str, nameless: bool) -> Path:
     try:
         return packages.find(package, nameless)
     except RobotError as error:
-        raise NotFound(str(error)) from None
+        raise PackageLost(str(error)) from None
 
 
 def _declared(folder: Path) -> entry_points.Declared:

@@ -107,6 +107,24 @@ def test_echo_of_a_silent_key_ends_with_its_timeout(sim: Bus, run: Run, wire: Wi
     assert run("topic", "echo", "odom", "--timeout", "0.1") == (1, "", told)
 
 
+@pytest.mark.parametrize("verb", ["echo", "hz"])
+def test_a_key_on_which_nothing_comes_is_told_with_the_nearest(sim: Bus, run: Run, wire: Wire, verb: str) -> None:
+    code, _, err = run("topic", verb, "Fred/odomm", "--timeout", "0.1")
+    assert (code, err.count("\n")) == (1, 1)
+    assert err.endswith(f"came on Fred/odomm within 0.1 s at {wire.endpoint}; did you mean 'Fred/odom'?\n")
+
+
+def test_an_echo_that_waits_tells_the_nearest_key(sim: Bus, wire: Wire) -> None:
+    echo = wire.start("topic", "echo", "Fred/odomm")
+    echo.wait_for_line("waiting for Fred/odomm; nothing came yet; did you mean 'Fred/odom'?")
+
+
+def test_a_service_that_nobody_has_is_told_with_the_nearest(sim: Bus, run: Run) -> None:
+    code, _, err = run("service", "call", "Fred/next_goal", "--timeout", "0.1")
+    assert (code, err.count("\n")) == (1, 1)
+    assert err.endswith("shows who serves; did you mean 'next_goal'?\n")
+
+
 def test_echo_of_a_wrong_key_is_one_line(run: Run) -> None:
     code, out, err = run("topic", "echo", "a//b")
     assert (code, out) == (1, "")

@@ -122,6 +122,8 @@ def test_a_folder_that_says_no_name_is_no_package_to_be_run(home: Path, write: W
     packages.use({})
     with pytest.raises(NotFound, match=rf"^no package 'hb_contrl' around {home}; packages found: none; say .*"):
         find("hb_contrl", "controller.py")
+    with pytest.raises(NotFound, match=r"^no package 'hb_contrl'"):
+        find("hb_contrl", "other.py", nameless=True)
     assert find("hb_contrl", "controller.py", nameless=True).path == path
 
 
