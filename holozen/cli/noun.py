@@ -6,7 +6,7 @@ import importlib
 
 from holozen import connection
 from holozen.bus import Bus
-from holozen.cli import quick
+from holozen.cli import quick, ros2_flags
 from holozen.flags import package
 
 TYPE_CHECKING = False  # importing `typing` takes 3 ms
@@ -80,6 +80,7 @@ class Noun:
         self.verb(name).arguments(parser)
         parser.add_argument("--json", action="store_true", help="one JSON object a line")
         connection.add_arguments(parser)
+        ros2_flags.add(parser, self.name, name)
 
 
 def open_bus(args: argparse.Namespace, early: bool = False) -> Bus:

@@ -6,7 +6,7 @@ import json
 
 from holozen import connection
 from holozen.bus import Bus
-from holozen.cli import quick
+from holozen.cli import quick, ros2_flags
 from holozen.cli.param_nodes import Nodes
 from holozen.errors import BusError
 from holozen.flags import key, number
@@ -78,6 +78,7 @@ def _arguments(parser: Any, verb: str) -> None:
     add("--timeout", type=number(0.01, 1e6, "s"), default=3.0, metavar="S", help=told)
     parser.set_defaults(verb=verb)
     connection.add_arguments(parser)
+    ros2_flags.add(parser, "param", verb)
 
 
 def _parsed(argv: list[str]) -> Any:

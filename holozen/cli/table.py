@@ -4,8 +4,9 @@ import argparse
 from collections.abc import Iterator
 
 from holozen import cli
+from holozen.cli import ros2_flags
 
-ZENOH = "zenoh"  # the group of flags that every verb on the wire has
+LEFT_OUT = ("zenoh", ros2_flags.TITLE)  # groups of flags that many verbs have
 
 
 def table() -> str:
@@ -25,8 +26,9 @@ def _verbs(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]
 
 
 def _row(parser: argparse.ArgumentParser) -> str:
-    zenoh = {id(action) for group in parser._action_groups if group.title == ZENOH for action in group._group_actions}
-    actions = [action for action in parser._actions if id(action) not in zenoh and action.dest != "help"]
+    groups = [group for group in parser._action_groups if group.title in LEFT_OUT]
+    left_out = {id(action) for group in groups for action in group._group_actions}
+    actions = [action for action in parser._actions if id(action) not in left_out and action.dest != "help"]
     places = [_place(action) for action in actions if not action.option_strings]
     flags = [f"`{_flag(action)}`" for action in actions if action.option_strings]
     does = " ".join((parser.description or "").split())

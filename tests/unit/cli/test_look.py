@@ -157,6 +157,29 @@ def test_a_call_that_fails_is_one_line(sim: Bus, run: Run, words: tuple[str, ...
     assert err.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        "topic echo Fred/odom --once --qos-reliability best_effort --qos-durability=volatile --qos-profile sensor_data",
+        "topic pub cmd_vel {} --once --qos-depth 1 --keep-alive 0.1 --spin-time 1",
+        "topic list --no-daemon --include-hidden-topics",
+        "topic hz Fred/odom --once --spin-time 0.5",
+        "service list --no-daemon --include-hidden-services",
+        "service call next_goal --spin-time 1",
+        "node list -a --no-daemon",
+        "param list --no-daemon --include-hidden-nodes",
+    ],
+)
+def test_flags_of_ros2_that_change_nothing_are_taken(sim: Bus, run: Run, words: str) -> None:
+    assert run(*words.split())[0] == 0
+
+
+def test_help_says_which_flags_change_nothing(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["topic", "echo", "--help"])
+    assert "They change nothing here." in capsys.readouterr().out.partition("taken for ros2's sake:")[2]
+
+
 def test_nodes_are_listed(sim: Bus, run: Run, wire: Wire) -> None:
     wire.bus("teleop", lasting=True)
     wire.bus("topic_echo")
