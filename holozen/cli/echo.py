@@ -41,7 +41,9 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Tap", printer: "Printer"
     from holozen.errors import BusError
 
     what = "nothing that passes the filter" if args.filter else "nothing"
-    late = threading.Timer(args.timeout or WAITING, tap.close if args.timeout else partial(_wait, args, bus, what))
+    late = threading.Timer(
+        args.timeout or WAITING, tap.close if args.timeout else partial(_wait, args, bus, what, printer)
+    )
     late.daemon = True
     late.start()
     try:
@@ -50,7 +52,7 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Tap", printer: "Printer"
                 sample = tap.recv()
             except BusError:
                 told = f"{what} came on {args.key} within {args.timeout:g} s at {bus.where}"
-                say(f"holozen topic echo: {told}{_meant(args, bus)}")
+                say(f"holozen topic echo: {told}{_meant(args, bus, printer)}")
                 return 1
             if not args.filter:
                 late.cancel()
@@ -65,16 +67,20 @@ def _echo(args: "argparse.Namespace", bus: "Bus", tap: "Tap", printer: "Printer"
         printer.tell(reader.why)
 
 
-def _wait(args: "argparse.Namespace", bus: "Bus", what: str) -> None:
+def _wait(args: "argparse.Namespace", bus: "Bus", what: str, printer: "Printer") -> None:
     try:
-        say(f"waiting for {args.key}; {what} came yet{_meant(args, bus)}")
+        say(f"waiting for {args.key}; {what} came yet{_meant(args, bus, printer)}")
     except Exception:  # the session was closed meanwhile, which zenoh tells by an error of its own
         return
 
 
-def _meant(args: "argparse.Namespace", bus: "Bus") -> str:
+def _meant(args: "argparse.Namespace", bus: "Bus", printer: "Printer") -> str:
     from holozen.cli.near import meant
 
+    if printer.stopped:
+        from holozen.cli.filters import lacking
+
+        return f"; {why}" if (why := lacking(args.filter, printer.stopped)) else ""
     return meant(bus, [args.key])
 
 
@@ -85,6 +91,7 @@ class Printer:
         self._args, self._many = args, "*" in args.key
         self._count = self._undecoded = self._fieldless = 0
         self._path = self._passes = None
+        self.stopped: Any = None  # the last message that the filter did not let pass
         if args.field:
             from holozen.cli import fields
 
@@ -102,6 +109,7 @@ class Printer:
         self._count += 1
         self._undecoded += isinstance(value, Hex)
         if self._passes and not self._passes(value):
+            self.stopped = value
             return False
         if self._path:
             try:

@@ -7,9 +7,11 @@ message; a bare name is its field.
 
 import ast
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
+
+from holozen.cli.fields import pick
 
 LONGEST = 1000  # characters
 MOST_NODES = 200
@@ -52,6 +54,26 @@ def compiled(text: str) -> Callable[[Any], bool]:
             return False
 
     return passes
+
+
+def lacking(text: str, message: Any) -> str:
+    """The first field in an expression that a message does not have, with the nearest that it has; else empty."""
+    for node in ast.walk(ast.parse(text.strip(), mode="eval").body):
+        if isinstance(node, ast.Attribute) or (isinstance(node, ast.Name) and node.id not in CALLS):
+            names = [*_chain(node)]
+            try:
+                pick(message, tuple(names[names[:1] == ["m"] :]))
+            except LookupError as error:
+                return str(error.args[0])
+    return ""
+
+
+def _chain(node: ast.expr) -> Iterator[str]:
+    """The names of a field's path; none where something else than names is in it."""
+    if isinstance(node, ast.Attribute) and (inner := [*_chain(node.value)]):
+        yield from [*inner, node.attr]
+    elif isinstance(node, ast.Name):
+        yield node.id
 
 
 def _value(node: ast.expr, text: str) -> Value:

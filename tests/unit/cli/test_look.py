@@ -114,6 +114,24 @@ def test_a_key_on_which_nothing_comes_is_told_with_the_nearest(sim: Bus, run: Ru
     assert err.endswith(f"came on Fred/odomm within 0.1 s at {wire.endpoint}; did you mean 'Fred/odom'?\n")
 
 
+@pytest.mark.parametrize(
+    ("filter", "told"),
+    [
+        (
+            "m.pose.pose.positoin.x > 1",
+            "; no field 'positoin'; did you mean 'position'?; there are position, orientation",
+        ),
+        ("poes.pose.position.x > 1", "; no field 'poes'; did you mean 'pose'?; there are header, child_frame_id, pose"),
+        ("m.pose.pose.position.x > 1 and len(m.child_frame_id) > 0", ""),
+    ],
+)
+def test_a_filter_of_a_field_that_is_not_there_is_told(sim: Bus, run: Run, filter: str, told: str) -> None:
+    code, _, err = run("topic", "echo", "Fred/odom", "--timeout", "0.3", "--filter", filter)
+    assert (code, err.count("\n")) == (1, 1)
+    assert err.startswith("holozen topic echo: nothing that passes the filter came on Fred/odom within 0.3 s at ")
+    assert err.partition("tcp/127.0.0.1:")[2].lstrip("0123456789").startswith(told or "\n")
+
+
 def test_an_echo_that_waits_tells_the_nearest_key(sim: Bus, wire: Wire) -> None:
     echo = wire.start("topic", "echo", "Fred/odomm")
     echo.wait_for_line("waiting for Fred/odomm; nothing came yet; did you mean 'Fred/odom'?")
