@@ -75,7 +75,7 @@ def _run(
     watcher = Watcher(bus, args.key) if form.stop() else None
     if watcher and matched:
         watcher.ask()
-    turns = _lines(form, args, stop) if args.stdin else _turns(payload, args, stop)
+    turns = _lines(form, args, stop) if args.stdin else _turns(form, payload, args, stop)
     sent = 0
     try:
         for each in turns:
@@ -101,6 +101,8 @@ def _form(args: "argparse.Namespace") -> Form | None:
     if not (words or given or args.stdin):
         raise Refused(f"{args.key}: a value is missing; write {EXAMPLE}", 2)
     args.value = words[0] if words else "{}"
+    if args.value == "-":
+        args.value = sys.stdin.read(values.LARGEST + 1)
     row = wire.topic(args.key)
     if given:
         try:
@@ -163,13 +165,14 @@ def _matched(
             told = True
 
 
-def _turns(payload: bytes, args: "argparse.Namespace", stop: "threading.Event") -> "Iterator[bytes]":
+def _turns(form: Form, payload: bytes, args: "argparse.Namespace", stop: "threading.Event") -> "Iterator[bytes]":
     """The value as often as is asked for, in time."""
     row = wire.topic(args.key)
     period = 1 / (args.rate or (row.rate if row else 1.0))
     left, due = 1 if args.once else args.times, time.monotonic()
     while not stop.is_set() and left != 0:
         yield payload
+        payload = _payload(form, args) if values.tells_time(args.value) else payload
         left = left and left - 1
         due += period
         if not args.once:  # the last one counts for a period too

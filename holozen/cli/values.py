@@ -2,6 +2,7 @@
 
 import json
 import sys
+import time
 from typing import Any
 
 from msgspec import to_builtins
@@ -71,11 +72,37 @@ def plain(text: str) -> Any:
     if len(text) > LARGEST:
         raise ValueError(f"the value is longer than {LARGEST} bytes")
     try:
-        return json.loads(text)
+        value = _read(text)
+        return _timed(value) if tells_time(text) else value
     except RecursionError:
         raise ValueError("the value is nested too deeply") from None
+
+
+def tells_time(text: str) -> bool:
+    """Whether a value may say `header: auto` or `stamp: now`, which is another time whenever it is read."""
+    return "auto" in text or "now" in text
+
+
+def _read(text: str) -> Any:
+    try:
+        return json.loads(text)
     except ValueError as error:
         return _yaml(text, error)
+
+
+def _timed(value: Any) -> Any:
+    """A value with the time of now where it says so, as `ros2 topic pub` fills it in."""
+    if isinstance(value, list):
+        return [_timed(inner) for inner in value]
+    if not isinstance(value, dict):
+        return value
+    sec, nanosec = divmod(time.time_ns(), 1_000_000_000)
+    stamp = {"sec": sec, "nanosec": nanosec}
+    filled = {("header", "auto"): {"stamp": stamp}, ("stamp", "now"): stamp}
+    return {
+        name: filled[name, inner] if isinstance(inner, str) and (name, inner) in filled else _timed(inner)
+        for name, inner in value.items()
+    }
 
 
 def _yaml(text: str, why_no_json: ValueError) -> Any:
@@ -85,8 +112,6 @@ def _yaml(text: str, why_no_json: ValueError) -> Any:
         raise ValueError(f"no JSON: {why_no_json}; to write YAML: pip install pyyaml") from None
     try:
         return yaml.safe_load(text)
-    except RecursionError:
-        raise ValueError("the value is nested too deeply") from None
     except yaml.YAMLError as error:
         raise ValueError(f"neither JSON nor YAML: {' '.join(str(error).split())}") from None
 

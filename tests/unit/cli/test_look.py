@@ -2,6 +2,7 @@
 
 import json
 import threading
+import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 
@@ -245,3 +246,15 @@ def test_a_strangers_service_is_called_as_it_is_or_by_its_type(wire: Wire, run: 
     assert code == 1
     assert "dta" in err
     queryable.undeclare()
+
+
+@pytest.mark.parametrize(
+    "value", ["{header: auto, twist: {linear: {x: 0.1}}}", "{header: {stamp: now}, twist: {linear: {x: 0.1}}}"]
+)
+def test_a_stamp_of_now_is_another_one_each_time(run: Run, wire: Wire, value: str) -> None:
+    tap = wire.bus("reader").tap("cmd_vel", 100)
+    before = time.time()
+    assert run("topic", "pub", "-t", "2", "-r", "100", "cmd_vel", "geometry_msgs/msg/TwistStamped", value)[0] == 0
+    stamps = [json.loads(tap.recv().payload)["header"]["stamp"] for _ in range(2)]
+    first, second = (stamp["sec"] + stamp["nanosec"] * 1e-9 for stamp in stamps)
+    assert before - 1e-3 <= first < second <= time.time() + 1e-3

@@ -64,6 +64,7 @@ def test_a_dash_reads_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
         ("&a {linear: *a}", "unknown field `linear`"),
         ("{1: 2}", "not a Twist: "),
         ("[" * 100_000, "the value is nested too deeply"),
+        ('{"now":' * 700 + "1" + "}" * 700, "the value is nested too deeply"),
         ("{" * 3000, "the value is nested too deeply"),
         ('{"linear": {"x": ' + "9" * 5000 + "}}", "4300 digits"),
         ('{"linear": {"x": ' + "9" * 500 + "}}", "out of range"),
