@@ -7,12 +7,18 @@ import argparse
 import contextlib
 import io
 import re
+from collections.abc import Callable
+from itertools import pairwise
 from types import ModuleType
+from typing import TYPE_CHECKING
 
 from holozen import cli, connection
 from holozen.bus import Bus
-from holozen.flags import Parser
+from holozen.flags import Parser, package
 from holozen.graph import Endpoint
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 PATIENCE = 0.25  # s to look who is there
 SAFE = re.compile(r"[A-Za-z0-9_./@%+-]+")  # what a shell takes as it is; keys come over the wire
@@ -46,9 +52,12 @@ def candidates(words: list[str]) -> list[str]:
         return []
     elif action.choices is not None:
         found = [str(choice) for choice in action.choices]
+    elif look := LOOKED_UP.get(f"{before[0]} {action.dest}"):
+        found = look(left, current)
     else:
         kind = LIVE.get(f"{before[0]} {action.dest}") or LIVE.get(action.dest)
-        found = [word for word in _live(kind, before) if SAFE.fullmatch(word)] if kind else []
+        slash = "/" * current.startswith("/")  # as ROS writes keys
+        found = [slash + word for word in _live(kind, before) if SAFE.fullmatch(word)] if kind else []
     return [word for word in found if word.startswith(current)]
 
 
@@ -85,6 +94,38 @@ def _wanted(parser: argparse.ArgumentParser, words: list[str]) -> argparse.Actio
     if places and taken >= len(places):
         return places[-1] if places[-1].nargs in ("*", "+") else None
     return places[taken] if places else None
+
+
+def _types(left: list[str], _current: str) -> list[str]:
+    from holozen.interfaces import Registry
+
+    return Registry(_given(left)).names()
+
+
+def _packages(left: list[str], current: str) -> list[str]:
+    """Names of packages; none for nothing, for which the shell shows files."""
+    from holozen.ros import packages
+
+    packages.use(_given(left))
+    return sorted(packages.around()) if current else []
+
+
+def _executables(left: list[str], _current: str) -> list[str]:
+    """Those of the package before them."""
+    from holozen.ros import executables, packages
+
+    packages.use(_given(left))
+    return executables.names(left[-1])
+
+
+def _given(left: list[str]) -> "dict[str, Path]":
+    return dict(package(value) for flag, value in pairwise(left) if flag == "--package")
+
+
+LOOKED_UP: dict[str, Callable[[list[str], str], list[str]]] = {
+    "interface type": _types, "run target": _packages, "run words": _executables,
+}  # fmt: skip
+"""By verb and argument, what tells the words that need no wire, from the words before and the one at hand."""
 
 
 def _live(kind: str, words: list[str]) -> list[str]:

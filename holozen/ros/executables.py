@@ -83,6 +83,12 @@ def _found(folder: Path, package: str, name: str) -> Script:
     raise NotFound(f"{said}{_there(f'in {folder} there are', there)}")
 
 
+def names(package: str) -> list[str]:
+    """The executables of a package. Raises NotFound."""
+    folder = _folder(package, nameless=False)
+    return sorted({*_declared(folder), *(name for name, _ in _files(folder, package))})
+
+
 def _there(words: str, names: list[str]) -> str:
     return f"; {words}: {listed(names, 20)}"
 

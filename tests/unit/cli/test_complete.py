@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import pytest
 
@@ -53,6 +54,8 @@ def fred(wire: Wire) -> Iterator[Bus]:
         (["completion", ""], ["bash", "zsh", "fish"]),
         (["pose-service", "--shape", "sq"], ["square"]),
         (["nonsense", ""], []),
+        (["interface", "show", "nav_msgs/msg/Od"], ["nav_msgs/msg/Odometry"]),
+        (["interface", "proto", "std_srvs/srv/Tr"], ["std_srvs/srv/Trigger"]),
         (["topic", "echo", "x", "y", "z", ""], []),
         (["spawn", "urdf/h"], []),
     ],
@@ -114,3 +117,23 @@ def test_bash_completes() -> None:
     path = f"{os.path.dirname(sys.executable)}:{os.environ['PATH']}"
     done = subprocess.run(["bash", "-c", bash], capture_output=True, text=True, env={**os.environ, "PATH": path})
     assert (done.stdout, done.stderr) == ("echo\n", "")
+
+
+def test_packages_and_their_executables_are_completed(
+    complete: Complete, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    package = tmp_path / "src" / "my_bot"
+    (package / "scripts").mkdir(parents=True)
+    (package / "package.xml").write_text("<package><name>my_bot</name></package>")
+    (package / "scripts" / "controller.py").touch()
+    monkeypatch.chdir(tmp_path)
+    assert complete("run", "my") == ["my_bot"]
+    assert complete("run", "my_bot", "") == ["controller.py"]
+    assert complete("run", "--package", f"other={package}", "other", "con") == ["controller.py"]
+    for words in (["run", ""], ["run", "my_bot", "controller.py", ""], ["run", "none", ""]):
+        assert complete(*words) == []
+
+
+def test_a_key_is_completed_after_the_slash_of_ros(complete: Complete, fred: Bus) -> None:
+    assert complete("topic", "echo", HERE, "/Fred/o") == ["/Fred/odom"]
+    assert complete("service", "call", HERE, "/n") == ["/next_goal"]
