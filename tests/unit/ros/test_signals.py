@@ -45,6 +45,17 @@ while rclpy.ok():
     rate.sleep()
 """
 THREAD = "threading.Thread(target=rclpy.spin, args=(node,)).start()"
+# What the main thread does not see stands for what comes just before it waits.
+DEAF = """
+import signal
+def spin():
+    up()
+    rclpy.spin(node)
+thread = threading.Thread(target=spin)
+signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+thread.start()
+thread.join()
+"""
 PENDING = """
 future = node.create_client(Trigger, "nobody").call_async(Trigger.Request())
 node.create_client(Trigger, "mine").call_async(Trigger.Request())
@@ -89,6 +100,7 @@ CASES = {
     "while ok, SIGTERM": (OK, signal.SIGTERM, 0, ""),
     "rate, SIGINT": (RATE, signal.SIGINT, 130, ""),
     "a thread spins, SIGINT": (THREAD, signal.SIGINT, 130, ""),
+    "a thread spins, SIGTERM that the main thread does not see": (DEAF, signal.SIGTERM, 0, ""),
     "calls wait, SIGINT": (PENDING, signal.SIGINT, 130, ""),
     "a call, SIGINT": (CALL, signal.SIGINT, 130, ""),
     "wait for a service, SIGTERM": (WAIT, signal.SIGTERM, 1, EXTERNAL),
