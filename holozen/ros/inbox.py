@@ -53,8 +53,7 @@ class Inbox(Generic[T]):
     def take(self) -> T | None:
         """The oldest that waits, or None. For one thread at a time."""
         if self._parked:
-            while (item := self._try_recv()) is not None:
-                self._came.append(item)
+            self._drain()
         return self._came.popleft() if self._came else None
 
     def arm(self, waker: Waker) -> None:
@@ -63,11 +62,16 @@ class Inbox(Generic[T]):
         with self._lock:
             if not self._parked or self._closed:
                 return
+            self._drain()  # else what came earlier would be taken before the thread has seen that newer ones wait
             self._parked = False
         if self.thread is None:
             self.thread = threading.Thread(target=self._read, daemon=True)
             self.thread.start()
         self._go.release()
+
+    def _drain(self) -> None:
+        while (item := self._try_recv()) is not None:
+            self._came.append(item)
 
     def close(self) -> None:
         """Let the thread end, if it does not wait in the ring, whose own end ends that."""

@@ -51,6 +51,21 @@ def test_the_thread_stops_reading_while_nobody_waits(wire: Wire) -> None:
     assert taken(inbox) == [b"4", b"5"]
 
 
+def test_who_begins_to_wait_finds_the_newest_at_once(wire: Wire) -> None:
+    bus, waker = wire.bus(), Waker()
+    inbox = boxed(bus, 2)
+    waker.waiting = True
+    inbox.arm(waker)
+    waker.waiting = False
+    bus.session.put("a", "0")
+    wait_for(lambda: inbox._parked)
+    for number in (1, 2):
+        bus.session.put("a", str(number))
+    waker.waiting = True
+    inbox.arm(waker)
+    assert taken(inbox) == [b"1", b"2"]
+
+
 def test_nothing_is_lost_or_turned_round_while_waits_and_looks_take_turns(wire: Wire) -> None:
     bus, waker = wire.bus(), Waker()
     inbox = boxed(bus, 10_000)
