@@ -20,8 +20,9 @@ EMPTY = "<package><name>{}</name></package>"
 
 @pytest.fixture(autouse=True)
 def _alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A folder of its own, no ROS around, and everything as before afterwards."""
-    monkeypatch.chdir(tmp_path)
+    """A folder of its own with nothing below it, no ROS around, and everything as before afterwards."""
+    (tmp_path / "empty").mkdir()
+    monkeypatch.chdir(tmp_path / "empty")
     for variable in ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH"):
         monkeypatch.delenv(variable, raising=False)
     before = set(sys.modules)
