@@ -51,6 +51,10 @@ class Robot:
     def status(self, **fields: object) -> None:
         self._status.put(CommandStatus(**fields))  # type: ignore[arg-type]
 
+    def is_heard(self) -> bool:
+        """Whether what it tells from now on arrives."""
+        return self.odom.matched and self._status.matched
+
     def heard(self) -> list[Twist | TwistStamped | None]:
         return [received.message for received in iter(self.commands.try_recv, None)]
 
@@ -64,6 +68,7 @@ def cockpit_of(wire: Wire, robot: Robot, settings: Settings | None = None, stamp
     pilot = Pilot(settings or Settings(mode=LATCH, repeat_rate=0), TTK)
     cockpit = Cockpit(wire.bus("teleop"), ["Fred"], pilot, stamped)
     wait_for(cockpit.listeners)
+    wait_for(robot.is_heard)
     return cockpit
 
 
