@@ -105,6 +105,7 @@ def test_a_script_that_somebody_stopped_breaks_off(wire: Wire, cockpit: Cockpit,
     """The robot obeys nobody then, and stands."""
     status = wire.bus("sim").publisher("cmd_vel_status", CommandStatus)
     wait_for(lambda: status.matched)
+    wait_for(lambda: status.matched)
     status.put(CommandStatus(sources=[CommandSource(cockpit.bus.source, "INTERACTIVE_HIGH", 20.0, False, True)]))
     wait_for(lambda: cockpit.helm.status().sources)
     told = script.run(parse("60s i"), cockpit, threading.Event())
