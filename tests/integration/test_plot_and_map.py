@@ -65,7 +65,7 @@ def test_every_wire_is_drawn(wire: Wire) -> None:
 
 
 def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
-    for verb, words, text in (("plot", (FIELD,), FIELD), ("map", (), "robot x")):
+    for verb, words, text in (("plot", (FIELD,), f"{FIELD}: "), ("map", (), "robot x")):
         terminal = town.terminal(verb, *words)
         terminal.wait_for_text(text)
         terminal.type("\x03")
