@@ -26,7 +26,8 @@ def meanwhile(work: Callable[[], T]) -> Callable[[], T]:
         done.set()
 
     def result() -> T:
-        done.wait()
+        while not done.wait(0.1):  # a signal in the instant before a wait interrupts nothing
+            pass
         if errors:
             raise errors[0]
         return results[0]
