@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
-from holozen.connection import Connection
+from holozen.transport.connection import Connection
 
 PATIENCE = 10.0  # s for the other process to come up
 

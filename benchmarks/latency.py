@@ -13,9 +13,7 @@ import zenoh
 
 from benchmarks.company import beside, guest, host, meeting_point, until
 from benchmarks.report import Case, parser, publish
-from holozen import codec
 from holozen.bus import Bus
-from holozen.connection import Connection
 from holozen.messages import (
     Header,
     Odometry,
@@ -27,7 +25,9 @@ from holozen.messages import (
     Twist,
     TwistStamped,
     TwistWithCovariance,
+    codec,
 )
+from holozen.transport.connection import Connection
 from holozen.wire import MAX_COMMAND_BYTES
 
 AIM = "ratio <= 1.2 (ours / raw zenoh)"

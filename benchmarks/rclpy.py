@@ -67,8 +67,9 @@ class Ear:
 
 def listen_as_node(endpoint: str, count: int) -> Told:
     """A node that spins."""
-    from holozen.ros import context, rclpy
+    from holozen.ros import rclpy
     from holozen.ros.generated import find
+    from holozen.ros.rclpy import context
 
     context.connection = guest(endpoint)
     rclpy.init(args=[])

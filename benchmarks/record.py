@@ -17,10 +17,9 @@ from typing import Any
 from benchmarks.company import guest, host, meeting_point, until
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
-from holozen import codec
 from holozen.bag.reader import Bag
 from holozen.bus import Bus
-from holozen.messages import Odometry, Time
+from holozen.messages import Odometry, Time, codec
 
 AIM = "every message that was received is in the file; what is missing is counted"
 TOPICS, RATE = 50, 100.0  # Hz

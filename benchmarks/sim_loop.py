@@ -20,21 +20,22 @@ from benchmarks.report import Case, parser, publish
 from holozen import data
 from holozen.bus import Bus
 from holozen.messages import Twist
-from holozen.publisher import Publisher
-from holozen.robot.model import load
+from holozen.robot.loading import load
 from holozen.robot.rigid import lump
+from holozen.robot.sdf_world import load_world
 from holozen.robot.xacro import expand
-from services.sim import intake, worldfile
-from services.sim.engine import bullet
+from holozen.transport.pubsub import Publisher
+from services.sim.command import inputs
 from services.sim.entities import Entities
 from services.sim.loop import Loop
+from services.sim.physics.engine import bullet
+from services.sim.physics.world import World
+from services.sim.robot import Robot
 from services.sim.spawn import spawn_all
-from services.sim.vehicle import Vehicle
-from services.sim.world import World
 
 AIM = "ratio <= 1.11 (ours / bare engine), which is 0.9 of its speed"
 ROBOT = data.find("urdf", "hb_bot.urdf.xacro")
-WORLD = worldfile.load(data.find("worlds", "gazebo.world"))
+WORLD = load_world(data.find("worlds", "gazebo.world"))
 COMMAND = Twist.planar(0.3, 0.1, 0.4)
 RATE = 20.0  # Hz of real time, of the commands
 REST = -0.04  # m; the height of the root frame when the robot stands on its wheels
@@ -45,10 +46,10 @@ Stepper = Callable[[int], None]
 """Makes so many steps."""
 
 PARTS = {
-    "hear: commands and calls": (Loop, "_hear"),
-    "move: read the body, set its velocity": (Vehicle, "move"),
+    "read: commands and requests": (Loop, "_read_inputs"),
+    "move: read the body, set its velocity": (Robot, "move"),
     "step: the engine": (World, "step"),
-    "tell: odom, tf, joint_states": (Vehicle, "tell"),
+    "publish: odom, tf, joint_states": (Robot, "publish"),
     "of which encode and send, with the clock": (Publisher, "put"),
 }
 
@@ -65,7 +66,9 @@ def drive(endpoint: str) -> None:
 def our_loop(bus: Bus) -> Stepper:
     """Our world with hb_bot on its keys, as `holozen sim --rtf 0` runs it."""
     world = World(WORLD)
-    flags = Namespace(robot=None, package=[], drive="", max_linear=intake.MAX_LINEAR, max_angular=intake.MAX_ANGULAR)
+    flags = Namespace(
+        robot=None, package=[], allow_env=[], drive="", max_linear=inputs.MAX_LINEAR, max_angular=inputs.MAX_ANGULAR
+    )
     entities = Entities(bus, world, (flags.max_linear, flags.max_angular))
     spawn_all(entities, flags)
     loop = Loop(bus, world, entities, rtf=0)

@@ -1,4 +1,4 @@
-"""Where the files that travel with the code are: beside this package in the source tree, inside it when installed."""
+"""The location of data files: beside this package in the source tree, inside it when installed."""
 
 from pathlib import Path
 

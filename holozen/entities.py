@@ -1,20 +1,20 @@
-"""What a client asks of the sim: which robots and objects there are, where they are, and to spawn and delete them."""
+"""The client side of the sim's entity services: list, locate, spawn and delete robots and objects."""
 
 from typing import TypeVar
 
-from holozen import simulation_interfaces as si
 from holozen.bus import Bus
-from holozen.errors import NoReply, ServiceError
-from holozen.messages import Message, Pose
+from holozen.messages import Message, Pose, PoseStamped
+from holozen.messages import simulation_interfaces as si
+from holozen.transport.errors import NoReply, ServiceError
 
-NOTICE = 3.0  # s for a sim to say that it is there
-PATIENCE = 30.0  # s for all it has to do
+NOTICE = 3.0  # s for a sim to answer
+PATIENCE = 30.0  # s for a request to complete
 
 R = TypeVar("R", si.SpawnEntityReply, si.DeleteEntityReply, si.GetEntityStateReply, si.GetEntitiesReply)
 
 
 def names(bus: Bus, notice: float = 0.0) -> list[str]:
-    """The names of all entities, sorted. Raises ServiceError, also when no sim is there within `notice` seconds (3)."""
+    """The names of all entities, sorted. Raises ServiceError, also if no sim answers within `notice` seconds (3)."""
     notice = notice or NOTICE
     try:
         return sorted(_ask(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice).entities)
@@ -23,34 +23,36 @@ def names(bus: Bus, notice: float = 0.0) -> list[str]:
 
 
 def pose(bus: Bus, name: str) -> Pose:
-    """Where an entity is in the world. Raises ServiceError."""
+    """The pose of an entity in the world. Raises ServiceError."""
     return _ask(bus, "get_entity_state", si.GetEntityStateRequest(name), si.GetEntityStateReply, PATIENCE).state.pose
 
 
 def delete(bus: Bus, name: str) -> None:
-    """Takes an entity out of the world. Raises ServiceError."""
+    """Delete an entity. Raises ServiceError."""
     _ask(bus, "delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, PATIENCE)
 
 
-def spawn(bus: Bus, name: str, text: str, at: Pose, namespace: str = "") -> str:
-    """Puts a robot or object, URDF or SDF text, into the world; returns its name there. Raises ServiceError.
+def spawn(bus: Bus, name: str, text: str, at: Pose, namespace: str = "") -> tuple[str, list[str]]:
+    """Spawn a robot or object from URDF or SDF text. Returns its name in the world, and the sim's warnings about the
+    text. Raises ServiceError.
 
-    Its keys are below `namespace`: by default its name, the root for a slash.
+    Its keys are below `namespace`: by default its name; a slash means the root.
     """
-    place = si.PoseStamped(pose=at)
+    place = PoseStamped(pose=at)
     request = si.SpawnEntityRequest(name, resource_string=text, entity_namespace=namespace, initial_pose=place)
-    return _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE).entity_name or name
+    reply = _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE)
+    return reply.entity_name or name, reply.result.error_message.splitlines()
 
 
 def is_taken(error: ServiceError) -> bool:
-    """Whether a spawn failed for its name alone."""
+    """Whether a spawn failed only because its name is taken."""
     result = error.fields.get("result")
-    return isinstance(result, dict) and result.get("result") == si.NAME_NOT_UNIQUE
+    return isinstance(result, dict) and result.get("result") == si.SpawnEntityReply.NAME_NOT_UNIQUE
 
 
 def _ask(bus: Bus, key: str, request: Message, reply: type[R], timeout: float) -> R:
     answer = bus.call(key, request, reply, timeout)
     result: si.Result = answer.result
-    if result.result != si.OK:  # ours answers with an error reply then; others keep to the letter of the interface
+    if result.result != si.Result.OK:  # our sim sends an error reply instead; others may not
         raise ServiceError(result.error_message or f"{key} failed with result {result.result}")
     return answer

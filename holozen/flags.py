@@ -1,31 +1,79 @@
-"""Flags: checked values, and the parser, which is loaded when it is asked for."""
+"""Command-line arguments: the parser, which reports a mistake in one line, and checked values."""
 
 from __future__ import annotations
 
+import argparse
+import os
+import sys
 from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, NoReturn
 
-TYPE_CHECKING = False  # importing `typing` takes 3 ms
+from holozen.console import report
+
 if TYPE_CHECKING:
     from pathlib import Path
-    from typing import Any
 
-    from holozen.parser import Formatter as Formatter
-    from holozen.parser import Parser as Parser
+WIDTH = 100  # characters of a line of help where there is no terminal
 
 
-def __getattr__(name: str) -> Any:
-    if name not in ("Formatter", "Parser"):
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from holozen import parser
+class Formatter(argparse.HelpFormatter):
+    """Help as wide as the terminal. argparse itself would load shutil for that, which takes 3 ms."""
 
-    return getattr(parser, name)
+    def __init__(self, prog: str) -> None:
+        try:
+            width = os.get_terminal_size().columns
+        except OSError:
+            width = WIDTH
+        super().__init__(prog, width=max(40, min(width, 120)), max_help_position=30)
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that reports a mistake in one line and suggests the closest valid word."""
+
+    def __init__(self, **options: Any) -> None:
+        self._words: list[str] = []  # the arguments
+        super().__init__(**{"formatter_class": Formatter, **options})
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse; all its other parse methods call this one."""
+        self._words = list(sys.argv[1:] if args is None else args)
+        return super().parse_known_args(args, namespace)
+
+    def error(self, message: str) -> NoReturn:
+        """Report the mistake, and exit with code 2."""
+        verbs = [action.choices for action in self._actions if isinstance(action, argparse._SubParsersAction)]
+        for choices in verbs:
+            if self._words and self._words[0] in choices:
+                choices[self._words[0]].error(message)  # the flags belong to this verb
+        before, _, left = message.partition("unrecognized arguments: ")
+        if left and not before:
+            message = f"unexpected argument {left!r}"
+        if not verbs and (flag := self._unknown_flag(message, [] if before else left.split())):
+            message = f"no flag {flag!r}{nearest(flag, self._option_string_actions)}"
+        report(f"{self.prog}: {message}; see `{self.prog} --help`")
+        raise SystemExit(2)
+
+    def _unknown_flag(self, message: str, left: list[str]) -> str:
+        """The unknown flag: the first one `left`, or one whose value `message` complains about, or one in place of a
+        required argument.
+        """
+        place = "are required: " in message
+        for word, value in [(word, word) for word in left] or zip(self._words, [*self._words[1:], ""], strict=False):
+            flag = word.partition("=")[0]
+            unknown = flag[:1] == "-" and not any(name.startswith(flag) for name in self._option_string_actions)
+            if unknown and (left or place or repr(value) in message):
+                return flag
+        return ""
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            words = [str(choice) for choice in action.choices]
+            raise argparse.ArgumentError(action, f"{value!r}{nearest(value, words)}; there are {', '.join(words)}")
 
 
 def refused(text: str) -> Exception:
-    """The error of a parser for a value, with what is wrong."""
-    from argparse import ArgumentTypeError
-
-    return ArgumentTypeError(text)
+    """The error of a value's parser."""
+    return argparse.ArgumentTypeError(text)
 
 
 def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
@@ -55,11 +103,11 @@ def count(low: int = 0) -> Callable[[str], int]:
 
 
 def nearest(word: str, words: Iterable[str]) -> str:
-    """`; did you mean ...?` with the closest of `words`; empty if none is close. For the end of a line that refuses."""
+    """`; did you mean ...?` with the closest of `words`; empty if none is close. For the end of an error message."""
     from difflib import SequenceMatcher
 
     def likeness(other: str) -> float:
-        """How alike they are; a word that was not written to its end is nearly as good."""
+        """Similarity from 0 to 1; the start of a word scores nearly as high."""
         whole, start = (SequenceMatcher(None, word, text).ratio() for text in (other, other[: len(word)]))
         return max(whole, 0.95 * start)
 
@@ -68,13 +116,13 @@ def nearest(word: str, words: Iterable[str]) -> str:
 
 
 def key(text: str) -> str:
-    """A parser for a key; ROS's leading slash is taken off, which no Zenoh key has."""
+    """Parses a key; removes ROS's leading slash, which Zenoh keys do not have."""
     return text.removeprefix("/")
 
 
 def robot(text: str) -> str:
-    """A parser for a robot's name; an empty one is the robot at the root."""
-    from holozen.wire import robot_name
+    """Parses a robot's name; an empty one is the robot at the root of the keys."""
+    from holozen.wire import robot_name  # loads the codec
 
     try:
         return robot_name(text) if text else ""
@@ -83,7 +131,7 @@ def robot(text: str) -> str:
 
 
 def package(text: str) -> tuple[str, Path]:
-    """A parser for NAME=DIR, a package and its folder."""
+    """Parses NAME=DIR, a package and its folder."""
     from pathlib import Path
 
     name, equals, folder = text.partition("=")
@@ -92,8 +140,15 @@ def package(text: str) -> tuple[str, Path]:
     return name, Path(folder).expanduser()
 
 
+def variable(text: str) -> str:
+    """Parses the name of an environment variable."""
+    if not text or "=" in text:
+        raise refused(f"{text!r}: write the name of an environment variable, such as HOME")
+    return text
+
+
 def robot_file(text: str) -> tuple[Path, str]:
-    """A parser for FILE or FILE=NAME, a robot's file and its name."""
+    """Parses FILE or FILE=NAME, a robot's file and its name."""
     from pathlib import Path
 
     path, equals, name = text.rpartition("=")

@@ -9,7 +9,7 @@ STOP: Planar = (0.0, 0.0, 0.0)
 
 
 def clamp(value: float, limit: float) -> float:
-    """`value`, brought within [-limit, limit]."""
+    """`value` limited to [-limit, limit]."""
     return max(-limit, min(limit, value))
 
 
@@ -22,12 +22,12 @@ def clamp_speed(velocity: Planar, linear: float, angular: float) -> Planar:
 
 
 def ramp(now: Planar, wanted: Planar, linear: float, angular: float, dt: float) -> Planar:
-    """The velocity `dt` seconds on from `now` towards `wanted`, at most `linear` m/s^2 and `angular` rad/s^2."""
+    """The velocity `dt` seconds after `now` on the way to `wanted`, at most `linear` m/s^2 and `angular` rad/s^2."""
     dx, dy, dturn = (w - n for w, n in zip(wanted, now, strict=True))
     dx, dy, dturn = clamp_speed((dx, dy, dturn), linear * dt, angular * dt)
     return now[0] + dx, now[1] + dy, now[2] + dturn
 
 
 def wrap(angle: float) -> float:
-    """`angle` in radians, brought into [-pi, pi]."""
+    """`angle` in radians, wrapped to [-pi, pi]."""
     return math.remainder(angle, math.tau)

@@ -1,4 +1,4 @@
-"""What processes share: how they are told to end, and how they do."""
+"""Signals that end a process, and its exit."""
 
 import _thread
 import atexit
@@ -7,8 +7,10 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from types import FrameType
+
+from holozen.console import drain, give_up_readers
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -16,7 +18,7 @@ if TYPE_CHECKING:
 
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
-LOOK = 0.5  # s
+POLL = 0.5  # s
 INTERRUPTED = 130
 
 
@@ -25,7 +27,8 @@ def stop_event() -> threading.Event:
     stop = threading.Event()
 
     def end(_number: int, _frame: FrameType | None) -> None:
-        # Not from here: the thread that was interrupted may be in `wait` and hold the event's own lock.
+        give_up_readers()
+        # Not set from here: the interrupted thread may be in `wait` and hold the event's lock.
         _thread.start_new_thread(stop.set, ())
 
     for number in SIGNALS:
@@ -34,25 +37,67 @@ def stop_event() -> threading.Event:
 
 
 def wait_for_end(stop: threading.Event) -> None:
-    """Wait until `stop` is set. Looks up now and then: a signal in the instant before a wait interrupts nothing."""
-    while not stop.wait(LOOK):
+    """Wait until `stop` is set. It polls, since a signal just before a wait does not interrupt it."""
+    while not stop.wait(POLL):
         pass
 
 
-def leave(code: int) -> "NoReturn":
-    """End this process now, as Python would: after the threads that are no daemons, with all that is due at its end.
-
-    In Python's own end a thread of Zenoh's that still runs may meet statics that are gone, and panics.
+@contextlib.contextmanager
+def deferred_interrupt() -> Iterator[None]:
+    """Delay the KeyboardInterrupt of a Ctrl-C to the end of the block. For importing messages: during the import of
+    msgspec it would be lost, or crash the process.
     """
+    caught: list[int] = []
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+    signal.signal(signal.SIGINT, lambda number, _frame: caught.append(number))
     try:
-        threading._shutdown()  # type: ignore[attr-defined]  # it waits for them, and ends those of thread pools
-    except KeyboardInterrupt:
-        code = code or INTERRUPTED
-    atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError, AttributeError):  # it is gone, closed or was never there
-            stream.flush()
-    os._exit(code)
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if caught:
+        raise KeyboardInterrupt
+
+
+class Ending:
+    """Ends a process that has opened Zenoh sessions: as Python does, without the final finalization.
+
+    Zenoh's own threads run on after its sessions are closed. One that enters Python while the interpreter is being
+    finalized aborts the process, and one that uses statics that the C library has destroyed by then panics
+    (eclipse-zenoh/zenoh#1904). So the last callback of atexit ends the process. Callbacks run in the
+    reverse order of their registration: make the Ending before anything else registers one.
+    """
+
+    def __init__(self) -> None:
+        self._code = 1  # of an uncaught exception
+        self._before: Callable[[int, FrameType | None], object]
+        atexit.register(self._end)
+
+    def leave(self, code: "int | str | None") -> "NoReturn":
+        """Exit, once all non-daemon threads and the callbacks of atexit are done. Ctrl-C ends that wait."""
+        self._code = code if isinstance(code, int) else int(code is not None)
+        before = signal.getsignal(signal.SIGINT)
+        if callable(before):
+            self._before = before
+            signal.signal(signal.SIGINT, self._interrupt)
+        sys.exit(code)
+
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        self._code = self._code or INTERRUPTED
+        with contextlib.suppress(KeyboardInterrupt):
+            self._before(number, frame)
+        self._end()
+
+    def _end(self) -> None:
+        if "zenoh" not in sys.modules:
+            return
+        drain()
+        for stream in (sys.stdout, sys.stderr):
+            with contextlib.suppress(OSError, ValueError, AttributeError):  # it is gone, closed or never existed
+                stream.flush()
+        os._exit(self._code)
 
 
 def dies_with_parent() -> Callable[[], None]:

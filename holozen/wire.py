@@ -1,25 +1,26 @@
-"""The one table of what goes over the wire: key, type, who writes, who reads, rate, silence rule.
+"""The one table of the wire: key, type, writers, readers, rate, silence rule.
 
 README, tests, the command line and the services read it from here.
 """
 
 import re
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from holozen import messages as m
-from holozen import rcl_interfaces as r
-from holozen import simulation_interfaces as s
+from holozen.messages import rcl_interfaces as r
+from holozen.messages import simulation_interfaces as s
 
-COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stands
-MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded at all
+COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stops
+MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded
 MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a TwistStamped is refused
 
 PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
-"""Zenoh priority of each command source. Anyone else has DATA, as a plain `zenoh put`."""
+"""Zenoh priority of each command source. Others have DATA, as a plain `zenoh put`."""
 
 
 class Topic(NamedTuple):
-    """A key with a stream of messages. `rate` in Hz; `silence` in seconds: when readers call it stale."""
+    """A key with a stream of messages. `rate` in Hz; After `silence` seconds readers call it stale."""
 
     key: str
     types: tuple[type[m.Message], ...]
@@ -31,12 +32,17 @@ class Topic(NamedTuple):
 
     @property
     def type(self) -> type[m.Message]:
-        """The type that is written by default; the others are accepted too."""
+        """The default type; the others are accepted too."""
         return self.types[0]
+
+    @property
+    def is_command(self) -> bool:
+        """Whether it moves a robot."""
+        return "sim" in self.readers
 
 
 class Service(NamedTuple):
-    """A key that answers a request with one reply, or with an error that says why."""
+    """A key that answers a request with one reply, or with an error and its reason."""
 
     key: str
     request: type[m.Message]
@@ -61,38 +67,40 @@ TOPICS = (
 SERVICES = (
     Service("next_goal", m.NextGoalRequest, m.NextGoalReply, "pose_service", "the goal with a number, in odom"),
     Service("get_pose", m.GetPoseRequest, m.GetPoseReply, "pose_service", "a robot's last odom and its age"),
-    Service("stop", m.TriggerRequest, m.TriggerReply, "sim", "the robot stands, whatever it is told, until `release`"),
-    Service("release", m.TriggerRequest, m.TriggerReply, "sim", "ends a `stop`; by itself it moves nothing"),
-    Service("resume", m.TriggerRequest, m.TriggerReply, "sim", "lets the sources drive that a higher one overruled"),
-    Service("spawn_entity", s.SpawnEntityRequest, s.SpawnEntityReply, "sim", "puts a robot or object into the world"),
-    Service("delete_entity", s.DeleteEntityRequest, s.DeleteEntityReply, "sim", "takes it out again"),
-    Service("get_entities", s.GetEntitiesRequest, s.GetEntitiesReply, "sim", "the names of all there are"),
     Service(
-        "get_entity_state", s.GetEntityStateRequest, s.GetEntityStateReply, "sim", "where one is, and its velocity"
+        "stop", m.TriggerRequest, m.TriggerReply, "sim", "the robot stands, whatever is commanded, until `release`"
     ),
-    Service("set_entity_state", s.SetEntityStateRequest, s.SetEntityStateReply, "sim", "puts one elsewhere"),
+    Service("release", m.TriggerRequest, m.TriggerReply, "sim", "ends a `stop`; by itself it moves nothing"),
+    Service("resume", m.TriggerRequest, m.TriggerReply, "sim", "lets overruled sources drive again"),
+    Service("spawn_entity", s.SpawnEntityRequest, s.SpawnEntityReply, "sim", "adds a robot or object to the world"),
+    Service("delete_entity", s.DeleteEntityRequest, s.DeleteEntityReply, "sim", "removes an entity"),
+    Service("get_entities", s.GetEntitiesRequest, s.GetEntitiesReply, "sim", "the names of all entities"),
+    Service("get_entity_state", s.GetEntityStateRequest, s.GetEntityStateReply, "sim", "an entity's pose and velocity"),
+    Service("set_entity_state", s.SetEntityStateRequest, s.SetEntityStateReply, "sim", "moves an entity"),
 )
 
 OF_NODES = (
     Service("list_parameters", r.ListParametersRequest, r.ListParametersReply, "", "names of a node's parameters"),
     Service("get_parameters", r.GetParametersRequest, r.GetParametersReply, "", "their values"),
     Service("set_parameters", r.SetParametersRequest, r.SetParametersReply, "", "sets all of them, or none"),
-    Service("describe_parameters", r.DescribeParametersRequest, r.DescribeParametersReply, "", "what they take"),
+    Service(
+        "describe_parameters", r.DescribeParametersRequest, r.DescribeParametersReply, "", "their types and ranges"
+    ),
 )
-"""What every node with parameters serves, each below its name: `sim/get_parameters`."""
+"""The services of every node with parameters, below its name: `sim/get_parameters`."""
 
 
 def table() -> str:
     """The table as Markdown, for the README (`scripts/wire-table` puts it there)."""
     topics = [_topic_row(row) for row in TOPICS]
     services = [f"| `{row.key}` | {row.reply.ROS} | {row.server} | {row.does} |" for row in SERVICES]
-    heads = ("| key | type | who -> who | rate | silence rule |", "| service | type | server | what it does |")
+    heads = ("| key | type | writers -> readers | rate | silence rule |", "| service | type | server | what it does |")
     return "\n".join([heads[0], "|---|---|---|---|---|", *topics, "", heads[1], "|---|---|---|---|", *services])
 
 
 def _topic_row(row: Topic) -> str:
     types = row.type.ROS + "".join(f" ({other.__name__} accepted)" for other in row.types[1:])
-    # A plain tool may write a command as well as read anything.
+    # Any plain Zenoh tool may write commands and read everything.
     writers = [*row.writers, "anyone"] if row.key in ("cmd_vel", "joint_command") else row.writers
     ends = f"{', '.join(writers)} -> {', '.join(row.readers) or 'anyone'}"
     return f"| `{row.key}` | {types} | {ends} | {row.rate:g} Hz | {row.rule} |"
@@ -102,7 +110,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 
 
 def robot_name(text: str) -> str:
-    """`text` if it may name a robot, else ValueError. Zenoh would take `*`, which drives every robot."""
+    """`text` if it may name a robot, else ValueError. Zenoh would accept `*`, which drives every robot."""
     if not _NAME.fullmatch(text):
         raise ValueError(f"robot name {text!r}: use a letter, then up to 63 letters, digits, '_' or '-' (such as Fred)")
     return text
@@ -117,6 +125,21 @@ def topic(key: str) -> Topic | None:
     """The table's row for a key, with or without a robot's name before it."""
     last = key.rpartition("/")[2]
     return next((row for row in TOPICS if row.key == last), None)
+
+
+def is_command(key: str, types: Iterable[type[m.Message]]) -> bool:
+    """Whether messages of `types` on `key` move a robot. On a key that is not in the table the type decides.
+
+    Commands are sent at once, and refused if they have an unknown field: a typo would leave the robot standing.
+    Telemetry is batched, and unknown fields are ignored: a newer sim may send more than an older reader knows.
+    """
+    row = topic(key)
+    return row.is_command if row else any(kind.ROS in _COMMAND_TYPES for kind in types)
+
+
+_COMMAND_TYPES = {kind.ROS for row in TOPICS if row.is_command for kind in row.types} - {
+    kind.ROS for row in TOPICS if not row.is_command for kind in row.types
+}
 
 
 def service(key: str) -> Service | None:

@@ -2,21 +2,21 @@
 
     zenoh subscribe -k odom --decoder holozen
 
-zenoh-cli tells a decoder the key and the payload, but not the Encoding, so the payload's first byte decides. CDR does
-not say its type: that is known for the keys of `holozen.wire`.
+zenoh-cli passes the key and the payload to a decoder, but not the Encoding, so the first byte of the payload decides.
+CDR does not contain its type, which is known for the keys of `holozen.wire`.
 """
 
 import json
 from typing import Any
 
-LONGEST = 12  # numbers of a list that are shown
-START = 32  # bytes shown of what cannot be read
-DEEPEST = 20
+MAX_ITEMS = 12  # of a list that are shown
+START = 32  # bytes of an unreadable payload that are shown
+MAX_DEPTH = 20
 
 
 def decode(key: object, payload: bytes) -> str:
-    """One line that says what is in `payload`. Never fails: zenoh-cli would print a traceback."""
-    from holozen.tell import printable
+    """The content of `payload` on one line. Never fails: zenoh-cli would print a traceback."""
+    from holozen.console import printable
 
     try:
         return printable(_line(_value(str(key), payload)))
@@ -26,7 +26,7 @@ def decode(key: object, payload: bytes) -> str:
 
 
 def _value(key: str, payload: bytes) -> Any:
-    """The plain value. Raises ValueError if it has none."""
+    """The content as plain values. Raises ValueError."""
     if payload[:1] == b"\0":
         return _cdr(key, payload)
     try:
@@ -42,7 +42,8 @@ def _value(key: str, payload: bytes) -> Any:
 def _cdr(key: str, payload: bytes) -> Any:
     import msgspec
 
-    from holozen import codec, wire
+    from holozen import wire
+    from holozen.messages import codec
 
     topic, service = wire.topic(key), wire.service(key)
     types = topic.types if topic else (service.reply,) if service else ()
@@ -55,8 +56,8 @@ def _msgpack(payload: bytes) -> Any:
     import msgspec
 
     value = msgspec.msgpack.decode(payload)
-    if not isinstance(value, dict | list):  # nearly any byte is some number in msgpack
-        raise ValueError("no message")
+    if not isinstance(value, dict | list):  # nearly any byte is a number in msgpack
+        raise ValueError("not a message")
     return value
 
 
@@ -65,8 +66,8 @@ def _line(value: Any) -> str:
 
 
 def _parts(value: Any, name: str, depth: int = 0) -> list[str]:
-    """`name=value` of all fields, with those of ROS that belong together in one."""
-    if depth > DEEPEST:
+    """`name=value` of all fields; ROS times and vectors are one value each."""
+    if depth > MAX_DEPTH:
         raise RecursionError
     if isinstance(value, dict) and set(value) == {"sec", "nanosec"}:
         return [f"{name}={value['sec']}.{value['nanosec']:09d}"]
@@ -76,21 +77,21 @@ def _parts(value: Any, name: str, depth: int = 0) -> list[str]:
         rows = [_parts(inner, f"{name}.{field}" if name else str(field), depth + 1) for field, inner in value.items()]
         return [part for row in rows for part in row]
     if isinstance(value, list) and any(isinstance(inner, dict | list) for inner in value):
-        rows = [_parts(inner, f"{name}[{index}]", depth + 1) for index, inner in enumerate(value[:LONGEST])]
+        rows = [_parts(inner, f"{name}[{index}]", depth + 1) for index, inner in enumerate(value[:MAX_ITEMS])]
         return [part for row in rows for part in row] + _rest(name, value)
     return [f"{name}={_scalar(value)}"]
 
 
 def _rest(name: str, values: list[Any]) -> list[str]:
-    return [f"{name}[...{len(values) - LONGEST} more]"] if len(values) > LONGEST else []
+    return [f"{name}[...{len(values) - MAX_ITEMS} more]"] if len(values) > MAX_ITEMS else []
 
 
 def _scalar(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list):
-        shown = ", ".join(map(_scalar, value[:LONGEST]))
-        return f"[{shown}]" if len(value) <= LONGEST else f"[{len(value)} values: {shown}, ...]"
+        shown = ", ".join(map(_scalar, value[:MAX_ITEMS]))
+        return f"[{shown}]" if len(value) <= MAX_ITEMS else f"[{len(value)} values: {shown}, ...]"
     if isinstance(value, str):
         return value or '""'
     return str(value) if not isinstance(value, dict) else "{}"

@@ -3,15 +3,22 @@
     @pytest.mark.needs("ip", "unshare")
 
 In CI (CI=true) every skip is a failure: a test that did not run has shown nothing.
+
+What is tried often, to be sure, is tried more often by `scripts/test --long`, which sets HOLOZEN_LONG=1:
+
+    def test_it_stops(trials):
+        for _ in range(trials(3, 20)):
 """
 
+import atexit
 import fcntl
 import os
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +30,8 @@ PACKAGES = {
     "Xvfb": "xvfb",
     "ip": "iproute2",
     "kitty": "kitty",
+    "nft": "nftables",
+    "nsenter": "util-linux",
     "screen": "screen",
     "setpriv": "util-linux",
     "setxkbmap": "x11-xkb-utils",
@@ -34,6 +43,8 @@ PACKAGES = {
 """Debian's package of each command that a test may need."""
 
 IN_CI = os.environ.get("CI") == "true"
+ALONE = tuple(Path(__file__).parent / folder for folder in ("docker", "faults", "terminals"))
+LONG = os.environ.get("HOLOZEN_LONG") == "1"
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -41,7 +52,35 @@ def pytest_configure(config: pytest.Config) -> None:
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)
+    config.addinivalue_line("markers", "alone: measures time, so scripts/test runs it beside no other test")
     config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
+
+
+class Exit:
+    """The exit code of this run, with which the last callback of atexit ends the process. A thread of Zenoh that comes
+    back to Python while the interpreter is being finalized would abort it (see holozen.process.Ending).
+    """
+
+    code = 1
+
+    @classmethod
+    def leave(cls) -> None:
+        for stream in (sys.stdout, sys.stderr):
+            stream.flush()
+        os._exit(cls.code)
+
+
+atexit.register(Exit.leave)
+
+
+def pytest_sessionfinish(exitstatus: int) -> None:
+    Exit.code = int(exitstatus)
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.parent in ALONE:
+            item.add_marker("alone")
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -50,6 +89,12 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, Non
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+@pytest.fixture(scope="session")
+def trials() -> Callable[[int, int], int]:
+    """`trials(short, long)`: how often to try; `long` in a run of `scripts/test --long`."""
+    return lambda short, long: long if LONG else short
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -1,4 +1,8 @@
-"""Bags: MCAP files of what came on the keys, written, read, summed up and played again."""
+"""Bags: MCAP files of messages, recorded from keys, inspected, drawn and played back."""
 
 ENCODING = "zenoh_encoding"
-"""The name of the channel's metadata that holds the Zenoh Encoding."""
+"""The key in a channel's metadata that holds the Zenoh Encoding."""
+
+
+class BagError(Exception):
+    """A file that cannot be read, or cannot be written any further. The text is one line with the reason."""

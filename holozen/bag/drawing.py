@@ -1,21 +1,97 @@
-"""A picture of a bag: the robots' paths, and their velocities beside what was commanded."""
+"""Draws a bag: the paths of the robots, and their velocities next to those commanded."""
 
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from holozen.bag.errors import BagError
-from holozen.bag.reader import Bag
-from holozen.bag.tracks import Track, Tracks, tracks
+from holozen import wire
+from holozen.bag import BagError
+from holozen.bag.reader import Bag, Message
+from holozen.messages import Odometry, Twist, TwistStamped, codec
 
 FORMATS = (".png", ".svg")
 SIZE = (12.0, 6.0)  # inches
 PANELS = ((3, "forward in m/s"), (4, "left in m/s"), (5, "turn in rad/s"))  # column of a track, title
+FARTHEST = 1e9  # m, m/s; larger values are not drawn
+MOST = 20_000  # rows of a track; when it has more, every other row is dropped
+TWISTS = (Twist, TwistStamped)
+
+
+@dataclass
+class Track:
+    """The messages of one key.
+
+    `rows`: time in s since the start of the bag, x and y in m, forward and left in m/s, turn in rad/s. For commands x
+    and y are 0.
+    """
+
+    key: str
+    rows: list[tuple[float, ...]] = field(default_factory=list)
+    count: int = 0
+    _stride: int = 1
+
+    def add(self, row: tuple[float, ...]) -> None:
+        """Add a message."""
+        if self.count % self._stride == 0:
+            self.rows.append(row)
+        self.count += 1
+        if len(self.rows) >= MOST:
+            self.rows, self._stride = self.rows[::2], 2 * self._stride
+
+    def column(self, number: int) -> list[float]:
+        """The numbers of one column."""
+        return [row[number] for row in self.rows]
+
+
+@dataclass
+class Tracks:
+    """The tracks of a bag, by key."""
+
+    odometry: dict[str, Track] = field(default_factory=dict)
+    commands: dict[str, Track] = field(default_factory=dict)
+    bad: int = 0  # messages on such keys that cannot be read or are out of range
+
+    def add(self, rows: dict[str, Track], key: str, row: tuple[float, ...]) -> None:
+        """Add a row of a key."""
+        if all(abs(value) < FARTHEST for value in row[1:]):  # false for NaN
+            rows.setdefault(key, Track(key)).add(row)
+        else:
+            self.bad += 1
+
+
+def tracks(messages: Iterable[Message]) -> Tracks:
+    """Collect the odometry and the commands of a bag."""
+    made, start = Tracks(), None
+    for message in messages:
+        start = message.at if start is None else start
+        _see(made, message, (message.at - start) / 1e9)
+    return made
+
+
+def _see(made: Tracks, message: Message, time: float) -> None:
+    key, kind = message.channel.key, message.channel.type
+    row = wire.topic(key)
+    name = kind or (row.type.ROS if row else "")
+    try:
+        if name == Odometry.ROS:
+            odom = codec.decode(message.payload, message.channel.encoding, (Odometry,), tolerant=True)
+            at, moves = odom.pose.pose.position, odom.twist.twist
+            numbers = (time, at.x, at.y, moves.linear.x, moves.linear.y, moves.angular.z)
+            made.add(made.odometry, key, numbers)
+        elif name in (Twist.ROS, TwistStamped.ROS):
+            command: Any = codec.decode(message.payload, message.channel.encoding, TWISTS)
+            twist = command.twist if isinstance(command, TwistStamped) else command
+            numbers = (time, 0.0, 0.0, twist.linear.x, twist.linear.y, twist.angular.z)
+            made.add(made.commands, key, numbers)
+    except codec.CodecError:
+        made.bad += 1
 
 
 def draw(source: Path, target: Path, keys: list[str] | None = None) -> dict[str, int]:
-    """Draw the bag `source` into the picture `target`; the keys drawn, with their numbers of messages.
+    """Draw the bag `source` into the picture `target`. Returns the keys drawn, with their numbers of messages.
 
-    Raises BagError, also where there is nothing to draw.
+    Raises BagError, also if there is nothing to draw.
     """
     if target.suffix.lower() not in FORMATS:
         raise BagError(f"{target}: pictures end in {' or '.join(FORMATS)}")
@@ -24,7 +100,7 @@ def draw(source: Path, target: Path, keys: list[str] | None = None) -> dict[str,
     if missing := [key for key in keys or () if key not in found.odometry]:
         raise BagError(f"{source} has no odometry on {', '.join(missing)}; on: {', '.join(found.odometry) or 'none'}")
     if not found.odometry:
-        raise BagError(f"{source} has no odometry to draw; `holozen bag info` shows what it has")
+        raise BagError(f"{source} has no odometry to draw; `holozen bag info` lists its keys")
     if keys:
         found.odometry = {key: found.odometry[key] for key in keys}
     try:
@@ -61,6 +137,6 @@ def _figure(found: Tracks, title: str) -> Any:
 def _draw_path(panel: Any, track: Track, color: str) -> None:
     x, y = track.column(1), track.column(2)
     panel.plot(x, y, color=color, label=track.key)
-    panel.plot(x[:1], y[:1], "o", color=color)  # a dot where it began, a square where it ended
+    panel.plot(x[:1], y[:1], "o", color=color)  # a dot at the start, a square at the end
     panel.plot(x[-1:], y[-1:], "s", color=color)
     panel.grid(alpha=0.3)

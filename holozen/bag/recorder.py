@@ -1,22 +1,184 @@
-"""From an intake into a bag."""
+"""Recording: samples are received as fast as they arrive, and written when the disk is ready."""
 
 import contextlib
+import threading
+import time
+from collections import deque
+from typing import NamedTuple, Self
 
-from holozen.bag.forms import Form, as_cdr, form_of, types_of
-from holozen.bag.intake import Intake, Waiting
-from holozen.bag.simtime import KEY, SimTime
+from holozen.bag.formats import Format, as_cdr, format_of, types_of
 from holozen.bag.writer import CHANNELS, BagWriter
-from holozen.codec import CodecError
-from holozen.graph import Graph, on_key
 from holozen.messages import Clock, Message
+from holozen.messages.codec import CodecError
+from holozen.transport.graph import Graph, on_key
+from holozen.transport.pubsub import RawSubscriber, Sample
+
+DEPTH = 8192  # samples that a subscriber holds while its thread is not scheduled
+QUEUE = 256 << 20  # bytes that may wait for the writer: a slow disk must not exhaust the memory
+PUBLISHERS = 65_536  # most publishers whose sequence numbers are kept
+LARGEST = 128 << 20  # bytes of a sample; a bag with larger ones could not be read again
+BATCH = 1000  # samples
+OVERHEAD = 300  # bytes of memory of a queued sample besides its payload
+PATIENCE = 0.5  # s
+CLOCK = "clock"  # the key of the sim's time
+LONGEST_TICK = 100_000_000  # ns; between two ticks the sim's time advances by at most this, as the sim may be paused
+
+
+class SimTime:
+    """The sim's time at the arrival of a sample, also between two ticks. All times are arguments, in ns."""
+
+    def __init__(self) -> None:
+        self._tick = self._came = self._last = -1
+
+    def tick(self, shows: int, at: int) -> None:
+        """The sim's clock showed `shows` at `at` of our own."""
+        if shows < self._tick:  # the sim was reset
+            self._last = shows
+        self._tick, self._came = shows, at
+
+    def of(self, at: int) -> int | None:
+        """The sim's time at `at`; None before the first tick. It goes back only with a reset."""
+        if self._tick < 0:
+            return None
+        self._last = max(self._last, self._tick + min(at - self._came, LONGEST_TICK))
+        return self._last
+
+
+class Waiting(NamedTuple):
+    """A sample to write. `at`: when it arrived, in ns since 1970; `missed`: how many of its key were lost before it."""
+
+    at: int
+    key: str
+    payload: bytes
+    encoding: str
+    missed: int = 0
+
+
+class Intake:
+    """Samples of several subscribers, in the order of arrival. Those that do not fit are dropped and counted.
+
+    Use it in a `with` block inside that of the bus.
+    """
+
+    def __init__(self, room: int = QUEUE) -> None:
+        self.received = self.dropped = 0
+        self.lost = 0  # samples that never arrived, by their sequence numbers
+        self._numbers: dict[str, int] = {}  # the last one of each publisher
+        self._missed: dict[str, int] = {}  # samples of a key that were lost or dropped since the last one kept
+        self._room, self._held = room, 0
+        self._waiting: deque[Waiting] = deque()
+        self._lock = threading.Lock()
+        self._listeners: list[_Listener] = []
+        # The system's clock may be set while this runs; the times in a bag never go back.
+        self._epoch = time.time_ns() - time.monotonic_ns()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    @property
+    def overran(self) -> int:
+        """How often a subscriber was full, and may have lost samples unnoticed."""
+        return sum(listener.overran for listener in self._listeners)
+
+    def listen(self, subscriber: RawSubscriber) -> None:
+        """Take in the samples of `subscriber`, which holds `DEPTH` of them."""
+        self._listeners.append(_Listener(self, subscriber))
+
+    def take(self) -> list[Waiting]:
+        """The next samples to write, the oldest first; at most BATCH."""
+        with self._lock:
+            batch = [self._waiting.popleft() for _ in range(min(BATCH, len(self._waiting)))]
+            self._held -= sum(len(sample.payload) + OVERHEAD for sample in batch)
+        return batch
+
+    def drop(self, count: int) -> None:
+        """Count samples that were taken but could not be written."""
+        with self._lock:
+            self.dropped += count
+
+    def close(self) -> None:
+        """Stop listening. What arrived before can still be taken."""
+        for listener in self._listeners:
+            listener.close()
+
+    def add(self, key: str, payload: bytes, encoding: str, number: tuple[str, int] | None = None) -> None:
+        """Add a sample. `number`: its publisher and sequence number."""
+        size = len(payload) + OVERHEAD
+        with self._lock:
+            self.received += 1
+            missed = self._missed.pop(key, 0) + (self._lost_before(*number) if number else 0)
+            if self._held + size > self._room or size > LARGEST:
+                self.dropped += 1
+                if len(self._missed) < PUBLISHERS:
+                    self._missed[key] = missed + 1
+                return
+            self._held += size
+            at = self._epoch + time.monotonic_ns()
+            self._waiting.append(Waiting(at, key, payload, encoding, missed))
+
+    def _lost_before(self, publisher: str, number: int) -> int:
+        if len(self._numbers) >= PUBLISHERS:
+            self._numbers.clear()
+        lost = max(0, number - self._numbers.get(publisher, number - 1) - 1)
+        self._numbers[publisher] = number
+        self.lost += lost
+        return lost
+
+
+class _Listener:
+    """A thread that reads one subscriber."""
+
+    def __init__(self, intake: Intake, subscriber: RawSubscriber) -> None:
+        self.overran = 0
+        self._intake, self._subscriber = intake, subscriber
+        self._idle = self._closing = False
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Wait until the subscriber is empty, since closing it discards its samples, then close it."""
+        if self._closing:
+            return
+        deadline = time.monotonic() + PATIENCE
+        while not self._idle and self._thread.is_alive() and time.monotonic() < deadline:
+            time.sleep(0.0005)
+        self._closing = True
+        self._subscriber.close()
+        self._thread.join(PATIENCE)
+
+    def _listen(self) -> None:
+        in_a_row = 0
+        try:
+            while True:
+                waiting = self._subscriber.try_recv()
+                in_a_row = in_a_row + 1 if waiting else 1
+                if in_a_row == DEPTH:
+                    self.overran, in_a_row = self.overran + 1, 0
+                self._add(waiting or self._wait())
+        except Exception:  # raised by a closed subscriber; anything else is an error
+            if not self._closing:
+                raise
+
+    def _wait(self) -> Sample:
+        self._idle = True
+        sample = self._subscriber.recv()
+        self._idle = False
+        return sample
+
+    def _add(self, sample: Sample) -> None:
+        self._intake.add(sample.key, sample.payload, sample.encoding, sample.number)
 
 
 class Recorder:
-    """Writes what an intake took in. The types of keys are those of the table, or what their publishers say.
+    """Writes the samples of an intake.
 
-    With `ros`, messages of known types are written as ROS 2 does: in CDR, on topics with a leading slash. All others,
-    and all without `ros`, stay as they came. With `time`, times are those of the sim, and what comes before its first
-    tick is left out.
+    The types of keys are those of the wire table, or those that their publishers announce.
+    With `ros`, messages of known types are written as by ROS 2: in CDR, on topics with a leading slash. All others,
+    and all without `ros`, stay as they arrived. With `time`, times are those of the sim, and samples before its
+    first tick are left out.
     """
 
     def __init__(
@@ -24,34 +186,34 @@ class Recorder:
     ) -> None:
         self._intake, self._writer, self._graph, self._ros, self._time = intake, writer, graph, ros, time
         self._types: dict[str, tuple[type[Message], ...]] = {}
-        self.refused = 0  # samples of more keys than a bag has room for
+        self.refused = 0  # samples beyond the number of channels that a bag can have
         self.early = 0  # samples from before the sim's clock was known
 
     def write_some(self) -> bool:
-        """Write what waits, at most a batch; whether there was any. Raises BagError."""
+        """Write a batch of waiting samples; returns whether there were any. Raises BagError."""
         batch = self._intake.take()
         for number, sample in enumerate(batch):
-            if self._writer.full:  # what room there is now is for the end of the file
+            if self._writer.full:  # the space left is for the end of the file
                 self._intake.drop(len(batch) - number)
                 break
             self._write(sample)
         return bool(batch)
 
     def _write(self, sample: Waiting) -> None:
-        form, payload, message = self._formed(sample)
+        form, payload, message = self._formatted(sample)
         at: int | None = sample.at
         if self._time:
-            if isinstance(message, Clock) and sample.key == KEY:
+            if isinstance(message, Clock) and sample.key == CLOCK:
                 self._time.tick(message.clock.sec * 10**9 + message.clock.nanosec, sample.at)
             at = self._time.of(sample.at)
         if at is None:
             self.early += 1
             return
         topic = f"/{sample.key}" if self._ros else sample.key
-        self.refused += not self._writer.write(topic, form, payload, at, sample.number)
+        self.refused += not self._writer.write(topic, form, payload, at, sample.missed)
 
-    def _formed(self, sample: Waiting) -> tuple[Form, bytes, Message | None]:
-        form, message = form_of(sample.payload, sample.encoding, self._types_of(sample.key))
+    def _formatted(self, sample: Waiting) -> tuple[Format, bytes, Message | None]:
+        form, message = format_of(sample.payload, sample.encoding, self._types_of(sample.key))
         if self._ros and message is not None and form.encoding != "cdr":
             with contextlib.suppress(CodecError):
                 return *as_cdr(message), message
@@ -60,7 +222,7 @@ class Recorder:
     def _types_of(self, key: str) -> tuple[type[Message], ...]:
         if key not in self._types:
             if len(self._types) >= CHANNELS:
-                self._types.clear()  # somebody writes on ever new keys
+                self._types.clear()  # something publishes on ever new keys
             self._types[key] = types_of(key, lambda: self._named(key))
         return self._types[key]
 

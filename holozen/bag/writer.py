@@ -1,16 +1,18 @@
-"""Bags, written so that they can be read whatever happens to the writer."""
+"""Writes bags that stay readable even if the writer is killed or the disk fills up."""
 
 import contextlib
+import errno
+import os
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 from mcap.writer import CompressionType, Writer
 
-from holozen.bag import ENCODING
-from holozen.bag.errors import BagError
-from holozen.bag.file import SafeFile
-from holozen.bag.forms import Form
+from holozen.bag import ENCODING, BagError
+from holozen.bag.formats import Format
 
+RESERVE = 8 << 20  # bytes of the disk kept free for the end of a file; a chunk and the summary take less
 CHUNK = 1 << 20  # bytes, before compression
 CHANNELS = 65_535  # MCAP numbers them with two bytes
 
@@ -18,15 +20,14 @@ CHANNELS = 65_535  # MCAP numbers them with two bytes
 class BagWriter:
     """Writes the files of one recording: `NAME.mcap`, or `NAME_0.mcap`, `NAME_1.mcap`, ... each of about `limit` bytes.
 
-    Raises OSError when a file cannot be made, BagError when it cannot be written on; what was flushed before stays
-    readable.
+    Raises OSError if a file cannot be created, BagError if it cannot be continued; flushed data stays readable.
     """
 
     def __init__(self, name: str, limit: int = 0, profile: str = "") -> None:
         self._name, self._limit, self._profile = name.removesuffix(".mcap"), limit, profile
         self.files: list[Path] = []
         self.messages = 0
-        self._before = 0  # bytes of the files before
+        self._before = 0  # bytes of the previous files
         self._open()
 
     @property
@@ -36,19 +37,19 @@ class BagWriter:
 
     @property
     def full(self) -> str:
-        """Why the disk takes no more, once that is so: end then."""
+        """Why the disk accepts no more data, or empty. If set, close the writer."""
         return self._file.full
 
-    def write(self, topic: str, form: Form, payload: bytes, at: int, number: int = -1) -> bool:
-        """Add a message that came at `at`, in ns since 1970; False if the file has no room for one more channel.
+    def write(self, topic: str, form: Format, payload: bytes, at: int, missed: int = 0) -> bool:
+        """Add a message that arrived at `at`, in ns since 1970; False if the file cannot have another channel.
 
-        `number` is its publisher's count; without one it is counted here.
+        `missed` is the number of messages of this key lost since the previous one.
         """
         channel = self._channels.get((topic, form)) or self._add_channel(topic, form)
         if not channel:
             return False
-        count = self._counts[channel] = self._counts.get(channel, -1) + 1
-        sequence = (count if number < 0 else number) & 0xFFFFFFFF
+        number = self._numbers[channel] = self._numbers.get(channel, -1) + 1 + missed
+        sequence = number & 0xFFFFFFFF
         self._writer.add_message(channel, log_time=at, data=payload, publish_time=at, sequence=sequence)
         self.messages += 1
         if self._limit and self._file.size >= self._limit:
@@ -57,11 +58,11 @@ class BagWriter:
         return True
 
     def flush(self) -> None:
-        """Put what waits into the file: from then on it survives this process."""
+        """Write the open chunk to the file, where it survives this process."""
         self._writer.flush()  # type: ignore[no-untyped-call]
 
     def close(self) -> None:
-        """End the last file properly; a recording without messages leaves none."""
+        """Finish the last file; a recording without messages leaves no file."""
         if not self.messages:
             self._file.remove()
             self.files.clear()
@@ -69,7 +70,7 @@ class BagWriter:
             self._finish()
 
     def abandon(self) -> None:
-        """Close without the summary at the end, which did not fit. Readers find the messages without it."""
+        """Close without the summary at the end, which did not fit. Readers do not require it."""
         self._file.close()
 
     def _open_next(self) -> None:
@@ -84,9 +85,9 @@ class BagWriter:
         self._file = SafeFile(path)
         self.files.append(path)
         self._writer = Writer(self._file, chunk_size=CHUNK, compression=CompressionType.ZSTD)  # type: ignore[arg-type]
-        self._channels: dict[tuple[str, Form], int] = {}
+        self._channels: dict[tuple[str, Format], int] = {}
         self._schemas: dict[str, int] = {}
-        self._counts: dict[int, int] = {}
+        self._numbers: dict[int, int] = {}
         with self._or_close():
             self._writer.start(self._profile, "holozen")
 
@@ -105,7 +106,7 @@ class BagWriter:
             self._file.close()
             raise
 
-    def _add_channel(self, topic: str, form: Form) -> int:
+    def _add_channel(self, topic: str, form: Format) -> int:
         if len(self._channels) == CHANNELS:
             return 0
         schema = 0
@@ -118,3 +119,70 @@ class BagWriter:
         channel = self._writer.register_channel(topic, form.encoding, schema, metadata)
         self._channels[topic, form] = channel
         return channel
+
+
+class SafeFile:
+    """A new file. Writes are atomic, and disk space is reserved for its end.
+
+    Raises OSError if it cannot be created.
+    """
+
+    def __init__(self, path: Path, reserve: int = RESERVE) -> None:
+        self.path, self.size = path, 0  # bytes
+        self.full = ""  # why the disk accepts no more data, or empty
+        self._number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
+        # Unnamed, so that it disappears with the process.
+        self._spare = tempfile.TemporaryFile(dir=path.parent)  # noqa: SIM115
+        try:
+            os.posix_fallocate(self._spare.fileno(), 0, reserve)
+        except OSError as error:
+            if error.errno == errno.ENOSPC:
+                self.remove()
+                raise OSError(error.errno, f"fewer than {reserve >> 20} MB of the disk are free", str(path)) from None
+            # Otherwise file sizes are limited, and there is no reserve.
+
+    def write(self, data: bytes) -> None:
+        """Append `data`, on a full disk into the reserved space. Raises BagError if that is full too."""
+        try:
+            self._append(data)
+        except OSError as error:
+            if self.full:
+                raise self._undone(error) from None
+            self.full = error.strerror or str(error)
+            self._spare.close()
+            try:
+                self._append(data)
+            except OSError as again:
+                raise self._undone(again) from None
+        self.size += len(data)
+
+    def tell(self) -> int:
+        """The position of the next byte."""
+        return self.size
+
+    def flush(self) -> None:
+        """Nothing to do: writes are unbuffered, and survive a killed process."""
+
+    def close(self) -> None:
+        """Close it, and free the reserved space."""
+        self._spare.close()
+        number, self._number = self._number, -1
+        if number >= 0:
+            with contextlib.suppress(OSError):
+                os.close(number)
+
+    def remove(self) -> None:
+        """Close it and delete it."""
+        self.close()
+        self.path.unlink(missing_ok=True)
+
+    def _undone(self, error: OSError) -> BagError:
+        """Remove a partial write."""
+        os.ftruncate(self._number, self.size)
+        return BagError(error.strerror or str(error))
+
+    def _append(self, data: bytes) -> None:
+        view, at = memoryview(data), self.size
+        while view:
+            done = os.pwrite(self._number, view, at)
+            view, at = view[done:], at + done

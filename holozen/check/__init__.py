@@ -1,1 +1,1 @@
-"""What a teaching assistant would see in a robot file."""
+"""Mistakes in robot files, as a teaching assistant would find them."""

@@ -1,21 +1,306 @@
-"""A robot file -> everything that is wrong with it."""
+"""A robot file -> everything that is wrong with it: the table of rules, and the findings in order."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 
-from holozen.check.broken import mend
-from holozen.check.finding import Finding, Mistake, Place, Rule
-from holozen.check.loading import EXPANDED, read
-from holozen.check.rules import FATAL, LOAD, NOTE, RULES
-from holozen.check.subject import Subject, Wanted, split
+from holozen.check import (
+    requirements,
+    rules_inertia,
+    rules_joints,
+    rules_meshes,
+    rules_names,
+    rules_plugins,
+    rules_wheels,
+    rules_xml,
+)
+from holozen.check.engine import (
+    EXPANDED,
+    Finding,
+    Mistake,
+    Place,
+    Requirements,
+    Rule,
+    Subject,
+    is_library,
+    loader_mistakes,
+    read,
+    split,
+)
+from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
-from holozen.robot.tag import Tag
+from holozen.robot.gazebo_plugins import DRIVES, kind_of
+from holozen.robot.xacro import read_text
+
+# Fixes for a file that cannot be read.
+
+
+_CASES = (
+    (re.compile("[\u2018-\u201f]"), "replace the curly quotes with straight ones"),
+    (re.compile(r"&(?!#?\w+;)"), "write &amp; for &"),
+    (re.compile(r"<!--(?:(?!-->).)*--(?!>)"), "a comment must not contain -- before its end"),
+    (re.compile(r"""\s[\w:.-]+\s*=\s*(?!["'\s])"""), 'put the value in quotes: name="value"'),
+    (re.compile(r"""<[\w:.-]+(?:\s+[\w:.-]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s+([\w:.-]+)(?=\s+[\w:.-]+\s*=|\s*/?>)"""),
+     'the word {0} has no value: write {0}="...", or join it to its neighbour'),
+    (re.compile(r"""=\s*(?:"[^"]*|'[^']*)$"""), "close the quotes"),
+    (re.compile(r"""(?:"[^"]*"|'[^']*')[\w:.-]+\s*="""), "put a space between two attributes"),
+    (re.compile(r"<\s+\w|<\d"), "no space and no digit may follow <"),
+)  # fmt: skip
+
+
+def mend(place: Place, reason: str) -> str:
+    """How to fix a file that cannot be read; for broken XML by the reported line and the one before."""
+    if "is a world" in reason:
+        return "check takes a robot, or a single <model>"
+    if "broken XML" not in reason:
+        return "fix this, then the rest is checked"
+    if "mismatched" in reason or "no element found" in reason:
+        return "close each element, inner ones first: </name>, or /> at the end of its tag"
+    if "declaration not at start" in reason:
+        return "nothing, not even a space, may come before <?xml"
+    if "junk after" in reason:
+        return "a file has a single <robot> around everything; remove what follows its end"
+    lines = _lines(Path(place.file))
+    for line in lines[max(0, place.line - 2) : place.line][::-1]:
+        for pattern, advice in _CASES:
+            if match := pattern.search(line):
+                return advice.format(*match.groups())
+    return 'write each element as <name attribute="value"> and close it'
+
+
+def _lines(path: Path) -> list[str]:
+    try:
+        return read_text(path).splitlines()
+    except RobotError:
+        return []
+
+
+# The rules, in the order in which they are best fixed.
+
+
+def _errors(subject: Subject) -> Iterator[Mistake]:
+    yield from loader_mistakes(subject, "error")
+
+
+def _warnings(subject: Subject) -> Iterator[Mistake]:
+    yield from loader_mistakes(subject, "warning")
+
+
+def _nothing(_: Subject) -> Iterator[Mistake]:
+    return iter(())
+
+
+FATAL = Rule(
+    "file",
+    "error",
+    "a file that is not a robot: broken XML, xacro that cannot be expanded",
+    "nothing in it is usable",
+    _nothing,
+)
+LOAD = Rule(
+    "load",
+    "error",
+    "other mistakes that prevent loading",
+    "the robot cannot be spawned",
+    _errors,
+)
+NOTE = Rule(
+    "load-note",
+    "warning",
+    "other values that are replaced on loading",
+    "the robot differs from the file",
+    _warnings,
+)
+
+RULES = (
+    Rule("xml", "warning", "broken XML that Gazebo tolerates", "ROS and other parsers reject it", rules_xml.forgiven),
+    Rule("tag", "error", "a misspelt element", "it is silently ignored", rules_xml.misspelt_tags),
+    Rule("attribute", "error", "a misspelt attribute", "it is silently ignored", rules_xml.misspelt_attributes),
+    Rule("place", "error", "an element in a place where it is not read", "it is silently ignored", rules_xml.misplaced),
+    Rule("ignored", "warning", "an element that URDF does not have", "URDF parsers ignore it", rules_xml.ignored),
+    Rule(
+        "joint-type", "error", "a joint type that does not exist", "the robot cannot be loaded", rules_xml.joint_kinds
+    ),
+    Rule(
+        "twice",
+        "error",
+        "two links or two joints with one name",
+        "references to it are ambiguous",
+        rules_names.duplicates,
+    ),
+    Rule("no-link", "error", "a joint that names no link", "the joint connects nothing", rules_names.unknown_links),
+    Rule(
+        "gazebo-link",
+        "warning",
+        "a gazebo tag that names no link",
+        "its settings are lost, as in Gazebo",
+        rules_names.unknown_references,
+    ),
+    Rule("tree", "error", "links that are not one tree", "the robot falls apart", rules_names.unconnected),
+    Rule(
+        "colour",
+        "warning",
+        "a material without a colour, or with two",
+        "the colour is undefined",
+        rules_names.colours,
+    ),
+    Rule(
+        "unused-colour", "warning", "a material that nothing uses", "a name may be misspelt", rules_names.unused_colours
+    ),
+    Rule("macro-twice", "warning", "a macro that is defined twice", "the first one is lost", rules_names.macros_twice),
+    Rule(
+        "unused",
+        "warning",
+        "a property or macro that nothing uses",
+        "a name may be misspelt",
+        rules_names.unused_macros,
+    ),
+    Rule(
+        "limit", "error", "a revolute or prismatic joint without limit", "URDF parsers reject it", rules_joints.no_limit
+    ),
+    Rule("limit-range", "error", "a joint limit without range", "the joint cannot move", rules_joints.empty_limit),
+    Rule(
+        "limit-effort",
+        "warning",
+        "a limit without effort or velocity",
+        "motors have no strength",
+        rules_joints.no_effort,
+    ),
+    Rule("mimic", "error", "a joint that mimics nothing", "the joint does not move", rules_joints.mimics),
+    Rule("degrees", "warning", "an angle in degrees", "URDF and SDF use radians", rules_joints.degrees),
+    Rule("no-inertia", "error", "a body without mass", "Gazebo drops it, or it cannot move", rules_inertia.no_inertia),
+    Rule("mass", "error", "a negative or missing mass", "it is physically impossible", rules_inertia.bad_mass),
+    Rule("massless", "warning", "a mass or an inertia of zero", "Gazebo drops such a link", rules_inertia.no_mass),
+    Rule("heavy", "warning", "a mass impossible for its size", "motors and contacts fail", rules_inertia.absurd_mass),
+    Rule(
+        "inertia",
+        "error",
+        "a physically impossible inertia",
+        "the robot shakes or flies off",
+        rules_inertia.impossible_inertia,
+    ),
+    Rule(
+        "inertia-size",
+        "warning",
+        "an inertia 10 times larger or smaller than the shape's",
+        "it turns too hard or too easily",
+        rules_inertia.unlike_shape,
+    ),
+    Rule("floating", "warning", "a body without gravity", "nothing keeps it on the ground", rules_inertia.floating),
+    Rule(
+        "wheel-collision",
+        "error",
+        "a wheel without collision shape",
+        "it sinks into the floor",
+        rules_wheels.wheel_collisions,
+    ),
+    Rule(
+        "wheel-axis",
+        "error",
+        "a wheel that does not turn about its cylinder's axis",
+        "it tumbles instead of rolling",
+        rules_wheels.wheel_axes,
+    ),
+    Rule(
+        "wheel-height",
+        "warning",
+        "a wheel above the ground, or lower than the others",
+        "it does not drive, or the robot leans",
+        rules_wheels.wheel_heights,
+    ),
+    Rule(
+        "overlap",
+        "warning",
+        "a wheel inside another, or more than half of it inside the body",
+        "impossible on a real robot",
+        rules_wheels.overlaps,
+    ),
+    Rule(
+        "wheel-load",
+        "warning",
+        "a part of the body that is as low as the wheels",
+        "it drags on the ground, and the wheels slip",
+        rules_wheels.dragging,
+    ),
+    Rule(
+        "wheel-side",
+        "error",
+        "a left wheel on the right side, or the other way round",
+        "it turns the wrong way: the plugin's tags say which side is which",
+        rules_wheels.sides,
+    ),
+    Rule(
+        "wheel-measure",
+        "warning",
+        "a plugin's wheel separation or diameter that differs by 20 % from the robot's",
+        "it turns or drives faster or slower than commanded",
+        rules_wheels.measures,
+    ),
+    Rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it", rules_plugins.misspelt_plugins),
+    Rule("plugin", "warning", "an unknown plugin", "it is ignored", rules_plugins.unknown_plugins),
+    Rule(
+        "plugin-link",
+        "warning",
+        "a plugin's frame that is not a link",
+        "odometry and sensors refer to a missing frame",
+        rules_plugins.plugin_links,
+    ),
+    Rule(
+        "plugin-joint",
+        "error",
+        "a plugin's joint that does not exist",
+        "the plugin has nothing to turn",
+        rules_plugins.plugin_joints,
+    ),
+    Rule("two-drives", "warning", "two drive plugins", "they work against each other", rules_plugins.two_drives),
+    Rule(
+        "no-drive",
+        "warning",
+        "wheels and plugin tags, but no drive plugin",
+        "cmd_vel moves nothing",
+        rules_plugins.no_drive,
+    ),
+    Rule("mesh", "error", "a mesh that is not found", "the part is invisible or a box", rules_meshes.missing),
+    Rule(
+        "mesh-path",
+        "warning",
+        "a mesh at a path on another machine",
+        "it is not found on other machines",
+        rules_meshes.elsewhere,
+    ),
+    Rule("mesh-empty", "error", "a mesh that is empty or broken", "the part has no shape", rules_meshes.unreadable),
+    Rule("mesh-unit", "warning", "a mesh in the wrong unit", "it is far too large or too small", rules_meshes.units),
+    Rule("fits", "error", "a robot larger than --fits", "the task sets its size", requirements.too_large),
+    Rule(
+        "require-file",
+        "error",
+        "an invalid line of --require",
+        "it checks nothing",
+        requirements.bad_needs,
+    ),
+    Rule(
+        "require",
+        "error",
+        "a missing link or joint of --require",
+        "the task sets its names",
+        requirements.missing_names,
+    ),
+)
+
+
+def table() -> str:
+    """The rules as a table in Markdown."""
+    rows = [f"| `{rule.name}` | {rule.severity} | {rule.finds} | {rule.why} |" for rule in (FATAL, LOAD, NOTE, *RULES)]
+    return "\n".join(["| rule | severity | finds | since |", "|---|---|---|---|", *rows]) + "\n"
+
+
+# The findings.
+
 
 MOST = 100  # findings of one rule
-LONGEST = 2000  # characters of a problem, and of how to mend it
-WHOLE = ("tree", "no-inertia", "place", "tag")  # the loader speaks of the robot as a whole where these name a link
+LONGEST = 2000  # characters of a problem, and of its fix
+WHOLE = ("tree", "no-inertia", "place", "tag")  # the loader reports on the whole robot where these name a link
 
 _LONG = re.compile(r"\S{301,}")  # paths may be long
 
@@ -24,23 +309,56 @@ def check(
     path: Path,
     args: Mapping[str, str] = {},
     packages: Mapping[str, Path] = {},
-    wanted: Wanted = Wanted(),  # noqa: B008
+    requirements: Requirements = Requirements(),  # noqa: B008
+    allow_env: Collection[str] = (),
 ) -> list[Finding]:
-    """The findings in a xacro, URDF or SDF file, by place. `args` and `packages` as for `xacro.expand`. Any file will
-    do; one that is no robot has a finding that says so.
+    """The findings in a xacro, URDF or SDF file, by place. `args`, `packages` and `allow_env` as for
+    `xacro.expand`. Any file is accepted; one that is not a robot has a finding that says so.
     """
+    return examine(path, args, packages, requirements, allow_env)[0]
+
+
+def examine(
+    path: Path,
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    requirements: Requirements,
+    allow_env: Collection[str],
+) -> tuple[list[Finding], str]:
+    """As `check`, with a one-line summary of the file; empty for a file that cannot be read."""
     try:
-        subject = read(path, args, packages, wanted)
+        subject = read(path, args, packages, requirements, allow_env)
     except RobotError as error:
-        return [_fatal(path, str(error))]
+        return [_fatal(path, str(error))], ""
     mistakes = [(rule, mistake) for rule in RULES for mistake in _first(rule, subject)]
-    mistakes += [(rule, mistake) for rule in (LOAD, NOTE) for mistake in _unsaid(rule, subject, mistakes)]
+    mistakes += [(rule, mistake) for rule in (LOAD, NOTE) for mistake in _unreported(rule, subject, mistakes)]
     findings = [_finding(rule, mistake, subject) for rule, mistake in mistakes]
-    return sorted(_once(findings, bool(subject.sources)), key=lambda finding: _order(finding.place, str(path)))
+    found = sorted(_once(findings, bool(subject.sources)), key=lambda finding: _order(finding.place, str(path)))
+    return found, _summary(subject)
+
+
+def _summary(subject: Subject) -> str:
+    """`9 links, 3 wheels, planar_move on cmd_vel`."""
+    if is_library(subject):
+        return "no links: a file for others to include, which cannot be spawned by itself"
+    parts = [_counted(len(subject.links), "link")]
+    if subject.wheels:
+        parts.append(_counted(len(subject.wheels), "wheel"))
+    drive = subject.model.drive if subject.model else None
+    if drive is not None:
+        plugin = next(kind for plugin in subject.plugins if (kind := kind_of(plugin)) in DRIVES)
+        parts.append(f"{plugin.removeprefix('gazebo_ros_')} on {drive.command_topic}")
+    elif subject.links and not (subject.model and subject.model.static):
+        parts.append("no drive: holozen spawn --drive planar_move moves it as a whole")
+    return ", ".join(parts)
+
+
+def _counted(count: int, thing: str) -> str:
+    return f"{count} {thing}" if count == 1 else f"{count or 'no'} {thing}s"
 
 
 def _once(findings: Iterable[Finding], expanded: bool) -> Iterable[Finding]:
-    """Each finding once; of those that a macro makes of one line of an expanded file the first."""
+    """Each finding once; if a macro repeats a line, only its first."""
     first: dict[tuple[str, Place, str], Finding] = {}
     for finding in findings:
         traced = expanded and finding.place.line and not finding.place.expanded
@@ -53,29 +371,29 @@ def _order(place: Place, file: str) -> tuple[bool, str, bool, int]:
 
 
 def _first(rule: Rule, subject: Subject) -> list[Mistake]:
-    """What a rule finds, at most MOST times: a file that is wrong all over has to end soon too."""
+    """The findings of a rule, at most MOST: a file full of mistakes has to finish soon too."""
     found = list(islice(rule.find(subject), MOST + 1))
-    more = [Mistake(None, f"there are more than {MOST} findings of this kind", "mend those first")]
+    more = [Mistake(None, f"there are more than {MOST} findings of this kind", "fix those first")]
     return found if len(found) <= MOST else found[:MOST] + more
 
 
 def _fatal(path: Path, message: str) -> Finding:
-    place, told = split(message, path)
+    place, problem = split(message, path)
     if place.file == f"{path}{EXPANDED}":
         place = Place(str(path), place.line, True)
-    return Finding(FATAL.name, FATAL.severity, place, told, FATAL.why, mend(place, told))
+    return Finding(FATAL.name, FATAL.severity, place, problem, FATAL.why, mend(place, problem))
 
 
-def _unsaid(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mistake]]) -> list[Mistake]:
-    """What the loader said of parts in which no rule found anything as bad."""
-    told: list[Tag] = []
+def _unreported(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mistake]]) -> list[Mistake]:
+    """The loader's messages about parts in which no rule found anything as serious."""
+    reported: list[Tag] = []
     for other, mistake in mistakes:
         if isinstance(mistake.at, Tag) and (rule is NOTE or other.severity == "error"):
-            told += [subject.part(mistake.at), *([subject.root] if other.name in WHOLE else [])]
+            reported += [subject.part(mistake.at), *([subject.root] if other.name in WHOLE else [])]
     return [
         mistake
         for mistake in rule.find(subject)
-        if not isinstance(mistake.at, Tag) or subject.part(mistake.at) not in told
+        if not isinstance(mistake.at, Tag) or subject.part(mistake.at) not in reported
     ]
 
 
@@ -85,6 +403,6 @@ def _finding(rule: Rule, mistake: Mistake, subject: Subject) -> Finding:
 
 
 def _short(text: str) -> str:
-    """The text with its long words cut, and itself: both may hold what a file says, of any length."""
+    """The text with long words, and itself, truncated: file contents may be of any length."""
     text = _LONG.sub(lambda word: f"{word[0][:77]}...", text)
     return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."

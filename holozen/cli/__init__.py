@@ -5,6 +5,9 @@ import importlib
 import os
 import sys
 from types import ModuleType
+from typing import Any
+
+from holozen.process import Ending
 
 VERBS = {
     "up": "start the sim, the controller, the pose service, and the teleop in this terminal",
@@ -16,27 +19,46 @@ VERBS = {
     "pose-service": "answer next_goal and get_pose",
     "router": "run a Zenoh router",
     "run": "run a Python script that was written for ROS 2",
-    "launch": "follow a Python launch file that was written for ROS 2",
+    "launch": "run a Python launch file that was written for ROS 2",
     "spawn": "put a robot or object into the sim",
-    "delete": "take it out again",
-    "list": "the robots and objects in the sim, and where they are",
+    "delete": "remove robots or objects from the sim",
+    "list": "list the robots and objects in the sim, and where they are",
     "xacro": "expand a xacro file",
-    "check": "say what is wrong with a robot file",
+    "check": "report what is wrong with a robot file",
     "topic": "list, info, type, find, echo, hz, bw, delay, pub, plot",
     "service": "list, type, find, info, call",
     "node": "list, info",
     "param": "list, get, set, describe, dump, load",
-    "doctor": "check this machine and what runs, and say how to mend it",
-    "graph": "who writes, reads and serves what",
-    "completion": "a script that completes words in bash, zsh or fish",
+    "tf": "echo",
+    "doctor": "diagnose problems on this machine and among the nodes, and suggest fixes",
+    "graph": "show which nodes write, read and serve which keys",
+    "completion": "print a completion script for bash, zsh or fish",
     "interface": "list, show, proto",
-    "record": "write what comes on the keys into a bag (MCAP)",
-    "replay": "publish what is in a bag again, in time",
+    "record": "record keys into a bag (MCAP)",
+    "replay": "publish the messages of a bag again, at their times",
     "bag": "info, plot, record, play",
-    "plot": "draw numbers of live messages in the terminal",
-    "map": "draw the robots, their ways and their goals in the terminal",
+    "plot": "draw fields of live messages in the terminal",
+    "map": "draw the robots, their paths and their goals in the terminal",
 }
-NOUNS = ("topic", "service", "node", "param", "interface", "bag")  # whose first word is a verb
+MODULES = {"graph": "node", "list": "robot", "delete": "robot", "map": "plot"}  # of verbs in another noun's module
+NOUNS = ("topic", "service", "node", "param", "tf", "interface", "bag")  # followed by a verb
+_DRAWS = "`holozen map` draws robots and `holozen plot` numbers, in the terminal"
+_NO_ACTIONS = "there are no actions here; `holozen service` calls services"
+_TYPES = "`holozen interface` shows messages and services"
+ELSEWHERE = {
+    "view": _DRAWS, "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
+    "action": _NO_ACTIONS, "pkg": "`--package NAME=DIR` gives the folder of a package",
+    "tf2_echo": "write `holozen tf echo SOURCE TARGET`", "tf2": "write `holozen tf`",
+    "rqt_graph": "write `holozen graph`", "wtf": "write `holozen doctor`", "msg": _TYPES, "srv": _TYPES,
+    "gazebo": "write `holozen sim`", "gz": "write `holozen sim`", "teleop_twist_keyboard": "write `holozen teleop`",
+    "start": "write `holozen up`", "down": "Ctrl-C ends `holozen up`; `holozen stop` stops robots",
+    "daemon": "there is no daemon here, and none is needed",
+    "lifecycle": "there are no lifecycle nodes here", "component": "there are no components here",
+    "rostopic": "write `holozen topic`", "rosservice": "write `holozen service`", "rosnode": "write `holozen node`",
+    "rosparam": "write `holozen param`", "rosbag": "write `holozen bag`", "rosrun": "write `holozen run`",
+    "roslaunch": "write `holozen launch`", "roscore": "none is needed; `holozen up` starts a robot",
+}  # fmt: skip
+"""Verbs of ROS's tools and other likely guesses, with what to use instead."""
 EXTRAS = (
     "lz4",
     "matplotlib",
@@ -46,21 +68,23 @@ EXTRAS = (
     "transforms3d",
     "xacro",
     "zstandard",
-)  # what only some verbs need
+)  # libraries that only some verbs need
 SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-service": "pose_service"}
 
 
 def main(argv: list[str] | None = None) -> int:
     """Run one verb; returns the exit code (0 good, 1 failed, 2 wrong usage). Without `argv` it ends the process."""
-    if sys.stdin is None:  # closed by who started it
+    if sys.stdin is None:  # closed by the parent process
         sys.stdin = open(os.devnull)  # noqa: SIM115 - kept as long as the process
-    words = sys.argv[1:] if argv is None else argv
-    code = _guarded(words)
-    if argv is None and "zenoh" in sys.modules:
-        from holozen.process import leave
-
-        leave(code)
-    return code
+    if argv is not None:
+        return _guarded(argv)
+    ending = Ending()
+    code: int | str | None
+    try:
+        code = _guarded(sys.argv[1:])
+    except SystemExit as end:  # of argparse, or of a script
+        code = end.code
+    ending.leave(code)
 
 
 def _guarded(words: list[str]) -> int:
@@ -78,10 +102,10 @@ def _guarded(words: list[str]) -> int:
     except OSError as error:
         if error.errno != errno.ENOSPC or error.filename:
             raise
-        from holozen.tell import say
+        from holozen.console import report
 
         _drop_output()
-        say(f"holozen: cannot write what was asked for: {error.strerror}")
+        report(f"holozen: cannot write what was asked for: {error.strerror}")
         return 1
 
 
@@ -99,40 +123,47 @@ def _main(words: list[str]) -> int:
         print(version("holozen"))
         return 0
     if words[0] == "__complete":
-        from holozen.cli.complete import main as complete
+        from holozen.cli.completion import complete
 
-        return complete(words[1:])
+        return complete(words[1:], VERBS, command)
     if words[0] not in VERBS:
+        from holozen.console import report
         from holozen.flags import nearest
 
-        known = f"{nearest(words[0], VERBS)}; there are {', '.join(VERBS)}"
-        print(f"holozen: no verb {words[0]!r}{known}", file=sys.stderr)
+        instead = ELSEWHERE.get(words[0])
+        hint = f"; {instead}" if instead else nearest(words[0], VERBS)
+        report(f"holozen: no verb {words[0]!r}{hint}; `holozen --help` lists the verbs")
         return 2
     return _run(words[0], words[1:])
 
 
 def _run(verb: str, words: list[str]) -> int:
-    from holozen.errors import BusError
-    from holozen.tell import say
+    from holozen.console import report
+    from holozen.transport.errors import BusError
 
     try:
-        return int(module(verb).main(words))
+        return int(command(verb).main(words))
     except BusError as error:
-        say(f"holozen {' '.join([verb, *words[: verb in NOUNS]])}: {error}")
+        report(f"holozen {' '.join([verb, *words[: verb in NOUNS]])}: {error}")
         return 1
-    except ModuleNotFoundError as error:  # some verbs import what they need late
+    except ModuleNotFoundError as error:  # optional libraries are imported where they are used
         name = (error.name or "").partition(".")[0]
         if name not in EXTRAS:
             raise
-        say(f"holozen {verb} needs {name}; run: pip install 'holozen[{verb}]'")
+        report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install '.[{verb}]'")
         return 1
 
 
-def module(verb: str) -> ModuleType:
-    """The verb's module. Services are `holozen.sim` when installed and `services.sim` in the bare source tree."""
-    if verb not in SERVICES:
-        return importlib.import_module(f"holozen.cli.{verb}")
-    name = SERVICES[verb]
+def command(verb: str) -> Any:
+    """What implements a verb, with `main(argv)` and `parser()`: a Verb, a Noun, or the module of a service."""
+    if verb in SERVICES:
+        return _service(SERVICES[verb])
+    module = importlib.import_module(f"holozen.cli.{MODULES.get(verb, verb)}")
+    return getattr(module, "VERBS", {}).get(verb, module)
+
+
+def _service(name: str) -> ModuleType:
+    """The module of a service: `holozen.sim` when installed, `services.sim` in the bare source tree."""
     try:
         return importlib.import_module(f"holozen.{name}.__main__")
     except ModuleNotFoundError as error:

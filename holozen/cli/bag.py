@@ -1,12 +1,12 @@
-"""`holozen bag`: info, plot; record and play, as ROS 2 calls them."""
+"""`holozen bag`: info and plot; record and play, as ROS 2 names them."""
 
 import argparse
 import json
 from typing import TYPE_CHECKING
 
 from holozen import cli
+from holozen.console import printable, report
 from holozen.flags import Parser
-from holozen.tell import printable, say
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -16,14 +16,14 @@ EXAMPLES = {"record": "record odom cmd_vel -o square", "play": "play square.mcap
 
 
 def parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="holozen bag", description="Write, play and look into bags: MCAP files with messages.")
+    parser = Parser(prog="holozen bag", description="Record, play and inspect bags: MCAP files of messages.")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
-    help_line = "what is in a bag: counts, rates, gaps"
+    help_line = "what is in a bag: counts, missing messages, rates"
     add = verbs.add_parser(
         "info", help=help_line, description=help_line, epilog="example: holozen bag info square.mcap"
     )
     add.add_argument("files", nargs="+", type=_file, metavar="FILE")
-    add.add_argument("--json", action="store_true", help="one JSON object a file, on a line")
+    add.add_argument("--json", action="store_true", help="one JSON object per file and line")
     help_line = "draw the paths and velocities of a bag's robots"
     add = verbs.add_parser(
         "plot", help=help_line, description=help_line, epilog="example: holozen bag plot square.mcap -o square.svg"
@@ -35,7 +35,7 @@ def parser() -> argparse.ArgumentParser:
     for name, verb in VERBS.items():
         same = f"the same as `holozen {verb}`"
         verbs.add_parser(name, help=same, description=same, epilog=f"example: holozen bag {EXAMPLES[name]}",
-            parents=[cli.module(verb).parser()], add_help=False)  # fmt: skip
+            parents=[cli.command(verb).parser()], add_help=False)  # fmt: skip
     return parser
 
 
@@ -47,22 +47,21 @@ def _file(text: str) -> "Path":
 
 def main(argv: list[str]) -> int:
     if argv and argv[0] in VERBS:
-        code: int = cli.module(VERBS[argv[0]]).main(argv[1:])
+        code: int = cli.command(VERBS[argv[0]]).main(argv[1:])
         return code
     args = parser().parse_args(argv)
-    from holozen.bag.errors import BagError
+    from holozen.bag import BagError
 
     try:
         return {"info": info, "plot": plot}[args.verb](args)
     except BagError as error:
-        say(f"holozen bag {args.verb}: {error}")
+        report(f"holozen bag {args.verb}: {error}")
         return 1
 
 
 def info(args: argparse.Namespace) -> int:
     """Print what is in each file."""
-    from holozen.bag.reader import Bag
-    from holozen.bag.summary import summarize
+    from holozen.bag.reader import Bag, summarize
 
     for path in args.files:
         with Bag(path) as bag:

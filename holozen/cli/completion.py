@@ -1,8 +1,24 @@
-"""`holozen completion`: a script for the shell, which asks `holozen __complete` for the words that fit."""
+"""`holozen completion`: a shell script, which calls `holozen __complete WORD...` for the candidates."""
 
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
 import json
+import re
+from collections.abc import Callable, Iterable
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
 
-from holozen.flags import Parser
+from holozen.bus import Bus
+from holozen.cli.verb import Noun, is_any
+from holozen.flags import Parser, package
+from holozen.transport import connection
+from holozen.transport.graph import Endpoint
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 BASH = """\
 _holozen() {
@@ -27,7 +43,7 @@ SCRIPTS = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 
 
 def parser() -> Parser:
-    about = "Print a script that completes verbs, flags, and the keys, types, services, nodes and robots there are."
+    about = "Print a script that completes verbs, flags, and the keys, types, services, nodes and robots found."
     parser = Parser(prog="holozen completion", description=about, epilog="example: source <(holozen completion bash)")
     parser.add_argument("shell", choices=SCRIPTS, help="for which shell")
     parser.add_argument("--json", action="store_true", help="the script as one JSON object")
@@ -39,3 +55,136 @@ def main(argv: list[str]) -> int:
     script = SCRIPTS[args.shell]
     print(json.dumps({"shell": args.shell, "script": script}) + "\n" if args.json else script, end="")
     return 0
+
+
+PATIENCE = 0.25  # s to discover nodes
+SAFE = re.compile(r"[A-Za-z0-9_./@%+-]+")  # words that need no quoting in a shell; keys come over the wire
+PARAMETERS = "rcl_interfaces/srv/ListParameters"
+LIVE = {
+    "key": "keys", "keys": "keys", "robot": "robots", "robots": "robots", "delete names": "robots",
+    "topic type": "types", "topic words": "types", "service key": "services", "service type": "services' types",
+    "node name": "nodes", "param node": "nodes with parameters",
+}  # fmt: skip
+"""By argument, or by verb and argument: the kind of candidates that are looked up on the wire."""
+
+
+def complete(words: list[str], verbs: Iterable[str], command: Callable[[str], Any]) -> int:
+    """Print the candidates for the last word, one a line; nothing if anything fails.
+
+    `verbs` are those of the command line, `command` gives what has a verb's parser.
+    """
+    with contextlib.redirect_stderr(io.StringIO()), contextlib.suppress(Exception, SystemExit):
+        for word in _candidates(words or [""], verbs, command):
+            print(word)
+    return 0
+
+
+def _candidates(words: list[str], verbs: Iterable[str], command: Callable[[str], Any]) -> list[str]:
+    *before, current = words
+    if not before:
+        return [verb for verb in verbs if verb.startswith(current)]
+    parser, left = _parser(command(before[0]), before[1:])
+    action = _wanted(parser, left)
+    if current.startswith("-"):
+        found = [flag for flag in parser._option_string_actions if flag.startswith("--")]
+    elif action is None:
+        return []
+    elif action.choices is not None:
+        found = [str(choice) for choice in action.choices]
+    elif look := LOOKED_UP.get(f"{before[0]} {action.dest}"):
+        found = look(left, current)
+    else:
+        kind = LIVE.get(f"{before[0]} {action.dest}") or LIVE.get(action.dest)
+        slash = "/" * current.startswith("/")  # as ROS writes keys
+        found = [slash + word for word in _live(kind, before) if SAFE.fullmatch(word)] if kind else []
+    return [word for word in found if word.startswith(current)]
+
+
+def _parser(command: Any, words: list[str]) -> tuple[argparse.ArgumentParser, list[str]]:
+    """The parser of a command, or of the noun's verb that `words` begin with; and the remaining words."""
+    if isinstance(command, Noun) and words and words[0] in command.modules:
+        return command.verb(words[0]).parser(), words[1:]
+    return _innermost(command.parser(), words)
+
+
+def _innermost(parser: argparse.ArgumentParser, words: list[str]) -> tuple[argparse.ArgumentParser, list[str]]:
+    """The parser of the verb that `words` name, and the remaining words."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction) and words and words[0] in action.choices:
+            return _innermost(action.choices[words[0]], words[1:])
+    return parser, words
+
+
+def _wanted(parser: argparse.ArgumentParser, words: list[str]) -> argparse.Action | None:
+    """The argument that the next word belongs to; None if any file or text may follow."""
+    if words and (flag := parser._option_string_actions.get(words[-1])) and flag.nargs != 0:
+        return flag
+    flags, taken, skip = parser._option_string_actions, 0, False
+    for word in words:
+        if skip:
+            skip = False
+        elif word.startswith("-") and len(word) > 1:
+            found = flags.get(word)
+            skip = found is not None and found.nargs != 0
+        else:
+            taken += 1
+    places = [action for action in parser._actions if not action.option_strings]
+    if places and taken >= len(places):
+        return places[-1] if places[-1].nargs in ("*", "+") else None
+    return places[taken] if places else None
+
+
+def _types(left: list[str], _current: str) -> list[str]:
+    from holozen.messages.registry import Registry
+
+    return Registry(_given(left)).names()
+
+
+def _packages(left: list[str], current: str) -> list[str]:
+    """Names of packages; none for an empty word, for which the shell shows files."""
+    from holozen.ros import packages
+
+    packages.use(_given(left))
+    return sorted(packages.around()) if current else []
+
+
+def _executables(left: list[str], _current: str) -> list[str]:
+    """The executables of the package named before."""
+    from holozen.ros import executables, packages
+
+    packages.use(_given(left))
+    return executables.names(left[-1])
+
+
+def _given(left: list[str]) -> dict[str, Path]:
+    return dict(package(value) for flag, value in pairwise(left) if flag == "--package")
+
+
+LOOKED_UP: dict[str, Callable[[list[str], str], list[str]]] = {
+    "interface type": _types, "run target": _packages, "run words": _executables,
+}  # fmt: skip
+"""By verb and argument: what lists candidates without the wire, from the previous words and the current one."""
+
+
+def _live(kind: str, words: list[str]) -> list[str]:
+    flags = Parser(add_help=False)
+    connection.add_arguments(flags)
+    where = connection.from_arguments(flags.parse_known_args(words)[0])
+    with Bus("complete", where, patience=PATIENCE) as bus:
+        ends = bus.endpoints(patience=PATIENCE)
+    return sorted(set(_words(kind, [end for end in ends if not is_any(end)])))
+
+
+def _words(kind: str, ends: list[Endpoint]) -> list[str]:
+    topics = [end for end in ends if end.kind in ("pub", "sub")]
+    services = [end for end in ends if end.kind == "srv"]
+    found = {
+        "keys": [end.key for end in topics],
+        "types": [end.type for end in topics],
+        "services": [end.key for end in services],
+        "services' types": [end.type for end in services],
+        "nodes": [end.node for end in ends],
+        "nodes with parameters": [end.key.rpartition("/")[0] for end in services if end.type == PARAMETERS],
+        "robots": [end.key.rpartition("/")[0] for end in topics if end.key.endswith("/odom")],
+    }[kind]
+    return [word for word in found if word and "*" not in word]

@@ -1,31 +1,30 @@
-"""`holozen doctor`: what may be wrong here, and how to mend it."""
+"""`holozen doctor`: diagnose problems and suggest fixes."""
 
 import argparse
 import json
 
-from holozen import connection
+from holozen.console import printable
 from holozen.flags import Parser
-from holozen.tell import printable
+from holozen.transport import connection
 
 
 def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="holozen doctor",
-        description="Check this machine and what runs, and say how to mend what is wrong. It changes nothing.",
-        epilog="exit code: 0 all well, 1 something is wrong (not by warnings). example: holozen doctor --json",
+        description="Check this machine and the running nodes, and suggest fixes. Changes nothing.",
+        epilog="exit code: 0 without errors, 1 with one; warnings do not count. example: holozen doctor --json",
     )
-    parser.add_argument("--json", action="store_true", help="one JSON object a line")
+    parser.add_argument("--json", action="store_true", help="one JSON object per line")
     connection.add_arguments(parser)
     return parser
 
 
 def main(argv: list[str]) -> int:
     args = parser().parse_args(argv)
-    from holozen.doctor.finding import first_error
-    from holozen.doctor.rounds import look
+    from holozen.doctor import ERROR, diagnose
 
-    findings = []
-    for finding in look(connection.from_arguments(args)):
-        findings.append(finding)
+    code = 0
+    for finding in diagnose(connection.from_arguments(args)):
+        code = max(code, int(finding.level == ERROR))
         print(json.dumps(finding._asdict()) if args.json else printable(str(finding)), flush=True)
-    return first_error(findings)
+    return code

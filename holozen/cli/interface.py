@@ -6,13 +6,13 @@ from collections.abc import Iterator
 from typing import Any
 
 from holozen import flags
-from holozen.interfaces import Interface, InterfaceError, Registry
-from holozen.interfaces.values import prototype
-from holozen.tell import printable, say
+from holozen.console import printable, report
+from holozen.messages.definitions import Interface, InterfaceError, prototype
+from holozen.messages.registry import Registry
 
 
 def parser() -> flags.Parser:
-    parser = flags.Parser(prog="holozen interface", description="Look at message and service types.")
+    parser = flags.Parser(prog="holozen interface", description="Show message and service types.")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
     for name, (about, example) in VERBS.items():
         verb = verbs.add_parser(name, help=about, description=about, epilog=f"example: {example}")
@@ -23,15 +23,15 @@ def parser() -> flags.Parser:
             verb.add_argument("type", metavar="TYPE", help="such as geometry_msgs/msg/Twist or std_srvs/srv/Trigger")
         verb.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
             help="the folder of package NAME, with msg and srv folders in it")  # fmt: skip
-        verb.add_argument("--json", action="store_true", help="one JSON object a line")
+        verb.add_argument("--json", action="store_true", help="one JSON object per line")
     return parser
 
 
 VERBS = {
-    "list": ("the types that are known", "holozen interface list --only-srvs"),
-    "show": ("a type's fields, with those of the types in it", "holozen interface show geometry_msgs/msg/Twist"),
+    "list": ("all known types", "holozen interface list --only-srvs"),
+    "show": ("the fields of a type, nested ones included", "holozen interface show geometry_msgs/msg/Twist"),
     "proto": (
-        "a message with every field, ready to be changed and published",
+        "a message with all fields, to edit and publish",
         "holozen interface proto geometry_msgs/msg/Twist | holozen topic pub cmd_vel -",
     ),
 }
@@ -42,7 +42,7 @@ def main(argv: list[str]) -> int:
     try:
         return {"list": list_types, "show": show, "proto": proto}[args.verb](args)
     except InterfaceError as error:
-        say(f"holozen interface {args.verb}: {error}")
+        report(f"holozen interface {args.verb}: {error}")
         return 1
 
 
@@ -60,14 +60,14 @@ def list_types(args: argparse.Namespace) -> int:
 
 
 def show(args: argparse.Namespace) -> int:
-    """Print the definition of a type, with what is in its fields indented below them."""
+    """Print the definition of a type, with nested fields indented."""
     interface = Registry(dict(args.package)).find(args.type)
     print(json.dumps(described(interface)) if args.json else "\n".join(map(printable_line, definition(interface))))
     return 0
 
 
 def proto(args: argparse.Namespace) -> int:
-    """Print a message, or a service's request, with every field at its default."""
+    """Print a message, or the request of a service, with all fields at their defaults."""
     interface = Registry(dict(args.package)).find(args.type)
     value = prototype(interface.request or interface)
     print(json.dumps(value) if args.json else "\n".join(yaml(value)) or "{}")
@@ -75,7 +75,7 @@ def proto(args: argparse.Namespace) -> int:
 
 
 def definition(interface: Interface, indent: str = "") -> Iterator[str]:
-    """The lines of a .msg or .srv file that says the same."""
+    """The lines of a .msg or .srv file."""
     if interface.request and interface.response:
         yield from (*definition(interface.request), "---", *definition(interface.response))
     for constant in interface.constants:
@@ -89,22 +89,22 @@ def definition(interface: Interface, indent: str = "") -> Iterator[str]:
 
 
 def printable_line(line: str) -> str:
-    """A line without what moves a terminal's cursor; the tabs before it stay."""
+    """A line without control characters, apart from leading tabs."""
     bare = line.lstrip("\t")
     return line[: len(line) - len(bare)] + printable(bare)
 
 
 def described(interface: Interface) -> dict[str, Any]:
     """A type as plain values."""
-    told: dict[str, Any] = {"name": interface.name, "kind": interface.kind}
+    row: dict[str, Any] = {"name": interface.name, "kind": interface.kind}
     if interface.request and interface.response:
-        return told | {"request": described(interface.request), "response": described(interface.response)}
+        return row | {"request": described(interface.request), "response": described(interface.response)}
     fields = [field._asdict() | {"nested": field.nested and described(field.nested)} for field in interface.fields]
-    return told | {"fields": fields, "constants": [constant._asdict() for constant in interface.constants]}
+    return row | {"fields": fields, "constants": [constant._asdict() for constant in interface.constants]}
 
 
 def yaml(value: dict[str, Any], indent: str = "") -> Iterator[str]:
-    """The lines of a message in YAML. Lists are on one line, as JSON writes them."""
+    """The lines of a message in YAML. Lists are on one line, as in JSON."""
     for name, inner in value.items():
         if isinstance(inner, dict) and inner:
             yield f"{indent}{name}:"

@@ -1,28 +1,31 @@
-"""`holozen launch`: follow a Python launch file that was written for ROS 2, without ROS."""
+"""`holozen launch`: run a Python launch file that was written for ROS 2, without ROS."""
 
 import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holozen import connection, flags
-from holozen.tell import say
+from holozen import flags
+from holozen.console import report
+from holozen.transport import connection
 
 if TYPE_CHECKING:
-    from holozen.ros.launch.entity import LaunchDescription
+    from holozen.ros.launch.launch_description import LaunchDescription
 
 
 def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen launch",
         usage="%(prog)s [options] FILE|PACKAGE FILE [name:=value ...]",
-        description="Follow a Python launch file that was written for ROS 2, without ROS.",
+        description="Run a Python launch file that was written for ROS 2, without ROS.",
         epilog="example: holozen launch launch/gazebo.launch.py world:=arena.world",
     )
     parser.add_argument("words", nargs="+", metavar="FILE [name:=value]",
         help="the launch file, or its package and its name; and values of its arguments")  # fmt: skip
-    parser.add_argument("-s", "--show-args", action="store_true", help="only tell which arguments it has")
+    parser.add_argument("-s", "--show-args", action="store_true", help="only list its arguments")
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="the folder of package NAME")  # fmt: skip
+    parser.add_argument("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
+        help="let the file read this environment variable, as $(env NAME)")  # fmt: skip
     connection.add_arguments(parser)
     return parser
 
@@ -31,55 +34,66 @@ def main(argv: list[str]) -> int:
     options = parser()
     args = options.parse_intermixed_args(argv)
     from holozen.robot.errors import RobotError
-    from holozen.ros import executables, finder, packages, traceback
-    from holozen.ros.launch import gazebo, sources
-    from holozen.ros.launch.text import LaunchError
+    from holozen.ros import executables, importer, packages, tracebacks
+    from holozen.ros.launch.launch_context import LaunchError
+    from holozen.ros.launch.launch_description_sources import read
+    from holozen.ros.launch.stand_ins import replace_gazebo_packages
 
     given, where = dict(args.package), connection.from_arguments(args)
     packages.use(given)
-    gazebo.stand_in()
+    replace_gazebo_packages()
     values = dict(word.split(":=", 1) for word in args.words if ":=" in word)
     try:
         path = _file([word for word in args.words if ":=" not in word], options)
         packages.use(given, path.resolve().parent)
-        finder.install(packages.given, [path.resolve().parent])
-        description = sources.read(path)
-        return _show(description) if args.show_args else _follow(path.absolute(), description, values, where)
+        importer.install(packages.given, [path.resolve().parent])
+        description = read(path)
+        return (
+            _show(description)
+            if args.show_args
+            else _follow(path.absolute(), description, values, where, args.allow_env)
+        )
     except (LaunchError, RobotError, executables.NotFound) as error:
-        say(f"holozen launch: {error}")
+        report(f"holozen launch: {error}")
     except Exception as error:
-        if not (told := traceback.in_one_line(error) or traceback.of_an_argument(error)):
-            traceback.show(error)
+        if not (line := tracebacks.import_error_line(error) or tracebacks.argument_error_line(error)):
+            tracebacks.show(error)
         else:
-            say(f"holozen launch: {told}")
+            report(f"holozen launch: {line}")
     return 1
 
 
-def _follow(path: Path, description: "LaunchDescription", values: dict[str, str], where: connection.Connection) -> int:
+def _follow(
+    path: Path,
+    description: "LaunchDescription",
+    values: dict[str, str],
+    where: connection.Connection,
+    allow_env: list[str],
+) -> int:
     from holozen.process import stop_event
-    from holozen.ros.launch import asked
-    from holozen.ros.launch.stage import Stage
+    from holozen.ros.launch.launch_service import LaunchService
 
-    with Stage(where.arguments(), stop_event()) as stage:
-        context = stage.context
+    with LaunchService(where.arguments(), stop_event()) as service:
+        context = service.context
+        context.allow_env = allow_env
         context.scope.configurations.update(values)
         context.scope = context.scope.within(path)
         left = set(values)
-        stage.begun = lambda: _tell_unused(path, context.used, left, set(asked.names(stage.pending, set())))
-        stage.run([description])
-        _tell_unused(path, context.used, left, set())
-    return 1 if stage.failed else 0
+        service.on_started = lambda: _report_unused(path, context.used, left, service.pending_arguments())
+        service.run([description])
+        _report_unused(path, context.used, left, set())
+    return 1 if service.failed else 0
 
 
-def _tell_unused(path: Path, used: set[str], left: set[str], later: set[str]) -> None:
-    """Tell the values among `left` that nothing has used and, as far as `later` says, nothing will."""
-    from holozen.ros.launch import asked
+def _report_unused(path: Path, used: set[str], left: set[str], later: set[str]) -> None:
+    """Report the values among `left` that nothing has used and that nothing in `later` will use."""
+    from holozen.ros.launch.launch_service import ANY
 
-    unused = left - used - later if asked.ANY not in later else set()
+    unused = left - used - later if ANY not in later else set()
     left -= unused
     for name in sorted(unused):
         hint = flags.nearest(name, used) or f"; it has {', '.join(sorted(used)) or 'no arguments'}"
-        say(f"holozen launch: {path.name} does not use {name!r}{hint}")
+        report(f"holozen launch: {path.name} does not use {name!r}{hint}")
 
 
 def _file(words: list[str], options: argparse.ArgumentParser) -> Path:
@@ -103,9 +117,9 @@ def _file(words: list[str], options: argparse.ArgumentParser) -> Path:
 
 
 def _show(description: "LaunchDescription") -> int:
-    """Tell the arguments of a launch file and of its groups."""
+    """Print the arguments of a launch file and of its groups."""
     from holozen.ros.launch.actions import DeclareLaunchArgument, GroupAction
-    from holozen.ros.launch.entity import LaunchDescription
+    from holozen.ros.launch.launch_description import LaunchDescription
 
     waiting: list[object] = [description]
     found = []
@@ -116,6 +130,6 @@ def _show(description: "LaunchDescription") -> int:
         elif isinstance(entity, GroupAction):
             waiting[:0] = entity.actions
         elif isinstance(entity, DeclareLaunchArgument):
-            found.append(entity.told())
+            found.append(entity.summary())
     print("\n".join(found) or "it has no arguments")
     return 0

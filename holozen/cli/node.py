@@ -1,6 +1,135 @@
-"""`holozen node`: look at the nodes that run."""
+"""`holozen node` and `graph`: which nodes run, and what they write, read and serve."""
 
-from holozen.cli.noun import Noun
+from __future__ import annotations
 
-NOUN = Noun("node", "Look at the nodes that run.", {"list": "nodes", "info": "nodes"})
-parser, main = NOUN.parser, NOUN.main
+import argparse
+import json
+
+from holozen.cli.verb import Noun, Verb, by_name, is_any, listed, no_nodes, open_bus
+from holozen.console import printable, report
+from holozen.flags import key, nearest
+from holozen.transport.graph import Endpoint, includes
+
+TITLES = {"sub": "Subscribers", "pub": "Publishers", "srv": "Service Servers"}
+
+
+def list_nodes(args: argparse.Namespace) -> int:
+    """Print the name of each running node, once for each session."""
+    with open_bus(args) as bus:
+        endpoints = bus.endpoints()
+    nodes = sorted((end.node, end.session) for end in endpoints if end.kind == "node")
+    if args.count_nodes:
+        print(json.dumps({"count": len(nodes)}) if args.json else len(nodes))
+        return 0
+    for name, session in nodes:
+        print(json.dumps({"node": name, "session": session}) if args.json else printable(name))
+    if not nodes:
+        report(no_nodes(bus.where))
+    return 0
+
+
+def info(args: argparse.Namespace) -> int:
+    """Print what a node reads, writes and serves; exit code 1 if there is no node of that name."""
+    with open_bus(args) as bus:
+        endpoints = bus.endpoints()
+    name, _, session = args.name.partition("@")
+    ends = [end for end in endpoints if end.node == name and end.session.startswith(session)]
+    if not ends:
+        names = sorted({end.node for end in endpoints})
+        known = f"known: {listed(names)}" if names else no_nodes(bus.where)
+        report(f"holozen node info: unknown node {args.name!r}{nearest(name, names)}; {known}")
+        return 1
+    for session in sorted({end.session for end in ends}):
+        _print_node(name, [end for end in ends if end.session == session], args.json)
+    return 0
+
+
+def _print_node(name: str, ends: list[Endpoint], as_json: bool) -> None:
+    shown = [end for end in ends if not is_any(end)]
+    kinds = {kind: [{"key": end.key, "type": end.type} for end in shown if end.kind == kind] for kind in TITLES}
+    session = ends[0].session
+    if as_json:
+        named = {"subscribers": kinds["sub"], "publishers": kinds["pub"], "services": kinds["srv"]}
+        print(json.dumps({"node": name, "session": session, **named}))
+        return
+    print(printable(f"{name} ({session[:6]})"))
+    for kind, title in TITLES.items():
+        print(f"  {title}:")
+        for end in kinds[kind]:
+            print(printable(f"    {end['key']}: {end['type']}"))
+
+
+def _list_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-c", "--count-nodes", action="store_true", help="only how many there are")
+
+
+def _info_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("name", type=key, help="such as sim, or sim@a1b2c3 where there are more")
+
+
+def graph(args: argparse.Namespace) -> int:
+    """Print the graph as arrows, JSON or Graphviz."""
+    with open_bus(args) as bus:
+        found = [end for end in bus.endpoints() if not is_any(end)]
+    ends = [end for end in found if end.kind != "node"]
+    _print_graph(args, ends)
+    if not found:
+        report(no_nodes(bus.where))
+    return 0
+
+
+def _print_graph(args: argparse.Namespace, ends: list[Endpoint]) -> None:
+    for row in dot(ends) if args.dot else arrows(ends) if not args.json else []:
+        print(printable(row))
+    for end in ends if args.json else []:
+        print(json.dumps(end._asdict()))
+
+
+def arrows(ends: list[Endpoint]) -> list[str]:
+    """A line a key: `teleop -> cmd_vel -> sim`; services after the topics, as `get_pose: pose_service`."""
+    rows = []
+    for topic in sorted({end.key for end in ends if end.kind in ("pub", "sub") and "*" not in end.key}):
+        writers = sorted({end.node for end in ends if end.kind == "pub" and end.key == topic})
+        readers = sorted({end.node for end in ends if end.kind == "sub" and includes(end.key, topic)})
+        rows.append(f"{', '.join(writers) or '-'} -> {topic} -> {', '.join(readers) or '-'}")
+    servers = [end for end in ends if end.kind == "srv"]
+    for service in sorted({end.key for end in servers}):
+        rows.append(f"{service}: {', '.join(sorted({end.node for end in servers if end.key == service}))}")
+    return rows
+
+
+def dot(ends: list[Endpoint]) -> list[str]:
+    """A digraph: nodes as boxes, keys as ellipses, services as dashed ones."""
+    nodes, services = sorted({end.node for end in ends}), {end.key for end in ends if end.kind == "srv"}
+    keys = sorted({end.key for end in ends if "*" not in end.key})
+    edges = set()
+    for end in ends:
+        if end.kind == "sub":
+            edges |= {(key, f"node {end.node}") for key in keys if includes(end.key, key) and key not in services}
+        else:
+            edges.add((f"node {end.node}", end.key))
+    return [
+        "digraph holozen {",
+        "  rankdir=LR;",
+        *(f"  {_quoted(f'node {name}')} [shape=box, label={_quoted(name)}];" for name in nodes),
+        *(f"  {_quoted(key)} [shape=ellipse{', style=dashed' * (key in services)}];" for key in keys),
+        *(f"  {_quoted(a)} -> {_quoted(b)};" for a, b in sorted(edges)),
+        "}",
+    ]
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+def _graph_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--dot", action="store_true", help="in the language of Graphviz")
+
+
+VERBS = by_name(
+    Noun("node", "Inspect the running nodes.", {"list": "node", "info": "node"}),
+    Verb("node list", "the names of the nodes", "", _list_arguments, list_nodes),
+    Verb("node info", "what a node reads, writes and serves", "sim", _info_arguments, info),
+    Verb("graph", "Show which nodes write, read and serve which keys.", "--dot | dot -Tsvg > g.svg", _graph_arguments,
+        graph, "one JSON object a line, of one end of a key"),
+)  # fmt: skip

@@ -1,125 +1,135 @@
-"""`holozen param`: list, get, set, describe, dump, load."""
+"""`holozen param`: read and set the parameters of running nodes.
+
+Values are written on the command line, or in a file in ROS 2's format:
+
+/sim:
+  ros__parameters:
+    max_linear: 5.0
+"""
 
 from __future__ import annotations
 
+import argparse
 import json
+import math
+import re
+import sys
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Any
 
-from holozen import connection
+from holozen.background import background
 from holozen.bus import Bus
-from holozen.cli import quick, ros2_flags
-from holozen.cli.param_nodes import Nodes
-from holozen.errors import BusError
-from holozen.flags import key, number
-from holozen.tell import printable, say
+from holozen.cli.verb import Noun, Verb, by_name, open_bus
+from holozen.console import printable, report
+from holozen.flags import key, nearest, number
+from holozen.process import deferred_interrupt
+from holozen.transport.errors import BusError
 
-TYPE_CHECKING = False  # importing `typing` takes 3 ms
 if TYPE_CHECKING:
-    import argparse
-    from typing import Any
+    from holozen.messages import rcl_interfaces as r
 
-    from holozen import rcl_interfaces as r
-    from holozen.parser import Parser
+LIST = "/list_parameters"
+TOKENS = "@holozen/*/*/srv/rcl_interfaces/srv/ListParameters/**"
 
-VERBS = {
-    "list": "the parameters of all nodes, or of one",
-    "get": "the value of one",
-    "set": "set one or more, all or none of them",
-    "describe": "what parameters are, and which values they take",
-    "dump": "all values of a node, as YAML that `load` reads",
-    "load": "set what a file of `dump` says, all or nothing",
-}
-
-EXAMPLES = """examples:
-  holozen param list
-  holozen param get sim max_linear
-  holozen param set sim max_linear 0.5
-  holozen param describe sim max_linear
-  holozen param dump controller > controller.yaml
-  holozen param load controller controller.yaml"""
+LARGEST = 1_000_000  # characters of a file
+DEEPEST = 20  # sections within sections
+HERE = "ros__parameters"
+_EXPONENT = re.compile(r"[+-]?[0-9]+[eE][+-]?[0-9]+")  # a number except in YAML 1.1
+_PLAIN = re.compile(r"/?[A-Za-z][A-Za-z0-9_./]*")
+_NO_NAMES = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")  # not strings in YAML 1.1
+Word = bool | int | float | str
+Value = Word | list[bool] | list[int] | list[float] | list[str]
 
 
-def parser() -> Parser:
-    """The parser of all verbs."""
-    from argparse import RawDescriptionHelpFormatter
+class Nodes:
+    """The nodes with parameters, and the requests to them."""
 
-    from holozen.parser import Parser
+    def __init__(self, bus: Bus, timeout: float) -> None:
+        self._bus, self._timeout = bus, timeout
+        self.sessions: dict[str, list[str]] = {}
+        looking = background(lambda: bus.endpoints(TOKENS))
+        with deferred_interrupt():  # while nodes are discovered
+            from holozen.messages import codec, rcl_interfaces  # noqa: F401
 
-    parser = Parser(
-        prog="holozen param", description="Read and set the parameters of running nodes.", epilog=EXAMPLES,
-        formatter_class=RawDescriptionHelpFormatter,
-    )  # fmt: skip
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
-    for name, text in VERBS.items():
-        example = next(line.strip() for line in EXAMPLES.splitlines() if line.startswith(f"  holozen param {name}"))
-        _arguments(verbs.add_parser(name, help=text, description=text, epilog=f"example: {example}"), name)
-    return parser
+        for endpoint in looking():
+            if endpoint.kind == "srv" and endpoint.key.endswith(LIST):
+                self.sessions.setdefault(endpoint.key.removesuffix(LIST), []).append(endpoint.session[:6])
 
+    def only(self, name: str) -> str:
+        """`name` if exactly one node has it. Raises BusError that lists the nodes found."""
+        found = self.sessions.get(name, [])
+        if len(found) > 1:
+            raise BusError(f"{self.twins(name)}; a request would reach any of them: end all but one")
+        if not found:
+            raise BusError(f"there is no node {name!r} with parameters{self._there(name)}")
+        return name
 
-def _arguments(parser: Any, verb: str) -> None:
-    add = parser.add_argument
-    if verb == "list":
-        add("node", nargs="?", type=key, metavar="NODE")
-        add("--param-type", action="store_true", help="with their types")
-        add("--param-prefixes", nargs="+", default=[], metavar="PREFIX", help="only those below: PREFIX.name")
-    else:
-        add("node", type=key, metavar="NODE")
-    if verb == "get":
-        add("name", metavar="NAME")
-        add("--hide-type", action="store_true", help="the value alone")
-    elif verb == "set":
-        add("pairs", nargs="+", metavar="NAME VALUE")
-    elif verb == "describe":
-        add("names", nargs="+", metavar="NAME")
-    elif verb == "load":
-        add("file", metavar="FILE", help="YAML, or JSON; - for standard input")
-        add("--no-use-wildcard", action="store_true", help="leave out what the file says for /**")
-    add("--json", action="store_true", help="one JSON object a line")
-    told = "seconds to wait for a reply (default: 3)"
-    add("--timeout", type=number(0.01, 1e6, "s"), default=3.0, metavar="S", help=told)
-    parser.set_defaults(verb=verb)
-    connection.add_arguments(parser)
-    ros2_flags.add(parser, "param", verb)
+    def twins(self, name: str) -> str:
+        """The message that several nodes share a name."""
+        found = self.sessions[name]
+        return f"{len(found)} nodes are called {name!r} ({', '.join(sorted(found))})"
 
+    def names(self, node: str, prefixes: list[str] = []) -> list[str]:
+        """The parameters of a node, sorted."""
+        from holozen.messages import rcl_interfaces as r
 
-def _parsed(argv: list[str]) -> Any:
-    """The flags; those of one verb alone are ready sooner than those of all."""
-    if argv and argv[0] in VERBS and (args := quick.parsed(lambda words: _arguments(words, argv[0]), argv[1:])):
-        return args
-    return parser().parse_args(argv)
+        request = r.ListParametersRequest(prefixes)
+        return sorted(self._call(node, "list_parameters", request, r.ListParametersReply).result.names)
 
+    def values(self, node: str, names: list[str]) -> list[r.ParameterValue]:
+        """The values of the named parameters."""
+        from holozen.messages import rcl_interfaces as r
 
-def main(argv: list[str]) -> int:
-    args = _parsed(argv)
-    if args.verb == "set" and len(args.pairs) % 2:
-        parser().error(f"{args.pairs[-1]!r} has no value; write NAME VALUE, or more such pairs")
-    with Bus(f"param_{args.verb}", connection.from_arguments(args), patience=3.0, early=True) as bus:
-        wanted = _wanted(args) if args.verb in ("set", "load") else {}
-        nodes = Nodes(bus, args.timeout)
-        if args.verb == "list":
-            return list_names(args, nodes)
-        node = nodes.only(args.node)
-        if wanted:
-            return set_values(args, nodes, node, wanted)
-        return {"get": get, "describe": describe, "dump": dump}[args.verb](args, nodes, node)
+        reply = self._call(node, "get_parameters", r.GetParametersRequest(names), r.GetParametersReply)
+        return _as_many(reply.values, names, node)
 
+    def descriptors(self, node: str, names: list[str]) -> list[r.ParameterDescriptor]:
+        """The descriptors of the named parameters."""
+        from holozen.messages import rcl_interfaces as r
 
-def _wanted(args: argparse.Namespace) -> dict[str, Any]:
-    from holozen.cli import param_file
+        request = r.DescribeParametersRequest(names)
+        reply = self._call(node, "describe_parameters", request, r.DescribeParametersReply)
+        return _as_many(reply.descriptors, names, node)
 
-    if args.verb == "load":
-        return param_file.read(args.file, args.node, not args.no_use_wildcard)
-    names = args.pairs[::2]
-    if len(set(names)) < len(names):
-        raise BusError(f"a name is there twice among {', '.join(names)}")
-    return dict(zip(names, map(param_file.typed, args.pairs[1::2]), strict=True))
+    def set(self, node: str, wanted: dict[str, Any]) -> list[r.SetParametersResult]:
+        """Set parameters, all or none of them."""
+        from holozen.messages import rcl_interfaces as r
+
+        parameters = [r.Parameter(name, r.ParameterValue.of(value)) for name, value in wanted.items()]
+        reply = self._call(node, "set_parameters", r.SetParametersRequest(parameters), r.SetParametersReply)
+        return _as_many(reply.results, parameters, node)
+
+    def _call(self, node: str, verb: str, request: Any, reply: type[Any]) -> Any:
+        from holozen.messages.codec import CodecError
+
+        try:
+            return self._bus.call(f"{node}/{verb}", request, reply, self._timeout)
+        except CodecError as error:
+            raise BusError(str(error)) from None
+
+    def _there(self, name: str) -> str:
+        if not self.sessions:
+            return "; no node has any; `holozen up` starts a robot"
+        return nearest(name, sorted(self.sessions)) or f"; there are {', '.join(sorted(self.sessions))}"
 
 
-def list_names(args: argparse.Namespace, nodes: Nodes) -> int:
-    """Print the names of one node's parameters, or of all nodes', each node only once."""
+def _as_many(found: list[Any], asked: list[Any], node: str) -> list[Any]:
+    if len(found) != len(asked):
+        raise BusError(f"{node} gave {len(found)} answers to {len(asked)} questions")
+    return found
+
+
+def list_names(args: argparse.Namespace) -> int:
+    """Print the names of one node's parameters, or of all nodes', each node once."""
+    with open_bus(args, early=True) as bus:
+        return _list_names(args, Nodes(bus, args.timeout))
+
+
+def _list_names(args: argparse.Namespace, nodes: Nodes) -> int:
     code = 0
     for node in [nodes.only(args.node)] if args.node else sorted(nodes.sessions):
         if len(nodes.sessions[node]) > 1:
-            say(f"holozen param {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
+            report(f"holozen {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
             code = 1
         names = nodes.names(node, args.param_prefixes)
         kinds = _kinds(nodes, node, names) if args.param_type or args.json else {}
@@ -129,7 +139,7 @@ def list_names(args: argparse.Namespace, nodes: Nodes) -> int:
             row = {"node": node, "name": name, "type": kinds.get(name)}
             _show(args, row, f"  {name}" + (f" (type: {kinds[name]})" if args.param_type else ""))
     if not nodes.sessions:
-        say("no parameters: nobody is there who has any; `holozen up` starts some")
+        report("no parameters: no node has any; `holozen up` starts a robot")
     return code
 
 
@@ -143,28 +153,46 @@ def get(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
     return 0
 
 
-def set_values(args: argparse.Namespace, nodes: Nodes, node: str, wanted: dict[str, Any]) -> int:
-    """Set values, and say of each what became of it; 1 if they were refused."""
-    results = nodes.set(node, wanted)
+def set_values(args: argparse.Namespace) -> int:
+    """Set the values that are given, all or none of them."""
+    if len(args.pairs) % 2:
+        VERBS["param set"].parser().error(f"{args.pairs[-1]!r} has no value; write NAME VALUE, or more such pairs")
+    names = args.pairs[::2]
+    if len(set(names)) < len(names):
+        raise BusError(f"a name is there twice among {', '.join(names)}")
+    return _set(args, dict(zip(names, map(typed, args.pairs[1::2]), strict=True)))
+
+
+def load(args: argparse.Namespace) -> int:
+    """Set the values in a file, all or none of them."""
+    return _set(args, read_file(args.file, args.node, not args.no_use_wildcard))
+
+
+def _set(args: argparse.Namespace, wanted: dict[str, Any]) -> int:
+    """Set values and report the result of each; 1 if they were refused."""
+    with open_bus(args, early=True) as bus:
+        nodes = Nodes(bus, args.timeout)
+        node = nodes.only(args.node)
+        results = nodes.set(node, wanted)
     for (name, value), result in zip(wanted.items(), results, strict=True):
         row = {"node": node, "name": name, "value": value, "successful": result.successful, "reason": result.reason}
-        what = f"Set parameter {name}" if len(wanted) > 1 or args.verb == "load" else "Set parameter"
+        what = f"Set parameter {name}" if len(wanted) > 1 or args.verb == "param load" else "Set parameter"
         if result.successful or args.json:
             _show(args, row, f"{what} successful")
-        elif not result.reason.startswith("not set"):  # which says no more than that another one was refused
-            say(f"holozen param {args.verb}: {what.replace('Set', 'setting')} failed: {result.reason}")
+        elif not result.reason.startswith("not set"):  # that reason only means that another one was refused
+            report(f"holozen {args.verb}: {what.replace('Set', 'setting')} failed: {result.reason}")
     done = all(result.successful for result in results)
     if not done and len(wanted) > 1:
-        say(f"holozen param {args.verb}: none of the {len(wanted)} was set")
+        report(f"holozen {args.verb}: none of the {len(wanted)} was set")
     return 0 if done else 1
 
 
 def describe(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
-    """Print what parameters are."""
+    """Print the descriptions of parameters."""
     for row in nodes.descriptors(node, args.names):
         ranges: list[Any] = [*row.floating_point_range, *row.integer_range]
         low, high = (ranges[0].from_value, ranges[0].to_value) if ranges else (None, None)
-        told = {
+        described = {
             "node": node, "name": row.name, "type": _word(row.type), "description": row.description,
             "read_only": row.read_only, "min": low, "max": high, "constraints": row.additional_constraints,
         }  # fmt: skip
@@ -172,20 +200,16 @@ def describe(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
         lines += ["  Constraints:"] + ["    Read only: true"] * row.read_only
         lines += [f"    Min value: {low}", f"    Max value: {high}"] if ranges else []
         lines += [f"    Additional constraints: {row.additional_constraints}"] * bool(row.additional_constraints)
-        _show(args, told, *lines)
+        _show(args, described, *lines)
     return 0
 
 
 def dump(args: argparse.Namespace, nodes: Nodes, node: str) -> int:
     """Print all values of a node."""
-    from holozen.cli import param_file
-
     names = nodes.names(node)
     values = nodes.values(node, names)
     if not args.json:
-        print(
-            "\n".join(param_file.lines(node, {name: value.plain() for name, value in zip(names, values, strict=True)}))
-        )
+        print("\n".join(file_lines(node, {name: value.plain() for name, value in zip(names, values, strict=True)})))
     for name, value in zip(names, values, strict=True) if args.json else ():
         print(json.dumps(_row(node, name, value)))
     return 0
@@ -200,7 +224,7 @@ def _row(node: str, name: str, value: r.ParameterValue) -> dict[str, Any]:
 
 
 def _word(kind: int) -> str:
-    from holozen.rcl_interfaces import WORDS
+    from holozen.messages.rcl_interfaces import WORDS
 
     return WORDS[kind] if kind < len(WORDS) else "unknown"
 
@@ -212,3 +236,198 @@ def _text(value: Any) -> str:
 def _show(args: argparse.Namespace, row: dict[str, Any], *lines: str) -> None:
     for line in (json.dumps(row),) if args.json else lines:
         print(printable(line))
+
+
+def typed(text: str) -> Value:
+    """The value that a word denotes, or a list such as `[1.0, 2.5]`.
+
+    Anything but a finite number or a list of one type stays text, which a node that expects another type refuses.
+    """
+    if text.startswith("["):
+        from holozen.ros import parameter_yaml
+
+        try:
+            found = parameter_yaml.parse(text)
+        except ValueError:
+            return text
+        return found if isinstance(found, list) else text
+    return _scalar(text)
+
+
+def _scalar(text: str) -> Word:
+    if text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    if re.fullmatch(r"[+-]?[0-9]{1,18}", text):
+        return int(text)
+    try:
+        value = float(text)
+    except ValueError:
+        return text
+    return value if math.isfinite(value) and "_" not in text else text
+
+
+def file_lines(node: str, values: dict[str, Any]) -> list[str]:
+    """The file that holds `values`."""
+    rows = [f"    {_written_name(name)}: {_written(value)}" for name, value in values.items()]
+    return [f"{_written_name('/' + node)}:", f"  {HERE}:" + ("" if rows else " {}"), *rows]
+
+
+def read_file(path: str, node: str, wildcards: bool = True) -> dict[str, Value]:
+    """The values that a file has for a node. Raises BusError with the reason and the file's sections."""
+    sections = list(_sections(_parsed(path), "", path))
+    wanted = {node, "**", "*"} if wildcards else {node}
+    mine = [(place, values) for place, values in sections if place in wanted]
+    if not mine:
+        there = ", ".join(place for place, _ in sections) or f"none with {HERE}"
+        raise BusError(f"{path}: it has no section for the node {node!r}; sections: {there}")
+    found: dict[str, Value] = {}
+    for place, values in sorted(mine, key=lambda section: section[0] == node):  # its own section overrides the others
+        found |= dict(_flat(values, "", f"{path}: {place}"))
+    if not found:
+        raise BusError(f"{path}: it has no parameter for the node {node!r}")
+    return found
+
+
+def _parsed(path: str) -> Any:
+    text = _file_text(path)
+    try:
+        return json.loads(text)
+    except RecursionError:
+        raise BusError(f"{path}: it is nested too deeply") from None
+    except ValueError:
+        pass
+    try:
+        import yaml
+    except ModuleNotFoundError:
+        raise BusError(f"{path}: it is no JSON; to read YAML: pip install pyyaml") from None
+    try:
+        return yaml.safe_load(text)
+    except RecursionError:
+        raise BusError(f"{path}: it is nested too deeply") from None
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: an invalid date
+        raise BusError(f"{path}: it is no YAML: {' '.join(str(error).split())}") from None
+
+
+def _file_text(path: str) -> str:
+    try:
+        if path == "-":
+            text = sys.stdin.read(LARGEST + 1)
+        else:
+            with open(path, encoding="utf-8") as file:
+                text = file.read(LARGEST + 1)
+    except OSError as error:
+        raise BusError(f"cannot read {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise BusError(f"{path}: it is not UTF-8 text") from None
+    if len(text) > LARGEST:
+        raise BusError(f"{path}: it is longer than {LARGEST} characters")
+    return text
+
+
+def _sections(value: Any, place: str, path: str, depth: int = 0) -> Iterator[tuple[str, dict[Any, Any]]]:
+    """(node, values) of each section, also of nested ones: ROS 2 nests namespaces."""
+    if not isinstance(value, dict):
+        where = f"section {place!r}" if place else "it"
+        raise BusError(f"{path}: {where} has no names with values; write NODE: {{{HERE}: {{NAME: VALUE}}}}")
+    for name, inner in value.items():
+        if name == HERE and place:
+            if not isinstance(inner, dict):
+                raise BusError(f"{path}: {HERE} of {place!r} has no names with values")
+            yield place, inner
+        elif depth < DEEPEST:
+            yield from _sections(inner, f"{place}/{str(name).strip('/')}".strip("/"), path, depth + 1)
+
+
+def _flat(values: dict[Any, Any], prefix: str, where: str, depth: int = 0) -> Iterator[tuple[str, Value]]:
+    for name, value in values.items():
+        full = f"{prefix}{name}"
+        if isinstance(value, dict) and depth < DEEPEST:
+            yield from _flat(value, f"{full}.", where, depth + 1)
+        elif isinstance(value, bool):
+            yield full, value
+        elif isinstance(value, str):
+            yield full, _scalar(value) if _EXPONENT.fullmatch(value) else value
+        elif isinstance(value, int | float):
+            yield full, value if math.isfinite(value) and abs(value) < 2**63 else str(value)
+        elif isinstance(value, list):
+            yield full, _listed(value, f"{where}: {full}")
+        else:
+            wanted = "write a number, a word, true or false, or a list of one of them"
+            raise BusError(f"{where}: {full} is a {type(value).__name__}; {wanted}")
+
+
+def _listed(values: list[Any], where: str) -> Any:
+    words = [_scalar(each) if isinstance(each, str) and _EXPONENT.fullmatch(each) else each for each in values]
+    kinds = sorted({type(each).__name__ for each in words})
+    if len(kinds) > 1 or not set(kinds) <= {"bool", "int", "float", "str"}:
+        wanted = "write a list of numbers, of words, or of true and false"
+        raise BusError(f"{where} is a list of {', '.join(kinds)}; {wanted}")
+    return words
+
+
+def _written_name(name: str) -> str:
+    return name if _PLAIN.fullmatch(name) and name.lower() not in _NO_NAMES else _written(name)
+
+
+def _written(value: Value) -> str:
+    if isinstance(value, list):
+        return f"[{', '.join(map(_written, value))}]"
+    if isinstance(value, str):
+        quoted = json.dumps(value, ensure_ascii=False)
+        return "".join(c if c.isascii() and c.isprintable() else f"\\U{ord(c):08x}" for c in quoted)
+    text = json.dumps(value)
+    # YAML 1.1 requires a decimal point before the exponent.
+    return text.replace("e", ".0e") if isinstance(value, float) and "." not in text else text
+
+
+def _of_node(work: Callable[[argparse.Namespace, Nodes, str], int]) -> Callable[[argparse.Namespace], int]:
+    """Wraps a verb that works on one node, the one its arguments name."""
+
+    def run(args: argparse.Namespace) -> int:
+        with open_bus(args, early=True) as bus:
+            nodes = Nodes(bus, args.timeout)
+            return work(args, nodes, nodes.only(args.node))
+
+    return run
+
+
+def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
+    """A function that adds the flags of a verb to its parser."""
+
+    def fill(parser: argparse.ArgumentParser) -> None:
+        add = parser.add_argument
+        if verb == "list":
+            add("node", nargs="?", type=key, metavar="NODE")
+            add("--param-type", action="store_true", help="with their types")
+            add("--param-prefixes", nargs="+", default=[], metavar="PREFIX", help="only those below: PREFIX.name")
+        else:
+            add("node", type=key, metavar="NODE")
+        if verb == "get":
+            add("name", metavar="NAME")
+            add("--hide-type", action="store_true", help="the value alone")
+        elif verb == "set":
+            add("pairs", nargs="+", metavar="NAME VALUE")
+        elif verb == "describe":
+            add("names", nargs="+", metavar="NAME")
+        elif verb == "load":
+            add("file", metavar="FILE", help="YAML, or JSON; - for standard input")
+            add("--no-use-wildcard", action="store_true", help="ignore the file's section /**")
+        text = "seconds to wait for a reply (default: 3)"
+        add("--timeout", type=number(0.01, 1e6, "s"), default=3.0, metavar="S", help=text)
+
+    return fill
+
+
+VERBS = by_name(
+    Noun("param", "Read and set the parameters of running nodes.",
+        dict.fromkeys(("list", "get", "set", "describe", "dump", "load"), "param")),
+    *(Verb(f"param {name}", about, example, _arguments(name), run)
+    for name, about, example, run in (
+        ("list", "the parameters of all nodes, or of one", "", list_names),
+        ("get", "the value of one", "sim max_linear", _of_node(get)),
+        ("set", "set one or more, all or none of them", "sim max_linear 0.5", set_values),
+        ("describe", "describe parameters, and the values that they accept", "sim max_linear", _of_node(describe)),
+        ("dump", "all values of a node, as YAML that `load` reads", "controller > controller.yaml", _of_node(dump)),
+        ("load", "set the values of a file that `dump` wrote, all or none of them", "controller controller.yaml", load),
+    ))
+)  # fmt: skip

@@ -1,106 +1,77 @@
-"""`holozen plot`: numbers of live messages, as lines in the terminal."""
+"""`holozen plot` and `map`: draw numbers of live messages, and robots on the plane, in the terminal."""
+
+from __future__ import annotations
 
 import argparse
 import json
-import sys
 import threading
 import time
 from collections import deque
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
-from holozen import connection
 from holozen.bus import Bus
 from holozen.cli.fields import path, pick
-from holozen.cli.noun import Verb, add_packages
-from holozen.cli.reading import Reader
-from holozen.flags import Parser, number
+from holozen.cli.output import Reader
+from holozen.cli.verb import Verb, add_packages, by_name, open_bus, suggest_key
+from holozen.console import Screen, printable, report
+from holozen.flags import number
+from holozen.plotting import Plane, Point, Robot, draw, panels
 from holozen.process import stop_event
-from holozen.tap import Tap
-from holozen.tell import printable, say
+from holozen.transport.errors import ServiceError
+from holozen.transport.pubsub import RawSubscriber
 
 Field = tuple[str, str, tuple[str | int, ...]]
-"""A field as it was written, its key, and the path in the messages there."""
+"""A field as written on the command line, its key, and its path in the messages."""
 
-ABOUT = "draw numbers of live messages in the terminal, until Ctrl-C"
-EXAMPLE = "odom.twist.twist.linear.x cmd_vel.linear.x"
 MOST = 5000  # points of a line
-TICK = 0.02  # s between two looks at what came
-
-
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="holozen plot", description=ABOUT, epilog=f"example: holozen plot {EXAMPLE}")
-    arguments(parser)
-    parser.set_defaults(node="plot")
-    parser.add_argument("--json", action="store_true", help="the numbers as they come, one JSON object a line")
-    connection.add_arguments(parser)
-    return parser
-
-
-def arguments(parser: argparse.ArgumentParser) -> None:
-    """The flags of `holozen plot`, which are those of `holozen topic plot` too."""
-    parser.add_argument("fields", nargs="+", type=_field, metavar="KEY.FIELD", help="such as joint_states.position[0]")
-    parser.add_argument(
-        "-w", "--window", type=number(0.1, 3600, "s"), default=10.0, metavar="S", help="seconds shown (default: 10)"
-    )
-    parser.add_argument(
-        "--once", action="store_true", help="watch for one window, print one picture (or its numbers) and end"
-    )
-    add_packages(parser)
-    parser.add_argument("--ascii", action="store_true", help="without braille")
-
-
-def _field(text: str) -> "Field":
-    start = text.rpartition("/")[2]
-    name, _, rest = start.partition(".")
-    key = text[: len(text) - len(start)] + name
-    if not (name and rest):
-        raise argparse.ArgumentTypeError(f"{text!r}: write KEY.FIELD, such as odom.twist.twist.linear.x")
-    try:
-        return text, key.removeprefix("/"), path(rest)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(str(error)) from None
-
-
-def main(argv: list[str]) -> int:
-    return plot(parser().parse_args(argv))
+TICK = 0.02  # s between two polls
+TRAIL = 2000  # points
+STEP = 0.02  # m between two points of a trail
+ASK_EVERY = 2.0  # s between two requests to the sim and the pose service
+MOST_GOALS = 100
+NEAR, FAR = 0.15, 1e9  # m
+PATIENCE = 1.0  # s for a service to answer
 
 
 def plot(args: argparse.Namespace) -> int:
-    """Draw, or print as JSON, what comes on the fields of `args`, until interrupted."""
+    """Draw the fields of `args`, or print them as JSON, until interrupted."""
     stop = stop_event()
-    with Bus("plot", connection.from_arguments(args), patience=3.0, stop=stop) as bus:
+    with open_bus(args, stop=stop) as bus:
         lines = Lines(bus, args.fields, Reader(packages=args.package))
+        keys = [key for _, key, _ in args.fields]
+        hint = "" if args.once else suggest_key(bus, keys)
+        if hint:
+            report(f"holozen {args.verb}: waiting for {', '.join(dict.fromkeys(keys))}{hint}")
         try:
-            (_json if args.json else _draw)(lines, args, stop)
+            (_print_rows if args.json else _draw)(lines, args, stop)
         except LookupError as error:
-            say(f"{_named(args)}: {error.args[0]}")
+            report(f"holozen {args.verb}: {error.args[0]}")
             return 1
-    if lines.bad:
-        print(f"{lines.bad} messages could not be read", file=sys.stderr)
-    if not any(lines.points.values()):
-        say(f"{_named(args)}: nothing came; `holozen topic list` shows who publishes")
+        if lines.bad:
+            report(f"holozen {args.verb}: {lines.bad} messages could not be read")
+        if any(lines.points.values()):
+            return 0
+        hint = suggest_key(bus, keys) or "; `holozen topic list` shows the topics"
+        report(f"holozen {args.verb}: no messages on {', '.join(dict.fromkeys(keys))}{hint}")
         return 1
-    return 0
-
-
-def _named(args: argparse.Namespace) -> str:
-    return f"holozen {args.node.replace('_', ' ')}"
 
 
 class Lines:
-    """The points of each field, as they come."""
+    """The points of each field, as they arrive."""
 
     def __init__(self, bus: Bus, fields: list[Field], reader: Reader) -> None:
         self.points: dict[str, deque[tuple[float, float]]] = {name: deque(maxlen=MOST) for name, _, _ in fields}
-        self.bad = 0  # messages that nobody can read
+        self.bad = 0  # messages that could not be decoded
         self._fields, self._bus, self._reader = fields, bus, reader
-        self._taps: dict[str, Tap] = {}
+        self._taps: dict[str, RawSubscriber] = {}
         for key in dict.fromkeys(key for _, key, _ in fields):
-            self._taps[key] = bus.tap(key)
+            self._taps[key] = bus.subscribe_raw(key)
             self._taps[key].ends.append(bus.announce("sub", "any/msg/Any", key))
 
     def take(self) -> list[dict[str, float]]:
-        """Take in what waits, and return it. Raises LookupError for a field that is not there."""
+        """Take in the messages that wait, and return their rows. Raises LookupError for a missing field."""
         rows = []
         for key, tap in self._taps.items():
             while (sample := tap.try_recv()) is not None:
@@ -130,7 +101,7 @@ def _number(value: Any) -> float:
     raise LookupError(f"this is no number{inside}")
 
 
-def _json(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None:
+def _print_rows(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None:
     end = time.monotonic() + args.window if args.once else float("inf")
     while time.monotonic() < end and not stop.wait(TICK):
         for row in lines.take():
@@ -138,9 +109,6 @@ def _json(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None
 
 
 def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None:
-    from holozen.chart import panels
-    from holozen.cli.screen import Screen
-
     begun = time.monotonic()
     picture: list[str] = []
     with Screen(args.once, args.ascii) as screen:
@@ -158,4 +126,176 @@ def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None
         print("\n".join(line.rstrip() for line in picture), flush=True)
 
 
-VERBS = {"plot": Verb(ABOUT, f"holozen topic plot {EXAMPLE}", arguments, plot)}
+def draw_map(args: argparse.Namespace) -> int:
+    """Draw the robots, or print them as JSON, until interrupted."""
+    stop = stop_event()
+    with open_bus(args, stop=stop) as bus:
+        watcher = Watcher(bus)
+        try:
+            return _watch(watcher, args, stop)
+        finally:
+            bus.close()
+            watcher.join()
+
+
+def _watch(watcher: Watcher, args: argparse.Namespace, stop: threading.Event) -> int:
+    single = args.once or args.json
+    due = time.monotonic() + (args.wait if single else 0.0)
+    with Screen(single, args.ascii) as screen:
+        while not stop.wait(TICK):
+            watcher.take()
+            if (now := time.monotonic()) < due:
+                continue
+            due = now + screen.every
+            plane = watcher.plane()
+            if args.json:
+                print(json.dumps(_plane_as_json(plane)), flush=True)
+            elif screen.terminal or plane.robots or plane.objects:
+                screen.show([printable(line) for line in draw(plane, screen.size, screen.ascii)])
+            if single:
+                break
+    if not (watcher.poses or watcher.objects):
+        report("holozen map: no robot is there; `holozen up` starts one")
+        return 1
+    return 0
+
+
+def _plane_as_json(plane: Plane) -> dict[str, object]:
+    robots = [{"name": one.name, "x": one.x, "y": one.y, "yaw": one.yaw} for one in plane.robots]
+    return {"robots": robots, "goals": plane.goals, "objects": plane.objects}
+
+
+class Watcher:
+    """Follows the odom of all robots, and calls the services periodically in a thread of its own."""
+
+    def __init__(self, bus: Bus) -> None:
+        from holozen.messages import Odometry
+
+        self.poses: dict[str, tuple[float, float, float]] = {}  # x, y, yaw by a robot's name
+        self.goals: list[Point] = []
+        self.objects: dict[str, Point] = {}
+        self._graph = bus.graph()
+        self._bus, self._odom = bus, bus.subscribe("**/odom", Odometry, depth=1024)
+        self._trails: dict[str, deque[Point]] = {}
+        self._moved, self._ended = threading.Event(), threading.Event()
+        self._asking = threading.Thread(target=self._ask, daemon=True)
+        self._asking.start()
+
+    def take(self) -> None:
+        """Take in the odom messages that wait."""
+        while (received := self._odom.try_recv()) is not None:
+            if received.message is not None:
+                name = received.sample.key.removesuffix("odom").removesuffix("/")
+                at = received.message.pose.pose
+                self._move(name, at.position.x, at.position.y, at.orientation.yaw())
+
+    def plane(self) -> Plane:
+        """The current state to draw."""
+        robots = [
+            Robot(name, x, y, yaw, [*self._trails[name], (x, y)]) for name, (x, y, yaw) in sorted(self.poses.items())
+        ]
+        others = {name: at for name, at in self.objects.items() if name not in self.poses}
+        return Plane(robots, self.goals, others, ", ".join(map(_place, robots)))
+
+    def join(self) -> None:
+        """Wait for the polling thread once the bus is closed: no thread may be inside Zenoh at exit."""
+        self._ended.set()
+        self._asking.join(ASK_EVERY + PATIENCE)
+
+    def _move(self, name: str, x: float, y: float, yaw: float) -> None:
+        trail = self._trails.setdefault(name, deque(maxlen=TRAIL))
+        if not trail or abs(trail[-1][0] - x) + abs(trail[-1][1] - y) > STEP:
+            trail.append((x, y))
+        self.poses[name] = x, y, yaw
+        self._moved.set()
+
+    def _ask(self) -> None:
+        self._moved.wait(PATIENCE)  # the position of the robot at the root is needed to exclude it from the objects
+        while not self._ended.is_set():
+            try:
+                self.goals = self._ask_goals()
+                self.objects = self._ask_objects()
+            except ServiceError:
+                pass  # there is no server at the moment
+            except Exception:  # the bus was closed
+                return
+            self._ended.wait(ASK_EVERY)
+
+    def _ask_goals(self) -> list[Point]:
+        """All goals of all next_goal services."""
+        served = {one.key for one in self._graph.endpoints() if one.kind == "srv"}
+        keys = [key for key in sorted(served) if key.rpartition("/")[2] == "next_goal"]
+        return [goal for key in keys for goal in self._goals_of(key)]
+
+    def _goals_of(self, key: str) -> Iterator[Point]:
+        from holozen.messages import NextGoalReply, NextGoalRequest
+
+        for index in range(MOST_GOALS):
+            reply = self._bus.call(key, NextGoalRequest(index), NextGoalReply, PATIENCE)
+            yield reply.x_goal, reply.y_goal
+            if reply.end_of_list:
+                return
+
+    def _ask_objects(self) -> dict[str, Point]:
+        from holozen import entities
+
+        found = {}
+        for name in entities.names(self._bus):
+            at = entities.pose(self._bus, name).position
+            # The robot at the root has a name in the sim but not on its keys; its odom identifies it by position.
+            x, y, _ = self.poses.get("", (FAR, FAR, 0.0))
+            if abs(at.x - x) + abs(at.y - y) > NEAR:
+                found[name] = at.x, at.y
+        return found
+
+
+def _place(robot: Robot) -> str:
+    return f"{robot.name or 'robot'} x {robot.x:.2f} y {robot.y:.2f}"
+
+
+def _plot_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("fields", nargs="+", type=_field, metavar="KEY.FIELD", help="such as joint_states.position[0]")
+    parser.add_argument(
+        "-w", "--window", type=number(0.1, 3600, "s"), default=10.0, metavar="S", help="seconds shown (default: 10)"
+    )
+    parser.add_argument(
+        "--once", action="store_true", help="watch for one window, print one picture (or its numbers) and end"
+    )
+    add_packages(parser)
+    parser.add_argument("--ascii", action="store_true", help="without braille")
+
+
+def _field(text: str) -> Field:
+    start = text.rpartition("/")[2]
+    name, _, rest = start.partition(".")
+    key = text[: len(text) - len(start)] + name
+    if not (name and rest):
+        raise argparse.ArgumentTypeError(f"{text!r}: write KEY.FIELD, such as odom.twist.twist.linear.x")
+    try:
+        return text, key.removeprefix("/"), path(rest)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def _map_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--once", action="store_true", help="print one picture and end")
+    add("-w", "--wait", type=number(0.1, 3600, "s"), default=1.0, metavar="S",
+        help="with --once or --json: watch for S seconds first (default: 1)")  # fmt: skip
+    add("--ascii", action="store_true", help="without braille")
+
+
+_PLOT = partial(
+    Verb, about="draw fields of live messages in the terminal, until Ctrl-C",
+    example="odom.twist.twist.linear.x cmd_vel.linear.x", arguments=_plot_arguments, run=plot,
+    json="the numbers as they arrive, one JSON object a line",
+)  # fmt: skip
+ABOUT_MAP = (
+    "Draw the robots, their paths and their goals in the terminal, until Ctrl-C. East is x, north is y. "
+    "Positions are those of odom: with encoders, relative to where a robot started."
+)
+VERBS = by_name(
+    _PLOT("plot"),
+    _PLOT("topic plot"),
+    Verb("map", ABOUT_MAP, "--once", _map_arguments, draw_map, "what a picture would show, as one JSON object"),
+)

@@ -1,4 +1,4 @@
-"""`holozen release`: ends the stop of `holozen stop`. By itself it moves nothing."""
+"""`holozen release`: ends a `holozen stop`. By itself it moves nothing."""
 
 import argparse
 

@@ -1,4 +1,4 @@
-"""`holozen replay`: what is in a bag, onto the keys again, in time."""
+"""`holozen replay`: publish the messages of a bag again, at their times."""
 
 import argparse
 import json
@@ -7,45 +7,46 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from holozen import connection
 from holozen.bus import Bus
-from holozen.cli.screen import Line
+from holozen.console import Line, printable, report
 from holozen.flags import Parser, key, number
 from holozen.process import stop_event
-from holozen.tell import printable, say
+from holozen.transport import connection
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from holozen.bag.outlet import Outlet
-    from holozen.bag.player import Player
-    from holozen.bag.reader import Message
-    from holozen.bag.summary import Summary
+    from holozen.bag.player import Outlet, Plan, Player
+    from holozen.bag.reader import Message, Summary
 
 WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # us
-AGAIN = 0.02  # s between two rounds of a loop: a bag of one moment is no flood
-TOLD = 0.2  # s between two looks of the line in a terminal
+AGAIN = 0.02  # s between two rounds of a loop, so that a very short bag does not flood the bus
+SHOW_EVERY = 0.2  # s between two updates of the line in a terminal
 
 
 def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="holozen replay",
-        description="Publish what is in MCAP files again, as it was and in time. Keys that move robots are left out "
-        "unless --commands is given, and so are keys that somebody publishes now. In a terminal space pauses and goes "
-        "on, and the right arrow (or s) plays the next message while paused.",
+        description="Publish the messages of MCAP files again, unchanged and in time. Keys that move robots are left "
+        "out unless --commands is given, and so are keys that have a publisher now (see --remap). In a terminal, space "
+        "pauses and resumes, and the right arrow (or s) plays the next message during a pause.",
         epilog="example: holozen replay square.mcap --remap odom:=old/odom -r 2",
     )
     parser.add_argument("files", nargs="+", type=_file, metavar="FILE", help="played one after the other")
     parser.add_argument(
         "-r", "--rate", type=number(0.001, 1e6), default=1.0, metavar="X", help="times as fast (default: 1)"
     )
-    parser.add_argument("-l", "--loop", action="store_true", help="begin again at the end, until Ctrl-C")
-    parser.add_argument("--start-offset", type=number(0, 1e9, "s"), default=0.0, metavar="S", help="begin S seconds in")
-    parser.add_argument("--until", type=number(0, 1e9, "s"), metavar="S", help="end S seconds after the bag's start")
+    parser.add_argument("-l", "--loop", action="store_true", help="start again at the end, until Ctrl-C")
+    parser.add_argument(
+        "--start-offset", type=number(0, 1e9, "s"), default=0.0, metavar="S", help="start S seconds into the bag"
+    )
+    parser.add_argument(
+        "--until", type=number(0, 1e9, "s"), metavar="S", help="stop S seconds after the start of the bag"
+    )
     parser.add_argument("--topics", nargs="+", type=key, metavar="KEY", help="only these keys or key expressions")
     parser.add_argument("--remap", nargs="+", type=_remap, default=[], metavar="OLD:=NEW", help="play on another key")
     parser.add_argument(
-        "--commands", action="store_true", help="play what moves robots too; they are stopped at the end"
+        "--commands", action="store_true", help="also play keys that move robots; they are stopped at the end"
     )
     parser.add_argument("--json", action="store_true", help="the figures as one JSON object at the end")
     connection.add_arguments(parser)
@@ -67,9 +68,8 @@ def _remap(text: str) -> tuple[str, str]:
 
 def main(argv: list[str]) -> int:
     args = parser().parse_args(argv)
-    from holozen.bag.errors import BagError
-    from holozen.bag.reader import Bag
-    from holozen.bag.summary import summarize
+    from holozen.bag import BagError
+    from holozen.bag.reader import Bag, summarize
 
     stop = stop_event()
     try:
@@ -79,27 +79,24 @@ def main(argv: list[str]) -> int:
                 summaries.append(summarize(bag))
         return _replay(args, summaries, stop)
     except BagError as error:
-        say(f"holozen replay: {error}")
+        report(f"holozen replay: {error}")
         return 1
 
 
 def _replay(args: argparse.Namespace, summaries: list["Summary"], stop: threading.Event) -> int:
-    from holozen.bag.keys import keys
-    from holozen.bag.outlet import Outlet
-    from holozen.bag.plan import plan
-    from holozen.bag.player import Player
+    from holozen.bag.player import Outlet, Player, keys, plan
 
     channels = {channel for summary in summaries for channel in summary.streams}
     wire = connection.from_arguments(args)
-    # Zenoh drops a sample after a millisecond in a full queue. Here it may wait: a bag is in no hurry.
+    # Zenoh drops a sample after a millisecond in a full queue; samples of a bag may wait longer.
     wire = wire.replace(cfg=(WAIT, *wire.cfg))
-    with Bus("replay", wire, patience=3.0, stop=stop) as bus:
-        others = [endpoint for endpoint in bus.graph().settled(bus.connected) if endpoint.session != bus.id]
+    with Bus("replay", wire, stop=stop) as bus:
+        others = [endpoint for endpoint in bus.endpoints() if endpoint.session != bus.id]
         made = plan(channels, others, topics=args.topics, remap=dict(args.remap), commands=args.commands)
         for name, why in made.left_out.items():
-            say(f"{name} is left out: {why}")
+            report(f"{name} is left out: {why}")
         if not made.targets:
-            say("holozen replay: there is nothing to play")
+            report(f"holozen replay: nothing was played{_advice(made)}")
             return 1
         outlet = Outlet(bus, made)
         outlet.settle()
@@ -108,18 +105,27 @@ def _replay(args: argparse.Namespace, summaries: list["Summary"], stop: threadin
             return _play(args, summaries, player, outlet, set(made.targets))
 
 
+def _advice(made: "Plan") -> str:
+    """How to have something played if nothing was."""
+    if made.published:
+        nodes = " and ".join(sorted(set(made.published.values())))
+        key = "odom" if "odom" in made.published else min(made.published)
+        return f"; end {nodes} first, or play under other keys, such as --remap {key}:=old/{key}"
+    return "; --commands plays what moves robots" if made.left_out else ": the bag holds no messages"
+
+
 def _play(
     args: argparse.Namespace, summaries: list["Summary"], player: "Player", outlet: "Outlet", wanted: set[object]
 ) -> int:
     start = min((summary.start for summary in summaries if summary.count), default=0)
     first = start + round(args.start_offset * 1e9)
     last = start + round(args.until * 1e9) if args.until is not None else 2**64
-    line = _Where(player, start, max(summary.end for summary in summaries))
+    line = _Position(player, start, max(summary.end for summary in summaries))
     begun = time.monotonic()
     try:
         while True:
             before = player.count
-            ended = player.play(_messages(args.files, wanted, first, last), line.tell)
+            ended = player.play(_messages(args.files, wanted, first, last), line.update)
             if not (args.loop and ended and player.count > before):
                 break
             time.sleep(AGAIN)
@@ -132,7 +138,7 @@ def _play(
     else:
         print(printable(f"played {player.count} messages in {seconds:.1f} s"))
     if ended and not player.count:
-        say("holozen replay: no message is between --start-offset and --until")
+        report("holozen replay: no message is between --start-offset and --until")
         return 1
     return 0
 
@@ -145,20 +151,20 @@ def _messages(files: "list[Path]", wanted: set[object], first: int, last: int) -
             yield from (m for m in bag.messages() if m.channel in wanted and first <= m.at <= last)
 
 
-class _Where:
-    """Where the bag stands, in a line that is written over. Only a terminal shows it."""
+class _Position:
+    """The position in the bag, on one line that is rewritten. Only a terminal shows it."""
 
     def __init__(self, player: "Player", start: int, end: int) -> None:
         self._player, self._start, self._end = player, start, end
-        self._line, self._told = Line(), 0.0
+        self._line, self._shown = Line(), 0.0
 
-    def tell(self, now: float) -> None:
-        """Show it, if it was not shown lately."""
-        if not self._line.shown or now - self._told < TOLD:
+    def update(self, now: float) -> None:
+        """Show the position, at most every SHOW_EVERY seconds."""
+        if not self._line.shown or now - self._shown < SHOW_EVERY:
             return
-        self._told = now
+        self._shown = now
         at = max(0, self._player.position - self._start) / 1e9
-        state = "paused: space goes on, the right arrow steps" if self._player.paused else "space pauses"
+        state = "paused: space resumes, the right arrow steps" if self._player.paused else "space pauses"
         text = f"{at:.2f} / {(self._end - self._start) / 1e9:.2f} s, {self._player.count} messages; {state}"
         self._line.show(text)
 

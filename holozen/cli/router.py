@@ -2,11 +2,11 @@
 
 import argparse
 
-from holozen import connection
 from holozen.bus import Bus
+from holozen.console import report
 from holozen.flags import Parser
 from holozen.process import stop_event, wait_for_end
-from holozen.tell import say
+from holozen.transport import connection
 
 
 def parser() -> argparse.ArgumentParser:
@@ -23,7 +23,7 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str]) -> int:
     where = connection.from_arguments(parser().parse_args(argv)).replace(mode="router")
     stop = stop_event()
-    with Bus("router", where, lasting=True):
-        say(f"router: listens at {', '.join(where.listen or (connection.DOOR,))}")
+    with Bus("router", where, lasting=True) as bus:
+        report(f"router: listens at {', '.join(bus.listens)}")
         wait_for_end(stop)
     return 0

@@ -1,11 +1,13 @@
 """`holozen run`: run a Python script that was written for ROS 2, without ROS."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from holozen import connection, flags
-from holozen.tell import say
+from holozen import flags
+from holozen.console import report
+from holozen.transport import connection
 
 if TYPE_CHECKING:
     from holozen.ros.executables import Script
@@ -20,10 +22,11 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("target", metavar="FILE.py|PACKAGE", help="the script, or the package of the executable")
     parser.add_argument("words", nargs=argparse.REMAINDER, metavar="[EXECUTABLE] ...",
-        help="the package's executable; what follows it, or FILE.py, is the script's own")  # fmt: skip
+        help="the package's executable; what follows it, or FILE.py, goes to the script, except for flags of holozen "
+             "that the script does not have")  # fmt: skip
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="the folder of package NAME, whose scripts, messages and services are used")  # fmt: skip
-    parser.add_argument("--force", action="store_true", help="also where ROS is sourced, whose rclpy is not used then")
+    parser.add_argument("--force", action="store_true", help="run even where ROS is sourced; its rclpy is not used")
     connection.add_arguments(parser)
     return parser
 
@@ -33,23 +36,62 @@ def main(argv: list[str]) -> int:
     from holozen.ros import executables, packages, runner
 
     if not args.force and (reason := runner.real_ros()):
-        say(f"holozen run: {reason}: start the script with ROS's own `ros2 run`, or over Zenoh with --force")
+        report(f"holozen run: {reason}: start the script with ROS's own `ros2 run`, or over Zenoh with --force")
         return 1
-    words = args.words[1:] if args.words[:1] == ["--"] else args.words
+    words, found = _split(args.words[1:] if args.words[:1] == ["--"] else args.words, ["--package"])
+    args = parser().parse_args([*found, args.target], args)
     try:
         script, words = _script(args.target, words, dict(args.package))
     except executables.NotFound as error:
-        say(f"holozen run: {error}")
+        report(f"holozen run: {error}")
         return 1
-    from holozen.ros import context, finder
+    source = script.path.read_text(errors="replace")
+    words, found = _split(words, [flag for flag in _BEHIND if flag not in source])
+    args = parser().parse_args([*found, args.target], args)
+    from holozen.ros import importer
+    from holozen.ros.rclpy import context
 
     context.connection = connection.from_arguments(args)
-    finder.install(packages.given, [script.root])
+    importer.install(packages.given, [script.root])
     return runner.run(script, words)
 
 
+def _split(words: list[str], flags: list[str]) -> tuple[list[str], list[str]]:
+    """The words for the script, and those of the given holozen flags among them that have a valid value."""
+    kept: list[str] = []
+    found: list[str] = []
+    waiting = list(words)
+    while waiting and waiting[0] not in ("--", "--ros-args"):
+        word = waiting.pop(0)
+        flag, equals, value = word.partition("=")
+        value = value if equals else "".join(waiting[:1])
+        if flag not in flags or not _is_valid(flag, value):
+            kept.append(word)
+            continue
+        found += [flag, value]
+        del waiting[: 0 if equals else 1]
+    return [*kept, *waiting], found
+
+
+def _is_valid(flag: str, value: str) -> bool:
+    try:
+        return bool(_BEHIND[flag](value))
+    except argparse.ArgumentTypeError:
+        return False
+
+
+_BEHIND: dict[str, Callable[[str], object]] = {
+    "--package": flags.package,
+    "--connect": connection.endpoint,
+    "--listen": connection.endpoint,
+    "--mode": ("peer", "client", "router").__contains__,
+    "--wire": ("json", "msgpack", "cdr").__contains__,
+}
+"""holozen flags that may also follow the script -> a function that accepts their values."""
+
+
 def _script(target: str, words: list[str], given: dict[str, Path]) -> "tuple[Script, list[str]]":
-    """What to run, and the words for it. Raises NotFound."""
+    """The script to run, and its words. Raises NotFound."""
     from holozen.ros import executables, packages
 
     path = Path(target).expanduser()

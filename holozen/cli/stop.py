@@ -1,27 +1,27 @@
-"""`holozen stop`: robots stand, whatever they are told, until `holozen release`."""
+"""`holozen stop`: robots ignore every command and stand still until `holozen release`."""
 
 import argparse
 import json
 import time
 from typing import TYPE_CHECKING
 
-from holozen import connection
 from holozen.bus import Bus
-from holozen.errors import TIMEOUT, BusError
+from holozen.console import printable, report
 from holozen.flags import Parser, number
-from holozen.tap import Sample
-from holozen.tell import printable, say
+from holozen.transport import connection
+from holozen.transport.errors import TIMEOUT, BusError
+from holozen.transport.pubsub import Sample
 
 if TYPE_CHECKING:
-    from holozen.replies import Replies
+    from holozen.transport.services import Replies
 
 TOKENS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/{verb}"
 DONE = {"stop": "is stopped", "release": "is released"}
-EVERY = 0.002  # s between two looks
-AGAIN = 0.5  # s after which one that does not answer is asked again
-PAUSE = 0.02  # s before one that refused is
-QUIET = 1.0  # s without another robot or sim, and all are known; a sim that is held up is met late
-NOTICE = 2.0  # s for the first one to be found, and for those that are named
+EVERY = 0.002  # s between two polls
+AGAIN = 0.5  # s without an answer until the request is repeated
+PAUSE = 0.02  # s until a refused request is repeated
+QUIET = 1.0  # s without a new robot or sim until all count as found; a busy sim is discovered late
+NOTICE = 2.0  # s to discover the first robot, and those named on the command line
 
 
 def main(argv: list[str]) -> int:
@@ -36,8 +36,8 @@ def parser(verb: str = "stop") -> argparse.ArgumentParser:
         epilog=f"example: holozen {verb} Fred",
     )
     parser.add_argument("robots", nargs="*", metavar="ROBOT", help="its name (default: all robots there are)")
-    parser.add_argument("--timeout", type=number(0.1, 1e6, "s"), default=3.0, metavar="S",
-        help="seconds in which every robot has to confirm (default: 3)")  # fmt: skip
+    parser.add_argument("--timeout", type=number(0.1, 1e6, "s"), default=5.0, metavar="S",
+        help="seconds to connect, and then for every robot to confirm (default: 5)")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="one JSON object a line")
     connection.add_arguments(parser)
     return parser
@@ -54,47 +54,34 @@ def run(verb: str, argv: list[str]) -> int:
             connected = bus.connected()
             code = orders.report()
     except BusError as error:
-        say(f"holozen {verb}: nobody was reached: {error}")
+        report(f"holozen {verb}: no robot was reached: {error}")
         return 1
     if not orders.there:
-        who = "no robot was found" if connected else hung(where.connect) or "nobody is there"
-        say(f"holozen {verb}: {who}; `holozen list` shows what a sim has, --connect where to look")
+        reason = f"no robot was found{connection.FORBIDDEN}" if connected else f"no nodes found at {where.where}"
+        report(f"holozen {verb}: {reason}; `holozen list` shows what a sim has, --connect where to look")
     return code
 
 
-def hung(endpoints: tuple[str, ...] | None) -> str:
-    """Who holds one of the `endpoints` but does not speak Zenoh, as a process does that Ctrl-Z has put to sleep."""
-    import socket
-
-    for endpoint in (connection.DOOR,) if endpoints is None else endpoints:
-        host, _, port = endpoint.partition("?")[0].removeprefix("tcp/").rpartition(":")
-        try:
-            socket.create_connection((host, int(port)), timeout=0.2).close()
-        except (OSError, ValueError):
-            continue
-        return f"who holds {endpoint} does not answer, so nobody can be reached: end that process first"
-    return ""
-
-
 class Order:
-    """What one robot is told. It is told again until all who serve its key have confirmed: two sims may."""
+    """The request to one robot, repeated until every server of its key has confirmed: two sims may share it."""
 
     def __init__(self, robot: str, key: str) -> None:
         self.robot, self.key, self.confirmed = robot, key, False
+        self.discovered = False  # by the token of its service; those that are named are asked without
         self.servers: set[str] = set()
-        self.told = False  # that it was confirmed
+        self.printed = False  # its confirmation
         self.message = ""
         self._replies: Replies | None = None
         self._good, self._due = 0, 0.0
 
     def look(self, bus: Bus, now: float) -> bool:
-        """Ask, or see what was answered; whether it was confirmed just now."""
-        if self.confirmed and self._good < len(self.servers):  # another sim was met since
+        """Send the request or read its replies; returns whether it was confirmed just now."""
+        if self.confirmed and self._good < len(self.servers):  # another sim was discovered since
             self.confirmed, self._replies = False, None
         if self.confirmed or (self._replies is None and now < self._due):
             return False
         if self._replies is None:
-            self._replies, self._good = bus.ask_all(self.key, AGAIN), 0
+            self._replies, self._good = bus.ask_all(self.key, max(AGAIN, bus.took)), 0
         try:
             while reply := self._replies.try_recv():
                 self._read(reply)
@@ -108,24 +95,23 @@ class Order:
             success, self.message = _read(reply.payload, reply.encoding)
             self._good += success
         elif reply != TIMEOUT:
-            from holozen.server import refusal
+            from holozen.transport.services import refusal
 
             self.message = str(refusal(reply))
 
 
 def _read(payload: bytes, encoding: str) -> tuple[bool, str]:
-    """Success and message of a reply. JSON needs none of the codec, which takes time to load."""
+    """Success and message of a reply. JSON is read without the codec, which takes time to load."""
     if encoding.startswith("application/json"):
         try:
             value = json.loads(payload)
             return value["success"] is True, str(value["message"])
         except (ValueError, TypeError, KeyError, RecursionError):
             return False, "its reply is no TriggerReply"
-    from holozen import codec
-    from holozen.messages import TriggerReply
+    from holozen.messages import TriggerReply, codec
 
     try:
-        reply = codec.decode(payload, encoding, (TriggerReply,))
+        reply = codec.decode(payload, encoding, (TriggerReply,), tolerant=True)
     except codec.CodecError as error:
         return False, f"its reply is {error}"
     return reply.success, reply.message
@@ -138,33 +124,42 @@ class Orders:
         self._bus, self._verb, self._args = bus, verb, args
         self._graph = bus.graph(TOKENS.format(verb=verb))
         self._wanted = {name.removeprefix("/") for name in args.robots}
-        self._orders: dict[str, Order] = {}
+        # Those that are named, or else the robot at the root, are asked before they are discovered.
+        names = {name for name in self._wanted or {""} if not set(name) & set("*$?#")}
+        self._orders = {name: Order(name, f"{name}/{verb}".removeprefix("/")) for name in names}
         self.there: set[str] = set()  # robots
 
     def give(self) -> None:
-        """Tell every robot as soon as it is found, and print each that confirms."""
+        """Send the order to every robot as soon as it is discovered, and print each confirmation."""
         begin = changed = now = time.monotonic()
         while now - begin < self._args.timeout and not self._is_over(now - begin, now - changed):
             known = self._known()
             self._find()
             changed = changed if self._known() == known else now
             for order in self._orders.values():
-                if order.look(self._bus, now) and not order.told:
-                    order.told = True
+                if not order.look(self._bus, now):
+                    continue
+                self.there.add(order.robot)
+                if not order.printed:
+                    order.printed = True
                     self._print(order)
             time.sleep(EVERY)
             now = time.monotonic()
 
     def report(self) -> int:
-        """Say what was not done, where there are robots. Returns the exit code."""
-        late = [order for order in self._orders.values() if not order.confirmed]
+        """Report robots that did not confirm or were not found. Returns the exit code."""
+        late = [order for order in self._orders.values() if order.discovered and not order.confirmed]
         for order in late:
             self._print(order)
         missing = sorted(self._wanted - self.there)
         if missing and self.there:
             there = ", ".join(map(_named, sorted(self.there)))
-            say(f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there are: {there}")
-        return 1 if late or missing or not self.there else 0
+            report(f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there are: {there}")
+        # The robot at the root answered, but without a token: there may be others that were not asked.
+        hidden = not self._wanted and any(order.confirmed and not order.discovered for order in self._orders.values())
+        if hidden:
+            report(f"holozen {self._verb}: other robots may not have been discovered{connection.FORBIDDEN}")
+        return 1 if late or missing or hidden or not self.there else 0
 
     def _find(self) -> None:
         for order in self._orders.values():
@@ -174,18 +169,21 @@ class Orders:
             self.there.add(robot)
             if not self._wanted or robot in self._wanted:
                 order = self._orders.setdefault(robot, Order(robot, endpoint.key))
+                order.discovered = True
                 order.servers.add(endpoint.session)
 
     def _known(self) -> tuple[int, int]:
-        """How many robots there are, and in how many sims those that are told."""
+        """The number of robots discovered, and of servers that the orders go to."""
         return len(self.there), sum(len(order.servers) for order in self._orders.values())
 
     def _is_over(self, since: float, quiet: float) -> bool:
-        if not all(order.confirmed for order in self._orders.values()):
+        if not all(order.confirmed for order in self._orders.values() if order.discovered):
             return False
-        if not self.there or self._wanted - self.there:  # a sim that is busy is met late
-            return since > NOTICE
-        return quiet > QUIET
+        if not self.there:  # among thousands of tokens, those of robots come late
+            return False
+        if self._wanted - self.there:
+            return since > max(NOTICE, self._bus.took)
+        return quiet > max(QUIET, self._bus.took)
 
     def _print(self, order: Order) -> None:
         name, confirmed, message = order.robot, order.confirmed, order.message
@@ -197,7 +195,7 @@ class Orders:
             return print(printable(f"{_named(name)} {DONE[self._verb]}{more}"), flush=True)
         because = f" ({message})" if message else ""
         risk = "; it may move" if self._verb == "stop" else ""
-        return say(f"{_named(name)} did not confirm within {self._args.timeout:g} s{because}{risk}")
+        return report(f"{_named(name)} did not confirm within {self._args.timeout:g} s{because}{risk}")
 
 
 def _named(robot: str) -> str:

@@ -1,4 +1,4 @@
-"""`holozen up`: the main job in one command, every part a process of its own."""
+"""`holozen up`: start sim, pose service, controller and teleop, each as a process of its own."""
 
 import argparse
 import contextlib
@@ -11,11 +11,12 @@ import threading
 import time
 from typing import IO, Any
 
-from holozen import connection, flags
+from holozen import flags
+from holozen.console import report
 from holozen.process import dies_with_parent, stop_event
-from holozen.tell import say
+from holozen.transport import connection
 
-GRACE = 1.2  # s for the commanding processes to stop the robot; the sim comes after them
+GRACE = 1.2  # s for the commanding processes to stop the robot; the sim ends after them
 SIM_GRACE = 0.5  # s
 LOOK = 0.05  # s
 LAST_LINES = 20
@@ -29,13 +30,26 @@ def parser() -> argparse.ArgumentParser:
         description="Start the sim, the controller, the pose service, and the teleop if there is a terminal.",
         epilog="example: holozen up --robot my_bot.urdf.xacro",
     )
-    parser.add_argument("--robot", type=flags.robot_file, metavar="FILE[=NAME]", help="as for `holozen sim --robot`")
-    for flag in ("--world", "--rtf", "--drive"):
-        parser.add_argument(flag, help=f"as for `holozen sim {flag}`")
-    parser.add_argument("--package", action="append", default=[], metavar="NAME=DIR", help="as for `holozen sim`")
-    for flag in ("--shape", "--size", "--goals"):
-        parser.add_argument(flag, help=f"as for `holozen pose-service {flag}`")
-    parser.add_argument("--laps", default="0", help="as for `holozen controller --laps` (default: 0, for ever)")
+    add = parser.add_argument
+    add("--robot", type=flags.robot_file, metavar="FILE[=NAME]",
+        help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root)")  # fmt: skip
+    add("--world", metavar="FILE", help="an SDF file (default: gazebo.world)")
+    add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
+    add("--drive", metavar="planar_move", help="the drive of a robot whose file has none")
+    add(
+        "--package",
+        action="append",
+        default=[],
+        metavar="NAME=DIR",
+        help="the folder of package NAME, for $(find NAME)",
+    )
+    add("--allow-env", action="append", default=[], metavar="NAME",
+        help="let the robot's file read this environment variable, as $(env NAME)")  # fmt: skip
+    add("--shape", metavar="SHAPE",
+        help="of the goals: square, triangle, rectangle, infinity or hexagon (default: square)")  # fmt: skip
+    add("--size", metavar="M", help="the side of that shape (infinity: half its length) in m")
+    add("--goals", metavar="FILE", help="goals from a file instead: x y theta a line")
+    add("--laps", metavar="N", default="0", help="times round the goals; 0: for ever (default: 0)")
     connection.add_arguments(parser)
     return parser
 
@@ -45,13 +59,14 @@ def main(argv: list[str]) -> int:
     stop = stop_event()
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     if not has_terminal:
-        say("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
+        report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
     with tempfile.TemporaryFile("w+", errors="replace") as log:
         team = Team(connection.from_arguments(args).arguments(), log if has_terminal else None)
         try:
             robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
             packages = [word for package in args.package for word in ("--package", package)]
+            packages += [word for name in args.allow_env for word in ("--allow-env", name)]
             team.start("sim", [*robot, *packages, *_flags(args, "world", "rtf", "drive")])
             team.start("pose-service", _flags(args, "shape", "size", "goals"))
             name = [args.robot[1]] if args.robot and args.robot[1] else []
@@ -63,12 +78,12 @@ def main(argv: list[str]) -> int:
             team.end()
             if has_terminal:
                 _restore(terminal)
-            _tell_last(log)
+            _report_last(log)
     return 1 if failed else 0
 
 
 class Team:
-    """The processes of one `up`. Their words go to `log`, or where ours go if that is None."""
+    """The processes of one `up`. Their output goes to `log`, or to ours if that is None."""
 
     def __init__(self, where: list[str], log: IO[str] | None) -> None:
         self._where, self._log = where, log
@@ -87,7 +102,7 @@ class Team:
         )
 
     def watch(self, stop: threading.Event) -> bool:
-        """Wait until told to stop, the teleop was quit, one failed, or all are done. Whether one failed."""
+        """Wait until `stop` is set, the teleop was quit, a process failed, or all ended. Returns whether one failed."""
         while self._running and not stop.wait(LOOK):
             for verb, process in list(self._running.items()):
                 code = process.poll()
@@ -95,22 +110,22 @@ class Team:
                     continue
                 del self._running[verb]
                 if code > 0:
-                    self._say(f"up: {verb} failed with exit code {code}; ending the others")
+                    self._report(f"up: {verb} failed with exit code {code}; ending the others")
                 if code < 0:
-                    self._say(f"up: {verb} was ended by signal {-code}; `holozen {verb}` starts it again")
+                    self._report(f"up: {verb} was ended by signal {-code}; `holozen {verb}` starts it again")
                 if code > 0 or verb == "teleop":
                     return code > 0
         return False
 
-    def _say(self, text: str) -> None:
-        """Tell a person, later if the terminal belongs to the teleop now."""
+    def _report(self, text: str) -> None:
+        """Report a line; after the end if the teleop owns the terminal."""
         if self._log:
             self._log.write(f"{text}\n")
         else:
-            say(text)
+            report(text)
 
     def end(self) -> None:
-        """End what runs: first who commands the robot, then the sim."""
+        """End the processes: first those that command the robot, then the sim."""
         sim = self._running.pop("sim", None)
         _end(self._running, GRACE)
         _end({"sim": sim} if sim else {}, SIM_GRACE)
@@ -124,7 +139,7 @@ def _end(running: dict[str, subprocess.Popen[bytes]], grace: float) -> None:
         try:
             process.wait(max(0.0, deadline - time.monotonic()))
         except subprocess.TimeoutExpired:
-            say(f"up: {verb} did not end within {grace} s and was killed")
+            report(f"up: {verb} did not end within {grace} s and was killed")
             process.kill()
             process.wait()
 
@@ -134,13 +149,13 @@ def _flags(args: argparse.Namespace, *names: str) -> list[str]:
 
 
 def _restore(terminal: list[Any]) -> None:
-    """Leave the terminal as it was, also after a teleop that was killed."""
+    """Restore the terminal, also after the teleop was killed."""
     with contextlib.suppress(OSError, termios.error):
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, terminal)
         print(SCREEN_LEFT, end="", flush=True)
 
 
-def _tell_last(log: IO[str]) -> None:
+def _report_last(log: IO[str]) -> None:
     log.seek(0)
     for line in log.readlines()[-LAST_LINES:]:
-        say(line.rstrip())
+        report(line.rstrip())

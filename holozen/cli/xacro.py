@@ -1,15 +1,28 @@
-"""`holozen xacro`: expand a xacro file, without ROS."""
+"""`holozen xacro`: expand a xacro file, without ROS; with --watch again on every save."""
 
 import argparse
+import contextlib
 import json
 import os
 import sys
+import threading
+from collections.abc import Collection, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from holozen import connection, flags
+from holozen import flags
+from holozen.console import report
+from holozen.process import stop_event
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import expand_xacro
-from holozen.tell import say
+from holozen.robot.xacro import SAVED, Inputs, Outcome, expand_xacro, now, process, unchanged
+from holozen.transport import connection
+from holozen.transport.errors import BusError
+
+if TYPE_CHECKING:
+    from holozen.bus import Bus
+
+LOOK = 0.2  # s
+SETTLED = 0.05  # s without a change: an editor may truncate a file before writing it
 
 
 def parser() -> argparse.ArgumentParser:
@@ -23,12 +36,14 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="the folder of package NAME, for $(find NAME)")  # fmt: skip
-    told = "one JSON object a line: the URDF, or with --watch what became of each save"
-    parser.add_argument("--json", action="store_true", help=told)
-    watch = parser.add_argument_group("watch", "Expand again on every save, and put the robot anew into a running sim.")
+    parser.add_argument("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
+        help="let the file read this environment variable, as $(env NAME)")  # fmt: skip
+    text = "one JSON object a line: the URDF, or with --watch the result of each save"
+    parser.add_argument("--json", action="store_true", help=text)
+    watch = parser.add_argument_group("watch", "Expand again on every save, and respawn the robot in a running sim.")
     watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
     watch.add_argument("--name", type=flags.robot, metavar="NAME", help="the robot's name (default: as in the file)")
-    watch.add_argument("--drive", choices=("planar_move",), default="", help="how to move one whose file has no drive")
+    watch.add_argument("--drive", choices=("planar_move",), default="", help="the drive of a robot whose file has none")
     connection.add_arguments(parser)
     return parser
 
@@ -37,14 +52,12 @@ def main(argv: list[str]) -> int:
     args = parser().parse_intermixed_args(argv)
     try:
         _check(args)
-        given = dict(map(_pair, args.args)), dict(args.package)
+        given = dict(map(_pair, args.args)), dict(args.package), frozenset(args.allow_env)
         if args.watch:
-            from holozen.cli.xacro_watch import watch
-
             return watch(args, *given)
         _give(args, expand_xacro(args.file, *given))
     except RobotError as error:
-        say(f"holozen xacro: {error}")
+        report(f"holozen xacro: {error}")
         return 1
     return 0
 
@@ -79,12 +92,12 @@ def _print(text: str) -> None:
     except BrokenPipeError:
         raise  # the reader has seen enough
     except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # what is left would be tried again
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the rest would be written again at exit
         raise RobotError(f"cannot write to standard output: {error.strerror}") from None
 
 
 def _encoded(text: str) -> bytes:
-    # Bytes of the environment that were no UTF-8 come out as they were.
+    # Bytes of the environment that are not UTF-8 are written unchanged.
     return text.encode("utf-8", "surrogateescape")
 
 
@@ -100,3 +113,74 @@ def _pair(text: str) -> tuple[str, str]:
     if not assign or not name:
         raise RobotError(f"{text!r}: write name:=value")
     return name, value
+
+
+def watch(
+    args: argparse.Namespace, values: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
+) -> int:
+    """Expand on every save and report the result, until stopped; an error waits for the next save."""
+    stop = stop_event()
+    with contextlib.ExitStack() as ends:
+        bus = None
+        if args.name is not None or not args.output:
+            from holozen.bus import Bus
+
+            bus = ends.enter_context(Bus("xacro", connection.from_arguments(args), lasting=True, stop=stop))
+        inputs: Inputs = {"file": {str(args.file): None}}
+        while not stop.is_set():
+            before = now(inputs, args.file, packages)  # later saves are noticed
+            outcome = _expanded(args.file, values, packages, allow_env)
+            _report(args, *((outcome.error, False) if outcome.error else _used(args, outcome, values, packages, bus)))
+            inputs = outcome.inputs or before
+            inputs["file"].setdefault(str(args.file), before["file"].get(str(args.file)))
+            _wait_for_save(inputs, args.file, packages, stop)
+    return 0
+
+
+def _expanded(
+    path: Path, values: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
+) -> Outcome:
+    try:
+        return process(path, values, packages, allow_env)
+    except RobotError as error:
+        return Outcome(error=str(error))
+
+
+def _used(
+    args: argparse.Namespace,
+    outcome: Outcome,
+    values: Mapping[str, str],
+    packages: Mapping[str, Path],
+    bus: "Bus | None",
+) -> tuple[str, bool]:
+    """The result of a save in words, and whether all of it succeeded."""
+    text = f"{args.file} expanded"
+    try:
+        if args.output:
+            write(args.output, outcome.text)
+            text += f", {args.output} written"
+        if bus:
+            from holozen.cli.spawn import spawn_file
+
+            name, drive = args.name or "", args.drive
+            text += (
+                f", {spawn_file(bus, args.file, name, None, True, values, packages, drive, allow_env=args.allow_env)}"
+            )
+    except (RobotError, BusError) as error:
+        return f"{text}, but {error}", False
+    return text, True
+
+
+def _report(args: argparse.Namespace, text: str, done: bool) -> None:
+    if args.json:
+        print(json.dumps({"file": str(args.file), "done": done, "text": text}), flush=True)
+    else:
+        report(f"holozen xacro: {text}")
+
+
+def _wait_for_save(inputs: Inputs, path: Path, packages: Mapping[str, Path], stop: threading.Event) -> None:
+    saved = {kind: answers for kind, answers in inputs.items() if kind in SAVED}
+    while unchanged(saved, path, packages) and not stop.wait(LOOK):
+        pass
+    while (latest := now(saved, path, packages)) != saved and not stop.wait(SETTLED):
+        saved = latest

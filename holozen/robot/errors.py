@@ -4,17 +4,17 @@ MOST = 2000  # characters of a message
 
 
 class RobotError(ValueError):
-    """A robot cannot be used as it is written. One line: where, what is wrong, what is allowed, what to do.
+    """A robot cannot be used as written. One line: where, what is wrong, what is allowed, what to do.
 
-    Of a message that grows long in spite of `cut` and `listed`, the first MOST characters are kept.
+    Messages that are long in spite of `cut` and `listed` are truncated to MOST characters.
     """
 
-    def __init__(self, told: str) -> None:
-        super().__init__(told if len(told) <= MOST else told[: MOST - 3] + "...")
+    def __init__(self, message: str) -> None:
+        super().__init__(message if len(message) <= MOST else message[: MOST - 3] + "...")
 
 
 def cut(text: str, most: int = 80) -> str:
-    """A text of the file in quotes, at most `most` characters of it."""
+    """Text from the file in quotes, truncated to `most` characters."""
     return repr(text if len(text) <= most else text[: most - 3] + "...")
 
 
@@ -24,8 +24,8 @@ def listed(names: list[str], most: int = 12) -> str:
     return shown + f" and {len(names) - most} more" if len(names) > most else shown or "none"
 
 
-def near(name: str, known: list[str]) -> str:
-    """Words that ask whether the name in `known` that looks like `name` was meant, or nothing."""
+def suggest(name: str, known: list[str]) -> str:
+    """ "; did you mean ...?" with the closest match in `known`, for the end of a message; else nothing."""
     from difflib import get_close_matches
 
     match = get_close_matches(name[:80], known, 1)

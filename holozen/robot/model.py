@@ -1,43 +1,245 @@
-"""A robot: its links, joints and drive, checked."""
+"""The contents of robot and world files as plain data: links, joints, drives, robots and worlds."""
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
 
-from holozen.robot.drives import Drive
-from holozen.robot.errors import RobotError
-from holozen.robot.gazebo import read_gazebo
-from holozen.robot.massless import check_drive, massless, tell_massless, without
-from holozen.robot.materials import read_materials
-from holozen.robot.mimics import check_mimics
-from holozen.robot.parts import Inertial, Joint, Limits, Link, Pose, Sensor, Shape, Transmission
-from holozen.robot.plugins import read_plugins
-from holozen.robot.sensors import read_sensors
-from holozen.robot.source import Source
-from holozen.robot.tag import Tag, read_xml
-from holozen.robot.transmissions import read_transmissions
-from holozen.robot.tree import root_of
-from holozen.robot.urdf import read_joint, read_link
-from holozen.robot.xacro import expand, is_xacro, read_text
+from holozen.robot.elements import Vector
+from holozen.wire import COMMAND_SILENCE
 
-__all__ = [
-    "Drive", "Inertial", "Joint", "Limits", "Link", "Pose", "RobotError", "RobotModel", "Shape",
-    "load", "parse", "planar_drive",
-]  # fmt: skip
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A frame in its parent frame: metres, and radians of roll, pitch, yaw about the parent's fixed x, y, z."""
+
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rpy: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Inertial:
+    """Mass in kg and `(ixx, ixy, ixz, iyy, iyz, izz)` in kg m^2 about the centre of mass, in the axes of
+    `pose`.
+
+    `pose` is the inertial frame in the link's. The tensor is positive definite, or all zero for a point mass.
+    """
+
+    pose: Pose
+    mass: float
+    inertia: tuple[float, float, float, float, float, float]
+
+
+Color = tuple[float, float, float, float]
+"""Red, green, blue, alpha, each from 0 to 1."""
+
+
+@dataclass(frozen=True, slots=True)
+class Shape:
+    """A visual or collision shape; `pose` is its frame in the link's.
+
+    `size` in metres by `kind`: "box" x, y, z; "cylinder" radius, length (along z); "sphere" radius; "plane" x, y (its
+    normal is z); "mesh" the three scale factors; "hull" nothing. `path` is a mesh's file, None if it was not found.
+    `points` in metres define a "hull" as their convex hull.
+    """
+
+    kind: str
+    size: tuple[float, ...]
+    pose: Pose
+    path: Path | None = None
+    color: Color | None = None
+    points: tuple[Vector, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Contact parameters of a link's collision shapes: friction coefficients (mu2 across mu1), stiffness in N/m and
+    damping in N s/m. None: the simulator's default.
+    """
+
+    mu1: float | None = None
+    mu2: float | None = None
+    kp: float | None = None
+    kd: float | None = None
+    self_collide: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """A rigid part. Without an `inertial` it has no mass."""
+
+    name: str
+    inertial: Inertial | None
+    visuals: tuple[Shape, ...]
+    collisions: tuple[Shape, ...]
+    surface: Surface = Surface()
+    gravity: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Effort in N or N m, velocity in m/s or rad/s, position in m or rad; infinite if the file sets none."""
+
+    effort: float = math.inf
+    velocity: float = math.inf
+    lower: float = -math.inf
+    upper: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that follows another one: multiplier * position + offset."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """`kind` is one of `JOINT_KINDS`. `pose` is the child link's frame in the parent's at joint position
+    zero; `axis` is a unit vector in the child's frame, (1, 0, 0) if the kind has none. `friction` is Coulomb friction,
+    in N m or N; `damping` in N m s/rad or N s/m.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    pose: Pose
+    axis: Vector
+    limits: Limits
+    friction: float = 0.0
+    damping: float = 0.0
+    mimic: Mimic | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A sensor on a link. `kind` as in the file, such as "imu" or "camera"; `rate` in Hz, 0: every step."""
+
+    name: str
+    kind: str
+    link: str
+    rate: float = 0.0
+    topic: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Transmission:
+    """A ros_control transmission: its joints and their hardware interfaces."""
+
+    name: str
+    kind: str
+    joints: tuple[str, ...]
+    interfaces: tuple[str, ...]
+    reduction: float = 1.0
+
+
+JOINT_KINDS = ("continuous", "revolute", "prismatic", "fixed", "floating", "planar")
+
+
+@dataclass(frozen=True, slots=True)
+class Planar:
+    """The whole robot moves over the plane at the commanded body-frame velocity: planar_move, VelocityControl."""
+
+
+@dataclass(frozen=True, slots=True)
+class Differential:
+    """Wheels on two sides: linear.x and angular.z are used, linear.y is ignored. Four or more make a skid-steer.
+
+    `left` and `right` name joints. `separation` between the sides and `radius` of the wheels are in metres; 0: measured
+    on the robot's links. `torque` in N m is the maximum of a wheel's motor, `acceleration` in m/s^2 the maximum
+    acceleration and deceleration of a wheel's rim. `encoder` is true if odometry integrates the wheels' rotation,
+    false if it is the true pose.
+    """
+
+    left: tuple[str, ...]
+    right: tuple[str, ...]
+    separation: float = 0.0
+    radius: float = 0.0
+    torque: float = math.inf
+    encoder: bool = True
+    acceleration: float = math.inf
+
+
+@dataclass(frozen=True, slots=True)
+class Mecanum:
+    """Four wheels with rollers at 45 degrees. Joints by position; metres; 0: measured on the robot's links.
+    `encoder` as for Differential.
+    """
+
+    front_left: str
+    front_right: str
+    back_left: str
+    back_right: str
+    separation: float = 0.0
+    wheelbase: float = 0.0
+    radius: float = 0.0
+    encoder: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Balancing:
+    """Two wheels that balance the body while it drives: wheely_boi."""
+
+    left: str = "jointL"
+    right: str = "jointR"
+
+
+Mechanism = Planar | Differential | Mecanum | Balancing
+
+
+def joints_of(mechanism: Mechanism) -> tuple[str, ...]:
+    """The joints that a mechanism turns."""
+    match mechanism:
+        case Planar():
+            return ()
+        case Differential():
+            return *mechanism.left, *mechanism.right
+        case Mecanum():
+            return mechanism.front_left, mechanism.front_right, mechanism.back_left, mechanism.back_right
+        case Balancing():
+            return mechanism.left, mechanism.right
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A drive: its topics, rates and limits.
+
+    All defaults except the timeout are those of Gazebo's planar_move.
+    Topics include their namespace and have no leading slash. `odometry_rate` in Hz of sim time.
+    `robot_base_frame` names a link, the child frame of odometry. `command_timeout` in seconds; -1 disables
+    it. `covariance` is the variance of x and y in m^2 and of yaw in rad^2. The limits are those of the file, in m/s,
+    rad/s, m/s^2 and rad/s^2.
+    """
+
+    command_topic: str = "cmd_vel"
+    odometry_topic: str = "odom"
+    odometry_frame: str = "odom"
+    odometry_rate: float = 20.0
+    robot_base_frame: str = ""
+    command_timeout: float = COMMAND_SILENCE
+    publish_odom: bool = True
+    publish_odom_tf: bool = True
+    covariance: tuple[float, float, float] = (1e-5, 1e-5, 1e-3)
+    mechanism: Mechanism = Planar()
+    max_linear: float = math.inf
+    max_angular: float = math.inf
+    max_linear_acceleration: float = math.inf
+    max_angular_acceleration: float = math.inf
+
 
 HERE = Pose()
-WORLD = "world"  # a root of this name is the ground: Gazebo holds what is fixed to it
-MOST_PARTS = 1000  # links, and joints; an engine has long lost real time by then
-Part = TypeVar("Part", Link, Joint)
+MOST_PARTS = 1000  # links, and joints; far beyond what an engine simulates in real time
 
 
 @dataclass(frozen=True, slots=True)
 class RobotModel:
-    """A tree of links from `root`, in the order of the file.
+    """A tree of links from `root`, in file order.
 
     `drive` is None for a robot without a plugin that drives it. Each of `warnings` is a line that names file, line,
-    element and what was done instead. A `static` one never moves. `pose` is where the file itself puts it (SDF).
+    element and what was done instead. A `static` one never moves. `pose` is the one given by the file itself (SDF).
     """
 
     name: str
@@ -52,82 +254,39 @@ class RobotModel:
     pose: Pose = HERE
 
 
-def load(
-    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, strict: bool = False
-) -> RobotModel:
-    """The robot in a xacro, URDF or SDF file. `args` and `packages` as for `xacro.expand`. Raises RobotError; with
-    `strict` for a missing or bad mesh too, instead of a box in its place and a warning.
-    """
-    text, place = read_text(path), ""
-    if is_xacro(path, text):
-        # Lines are those of the expanded text, so messages have to say so.
-        text, place = expand(path, args, packages), f"{path} (as `holozen xacro` prints it)"
-    return parse(text, path, packages, place, strict)
-
-
-def parse(
-    text: str,
-    origin: Path,
-    packages: Mapping[str, Path] = {},
-    place: str = "",
-    strict: bool = False,
-    confined: bool = False,
-) -> RobotModel:
-    """The robot in a URDF or SDF text. `origin` is the file that the text comes from: relative paths and packages
-    start there, and messages name it, or `place` if that is given. `strict` as for `load`; `confined` is for a text
-    that came over the wire, which may open files of known packages only. Raises RobotError.
-    """
-    tag = read_xml(text, place or str(origin))
-    source = Source(origin, packages, strict=strict, confined=confined)
-    if tag.name == "sdf":
-        from holozen.robot.sdf.models import parse_sdf  # which builds a RobotModel itself
-
-        return parse_sdf(tag, source)
-    if tag.name != "robot":
-        raise tag.wrong("is no robot; a URDF file starts with <robot name=...>, an SDF file with <sdf version=...>")
-    return _urdf(tag, source)
-
-
 def planar_drive(model: RobotModel) -> RobotModel:
-    """The model with planar_move on its root, for `--drive planar_move`; one that has a drive keeps it."""
+    """The model with planar_move on its root, for `--drive planar_move`; a model that has a drive keeps it."""
     return model if model.drive else replace(model, drive=Drive(robot_base_frame=model.root))
 
 
-def _urdf(robot: Tag, source: Source) -> RobotModel:
-    materials = read_materials(robot, source)
-    links = _by_name(robot, "link", lambda tag: read_link(tag, source, materials))
-    joints = _by_name(robot, "joint", lambda tag: read_joint(tag, source))
-    if not links:
-        raise robot.wrong("has no <link>; a robot has at least one")
-    root = root_of(robot, links, joints)
-    check_mimics(robot, joints, source)
-    dressed, static = read_gazebo(robot, links, joints, source)
-    lost = massless(links, joints, root)
-    tell_massless(robot, links, joints, lost, source)
-    kept, moving = without(dressed, joints, lost)
-    drive = read_plugins(robot, kept, joints, root, source)
-    check_drive(robot, drive, links, joints, root, lost, source)
-    return RobotModel(
-        name=robot.word("name"),
-        root=root,
-        links=kept,
-        joints=moving,
-        drive=drive,
-        sensors=tuple(sensor for sensor in read_sensors(robot, links, root, source) if sensor.link in kept),
-        transmissions=read_transmissions(robot, joints, source),
-        static=static or root == WORLD,
-        warnings=tuple(source.warnings),
-    )
+STEP = 1 / 240  # s
+GRAVITY = (0.0, 0.0, -9.8)  # m/s^2; Gazebo's default
 
 
-def _by_name(robot: Tag, name: str, read: Callable[[Tag], Part]) -> dict[str, Part]:
-    tags = robot.all(name)
-    if len(tags) > MOST_PARTS:
-        raise robot.wrong(f"has {len(tags)} {name}s; a robot has at most {MOST_PARTS} links and {MOST_PARTS} joints")
-    parts: dict[str, Part] = {}
-    for tag in tags:
-        part = read(tag)
-        if part.name in parts:
-            raise tag.wrong("is there twice; give each its own name")
-        parts[part.name] = part
-    return parts
+@dataclass(frozen=True)
+class WorldSpec:
+    """A world: physics step in s, gravity in m/s^2, real-time factor, and warnings.
+
+    `ground` is a level plane at z = 0. `models` are everything else: each has its own `pose` in the world, and a
+    plane that is tilted or at another height is a static model.
+    """
+
+    name: str = "default"
+    step: float = STEP
+    gravity: Vector = GRAVITY
+    rtf: float = 1.0
+    ground: bool = False
+    warnings: tuple[str, ...] = ()
+    models: tuple[RobotModel, ...] = ()
+
+
+def descend(root: str, joints: Mapping[str, Joint]) -> Iterator[str]:
+    """`root` and the links below it, every parent before its children."""
+    children: dict[str, list[str]] = {}
+    for joint in joints.values():
+        children.setdefault(joint.parent, []).append(joint.child)
+    waiting = [root]
+    while waiting:
+        name = waiting.pop()
+        yield name
+        waiting += children.get(name, [])

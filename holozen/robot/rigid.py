@@ -1,18 +1,18 @@
-"""A robot as one rigid body, all joints at zero: mass, inertia, and where each part is."""
+"""A robot as rigid bodies: frames, lumped masses and shapes, moving parts, and its height above the ground."""
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
+from holozen.robot.elements import Vector
 from holozen.robot.errors import RobotError, cut
-from holozen.robot.model import RobotModel
-from holozen.robot.parts import Inertial, Link, Pose, Shape
-from holozen.robot.rotation import Array, Quaternion, matrix_of, principal, quaternion_of, rpy_of, symmetric, triple
+from holozen.robot.inertia import is_absurd, moments
+from holozen.robot.model import HERE, Inertial, Joint, Link, Pose, RobotModel, Shape, Surface, descend
+from holozen.robot.rotation import Array, matrix_of, principal, quaternion_of, rpy_of, symmetric, triple
 from holozen.robot.shapes import solid
-from holozen.robot.solids import is_absurd, moments
-from holozen.robot.tag import Vector
-from holozen.robot.tree import descend
+from holozen.rotation import XYZW, conjugate, rotate
 
 SMALLEST_MASS = 1e-6  # kg; an engine divides by the mass
 SMALLEST_GYRATION = 1e-3  # m; and by the moments of inertia, of which a point mass would have none
@@ -31,12 +31,12 @@ class Frame:
         return cls(np.array(pose.xyz), matrix_of(pose.rpy))
 
     def __matmul__(self, inner: "Frame") -> "Frame":
-        """`inner`, which is told in this frame, in the frame that this one is told in."""
+        """The composition: `inner`, relative to this frame, in this frame's parent."""
         return Frame(self.position + self.rotation @ inner.position, self.rotation @ inner.rotation)
 
     @property
     def inverse(self) -> "Frame":
-        """The outer frame as this one sees it."""
+        """The inverse: the parent frame in this one."""
         back = self.rotation.T
         return Frame(-(back @ self.position), back)
 
@@ -51,14 +51,14 @@ class Frame:
         return triple(self.position)
 
     @property
-    def quaternion(self) -> Quaternion:
+    def quaternion(self) -> XYZW:
         """The rotation as x, y, z, w."""
         return quaternion_of(self.rotation)
 
 
 @dataclass(frozen=True, slots=True)
 class Axis:
-    """A joint at zero in the root frame: its origin in metres and the unit vector it turns about or slides on."""
+    """A joint at zero in the root frame: its origin in metres and the unit vector it turns about or slides along."""
 
     xyz: Vector
     direction: Vector
@@ -71,7 +71,7 @@ class PlacedShape:
     link: str
     shape: Shape
     xyz: Vector
-    quaternion: Quaternion
+    quaternion: XYZW
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,14 +79,22 @@ class Body:
     """One rigid body in the root frame.
 
     `mass` in kg, `centre` of mass in metres, principal moments `inertia` in kg m^2 about it, and their axes
-    as the quaternion x, y, z, w `axes`, which turns the principal frame into the root frame.
+    as the quaternion x, y, z, w `axes`, which rotates the principal frame into the root frame. `weightless` is the
+    part of the mass in kg that gravity does not pull.
     """
 
     mass: float
     centre: Vector
     inertia: Vector
-    axes: Quaternion
+    axes: XYZW
     collisions: tuple[PlacedShape, ...]
+    weightless: float = 0.0
+
+    def moment(self, axis: Vector) -> float:
+        """The moment of inertia in kg m^2 about an axis through the centre of mass, a unit vector in the root frame."""
+        a, b, c = rotate(conjugate(self.axes), axis)
+        x, y, z = self.inertia
+        return x * a * a + y * b * b + z * c * c
 
 
 def link_frames(model: RobotModel) -> dict[str, Frame]:
@@ -111,7 +119,7 @@ def joint_axes(model: RobotModel) -> dict[str, Axis]:
 def lump(model: RobotModel) -> Body:
     """All links as one body, as Gazebo lumps links over fixed joints.
 
-    A link without mass only lends its shapes. Raises RobotError for a robot without mass.
+    A link without mass only contributes its shapes. Raises RobotError for a robot without mass.
     """
     body = lump_links(model, link_frames(model))
     if body.mass < SMALLEST_MASS and not model.static:
@@ -121,15 +129,17 @@ def lump(model: RobotModel) -> Body:
 
 
 def lump_links(model: RobotModel, frames: Mapping[str, Frame]) -> Body:
-    """The links named by `frames` as one body, in the frame that `frames` are told in. Its moments of inertia are those
-    of its shapes where its own are far below them: an engine makes what turns so easily spin.
+    """The links in `frames` as one body, in the frame that `frames` are relative to. Moments of inertia far below those
+    of its shapes are replaced by them: in an engine so light a body would spin.
     """
     links = [model.links[name] for name in frames]
     parts = [(frames[link.name] @ Frame.of(link.inertial.pose), link.inertial) for link in links if link.inertial]
     mass, centre, inertia = _sum(parts)
     principals, axes = principal(_not_absurd(inertia, mass, links, frames))
     principals = np.maximum(principals, mass * SMALLEST_GYRATION**2)
-    return Body(mass, triple(centre), triple(principals), quaternion_of(axes), tuple(_collisions(links, frames)))
+    collisions = tuple(_collisions(links, frames))
+    weightless = sum(link.inertial.mass for link in links if link.inertial and not link.gravity)
+    return Body(mass, triple(centre), triple(principals), quaternion_of(axes), collisions, weightless)
 
 
 def _not_absurd(inertia: Array, mass: float, links: list[Link], frames: Mapping[str, Frame]) -> Array:
@@ -156,3 +166,136 @@ def _collisions(links: list[Link], frames: Mapping[str, Frame]) -> Iterable[Plac
         for shape in link.collisions:
             frame = frames[link.name] @ Frame.of(shape.pose)
             yield PlacedShape(link.name, solid(shape), frame.xyz, frame.quaternion)
+
+
+# Moving parts: links connected by fixed joints are one part.
+
+
+MOVING = ("continuous", "revolute", "prismatic")
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Links that move together, in the frame of the topmost, `link`.
+
+    `joint` moves it, None for the root's part; `parent` is the index of the part that carries it. `xyz` in metres and
+    the quaternion x, y, z, w `rotation` are where it is in that part's frame, its joint at zero.
+    """
+
+    link: str
+    body: Body
+    surface: Surface
+    joint: Joint | None = None
+    parent: int = -1
+    xyz: Vector = (0.0, 0.0, 0.0)
+    rotation: XYZW = (0.0, 0.0, 0.0, 1.0)
+
+
+def assemble(model: RobotModel) -> list[Part]:
+    """The parts, every parent before its children, the root's first. A joint that moves no mass is treated as fixed."""
+    above = {joint.child: joint for joint in model.joints.values()}
+    moving = _moving(model, above)
+    tops: dict[str, str] = {}  # link -> the topmost link of its part
+    within: dict[str, dict[str, Frame]] = {}  # topmost link -> the frames of its part's links
+    for name in descend(model.root, model.joints):
+        if name == model.root or name in moving:
+            tops[name], within[name] = name, {name: Frame.of(HERE)}
+        else:
+            top = tops[name] = tops[above[name].parent]
+            within[top][name] = within[top][above[name].parent] @ Frame.of(above[name].pose)
+    order = list(within)
+    return [_part(model, top, within, tops, order, above) for top in order]
+
+
+def _moving(model: RobotModel, above: dict[str, Joint]) -> set[str]:
+    """The links that a joint moves. A massless link may still carry others with mass."""
+    masses = {name: link.inertial.mass if link.inertial else 0.0 for name, link in model.links.items()}
+    found = set()
+    for name in reversed(list(descend(model.root, model.joints))):
+        if name == model.root:
+            continue
+        if above[name].kind in MOVING and masses[name] >= SMALLEST_MASS:
+            found.add(name)
+        else:
+            masses[above[name].parent] += masses[name]
+    return found
+
+
+def _part(
+    model: RobotModel,
+    top: str,
+    within: dict[str, dict[str, Frame]],
+    tops: dict[str, str],
+    order: list[str],
+    above: dict[str, Joint],
+) -> Part:
+    body, surface = lump_links(model, within[top]), _surface(model, within[top])
+    if top == model.root:
+        return Part(top, body, surface)
+    joint = above[top]
+    carrier = tops[joint.parent]
+    frame = within[carrier][joint.parent] @ Frame.of(joint.pose)
+    return Part(top, body, surface, joint, order.index(carrier), frame.xyz, frame.quaternion)
+
+
+def _surface(model: RobotModel, links: dict[str, Frame]) -> Surface:
+    """The surface of the first link with a surface and collision shapes: an engine has one surface per part."""
+    touching = [model.links[name] for name in links if model.links[name].collisions]
+    return next((link.surface for link in touching if link.surface != Surface()), Surface())
+
+
+# Height above the ground.
+
+
+LEVEL = (0.0, 0.0, 0.0)
+
+
+def lowest(model: RobotModel, rpy: Vector = LEVEL) -> float:
+    """z in metres of the lowest collision point under the root frame, with all joints at zero and the root turned by
+    `rpy` in radians; 0 without collision shapes. Raises RobotError for a mesh that can no longer be read.
+    """
+    turned = Frame.of(Pose(rpy=rpy))
+    frames = {name: turned @ frame for name, frame in link_frames(model).items()}
+    shapes = [(frames[link.name], shape) for link in model.links.values() for shape in link.collisions]
+    # Adding 0 turns -0 into 0 for printing.
+    low = min((_bottom(frame @ Frame.of(shape.pose), solid(shape)) for frame, shape in shapes), default=math.inf)
+    return low + 0.0 if math.isfinite(low) else 0.0
+
+
+def _bottom(frame: Frame, shape: Shape) -> float:
+    """z of the lowest point of a shape. Infinity for planes and missing meshes, which support nothing."""
+    reach = _REACHES.get(shape.kind)
+    return math.inf if reach is None else float(frame.position[2]) - reach(shape, _up(frame))
+
+
+def _up(frame: Frame) -> Vector:
+    """The world's z axis in the shape's own frame."""
+    x, y, z = (float(value) for value in frame.rotation[2])
+    return x, y, z
+
+
+def _box(shape: Shape, up: Vector) -> float:
+    return sum(abs(part) * edge / 2 for part, edge in zip(up, shape.size, strict=True))
+
+
+def _cylinder(shape: Shape, up: Vector) -> float:
+    radius, length = shape.size
+    return abs(up[2]) * length / 2 + math.hypot(up[0], up[1]) * radius
+
+
+def _sphere(shape: Shape, up: Vector) -> float:
+    return shape.size[0]
+
+
+def _hull(shape: Shape, up: Vector) -> float:
+    x, y, z = up
+    return -min(a * x + b * y + c * z for a, b, c in shape.points)
+
+
+_REACHES: dict[str, Callable[[Shape, Vector], float]] = {
+    "box": _box,
+    "cylinder": _cylinder,
+    "sphere": _sphere,
+    "hull": _hull,
+}
+"""How far in metres a kind of shape reaches below its origin."""

@@ -1,4 +1,4 @@
-"""Rotations as 3x3 matrices, roll pitch yaw, and quaternions x, y, z, w. Angles in radians."""
+"""Rotation matrices and inertia tensors as numpy arrays, in radians; quaternions are those of `holozen.rotation`."""
 
 import math
 from collections.abc import Sequence
@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Quaternion = tuple[float, float, float, float]
+from holozen.rotation import XYZW
 
+Array = npt.NDArray[np.float64]
 UPRIGHT = 1e-8  # cosine of a pitch that counts as straight up or down
 
 
@@ -39,7 +39,7 @@ def rpy_of(matrix: Array) -> tuple[float, float, float]:
     return math.atan2(h, i), pitch, math.atan2(d, a)
 
 
-def quaternion_of(matrix: Array) -> Quaternion:
+def quaternion_of(matrix: Array) -> XYZW:
     """The unit quaternion of a rotation matrix, with w >= 0."""
     # Each row is 4 times one component times all four. The row with the largest square loses no digits
     # (S. W. Shepperd, "Quaternion from rotation matrix", Journal of Guidance and Control 1, 1978).
@@ -56,18 +56,6 @@ def quaternion_of(matrix: Array) -> Quaternion:
     row = row / (np.linalg.norm(row) * (-1 if row[3] < 0 else 1))
     x, y, z, w = row.tolist()
     return x, y, z, w
-
-
-def matrix_of_quaternion(q: Quaternion) -> Array:
-    """The rotation matrix of a unit quaternion."""
-    x, y, z, w = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def principal(inertia: Array) -> tuple[Array, Array]:

@@ -1,21 +1,257 @@
-"""URDF's visual and collision elements -> shapes."""
+"""Shapes and colours of URDF, and what URDF and SDF share: meshes, placeholder boxes and Gazebo's materials."""
 
+import math
 import os
+from collections.abc import Mapping
 from dataclasses import replace
 
-from holozen.robot.errors import RobotError
-from holozen.robot.parts import Color, Pose, Shape
-from holozen.robot.placeholder import placeholder
-from holozen.robot.source import Source
-from holozen.robot.tag import Tag, Vector
-from holozen.robot.uris import is_data, resolve_uri
+from holozen.robot.elements import Source, Tag, Vector, number
+from holozen.robot.errors import RobotError, cut
+from holozen.robot.meshes import data_hull, hull
+from holozen.robot.model import Color, Pose, Shape
+from holozen.robot.packages import is_data, resolve_uri
 
-MOST_MESHES = 200  # of a text that came over the wire: each takes up to 1 ms of the sim's loop
-MOST_BYTES = 5_000_000  # of a file that such a text names: 0.3 s
+# Colours, by Gazebo's names or as numbers.
+
+
+# Names and diffuse colours of Gazebo Classic's media/materials/scripts/gazebo.material, transparent ones with their
+# blending alpha. Textures are not shown: the last three rows have the colour beneath the texture.
+_NAMES: dict[str, Color] = {
+    "Grey": (0.7, 0.7, 0.7, 1.0),
+    "DarkGrey": (0.175, 0.175, 0.175, 1.0),
+    "White WhiteGlow JointAnchor": (1.0, 1.0, 1.0, 1.0),
+    "FlatBlack": (0.1, 0.1, 0.1, 1.0),
+    "Black": (0.0, 0.0, 0.0, 1.0),
+    "Red RedGlow LightOff": (1.0, 0.0, 0.0, 1.0),
+    "RedBright": (0.87, 0.26, 0.07, 1.0),
+    "Green GreenGlow LightOn": (0.0, 1.0, 0.0, 1.0),
+    "Blue BlueGlow SkyBlue": (0.0, 0.0, 1.0, 1.0),
+    "Yellow YellowGlow": (1.0, 1.0, 0.0, 1.0),
+    "ZincYellow": (0.9725, 0.9529, 0.2078, 1.0),
+    "DarkYellow": (0.7, 0.7, 0.0, 1.0),
+    "Purple PurpleGlow": (1.0, 0.0, 1.0, 1.0),
+    "Turquoise TurquoiseGlow TurquoiseGlowOutline": (0.0, 1.0, 1.0, 1.0),
+    "Orange": (1.0, 0.5088, 0.0468, 1.0),
+    "Indigo": (0.33, 0.0, 0.5, 1.0),
+    "Gold": (0.8, 0.64869, 0.120759, 1.0),
+    "RedTransparent RedTransparentOverlay": (1.0, 0.0, 0.0, 0.5),
+    "GreenTransparent GreenTransparentOverlay": (0.0, 1.0, 0.0, 0.5),
+    "BlueTransparent BlueTransparentOverlay": (0.0, 0.0, 1.0, 0.5),
+    "YellowTransparent": (1.0, 1.0, 0.0, 0.5),
+    "GreyTransparent": (0.5, 0.5, 0.5, 0.5),
+    "BlackTransparent": (0.0, 0.0, 0.0, 0.5),
+    "DarkMagentaTransparent": (0.6, 0.0, 0.6, 0.5),
+    "OrangeTransparent": (1.0, 0.44, 0.0, 0.4),
+    "OrangeTransparentOverlay": (1.0, 0.5088, 0.0468, 0.8),
+    "DarkOrangeTransparentOverlay": (0.6, 0.305, 0.028, 0.8),
+    "BlueLaser": (0.0, 0.0, 1.0, 0.4),
+    "LightBlueLaser": (0.5, 0.5, 1.0, 0.4),
+    "PioneerBody": (1.0, 0.0, 0.0, 1.0),
+    "Pioneer2Body": (0.681193, 0.000923, 0.000923, 1.0),
+    "WoodPallet Wood Bricks WindowFrame BuildingFrame PaintedWall GreyGradientSky CloudySky": (1.0, 1.0, 1.0, 1.0),
+    "WoodFloor CeilingTiled Runway Grass CoM": (0.5, 0.5, 0.5, 1.0),
+    "Road Residential Tertiary Pedestrian Footway Motorway Lanes_6 "
+    "Trunk Lanes_4 Primary Lanes_2 Secondary Lane_1 Steps": (0.8, 0.8, 0.8, 1.0),
+}
+
+GAZEBO: dict[str, Color] = {f"Gazebo/{name}": color for names, color in _NAMES.items() for name in names.split()}
+"""Gazebo's name of a material -> its colour."""
+
+
+def read_color(tag: Tag, words: str, source: Source) -> Color | None:
+    """Red, green, blue and optionally alpha, each from 0 to 1, in `words` of `tag`; anything else causes a warning."""
+    values = [number(word) for word in words.split()]
+    known = [value for value in values if value is not None and 0 <= value <= 1]
+    if len(values) not in (3, 4) or len(known) != len(values):
+        expected = "red, green, blue and alpha, each from 0 to 1"
+        source.warn(tag, f"has the colour {cut(words)}, which is left out; write {expected}")
+        return None
+    red, green, blue, alpha = (*known, 1.0)[:4]
+    return red, green, blue, alpha
+
+
+def nearest_gazebo(word: str, source: Source) -> str:
+    """A suggestion for a misspelt Gazebo material; `Black` is accepted for `Gazebo/Black`."""
+    return source.nearest(word if "/" in word else f"Gazebo/{word}", GAZEBO)
+
+
+# Materials of URDF, and those of Gazebo, which take precedence.
+
+
+Materials = Mapping[str, Color | None]
+"""Name -> colour; None for a known material without a colour, such as a texture."""
+
+
+def read_materials(robot: Tag, source: Source) -> dict[str, Color | None]:
+    """The materials that a `<robot>` defines: directly, or in any visual, as in urdfdom's model.cpp."""
+    found: dict[str, Color | None] = {}
+    for tag in robot.all("material"):
+        name = tag.attributes.get("name", "")
+        if name in found:
+            source.warn(tag, "is defined twice; the first is used")
+        else:
+            found[name] = _own_color(tag, source)
+    quiet = Source(source.origin, source.packages)  # mistakes are reported when the visual is read
+    inside = [tag for link in robot.all("link") for visual in link.all("visual") for tag in visual.all("material")]
+    for tag in inside:
+        name = tag.attributes.get("name", "")
+        if name and name not in found and tag.first("color"):
+            found[name] = _own_color(tag, quiet)
+    return found
+
+
+def urdf_color(visual: Tag, materials: Materials, source: Source) -> Color | None:
+    """The colour of a URDF `<visual>`: its own, or that of the material it names."""
+    tag = visual.first("material")
+    if tag is None:
+        return None
+    name = tag.attributes.get("name", "")
+    if name in materials:
+        return _plain_color(tag, source) if tag.first("color") else materials[name]
+    if name in GAZEBO or not name.strip():
+        return GAZEBO.get(name) or _own_color(tag, source)
+    if not tag.first("texture"):
+        source.warn(tag, f"has no colour, neither here nor in <robot>{source.nearest(name, materials)}")
+    return _own_color(tag, source)
+
+
+def gazebo_color(gazebo: Tag, source: Source) -> Color | None:
+    """The colour that a `<gazebo reference="link">` gives: `<material>Gazebo/Black</material>`, or SDF's
+    `<visual><material>` with `<diffuse>`, `<ambient>` or a `<script>`.
+    """
+    for tag in (gazebo, *gazebo.all("visual")):
+        material = tag.first("material")
+        if material is not None:
+            return material_color(material, source)
+    return None
+
+
+def material_color(material: Tag, source: Source) -> Color | None:
+    """The colour of a `<material>` of Gazebo or SDF."""
+    for name in ("diffuse", "ambient"):
+        tag = material.first(name)
+        if tag is not None:
+            return read_color(tag, tag.value(), source)
+    script = material.first("script") or material
+    tag = script.first("name") or script
+    name = tag.value()
+    if name and name not in GAZEBO:
+        source.warn(tag, f"names the colour {cut(name)}, which Gazebo does not have{nearest_gazebo(name, source)}")
+    return GAZEBO.get(name)
+
+
+def _own_color(tag: Tag, source: Source) -> Color | None:
+    if tag.first("color") is None and tag.first("texture") is not None:
+        source.warn(tag, "is a texture; textures are not shown, and it has no <color> to show instead")
+    return _plain_color(tag, source)
+
+
+def _plain_color(tag: Tag, source: Source) -> Color | None:
+    color = tag.first("color")
+    return None if color is None else read_color(color, color.attributes.get("rgba", ""), source)
+
+
+# A box in place of an unusable mesh: the robot still loads, and the gap is visible.
+
+
+EDGE = 0.1  # m; if the link gives no size
+SMALLEST_EDGE, LARGEST_EDGE = 1e-3, 2.0  # m; an inertia that implies another size is considered a mistake
+WIDEST_BOX = 0.3  # m; inertias are often guesses, and too large a box hides the robot
+
+MOMENTS = ("ixx", "iyy", "izz")
+EXTENTS = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
+"""What gives a shape's size: attributes in URDF, elements in SDF."""
+
+
+def placeholder(tag: Tag, pose: Pose) -> Shape:
+    """The box in place of a mesh of the link around `tag`: for a visual one that around the link's largest collision
+    shape, meshes left out; else the one that has the link's mass and moments, cut to WIDEST_BOX; else a cube.
+
+    In URDF its pose is that of the collision shape or the inertial frame; in SDF, whose poses may be relative to
+    other frames, it is the shape's own `pose`, as for the cube. A box a, b, c of mass m has Ixx = m (b^2 + c^2) / 12,
+    so a^2 = 6 (Iyy + Izz - Ixx) / m. The products of inertia are ignored.
+    """
+    seen = _around(tag, "visual") is not None
+    link = _around(tag, "link")
+    solid = [found for shape in (link.all("collision") if link and seen else ()) if (found := _box(shape))]
+    if solid:
+        edges, collision = max(solid, key=lambda found: math.prod(found[0]))
+        return Shape("box", edges, _origin(collision, _is_sdf(collision)) or pose)
+    inertial = link.first("inertial") if link else None
+    size = None if inertial is None else _box_of_inertia(inertial)
+    if inertial is None or size is None:
+        return Shape("box", (EDGE, EDGE, EDGE), pose)
+    mass = inertial.first("mass")
+    return Shape("box", size, _origin(inertial, mass is None or "value" not in mass.attributes) or pose)
+
+
+def _around(tag: Tag | None, name: str) -> Tag | None:
+    while tag is not None and tag.name != name:
+        tag = tag.parent
+    return tag
+
+
+def _box(collision: Tag) -> tuple[tuple[float, ...], Tag] | None:
+    """The edges of the box around a collision shape, and its element; None for a mesh or an invalid size."""
+    geometry = collision.first("geometry")
+    for shape in geometry.children if geometry else ():
+        numbers = [number(word) for name in EXTENTS.get(shape.name, ()) for word in _value(shape, name, name).split()]
+        edges = [value for value in numbers if value is not None and 1e-6 <= value <= 1e3]
+        if shape.name == "box" and len(edges) == 3:
+            return tuple(edges), collision
+        if shape.name == "cylinder" and len(edges) == 2:
+            return (2 * edges[0], 2 * edges[0], edges[1]), collision
+        if shape.name == "sphere" and len(edges) == 1:
+            return (2 * edges[0],) * 3, collision
+    return None
+
+
+def _is_sdf(collision: Tag) -> bool:
+    """SDF uses elements where URDF uses attributes."""
+    geometry = collision.first("geometry")
+    return geometry is not None and any(shape.children for shape in geometry.children)
+
+
+def _box_of_inertia(inertial: Tag) -> tuple[float, ...] | None:
+    inertia = inertial.first("inertia")
+    mass = number(_value(inertial, "mass", "value"))
+    moments = [number(_value(inertia, name, name)) for name in MOMENTS] if inertia else []
+    known = [moment for moment in moments if moment is not None]
+    if len(known) != 3 or mass is None or mass <= 0:
+        return None
+    squares = [6 * (sum(known) - 2 * moment) / mass for moment in known]
+    if not all(SMALLEST_EDGE**2 <= square <= LARGEST_EDGE**2 for square in squares):
+        return None
+    return tuple(min(WIDEST_BOX, math.sqrt(square)) for square in squares)
+
+
+def _value(tag: Tag, name: str, attribute: str) -> str:
+    """The value of `name`: an attribute in URDF, a child's text in SDF."""
+    child = tag.first(name)
+    return tag.attributes.get(name, "") if child is None else child.attributes.get(attribute, child.text)
+
+
+def _origin(tag: Tag, sdf: bool) -> Pose | None:
+    """Where a URDF's inertial or collision frame is; None in SDF, and for invalid numbers."""
+    origin = tag.first("origin")
+    if sdf:
+        return None
+    try:
+        zero = (0.0, 0.0, 0.0)
+        return Pose() if origin is None else Pose(origin.vector("xyz", zero), origin.vector("rpy", zero))
+    except RobotError:
+        return None
+
+
+# Visual and collision elements.
+
+
+MOST_MESHES = 200  # in a text received over the network: each takes up to 1 ms of the sim's loop
+MOST_BYTES = 5_000_000  # of a file that such a text refers to: 0.3 s
 SMALLEST = 1e-6  # of a size in metres, and of a mesh's scale
 
 SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
-"""Attributes that give a shape's size, and how many numbers each holds."""
+"""Attributes that give a shape's size, and how many numbers each contains."""
 
 
 def read_shape(tag: Tag, source: Source) -> Shape:
@@ -24,7 +260,7 @@ def read_shape(tag: Tag, source: Source) -> Shape:
     known = [child for child in geometry.children if child.name in SIZES or child.name == "mesh"]
     if not known:
         found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
-        raise geometry.wrong(f"holds {found}; it has to hold <box>, <cylinder>, <sphere> or <mesh>")
+        raise geometry.wrong(f"contains {found}; it must contain <box>, <cylinder>, <sphere> or <mesh>")
     shape = known[0]
     if shape.name == "mesh":
         return mesh_shape(shape, shape.word("filename"), _scale(shape), read_pose(tag), tag.name, source)
@@ -36,9 +272,9 @@ def mesh_shape(
 ) -> Shape:
     """The mesh that `uri` names, for a visual or collision (`use`) of a link around `tag`, in URDF or SDF.
 
-    A collision mesh is read, a visual one only found. A mesh that is missing or bad makes a warning and a box in its
-    place, or with `source.strict` a RobotError. Of a text that came over the wire visual meshes are not even
-    looked for.
+    A collision mesh is read, a visual one only located. A missing or invalid mesh is replaced by a box with a
+    warning, or is a RobotError with `source.strict`. In text received over the network visual meshes are not even
+    looked up.
     """
     if use == "visual" and source.confined:
         return Shape("mesh", scale, pose, color=color)
@@ -54,11 +290,9 @@ def mesh_shape(
 
 
 def solid(shape: Shape) -> Shape:
-    """What the sim takes: the convex hull of a mesh that was found; any other shape as it is. Raises RobotError."""
+    """The shape for the sim: the convex hull of a mesh that was found; others unchanged. Raises RobotError."""
     if shape.kind != "mesh" or shape.path is None:
         return shape
-    from holozen.robot.mesh.files import hull
-
     x, y, z = shape.size
     return replace(shape, kind="hull", size=(), points=hull(shape.path, (x, y, z)))
 
@@ -66,20 +300,16 @@ def solid(shape: Shape) -> Shape:
 def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Source) -> Shape:
     source.meshes += 1
     if source.confined and source.meshes > MOST_MESHES:
-        raise RobotError(f"is number {source.meshes}; of a text that was sent {MOST_MESHES} collision meshes are read")
+        raise RobotError(f"is number {source.meshes}; in text that was sent {MOST_MESHES} collision meshes are read")
     if is_data(uri):
-        from holozen.robot.mesh.files import data_hull
-
         return Shape("hull", (), pose, points=data_hull(uri, scale))
     path = resolve_uri(
         uri, source.origin, source.packages, source.confined, lambda taken: source.warn(tag, f"({use}): {taken}")
     )
     if use == "collision":
-        from holozen.robot.mesh.files import hull
-
         if source.confined and os.path.getsize(path) > MOST_BYTES:
-            raise RobotError(f"{path}: is too large to be read here; send the mesh itself (holozen spawn does)")
-        hull(path, scale)  # here a bad one can be told with its line; `solid` does not read it again
+            raise RobotError(f"{path}: is too large to be read by the sim; send the mesh itself (holozen spawn does)")
+        hull(path, scale)  # reports an invalid one with its line; `solid` does not read it again
     return Shape("mesh", scale, pose, path)
 
 
@@ -102,12 +332,12 @@ def _size(tag: Tag) -> tuple[float, ...]:
     attributes, count = SIZES[tag.name]
     size = tuple(value for attribute in attributes.split() for value in tag.numbers(attribute, count))
     if min(size) < SMALLEST:
-        raise tag.wrong(f"has the size {size} m; each number has to be {SMALLEST:g} or more")
+        raise tag.wrong(f"has the size {size} m; each number must be {SMALLEST:g} or more")
     return size
 
 
 def _scale(tag: Tag) -> Vector:
     scale = tag.vector("scale", (1.0, 1.0, 1.0))
     if min(abs(factor) for factor in scale) < SMALLEST:
-        raise tag.wrong(f"has the scale {scale}; a zero leaves nothing of the mesh (below zero mirrors it)")
+        raise tag.wrong(f"has the scale {scale}; a zero flattens the mesh (a negative scale mirrors it)")
     return scale

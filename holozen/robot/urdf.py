@@ -1,17 +1,258 @@
-"""URDF elements -> links and joints."""
+"""URDF: a `<robot>` with its links, joints, materials, transmissions and `<gazebo>` elements -> RobotModel."""
 
 import math
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import TypeVar
 
-from holozen.robot.errors import cut
-from holozen.robot.materials import Materials, urdf_color
-from holozen.robot.moments import NO_INERTIA, with_moments
-from holozen.robot.parts import JOINT_KINDS, Inertial, Joint, Limits, Link, Mimic, Shape
-from holozen.robot.shapes import needed, read_pose, read_shape
-from holozen.robot.source import Source
-from holozen.robot.tag import Tag, Vector
+from holozen.robot.elements import Source, Tag, Vector, number
+from holozen.robot.errors import RobotError, cut, listed
+from holozen.robot.gazebo_plugins import Settings, read_plugins, read_sensors
+from holozen.robot.inertia import (
+    NO_INERTIA,
+    check_drive,
+    massless,
+    positive_definite,
+    warn_massless,
+    with_moments,
+    without,
+)
+from holozen.robot.model import (
+    JOINT_KINDS,
+    MOST_PARTS,
+    Inertial,
+    Joint,
+    Limits,
+    Link,
+    Mimic,
+    RobotModel,
+    Shape,
+    Surface,
+    Transmission,
+    descend,
+)
+from holozen.robot.shapes import Materials, gazebo_color, needed, read_materials, read_pose, read_shape, urdf_color
+
+# The tree of links and joints.
+
+
+def root_of(robot: Tag, links: Mapping[str, object], joints: Mapping[str, Joint]) -> str:
+    """The only link that is not a joint's child. Raises RobotError unless links and joints form one tree."""
+    tags = {tag.word("name"): tag for tag in robot.all("joint")}
+    _check_ends(tags, links, joints)
+    parents = _parents(tags, joints)
+    roots = [name for name in links if name not in parents]
+    if len(roots) > 1:
+        raise robot.wrong(
+            f"has {len(roots)} root links: {listed(roots)}; attach all but one to another link with a joint"
+        )
+    reached = set(descend(roots[0], joints)) if roots else set()
+    lost = [name for name in links if name not in reached]
+    if lost:
+        raise robot.wrong(f"has joints that form a loop through the links {listed(lost)}; remove one joint")
+    return roots[0]
+
+
+def _check_ends(tags: Mapping[str, Tag], links: Mapping[str, object], joints: Mapping[str, Joint]) -> None:
+    for joint in joints.values():
+        for end, name in (("parent", joint.parent), ("child", joint.child)):
+            if name not in links:
+                known = listed(list(links))
+                raise tags[joint.name].wrong(f"names the unknown {end} link {cut(name)}; links: {known}")
+
+
+def _parents(tags: Mapping[str, Tag], joints: Mapping[str, Joint]) -> dict[str, str]:
+    """Child link -> its parent joint."""
+    parents: dict[str, str] = {}
+    for joint in joints.values():
+        other = parents.setdefault(joint.child, joint.name)
+        if other != joint.name:
+            raise tags[joint.name].wrong(
+                f"has the child link {cut(joint.child)}, which is already the child of joint {cut(other)}"
+            )
+    return parents
+
+
+def check_mimics(robot: Tag, joints: Mapping[str, Joint], source: Source) -> None:
+    """Raise RobotError for a joint that mimics a missing joint, or itself, directly or through others."""
+    followed = {joint.name: joint.mimic.joint for joint in joints.values() if joint.mimic}
+    for name, other in followed.items():
+        if other not in joints:
+            near = source.nearest(other, joints)
+            problem = f"follows the joint {cut(other)}, which does not exist{near}"
+            raise _wrong(robot, name, f"{problem}; joints: {listed(list(joints))}")
+    done: set[str] = set()
+    for start in followed:
+        path: dict[str, None] = {}
+        name = start
+        while name in followed and name not in done:
+            if name in path:
+                circle = list(path)[list(path).index(name) :]
+                raise _wrong(robot, name, f"follows itself in a loop through the joints {listed(circle)}")
+            path[name] = None
+            name = followed[name]
+        done.update(path)
+
+
+def _wrong(robot: Tag, name: str, problem: str) -> RobotError:
+    joint = next(tag for tag in robot.all("joint") if tag.word("name") == name)
+    return (joint.first("mimic") or joint).wrong(problem)
+
+
+# Transmissions, as written for pr2 and for ros_control.
+
+
+def read_transmissions(robot: Tag, joints: Mapping[str, Joint], source: Source) -> tuple[Transmission, ...]:
+    """Those whose joints exist; the others only cause warnings, since nothing is driven by them."""
+    found = []
+    for tag in robot.all("transmission"):
+        names = tuple(joint.attributes.get("name", "").strip() for joint in tag.all("joint"))
+        unknown = [name for name in names if name not in joints]
+        if unknown:
+            near = source.nearest(unknown[0], joints)
+            source.warn(tag, f"names the joint {cut(unknown[0])}, which does not exist{near}; it is left out")
+        elif not names:
+            source.warn(tag, "names no joint; it is left out")
+        else:
+            found.append(Transmission(_name(tag), _kind(tag), names, _interfaces(tag), _reduction(tag, source)))
+    return tuple(found)
+
+
+def _name(tag: Tag) -> str:
+    return tag.attributes.get("name", "").strip()
+
+
+def _kind(tag: Tag) -> str:
+    kind = tag.first("type")
+    return kind.value() if kind else tag.attributes.get("type", "")
+
+
+def _interfaces(tag: Tag) -> tuple[str, ...]:
+    """Hardware interfaces of the joints; older files set them on the actuators."""
+    for parts in (tag.all("joint"), tag.all("actuator")):
+        found = tuple(inside.value() for part in parts for inside in part.all("hardwareInterface"))
+        if found:
+            return found
+    return ()
+
+
+def _reduction(tag: Tag, source: Source) -> float:
+    reduction = next(tag.below("mechanicalReduction"), None)
+    if reduction is None:
+        return 1.0
+    value = number(reduction.value())
+    if not value:
+        source.warn(reduction, f"is {cut(reduction.value())}; 1 is used")
+    return value or 1.0
+
+
+# `<gazebo>` elements.
+
+
+CONTACT = ("mu", "mu1", "mu2", "kp", "kd")
+STIFFEST = 1e18  # N/m; Gazebo's own default is 1e12
+
+
+def read_gazebo(
+    robot: Tag, links: Mapping[str, Link], joints: Mapping[str, Joint], source: Source
+) -> tuple[dict[str, Link], bool]:
+    """The links with the settings of their `<gazebo reference="...">`, and whether the robot is static.
+
+    A later element overrides an earlier one, and a material here overrides URDF's, as in sdformat's
+    parser_urdf.cc. Raises RobotError.
+    """
+    dressed, static = dict(links), False
+    for tag in robot.all("gazebo"):
+        name = tag.attributes.get("reference", "").strip()
+        if not name:
+            static = Settings(tag).flag("static", default=static)
+        elif name in dressed:
+            dressed[name] = _dressed(dressed[name], tag, source)
+        elif name not in joints:
+            near = source.nearest(name, (*links, *joints))
+            problem = f"reference={cut(name)} names no link and no joint{near}; it is left out"
+            source.warn(tag, f"{problem}; links: {listed(list(links))}")
+    return dressed, static
+
+
+def _dressed(link: Link, tag: Tag, source: Source) -> Link:
+    settings = Settings(_with_contact(tag))
+    color = gazebo_color(tag, source)
+    # Two spellings: <gravity>0</gravity> of SDF, and the older <turnGravityOff>.
+    light = settings.flag("turn_gravity_off", default=not link.gravity)
+    return replace(
+        link,
+        surface=_surface(link.surface, settings),
+        gravity=settings.flag("gravity", default=not light),
+        visuals=tuple(replace(shape, color=color) for shape in link.visuals) if color else link.visuals,
+    )
+
+
+def _surface(before: Surface, settings: Settings) -> Surface:
+    values = {
+        "mu1": settings.maybe("mu1", "mu"),
+        "mu2": settings.maybe("mu2", "mu"),
+        "kp": settings.maybe("kp", most=STIFFEST),
+        "kd": settings.maybe("kd", most=STIFFEST),
+    }
+    given = {name: value for name, value in values.items() if value is not None}
+    self_collide = settings.flag("self_collide", default=before.self_collide)
+    return replace(before, self_collide=self_collide, **given)
+
+
+def _with_contact(tag: Tag) -> Tag:
+    """The element with SDF's `<collision><surface>...<mu>` and so on as direct children."""
+    inside = [deep for collision in tag.all("collision") for name in CONTACT for deep in collision.below(name)]
+    return replace(tag, children=[*tag.children, *inside]) if inside else tag
+
+
+# Links and joints.
+
 
 SMALLEST_AXIS = 1e-6
+WORLD = "world"  # a root of this name is the ground: Gazebo fixes the robot to it
+Part = TypeVar("Part", Link, Joint)
+
+
+def read_robot(robot: Tag, source: Source) -> RobotModel:
+    """A `<robot>`. Raises RobotError."""
+    materials = read_materials(robot, source)
+    links = _by_name(robot, "link", lambda tag: read_link(tag, source, materials))
+    joints = _by_name(robot, "joint", lambda tag: read_joint(tag, source))
+    if not links:
+        raise robot.wrong("has no <link>; a robot has at least one")
+    root = root_of(robot, links, joints)
+    check_mimics(robot, joints, source)
+    dressed, static = read_gazebo(robot, links, joints, source)
+    lost = massless(links, joints, root)
+    warn_massless(robot, links, joints, lost, source)
+    kept, moving = without(dressed, joints, lost)
+    drive = read_plugins(robot, kept, joints, root, source)
+    check_drive(robot, drive, links, joints, root, lost, source)
+    return RobotModel(
+        name=robot.word("name"),
+        root=root,
+        links=kept,
+        joints=moving,
+        drive=drive,
+        sensors=tuple(sensor for sensor in read_sensors(robot, links, root, source) if sensor.link in kept),
+        transmissions=read_transmissions(robot, joints, source),
+        static=static or root == WORLD,
+        warnings=tuple(source.warnings),
+    )
+
+
+def _by_name(robot: Tag, name: str, read: Callable[[Tag], Part]) -> dict[str, Part]:
+    tags = robot.all(name)
+    if len(tags) > MOST_PARTS:
+        raise robot.wrong(f"has {len(tags)} {name}s; a robot has at most {MOST_PARTS} links and {MOST_PARTS} joints")
+    parts: dict[str, Part] = {}
+    for tag in tags:
+        part = read(tag)
+        if part.name in parts:
+            raise tag.wrong("is defined twice; give each a unique name")
+        parts[part.name] = part
+    return parts
 
 
 def read_link(tag: Tag, source: Source, materials: Materials = {}) -> Link:
@@ -30,7 +271,7 @@ def read_joint(tag: Tag, source: Source) -> Joint:
     """A `<joint>`. Raises RobotError."""
     kind = tag.word("type")
     if kind not in JOINT_KINDS:
-        raise tag.wrong(f"has the unknown type {cut(kind)}; known are {', '.join(JOINT_KINDS)}")
+        raise tag.wrong(f"has unknown type {cut(kind)}; known types: {', '.join(JOINT_KINDS)}")
     ends = {name: tag.first(name) for name in ("parent", "child")}
     parent, child = (needed(tag, name).word("link") for name in ends)
     friction, damping = (_dynamics(tag, name) for name in ("friction", "damping"))
@@ -48,7 +289,7 @@ def _dynamics(tag: Tag, name: str) -> float:
     dynamics = tag.first("dynamics")
     value = 0.0 if dynamics is None else dynamics.number(name, 0.0)
     if dynamics is not None and value < 0:
-        raise dynamics.wrong(f"{name}: {value} is below zero; it would drive the joint on")
+        raise dynamics.wrong(f"{name}: {value} is negative; it would accelerate the joint")
     return value
 
 
@@ -62,7 +303,7 @@ def _mimic(tag: Tag) -> Mimic | None:
 def _inertial(tag: Tag) -> Inertial:
     mass = needed(tag, "mass").number("value")
     if mass < 0:
-        raise needed(tag, "mass").wrong(f"value: {mass} kg is below zero")
+        raise needed(tag, "mass").wrong(f"value: {mass} kg is negative")
     return Inertial(read_pose(tag), mass, _inertia(tag) if mass else NO_INERTIA)
 
 
@@ -70,16 +311,9 @@ def _inertia(tag: Tag) -> tuple[float, float, float, float, float, float]:
     given = tag.first("inertia") or Tag("inertia", {}, tag.place, tag)
     xx, xy, xz, yy, yz, zz = (given.number(name, 0.0) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
     if min(xx, yy, zz) < 0:
-        raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never below zero")
-    # Refusing what is not positive definite would stop many a student's robot.
+        raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never negative")
+    # Rejecting tensors that are not positive definite would stop many students' robots.
     return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
-
-
-def positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> bool:
-    """Sylvester's criterion: the leading minors are above zero."""
-    minor = xx * yy - xy * xy
-    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
-    return xx > 0 and minor > 0 and determinant > 0
 
 
 def _axis(tag: Tag, kind: str) -> Vector:
@@ -89,7 +323,7 @@ def _axis(tag: Tag, kind: str) -> Vector:
     x, y, z = axis.vector("xyz", (1.0, 0.0, 0.0))
     length = math.hypot(x, y, z)
     if length < SMALLEST_AXIS:
-        raise axis.wrong("has no direction; a wheel that turns about its own y has xyz='0 1 0'")
+        raise axis.wrong("has no direction; a wheel that turns about its y axis has xyz='0 1 0'")
     return x / length, y / length, z / length
 
 
@@ -98,7 +332,7 @@ def _limits(tag: Tag, kind: str, source: Source) -> Limits:
     bounded = kind in ("revolute", "prismatic")
     if limit is None:
         if bounded:
-            source.warn(tag, f"is {kind} and has no <limit>; it is taken as unlimited")
+            source.warn(tag, f"is {kind} and has no <limit>; it is treated as unlimited")
         return Limits()
     effort, velocity = (_most(limit, name, source) for name in ("effort", "velocity"))
     if not bounded:
@@ -113,6 +347,6 @@ def _limits(tag: Tag, kind: str, source: Source) -> Limits:
 def _most(limit: Tag, name: str, source: Source) -> float:
     value = limit.number(name, math.inf, most=math.inf)
     if value < 0:
-        source.warn(limit, f"{name}: {value:g} is below zero; it is taken as unlimited")
+        source.warn(limit, f"{name}: {value:g} is negative; it is treated as unlimited")
         return math.inf
     return value

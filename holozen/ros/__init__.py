@@ -1,5 +1,5 @@
 """ROS 2's Python packages over Zenoh, for scripts that begin with `import rclpy`.
 
-`holozen run` makes them importable in its own process, and nobody else does: the modules here have their own names
-(`holozen.ros.node`), and `finder.py` gives them ROS's (`rclpy.node`).
+The modules stand under ROS's own names (`holozen.ros.rclpy.node` is `rclpy.node`), and `importer` makes them importable
+under those names in the process of `holozen run` or `holozen launch`, and in no other.
 """

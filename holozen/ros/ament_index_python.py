@@ -1,4 +1,4 @@
-"""ament_index_python: where packages lie, by their sources or where they are installed."""
+"""ament_index_python: the folders of packages, from their sources or where they are installed."""
 
 from pathlib import Path
 
@@ -6,16 +6,13 @@ from holozen.robot.errors import RobotError
 from holozen.ros import packages
 
 __all__ = [
-    "PackageNotFoundError",
-    "get_package_prefix",
-    "get_package_share_directory",
-    "get_package_share_path",
+    "PackageNotFoundError", "get_package_prefix", "get_package_share_directory", "get_package_share_path",
     "get_packages_with_prefixes",
-]
+]  # fmt: skip
 
 
 class PackageNotFoundError(KeyError):
-    """There is no such package. Its text says where it was looked for."""
+    """There is no such package. The message lists where it was searched."""
 
     def __str__(self) -> str:
         return str(self.args[0])
@@ -24,7 +21,7 @@ class PackageNotFoundError(KeyError):
 def get_package_share_directory(package_name: str, print_warning: bool = True) -> str:
     """The folder that holds a package's urdf, launch and worlds: its sources, unless it is installed.
 
-    Raises PackageNotFoundError, and ValueError for what cannot be a name.
+    Raises PackageNotFoundError, and ValueError for anything but a name.
     """
     return str(get_package_share_path(package_name))
 
@@ -32,7 +29,7 @@ def get_package_share_directory(package_name: str, print_warning: bool = True) -
 def get_package_share_path(package_name: str, print_warning: bool = True) -> Path:
     """As get_package_share_directory, as a path."""
     if not isinstance(package_name, str) or not package_name:
-        raise ValueError(f"{package_name!r} is no package name")
+        raise ValueError(f"{package_name!r} is not a package name")
     try:
         return packages.find(package_name).absolute()
     except RobotError as error:

@@ -1,5 +1,10 @@
-"""What `holozen run` runs: a file, or the executable of a package."""
+"""What `holozen run` runs: a Python file, or an executable of a package.
 
+The console scripts of a Python package are read from setup.cfg and setup.py, without running either.
+"""
+
+import ast
+import configparser
 import contextlib
 import os
 from collections.abc import Iterator
@@ -8,17 +13,17 @@ from pathlib import Path
 
 from holozen.flags import nearest
 from holozen.robot.errors import RobotError, listed
-from holozen.ros import entry_points, packages
+from holozen.ros import packages
 
 FOLDERS = ("scripts", "{package}", "nodes", "src", "bin")  # where scripts lie in a package's sources
-_HEAD = 200  # bytes of a file that tell whether it is a script
+_HEAD = 200  # bytes of a file that show whether it is a script
 
 
 class NotFound(ValueError):
-    """There is no such file, package or executable, or it is no Python script. One line that says what there is."""
+    """There is no such file, package or executable, or it is not a Python script. One line that lists what there is."""
 
 
-class PackageLost(NotFound):
+class PackageNotFound(NotFound):
     """There is no such package."""
 
 
@@ -26,7 +31,7 @@ class PackageLost(NotFound):
 class Script:
     """A Python file, run as `__main__`; or `function` of `module`, if that is not empty.
 
-    `root` is the folder where its imports are looked up first.
+    `root` is the first folder in which its imports are looked up.
     """
 
     path: Path
@@ -40,18 +45,16 @@ def from_file(path: Path) -> Script:
     if path.is_dir():
         raise NotFound(f"{path} is a folder; give a Python file, or PACKAGE EXECUTABLE")
     if not path.exists():
-        there = sorted(each.name for each in path.parent.glob("*.py")) if path.parent.is_dir() else []
-        close = nearest(path.name, there)
-        raise NotFound(f"no file {str(path)!r}{close or _there('Python files there', there)}")
+        files = sorted(each.name for each in path.parent.glob("*.py")) if path.parent.is_dir() else []
+        hint = nearest(path.name, files) or f"; Python files there: {listed(files, 20)}"
+        raise NotFound(f"no file {str(path)!r}{hint}")
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError as error:
         raise NotFound(f"cannot read {path}: {error.strerror}") from None
     if path.suffix != ".py" and not _is_python(head):
-        raise NotFound(
-            f"{path} is no Python script, and only those run here; its first line would be #!/usr/bin/python3"
-        )
+        raise NotFound(f"{path} is not a Python script; only those run here, with the first line #!/usr/bin/python3")
     path = path.absolute()
     return Script(path, path.resolve().parent)
 
@@ -59,11 +62,11 @@ def from_file(path: Path) -> Script:
 def find(package: str, name: str, nameless: bool = False) -> Script:
     """The executable `name` of a package, with or without `.py`. Raises NotFound.
 
-    If `nameless`, a folder that says no name of a package is taken for this one too, where it has the executable.
+    If `nameless`, a folder without a package.xml is accepted too if it contains the executable.
     """
     try:
         return _found(_folder(package, nameless=False), package, name)
-    except PackageLost:
+    except PackageNotFound:
         with contextlib.suppress(NotFound):
             if nameless:
                 return _found(_folder(package, nameless=True), package, name)
@@ -71,44 +74,33 @@ def find(package: str, name: str, nameless: bool = False) -> Script:
 
 
 def _found(folder: Path, package: str, name: str) -> Script:
-    declared = _declared(folder)
+    declared = console_scripts(folder)
     if name in declared:
         return _console_script(folder, declared[name], name)
     files = dict(_files(folder, package))
     for wanted in (name, f"{name}.py"):
         if wanted in files:
             return from_file(files[wanted])
-    there = sorted({*declared, *files})
-    said = "give one" if not name else f"package {package!r} has no executable {name!r}{nearest(name, there)}"
-    raise NotFound(f"{said}{_there(f'in {folder} there are', there)}")
+    known = sorted({*declared, *files})
+    fault = f"package {package!r} has no executable {name!r}{nearest(name, known)}" if name else "give an executable"
+    raise NotFound(f"{fault}; executables in {folder}: {listed(known, 20)}")
 
 
 def names(package: str) -> list[str]:
     """The executables of a package. Raises NotFound."""
     folder = _folder(package, nameless=False)
-    return sorted({*_declared(folder), *(name for name, _ in _files(folder, package))})
-
-
-def _there(words: str, names: list[str]) -> str:
-    return f"; {words}: {listed(names, 20)}"
+    return sorted({*console_scripts(folder), *(name for name, _ in _files(folder, package))})
 
 
 def _folder(package: str, nameless: bool) -> Path:
     try:
         return packages.find(package, nameless)
     except RobotError as error:
-        raise PackageLost(str(error)) from None
-
-
-def _declared(folder: Path) -> entry_points.Declared:
-    try:
-        return entry_points.declared(folder)
-    except entry_points.SetupError as error:
-        raise NotFound(str(error)) from None
+        raise PackageNotFound(str(error)) from None
 
 
 def _files(folder: Path, package: str) -> Iterator[tuple[str, Path]]:
-    """Name and path of all that may be run, the least wanted first."""
+    """Name and path of everything that can be run, in reverse order of precedence."""
     prefix = packages.prefix(folder)
     for each in (*(folder / part.format(package=package) for part in reversed(FOLDERS)), prefix / "lib" / package):
         try:
@@ -128,9 +120,79 @@ def _console_script(folder: Path, place: str, name: str) -> Script:
     for path in (stem.with_name(f"{stem.name}.py"), stem / "__init__.py"):
         if path.is_file():
             return Script(path.absolute(), folder.absolute(), module, function)
-    raise NotFound(f"{folder}: executable {name!r} is {place} in its setup file, but there is no {stem}.py")
+    raise NotFound(f"{folder}: executable {name!r} is {place} in its setup file, but {stem}.py does not exist")
 
 
 def _is_python(head: bytes) -> bool:
     first = head.splitlines()[0] if head else b""
     return b"\0" not in head and first.startswith(b"#!") and b"python" in first
+
+
+def console_scripts(folder: Path) -> dict[str, str]:
+    """Command -> `module:function` of the console scripts that the package in `folder` declares. Raises NotFound."""
+    lines = [*_from_setup_cfg(folder / "setup.cfg"), *_from_setup_py(folder / "setup.py")]
+    found = {}
+    for line in lines:
+        name, _, place = line.partition("=")
+        module, _, function = place.partition("[")[0].partition(":")
+        if name.strip() and module.strip():
+            found[name.strip()] = f"{module.strip()}:{function.strip() or 'main'}"
+    return found
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8-sig") if path.is_file() else ""
+    except (OSError, UnicodeDecodeError) as error:
+        raise NotFound(f"cannot read {path}: {getattr(error, 'strerror', '') or 'it is not UTF-8'}") from None
+
+
+def _from_setup_cfg(path: Path) -> list[str]:
+    parser = configparser.ConfigParser(interpolation=None)
+    try:
+        parser.read_string(_text(path))
+    except configparser.Error as error:
+        raise NotFound(f"{path}: {' '.join(str(error).split())}") from None
+    return parser.get("options.entry_points", "console_scripts", fallback="").splitlines()
+
+
+def _from_setup_py(path: Path) -> list[str]:
+    try:
+        tree = ast.parse(_text(path))
+    except (SyntaxError, ValueError, RecursionError) as error:
+        line = getattr(error, "lineno", None) or 1
+        raise NotFound(f"{path}:{line}: {getattr(error, 'msg', error)}") from None
+    names = _constants(tree)
+    found = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Dict):
+            for key, value in zip(node.keys, node.values, strict=True):
+                if isinstance(key, ast.Constant) and key.value == "console_scripts":
+                    elements = value.elts if isinstance(value, ast.List | ast.Tuple) else [value]
+                    found += [line for element in elements for line in _string(element, names).splitlines()]
+    return found
+
+
+def _constants(tree: ast.Module) -> dict[str, str]:
+    """The string constants of a file, such as `package_name = "my_bot"`."""
+    names: dict[str, str] = {}
+    for node in tree.body:
+        if isinstance(node, ast.Assign) and len(node.targets) == 1 and isinstance(node.targets[0], ast.Name):
+            names[node.targets[0].id] = _string(node.value, names)
+    return names
+
+
+def _string(node: ast.expr, names: dict[str, str]) -> str:
+    """The value of an expression of string constants; empty for any other."""
+    match node:
+        case ast.Constant(value=str(text)):
+            return text
+        case ast.Name(id=name):
+            return names.get(name, "")
+        case ast.BinOp(left=left, op=ast.Add(), right=right):
+            return _string(left, names) + _string(right, names)
+        case ast.JoinedStr(values=parts):
+            return "".join(_string(part, names) for part in parts)
+        case ast.FormattedValue(value=value):
+            return _string(value, names)
+    return ""

@@ -1,91 +1,106 @@
-"""ROS's message and service classes, made from their definitions when they are first asked for.
+"""ROS's message and service classes, generated from their definitions on first use.
 
-They are Structs, read and written by the one codec (JSON, msgpack, CDR) as our own messages are. What scripts assign is
-checked as ROS does; what is read was checked by its reader, so reading costs no more than reading our own.
+They are Structs, encoded and decoded by the same codec (JSON, msgpack, CDR) as our own messages. Values assigned by
+scripts are checked as in ROS; a decoder checks what it reads, so reading costs no more than for our own messages.
 """
 
 import keyword
+import math
+import operator
 import re
+import struct
 import threading
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Sequence, Set
 from copy import deepcopy
 from functools import partial
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import msgspec
-from msgspec import Struct, StructMeta
+from msgspec import Meta, Struct, StructMeta
 
-from holozen.interfaces import Field, Interface, InterfaceError, Registry
-from holozen.interfaces.definition import FLOATS, TEXTS
-from holozen.interfaces.registry import closest
-from holozen.messages import Message
-from holozen.ros import arrays, fields
+from holozen.messages import CodecError, Message
+from holozen.messages.definitions import (
+    FLOAT32,
+    FLOATS,
+    INTEGERS,
+    TEXTS,
+    TYPECODES,
+    Field,
+    Interface,
+    InterfaceError,
+    closest,
+)
+from holozen.messages.message import packed
+from holozen.messages.registry import Registry
 
-_build = StructMeta.__call__  # makes a message of values that are known to be right
+Check = Callable[[Any], Any]
+"""Takes the value assigned to a field and returns what is stored, or raises AssertionError."""
+
+_construct = StructMeta.__call__  # constructs a message from values known to be valid
 _store = Struct.__setattr__
-_made: dict[Interface, type["RosMessage"]] = {}
-_kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by what the definition says: another registry parses it anew
+MADE: dict[Interface, type["RosMessage"]] = {}
+_kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by content: another registry parses the same file anew
 _services: dict[tuple[str, Any, Any], type["RosService"]] = {}
 _registry = Registry()
-_lock = threading.RLock()  # callbacks of several threads may ask first
+_lock = threading.RLock()  # callbacks in several threads may ask first
 
 
 class RosMeta(StructMeta):
-    """Makes messages as ROS does: of named fields only, each checked."""
+    """Constructs messages as ROS does: from keyword arguments only, each checked."""
 
     def __call__(cls, *positions: Any, **given: Any) -> Any:
         if positions:
             raise TypeError(f"{cls.__module__}.{cls.__name__} takes its fields by name: {_example(cls)}")
-        message, checks = _build(cls), getattr(cls, "__checks__")  # noqa: B009
+        message, checks = _construct(cls), getattr(cls, "__checks__")  # noqa: B009
         for name, value in given.items():
             if name not in checks:
-                raise AssertionError(f"Invalid arguments passed to constructor: {_lacks(cls, name)}")
+                raise AssertionError(f"Invalid arguments passed to constructor: {_no_field(cls, name)}")
             _store(message, name, checks[name](value))
         return message
 
 
 class RosMessage(Message, metaclass=RosMeta):
-    """What every generated message is."""
+    """The base class of all generated messages."""
 
-    ANY_NUMBER: ClassVar[bool] = True  # an infinite range of a LaserScan is nothing wrong
+    ANY_NUMBER: ClassVar[bool] = True  # an infinite range in a LaserScan is valid
     __interface__: ClassVar[Interface]
-    __checks__: ClassVar[dict[str, fields.Check]] = {}
+    __checks__: ClassVar[dict[str, Check]] = {}
 
     @classmethod
     def get_fields_and_field_types(cls) -> dict[str, str]:
-        """The type of each field, by its name, as ROS spells it: `{'x': 'double'}`."""
-        return {field.name: fields.spelled(field) for field in cls.__interface__.fields}
+        """The type of each field, by its name, in ROS's spelling: `{'x': 'double'}`."""
+        return {field.name: _spelled(field) for field in cls.__interface__.fields}
 
     def __setattr__(self, name: str, value: Any) -> None:
         if name not in self.__checks__:
-            raise AttributeError(_lacks(type(self), name))
+            raise AttributeError(_no_field(type(self), name))
         _store(self, name, self.__checks__[name](value))
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={_shown(getattr(self, name))!r}" for name in self.__struct_fields__)
+        values = ", ".join(f"{name}={_printable(getattr(self, name))!r}" for name in self.__struct_fields__)
         return f"{type(self).__module__}.{type(self).__name__}({values})"
 
     def __deepcopy__(self, memo: dict[int, Any]) -> "RosMessage":
         return _restored(type(self), [deepcopy(getattr(self, name), memo) for name in self.__struct_fields__])
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return _found, (self.__interface__.name, [getattr(self, name) for name in self.__struct_fields__])
+        return _unpickled, (self.__interface__.name, [getattr(self, name) for name in self.__struct_fields__])
 
 
 class RosService:
-    """What every generated service is: the name of its two messages."""
+    """The base class of all generated services, which only name their two messages."""
 
     ROS: ClassVar[str] = ""
     Request: ClassVar[Any]
     Response: ClassVar[Any]
 
     def __init__(self) -> None:
-        raise NotImplementedError(f"a service has no values; make a {type(self).__name__}.Request()")
+        raise NotImplementedError(f"a service type has no instances; create a {type(self).__name__}.Request()")
 
 
 def use(registry: Registry) -> None:
-    """Find types in this registry from now on."""
+    """Look up types in this registry from now on."""
     global _registry
     _registry = registry
 
@@ -93,7 +108,7 @@ def use(registry: Registry) -> None:
 def find(name: str) -> Any:
     """The class of `geometry_msgs/msg/Twist`, `std_srvs/srv/Trigger` or `std_srvs/srv/Trigger_Request`.
 
-    Raises InterfaceError, with the closest name there is.
+    Raises InterfaceError, with the closest name that exists.
     """
     with _lock:
         interface = _registry.find(name)
@@ -101,21 +116,21 @@ def find(name: str) -> Any:
 
 
 def make(interface: Interface) -> type[RosMessage]:
-    """The class of a message: one for each definition. Raises InterfaceError for a name that no class can have."""
-    if interface not in _made:
+    """The class of a message, one per definition. Raises InterfaceError for names that no class can have."""
+    if interface not in MADE:
         nested = {field.name: make(field.nested) for field in interface.fields if field.nested}
-        said = ((*each[:6], nested.get(each.name)) for each in interface.fields)
-        key = (interface.name, repr(interface.constants), *((repr(words), kind) for *words, kind in said))
+        described = ((*each[:6], nested.get(each.name)) for each in interface.fields)
+        key = (interface.name, repr(interface.constants), *((repr(words), kind) for *words, kind in described))
         if key not in _kinds:
             _kinds[key] = _make(interface, nested)
-        _made[interface] = _kinds[key]
-    return _made[interface]
+        MADE[interface] = _kinds[key]
+    return MADE[interface]
 
 
 def make_service(interface: Interface) -> type[RosService]:
-    """The class of a service: one for each definition. Raises InterfaceError."""
+    """The class of a service, one per definition. Raises InterfaceError."""
     if not (interface.request and interface.response):
-        raise InterfaceError(f"{interface.name} is no service")
+        raise InterfaceError(f"{interface.name} is not a service")
     request, response = make(interface.request), make(interface.response)
     key = (interface.name, request, response)
     if key not in _services:
@@ -127,18 +142,18 @@ def make_service(interface: Interface) -> type[RosService]:
 def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[RosMessage]:
     for name in (*(field.name for field in interface.fields), *(each.name for each in interface.constants)):
         if keyword.iskeyword(name) or hasattr(RosMessage, name):
-            raise InterfaceError(f"{interface.name}: {name!r} is a word of Python's, or of every message; rename it")
-    hints = {field.name: fields.hint(field, nested.get(field.name)) for field in interface.fields}
+            raise InterfaceError(f"{interface.name}: {name!r} is reserved by Python or by all messages; rename it")
+    hints = {field.name: _hint(field, nested.get(field.name)) for field in interface.fields}
     names: dict[str, Any] = {"__annotations__": hints, "__module__": _module(interface), "__doc__": interface.name}
     for field in interface.fields:
         names[field.name] = msgspec.field(default_factory=_default(field, nested.get(field.name)))
-    if codes := {field.name: arrays.code(field) for field in interface.fields if arrays.code(field)}:
-        names["__post_init__"] = _filler(codes)
+    if codes := {field.name: _typecode(field) for field in interface.fields if _typecode(field)}:
+        names["__post_init__"] = _array_filler(codes)
     kind: Any = RosMeta(_last(interface), (RosMessage,), names)
     kind.ROS = re.sub("_(Request|Response)$", "", interface.name) if "/srv/" in interface.name else interface.name
     kind.__interface__ = interface
     owner = f"{kind.__module__}.{kind.__name__}"
-    kind.__checks__ = {field.name: fields.check(owner, field, nested.get(field.name)) for field in interface.fields}
+    kind.__checks__ = {field.name: _check(owner, field, nested.get(field.name)) for field in interface.fields}
     kind.SETTLE = _settle(kind.__name__, interface, nested)
     for field in interface.fields:
         setattr(kind, f"_{field.name}", kind.__dict__[field.name])
@@ -149,55 +164,12 @@ def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[Ros
     return made
 
 
-def _default(field: Field, nested: type | None) -> Callable[[], Any]:
-    one: Callable[[], Any] = partial(_build, nested) if nested else partial(_same, _zero(field))
-    if code := arrays.code(field):
-        return partial(array, code, field.default or ())
-    if isinstance(field.default, list):
-        return partial(list, tuple(field.default))
-    if not field.array or field.array != "fixed":
-        return list if field.array else one
-    return partial(_row, one, field.bound) if nested else partial(list, (one(),) * field.bound)
-
-
-def _filler(codes: dict[str, str]) -> Callable[[Any], None]:
-    """Makes arrays of the lists that a reader gave."""
-    each = tuple(codes.items())
-
-    def fill(self: Any) -> None:
-        for name, code in each:
-            values = getattr(self, name)
-            if type(values) is not array:
-                _store(self, name, arrays.filled(name, code, values))
-
-    return fill
-
-
-def _shown(value: Any) -> Any:
-    """What stands in a repr: of an array its numbers, as in ROS."""
-    return value.tolist() if type(value) is array else value
-
-
-def _zero(field: Field) -> Any:
-    if field.default is not None:
-        return field.default
-    return "" if field.type in TEXTS else 0.0 if field.type in FLOATS else False if field.type == "bool" else 0
-
-
-def _same(value: Any) -> Any:
-    return value
-
-
-def _row(one: Callable[[], Any], many: int) -> list[Any]:
-    return [one() for _ in range(many)]
-
-
 def _settle(owner: str, interface: Interface, nested: dict[str, type[RosMessage]]) -> Any:
-    """Checks the lists of a message, and those within it, before it is written; None where there are none."""
+    """Checks the sequences of a message, and those inside it, before it is encoded; None if there are none."""
     lists = [
-        (field.name, fields.settled(owner, field, nested.get(field.name)))
+        (field.name, _settled(owner, field, nested.get(field.name)))
         for field in interface.fields
-        if field.array and not (field.array == "sequence" and arrays.code(field))
+        if field.array and not (field.array == "sequence" and _typecode(field))
     ]
     inner = [(field.name, field.array) for field in interface.fields if field.nested and nested[field.name].SETTLE]
 
@@ -211,6 +183,36 @@ def _settle(owner: str, interface: Interface, nested: dict[str, type[RosMessage]
     return settle if lists or inner else None
 
 
+def _default(field: Field, nested: type | None) -> Callable[[], Any]:
+    one: Callable[[], Any] = partial(_construct, nested) if nested else partial(_same, _zero(field))
+    if code := _typecode(field):
+        return partial(array, code, field.default or ())
+    if isinstance(field.default, list):
+        return partial(list, tuple(field.default))
+    if not field.array or field.array != "fixed":
+        return list if field.array else one
+    return partial(_row, one, field.bound) if nested else partial(list, (one(),) * field.bound)
+
+
+def _zero(field: Field) -> Any:
+    if field.default is not None:
+        return field.default
+    return "" if field.type in TEXTS else 0.0 if field.type in FLOATS else False if field.type == "bool" else 0
+
+
+def _row(one: Callable[[], Any], length: int) -> list[Any]:
+    return [one() for _ in range(length)]
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+def _printable(value: Any) -> Any:
+    """What a repr shows: the numbers of an array, as in ROS."""
+    return value.tolist() if type(value) is array else value
+
+
 def _module(interface: Interface) -> str:
     package, kind, _ = interface.name.split("/")
     return f"{package}.{kind}"
@@ -220,7 +222,7 @@ def _last(interface: Interface) -> str:
     return interface.name.rpartition("/")[2]
 
 
-def _lacks(kind: Any, name: str) -> str:
+def _no_field(kind: Any, name: str) -> str:
     known = kind.__struct_fields__
     hint = closest(name, known) or (f"; it has {', '.join(known)}" if known else "; it has none")
     return f"{kind.__module__}.{kind.__name__} has no field {name!r}{hint}"
@@ -231,9 +233,318 @@ def _example(kind: Any) -> str:
 
 
 def _restored(kind: type[RosMessage], values: list[Any]) -> RosMessage:
-    made: RosMessage = _build(kind, *values)
+    made: RosMessage = _construct(kind, *values)
     return made
 
 
-def _found(name: str, values: list[Any]) -> RosMessage:
+def _unpickled(name: str, values: list[Any]) -> RosMessage:
     return _restored(find(name), values)
+
+
+# Fields: their types for the decoder, and ROS's checks at every assignment
+
+_LONGEST = 60  # characters of a value in an error
+_IDL = {"bool": "boolean", "byte": "octet", "char": "uint8", "float32": "float", "float64": "double"}
+_CLASSES = {"bool": bool, **dict.fromkeys(INTEGERS, int), **dict.fromkeys(FLOATS, float), **dict.fromkeys(TEXTS, str)}
+
+
+class _Invalid(Exception):
+    """A value that a field cannot hold."""
+
+
+_REJECTED = (_Invalid, TypeError, ValueError, ArithmeticError)
+
+
+def _hint(field: Field, nested: type | None) -> Any:
+    """The type of a field for msgspec, with its range and its length: what may arrive on the wire."""
+    one: Any = nested or _CLASSES[field.type]
+    if field.type in INTEGERS:
+        low, high = INTEGERS[field.type]
+        # msgspec accepts no limit above a signed 64-bit integer; it reads no more than 64 bits anyway.
+        one = Annotated[int, Meta(ge=low, le=high if high < 2**63 else None)]
+    elif field.longest:
+        one = Annotated[str, Meta(max_length=field.longest)]
+    if not field.array:
+        return one
+    least = field.bound if field.array == "fixed" else None
+    return Annotated[list[one], Meta(min_length=least, max_length=field.bound or None)]
+
+
+def _spelled(field: Field) -> str:
+    """The type as ROS's `get_fields_and_field_types` writes it, such as `sequence<geometry_msgs/Point>`."""
+    one = field.type.replace("/msg/", "/") if field.nested else _IDL.get(field.type, field.type)
+    one += f"<{field.longest}>" if field.longest else ""
+    if field.array == "fixed":
+        return f"{one}[{field.bound}]"
+    return f"sequence<{one}{f', {field.bound}' if field.bound else ''}>" if field.array else one
+
+
+def _check(owner: str, field: Field, nested: type | None) -> Check:
+    """The check of a field in the message called `owner`."""
+    one = _element_check(field, nested)
+    if field.array:
+        listed = _list_check(owner, field, nested, one)
+        return _array_check(field, listed) if _typecode(field) else listed
+    exact = nested or (float if field.type == "float64" else bool if field.type == "bool" else None)
+
+    def check(value: Any) -> Any:
+        if type(value) is exact:
+            return value
+        try:
+            return one(value)
+        except _Invalid:
+            raise AssertionError(_rejection(owner, field, nested, value)) from None
+
+    return check
+
+
+def _settled(owner: str, field: Field, nested: type | None) -> Check:
+    """The check of a sequence before it is encoded, since anything may have been appended. Raises CodecError.
+
+    Numbers of other classes are converted as an array would: an int for a float, and numpy's.
+    """
+    if _typecode(field):
+        return _settled_array(owner, field)
+    exact, one = nested or _CLASSES[field.type], _element_check(field, nested, _LENIENT.get(field.type, _same))
+
+    def check(values: Any) -> list[Any]:
+        where = ""
+        try:
+            if _fits_length(field, len(values)) and _all_exact(field, values, exact):
+                return list(values) if type(values) is not list else values
+            made = []
+            for index, value in enumerate(values):
+                where = f"[{index}]: {_short(value)} of type '{_class_name(value)}'"
+                made.append(one(value))
+            where = f": {len(values)} values"
+            if _fits_length(field, len(values)):
+                return made
+        except _REJECTED:
+            pass
+        raise CodecError(f"{owner}.{field.name}{where} does not fit a {field.spelled()}") from None
+
+    return check
+
+
+def _to_float(value: Any) -> Any:
+    return value if isinstance(value, str) else float(value)
+
+
+def _to_bool(value: Any) -> Any:
+    return value.item() if hasattr(value, "item") else value
+
+
+_LENIENT: dict[str, Check] = {
+    "bool": _to_bool,
+    **dict.fromkeys(FLOATS, _to_float),
+    **{kind: operator.index for kind in INTEGERS if kind != "byte"},
+}
+
+
+def _element_check(field: Field, nested: type | None, convert: Check = _same) -> Check:
+    """The check of one value, after `convert`. Raises _Invalid."""
+    kind: type = nested or _CLASSES[field.type]
+    low, high = INTEGERS.get(field.type, (0, 0))
+
+    def check(value: Any) -> Any:
+        value = convert(value)
+        if field.type == "byte" and isinstance(value, bytes | bytearray) and len(value) == 1:
+            return value[0]
+        if not isinstance(value, kind):
+            raise _Invalid
+        if nested or kind is bool:
+            return value
+        value = kind(value) if kind is not str else str.__str__(value)  # a subclass, such as numpy's float64
+        if kind is int and not low <= value <= high:
+            raise _Invalid
+        if field.type == "float32" and math.isfinite(value) and abs(value) >= FLOAT32:
+            raise _Invalid
+        if field.longest and len(value) > field.longest:
+            raise _Invalid
+        return value
+
+    return check
+
+
+def _list_check(owner: str, field: Field, nested: type | None, one: Check) -> Check:
+    exact = nested or _CLASSES[field.type]
+    is_kept = exact is str or nested  # as in ROS, which stores the very list that was assigned
+
+    def check(given: Any) -> list[Any]:
+        values = _as_list(given)
+        if values is None or not _fits_length(field, len(values)):
+            raise AssertionError(_rejection(owner, field, nested, given))
+        if _all_exact(field, values, exact):
+            return values if is_kept or values is not given else list(values)
+        made = []
+        for index, value in enumerate(values):
+            try:
+                made.append(one(value))
+            except _Invalid:
+                raise AssertionError(_rejection(owner, field, nested, value, f"[{index}]")) from None
+        return made
+
+    return check
+
+
+def _as_list(value: Any) -> list[Any] | None:
+    """A list, tuple, array, bytes or set as a list; None for anything else."""
+    if type(value) is list:
+        return value
+    if hasattr(value, "tolist"):  # array.array and numpy
+        values = value.tolist()
+        return values if isinstance(values, list) else None
+    return list(value) if isinstance(value, Sequence | Set) and not isinstance(value, str) else None
+
+
+def _fits_length(field: Field, length: int) -> bool:
+    return length == field.bound if field.array == "fixed" else not field.bound or length <= field.bound
+
+
+def _all_exact(field: Field, values: list[Any], exact: type) -> bool:
+    """Whether all values are of the exact class and in range: a quick test for the usual case."""
+    if not values:
+        return True
+    if field.longest or not set(map(type, values)) <= {exact}:
+        return False
+    if field.type == "float32":
+        return _fit_float32(values)
+    if exact is int:
+        low, high = INTEGERS[field.type]
+        return bool(low <= min(values) and max(values) <= high)
+    return True
+
+
+def _fit_float32(values: list[float]) -> bool:
+    try:
+        struct.pack(f"={len(values)}f", *values)
+    except OverflowError:
+        return False
+    return True
+
+
+# Arrays: sequences of all numbers but bool and byte are `array.array`, as in ROS
+
+# The format that numpy gives for 64-bit integers depends on the machine.
+_LONGS = dict(zip("lL", "qQ" if struct.calcsize("l") == 8 else "iI", strict=True))
+
+
+def _typecode(field: Field) -> str:
+    """The typecode of a field's array; empty for a field that holds no array."""
+    return TYPECODES.get(field.type, "") if field.array in ("sequence", "bounded") else ""
+
+
+def _array_check(field: Field, listed: Callable[[Any], list[Any]]) -> Check:
+    """The check of an array field. As in ROS an array with its typecode is stored itself; all else is copied.
+
+    `listed` turns anything else into a list of valid values, or raises.
+    """
+    code, most = _typecode(field), field.bound
+
+    def check(given: Any) -> Any:
+        values = given if type(given) is array and given.typecode == code else _copied(code, given)
+        if values is None or 0 < most < len(values):
+            return packed(code, listed(given))
+        return values
+
+    return check
+
+
+def _settled_array(owner: str, field: Field) -> Check:
+    """The check of an array's length before it is encoded, since numbers may have been appended."""
+
+    def check(values: Any) -> Any:
+        if 0 < field.bound < len(values):
+            raise CodecError(f"{owner}.{field.name}: {len(values)} values does not fit a {field.spelled()}")
+        return values
+
+    return check
+
+
+def _array_filler(codes: dict[str, str]) -> Callable[[Any], None]:
+    """Turns the lists from a decoder into arrays."""
+    each = tuple(codes.items())
+
+    def fill(self: Any) -> None:
+        for name, code in each:
+            values = getattr(self, name)
+            if type(values) is not array:
+                _store(self, name, _filled(name, code, values))
+
+    return fill
+
+
+def _filled(name: str, code: str, values: list[Any]) -> "array[Any]":
+    """The array of the list that a decoder gave for the field `name`. Raises ValueError, which decoders report."""
+    try:
+        return packed(code, values)
+    except (OverflowError, struct.error):
+        index = next(index for index, value in enumerate(values) if not _fits(code, value))
+        raise ValueError(f"{name}[{index}] of {values[index]!r} is too large") from None
+
+
+def _fits(code: str, value: Any) -> bool:
+    try:
+        return bool(packed(code, [value]))
+    except (OverflowError, struct.error):
+        return False
+
+
+def _copied(code: str, given: Any) -> "array[Any] | None":
+    """An array of the same numbers, from anything with that layout in memory (bytes, numpy); None for all else."""
+    if type(given) is list:
+        return None
+    try:
+        view = memoryview(given)
+    except (TypeError, ValueError):
+        return None
+    if view.ndim != 1 or _LONGS.get(view.format, view.format) != code:
+        return None
+    made: array[Any] = array(code)
+    made.frombytes(view.tobytes())
+    return made
+
+
+# Error messages for rejected values
+
+
+def _rejection(owner: str, field: Field, nested: type | None, value: Any, place: str = "") -> str:
+    wanted = nested.__name__ if nested else _CLASSES[field.type].__name__
+    one = f"a sub message of type '{wanted}'" if nested else f"of type '{wanted}'"
+    if field.array and not place:
+        many = {"fixed": f"exactly {field.bound}", "bounded": f"at most {field.bound}"}.get(field.array, "")
+        one = f"a sequence of {many + ' values' if many else 'values'} {one.removeprefix('a ')}"
+        if (values := _as_list(value)) is not None:
+            return f"The '{field.name}' field of {owner} must be {one}, not of {len(values)} values"
+    given = f"'{_class_name(value)}' ({_short(value)})"
+    text = f"The '{field.name}{place}' field of {owner} must be {one}{_limits(field)}, not {given}"
+    return text + _remedy(field, wanted, value, place)
+
+
+def _limits(field: Field) -> str:
+    if field.type in INTEGERS:
+        low, high = INTEGERS[field.type]
+        return f" in [{low}, {high}]"
+    if field.longest:
+        return f" of at most {field.longest} characters"
+    return " within a float32" if field.type == "float32" else ""
+
+
+def _remedy(field: Field, wanted: str, value: Any, place: str) -> str:
+    """How to write it, where that is obvious."""
+    if field.nested and hasattr(value, "to_msg"):
+        return "; append .to_msg()"
+    if field.nested or (field.array and not place):
+        return ""
+    if wanted == "float" and type(value) is int:
+        return f"; write {_short(value)}.0, or float(...)"
+    return f"; write {wanted}(...)" if hasattr(value, "item") or (wanted == "int" and isinstance(value, float)) else ""
+
+
+def _class_name(value: Any) -> str:
+    return type(value).__name__
+
+
+def _short(value: Any) -> str:
+    text = repr(value).replace("\n", " ")
+    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."

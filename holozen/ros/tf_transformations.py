@@ -1,7 +1,8 @@
-"""tf_transformations: rotations as ROS counts them, by the library transforms3d.
+"""tf_transformations: rotations and matrices in ROS's conventions, by the library transforms3d.
 
 Quaternions are x, y, z, w (transforms3d has w first), matrices 4x4 and homogeneous, angles in radians. `axes` names one
-of 24 orders of Euler angles: "s" about fixed, "r" about turning axes, then their letters; "sxyz" is roll, pitch, yaw.
+of 24 orders of Euler angles: "s" for static, "r" for rotating axes, then their letters; "sxyz" is roll, pitch, yaw.
+
 """
 
 import math
@@ -12,36 +13,16 @@ import numpy as np
 import numpy.typing as npt
 from transforms3d import affines, axangles, euler, quaternions
 
-from holozen.ros.tf2_math import slerp
+from holozen.rotation import slerp
 
 __all__ = [
-    "compose_matrix",
-    "concatenate_matrices",
-    "euler_from_matrix",
-    "euler_from_quaternion",
-    "euler_matrix",
-    "identity_matrix",
-    "inverse_matrix",
-    "is_same_transform",
-    "quaternion_about_axis",
-    "quaternion_conjugate",
-    "quaternion_from_euler",
-    "quaternion_from_matrix",
-    "quaternion_inverse",
-    "quaternion_matrix",
-    "quaternion_multiply",
-    "quaternion_slerp",
-    "random_quaternion",
-    "random_rotation_matrix",
-    "random_vector",
-    "rotation_from_matrix",
-    "rotation_matrix",
-    "scale_matrix",
-    "translation_from_matrix",
-    "translation_matrix",
-    "unit_vector",
-    "vector_norm",
-]
+    "compose_matrix", "concatenate_matrices", "euler_from_matrix", "euler_from_quaternion", "euler_matrix",
+    "identity_matrix", "inverse_matrix", "is_same_transform", "quaternion_about_axis", "quaternion_conjugate",
+    "quaternion_from_euler", "quaternion_from_matrix", "quaternion_inverse", "quaternion_matrix",
+    "quaternion_multiply", "quaternion_slerp", "random_quaternion", "random_rotation_matrix", "random_vector",
+    "rotation_from_matrix", "rotation_matrix", "scale_matrix", "translation_from_matrix", "translation_matrix",
+    "unit_vector", "vector_norm",
+]  # fmt: skip
 
 Array = npt.NDArray[np.float64]
 Numbers = Sequence[float] | Array
@@ -49,13 +30,13 @@ XYZW = tuple[float, float, float, float]
 
 
 def euler_from_quaternion(quaternion: Numbers, axes: str = "sxyz") -> tuple[float, float, float]:
-    """The Euler angles of a rotation; its quaternion need not have the length 1."""
+    """The Euler angles of a quaternion of any length."""
     a, b, c = euler.quat2euler(_w_first(quaternion), axes)
     return float(a), float(b), float(c)
 
 
 def quaternion_from_euler(ai: float, aj: float, ak: float, axes: str = "sxyz") -> XYZW:
-    """The unit quaternion of Euler angles: roll, pitch and yaw if `axes` is not given."""
+    """The unit quaternion of Euler angles: roll, pitch and yaw unless `axes` is given."""
     return _w_last(euler.euler2quat(ai, aj, ak, axes))
 
 
@@ -71,22 +52,22 @@ def euler_matrix(ai: float, aj: float, ak: float, axes: str = "sxyz") -> Array:
 
 
 def quaternion_matrix(quaternion: Numbers) -> Array:
-    """The 4x4 matrix of a quaternion of any length; that of no rotation for zeros."""
+    """The 4x4 matrix of a quaternion of any length; the identity for zeros."""
     return _homogeneous(quaternions.quat2mat(_w_first(quaternion)))
 
 
 def quaternion_from_matrix(matrix: Any, isprecise: bool = False) -> XYZW:
-    """The unit quaternion of a 3x3 or 4x4 rotation matrix. `isprecise` changes nothing."""
+    """The unit quaternion of a 3x3 or 4x4 rotation matrix. `isprecise` has no effect."""
     return _w_last(quaternions.mat2quat(np.asarray(matrix, dtype=float)[:3, :3]))
 
 
 def quaternion_multiply(quaternion1: Numbers, quaternion0: Numbers) -> XYZW:
-    """The product: first the rotation of `quaternion0`, then that of `quaternion1`."""
+    """The product: rotates by `quaternion0` first, then by `quaternion1`."""
     return _w_last(quaternions.qmult(_w_first(quaternion1), _w_first(quaternion0)))
 
 
 def quaternion_conjugate(quaternion: Numbers) -> Array:
-    """The rotation back, of a unit quaternion."""
+    """The conjugate, which for a unit quaternion is the inverse rotation."""
     x, y, z, w = quaternion
     return np.array((-x, -y, -z, w), dtype=float)
 
@@ -97,23 +78,23 @@ def quaternion_inverse(quaternion: Numbers) -> Array:
 
 
 def quaternion_about_axis(angle: float, axis: Numbers) -> Array:
-    """The unit quaternion that turns by an angle about an axis of any length."""
+    """The unit quaternion of a rotation by an angle about an axis of any length."""
     return np.array(_w_last(quaternions.axangle2quat(np.asarray(axis, dtype=float), angle)))
 
 
 def quaternion_slerp(
     quat0: Numbers, quat1: Numbers, fraction: float, spin: int = 0, shortestpath: bool = True
 ) -> Array:
-    """The rotation at `fraction` of the way from one to the other, at even speed.
+    """The rotation at `fraction` of the way from one to the other, at constant angular speed.
 
-    `spin` adds whole half turns on the way; `shortestpath` false goes the long way round if the quaternions say so.
+    `spin` adds half turns on the way; with `shortestpath` false the longer way is taken if the quaternions are apart.
     """
     a, b = (tuple(float(each) for each in unit_vector(q)) for q in (quat0, quat1))
     return np.array(slerp((a[0], a[1], a[2], a[3]), (b[0], b[1], b[2], b[3]), fraction, spin * math.pi, shortestpath))
 
 
 def random_quaternion(rand: Numbers | None = None) -> Array:
-    """A rotation, all equally likely. `rand` are three numbers from 0 to 1 to make it from."""
+    """A uniformly distributed rotation. `rand` are three numbers from 0 to 1 to use instead of random ones."""
     u, v, w = np.random.default_rng().random(3) if rand is None else rand
     far, near = math.sqrt(1.0 - u), math.sqrt(u)
     a, b = 2 * math.pi * v, 2 * math.pi * w
@@ -126,27 +107,27 @@ def random_rotation_matrix(rand: Numbers | None = None) -> Array:
 
 
 def random_vector(size: int) -> Array:
-    """Numbers from 0 to 1, as many as asked for."""
+    """`size` random numbers from 0 to 1."""
     return np.random.default_rng().random(size)
 
 
 def identity_matrix() -> Array:
-    """The 4x4 matrix that moves nothing."""
+    """The 4x4 identity matrix."""
     return np.identity(4)
 
 
 def translation_matrix(direction: Numbers) -> Array:
-    """The 4x4 matrix that moves by a vector."""
+    """The 4x4 matrix that translates by a vector."""
     return affines.compose(np.asarray(direction, dtype=float)[:3], np.identity(3), np.ones(3))  # type: ignore[no-any-return]
 
 
 def translation_from_matrix(matrix: Any) -> Array:
-    """The vector by which a 4x4 matrix moves."""
+    """The translation of a 4x4 matrix."""
     return np.array(np.asarray(matrix, dtype=float)[:3, 3])
 
 
 def rotation_matrix(angle: float, direction: Numbers, point: Numbers | None = None) -> Array:
-    """The 4x4 matrix that turns by an angle about an axis through the origin, or through `point`."""
+    """The 4x4 matrix that rotates by an angle about an axis through the origin, or through `point`."""
     matrix = _homogeneous(axangles.axangle2mat(np.asarray(direction, dtype=float)[:3], angle))
     if point is not None:
         centre = np.asarray(point, dtype=float)[:3]
@@ -155,13 +136,13 @@ def rotation_matrix(angle: float, direction: Numbers, point: Numbers | None = No
 
 
 def rotation_from_matrix(matrix: Any) -> tuple[float, Array, Array]:
-    """Angle, direction and a point (x, y, z, 1) of the axis about which a 4x4 matrix turns. Raises ValueError."""
+    """Angle, direction and a point (x, y, z, 1) of the rotation axis of a 4x4 matrix. Raises ValueError."""
     direction, angle, point = axangles.aff2axangle(np.asarray(matrix, dtype=float))
     return float(angle), np.asarray(direction), np.asarray(point)
 
 
 def scale_matrix(factor: float, origin: Numbers | None = None, direction: Numbers | None = None) -> Array:
-    """The 4x4 matrix that scales about `origin`, along `direction` only if that is given."""
+    """The 4x4 matrix that scales about `origin`, and only along `direction` if that is given."""
     part = np.identity(3)
     if direction is not None:
         axis = unit_vector(np.asarray(direction, dtype=float)[:3])
@@ -179,7 +160,7 @@ def compose_matrix(
     angles: Numbers | None = None,
     translate: Numbers | None = None,
 ) -> Array:
-    """The 4x4 matrix that scales, shears, turns by roll, pitch and yaw, and then moves; each if given."""
+    """The 4x4 matrix that scales, shears, rotates by roll, pitch and yaw, and then translates; each if given."""
     return affines.compose(  # type: ignore[no-any-return]
         np.zeros(3) if translate is None else np.asarray(translate, dtype=float),
         np.identity(3) if angles is None else euler.euler2mat(*angles),
@@ -197,12 +178,12 @@ def concatenate_matrices(*matrices: Any) -> Array:
 
 
 def inverse_matrix(matrix: Any) -> Array:
-    """The matrix that undoes a square one. numpy.linalg.LinAlgError if there is none."""
+    """The inverse of a square matrix. Raises numpy.linalg.LinAlgError if there is none."""
     return np.linalg.inv(np.asarray(matrix, dtype=float))
 
 
 def is_same_transform(matrix0: Any, matrix1: Any) -> bool:
-    """Whether two 4x4 matrices do the same, whatever their last number."""
+    """Whether two 4x4 matrices are the same transform, whatever their last number."""
     first, second = (np.asarray(matrix, dtype=float) for matrix in (matrix0, matrix1))
     return bool(np.allclose(first / first[3, 3], second / second[3, 3]))
 
@@ -217,7 +198,7 @@ def vector_norm(data: Any, axis: int | None = None, out: Array | None = None) ->
 
 
 def unit_vector(data: Any, axis: int | None = None, out: Array | None = None) -> Any:
-    """The vector of length 1 with that direction, or those along an axis of an array."""
+    """The vector of length 1 with that direction, or the vectors along an axis of an array."""
     given = np.asarray(data, dtype=float)
     length = np.sqrt(np.sum(np.square(given), axis=axis, keepdims=axis is not None))
     if out is None:

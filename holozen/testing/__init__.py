@@ -1,4 +1,4 @@
-"""Test robots with real processes, real Zenoh and a real pseudo-terminal; pytest loads the fixtures by itself.
+"""Test robots with real processes, real Zenoh and a real pseudo-terminal; pytest loads the fixtures automatically.
 
     def test_the_robot_stands_after_half_a_second_of_silence(wire, wait_for):
         wire.start("sim")

@@ -12,9 +12,9 @@ from holozen.testing.wire import Wire
 
 @pytest.fixture
 def wire() -> Iterator[Wire]:
-    """A place to meet that no other test uses. What was started in it ends with the test.
+    """A network of its own for a test. Everything started on it ends with the test.
 
-    To share one among the tests of a file, write a fixture with `scope="module"` that does the same.
+    To share one among the tests of a file, write such a fixture with `scope="module"`.
     """
     with Wire() as wire:
         yield wire
@@ -28,5 +28,5 @@ def terminal(wire: Wire) -> Callable[..., Terminal]:
 
 @pytest.fixture
 def wait_for() -> Callable[..., Any]:
-    """`wait_for(lambda: odom.count > 3, within=5)`: wait for a condition and not for a time."""
+    """`wait_for(lambda: odom.count > 3, within=5)`: wait for a condition rather than for a time."""
     return wait

@@ -1,4 +1,4 @@
-"""Processes of a test: what they write is kept, and they end with it."""
+"""Processes of a test: their output is kept, and they end with the test."""
 
 import os
 import signal
@@ -10,14 +10,14 @@ from typing import IO, Self, TypeVar
 
 T = TypeVar("T")
 
-EVERY = 0.005  # s between two looks
+EVERY = 0.005  # s between two polls
 GRACE = 3.0  # s from SIGTERM to SIGKILL
 
 
 def wait_for(condition: Callable[[], T], within: float = 10.0, what: str | Callable[[], str] = "a condition") -> T:
-    """Wait until `condition()` is true, and return what it gave. AssertionError after `within` seconds.
+    """Wait until `condition()` is true, and return its value. AssertionError after `within` seconds.
 
-    `what` says in the error what was waited for; as a function it is asked only then.
+    `what` describes the condition in the error; a function is called only then.
     """
     deadline = time.monotonic() + within
     while not (value := condition()):
@@ -29,9 +29,9 @@ def wait_for(condition: Callable[[], T], within: float = 10.0, what: str | Calla
 
 
 class Process:
-    """A running program, the leader of its own session. `out` and `err` are what it has written so far.
+    """A running program, the leader of its own session. `out` and `err` are its output so far.
 
-    `stdin`, `stdout` and `stderr` are as for subprocess.Popen; by default the first is empty and the others are kept.
+    `stdin`, `stdout` and `stderr` are as for subprocess.Popen; the first is empty and the others captured by default.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class Process:
         stderr: int | IO[bytes] | None = None,
     ) -> None:
         self.words = list(words)
-        # Files and not pipes: a process that writes much never waits for its reader.
+        # Files rather than pipes: a process with much output never blocks.
         self._out, self._err = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115
         self._ended: tuple[str, str] | None = None
         self._popen = subprocess.Popen(
@@ -82,7 +82,7 @@ class Process:
         return self._popen.poll()
 
     def wait_for_line(self, text: str, within: float = 20.0) -> str:
-        """The first line of its output or errors that holds `text`. AssertionError if it ends without one."""
+        """The first line of its output or errors that contains `text`. AssertionError if it ends without one."""
 
         def look() -> str | None:
             ended = self.returncode is not None
@@ -94,7 +94,7 @@ class Process:
         return wait_for(look, within, lambda: f"{text!r} from {self}, which wrote:\n{self.out}{self.err}") or ""
 
     def wait(self, within: float = 10.0) -> int:
-        """Wait for its end; the exit code. AssertionError if it runs on."""
+        """Wait for its end and return the exit code. AssertionError if it keeps running."""
         try:
             return self._popen.wait(within)
         except subprocess.TimeoutExpired:
@@ -105,19 +105,19 @@ class Process:
         self._popen.send_signal(number)
 
     def terminate(self, within: float = 10.0) -> int:
-        """SIGTERM, and wait for its end; the exit code."""
+        """Send SIGTERM, wait for its end and return the exit code."""
         self.signal(signal.SIGTERM)
         return self.wait(within)
 
     def kill(self) -> int:
-        """SIGKILL, and wait for its end; the exit code."""
+        """Send SIGKILL, wait for its end and return the exit code."""
         self.signal(signal.SIGKILL)
         return self.wait()
 
     def close(self) -> None:
-        """End it, kindly if it listens; `out` and `err` stay."""
+        """End it, gracefully if it reacts to SIGTERM; `out` and `err` stay available."""
         self.signal(signal.SIGTERM)
-        self.signal(signal.SIGCONT)  # in case a test has stopped it
+        self.signal(signal.SIGCONT)  # in case a test has suspended it
         try:
             self._popen.wait(GRACE)
         except subprocess.TimeoutExpired:

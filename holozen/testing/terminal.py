@@ -13,14 +13,14 @@ from typing import Any, Self
 from holozen.testing.process import Process, wait_for
 
 SIZE = 100, 32  # columns and rows
-# Makes the terminal on standard input the controlling one, so that it hangs up and interrupts as real ones do.
+# Makes the terminal on standard input the controlling one, so that it delivers hang-ups and interrupts.
 _ENTER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
 
 
 class Terminal:
-    """A process and the terminal it runs in. Its output is read all the time, as a terminal does.
+    """A process and the terminal it runs in. Its output is read continuously, as by a real terminal.
 
-    `size` is in columns and rows. `screen` needs the package pyte; nothing else does.
+    `size` is in columns and rows. Only `screen` needs the package pyte.
     """
 
     def __init__(
@@ -31,13 +31,13 @@ class Terminal:
         termios.tcsetwinsize(slave, size[::-1])
         self.modes_before = self.modes()
         self._bytes = b""
-        self._shown = 0  # how many of them the emulator has seen
+        self._shown = 0  # bytes passed to the emulator
         self._emulator: Any = None
         self._closing, self._frozen = threading.Event(), threading.Event()
         try:
             self.process = Process(
                 [sys.executable, "-S", "-c", _ENTER, *words],
-                # It is not in the tmux or screen that the tests may run in.
+                # Not inside the tmux or screen that the tests may run in.
                 env={"TERM": "xterm-256color", "TMUX": "", "STY": "", **(env or {})},
                 stdin=slave,
                 stdout=slave,
@@ -55,13 +55,13 @@ class Terminal:
         self.close()
 
     def type(self, keys: str | bytes) -> None:
-        """Press keys: `terminal.type("i")`; a control or arrow key by the bytes it sends, such as `"\\x1b[A"`."""
+        """Press keys: `terminal.type("i")`; control and arrow keys by their bytes, such as `"\\x1b[A"`."""
         os.write(self._master, keys.encode() if isinstance(keys, str) else keys)
 
     def hold(self, key: str | bytes, seconds: float, delay: float = 0.5, interval: float = 0.04) -> list[float]:
-        """Hold a key as long, in a terminal that repeats it after `delay` and then every `interval` seconds.
+        """Hold a key for `seconds`, in a terminal that repeats it after `delay` and then every `interval` seconds.
 
-        Returns when each was sent, on the clock of time.monotonic.
+        Returns the times at which it was sent, as of time.monotonic.
         """
         sent = [time.monotonic()]
         self.type(key)
@@ -74,23 +74,23 @@ class Terminal:
         return sent
 
     def resize(self, columns: int, rows: int) -> None:
-        """Give the window another size, and tell the process."""
+        """Resize the window, and notify the process."""
         if self._emulator is not None:
-            self.screen()  # what was written until now was written for the old size
+            self.screen()  # the output so far was written for the old size
             self._emulator.listener.resize(rows, columns)
         self._size = columns, rows
         termios.tcsetwinsize(self._master, (rows, columns))
 
     def freeze(self) -> None:
-        """Hang: read nothing more of what the process writes, until `thaw`."""
+        """Hang: read no output of the process until `thaw`."""
         self._frozen.set()
 
     def thaw(self) -> None:
-        """Read on."""
+        """Resume reading."""
         self._frozen.clear()
 
     def received(self, data: bytes) -> None:
-        """Called with what the process has written. Does nothing; a terminal that answers questions does it here."""
+        """Called with the output of the process. Does nothing; override it in a terminal that answers queries."""
 
     @property
     def closed(self) -> bool:
@@ -99,11 +99,11 @@ class Terminal:
 
     @property
     def raw(self) -> str:
-        """All that was written to the terminal, with its control sequences."""
+        """All output to the terminal, including control sequences."""
         return self._bytes.decode(errors="replace")
 
     def screen(self) -> str:
-        """What a person sees now, a line a row."""
+        """The visible text, one line for each row."""
         try:
             import pyte
         except ModuleNotFoundError:
@@ -116,7 +116,7 @@ class Terminal:
         return "\n".join(line.rstrip() for line in self._emulator.listener.display)
 
     def wait_for_text(self, text: str, within: float = 20.0) -> str:
-        """Wait until the screen shows `text`; the screen. AssertionError if the process ends without."""
+        """Wait until the screen shows `text`, and return the screen. AssertionError if the process ends without it."""
 
         def look() -> str | None:
             ended = self.process.returncode is not None
@@ -132,7 +132,7 @@ class Terminal:
         return termios.tcgetattr(self._master)
 
     def hang_up(self) -> None:
-        """Close the terminal, as its window's button does: the process gets SIGHUP and has no screen left."""
+        """Close the terminal, like closing its window: the process receives SIGHUP and has no screen left."""
         if not self._closing.is_set():
             self._closing.set()
             self._reader.join()

@@ -1,4 +1,4 @@
-"""A place of their own for the processes of a test."""
+"""A network of their own for the processes of a test."""
 
 import contextlib
 import random
@@ -7,16 +7,16 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Any, Self
 
-from holozen.connection import Connection
 from holozen.testing.process import Process
 from holozen.testing.terminal import Terminal
+from holozen.transport.connection import Connection
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
 
 
 class Wire:
-    """A loopback port where the processes and the buses of one test meet, and nobody else.
+    """A loopback port on which only the processes and buses of one test meet.
 
     `connection` is for `holozen.bus.Bus`, `flags` for any holozen verb, `endpoint` for any Zenoh tool.
     """
@@ -57,17 +57,17 @@ class Wire:
         return self._ends.enter_context(Bus(node, self.connection, **options))
 
     def close(self) -> None:
-        """End all that was started here, the last first."""
+        """End everything started here, in reverse order."""
         self._ends.close()
 
 
 def command(verb: str, *words: str) -> list[str]:
-    """The words that start `holozen VERB WORDS...` with this Python."""
+    """The command line that runs `holozen VERB WORDS...` with this Python."""
     return [sys.executable, "-m", "holozen", verb, *words]
 
 
 def free_port() -> int:
-    """A free TCP port on loopback, below those that the kernel gives to whoever asks for any."""
+    """A free TCP port on loopback, below the range of ephemeral ports."""
     while True:
         port = random.randint(10_000, 32_000)
         with socket.socket() as probe, contextlib.suppress(OSError):

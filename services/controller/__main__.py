@@ -1,21 +1,52 @@
-"""The controller: drives a robot to the goals that next_goal hands out."""
+"""The controller: drives a robot to the goals of next_goal."""
 
 import argparse
 import math
 import sys
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
-from holozen import connection, flags
+from holozen import flags
 from holozen.bus import Bus
-from holozen.errors import BusError
+from holozen.console import output, report
 from holozen.messages import TriggerReply, TriggerRequest
-from holozen.parameters import Parameters
 from holozen.process import stop_event
-from holozen.tell import say
+from holozen.transport import connection
+from holozen.transport.errors import BusError
+from holozen.transport.parameters import Number, Parameters
 from holozen.wire import key_for
 
 from .follow import Follower
 from .goto import Gains, Leg
-from .knobs import KNOBS, declared
+
+
+class Param(NamedTuple):
+    """One of the Gains: a flag, and a parameter that can be set while the controller drives."""
+
+    name: str
+    field: str
+    low: float
+    high: float
+    unit: str
+    about: str
+
+    @property
+    def flag(self) -> str:
+        """Its command-line flag."""
+        return "--" + self.name.replace("_", "-")
+
+
+PARAMS = (
+    Param("max_speed", "max_speed", 0.01, 10, "m/s", "maximum speed"),
+    Param("max_turn", "max_turn", 0.01, 20, "rad/s", "maximum turn rate"),
+    Param("max_acceleration", "max_acceleration", 0.01, 100, "m/s^2", "maximum acceleration"),
+    Param("gain", "linear", 0.1, 10, "1/s", "speed per metre of distance"),
+    Param("turn_gain", "angular", 0.1, 10, "1/s", "turn rate per radian of error"),
+    Param("tolerance", "tolerance", 0.001, 1, "m", "allowed distance to a goal"),
+    Param("angle_tolerance", "angle_tolerance", 0.001, 1, "rad", "allowed heading error at a goal"),
+)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -25,12 +56,20 @@ def parser() -> argparse.ArgumentParser:
         description="Drive a robot to the goals of next_goal.",
         epilog="example: holozen controller --laps 0",
     )
-    parser.add_argument("robot", nargs="?", default="", type=flags.robot, help="its name; none: the one at the root")
-    parser.add_argument("--resume", action="store_true", help="let the controller drive again, and end")
-    parser.add_argument("--laps", type=flags.count(), default=1, help="times round the list; 0: for ever (default: 1)")
-    for knob in KNOBS:
-        parser.add_argument(knob.flag, type=flags.number(knob.low, knob.high, knob.unit),
-            default=getattr(default, knob.field), help=f"{knob.about}, {knob.unit} (default: %(default)g)")  # fmt: skip
+    parser.add_argument(
+        "robot", nargs="?", default="", type=flags.robot, help="the robot's name; default: the robot without a name"
+    )
+    parser.add_argument("--resume", action="store_true", help="let the controller drive again, and exit")
+    parser.add_argument(
+        "--laps", type=flags.count(), default=1, help="laps of the list of goals; 0: for ever (default: 1)"
+    )
+    for param in PARAMS:
+        parser.add_argument(
+            param.flag,
+            type=flags.number(param.low, param.high, param.unit),
+            default=getattr(default, param.field),
+            help=f"{param.about}, {param.unit} (default: %(default)g)",
+        )
     connection.add_arguments(parser)
     return parser
 
@@ -41,26 +80,26 @@ def main(argv: list[str] | None = None) -> int:
     try:
         return resume(args.robot, where) if args.resume else follow(args, where)
     except BusError as failure:
-        say(f"controller: {failure}")
+        report(f"controller: {failure}")
         return 1
 
 
 def follow(args: argparse.Namespace, where: connection.Connection) -> int:
-    """Drive `args.laps` laps, and say after each how well."""
+    """Drive `args.laps` laps, and print the results of each."""
     stop, laps = stop_event(), 0
     with Bus("controller", where, lasting=True, stop=stop) as bus:
-        follower = Follower(bus, args.robot, _gains(args), stop, lambda text: say(f"controller: {text}"))
+        follower = Follower(bus, args.robot, _gains(args), stop, lambda text: report(f"controller: {text}"))
         serve_parameters(bus, args.robot, follower)
         try:
             while not stop.is_set() and (laps < args.laps or not args.laps):
-                report(follower.lap(), laps := laps + 1)
+                print_legs(follower.lap(), laps := laps + 1)
         finally:
             follower.halt()
     return 0
 
 
 def serve_parameters(bus: Bus, robot: str, follower: Follower) -> None:
-    """Let others read and set its gains and limits; they hold from the next command on."""
+    """Serve its gains and limits as parameters; changes apply from the next command on."""
 
     def write(gains: Gains) -> None:
         follower.gains = gains
@@ -68,28 +107,45 @@ def serve_parameters(bus: Bus, robot: str, follower: Follower) -> None:
     Parameters(bus, key_for("controller", robot), lambda: declared(lambda: follower.gains, write)).start()
 
 
+def declared(read: Callable[[], Gains], write: Callable[[Gains], None]) -> Iterator[Number]:
+    """The parameters of the Gains that `read` returns and `write` sets."""
+    for param in PARAMS:
+        yield Number(
+            param.name, param.about, param.unit, param.low, param.high,
+            partial(_get, read, param.field), partial(_set, read, write, param.field),
+        )  # fmt: skip
+
+
+def _get(read: Callable[[], Gains], field: str) -> float:
+    value: float = getattr(read(), field)
+    return value
+
+
+def _set(read: Callable[[], Gains], write: Callable[[Gains], None], field: str, value: float) -> None:
+    write(replace(read(), **{field: value}))
+
+
 def resume(robot: str, where: connection.Connection) -> int:
-    """Tell the sim that overruled sources may drive again."""
-    with Bus("controller_resume", where, patience=3.0) as bus:
+    """Ask the sim to let overruled sources drive again."""
+    with Bus("controller_resume", where) as bus:
         reply = bus.call(key_for("resume", robot), TriggerRequest(), TriggerReply)
-    say(reply.message)
+    report(reply.message)
     return 0 if reply.success else 1
 
 
-def report(legs: list[Leg], lap: int) -> None:
+def print_legs(legs: list[Leg], lap: int) -> None:
     """Print one line a leg: goal, time, worst distance from the straight line."""
     for number, leg in enumerate(legs):
         x, y, theta = leg.goal
         seconds = leg.ended - leg.began
-        print(
+        output(
             f"lap {lap} goal {number}: ({x:.2f}, {y:.2f}, {math.degrees(theta):.0f} deg) "
-            f"in {seconds:.2f} s, path error {leg.path_error * 1000:.1f} mm",
-            flush=True,
+            f"in {seconds:.2f} s, path error {leg.path_error * 1000:.1f} mm"
         )
 
 
 def _gains(args: argparse.Namespace) -> Gains:
-    return Gains(**{knob.field: getattr(args, knob.name) for knob in KNOBS})
+    return Gains(**{param.field: getattr(args, param.name) for param in PARAMS})
 
 
 if __name__ == "__main__":

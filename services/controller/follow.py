@@ -1,44 +1,79 @@
-"""Follows goals: asks for one after another, drives there, and reports each leg."""
+"""Follows goals: requests one after another and drives there, while no other source drives the robot."""
 
 import threading
 import time
 from collections.abc import Callable
 
 from holozen.bus import Bus
-from holozen.errors import NoReply, ServiceError
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, Twist
-from holozen.publisher import Publisher
+from holozen.transport.errors import NoReply, ServiceError
+from holozen.transport.pubsub import Publisher
 from holozen.wire import PRIORITY_OF, key_for, topic
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
-from .yielding import Manners
 
 PERIOD = 0.05  # s of the odom's clock between two commands
-PATIENCE = 0.5  # s between two tries to reach a service
+PATIENCE = 0.5  # s between two attempts to reach a service
 STOP_FOR, STOP_EVERY = 1.0, 0.05  # s; how long and how often a stop is repeated
 RESTS = 0.01  # m/s and rad/s; slower than this is standing
-FARTHEST = 1e6  # m; what is farther is no goal and no pose
+MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
+RESUMES = "`holozen controller --resume` or the teleop's r resumes"
+
+
+class YieldPolicy:
+    """Whether the controller may drive: it yields when another source drives, and drives again only after a resume.
+
+    Reads cmd_vel_status, in which `source` is this controller.
+    """
+
+    def __init__(self, source: str) -> None:
+        self._source = source
+        self._resumed = 0
+        self.yielded_to = ""  # empty while this controller may drive
+        self.stopped = ""  # who set the software stop, while it is set
+
+    @property
+    def reason(self) -> str:
+        """Why this controller does not drive, and what would let it; empty while it may."""
+        if self.stopped:
+            return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, and then {RESUMES}"
+        return f"yields to {self.yielded_to}; {RESUMES}" if self.yielded_to else ""
+
+    def update(self, status: CommandStatus) -> None:
+        """Apply the newest status. A restarted sim forgets which source drove; this does not."""
+        if status.resumed > self._resumed:
+            self.yielded_to = ""
+        self._resumed = status.resumed
+        self.stopped = status.stopped
+        if status.stopped:
+            self.yielded_to = f"the stop by {status.stopped}"
+        elif status.obeyed and status.obeyed != self._source:
+            self.yielded_to = status.obeyed
+        elif status.held and not self.yielded_to:
+            self.yielded_to = "an earlier source"
 
 
 class Follower:
     """Drives one robot from goal to goal until `stop` is set."""
 
-    def __init__(self, bus: Bus, robot: str, gains: Gains, stop: threading.Event, say: Callable[[str], None]) -> None:
+    def __init__(
+        self, bus: Bus, robot: str, gains: Gains, stop: threading.Event, report: Callable[[str], None]
+    ) -> None:
         row = topic("odom")
         assert row is not None
-        self._bus, self._stop, self._say, self._silence = bus, stop, say, row.silence
+        self._bus, self._stop, self._report, self._silence = bus, stop, report, row.silence
         self.gains = gains  # may be replaced while it drives
         self._odom = bus.latest(key_for("odom", robot), Odometry)
-        self._status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
+        self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
-        self._manners = Manners(bus.source)
+        self._policy = YieldPolicy(bus.source)
         self._now: Planar = STOP
         self._yielded = False
-        self._told = ""
+        self._reported = ""
 
     def lap(self) -> list[Leg]:
-        """Visit every goal of the list once. Returns the legs driven; fewer than the list when told to stop."""
+        """Visit every goal of the list once. Returns the legs driven; fewer than the list if stopped before its end."""
         legs: list[Leg] = []
         while not self._stop.is_set():
             goal = self._ask(len(legs))
@@ -51,7 +86,7 @@ class Follower:
         return legs
 
     def halt(self) -> None:
-        """Stop the robot if this controller moves it: zeros until odom shows rest, at most a second."""
+        """Stop the robot if this controller moves it: zeros until odom shows rest, for at most a second."""
         ends = time.monotonic() + STOP_FOR
         while self._now != STOP:
             count = self._odom.count
@@ -62,35 +97,35 @@ class Follower:
                 self._now = STOP
 
     def _ask(self, number: int) -> NextGoalReply | None:
-        """Goal `number` of the list; waits for the service. None when told to stop meanwhile."""
+        """Goal `number` of the list; waits for the service. None when `stop` is set first."""
         while not self._stop.is_set():
             try:
                 goal = self._bus.call("next_goal", NextGoalRequest(number), NextGoalReply, PATIENCE)
-                if all(abs(value) <= FARTHEST for value in (goal.x_goal, goal.y_goal, goal.theta_goal)):
+                if all(abs(value) <= MAX_DISTANCE for value in (goal.x_goal, goal.y_goal, goal.theta_goal)):
                     return goal
-                self._tell(f"goal {number} is more than {FARTHEST:g} m away; waiting for another")
+                self._report_hold(f"goal {number} is more than {MAX_DISTANCE:g} m away; waiting for another")
             except NoReply as silence:
-                self._tell(f"waiting for goal {number}: {silence}")
+                self._report_hold(f"waiting for goal {number}: {silence}")
             except ServiceError as failure:
-                self._tell(f"goal {number}: {failure}")
+                self._report_hold(f"goal {number}: {failure}")
                 if number:  # the list got shorter: this lap is over
                     return None
             self._stop.wait(PATIENCE)
         return None
 
     def _drive(self, goal: Pose) -> Leg | None:
-        """Drive to a goal. None when told to stop before it was reached."""
+        """Drive to a goal. None when `stop` is set first."""
         leg: Leg | None = None
         before = 0.0
         while not self._stop.is_set():
             odom = self._next_odom()
             if odom is None:
-                leg = None if self._manners.yielded_to else leg  # where the other one left it, a new leg begins
+                leg = None if self._policy.yielded_to else leg  # a new leg begins where the other source left the robot
                 continue
             stamp, pose = odom.header.stamp.seconds(), _pose(odom)
-            if leg is None or stamp < before:  # the first odom, or those of a sim that was started again
+            if leg is None or stamp < before:  # the first odom, or those of a restarted sim
                 leg, before = Leg(pose, goal, stamp), stamp - PERIOD
-            leg.see(pose, stamp)
+            leg.update(pose, stamp)
             left = error(pose, goal)
             if arrived(left, self._now, self.gains):
                 self.halt()
@@ -101,28 +136,28 @@ class Follower:
         return None
 
     def _next_odom(self) -> Odometry | None:
-        """The next odom, if this controller may act on it; else the robot is let go."""
+        """The next odom, if this controller may act on it; else None, and this controller sends no commands."""
         count = self._odom.count
         fresh = self._odom.wait(count, self._odom.patience(self._silence))
         odom, _ = self._odom.read()
-        status, _ = self._status.read()
+        status, _ = self.status.read()
         if status:
-            self._manners.see(status)
-        if reason := self._manners.reason:
-            self._now = STOP  # the other one has the robot: nothing of ours moves it, not even a stop
+            self._policy.update(status)
+        if reason := self._policy.reason:
+            self._now = STOP  # another source drives: not even a stop of ours may reach the robot
             self._yielded = True
-            self._tell(reason)
+            self._report_hold(reason)
         elif not fresh:
             self.halt()
-            self._tell("waiting for odom: it is stale or was never heard")
-        elif odom is None or not all(abs(value) <= FARTHEST for value in _pose(odom)):
+            self._report_hold("waiting for odom: it is stale, or none was received")
+        elif odom is None or not all(abs(value) <= MAX_DISTANCE for value in _pose(odom)):
             self.halt()
-            self._tell(f"waiting for odom: its pose is more than {FARTHEST:g} m away")
+            self._report_hold(f"waiting for odom: its pose is more than {MAX_DISTANCE:g} m away")
         else:
-            if self._yielded:  # it lets go with a stop, as whoever commanded a stopped robot has to
+            if self._yielded:  # a source that commanded a stopped robot has to let go with a stop
                 self._command(STOP)
             self._yielded = False
-            self._tell("")
+            self._report_hold("")
             return odom
         return None
 
@@ -130,13 +165,13 @@ class Follower:
         self._commands.put(Twist.planar(*planar))
         self._now = planar
 
-    def _tell(self, text: str) -> None:
-        """Tell what holds this controller up, once."""
-        if text and text != self._told:
-            self._say(text)
-        elif self._told and not text:
-            self._say("goes on")
-        self._told = text
+    def _report_hold(self, text: str) -> None:
+        """Report once why this controller waits; an empty text when it goes on."""
+        if text and text != self._reported:
+            self._report(text)
+        elif self._reported and not text:
+            self._report("continues")
+        self._reported = text
 
 
 def _pose(odom: Odometry) -> Pose:

@@ -3,10 +3,10 @@
 import math
 from dataclasses import dataclass
 
-from holozen.drive import to_body
+from holozen.kinematics import to_body
 from holozen.limits import Planar, clamp_speed, ramp, wrap
 
-CREEP, TURN_CREEP = 0.05, 0.1  # m/s, rad/s; slower than this an arrival needs no braking
+CREEP, TURN_CREEP = 0.05, 0.1  # m/s, rad/s; slow enough to arrive without braking
 
 Pose = tuple[float, float, float]
 """x, y in metres and theta in radians."""
@@ -14,7 +14,7 @@ Pose = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Gains:
-    """How eager the controller is. `linear`, `angular` in 1/s; speeds and accelerations in m, rad and s."""
+    """The gains and limits of the controller. `linear`, `angular` in 1/s; speeds and accelerations in m, rad and s."""
 
     linear: float = 1.5
     angular: float = 2.0
@@ -27,13 +27,13 @@ class Gains:
 
 
 def error(pose: Pose, goal: Pose) -> Planar:
-    """The goal seen from the body: forward, left, and the angle still to turn within [-pi, pi]."""
+    """The goal in the body frame: forward, left, and the heading error within [-pi, pi]."""
     x, y = to_body(goal[0] - pose[0], goal[1] - pose[1], pose[2])
     return x, y, wrap(goal[2] - pose[2])
 
 
 def arrived(left: Planar, now: Planar, gains: Gains) -> bool:
-    """Whether the error is within the tolerances and the velocity last commanded is as good as none."""
+    """Whether the error is within the tolerances and the last commanded velocity is nearly zero."""
     close = math.hypot(left[0], left[1]) <= gains.tolerance and abs(left[2]) <= gains.angle_tolerance
     return close and math.hypot(now[0], now[1]) <= CREEP and abs(now[2]) <= TURN_CREEP
 
@@ -41,8 +41,8 @@ def arrived(left: Planar, now: Planar, gains: Gains) -> bool:
 def velocity(left: Planar, now: Planar, gains: Gains, dt: float) -> Planar:
     """The velocity to command `dt` seconds after `now` was commanded.
 
-    Proportional to the error, within the limits, and never faster than what half of the acceleration stops in the way
-    that is left: v^2 = 2 a s.
+    Proportional to the error, within the limits, and never too fast to stop within the remaining distance at half of
+    the acceleration: v^2 = 2 a s.
     """
     x, y, turn = left
     wanted = (gains.linear * x, gains.linear * y, gains.angular * turn)
@@ -53,7 +53,7 @@ def velocity(left: Planar, now: Planar, gains: Gains, dt: float) -> Planar:
 
 @dataclass
 class Leg:
-    """One goal's way: from where, since when (s, the odom's clock), and the worst distance from the straight line."""
+    """The way to one goal: its start, its times (s, odom's clock), and the largest distance from the straight line."""
 
     start: Pose
     goal: Pose
@@ -61,8 +61,8 @@ class Leg:
     ended: float = 0.0
     path_error: float = 0.0
 
-    def see(self, pose: Pose, time: float) -> None:
-        """Take account of where the robot was at `time`."""
+    def update(self, pose: Pose, time: float) -> None:
+        """Apply the robot's pose at `time`."""
         self.ended = time
         self.path_error = max(self.path_error, distance_to_line(pose, self.start, self.goal))
 

@@ -1,21 +1,62 @@
-"""The pose service: hands out goals and tells where robots are."""
+"""The pose service: answers next_goal and get_pose."""
 
 import argparse
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
-from holozen import connection
 from holozen.bus import Bus
-from holozen.errors import BusError
+from holozen.console import report
 from holozen.flags import Parser, number
 from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest, Odometry
-from holozen.parameters import Parameters
 from holozen.process import stop_event, wait_for_end
-from holozen.tell import say
+from holozen.transport import connection
+from holozen.transport.errors import BusError, ServiceError
+from holozen.transport.parameters import Choice, Number, Parameter, Parameters
 
-from .route import SIZES, Route
-from .shapes import SHAPES, GoalsError
-from .tracker import Tracker
+from .shapes import SHAPES, Goal, GoalsError, read_goals
+from .tracker import MAX_ODOM_BYTES, Tracker
+
+SIZES = (0.01, 1000.0)  # m
+
+
+def next_goal(goals: list[Goal], request: NextGoalRequest) -> NextGoalReply:
+    """The goal with the requested number, counted from 0. Raises ServiceError if the list has no such goal."""
+    number = request.request_goal
+    if not 0 <= number < len(goals):
+        raise ServiceError(f"goal {number}: the list holds goals 0 to {len(goals) - 1}")
+    x, y, theta = goals[number]
+    return NextGoalReply(x, y, theta, int(number == len(goals) - 1))
+
+
+class Route:
+    """Goals of a `file`, or without one of a `shape` with `size` metres. Raises GoalsError for a bad file."""
+
+    def __init__(self, shape: str, size: float, file: Path | None = None) -> None:
+        self._shape, self._size, self._file = shape, size, file
+        self.goals = read_goals(file) if file else SHAPES[shape](size)
+
+    def next_goal(self, request: NextGoalRequest) -> NextGoalReply:
+        """The goal with the requested number. Raises ServiceError if the list has no such goal."""
+        return next_goal(self.goals, request)
+
+    def declared(self) -> Iterator[Parameter]:
+        """Its parameters; goals from a file cannot be changed."""
+        if self._file:
+            file = str(self._file)
+            yield Choice("goals", "the file of the goals", (), lambda: file)
+            return
+        yield Choice(
+            "shape", "the shape of the goals, from the next request on", tuple(SHAPES), lambda: self._shape,
+            lambda shape: self._draw(shape, self._size),
+        )  # fmt: skip
+        yield Number(
+            "size", "its side (infinity: half its length)", "m", *SIZES, lambda: self._size,
+            lambda size: self._draw(self._shape, size),
+        )  # fmt: skip
+
+    def _draw(self, shape: str, size: float) -> None:
+        self._shape, self._size, self.goals = shape, size, SHAPES[shape](size)
 
 
 def parser() -> argparse.ArgumentParser:
@@ -26,9 +67,11 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--shape", choices=SHAPES, default="square", help="the goals' shape (default: square)")
     parser.add_argument(
-        "--size", type=number(*SIZES, "m"), default=1.0, help="its side (infinity: half its length) in m"
+        "--size", type=number(*SIZES, "m"), default=1.0, help="its side (infinity: half its length) in m (default: 1)"
     )
-    parser.add_argument("--goals", type=Path, metavar="FILE", help="goals from a file instead: x y theta a line")
+    parser.add_argument(
+        "--goals", type=Path, metavar="FILE", help="read goals from a file instead, one x y theta per line"
+    )
     connection.add_arguments(parser)
     return parser
 
@@ -39,14 +82,14 @@ def main(argv: list[str] | None = None) -> int:
     try:
         route = Route(args.shape, args.size, args.goals)
         with Bus("pose_service", connection.from_arguments(args), lasting=True, stop=stop) as bus:
-            tracker = Tracker(bus.subscribe("**/odom", Odometry, depth=256))
+            tracker = Tracker(bus.subscribe("**/odom", Odometry, depth=256, limit=MAX_ODOM_BYTES))
             bus.serve("get_pose", GetPoseRequest, GetPoseReply, tracker.get_pose).start()
             bus.serve("next_goal", NextGoalRequest, NextGoalReply, route.next_goal).start()
             Parameters(bus, "pose_service", route.declared).start()
-            say(f"pose_service: {len(route.goals)} goals from {args.goals or args.shape}")
+            report(f"pose_service: {len(route.goals)} goals from {args.goals or args.shape}")
             wait_for_end(stop)
     except (BusError, GoalsError) as error:
-        say(f"pose_service: {error}")
+        report(f"pose_service: {error}")
         return 1
     return 0
 

@@ -8,11 +8,11 @@ Goal = tuple[float, float, float]
 Point = tuple[float, float]
 
 INFINITY_POINTS = 24
-FARTHEST = 1e6  # m, rad
+MAX_VALUE = 1e6  # m, rad
 
 
 class GoalsError(ValueError):
-    """A list of goals that cannot be used; the text is one line that says why."""
+    """An unusable list of goals; the text is one line with the reason."""
 
 
 def square(size: float) -> list[Goal]:
@@ -55,7 +55,7 @@ SHAPES: dict[str, Callable[[float], list[Goal]]] = {
 
 
 def _tour(corners: list[Point]) -> list[Goal]:
-    """From the first corner round the others and back; at each goal the robot looks where it goes next."""
+    """From the first corner round the others and back; at each goal the robot faces the next one."""
     goals = []
     for here, ahead in zip(corners[1:] + corners[:1], corners[2:] + corners[:2], strict=True):
         goals.append((*here, math.atan2(ahead[1] - here[1], ahead[0] - here[0])))
@@ -63,14 +63,14 @@ def _tour(corners: list[Point]) -> list[Goal]:
 
 
 def read_goals(path: Path) -> list[Goal]:
-    """The goals in a text file, one `x y theta` a line: commas are spaces, theta may be left out, # is a comment."""
+    """The goals in a text file, one `x y theta` per line: commas count as spaces, theta is optional, # is a comment."""
     try:
         lines = path.read_text().splitlines()
     except (OSError, UnicodeDecodeError) as error:
         raise GoalsError(f"goals {path}: {error}") from None
     goals = [_goal(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if _content(line)]
     if not goals:
-        raise GoalsError(f"goals {path}: no goal in it; write lines of x y theta")
+        raise GoalsError(f"goals {path}: no goals; write one x y theta per line")
     return goals
 
 
@@ -83,6 +83,6 @@ def _goal(line: str, where: str) -> Goal:
         values = [float(part) for part in _content(line)]
     except ValueError:
         values = []
-    if len(values) not in (2, 3) or not all(abs(value) <= FARTHEST for value in values):
+    if len(values) not in (2, 3) or not all(abs(value) <= MAX_VALUE for value in values):
         raise GoalsError(f"goals {where}: {line.strip()!r}; write x y theta in metres and radians, such as 1.0 0 1.57")
     return values[0], values[1], values[2] if len(values) == 3 else 0.0

@@ -4,14 +4,16 @@ import argparse
 import sys
 from pathlib import Path
 
-from holozen import connection, data, flags
+from holozen import data, flags
 from holozen.bus import Bus
-from holozen.errors import BusError
+from holozen.console import report
 from holozen.process import stop_event
-from holozen.robot.model import RobotError
-from holozen.tell import say
+from holozen.robot.errors import RobotError
+from holozen.transport import connection
+from holozen.transport.errors import BusError
 
-from . import intake, pace, worldfile
+from . import pace
+from .command import inputs
 
 
 def parser() -> argparse.ArgumentParser:
@@ -23,16 +25,21 @@ def parser() -> argparse.ArgumentParser:
     add = parser.add_argument
     add("--world", type=Path, default=data.find("worlds", "gazebo.world"), help="an SDF file (default: gazebo.world)")
     add("--robot", type=flags.robot_file, action="append", metavar="FILE[=NAME]",
-        help="a xacro or URDF file, and the robot's name (default: hb_bot at the root of the keys)")  # fmt: skip
-    add("--empty", action="store_true", help="no robot at the start; `holozen spawn` puts some in")
-    add("--drive", choices=["planar_move"], help="for robots that have no drive of their own")
-    add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR", help="for $(find NAME)")
+        help="a xacro or URDF file, and the robot's name (default: hb_bot, on keys without a name)")  # fmt: skip
+    add("--empty", action="store_true", help="start without robots; add them with `holozen spawn`")
+    add("--drive", choices=["planar_move"], help="a drive for robots whose file has none")
+    add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
+        help="where $(find NAME) is")  # fmt: skip
+    add("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
+        help="an environment variable that a robot's file may read as $(env NAME)")  # fmt: skip
     add(
-        "--rtf", type=flags.number(*pace.FACTORS), help="real-time factor; 0: as fast as it goes (default: the world's)"
+        "--rtf",
+        type=flags.number(*pace.FACTORS),
+        help="real-time factor; 0: as fast as possible (default: the world's)",
     )
-    add("--max-linear", type=flags.number(*intake.LINEAR, "m/s"), default=intake.MAX_LINEAR, metavar="M/S",
+    add("--max-linear", type=flags.number(*inputs.LINEAR, "m/s"), default=inputs.MAX_LINEAR, metavar="M/S",
         help="faster commands are clamped (default: %(default)s)")  # fmt: skip
-    add("--max-angular", type=flags.number(*intake.ANGULAR, "rad/s"), default=intake.MAX_ANGULAR, metavar="RAD/S",
+    add("--max-angular", type=flags.number(*inputs.ANGULAR, "rad/s"), default=inputs.MAX_ANGULAR, metavar="RAD/S",
         help="(default: %(default)s)")  # fmt: skip
     connection.add_arguments(parser)
     return parser
@@ -42,33 +49,35 @@ def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
     stop = stop_event()
     try:
-        spec = worldfile.load(args.world, dict(args.package))
+        from holozen.robot.sdf_world import load_world  # loads numpy, which --help does not need
+
+        spec = load_world(args.world, dict(args.package))
         with Bus("sim", connection.from_arguments(args), lasting=True, stop=stop) as bus:
-            # The engine takes the longest to load, and a wrong flag should not wait for it.
-            from holozen.parameters import Parameters
+            # The engine is slow to load: a wrong flag is reported first.
+            from holozen.transport.parameters import Parameters
 
             from .entities import Entities
-            from .entity_services import EntityServices
+            from .io.entity_services import EntityServices
             from .loop import Loop
             from .parameters import declared
-            from .spawn import furnish, spawn_all
-            from .world import World
+            from .physics.world import World
+            from .spawn import add_models, spawn_all
 
             world = World(spec)
             entities = Entities(bus, world, (args.max_linear, args.max_angular))
-            furnish(entities, spec.models)
+            add_models(entities, spec.models)
             if args.robot or not args.empty:
                 spawn_all(entities, args)
             for warning in spec.warnings:
-                say(f"sim: {warning}")
+                report(f"sim: {warning}")
             services = EntityServices(bus, entities, dict(args.package))
-            if not entities.vehicles:
-                say("sim: no robot yet; `holozen spawn FILE` puts one in")
+            if not entities.robots:
+                report("sim: no robot yet; add one with `holozen spawn FILE`")
             loop = Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services)
             loop.answers.append(Parameters(bus, "sim", lambda: declared(entities, loop.pace)).answer)
             loop.run(stop)
-    except (BusError, RobotError, worldfile.WorldError) as error:
-        say(f"sim: {error}")
+    except (BusError, RobotError) as error:
+        report(f"sim: {error}")
         return 1
     return 0
 

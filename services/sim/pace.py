@@ -1,6 +1,6 @@
 """Pacing: when the next step is due, on a monotonic clock and without drift."""
 
-STALL = 0.1  # s; a sim that is later than this starts anew from now instead of racing to catch up
+STALL = 0.1  # s; a sim that is later than this drops the backlog instead of racing to catch up
 
 FACTORS = (0.0, 1000.0)  # real-time factors that may be set
 
@@ -10,11 +10,11 @@ class Pace:
 
     def __init__(self, dt: float, rtf: float, now: float) -> None:
         self._dt = dt
-        self.keep(rtf, now)
+        self.set_factor(rtf, now)
         self.lost = 0.0  # s of real time given up after stalls
 
-    def keep(self, rtf: float, now: float) -> None:
-        """Go on at `rtf` from `now`."""
+    def set_factor(self, rtf: float, now: float) -> None:
+        """Run at `rtf` from `now` on."""
         self.rtf, self._period, self._due = rtf, self._dt / rtf if rtf else 0.0, now
 
     def left(self, now: float) -> float:
@@ -22,7 +22,7 @@ class Pace:
         return self._due - now if self._period else 0.0
 
     def stepped(self, now: float) -> None:
-        """A step was made: the next is one period after the time this one was due."""
+        """Record a step: the next is due one period after this one was due."""
         self._due += self._period
         if now - self._due > STALL:
             self.lost += now - self._due

@@ -1,35 +1,36 @@
-"""The world as it is at the start: the world file's models, and the robots of `--robot` side by side."""
+"""The initial world: the models of the world file, and the robots of `--robot` side by side."""
 
 import argparse
 import math
 from pathlib import Path
 
 from holozen import data
-from holozen.robot.model import RobotError, RobotModel, load, planar_drive
-from holozen.robot.rigid import PlacedShape, lump
-from holozen.robot.rotation import matrix_of, quaternion_of
-from holozen.robot.standing import lowest
-from holozen.tell import say
+from holozen.console import report
+from holozen.robot.errors import RobotError
+from holozen.robot.loading import load
+from holozen.robot.model import RobotModel, planar_drive
+from holozen.robot.rigid import PlacedShape, lowest, lump
+from holozen.rotation import from_rpy
 from holozen.wire import key_for
 
-from .engine import UPRIGHT
 from .entities import Entities, EntityError
+from .physics.engine import UPRIGHT
 
 GAP = 0.5  # m between two robots at the start
 
 
-def furnish(entities: Entities, models: tuple[RobotModel, ...]) -> None:
-    """The models of the world file, where it puts them. Raises RobotError."""
+def add_models(entities: Entities, models: tuple[RobotModel, ...]) -> None:
+    """Add the models of the world file at their poses. Raises RobotError."""
     for model in models:
-        rotation = quaternion_of(matrix_of(model.pose.rpy))
+        rotation = from_rpy(*model.pose.rpy)
         try:
-            entities.add(entities.free_name(_legal(model.name)), model, (model.pose.xyz, rotation))
+            entities.add(entities.free_name(_valid_name(model.name)), model, (model.pose.xyz, rotation))
         except EntityError as error:
             raise RobotError(f"model {model.name!r} of the world: {error}") from None
 
 
 def spawn_all(entities: Entities, args: argparse.Namespace) -> None:
-    """Every robot of `--robot` on the ground, side by side along y, the first at the origin. Raises RobotError."""
+    """Add the robots of `--robot` on the ground, side by side along y, the first at the origin. Raises RobotError."""
     robots: list[tuple[Path, str]] = args.robot or [(data.find("urdf", "hb_bot.urdf.xacro"), "")]
     names = [name for _, name in robots]
     for name in names:
@@ -37,7 +38,7 @@ def spawn_all(entities: Entities, args: argparse.Namespace) -> None:
             raise RobotError(f"{names.count(name)} robots are called {name!r}; give each a name: --robot FILE=NAME")
     y = 0.0
     for number, (path, name) in enumerate(robots):
-        model = _read(path, dict(args.package), args.drive)
+        model = _read(path, args)
         reach = max(map(_reach, lump(model).collisions), default=0.0)
         y += reach if number else 0.0
         _add(entities, path, name, model, y)
@@ -47,39 +48,39 @@ def spawn_all(entities: Entities, args: argparse.Namespace) -> None:
 def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float) -> None:
     try:
         entity = entities.add(
-            name or entities.free_name(_legal(model.name)), model, ((0.0, y, -lowest(model)), UPRIGHT), name
+            name or entities.free_name(_valid_name(model.name)), model, ((0.0, y, -lowest(model)), UPRIGHT), name
         )
     except EntityError as error:
         raise RobotError(f"{path}: {error}") from None
     drive = model.drive
-    assert drive is not None, "_read refuses a robot without"
-    say(f"sim: {entity.name} listens on {key_for(drive.command_topic, name)}")
+    assert drive is not None, "_read refuses a robot without a drive"
+    report(f"sim: {entity.name} listens on {key_for(drive.command_topic, name)}")
     for topic, known in ((drive.command_topic, "cmd_vel"), (drive.odometry_topic, "odom")):
         if topic.rpartition("/")[2] != known:
-            say(f"sim: {path}: topic {topic!r}: the teleop and the controller use {known!r}")
+            report(f"sim: {path}: topic {topic!r}: the teleop and the controller use {known!r}")
 
 
-def _read(path: Path, packages: dict[str, Path], drive: str | None) -> RobotModel:
-    """A robot's file, checked. Raises RobotError."""
-    model = load(path, packages=packages)
+def _read(path: Path, args: argparse.Namespace) -> RobotModel:
+    """Load and check a robot's file. Raises RobotError."""
+    model = load(path, packages=dict(args.package), allow_env=args.allow_env)
     for warning in model.warnings:
-        say(f"sim: {warning}")
-    if model.drive is None and drive:
+        report(f"sim: {warning}")
+    if model.drive is None and args.drive:
         model = planar_drive(model)
     if model.drive is None:
-        raise RobotError(f"{path}: no plugin drives it; add one, or have it moved as a whole: --drive planar_move")
+        raise RobotError(f"{path}: no plugin drives it; add one, or move the whole body: --drive planar_move")
     if not lump(model).collisions:
         raise RobotError(f"{path}: no collision shape to stand on; give a link a <box>, <cylinder>, <sphere> or <mesh>")
     return model
 
 
-def _legal(name: str) -> str:
-    """A model's name as one for an entity: it may hold anything."""
+def _valid_name(name: str) -> str:
+    """A valid entity name from a model's name, which may hold any character."""
     word = "".join(letter if letter.isascii() and (letter.isalnum() or letter in "_-") else "_" for letter in name)
     return word[:60] if word[:1].isalpha() else f"robot_{word}"[:60]
 
 
 def _reach(part: PlacedShape) -> float:
-    """How far in metres a shape may reach from the robot's z axis."""
+    """An upper bound in metres of a shape's extent from the robot's z axis."""
     size = max((math.hypot(*point) for point in part.shape.points), default=math.hypot(*part.shape.size))
     return math.hypot(part.xyz[0], part.xyz[1]) + size

@@ -6,21 +6,22 @@ import signal
 import sys
 from typing import TYPE_CHECKING
 
-from holozen import connection, flags
-from holozen.tell import say
+from holozen import flags
+from holozen.console import report
+from holozen.transport import connection
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
 
-    from .cockpit import Cockpit
-    from .layouts import Layout
+    from .control.layouts import Layout
+    from .session import Session
 
 DRIVE_MODES, ZENOH_MODES = ("hold", "latch"), ("peer", "client", "router")
 WITHOUT = """holozen topic pub {key} '{{"linear": {{"x": 0.3}}}}'"""
 
 
 class Mode(argparse.Action):
-    """`--mode` means two things, the keys' and Zenoh's; their words tell which."""
+    """`--mode` sets the mode of the keys or of Zenoh, depending on its value."""
 
     def __call__(
         self, _parser: argparse.ArgumentParser, args: argparse.Namespace, word: object, _flag: str | None = None
@@ -37,26 +38,26 @@ def parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("robots", nargs="*", metavar="ROBOT", type=flags.robot,
-        help="names; Tab goes from one to the next (none: the one at the root)")  # fmt: skip
+        help="names; Tab switches to the next one (none: the robot at the root)")  # fmt: skip
     add("--robot", action="append", default=[], type=flags.robot, metavar="ROBOT", help="the same as a flag")
     add("--speed", type=flags.number(0, 1000, "m/s"), default=0.5, help="m/s (default: 0.5)")
     add("--turn", type=flags.number(0, 1000, "rad/s"), default=1.0, help="rad/s (default: 1.0)")
     add("--speed-limit", type=flags.number(0, 1000, "m/s"), default=1000.0, help="m/s (default: 1000)")
     add("--turn-limit", type=flags.number(0, 1000, "rad/s"), default=1000.0, help="rad/s (default: 1000)")
     add("--repeat-rate", type=flags.number(0, 1000, "Hz"), default=20.0,
-        help="Hz; 0: only when a key changes something (default: 20)")  # fmt: skip
+        help="Hz; 0: publish only on changes (default: 20)")  # fmt: skip
     add("--key-timeout", type=flags.number(0, 3600, "s"),
-        help="s that a key counts if the terminal tells no releases; 0: latch (default: while it repeats)")  # fmt: skip
-    add("--deadman", action=argparse.BooleanOptionalAction, default=False, help="drive only while space is held too")
+        help="s that a key counts if no release is reported; 0: latch (default: while it repeats)")  # fmt: skip
+    add("--deadman", action=argparse.BooleanOptionalAction, default=False, help="drive only while space is also held")
     add("--keys", default="ttk", metavar="LAYOUT", help="ttk, wasd, arrows or a TOML file (default: ttk)")
-    add("--joystick", nargs="?", const="", metavar="DEVICE", help="drive by a gamepad too (default: the first one)")
+    add("--joystick", nargs="?", const="", metavar="DEVICE", help="also drive with a gamepad (default: the first one)")
     add(
         "--plain",
         action=argparse.BooleanOptionalAction,
         default=False,
         help="a line a second instead of a screen, for screen readers and logs",
     )
-    add("--script", metavar="FILE", help="drive what a file says, without a terminal; - reads standard input")
+    add("--script", metavar="FILE", help="drive as a script says, without a terminal; - reads standard input")
     add("--stamped", action=argparse.BooleanOptionalAction, default=False, help="publish TwistStamped instead of Twist")
     add("--frame-id", default="", metavar="FRAME", help="frame_id of the TwistStamped")
     add("--cmd-vel", default="", metavar="KEY", type=flags.key,
@@ -70,77 +71,77 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str] | None = None) -> int:
-    from .layouts import LayoutError, load
-    from .ros_words import RosWordError
+    from .control.layout_file import load
+    from .control.layouts import LayoutError
+    from .ros_args import RosArgError
     from .settings import SettingsError, parse, path
 
     try:
         args = parse(parser(), sys.argv[1:] if argv is None else argv, path())
         layout = load(args.keys)
-    except (LayoutError, SettingsError, RosWordError) as error:
-        say(f"teleop: {error}")
+    except (LayoutError, SettingsError, RosArgError) as error:
+        report(f"teleop: {error}")
         return 2
     args.robots = [*args.robot, *args.robots]
     if args.deadman and (args.script is not None or latches(args)):
-        say("teleop: --deadman needs keys that are held, so neither --script nor --mode latch; or give --no-deadman")
+        report("teleop: --deadman needs keys that are held, so neither --script nor --mode latch; or give --no-deadman")
         return 2
     if args.script is None and not (sys.stdin.isatty() and sys.stdout.isatty()):
         from holozen.wire import key_for
 
         key = args.cmd_vel or key_for("cmd_vel", args.robots[0] if args.robots else "")
-        say(f"teleop: needs a terminal for its keys; without one: --script FILE, or {WITHOUT.format(key=key)}")
+        report(f"teleop: needs a terminal for its keys; without one: --script FILE, or {WITHOUT.format(key=key)}")
         return 2
-    from holozen.errors import BusError
+    from holozen.transport.errors import BusError
 
     try:
-        return read_script(args, layout) if args.script is not None else fly(args, layout)
+        return read_script(args, layout) if args.script is not None else drive(args, layout)
     except BusError as error:
-        say(f"teleop: {error}")
+        report(f"teleop: {error}")
         return 1
 
 
 def latches(args: argparse.Namespace) -> bool:
-    """Whether a key sets the motion until another one."""
+    """Whether a key sets the motion until another key is pressed."""
     return args.mode == "latch" or (args.mode is None and args.key_timeout == 0)
 
 
-def fly(args: argparse.Namespace, layout: "Layout") -> int:
-    """Drive from the terminal until it is quit, a signal comes or something breaks; the robot is stopped each time."""
-    from .dials import Dials
-    from .flight import ENDS, Flight, TeleopError
-    from .joystick import Joystick, JoystickError
-    from .screen import Screen
-    from .terminal import Terminal
+def drive(args: argparse.Namespace, layout: "Layout") -> int:
+    """Drive from the terminal until quit, a signal or an error; the robot is stopped in each case."""
+    from .app import ENDS, TeleopApp, TeleopError
+    from .input.gamepad import Joystick, JoystickError
+    from .input.terminal import Terminal
+    from .telemetry import Telemetry
 
     try:
         joystick = None if args.joystick is None else Joystick.open(args.joystick)
     except JoystickError as error:
-        say(f"teleop: {error}")
+        report(f"teleop: {error}")
         return 1
     term = os.environ.get("TERM", "dumb")
-    plain, ascii = args.plain or term == "dumb", term == "linux"  # whose font lacks what the picture is drawn with
+    plain, ascii = args.plain or term == "dumb", term == "linux"  # its font lacks the drawing characters
     with open_bus(args) as bus:
-        cockpit = open_cockpit(args, bus, layout)
-        dials = Dials(cockpit)
+        session = open_session(args, bus, layout)
+        telemetry = Telemetry(session)
         for number in ENDS:
-            signal.signal(number, _quit)  # until the flight minds them: the terminal is to be left as it was
+            signal.signal(number, _quit)  # until the app handles them: the terminal must be restored
         try:
             with Terminal(full=not plain) as terminal:
-                screen = Screen(terminal, dials, plain, ascii, not os.environ.get("NO_COLOR"))
+                colour = not os.environ.get("NO_COLOR")
                 try:
-                    Flight(cockpit, terminal, screen, joystick).run()
+                    TeleopApp(session, terminal, telemetry, joystick, plain, ascii, colour).run()
                 finally:
-                    cockpit.halt()  # before the terminal is tidied up: it may be gone
+                    session.halt()  # before the terminal is restored, which may be gone
         except TeleopError as error:
-            say(f"teleop: {error}")
+            report(f"teleop: {error}")
             return 2
         except OSError as error:
-            say(f"teleop: the terminal is gone ({error}); the robot was told to stop")
+            report(f"teleop: the terminal is gone ({error}); a stop was sent to the robot")
         except Exception as error:
-            say(f"teleop: {type(error).__name__}: {error}; the robot was told to stop")
+            report(f"teleop: {type(error).__name__}: {error}; a stop was sent to the robot")
             return 1
         finally:
-            dials.close()
+            telemetry.close()
     return 0
 
 
@@ -149,7 +150,7 @@ def _quit(_number: int, _frame: object) -> None:
 
 
 def read_script(args: argparse.Namespace, layout: "Layout") -> int:
-    """Drive what a script says."""
+    """Drive according to a script."""
     from holozen.process import stop_event
 
     from . import script
@@ -157,18 +158,18 @@ def read_script(args: argparse.Namespace, layout: "Layout") -> int:
     try:
         steps = script.load(args.script, layout)
     except script.ScriptError as error:
-        say(f"teleop: {error}")
+        report(f"teleop: {error}")
         return 2
     stop = stop_event()
-    args.mode = "hold"  # its keys are held for as long as it says, whatever keys of a terminal are
+    args.mode = "hold"  # a script states how long keys are held
     with open_bus(args) as bus:
-        cockpit = open_cockpit(args, bus, layout)
+        session = open_session(args, bus, layout)
         try:
-            failed = script.run(steps, cockpit, stop)
+            failed = script.run(steps, session, stop)
         finally:
-            cockpit.halt()
+            session.halt()
     if failed:
-        say(f"teleop: {failed}")
+        report(f"teleop: {failed}")
     return 1 if failed else 0
 
 
@@ -180,10 +181,10 @@ def open_bus(args: argparse.Namespace) -> "Bus":
     return Bus(args.name, where, lasting=True)
 
 
-def open_cockpit(args: argparse.Namespace, bus: "Bus", layout: "Layout") -> "Cockpit":
-    """The cockpit that the flags describe."""
-    from .cockpit import Cockpit
-    from .pilot import Pilot, Settings
+def open_session(args: argparse.Namespace, bus: "Bus", layout: "Layout") -> "Session":
+    """A session configured by the flags."""
+    from .control.twist_mapper import Settings, TwistMapper
+    from .session import Session
 
     names = ("speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "deadman")
     settings = Settings(
@@ -191,7 +192,9 @@ def open_cockpit(args: argparse.Namespace, bus: "Bus", layout: "Layout") -> "Coc
         key_timeout=args.key_timeout or None,
         **{name: getattr(args, name) for name in names},
     )
-    return Cockpit(bus, args.robots, Pilot(settings, layout), args.frame_id if args.stamped else None, args.cmd_vel)
+    return Session(
+        bus, args.robots, TwistMapper(settings, layout), args.frame_id if args.stamped else None, args.cmd_vel
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""A drive written down: `0.5s i` holds a key for half a second, `1s i J` two, `q` presses one, `1s` waits, and `stop`
+"""Scripted driving: `0.5s i` holds a key for half a second, `1s i J` two, `q` presses one, `1s` waits, and `stop`
 stops. It needs no terminal: for demonstrations and tests.
 """
 
@@ -8,25 +8,25 @@ import threading
 import time
 from dataclasses import dataclass
 
-from .cockpit import Cockpit
-from .keynames import Key
-from .layouts import Layout
+from .control.layouts import Layout
+from .input.kitty import Key
+from .session import Session
 
 LONGEST = 3600.0  # s
 LARGEST = 1_000_000  # characters
 TICK = 0.005  # s
-PATIENCE = 3.0  # s until somebody has to listen
-DOUBT = 0.5  # s; the sim says ten times a second who drives
+PATIENCE = 3.0  # s to wait for a subscriber
+DOUBT = 0.5  # s without being obeyed until it gives up; the sim reports its status at 10 Hz
 DURATION = re.compile(r"(\d+(?:\.\d*)?|\.\d+)(ms|s)")
 
 
 class ScriptError(ValueError):
-    """What is wrong with a script, in one line."""
+    """An invalid script; the text is one line."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """Keys held together for some seconds; none: nothing is held."""
+    """Keys held together for some seconds; none: no key is held."""
 
     seconds: float
     keys: tuple[str, ...]
@@ -73,50 +73,50 @@ def _step(words: list[str], where: str, layout: Layout) -> Step:
     return Step(seconds, keys)
 
 
-def run(steps: list[Step], cockpit: Cockpit, stop: threading.Event) -> str:
-    """Drive the steps, one after the other; what is held at the end is let go. Returns why it broke off, or ""."""
+def run(steps: list[Step], session: Session, stop: threading.Event) -> str:
+    """Drive the steps in order; keys held at the end are released. Returns why it was aborted, or ""."""
     patience = time.monotonic() + PATIENCE
-    while not cockpit.listeners() and not stop.wait(TICK):
+    while not session.listeners() and not stop.wait(TICK):
         if time.monotonic() > patience:
-            return f"nobody listens on {cockpit.helm.key}; start a sim in another terminal: holozen sim"
+            return f"no subscriber on {session.client.key}; start a sim in another terminal: holozen sim"
     for step in steps:
         now = time.monotonic()
         if not step.keys:
-            cockpit.let_go()
+            session.let_go()
         for key in step.keys:
-            cockpit.take(Key(key, key, "press", key), now)
-        if why := _hold(cockpit, now + step.seconds, stop):
+            session.take(Key(key, key, "press", key), now)
+        if why := _hold(session, now + step.seconds, stop):
             return why
         for key in step.keys:
-            cockpit.take(Key(key, key, "release", key), time.monotonic())
+            session.take(Key(key, key, "release", key), time.monotonic())
     return ""
 
 
-def _hold(cockpit: Cockpit, until: float, stop: threading.Event) -> str:
-    """Drive until then. Returns why it broke off, or ""."""
+def _hold(session: Session, until: float, stop: threading.Event) -> str:
+    """Drive until `until`. Returns why it was aborted, or ""."""
     obeyed = now = time.monotonic()
     while now < until:
-        cockpit.tick(now)
+        session.tick(now)
         if stop.wait(min(TICK, until - now)):
             return "ended by a signal"
         before, now = now, time.monotonic()
         if now - before > DOUBT:
             return "it was paused, and the robot with it"
-        why = _not_obeyed(cockpit)
+        why = _not_obeyed(session)
         obeyed = obeyed if why else now
-        if cockpit.warning or now - obeyed > DOUBT:
-            return cockpit.warning or why
+        if session.warning or now - obeyed > DOUBT:
+            return session.warning or why
     return ""
 
 
-def _not_obeyed(cockpit: Cockpit) -> str:
-    status = cockpit.helm.status()
+def _not_obeyed(session: Session) -> str:
+    status = session.client.status()
     if status.stopped:
         return f"stopped by {status.stopped}; `holozen release` lets the robot drive again"
-    if not any(cockpit.pilot.motion):
+    if not any(session.mapper.motion):
         return ""
-    if any(source.held for source in status.sources if source.source == cockpit.bus.source):
-        return "somebody stopped the robot or took it over; `holozen controller --resume` gives it back"
-    if status.obeyed not in ("", cockpit.bus.source):
+    if any(source.held for source in status.sources if source.source == session.bus.source):
+        return "the robot was stopped or taken over; `holozen controller --resume` gives it back"
+    if status.obeyed not in ("", session.bus.source):
         return f"{status.obeyed} drives the robot, not this script"
     return ""

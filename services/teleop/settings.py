@@ -1,42 +1,42 @@
-"""The teleop's settings file: the flags that a person would write every time."""
+"""The teleop's settings file: defaults for its flags."""
 
 import argparse
 import os
 from collections.abc import Mapping
 
-from holozen.tell import printable
+from holozen.console import printable
 
 from . import toml_file
-from .layouts import LAYOUTS
-from .ros_words import ros_arguments
+from .control.layouts import LAYOUTS
+from .ros_args import ros_arguments
 from .toml_file import closest, cut
 
 NAMES = (
     "speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "key_timeout", "stamped", "frame_id",
     "mode", "keys", "plain", "deadman", "joystick",
 )  # fmt: skip
-"""The flags that may stand in the file. Which robot and which network it is stays on the command line."""
+"""The flags allowed in the file. Robot and network are given on the command line only."""
 
-MODES = ("hold", "latch")  # the flag also takes Zenoh's modes, which are of the network
+MODES = ("hold", "latch")  # the flag also accepts Zenoh's modes, which belong to the network
 
 Setting = str | int | float | bool
 
 
 class SettingsError(ValueError):
-    """A settings file that cannot be used; the text is one line that says why."""
+    """An invalid settings file; the text is one line with the reason."""
 
 
 def path(environ: Mapping[str, str] = os.environ) -> str | None:
-    """Where the settings file would be; None without a home folder."""
+    """The path of the settings file; None without a home folder."""
     folder = environ.get("XDG_CONFIG_HOME", "")
-    if not os.path.isabs(folder):  # to be passed over, says the XDG Base Directory Specification
+    if not os.path.isabs(folder):  # must be ignored according to the XDG Base Directory Specification
         home = environ.get("HOME", "")
         folder = os.path.join(home, ".config") if os.path.isabs(home) else ""
     return os.path.join(folder, "holozen", "teleop.toml") if folder else None
 
 
 def read(path: str | None) -> dict[str, Setting]:
-    """The settings in the file, names and kinds checked, values not; none if there is no file. SettingsError."""
+    """The settings in the file, with names and types checked but not values; empty without a file. SettingsError."""
     if path is None or not os.path.lexists(path):
         return {}
     try:
@@ -67,22 +67,22 @@ def apply(parser: argparse.ArgumentParser, path: str | None) -> None:
 
 
 def parse(parser: argparse.ArgumentParser, words: list[str], path: str | None) -> argparse.Namespace:
-    """Flags and ROS spellings, and the file's settings where neither is given; SettingsError, RosWordError."""
+    """Parse flags and ROS arguments; settings of the file are the defaults. SettingsError, RosArgError."""
     words = ros_arguments(words)
-    parser.parse_args(words)  # --help works and wrong flags are told, whatever the file says
+    parser.parse_args(words)  # first, so that --help and errors in flags do not depend on the file
     apply(parser, path)
     return parser.parse_args(words)
 
 
 def _from_here(name: str, value: Setting, path: str) -> Setting:
-    """A layout's file is meant from the folder of the settings file."""
+    """Resolve a layout's file relative to the settings file."""
     if name != "keys" or not isinstance(value, str) or value in LAYOUTS:
         return value
     return os.path.join(os.path.dirname(path), os.path.expanduser(value))
 
 
 def _checked(action: argparse.Action, value: Setting) -> object:
-    """The value as the flag would give it; ArgumentTypeError, ValueError."""
+    """The value converted as by the flag; ArgumentTypeError, ValueError."""
     if action.nargs == 0:  # a flag that takes no value
         if not isinstance(value, bool):
             raise ValueError(f"{cut(value)}: write true or false")

@@ -1,11 +1,11 @@
-"""Small TOML files that people write, read with care: one line says what is wrong, and where."""
+"""Reads small hand-written TOML files: an error is one line with the place."""
 
 import os
 import re
 import stat
 from typing import Any
 
-from holozen.tell import printable
+from holozen.console import printable
 
 LARGEST = 64 * 1024  # bytes
 LONGEST = 1000  # characters in a line; a long dotted key keeps tomllib busy for many seconds
@@ -13,15 +13,15 @@ _PLACE = re.compile(r"(.*) \(at (?:line (\d+), column \d+|end of document)\)", r
 
 
 class TomlError(ValueError):
-    """A file that cannot be used; the text is one line."""
+    """An invalid file; the text is one line."""
 
     def __init__(self, text: str) -> None:
         super().__init__(printable(text))
 
 
 def read(path: str) -> dict[str, Any]:
-    """What is in the file, unchecked; TomlError. It never waits, as one would for a FIFO."""
-    import tomllib  # here and below: most starts need neither
+    """The contents of the file, unchecked; TomlError. It never blocks, not even on a FIFO."""
+    import tomllib  # here and below, since most runs need neither
 
     try:
         text = _bytes(path).decode()
@@ -39,13 +39,13 @@ def read(path: str) -> dict[str, Any]:
 
 
 def cut(value: object) -> str:
-    """How a value is shown in a line: as it is written in Python, but short."""
+    """A value for a message: as written in Python, but shortened."""
     text = repr(value)
     return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def closest(name: str, known: list[str]) -> str:
-    """The words that name what there is, the one that was probably meant first."""
+    """A hint with the closest known name, or else with all of them."""
     from difflib import get_close_matches
 
     match = get_close_matches(name[:60].lower(), known, 1)
@@ -72,10 +72,10 @@ def _bytes(path: str) -> bytes:
     return found
 
 
-def _not_toml(path: str, text: str, said: str) -> str:
-    match = _PLACE.fullmatch(said)
+def _not_toml(path: str, text: str, reason: str) -> str:
+    match = _PLACE.fullmatch(reason)
     if not match:
-        return f"{path}: is not TOML: {said}"
+        return f"{path}: is not TOML: {reason}"
     lines = text.rstrip().split("\n")
     number = int(match[2] or len(lines))
     return f"{path}:{number}: is not TOML: {match[1]}: {cut(lines[number - 1].strip())}"

@@ -47,17 +47,8 @@ def test_no_file_names_a_folder_of_somebodys_machine() -> None:
     assert [where for where, line in lines() if HOMES.search(line) or (len(REPO.parts) > 2 and here in line)] == []
 
 
-@pytest.mark.parametrize(
-    ("line", "found"),
-    [
-        ("cd /" + "root/holozen", True),
-        ("see '/" + "home/me/x'", True),
-        ("file:///" + "home/me/x", True),
-        ("/" + "work/x", True),
-        ("docs/work/notes and ~/home/x", False),
-        ("/home/asha/catkin_ws", False),
-        ("$HOME/root/x", False),
-    ],
-)
-def test_the_pattern_finds_folders_and_nothing_else(line: str, found: bool) -> None:
-    assert bool(HOMES.search(line)) == found
+def test_the_pattern_finds_folders_and_nothing_else() -> None:
+    for line in ("cd /" + "root/holozen", "see '/" + "home/me/x'", "file:///" + "home/me/x", "/" + "work/x"):
+        assert HOMES.search(line), line
+    for line in ("docs/work/notes and ~/home/x", "/home/asha/catkin_ws", "$HOME/root/x"):
+        assert not HOMES.search(line), line

@@ -9,10 +9,10 @@ from typing import Any
 from uuid import uuid4
 
 from holozen.bus import Bus
-from holozen.connection import Connection
 from holozen.messages import CommandStatus, Odometry
 from holozen.testing import wait_for
 from holozen.testing.wire import free_port
+from holozen.transport.connection import Connection
 
 ROOT = Path(__file__).resolve().parents[2]
 SERVICES = ("router", "sim", "pose_service", "controller")

@@ -14,8 +14,8 @@ LARGEST = 600e6  # bytes; 484e6 with the stand-in base, most of it the engine
 UNCOMPILED = """
 import importlib.util, os, sys
 import holozen.cli.up, holozen.cli.topic, holozen.cli.node, holozen.cli.service, holozen.robot.xacro, xacro
-import holozen.sim.__main__, holozen.sim.loop, holozen.sim.spawn, holozen.teleop.__main__, holozen.teleop.screen
-import holozen.teleop.cockpit, holozen.controller.__main__, holozen.pose_service.__main__
+import holozen.sim.__main__, holozen.sim.loop, holozen.sim.spawn, holozen.teleop.__main__, holozen.teleop.app
+import holozen.teleop.session, holozen.controller.__main__, holozen.pose_service.__main__
 files = {getattr(module, "__file__", None) or "" for module in list(sys.modules.values())}
 print(*[f for f in files if f.endswith(".py") and not os.path.exists(importlib.util.cache_from_source(f))])
 """

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import pytest
 import zenoh
 
-from holozen.errors import ServiceError
 from holozen.testing import Process, Wire, wait_for
+from holozen.transport.errors import ServiceError
 
 from .robots import Robot
 

@@ -2,16 +2,20 @@
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, Message, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
-from holozen.rcl_interfaces import Parameter, ParameterValue, SetParametersReply, SetParametersRequest
-from holozen.readers import Received, Subscription
+from holozen.messages.rcl_interfaces import Parameter, ParameterValue, SetParametersReply, SetParametersRequest
 from holozen.testing import wait_for
+from holozen.transport.pubsub import Received, Subscription
 from holozen.wire import key_for
 
+URDF = Path(__file__).parents[2] / "urdf"
 RESTS = 1e-6  # m/s and rad/s
+Planar = tuple[float, float, float]
+"""x, y and yaw, in metres and radians; or their rates."""
 
 
 class Record:
@@ -91,7 +95,7 @@ class Robot:
                 self.put(x, y, turn)
             return any(wanted(odom) for odom in new)
 
-        wait_for(look, 20, lambda: f"the robot to be driven as told; its status: {self._last_status()}")
+        wait_for(look, 20, lambda: f"the robot to be driven as told; its status: {self.last_status()}")
         odoms: list[Odometry] = self.odom.messages()[begin:seen]
         return odoms
 
@@ -123,7 +127,8 @@ class Robot:
         """Let everybody drive again. Raises ServiceError if the sim refuses."""
         return self.bus.call(key_for("resume", self.name), TriggerRequest(), TriggerReply).message
 
-    def _last_status(self) -> Any:
+    def last_status(self) -> Any:
+        """The newest status; None before the first."""
         messages = self._status.messages()
         return messages[-1] if messages else None
 
@@ -162,3 +167,20 @@ def planar(command: Twist | TwistStamped) -> tuple[float, float, float, float]:
     """A command as forward, left, up (m/s) and counter-clockwise (rad/s)."""
     twist = command.twist if isinstance(command, TwistStamped) else command
     return twist.linear.x, twist.linear.y, twist.linear.z, twist.angular.z
+
+
+def ahead(start: Planar, velocity: Planar, seconds: float) -> Planar:
+    """Where a body is after moving at a constant body-frame velocity: straight, or on an arc."""
+    x, y, yaw = start
+    vx, vy, turn = velocity
+    angle = turn * seconds
+    if abs(turn) < 1e-12:
+        forward, left = vx * seconds, vy * seconds
+    else:
+        sine, cosine = math.sin(angle) / turn, (1 - math.cos(angle)) / turn
+        forward, left = vx * sine - vy * cosine, vx * cosine + vy * sine
+    return (
+        x + forward * math.cos(yaw) - left * math.sin(yaw),
+        y + forward * math.sin(yaw) + left * math.cos(yaw),
+        yaw + angle,
+    )

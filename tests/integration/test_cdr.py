@@ -87,7 +87,7 @@ def test_json_still_drives(robot: Robot) -> None:
     ("payload", "encoding", "kind", "reason"),
     [
         (twist(0.3)[:-1], "application/cdr", "malformed", "not a Twist: cut off after 51 bytes"),
-        (twist(0.3), "application/cdr;geometry_msgs/msg/Accel", "malformed", "encoding says geometry_msgs/msg/Accel"),
+        (twist(0.3), "application/cdr;geometry_msgs/msg/Accel", "malformed", "encoding names geometry_msgs/msg/Accel"),
         (twist(float("nan")), "application/cdr", "not finite", "linear.x is not a finite number"),
         (twist(float("inf")), "application/cdr", "not finite", "linear.x is not a finite number"),
         (b"\x00\x01\x00\x00" + b"\xff" * 600, "application/cdr", "malformed", "552 bytes too many"),

@@ -22,9 +22,23 @@ def run(*words: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command("check", *words), capture_output=True, text=True, timeout=30)
 
 
-def test_a_good_file_is_silent() -> None:
+def test_a_good_file_is_summed_up_in_one_line(tmp_path: Path) -> None:
     done = run(str(BOT))
-    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
+    assert (done.returncode, done.stdout, done.stderr) == (0, "ok: 5 links, 3 wheels, planar_move on cmd_vel\n", "")
+    assert run(str(BOT), "--json").stdout == ""
+    (tmp_path / "r.urdf").write_text(WARNS.replace("9", "0.004"))
+    told = "ok: 1 link, no drive: holozen spawn --drive planar_move moves it as a whole\n"
+    assert run(str(tmp_path / "r.urdf")).stdout == told
+    assert run(str(data.find("urdf", "materials.xacro"))).stdout.startswith(
+        "ok: no links: a file for others to include"
+    )
+
+
+def test_a_file_without_links_is_an_error_unless_it_is_for_others_to_include(tmp_path: Path) -> None:
+    for name in ("r.urdf", "r.xacro"):
+        (tmp_path / name).write_text('<robot name="r"/>')
+        done = run(str(tmp_path / name))
+        assert (done.returncode, done.stdout.count("error: <robot name='r'> has no <link>")) == (1, 1), done
 
 
 def test_an_error_is_told_with_its_line_and_how_to_mend_it(tmp_path: Path) -> None:

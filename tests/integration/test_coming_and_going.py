@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 import zenoh
 
-from holozen.errors import BusError
 from holozen.messages import Odometry, Twist
 from holozen.testing import Process, Wire, wait_for
+from holozen.transport.errors import BusError
 
 from .conftest import start_sim, stranger_config
 from .robots import Robot, moves, place, rests
@@ -29,7 +29,7 @@ def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pres
     sim.kill()
     terminal.wait_for_text("ODOM IS STALE")
     assert terminal.process.returncode is None
-    terminal.wait_for_text("odom comes no more: stopped")
+    terminal.wait_for_text("odom was lost: stopped")
     start_sim(wire)
     wait_for(lambda: "ODOM IS STALE" not in terminal.screen())
     assert rests(robot.newest())
@@ -112,7 +112,7 @@ def test_those_who_met_through_a_holder_talk_on_when_it_is_gone(wire: Wire) -> N
 USER = """
 import os, signal, sys
 from holozen.bus import Bus
-from holozen.connection import Connection
+from holozen.transport.connection import Connection
 from holozen.messages import Odometry, Twist
 where = Connection(connect=(sys.argv[1],), listen=(sys.argv[1],))
 with Bus("user", where, lasting=True) as bus:
@@ -161,7 +161,7 @@ def test_a_bus_whose_peer_hangs_closes_at_once(wire: Wire) -> None:
     bus.close()
     assert time.monotonic() - begin < 5.0  # Zenoh itself would wait 10 s
     with pytest.raises(BusError):
-        bus.tap("odom").recv()
+        bus.subscribe_raw("odom").recv()
 
 
 def test_every_service_ends_on_each_signal_though_nobody_is_there(wire: Wire) -> None:

@@ -89,7 +89,7 @@ def test_it_yields_to_a_person_and_stays_off_until_resume(wire: Wire, scene: Sce
     done = wire.run("controller", "--resume")
     assert (done.returncode, done.stderr) == (0, "every source may drive\n")
     scene.controller_drives()
-    scene.controller.wait_for_line("goes on")
+    scene.controller.wait_for_line("continues")
 
 
 def test_it_says_nothing_on_cmd_vel_while_a_person_has_the_robot(scene: Scene) -> None:
@@ -118,7 +118,7 @@ def test_the_teleops_r_hands_over(wire: Wire, scene: Scene) -> None:
     terminal.wait_for_text("you drive")
     terminal.type("k")
     scene.controller.wait_for_line("yields to teleop@")
-    terminal.wait_for_text("nobody drives; the autopilot is held")
+    terminal.wait_for_text("no driver; the autopilot is held")
     scene.robot.stands()
     terminal.type("r")
     scene.controller_drives()
@@ -137,7 +137,7 @@ def test_the_teleops_r_hands_over_in_the_middle_of_a_drive(wire: Wire, scene: Sc
 
 def test_it_stops_when_odom_stops_and_goes_on_when_the_sim_is_back(wire: Wire, scene: Scene) -> None:
     scene.sim.kill()
-    scene.controller.wait_for_line("waiting for odom: it is stale or was never heard")
+    scene.controller.wait_for_line("waiting for odom: it is stale, or none was received")
     scene.robot.told_to_stop()
     start_sim(wire)
     scene.controller_drives()

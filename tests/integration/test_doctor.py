@@ -14,11 +14,11 @@ from typing import Any
 
 import pytest
 
-from holozen import about
 from holozen.bus import Bus
 from holozen.messages import Odometry, Twist
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
+from holozen.transport import graph
 
 REPO = Path(__file__).parents[2]
 HOLD = """
@@ -31,12 +31,12 @@ Rows = list[dict[str, str]]
 
 
 def doctor(wire: Wire, *words: str) -> tuple[int, Rows]:
-    """Its exit code and findings, all of them with a mend unless all is well."""
+    """Its exit code and findings, all with a fix unless all is well."""
     done = wire.run("doctor", "--json", *words)
     rows = [json.loads(line) for line in done.stdout.splitlines()]
     assert done.stderr == ""
-    assert all(set(row) == {"check", "level", "text", "mend"} for row in rows)
-    assert all(row["mend"] for row in rows if row["level"] != "ok")
+    assert all(set(row) == {"check", "level", "text", "fix"} for row in rows)
+    assert all(row["fix"] for row in rows if row["level"] != "ok")
     assert done.returncode == int(any(row["level"] == "error" for row in rows))
     return done.returncode, rows
 
@@ -73,15 +73,15 @@ def test_with_no_network_and_nothing_running_all_is_well() -> None:
     words = ["unshare", "-rn", *command("doctor")]  # not even loopback is up
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "tcp/127.0.0.1:7447 is free: nothing runs here yet" in done.stdout
+    assert "tcp/127.0.0.1:7447 is free: no node runs here yet" in done.stdout
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
 def test_a_router_that_is_not_there_is_told(wire: Wire, mode: str) -> None:
     code, rows = doctor(wire, "--mode", mode)
     assert code == 1
-    assert bad(rows, "port") == [f"error: nobody is reached at {wire.endpoint}: Connection refused"]
-    assert f"--listen tcp/0.0.0.0:{wire.port}" in next(row["mend"] for row in rows if row["check"] == "port")
+    assert bad(rows, "port") == [f"error: {wire.endpoint} cannot be reached: Connection refused"]
+    assert f"--listen tcp/0.0.0.0:{wire.port}" in next(row["fix"] for row in rows if row["check"] == "port")
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
@@ -90,8 +90,8 @@ def test_who_holds_the_port_and_speaks_no_zenoh_is_named(wire: Wire, mode: str) 
         holder.wait_for_line("up")
         _, rows = doctor(wire, "--mode", mode)
     (text,) = bad(rows, "port")
-    assert f"(pid {holder.pid}), who does not answer as Zenoh does" in text
-    assert f"kill {holder.pid}" in next(row["mend"] for row in rows if row["check"] == "port")
+    assert f"(pid {holder.pid}), which does not answer as Zenoh does" in text
+    assert f"kill {holder.pid}" in next(row["fix"] for row in rows if row["check"] == "port")
 
 
 def test_who_holds_the_port_and_sleeps_is_to_be_woken(wire: Wire) -> None:
@@ -100,7 +100,7 @@ def test_who_holds_the_port_and_sleeps_is_to_be_woken(wire: Wire) -> None:
     router.signal(signal.SIGSTOP)
     _, rows = doctor(wire)
     router.signal(signal.SIGCONT)
-    assert "asleep as after Ctrl-Z" in bad(rows, "port")[0]
+    assert "stopped as by Ctrl-Z" in bad(rows, "port")[0]
     assert f"kill -CONT {router.pid}" in str(rows)
 
 
@@ -109,7 +109,7 @@ def test_two_sims_on_one_key_are_told_with_their_processes(wire: Wire) -> None:
     for sim in sims:
         sim.wait_for_line("no robot yet")
     code, rows = doctor(wire)
-    (text,) = bad(rows, "twins")
+    (text,) = bad(rows, "duplicates")
     assert code == 1
     assert all(f"sim (pid {sim.pid} on {os.uname().nodename})" in text for sim in sims)
 
@@ -118,7 +118,7 @@ def test_odom_that_does_not_come_is_stale(wire: Wire, door: Bus) -> None:
     publisher = wire.bus("sim").publisher("Fred/odom", Odometry)
     code, rows = doctor(wire)
     (text,) = bad(rows, "odom")
-    assert text.startswith("error: Fred/odom is stale: sim has told nothing for 1.")
+    assert text.startswith("error: Fred/odom is stale: nothing from sim for 1.")
     assert code == 1
     assert publisher.matched is False  # the doctor is gone without a trace
 
@@ -161,38 +161,41 @@ def test_two_that_fight_for_a_robot_are_told(wire: Wire) -> None:
 def stranger(wire: Wire, change: Callable[[dict[str, Any]], None]) -> tuple[Any, Any]:
     """A node that tells of itself as `change` has it."""
     bus = wire.bus("stranger")
-    told = {"node": "stranger", "version": about.version("holozen"), "host": "elsewhere", "pid": 7}
+    told = {"node": "stranger", "version": graph.version("holozen"), "host": "elsewhere", "pid": 7}
 
     def answer(query: Any) -> None:
         with query:
             row = told | {"time": time.time()}
             change(row)
-            query.reply(about.key(bus.id), json.dumps(row))
+            query.reply(graph.node_info_key(bus.id), json.dumps(row))
 
-    return bus.session.declare_queryable(about.key(bus.id), answer), bus.announce("node")
+    return bus.session.declare_queryable(graph.node_info_key(bus.id), answer), bus.announce("node")
 
 
 def test_a_clock_that_is_off_is_told(wire: Wire, door: Bus) -> None:
     held = stranger(wire, lambda row: row.__setitem__("time", row["time"] + 3))
     code, rows = doctor(wire)
     (text,) = bad(rows, "clock")
-    assert (code, text.startswith("error: that of elsewhere is +3.0"), bool(held)) == (1, True, True)
+    assert (code, text.startswith("error: the clock of elsewhere is +3.0"), bool(held)) == (1, True, True)
 
 
 def test_another_version_is_told(wire: Wire, door: Bus) -> None:
     held = stranger(wire, lambda row: row.__setitem__("version", "0.0.1"))
     code, rows = doctor(wire)
-    (text,) = bad(rows, "peers")
-    told = f"warning: stranger (pid 7 on elsewhere) is holozen 0.0.1, this is {about.version('holozen')}"
+    (text,) = bad(rows, "nodes")
+    told = f"warning: stranger (pid 7 on elsewhere) has holozen 0.0.1, this is {graph.version('holozen')}"
     assert (code, text, bool(held)) == (0, told, True)
 
 
 def test_a_node_that_does_not_answer_is_told(wire: Wire, door: Bus) -> None:
     bus = wire.bus("mute")
-    held = bus.announce("node"), bus.session.declare_queryable(about.key(bus.id), lambda query: queries.append(query))
+    held = (
+        bus.announce("node"),
+        bus.session.declare_queryable(graph.node_info_key(bus.id), lambda query: queries.append(query)),
+    )
     queries: list[Any] = []
     _, rows = doctor(wire)
-    (text,) = bad(rows, "peers")
+    (text,) = bad(rows, "nodes")
     assert (text.startswith(f"warning: mute ({bus.id[:6]}) does not answer"), bool(held)) == (True, True)
     queries.clear()
 
@@ -210,9 +213,9 @@ def test_a_wheel_that_lacks_is_told(wire: Wire, tmp_path: Path, lacks: str, leve
     words = [sys.executable, "-S", "-I", "-c", script, str(REPO), str(tmp_path), "doctor", *wire.flags]
     done = subprocess.run(words, capture_output=True, text=True, timeout=60)
     assert done.stderr == ""
-    assert f"{level:<8} wheels: " in done.stdout
-    assert f"{lacks} is not installed" in done.stdout
-    assert "disk: " in done.stdout  # the rest is looked at all the same
+    assert f"{level:<8} packages: " in done.stdout
+    assert f"{lacks} is missing" in done.stdout
+    assert "port: " in done.stdout  # everything else is checked all the same
 
 
 def test_a_configuration_that_is_wrong_is_told_in_one_line(wire: Wire) -> None:

@@ -1,9 +1,8 @@
 """Every verb beside what runs, beside nobody, and interrupted: no traceback, one line, the right exit code.
 
-All tries of a kind run side by side, each as a process; a test looks at the one of its verb.
+A test tries all verbs of its kind side by side, each as a process.
 """
 
-import argparse
 import json
 import os
 import re
@@ -12,9 +11,9 @@ import socket
 import subprocess
 import threading
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import pytest
 import zenoh
@@ -25,7 +24,7 @@ from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command, free_port
 
 from .conftest import start_sim, stranger_config
-from .test_strangers import PUTS
+from .strangers import PUTS
 from .verbs import VERBS, Row
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
@@ -33,10 +32,13 @@ BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/><inertia 
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
 SIDE_BY_SIDE, MANY = 12, 40  # processes at once: those that work, and those that mostly wait
 
-RACE = "dispatcher/resource.rs"  # where a thread of Zenoh's may panic: eclipse-zenoh/zenoh#2624
+RACE = "dispatcher/resource.rs"
+"""Where a thread of Zenoh's panics when many sessions come and go beside each other: eclipse-zenoh/zenoh#2624."""
+MOST_RACES = 3  # of some 300 tries; nothing is tried again
+RACED: list[str] = []
 
 Done = subprocess.CompletedProcess[str]
-Try = Callable[[str], Any]
+T = TypeVar("T")
 
 LIVE = [name for name, row in VERBS.items() if row.live is not None]
 TEXT = [name for name in LIVE if not (VERBS[name].stranger or VERBS[name].endless)]  # the others print it there
@@ -48,15 +50,13 @@ ENDLESS = [name for name, row in VERBS.items() if row.endless]
 WAITING = [name for name in ON_THE_WIRE if not VERBS[name].endless and name != "doctor"]
 
 
-def verbs_of(parser: argparse.ArgumentParser) -> list[str]:
-    """The names of a parser's verbs; its own where it has none."""
-    found = [action.choices for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    own = parser.prog.removeprefix("holozen ")
-    return [f"{own} {name}" for choices in found for name in choices] or [own]
+def words_of(verb: str) -> list[str]:
+    """A verb, or the verbs of a noun."""
+    return [f"{verb} {name}" for name in cli.VERBS[verb].split(", ")] if verb in cli.NOUNS else [verb]
 
 
 def test_every_verb_has_a_row() -> None:
-    assert list(VERBS) == [name for verb in cli.VERBS for name in verbs_of(cli.module(verb).parser())]
+    assert list(VERBS) == [words for verb in cli.VERBS for words in words_of(verb)]
 
 
 class Town:
@@ -104,27 +104,18 @@ def _talk(session: zenoh.Session, done: threading.Event) -> None:
             session.put(key, payload, encoding=encoding)
 
 
-class Tries:
-    """What came of the same try with many verbs, made side by side when the first is asked for."""
-
-    def __init__(self, names: list[str], attempt: Try, at_once: int = SIDE_BY_SIDE) -> None:
-        self._names, self._attempt, self._at_once = names, attempt, at_once
-        self._made: dict[str, Future[Any]] = {}
-
-    def __getitem__(self, name: str) -> Any:
-        if not self._made:
-            with ThreadPoolExecutor(self._at_once) as pool:
-                self._made = {each: pool.submit(self._attempt, each) for each in self._names}
-        return self._made[name].result()
+def tries(names: list[str], attempt: Callable[[str], T], at_once: int = SIDE_BY_SIDE) -> Iterator[tuple[str, T]]:
+    """What came of the same try with many verbs, side by side, but for those that Zenoh's own race took part in."""
+    with ThreadPoolExecutor(at_once) as pool:
+        done = dict(zip(names, pool.map(attempt, names), strict=True))
+    for name, outcome in done.items():
+        if RACE in str(outcome):
+            RACED.append(name)
+        else:
+            yield name, outcome
 
 
 def run(words: list[str], stdout: Any = subprocess.PIPE) -> Done:
-    """Run it to its end; once more where Zenoh's own race made a noise, which many who come and go bring on."""
-    done = _run(words, stdout)
-    return _run(words, stdout) if RACE in done.stderr else done
-
-
-def _run(words: list[str], stdout: Any) -> Done:
     return subprocess.run(
         [*command("")[:-1], *words],
         stdin=subprocess.DEVNULL,
@@ -143,50 +134,38 @@ def is_clean(text: str) -> bool:
     return not any(word in text for word in ("Traceback", "Exception ignored", "Error:", "panicked"))
 
 
-def assert_one_line(done: Done, code: int, part: str) -> None:
-    assert done.returncode == code, done.stderr
-    assert (len(done.stderr.splitlines()), part in done.stderr) == (1, True), done.stderr
-    assert done.stdout == ""
+def assert_one_line(name: str, done: Done, code: int, part: str) -> None:
+    assert (done.returncode, done.stdout) == (code, ""), f"{name}: {done}"
+    assert len(done.stderr.splitlines()) == 1 and part in done.stderr, f"{name}: {done.stderr}"
 
 
 # --- beside what runs
 
 
-@pytest.fixture(scope="module")
-def in_text(place: Town) -> Tries:
+def test_it_does_its_work(place: Town) -> None:
     def attempt(name: str) -> Done:
         row = VERBS[name]
         return run(place.words(name, row.live or "", "text") + flags(row, place.wire))
 
-    return Tries(TEXT, attempt)
+    for name, done in tries(TEXT, attempt):
+        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
+        assert done.stdout or done.stderr, name
+        assert is_clean(done.stderr), f"{name}: {done.stderr}"
 
 
-@pytest.mark.parametrize("name", TEXT)
-def test_it_does_its_work(in_text: Tries, name: str) -> None:
-    done = in_text[name]
-    assert done.returncode in {VERBS[name].code, int(name == "doctor")}, done.stderr
-    assert (done.stdout or done.stderr) and is_clean(done.stderr)
-
-
-@pytest.fixture(scope="module")
-def in_json(place: Town) -> Tries:
+def test_as_json_it_is_one_object_a_line(place: Town) -> None:
     def attempt(name: str) -> Done:
         row = VERBS[name]
         return run([*place.words(name, row.live or "", "json"), "--json", *flags(row, place.wire)])
 
-    return Tries(LIVE, attempt)
+    for name, done in tries(LIVE, attempt):
+        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
+        assert done.stdout, name
+        assert all(isinstance(json.loads(line), dict) for line in done.stdout.splitlines()), f"{name}: {done.stdout}"
+        assert is_clean(done.stderr), f"{name}: {done.stderr}"
 
 
-@pytest.mark.parametrize("name", LIVE)
-def test_as_json_it_is_one_object_a_line(in_json: Tries, name: str) -> None:
-    done = in_json[name]
-    assert done.returncode in {VERBS[name].code, int(name == "doctor")}, done.stderr
-    assert done.stdout and all(isinstance(json.loads(line), dict) for line in done.stdout.splitlines())
-    assert is_clean(done.stderr)
-
-
-@pytest.fixture(scope="module")
-def into_nothing(place: Town) -> Tries:
+def test_a_reader_that_is_gone_ends_it_quietly(place: Town) -> None:
     def attempt(name: str) -> Done:
         reading, writing = os.pipe()
         os.close(reading)
@@ -194,95 +173,70 @@ def into_nothing(place: Town) -> Tries:
         with open(writing, "wb") as gone:
             return run([*place.words(name, row.live or "", "pipe"), "--json", *flags(row, place.wire)], gone)
 
-    return Tries(LIVE, attempt)
+    for name, done in tries(LIVE, attempt):
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+        assert is_clean(done.stderr) and "Broken pipe" not in done.stderr, f"{name}: {done.stderr}"
 
 
-@pytest.mark.parametrize("name", LIVE)
-def test_a_reader_that_is_gone_ends_it_quietly(into_nothing: Tries, name: str) -> None:
-    done = into_nothing[name]
-    assert done.returncode == 0, done.stderr
-    assert is_clean(done.stderr) and "Broken pipe" not in done.stderr
-
-
-@pytest.fixture(scope="module")
-def wrongly(place: Town) -> Tries:
+def test_what_is_wrong_is_one_line(place: Town) -> None:
     def attempt(name: str) -> Done:
         row = VERBS[name]
         return run(place.words(name, (row.wrong or ("",))[0], "wrong") + flags(row, place.wire))
 
-    return Tries(WRONG, attempt)
+    for name, done in tries(WRONG, attempt):
+        _, code, part = VERBS[name].wrong or ("", 0, "")
+        assert_one_line(name, done, code, part)
 
 
-@pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_one_line(wrongly: Tries, name: str) -> None:
-    _, code, part = VERBS[name].wrong or ("", 0, "")
-    assert_one_line(wrongly[name], code, part)
-
-
-@pytest.fixture(scope="module")
-def beside_strangers(place: Town) -> Tries:
+def test_it_does_its_work_with_strangers(place: Town) -> None:
     def attempt(name: str) -> Done:
         words, _ = VERBS[name].stranger or ("", "")
         return run(place.words(name, words, "stranger") + place.wire.flags)
 
-    return Tries(STRANGERS, attempt)
-
-
-@pytest.mark.parametrize("name", STRANGERS)
-def test_it_does_its_work_with_strangers(beside_strangers: Tries, name: str) -> None:
-    done, (_, part) = beside_strangers[name], VERBS[name].stranger or ("", "")
-    assert (done.returncode, is_clean(done.stderr)) == (0, True), done.stderr
-    assert part in done.stdout
+    for name, done in tries(STRANGERS, attempt):
+        _, part = VERBS[name].stranger or ("", "")
+        assert done.returncode == 0 and is_clean(done.stderr), f"{name}: {done.stderr}"
+        assert part in done.stdout, f"{name}: {done.stdout}"
 
 
 # --- beside nobody
 
 
-@pytest.fixture(scope="module")
-def in_silence(place: Town) -> Tries:
+def test_where_nobody_is_it_says_so(place: Town) -> None:
     def attempt(name: str) -> Done:
         words, _, _ = VERBS[name].silent or ("", 0, "")
         with Wire() as own:
             return run(place.words(name, words, "silent") + own.flags)
 
-    return Tries(SILENT, attempt, MANY)
+    for name, done in tries(SILENT, attempt, MANY):
+        _, code, part = VERBS[name].silent or ("", 0, "")
+        said = done.stderr.splitlines()
+        if name.endswith("record"):
+            assert said.pop(0).startswith("recording odom into ")
+        assert (done.returncode, len(said)) == (code, 1), f"{name}: {done.stderr}"
+        assert part in said[0] and is_clean(done.stderr), f"{name}: {done.stderr}"
 
 
-@pytest.mark.parametrize("name", SILENT)
-def test_where_nobody_is_it_says_so(in_silence: Tries, name: str) -> None:
-    _, code, part = VERBS[name].silent or ("", 0, "")
-    done = in_silence[name]
-    said = done.stderr.splitlines()
-    if name.endswith("record"):
-        assert said.pop(0).startswith("recording odom into ")
-    assert (done.returncode, len(said)) == (code, 1), done.stderr
-    assert part in said[0] and is_clean(done.stderr)
-
-
-@pytest.fixture(scope="module")
-def without_router(place: Town) -> Tries:
+def test_a_client_without_a_router_gives_up(place: Town) -> None:
     nowhere = ["--mode", "client", "--connect", f"tcp/127.0.0.1:{free_port()}"]
 
     def attempt(name: str) -> Done:
         return run(place.words(name, VERBS[name].live or "", "alone") + nowhere)
 
-    return Tries(ON_THE_WIRE, attempt, MANY)
-
-
-@pytest.mark.parametrize("name", ON_THE_WIRE)
-def test_a_client_without_a_router_gives_up(without_router: Tries, name: str) -> None:
-    done = without_router[name]
-    if name == "doctor":
-        assert done.returncode == 1 and "no router answers at " in done.stdout and is_clean(done.stderr)
-    else:
-        assert_one_line(done, 1, "cannot open Zenoh: no router answers at ")
+    for name, done in tries(ON_THE_WIRE, attempt, MANY):
+        if name == "doctor":
+            assert done.returncode == 1 and "no router answers at " in done.stdout and is_clean(done.stderr), done
+        else:
+            waits, fails = done.stderr.splitlines()
+            assert (done.returncode, done.stdout) == (1, ""), f"{name}: {done}"
+            assert waits.startswith("waiting for a Zenoh router at "), f"{name}: {done.stderr}"
+            assert "cannot open Zenoh: no router answers at " in fails, f"{name}: {done.stderr}"
 
 
 # --- interrupted
 
 
-@pytest.fixture(scope="module")
-def interrupted(place: Town) -> Tries:
+def test_ctrl_c_ends_what_would_go_on(place: Town) -> None:
     def attempt(name: str) -> tuple[int, str]:
         row = VERBS[name]
         assert row.endless
@@ -294,19 +248,13 @@ def interrupted(place: Town) -> Tries:
                 terminal.type("\x03")
                 return terminal.process.wait(), terminal.raw
 
-    return Tries(ENDLESS, attempt)
+    for name, (code, shown) in tries(ENDLESS, attempt):
+        row = VERBS[name].endless
+        assert row and code == row.code, f"{name}: {shown}"
+        assert is_clean(shown), f"{name}: {shown}"
 
 
-@pytest.mark.parametrize("name", ENDLESS)
-def test_ctrl_c_ends_what_would_go_on(interrupted: Tries, name: str) -> None:
-    code, shown = interrupted[name]
-    row = VERBS[name].endless
-    assert row and code == row.code, shown
-    assert is_clean(shown)
-
-
-@pytest.fixture(scope="module")
-def kept_waiting(place: Town) -> Tries:
+def test_ctrl_c_ends_what_waits(place: Town) -> None:
     """Interrupted while they wait for a router that takes their call and then says nothing."""
 
     def attempt(name: str) -> tuple[int, str]:
@@ -318,10 +266,9 @@ def kept_waiting(place: Town) -> Tries:
                 terminal.type("\x03")
                 return terminal.process.wait(), terminal.raw
 
-    return Tries(WAITING, attempt, MANY)
+    for name, (code, shown) in tries(WAITING, attempt, MANY):
+        assert (code, is_clean(shown)) == (130, True), f"{name}: {shown}"
 
 
-@pytest.mark.parametrize("name", WAITING)
-def test_ctrl_c_ends_what_waits(kept_waiting: Tries, name: str) -> None:
-    code, shown = kept_waiting[name]
-    assert (code, is_clean(shown)) == (130, True), shown
+def test_zenohs_own_race_was_rare() -> None:
+    assert len(RACED) <= MOST_RACES, RACED

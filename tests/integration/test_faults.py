@@ -9,10 +9,17 @@ import numpy as np
 import pytest
 
 from holozen.bus import Bus
-from holozen.errors import ServiceError
 from holozen.messages import Clock
-from holozen.simulation_interfaces import DeleteEntityReply, DeleteEntityRequest, SpawnEntityReply, SpawnEntityRequest
+from holozen.messages.simulation_interfaces import (
+    DeleteEntityReply,
+    DeleteEntityRequest,
+    SpawnEntityReply,
+    SpawnEntityRequest,
+)
 from holozen.testing import Wire, wait_for
+from holozen.transport.errors import ServiceError
+
+pytestmark = pytest.mark.alone
 
 LIMIT = 10.0  # s for `holozen spawn` with its start and a busy machine; the figures are in the closing notes
 INERTIAL = '<inertial><mass value="{}"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
@@ -64,13 +71,13 @@ LAUGHS = "<!DOCTYPE r [<!ENTITY a 'ha'>" + "".join(
 FAULTS: dict[str, tuple[str, str]] = {
     "an empty file": ("", "the file is empty"),
     "an unclosed tag": ('<robot name="r">\n<link name="a">', "line 2: broken XML"),
-    "a cycle": (robot(link("a") + link("b") + joint("a", "b") + joint("b", "a")), "circle"),
+    "a cycle": (robot(link("a") + link("b") + joint("a", "b") + joint("b", "a")), "loop"),
     "two roots": (robot(link("a") + link("b")), "2 root links"),
-    "a duplicate link": (robot(link("a") + link("a")), "is there twice"),
-    "a mass of nan": (robot(link("a", INERTIAL.format("nan"))), "'nan' is no finite number"),
-    "a mass below zero": (robot(link("a", INERTIAL.format("-1"))), "is below zero"),
-    "a mass of abc": (robot(link("a", INERTIAL.format("abc"))), "'abc' is no finite number"),
-    "a radius of zero": (robot(link("a", INERTIAL.format(1) + BALL.format(0))), "each number has to be"),
+    "a duplicate link": (robot(link("a") + link("a")), "is defined twice"),
+    "a mass of nan": (robot(link("a", INERTIAL.format("nan"))), "'nan' is not a finite number"),
+    "a mass below zero": (robot(link("a", INERTIAL.format("-1"))), "is negative"),
+    "a mass of abc": (robot(link("a", INERTIAL.format("abc"))), "'abc' is not a finite number"),
+    "a radius of zero": (robot(link("a", INERTIAL.format(1) + BALL.format(0))), "each number must be"),
     "billion laughs": (f"{LAUGHS}]><robot name='&j;'/>", "entity"),
     "an external entity": ('<!DOCTYPE r [<!ENTITY a SYSTEM "/etc/passwd">]><robot name="r">&a;</robot>', "entity"),
     "macros without end": (

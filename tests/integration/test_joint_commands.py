@@ -6,11 +6,10 @@ import pytest
 
 from holozen import entities
 from holozen.messages import JointState
-from holozen.publisher import Publisher
 from holozen.testing import Wire, wait_for
+from holozen.transport.pubsub import Publisher
 
-from .robots import Record, Robot, place, record, speeds
-from .test_robots import URDF
+from .robots import URDF, Record, Robot, place, record, speeds
 
 JOINTS = ["jFL", "jFR", "jBL", "jBR"]
 RADIUS = 0.05
@@ -45,7 +44,7 @@ class Rover:
             self.commands.put(message)
             return bool(until())
 
-        wait_for(look, 20, lambda: f"{values} to be done; {self.robot._last_status()}")
+        wait_for(look, 20, lambda: f"{values} to be done; {self.robot.last_status()}")
 
     def still(self) -> dict[str, float]:
         """Wait until all joints are; their positions."""

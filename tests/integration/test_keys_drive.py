@@ -9,6 +9,8 @@ from holozen.testing import Terminal, Wire, wait_for
 
 from .robots import Record, Robot, distance, moves, place, planar, rests, time_of
 
+pytestmark = pytest.mark.alone
+
 V, W = 0.4, 0.8  # m/s, rad/s
 ESCAPE = "\x1b"
 UP = f"{ESCAPE}[A"

@@ -8,10 +8,9 @@ from holozen.messages import Odometry
 from holozen.testing import Wire
 
 from .conftest import start_sim
-from .robots import Robot, distance, moves, place, time_of
+from .robots import Planar, Robot, ahead, distance, moves, place, time_of
 
 MILLIMETRE = 1e-3  # m; and rad
-Planar = tuple[float, float, float]
 
 
 @pytest.fixture(scope="module")
@@ -19,23 +18,6 @@ def quick(town: Wire) -> Robot:
     """A robot four times as fast as real time."""
     start_sim(town, "--rtf", "4")
     return Robot(town.bus()).wait_longer()
-
-
-def ahead(start: Planar, velocity: Planar, seconds: float) -> Planar:
-    """Where a body is after moving at a constant body-frame velocity: straight, or on an arc."""
-    x, y, yaw = start
-    vx, vy, turn = velocity
-    angle = turn * seconds
-    if abs(turn) < 1e-12:
-        forward, left = vx * seconds, vy * seconds
-    else:
-        sine, cosine = math.sin(angle) / turn, (1 - math.cos(angle)) / turn
-        forward, left = vx * sine - vy * cosine, vx * cosine + vy * sine
-    return (
-        x + forward * math.cos(yaw) - left * math.sin(yaw),
-        y + forward * math.sin(yaw) + left * math.cos(yaw),
-        yaw + angle,
-    )
 
 
 def steady(robot: Robot, velocity: Planar, seconds: float) -> list[Odometry]:

@@ -100,7 +100,7 @@ def test_a_teleop_of_ros_drives_from_a_terminal_and_its_end_stops_the_robot(
     wire: Wire, robot: Robot, stamped: str
 ) -> None:
     parameters = ["-p", f"stamped:={stamped}", "-p", "speed:=0.4"]
-    commands = wire.bus("reader").tap("cmd_vel")
+    commands = wire.bus("reader").subscribe_raw("cmd_vel")
     with Terminal(words(wire, "teleop_keys.py", "--ros-args", *parameters)) as teleop:
         teleop.wait_for_text("drive, k stops")
         wait_for(partial(is_heard, teleop, robot), what="the sim to hear it")

@@ -4,7 +4,6 @@ Each test has a network of its own, so that it meets nobody else's robot and dis
 """
 
 import json
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,81 +12,56 @@ import pytest
 
 from holozen.testing import Process, Terminal, wait_for
 from holozen.testing.wire import command
+from tests.faults.namespaces import NEEDS, Host, Lab
 
-pytestmark = pytest.mark.needs("ip", "unshare")
+pytestmark = NEEDS
 
 ZENOH = str(Path(sys.executable).with_name("zenoh"))
 CLIENT = ("--mode", "client", "--connect", "tcp/127.0.0.1:7447")
-LINKS = """set -e
-ip link set lo up
-ip link add here type veth peer name there
-ip address add 10.99.0.1/24 dev here
-ip link set here up
-ip link set there up
-echo up
-exec sleep 1000
-"""
-
-
-class Network:
-    """Loopback and one more interface that is up, seen by nobody else."""
-
-    def __init__(self, holder: Process) -> None:
-        self._holder = holder
-
-    def inside(self, *words: str) -> list[str]:
-        """The words that run a program in this network."""
-        return ["nsenter", "--preserve-credentials", "-t", str(self._holder.pid), "-U", "-n", "--", *words]
-
-    def run(self, *words: str) -> subprocess.CompletedProcess[str]:
-        return subprocess.run(self.inside(*words), capture_output=True, text=True, timeout=30)
-
-    def sockets(self, name: str) -> list[tuple[str, int, str]]:
-        """Address, port and state of the sockets in tcp, tcp6, udp or udp6, as the kernel has them (hexadecimal)."""
-        rows = Path(f"/proc/{self._holder.pid}/net/{name}").read_text().splitlines()[1:]
-        local = [(row.split()[1].rpartition(":"), row.split()[3]) for row in rows]
-        return [(address, int(port, 16), state) for (address, _, port), state in local]
-
-    def groups(self) -> set[str]:
-        """The multicast groups joined on any interface."""
-        rows = Path(f"/proc/{self._holder.pid}/net/igmp").read_text().splitlines()[1:]
-        six = Path(f"/proc/{self._holder.pid}/net/igmp6").read_text().splitlines()
-        return {row.split()[0] for row in rows if row.startswith("\t")} | {row.split()[2] for row in six}
-
-
 LOOPBACK, LISTENS = "0100007F", "0A"
 
 
 @pytest.fixture
-def network() -> Iterator[Network]:
-    allowed = subprocess.run(["unshare", "-rn", "true"], capture_output=True, text=True)
-    if allowed.returncode:
-        pytest.skip(f"needs networks of its own: {allowed.stderr.strip()}")
-    with Process(["unshare", "-rn", "sh", "-c", LINKS]) as holder:
-        holder.wait_for_line("up")
-        yield Network(holder)
+def network() -> Iterator[Host]:
+    """Loopback and one more interface that is up, seen by nobody else."""
+    with Lab() as lab:
+        here = lab.host("here")
+        lab.cable(here, lab.host("there"))
+        yield here
 
 
-def test_nothing_listens_beyond_loopback_and_no_multicast_is_joined(network: Network) -> None:
-    before = network.groups()
+def sockets(host: Host, name: str) -> list[tuple[str, int, str]]:
+    """Address, port and state of the sockets in tcp, tcp6, udp or udp6, as the kernel has them (hexadecimal)."""
+    local = [(row.split()[1].rpartition(":"), row.split()[3]) for row in host.proc_net(name)[1:]]
+    return [(address, int(port, 16), state) for (address, _, port), state in local]
+
+
+def groups(host: Host) -> set[str]:
+    """The multicast groups joined on any interface."""
+    four = {row.split()[0] for row in host.proc_net("igmp") if row.startswith("\t")}
+    return four | {row.split()[2] for row in host.proc_net("igmp6")}
+
+
+def test_nothing_listens_beyond_loopback_and_no_multicast_is_joined(network: Host) -> None:
+    before = groups(network)
     with Process(network.inside(*command("up"))) as up, Terminal(network.inside(*command("teleop"))) as teleop:
         teleop.wait_for_text("controller@")
-        listeners = [(address, port) for address, port, state in network.sockets("tcp") if state == LISTENS]
+        listeners = [(address, port) for address, port, state in sockets(network, "tcp") if state == LISTENS]
         assert (LOOPBACK, 7447) in listeners
         assert {address for address, _ in listeners} == {LOOPBACK}
         for name in ("tcp6", "udp", "udp6"):
-            assert network.sockets(name) == []
-        assert network.groups() == before
+            assert sockets(network, name) == []
+        assert groups(network) == before
         assert up.returncode is None
 
 
-def test_no_socket_at_all_has_an_address_of_the_network(network: Network) -> None:
+def test_no_socket_at_all_has_an_address_of_the_network(network: Host) -> None:
     with Process(network.inside(*command("up"))):
         wait_for(lambda: network.run(*command("topic", "echo", "odom", "--once", "--timeout", "5")).returncode == 0)
-        assert {address for address, *_ in network.sockets("tcp")} == {LOOPBACK}
+        assert {address for address, *_ in sockets(network, "tcp")} == {LOOPBACK}
 
 
-def test_the_commands_of_the_readme_work_as_they_stand(network: Network) -> None:
+def test_the_commands_of_the_readme_work_as_they_stand(network: Host) -> None:
     with Process(network.inside(*command("up"))) as up:
         with Process(
             network.inside(ZENOH, *CLIENT, "subscribe", "-k", "odom", "--decoder", "json"),
@@ -100,19 +74,19 @@ def test_the_commands_of_the_readme_work_as_they_stand(network: Network) -> None
         assert put.returncode == 0
         up.wait_for_line("controller: yields to anonymous (DATA)")
         wait_for(lambda: network.run(*command("controller", "--resume")).returncode == 0)
-        up.wait_for_line("controller: goes on")
+        up.wait_for_line("controller: continues")
 
 
-def test_a_router_listens_on_loopback_only_too(network: Network) -> None:
+def test_a_router_listens_on_loopback_only_too(network: Host) -> None:
     with Process(network.inside(*command("router"))) as router:
         router.wait_for_line("router: listens at tcp/127.0.0.1:7447")
-        listeners = [(address, port) for address, port, state in network.sockets("tcp") if state == LISTENS]
+        listeners = [(address, port) for address, port, state in sockets(network, "tcp") if state == LISTENS]
         assert listeners == [(LOOPBACK, 7447)]
         for name in ("tcp6", "udp", "udp6"):
-            assert network.sockets(name) == []
+            assert sockets(network, name) == []
 
 
-def test_peers_go_on_while_a_router_takes_the_port_first(network: Network) -> None:
+def test_peers_go_on_while_a_router_takes_the_port_first(network: Host) -> None:
     with Process(network.inside(*command("router"))) as router:
         router.wait_for_line("listens at")
         with Process(network.inside(*command("sim"))) as sim:

@@ -11,6 +11,8 @@ from holozen.testing import Wire, wait_for
 from .conftest import start_sim
 from .robots import Robot, distance, moves, place, record
 
+pytestmark = pytest.mark.alone
+
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 
 

@@ -52,4 +52,5 @@ def test_a_place_outside_of_known_packages_is_never_opened_for_a_text_that_was_s
     request = json.dumps({"name": "spy", "resource_string": text})
     done = town.run("service", "call", "spawn_entity", request)
     assert done.returncode == 0, done.stderr
-    wait_for(lambda: "'/etc/passwd' is no file in a known package" in sim.err, what="the sim's warning")
+    assert "'/etc/passwd' is not a file in a known package" in done.stdout
+    wait_for(lambda: "'/etc/passwd' is not a file in a known package" in sim.err, what="the sim's warning")

@@ -9,6 +9,8 @@ from holozen.testing import Wire, wait_for
 from .conftest import start_sim
 from .robots import Robot, time_of
 
+pytestmark = pytest.mark.alone
+
 
 def advances(*flags: tuple[str, ...], span: float) -> list[float]:
     """How far the time of sims with these flags goes while that of the first goes on by `span` seconds."""

@@ -8,12 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from holozen import rcl_interfaces as r
 from holozen.bus import Bus
 from holozen.messages import NextGoalReply, NextGoalRequest, Twist
+from holozen.messages import rcl_interfaces as r
 from holozen.testing import Wire, wait_for
 
 from .robots import Robot, moves, rests, time_of
+
+pytestmark = pytest.mark.alone
 
 DEFAULTS = {
     "max_linear": 5.0, "max_angular": 10.0, "real_time_factor": 1.0, "command_timeout": 0.5, "odometry_rate": 50.0,
@@ -103,7 +105,7 @@ def test_a_robot_with_a_name_has_its_own(town: Wire, robot: Robot) -> None:
     finally:
         assert town.run("delete", "Fred").returncode == 0
     assert put(robot.bus, "sim", **{"Fred.command_timeout": 1.0}) == [
-        "sim has no parameter 'Fred.command_timeout'; did you mean command_timeout?"
+        "sim has no parameter 'Fred.command_timeout'; did you mean 'command_timeout'?"
     ]
 
 
@@ -137,4 +139,4 @@ def test_goals_of_a_file_can_only_be_read(wire: Wire, tmp_path: Path) -> None:
     file = tmp_path / "goals.txt"
     file.write_text("1 2 3\n")
     wire.start("pose-service", "--goals", str(file)).wait_for_line("goals")
-    assert put(wire.bus(), "pose_service", goals="other.txt") == ["goals: it can only be read"]
+    assert put(wire.bus(), "pose_service", goals="other.txt") == ["goals: it is read-only"]

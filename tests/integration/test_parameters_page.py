@@ -3,8 +3,8 @@
 import re
 from pathlib import Path
 
-from holozen import rcl_interfaces as r
 from holozen.bus import Bus
+from holozen.messages import rcl_interfaces as r
 from holozen.testing import Wire
 
 PAGE = Path(__file__).parents[2] / "docs" / "parameters.md"

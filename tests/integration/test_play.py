@@ -12,8 +12,8 @@ from holozen import entities
 from holozen.testing import Terminal, Wire, wait_for
 
 from .conftest import start_sim
+from .processes import parts_at
 from .robots import Robot, speeds
-from .test_up import parts_at
 
 REPO = Path(__file__).parents[2]
 

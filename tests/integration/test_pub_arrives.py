@@ -11,8 +11,8 @@ from holozen.messages import Twist
 from holozen.testing import Wire, wait_for
 from holozen.testing.wire import command
 
+from .processes import assert_one_line
 from .robots import Robot, moves
-from .test_topic import assert_one_line
 
 AHEAD = '{"linear": {"x": 0.2}}'
 
@@ -36,7 +36,7 @@ def test_it_waits_for_as_many_subscribers_as_it_is_told(town: Wire, robot: Robot
 def test_it_gives_up_waiting_when_it_is_told_to(town: Wire) -> None:
     done = town.run("topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "-1", "-w", "1", "--max-wait", "0.1")
     assert done.returncode == 1
-    assert "nobody subscribes to nobody" in done.stderr
+    assert "no subscribers of nobody" in done.stderr
 
 
 def test_fewer_subscribers_than_it_is_told_to_wait_for_are_not_enough(town: Wire, robot: Robot) -> None:
@@ -159,7 +159,7 @@ def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
     def told() -> str:
         publisher.put(Twist())
         for _ in range(5):
-            next(publisher._numbers)  # as if a sample had been sent and lost
+            next(publisher.numbers)  # as if a sample had been sent and lost
         return hz.out
 
     wait_for(told)

@@ -11,28 +11,16 @@ from typing import cast
 import pytest
 import zenoh
 
-from holozen import codec
-from holozen.bag.reader import Bag, Message
-from holozen.messages import Odometry
+from holozen.bag.reader import Bag
+from holozen.messages import Odometry, codec
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
+from .processes import read
 from .robots import Robot
+from .strangers import PAYLOADS
 
 BLOCK = zenoh.CongestionControl.BLOCK  # by default a burst loses some, before anybody receives it
-PAYLOADS = {  # by Zenoh Encoding
-    "application/json": b'{"a":   1.0, "b": [1,2]}',
-    "text/plain": "grüße\n".encode(),
-    "zenoh/bytes": bytes(range(256)),
-    "application/cdr": b"\x00\x01\x00\x00" + bytes(48),
-    "image/jpeg": b"\xff\xd8\xff",
-    "application/protobuf;of.some.Type": b"\x08\x01",
-}
-
-
-def read(path: Path) -> list[Message]:
-    with Bag(path) as bag:
-        return list(bag.messages())
 
 
 def info_of(path: Path, *flags: str) -> str:
@@ -71,12 +59,13 @@ def test_a_live_robot_is_recorded_with_the_types_of_ros(town: Wire, robot: Robot
     assert done.returncode == 0, done.stderr
     *_, last = map(json.loads, done.stdout.splitlines())
     assert last["files"] == [str(tmp_path / "a.mcap")]
-    assert (last["dropped"], last["overran"], last["error"]) == (0, 0, "")
+    assert (last["dropped"], last["overran"], last["lost"], last["error"]) == (0, 0, 0, "")
     info = json.loads(info_of(tmp_path / "a.mcap", "--json"))
     types = {topic["key"]: topic["type"] for topic in info["topics"]}
     assert types["odom"] == "nav_msgs/msg/Odometry"
     assert types["tf"] == "tf2_msgs/msg/TFMessage"
     assert info["messages"] == last["messages"]
+    assert all(topic["missing"] == 0 for topic in info["topics"])
 
 
 def test_a_killed_recorder_leaves_a_file_that_can_be_read(wire: Wire, tmp_path: Path) -> None:
@@ -116,7 +105,7 @@ def test_on_a_full_disk_it_ends_with_a_file_that_is_whole(tmp_path: Path) -> Non
         assert process.wait(60) == 0, process.err
     told = json.loads(process.out.splitlines()[-1])
     assert told["code"] == 1
-    assert told["said"].count("holozen record: ended: No space left on device") == 1
+    assert told["said"].count("holozen record: stopped: No space left on device") == 1
     assert 100 < told["readable"] == told["messages"]
     assert told["mcap"] == told["messages"], "the mcap library wants an end"
 
@@ -159,7 +148,7 @@ print(json.dumps(told | {"mcap": summary.statistics.message_count}))
         (("odom", "-o", "/nowhere/a"), 1, "cannot write /nowhere/a.mcap: No such file or directory"),
         (("odom", "--max-size", "0"), 2, "use a number from 0.1"),
         (("a//b", "-o", "a"), 1, "key 'a//b'"),
-        (("odom", "-o", "a", "--max-duration", "0.1"), 1, "nothing came, so no file is left"),
+        (("odom", "-o", "a", "--max-duration", "0.1"), 1, "nothing arrived, so no file is left"),
     ],
 )
 def test_what_is_wrong_is_told_in_one_line(
@@ -209,7 +198,7 @@ def test_without_a_clock_there_is_no_time_of_the_sim(wire: Wire, tmp_path: Path)
     recorder = wire.start("record", "a", "-o", str(tmp_path / "a"), "--use-sim-time", "--max-duration", "2")
     listening(wire, "a").put("a", b"x")
     assert recorder.wait() == 1
-    assert recorder.err.splitlines()[-1].endswith("nothing came on clock, so nobody knows the sim's time")
+    assert recorder.err.splitlines()[-1].endswith("nothing arrived on clock, so the sim's time is unknown")
     assert list(tmp_path.iterdir()) == []
 
 
@@ -219,7 +208,7 @@ def test_a_reader_that_has_seen_enough_ends_it_quietly(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     publisher = wire.start("topic", "pub", "tf", "{}", "-r", "100")
-    publisher.wait_for_line("nobody subscribes")
+    publisher.wait_for_line("no subscribers")
     if words.startswith("bag"):
         assert wire.run("record", "-a", "-o", "a", "--max-duration", "0.3").returncode == 0
     flags = wire.flags if words.startswith("record") else []

@@ -10,8 +10,8 @@ import msgspec
 import pytest
 import zenoh
 
-from holozen.codec import WIRES
 from holozen.messages import Header, Time, Twist, TwistStamped, Vector3
+from holozen.messages.codec import WIRES
 from holozen.testing import Wire, wait_for
 
 from .conftest import start_sim

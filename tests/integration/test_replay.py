@@ -6,15 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from holozen import codec
-from holozen.bag.forms import form_of
+from holozen.bag.formats import format_of
 from holozen.bag.writer import BagWriter
-from holozen.messages import Message, Odometry, Twist
-from holozen.tap import Sample, Tap
+from holozen.messages import Message, Odometry, Twist, codec
 from holozen.testing import Wire, wait_for
+from holozen.transport.pubsub import RawSubscriber, Sample
 
+from .processes import read
 from .robots import Robot, moves
-from .test_record import PAYLOADS, read
+from .strangers import PAYLOADS
 
 MS = 1_000_000  # ns
 FORWARD = codec.encode(Twist.planar(x=0.2))
@@ -24,12 +24,12 @@ def bag(path: Path, *rows: tuple[str, bytes, str, float], types: tuple[type[Mess
     """A bag with rows of key, payload, Zenoh Encoding and time in ms."""
     writer = BagWriter(str(path))
     for key, payload, encoding, at in rows:
-        writer.write(key, form_of(payload, encoding, types)[0], payload, round(at * MS))
+        writer.write(key, format_of(payload, encoding, types)[0], payload, round(at * MS))
     writer.close()
     return str(path)
 
 
-def drain(tap: Tap) -> list[Sample]:
+def drain(tap: RawSubscriber) -> list[Sample]:
     return list(iter(tap.try_recv, None))
 
 
@@ -40,7 +40,7 @@ def commands(count: int, every: float = 50.0) -> list[tuple[str, bytes, str, flo
 
 def test_payloads_and_encodings_are_those_of_the_bag(wire: Wire, tmp_path: Path) -> None:
     rows = [(f"any/{i}", payload, encoding, i * 5) for i, (encoding, payload) in enumerate(PAYLOADS.items())]
-    tap = wire.bus().tap("any/**")
+    tap = wire.bus().subscribe_raw("any/**")
     done = wire.run("replay", bag(tmp_path / "a.mcap", *rows))
     assert (done.returncode, done.stderr) == (0, "")
     assert done.stdout.startswith(f"played {len(rows)} messages in ")
@@ -65,7 +65,7 @@ def test_what_was_recorded_is_played_to_who_records_again(wire: Wire, tmp_path: 
 def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(town: Wire, robot: Robot, tmp_path: Path) -> None:
     odom = ("odom", codec.encode(Odometry()), "application/json", 0.0)
     path = bag(tmp_path / "a.mcap", odom, *commands(3), ("note", b"hello", "text/plain", 1.0))
-    tap = robot.bus.tap("note")
+    tap = robot.bus.subscribe_raw("note")
     done = town.run("replay", path)
     assert done.returncode == 0
     assert done.stderr.splitlines() == [
@@ -78,9 +78,17 @@ def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(town: Wire,
     assert done.stderr == "holozen replay: cmd_vel: it moves robots; --commands plays it too\n"
 
 
+def test_a_recording_of_a_sim_that_still_runs_says_how_to_play_it(town: Wire, robot: Robot, tmp_path: Path) -> None:
+    path = bag(tmp_path / "a.mcap", ("odom", codec.encode(Odometry()), "application/json", 0.0))
+    done = town.run("replay", path)
+    advice = "nothing was played; end sim first, or play under other keys, such as --remap odom:=old/odom"
+    assert (done.returncode, done.stderr.splitlines()[-1]) == (1, f"holozen replay: {advice}")
+    assert town.run("replay", path, "--remap", "odom:=old/odom").returncode == 0
+
+
 def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot, tmp_path: Path) -> None:
     path = bag(tmp_path / "a.mcap", *commands(8), types=(Twist,))
-    tap = robot.bus.tap("cmd_vel")
+    tap = robot.bus.subscribe_raw("cmd_vel")
     done = town.run("replay", path, "--commands")
     assert done.returncode == 0, done.stderr
     sent = drain(tap)
@@ -93,7 +101,7 @@ def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot,
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_stops_the_robot(town: Wire, robot: Robot, tmp_path: Path, number: int) -> None:
     path = bag(tmp_path / "a.mcap", *commands(600), types=(Twist,))
-    tap = robot.bus.tap("cmd_vel")
+    tap = robot.bus.subscribe_raw("cmd_vel")
     player = town.start("replay", path, "--commands", "--loop")
     wait_for(lambda: moves(robot.newest(), 0.2, 0, 0, tolerance=0.02), what="the robot to move")
     player.signal(number)
@@ -104,11 +112,11 @@ def test_a_signal_stops_the_robot(town: Wire, robot: Robot, tmp_path: Path, numb
 
 def test_in_a_terminal_space_pauses_and_the_arrow_steps(wire: Wire, tmp_path: Path) -> None:
     rows = [("a", b"%d" % i, "text/plain", i * 20_000.0) for i in range(5)]
-    tap = wire.bus().tap("a")
+    tap = wire.bus().subscribe_raw("a")
     terminal = wire.terminal("replay", bag(tmp_path / "a.mcap", *rows))
     terminal.wait_for_text("space pauses")
     terminal.type(" ")
-    terminal.wait_for_text("paused: space goes on")
+    terminal.wait_for_text("paused: space resumes")
     terminal.type("\x1b[C")
     terminal.wait_for_text("2 messages")
     terminal.type("s")
@@ -121,18 +129,18 @@ def test_in_a_terminal_space_pauses_and_the_arrow_steps(wire: Wire, tmp_path: Pa
 
 
 def test_a_pause_stops_the_robot(wire: Wire, tmp_path: Path) -> None:
-    tap = wire.bus().tap("cmd_vel")
+    tap = wire.bus().subscribe_raw("cmd_vel")
     terminal = wire.terminal("replay", bag(tmp_path / "a.mcap", *commands(600), types=(Twist,)), "--commands")
     terminal.wait_for_text("space pauses")
     terminal.type(" ")
-    terminal.wait_for_text("paused: space goes on")
+    terminal.wait_for_text("paused: space resumes")
     assert [s.payload for s in drain(tap)][-6:] == [FORWARD] + 5 * [codec.encode(Twist())]
     terminal.type("\x03")
     assert terminal.process.wait() == 0
 
 
 def test_a_loop_plays_until_it_is_told_to_end(wire: Wire, tmp_path: Path) -> None:
-    tap = wire.bus().tap("a")
+    tap = wire.bus().subscribe_raw("a")
     player = wire.start("replay", bag(tmp_path / "a.mcap", *[("a", b"x", "", i) for i in range(10)]), "--loop")
     for _ in range(31):
         assert tap.recv().payload == b"x"
@@ -144,8 +152,8 @@ def test_a_loop_plays_until_it_is_told_to_end(wire: Wire, tmp_path: Path) -> Non
     ("words", "code", "part"),
     [
         (("none.mcap",), 1, "cannot read none.mcap: No such file or directory"),
-        (("text.mcap",), 1, "text.mcap is no MCAP file"),
-        (("a.mcap", "--topics", "odom"), 1, "there is no 'odom' in the bag; there is a"),
+        (("text.mcap",), 1, "text.mcap is not an MCAP file"),
+        (("a.mcap", "--topics", "odom"), 1, "there is no 'odom' in the bag; it has a"),
         (("a.mcap", "--remap", "a"), 2, "write OLD:=NEW, such as odom:=old/odom"),
         (("a.mcap", "-r", "0"), 2, "use a number from 0.001"),
         (("a.mcap", "--start-offset", "9"), 1, "no message is between --start-offset and --until"),

@@ -10,6 +10,8 @@ from holozen.testing import Process, Wire
 from .conftest import deaf, start_sim
 from .robots import Robot, time_of
 
+pytestmark = pytest.mark.alone
+
 AT_ONCE = 2.0  # s; a publisher that waits for a slow reader waits 5
 ENOUGH = 100  # s of sim time, with 200 samples each: more than Zenoh's queue of 256 and loopback's buffers hold
 

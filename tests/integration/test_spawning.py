@@ -6,13 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from holozen import simulation_interfaces as si
 from holozen.bus import Bus
 from holozen.messages import Clock
+from holozen.messages import simulation_interfaces as si
 from holozen.robot.xacro import expand
 from holozen.testing import Process, Wire, wait_for
 
 from .robots import Robot, distance, place, planar
+
+pytestmark = pytest.mark.alone
 
 REPO = Path(__file__).parents[2]
 HB_BOT = str(REPO / "urdf" / "hb_bot.urdf.xacro")
@@ -90,8 +92,9 @@ def test_a_name_twice_an_unknown_robot_and_a_wrong_file_are_told_with_what_there
     done(wire, "spawn", HB_BOT, "--name", "Fred")
     wrong = tmp_path / "wrong.urdf"
     wrong.write_text('<robot name="r"><link name="a"/><link name="b"/></robot>')
-    assert "there is an entity 'Fred' already; there are Fred" in refused(wire, "spawn", HB_BOT, "--name", "Fred")
-    assert "there is no entity 'Ann'; there are Fred" in refused(wire, "delete", "Ann")
+    taken = refused(wire, "spawn", HB_BOT, "--name", "Fred")
+    assert "there is an entity 'Fred' already; the entities are Fred" in taken
+    assert "there is no entity 'Ann'; the entities are Fred" in refused(wire, "delete", "Ann")
     assert f"{wrong}, line 1: <robot name='r'> has 2 root links" in refused(wire, "spawn", str(wrong))
     assert "no such" in refused(wire, "spawn", str(tmp_path / "none.urdf")).lower()
     assert wire.run("spawn", HB_BOT, "--name", "a/*").returncode == 2

@@ -11,6 +11,8 @@ from holozen.testing import Terminal, Wire, wait_for
 from .conftest import deaf, start_sim
 from .robots import Robot, moves, planar
 
+pytestmark = pytest.mark.alone
+
 ROOT = Path(__file__).parents[2]
 DRIVES_ON = ("--mode", "latch")
 
@@ -18,17 +20,17 @@ DRIVES_ON = ("--mode", "latch")
 BROKEN = """
 import sys
 sys.path.insert(0, {root!r})
-from services.teleop import __main__ as teleop, cockpit, dials
-from services.teleop.keys import Key
+from services.teleop import __main__ as teleop, session, telemetry
+from services.teleop.input.kitty import Key
 def breaks(*_, **__):
     raise RuntimeError("broken on purpose")
-take = cockpit.Cockpit.take
+take = session.Session.take
 def take_and_break(self, event, now):
     done = take(self, event, now)
     if isinstance(event, Key):
         {statement}
     return done
-cockpit.Cockpit.take = take_and_break
+session.Session.take = take_and_break
 sys.exit(teleop.main(sys.argv[1:]))
 """
 
@@ -90,6 +92,16 @@ def test_ctrl_c_stops_the_robot_and_quits(town: Wire, robot: Robot) -> None:
         assert_tidy(terminal)
 
 
+def test_ctrl_c_that_was_typed_during_a_pause_quits(town: Wire, robot: Robot) -> None:
+    with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
+        terminal.process.signal(signal.SIGSTOP)
+        robot.stands()
+        terminal.type("i\x03")
+        terminal.process.signal(signal.SIGCONT)
+        assert terminal.process.wait() == 0
+        assert_tidy(terminal)
+
+
 def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> None:
     with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
         terminal.hang_up()
@@ -101,8 +113,8 @@ def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> 
 @pytest.mark.parametrize(
     "statement",
     [
-        "dials.Dials.state = breaks",  # the next picture fails
-        "cockpit.Cockpit.tick = breaks",
+        "telemetry.Telemetry.state = breaks",  # the next picture fails
+        "session.Session.tick = breaks",
         "breaks()",
     ],
     ids=["picture", "tick", "key"],
@@ -121,7 +133,7 @@ def test_an_exception_stops_the_robot_and_is_told_in_one_line(
         assert any(any(planar(command)) for command in robot.commands.messages()[seen:]), "it drove"
         robot.told_to_stop()
         assert_tidy(terminal)
-        assert "teleop: RuntimeError: broken on purpose; the robot was told to stop" in terminal.raw
+        assert "teleop: RuntimeError: broken on purpose; a stop was sent to the robot" in terminal.raw
         assert "Traceback" not in terminal.raw
 
 
@@ -150,7 +162,7 @@ def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
 def test_a_teleop_alone_says_that_nobody_listens(wire: Wire) -> None:
     terminal = wire.terminal("teleop", *DRIVES_ON)
     screen = terminal.wait_for_text("NO ODOM")
-    assert "NOBODY IS LISTENING on cmd_vel" in screen
+    assert "NO SUBSCRIBER on cmd_vel" in screen
     terminal.type("i")
     terminal.wait_for_text("+0.500")
     start_sim(wire)

@@ -11,28 +11,11 @@ from holozen import data
 from holozen.testing import Process, Terminal, Wire, wait_for
 
 from .conftest import start_sim
+from .processes import parts_at
 from .robots import Robot, moves, rests
 
 PARTS = {"sim", "pose-service", "controller"}
 AT_MOST = 6.0  # s; it promises 2, and a busy machine gets more
-
-
-def words_of(pid: int) -> list[str]:
-    """A running process's words; none if it is gone."""
-    try:
-        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
-    except OSError:
-        return []
-
-
-def parts_at(wire: Wire) -> dict[str, int]:
-    """The verbs that run on this wire, with their process ids; `up` itself too."""
-    found = {}
-    for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))):
-        words = words_of(pid)
-        if wire.endpoint in words and "holozen" in words and "-c" not in words:
-            found[words[words.index("holozen") + 1]] = pid
-    return found
 
 
 def all_run(wire: Wire, parts: set[str]) -> dict[str, int]:
@@ -197,4 +180,4 @@ def test_a_killed_sim_is_told_and_one_started_by_hand_joins_the_others(wire: Wir
     assert set(parts_at(wire)) == {"up", "pose-service", "controller"}
     start_sim(wire)
     driven(robot)
-    up.wait_for_line("controller: goes on")
+    up.wait_for_line("controller: continues")

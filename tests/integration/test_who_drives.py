@@ -4,12 +4,14 @@ from collections.abc import Callable
 
 import pytest
 
-from holozen.errors import ServiceError
 from holozen.messages import CommandStatus, Twist
 from holozen.testing import Process, Wire, wait_for
+from holozen.transport.errors import ServiceError
 from holozen.wire import PRIORITY_OF
 
 from .robots import Robot, moves, rests
+
+pytestmark = pytest.mark.alone
 
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from holozen import simulation_interfaces as si
 from holozen.bus import Bus
+from holozen.messages import simulation_interfaces as si
 from holozen.testing import Process, Wire
 
 from .conftest import start_sim
@@ -70,7 +70,9 @@ def test_a_robot_climbs_the_ramp(wire: Wire, disc: str) -> None:
     bus = wire.bus()
     robot = Robot(bus).wait_longer()
     x = where(bus, "ramp")[0]
-    robot.drive(0.5, 0, until=lambda odom: odom.pose.pose.position.z > 0.15 or place(odom)[0] > x + 1)
+    robot.drive(0, 1, until=lambda odom: place(odom)[1] > 2.5)  # to its foot, not to the edge at its side
+    robot.drive(1, 0, until=lambda odom: place(odom)[0] > x)
+    robot.drive(0, -0.5, until=lambda odom: odom.pose.pose.position.z > 0.15 or place(odom)[1] < -1)
     robot.put()
     stood = robot.odom.next(lambda odom: moves(odom, 0, 0, 0))
     assert stood.pose.pose.position.z > 0.1

@@ -170,7 +170,7 @@ def test_a_robot_is_respawned_in_a_running_sim_on_every_save(robot: Path) -> Non
         robot.write_text(robot.read_text().replace("0.28", "0.27"))
         assert said(watcher, 2) == told
         wait_for(
-            lambda: sim.err.count("Fred was put into the world") + sim.out.count("Fred was put into the world") == 2
+            lambda: sim.err.count("Fred was added to the world") + sim.out.count("Fred was added to the world") == 2
         )
         assert watcher.terminate() == 0
 

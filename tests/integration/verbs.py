@@ -31,12 +31,12 @@ def row(live: str | None, wrong: tuple[str, int, str] | None = None, **more: obj
     return Row(live, wrong=wrong)._replace(**more)  # type: ignore[arg-type]
 
 
-NO_NODE = (1, "there is no node 'sim' with parameters; no node has any; `holozen up` starts some")
+NO_NODE = (1, "there is no node 'sim' with parameters; no node has any; `holozen up` starts a robot")
 NO_SIM = (1, "no sim answered within 3 s; start one in another terminal: holozen sim")
-NO_KEY = (1, "unknown key 'odom': nobody is there at ")
+NO_KEY = (1, "unknown key 'odom': no nodes found at ")
 NO_SUCH_KEY = ("odmo", 1, "unknown key 'odmo'; did you mean 'odom'?")
 NO_FILE = (1, "No such file or directory")
-NOTHING = (1, "nothing came on odom within 0.2 s at ")
+NOTHING = (1, "no messages on odom within 0.2 s; no nodes found at ")
 TYPO = (1, "did you mean geometry_msgs/msg/Twist?")
 STOPPED = ("--timeout 0.2", 1, "; `holozen list` shows what a sim has, --connect where to look")
 NOT_THERE = ("Nobody --timeout 0.5", 1, "there is no robot 'Nobody'; there are: ")
@@ -44,12 +44,12 @@ PUB = """a/heard std_msgs/msg/String '{{"data": "x"}}' --once"""
 PLOT = row(
     f"{ODOM_X} --once -w 2", ("odom", 2, "'odom': write KEY.FIELD"),
     stranger=("a/json.speed --once -w 2", "a/json.speed: 1.5"),
-    silent=("odom.x --once -w 0.2", 1, "nothing came"), endless=Endless(ODOM_X, r"x: -?\d"),
+    silent=("odom.x --once -w 0.2", 1, "no messages on odom; no nodes found at "), endless=Endless(ODOM_X, r"x: -?\d"),
 )  # fmt: skip
 RECORD = row(
     "odom -o {tmp}/{id} --max-duration 2", ("-o {tmp}/{id}", 2, "name the keys to record, or use -a for all"),
     stranger=("a/json a/bytes a/cdr -o {tmp}/{id} --max-duration 2", "messages, "),
-    silent=("odom -o {tmp}/{id} --max-duration 0.2", 1, "nothing came, so no file is left"),
+    silent=("odom -o {tmp}/{id} --max-duration 0.2", 1, "nothing arrived, so no file is left"),
     endless=Endless("odom -o {tmp}/{id}", "messages,"),
 )  # fmt: skip
 REPLAY = row(
@@ -74,7 +74,7 @@ VERBS = {
     "xacro": row("{bot}", ("{tmp}/none.xacro", *NO_FILE), bus=False,
         endless=Endless("{bot} --watch -o {tmp}/{id}.urdf", "written")),
     "check": row("{odd}", code=1, bus=False),
-    "topic list": row("", silent=("", 0, "no topics: nobody is there at ")),
+    "topic list": row("", silent=("", 0, "no topics: no nodes found at ")),
     "topic info": row("cmd_vel", NO_SUCH_KEY, silent=("odom", *NO_KEY)),
     "topic type": row("odom", NO_SUCH_KEY, silent=("odom", *NO_KEY)),
     "topic find": row("Odometry", ("Odm", 1, "no topic of type 'Odm'"), silent=("Odometry", 1, "types: none")),
@@ -87,10 +87,10 @@ VERBS = {
     "topic delay": row("odom --once", ("cmd_vel_status --timeout 0.2", 1, "messages have no header.stamp"),
         silent=("odom --timeout 0.2", *NOTHING), endless=Endless("odom", "average delay: ")),
     "topic pub": row(PUB, (f"odom {TWIST} {{{{}}}}", 1, f"its type is nav_msgs/msg/Odometry, not {TWIST}"),
-        silent=("cmd_vel {{}} --once --max-wait 0.2", 1, "nobody subscribes to cmd_vel"),
+        silent=("cmd_vel {{}} --once --max-wait 0.2", 1, "no subscribers of cmd_vel; no nodes found at "),
         endless=Endless("Spare/cmd_vel {{}}", "subscriber")),
     "topic plot": PLOT,
-    "service list": row("", silent=("", 0, "no services: nobody is there at ")),
+    "service list": row("", silent=("", 0, "no services: no nodes found at ")),
     "service type": row("resume", ("resmue", 1, "did you mean 'resume'?"), silent=("odom", *NO_KEY)),
     "service find": row("NextGoal", ("NextGaol", 1, "of type 'NextGaol'"), silent=("x/X", 1, "types: none")),
     "service info": row("resume", ("resmue", 1, "did you mean 'resume'?"), silent=("odom", *NO_KEY)),
@@ -98,17 +98,20 @@ VERBS = {
         stranger=("a/asked --any", "x: 1"),
         silent=("next_goal --timeout 0.2", 1, "no reply from 'next_goal' within 0.2 s at "),
         endless=Endless("next_goal -r 20", "x_goal", 130)),
-    "node list": row("", silent=("", 0, "no nodes: nobody is there at ")),
-    "node info": row("sim", ("smi", 1, "unknown node 'smi'; did you mean 'sim'?"), silent=("x", 1, "nobody is there")),
-    "param list": row("", ("smi", 1, "did you mean sim?"), silent=("sim", *NO_NODE)),
+    "node list": row("", silent=("", 0, "no nodes found at ")),
+    "node info": row("sim", ("smi", 1, "unknown node 'smi'; did you mean 'sim'?"), silent=("x", 1, "no nodes found")),
+    "param list": row("", ("smi", 1, "did you mean 'sim'?"), silent=("sim", *NO_NODE)),
     "param get": row("sim max_linear", ("sim max_linaer", 1, "max_linaer"), silent=("sim rate", *NO_NODE)),
     "param set": row("sim max_linear 1.5", ("sim max_linear 1e9", 1, "use a number from "),
         silent=("sim rate 1", *NO_NODE)),
     "param describe": row("sim max_linear", ("sim max_linaer", 1, "max_linaer"), silent=("sim rate", *NO_NODE)),
-    "param dump": row("sim", ("smi", 1, "did you mean sim?"), silent=("sim", *NO_NODE)),
+    "param dump": row("sim", ("smi", 1, "did you mean 'sim'?"), silent=("sim", *NO_NODE)),
     "param load": row("sim {yaml}", ("sim {tmp}/none.yaml", *NO_FILE), silent=("sim {yaml}", *NO_NODE)),
+    "tf echo": row("odom footprint_link --once", ("odom footprint --timeout 0.5", 1, "did you mean 'footprint_link'?"),
+        silent=("odom base_link --timeout 0.2", 1, "no transforms on tf; no nodes found at "),
+        endless=Endless("odom footprint_link", "- Translation: ")),
     "doctor": row(""),
-    "graph": row("", silent=("", 0, "no nodes: nobody is there at ")),
+    "graph": row("", silent=("", 0, "no nodes found at ")),
     "completion": row("bash", ("tcsh", 2, "'tcsh'; there are bash, zsh, fish"), bus=False),
     "interface list": row("", ("--package a=/no/such", 1, "there is no such folder"), bus=False),
     "interface show": row(TWIST, ("geometry_msgs/msg/Twsit", *TYPO), bus=False),

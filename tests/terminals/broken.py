@@ -6,28 +6,29 @@ ROOT = Path(__file__).parents[2]
 
 PARTS = {
     "a key's callback": "breaks()",
-    "the tick": "cockpit.Cockpit.tick = breaks",
-    "the draw loop": "screen.Screen.show = breaks",
+    "the tick": "session.Session.tick = breaks",
+    "the draw loop": "app.TeleopApp.draw = breaks",
 }
 """What breaks, and the statement that breaks it while the key is taken."""
 
 SCRIPT = """
 import sys
 sys.path.insert(0, {root!r})
-from services.teleop import __main__ as teleop, cockpit, keys, screen
+from services.teleop import __main__ as teleop, app, session
+from services.teleop.input.kitty import Key
 
 def breaks(*_):
     raise RuntimeError("broken on purpose")
 
-take = cockpit.Cockpit.take
+take = session.Session.take
 
 def take_and_break(self, event, *more):
     done = take(self, event, *more)
-    if isinstance(event, keys.Key) and event.name == "w":
+    if isinstance(event, Key) and event.name == "w":
         {statement}
     return done
 
-cockpit.Cockpit.take = take_and_break
+session.Session.take = take_and_break
 sys.exit(teleop.main(sys.argv[1:]))
 """
 

@@ -1,6 +1,11 @@
 """What the robot does while somebody is at the keys."""
 
+import os
+
 from tests.integration.robots import Robot, moves, planar
+
+OFTEN = 100 if os.environ.get("HOLOZEN_LONG") else 1
+"""How often a test that looks for a race runs; scripts/test --long asks for the whole hundred."""
 
 
 def drives(robot: Robot, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:

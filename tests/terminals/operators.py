@@ -2,19 +2,19 @@
 
 import contextlib
 import signal
-import socket
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
 
 from holozen.bus import Bus
-from holozen.connection import Connection
-from holozen.errors import BusError
 from holozen.messages import Odometry
 from holozen.testing import Wire, wait_for
 from holozen.testing.wire import command
+from holozen.transport.connection import Connection
+from holozen.transport.errors import BusError
 from holozen.wire import key_for
+from tests.faults.proxy import Proxy
 from tests.integration.robots import speeds, time_of
 
 from .played import KITTY, REPEAT, Played, event
@@ -37,61 +37,6 @@ BOX = f"""<robot name="box">
   </gazebo>
 </robot>
 """
-
-
-class Line:
-    """A cable to a port on loopback, as a TCP proxy. `cut`: it carries nothing more, and tells nobody."""
-
-    def __init__(self, port: int) -> None:
-        self._to = port
-        self._ends: list[socket.socket] = []
-        self._threads: list[threading.Thread] = []
-        self._whole, self._closing = threading.Event(), threading.Event()
-        self._whole.set()
-        self._door = socket.create_server(("127.0.0.1", 0))
-        self.port = self._door.getsockname()[1]
-        self._start(self._take)
-
-    def cut(self) -> None:
-        """Break."""
-        self._whole.clear()
-
-    def mend(self) -> None:
-        """Carry on, with what waited meanwhile."""
-        self._whole.set()
-
-    def close(self) -> None:
-        """End it, and what is connected by it."""
-        self._closing.set()
-        self._whole.set()
-        for end in (self._door, *self._ends):
-            with contextlib.suppress(OSError):
-                end.shutdown(socket.SHUT_RDWR)
-        for thread in self._threads:
-            thread.join()
-        for end in (self._door, *self._ends):
-            end.close()
-
-    def _start(self, work: Callable[..., None], *args: socket.socket) -> None:
-        self._threads.append(threading.Thread(target=work, args=args, daemon=True))
-        self._threads[-1].start()
-
-    def _take(self) -> None:
-        with contextlib.suppress(OSError):
-            while not self._closing.is_set():
-                one = self._door.accept()[0]
-                self._ends.append(one)
-                other = socket.create_connection(("127.0.0.1", self._to))
-                self._ends.append(other)
-                self._start(self._carry, one, other)
-                self._start(self._carry, other, one)
-
-    def _carry(self, source: socket.socket, to: socket.socket) -> None:
-        with contextlib.suppress(OSError):
-            while (data := source.recv(65536)) and not self._closing.is_set():
-                self._whole.wait()
-                to.sendall(data)
-            to.shutdown(socket.SHUT_RDWR)  # one end was closed, so the other is told
 
 
 class Witness:
@@ -137,7 +82,7 @@ class Operator:
         self.robot, self.witness = robot, Witness(bus, robot)
         self._wire, self._count = wire, 0
         self.terminal: Played | None = None
-        self.line: Line | None = None
+        self.line: Proxy | None = None
 
     def __enter__(self) -> Self:
         return self
@@ -149,8 +94,8 @@ class Operator:
         """Start the teleop, or this script in its place; in a shell with job control; over a line that can be cut."""
         flags: Sequence[str] = self._wire.flags
         if line:
-            self.line = Line(self._wire.port)
-            flags = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.line.port}",), listen=()).arguments()
+            self.line = Proxy(self._wire.port)
+            flags = Connection(mode="client", connect=(self.line.endpoint,), listen=()).arguments()
         words = command("teleop", *([self.robot] if self.robot else []), *flags)
         if script:
             words[1:4] = [str(script)]
@@ -196,12 +141,12 @@ class Operator:
     def cut(self) -> None:
         """Cut the line."""
         assert self.line is not None
-        self.line.cut()
+        self.line.stall()
 
     def mend(self) -> None:
         """Mend the line."""
         assert self.line is not None
-        self.line.mend()
+        self.line.resume()
 
     def leave(self) -> None:
         """End the teleop, if it lives, and close the terminal."""

@@ -35,15 +35,19 @@ WITHOUT_RELEASES = {"xterm": XTERM, "tmux": TMUX, "screen": SCREEN, "console": C
 
 
 class Played(Terminal):
-    """A terminal of some kind. `late`: seconds until it answers. `kind` may be changed while it runs."""
+    """A terminal of some kind. `late`: seconds until it answers. `kind` may be changed while it runs. `kept`: keys that
+    come in one breath with its next answers, the first with the first of them.
+    """
 
     def __init__(
         self, words: Sequence[str], kind: Kind, *, late: float = 0.0, env: Mapping[str, str] | None = None
     ) -> None:
         self.kind, self.late = kind, late
         self.asked: list[str] = []  # the questions so far
+        self.kept: list[str] = []
+        self._answers = ""
         self._alternate = False
-        self._flags: dict[bool, list[int]] = {False: [], True: []}  # of both screens; the last is on
+        self.pushed: dict[bool, list[int]] = {False: [], True: []}  # of both screens; the last is on
         self._rest = b""
         super().__init__(words, env=env)
 
@@ -55,7 +59,7 @@ class Played(Terminal):
     @property
     def flags_left(self) -> dict[bool, list[int]]:
         """The flags pushed and not popped: of the main screen (False) and of the alternate one (True)."""
-        return {screen: flags for screen, flags in self._flags.items() if flags}
+        return {screen: flags for screen, flags in self.pushed.items() if flags}
 
     def press(self, code: int, modifiers: int = 0, *, shifted: int = 0, base: int = 0) -> None:
         """A key goes down, on a terminal that was asked to tell releases."""
@@ -77,10 +81,13 @@ class Played(Terminal):
             end = question.end()
             self._hear(question[1].decode(), question[2].decode(), question[3].decode())
         self._rest = self._rest[end:]
+        if self._answers:
+            text, self._answers = self._answers + (self.kept.pop(0) if self.kept else ""), ""
+            self._send(text)
 
     @property
     def _current(self) -> list[int]:
-        return self._flags[self._alternate]
+        return self.pushed[self._alternate]
 
     def _hear(self, mark: str, numbers: str, final: str) -> None:
         if (mark, numbers) == ("?", "1049"):
@@ -106,12 +113,15 @@ class Played(Terminal):
 
     def _answer(self, question: str, answer: str) -> None:
         self.asked.append(question)
+        self._answers += answer
+
+    def _send(self, text: str) -> None:
         if self.late:
-            timer = threading.Timer(self.late, self._say, [answer])
+            timer = threading.Timer(self.late, self._say, [text])
             timer.daemon = True
             timer.start()
         else:
-            self._say(answer)
+            self._say(text)
 
     def _say(self, answer: str) -> None:
         if not self.closed:

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import pytest
 
 from holozen.bus import Bus
-from holozen.errors import BusError
 from holozen.messages import Twist
 from holozen.testing import Terminal, Wire, wait_for
+from holozen.transport.errors import BusError
 from tests.integration.robots import Robot, moves, planar
 
 GRACE = 0.06  # s after the interval, until the stop is on the wire

@@ -13,7 +13,7 @@ from tests.integration.robots import Robot, place, planar
 
 from .broken import broken_teleop
 from .kitty import Display, Kitty, Program
-from .motion import assert_nothing_moves, drives, stands
+from .motion import OFTEN, assert_nothing_moves, drives, stands
 
 pytestmark = pytest.mark.needs("Xvfb", "kitty", "setxkbmap", "xdotool")
 
@@ -216,10 +216,11 @@ def test_what_is_pasted_by_the_mouse_never_drives(start: Start, keys: Display, k
         assert robot.commands.messages()[seen:] == []
 
 
+@pytest.mark.parametrize("run", range(OFTEN))
 def test_a_kitty_that_hangs_stops_the_robot_and_what_it_kept_back_moves_nothing(
-    start: Start, keys: Display, kitty: Kitty, robot: Robot
+    start: Start, keys: Display, kitty: Kitty, robot: Robot, run: int
 ) -> None:
-    with start():
+    with start() as program:
         keys.keys("keydown", "i")
         drives(robot, x=V)
         kitty.signal(signal.SIGSTOP)
@@ -231,6 +232,7 @@ def test_a_kitty_that_hangs_stops_the_robot_and_what_it_kept_back_moves_nothing(
             kitty.signal(signal.SIGCONT)
         assert_nothing_moves(robot, 1.0)
         assert not [command for command in robot.commands.messages()[seen:] if any(planar(command))]
+        program.wait_for_text("answers again")
         keys.keys("keyup", "j")
         keys.keys("keydown", "j")
         drives(robot, turn=W)

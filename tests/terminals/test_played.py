@@ -10,12 +10,28 @@ import pytest
 
 from holozen.testing import Wire, wait_for
 from holozen.testing.wire import command
-from tests.integration.robots import Robot, moves, planar
+from tests.integration.robots import Robot, planar
 
 from .broken import ROOT, SCRIPT
-from .motion import assert_nothing_moves, drives, stands
+from .motion import OFTEN, assert_nothing_moves, drives, stands
 from .operators import SPEED, Operator
-from .played import CTRL, DUMB, FOCUS_IN, FOCUS_OUT, KITTY, NUM, SHIFT, WITHOUT_RELEASES, XTERM, Kind, Played, event
+from .played import (
+    CTRL,
+    DUMB,
+    FOCUS_IN,
+    FOCUS_OUT,
+    KITTY,
+    NUM,
+    RELEASE,
+    REPEAT,
+    SHIFT,
+    TMUX,
+    WITHOUT_RELEASES,
+    XTERM,
+    Kind,
+    Played,
+    event,
+)  # fmt: skip
 
 V, W = 0.4, 0.8  # m/s, rad/s
 KEY_I, KEY_J, KEY_L, COMMA, SPACE = map(ord, "ijl, ")
@@ -33,7 +49,7 @@ def start(town: Wire, robot: Robot) -> Iterator[Start]:
         words = command("teleop", "--speed", str(V), "--turn", str(W), *flags, *town.flags)
         terminal = Played(words, kind, late=late)
         terminals.append(terminal)
-        terminal.wait_for_text("listening sim")
+        terminal.wait_for_text("listening: sim" if "--plain" in flags else "listening sim")
         if kind.keyboard:
             wait_for(lambda: terminal.flags == 15, what="the releases to be asked for")
         return terminal
@@ -209,6 +225,34 @@ def test_a_terminal_that_hangs_stops_the_robot_and_what_was_typed_meanwhile_move
     drives(robot, turn=-W)
 
 
+@pytest.mark.parametrize("run", range(OFTEN))
+@pytest.mark.parametrize("late", [0.0, 0.1], ids=["here", "over ssh"])
+@pytest.mark.parametrize("kind", [KITTY, XTERM, TMUX], ids=["kitty", "xterm", "tmux"])
+def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothing(
+    start: Start, robot: Robot, kind: Kind, late: float, run: int
+) -> None:
+    """Both with those to old questions and with the first to a new one; nor does a key that is held since then."""
+    terminal = start(kind, "--plain", "--mode", "latch", late=late)
+    tells = kind.keyboard
+    terminal.press(KEY_I) if tells else terminal.type("i")
+    drives(robot, x=V)
+    terminal.freeze()
+    stands(robot)
+    seen = len(robot.commands.messages())
+    key = event(KEY_J) if tells else "j"
+    terminal.kept = [(event(KEY_I, 0, RELEASE) if tells else "") + key, key]
+    terminal.thaw()
+    wait_for(lambda: not terminal.kept, what="two answers with keys")
+    terminal.hold(event(KEY_J, 0, REPEAT) if tells else key, 1.0, 0.03, 0.03)
+    assert not [command for command in robot.commands.messages()[seen:] if any(planar(command))]
+    if tells:
+        terminal.release(KEY_J)
+    else:
+        robot.pass_time(0.9)  # it was let go
+    terminal.type(key)
+    drives(robot, turn=W)
+
+
 @pytest.mark.parametrize("pasted", ["iiii", f"{event(KEY_I)}{event(KEY_J)}", "k\r\ni\r\n", "i" * 100_000, "\x1b[200~i"])
 @pytest.mark.parametrize("kind", [KITTY, XTERM], ids=["kitty", "xterm"])
 def test_pasted_text_never_drives(start: Start, robot: Robot, kind: Kind, pasted: str) -> None:
@@ -231,11 +275,11 @@ def test_another_terminal_that_does_not_speak_kitty_takes_over(start: Start, rob
     terminal.kind = XTERM
     stands(robot)
 
-    def drives_again() -> bool:
-        terminal.type("l")
-        return moves(robot.newest(), 0, 0, -W)
-
-    wait_for(drives_again, what="the other terminal's keys to drive")
+    terminal.type("l")  # shows that somebody is there
+    terminal.wait_for_text("answers again")
+    terminal.type("k")
+    terminal.type("l")
+    drives(robot, turn=-W)
     stands(robot)
 
 
@@ -257,16 +301,17 @@ def test_after_a_while_without_a_terminal_the_next_one_drives(start: Start, robo
     terminal.kind = DUMB
     stands(robot)
     robot.pass_time(3.0)
-    terminal._flags = {False: [], True: []}
+    terminal.pushed = {False: [], True: []}
     terminal.kind = KITTY
     terminal.resize(99, 30)
     wait_for(lambda: terminal.flags == 15, what="the releases to be asked for anew")
+    terminal.wait_for_text("answers again")  # keys count from then on
     assert_a_new_press_drives(terminal, robot)
 
 
 def test_another_terminal_that_speaks_kitty_too_is_asked_for_releases(start: Start, robot: Robot) -> None:
     terminal = start(KITTY)
-    terminal._flags = {False: [], True: []}  # a window that was opened just now
+    terminal.pushed = {False: [], True: []}  # a window that was opened just now
     wait_for(lambda: terminal.flags == 15, what="the releases to be asked for anew")
     assert_a_new_press_drives(terminal, robot)
 
@@ -307,7 +352,7 @@ def test_after_a_sleep_of_the_computer_a_key_is_to_be_pressed_anew(town: Wire, r
 @pytest.mark.parametrize("late", [0.0, 0.3])
 def test_it_pops_what_it_pushed_and_nothing_more(start: Start, robot: Robot, late: float) -> None:
     terminal = start(KITTY, late=late)
-    terminal._flags[False].append(1)  # the shell's own
+    terminal.pushed[False].append(1)  # the shell's own
     terminal.type(event(ord("c"), CTRL))
     assert terminal.process.wait() == 0
     wait_for(lambda: terminal.flags_left == {False: [1]})
@@ -326,7 +371,8 @@ def test_an_end_before_the_terminal_answered_leaves_it_tidy(town: Wire) -> None:
 EARLY = """
 import os, sys
 sys.path.insert(0, {root!r})
-from services.teleop import __main__ as teleop, {module} as part
+from services.teleop import __main__ as teleop
+import services.teleop.{module} as part
 before = {name}
 def early(*given):
     {name} = before
@@ -339,7 +385,9 @@ sys.exit(teleop.main(sys.argv[2:]))
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize(
-    ("module", "name"), [("terminal", "part.Terminal.write"), ("flight", "part.Flight.__init__")], ids=["enter", "fly"]
+    ("module", "name"),
+    [("input.terminal", "part.Terminal.write"), ("app", "part.TeleopApp.__init__")],
+    ids=["enter", "fly"],
 )
 def test_a_signal_at_the_very_start_leaves_the_terminal_tidy(
     town: Wire, tmp_path: Path, number: signal.Signals, module: str, name: str

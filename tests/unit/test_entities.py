@@ -3,16 +3,16 @@
 import pytest
 
 from holozen import entities
-from holozen import simulation_interfaces as si
-from holozen.errors import NoReply, ServiceError
+from holozen.messages import simulation_interfaces as si
 from holozen.testing import Wire
+from holozen.transport.errors import NoReply, ServiceError
 
 
 @pytest.mark.parametrize(
     ("result", "told"),
     [
-        (si.Result(si.NOT_FOUND, "no such thing"), "no such thing"),
-        (si.Result(si.NOT_FOUND), "delete_entity failed with result 2"),
+        (si.Result(si.Result.NOT_FOUND, "no such thing"), "no such thing"),
+        (si.Result(si.Result.NOT_FOUND), "delete_entity failed with result 2"),
     ],
 )
 def test_a_result_that_is_not_ok_is_a_refusal(wire: Wire, result: si.Result, told: str) -> None:

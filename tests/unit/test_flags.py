@@ -22,9 +22,9 @@ def test_a_number_within_its_range_is_taken(text: str, value: float) -> None:
     assert flags.number(-1, 2)(text) == value
 
 
-@pytest.mark.parametrize("text", ["", "fast", "nan", "inf", "-inf", "2.1", "-1.1", "1,5", "\n"])
-def test_any_other_number_is_refused_with_its_range_and_unit(text: str) -> None:
-    assert refusal(flags.number(-1, 2, "m/s"), text) == f"{text!r}: use a number from -1 to 2 m/s"
+def test_any_other_number_is_refused_with_its_range_and_unit() -> None:
+    for text in ["", "fast", "nan", "inf", "-inf", "2.1", "-1.1", "1,5", "\n"]:
+        assert refusal(flags.number(-1, 2, "m/s"), text) == f"{text!r}: use a number from -1 to 2 m/s"
 
 
 def test_a_count_is_a_whole_number() -> None:

@@ -13,9 +13,9 @@ speeds = st.tuples(numbers, numbers, numbers)
 limits = st.floats(1e-3, 1e3)
 
 
-@pytest.mark.parametrize(("value", "inside"), [(0.3, 0.3), (2, 1), (-2, -1), (1, 1), (-1, -1), (0, 0)])
-def test_clamp_brings_a_value_within_its_limit(value: float, inside: float) -> None:
-    assert clamp(value, 1) == inside
+def test_clamp_brings_a_value_within_its_limit() -> None:
+    for value, inside in [(0.3, 0.3), (2, 1), (-2, -1), (1, 1), (-1, -1), (0, 0)]:
+        assert clamp(value, 1) == inside
 
 
 def test_a_clamped_speed_has_the_limit_and_the_direction() -> None:

@@ -37,28 +37,60 @@ def test_a_process_waits_for_its_end(monkeypatch: pytest.MonkeyPatch) -> None:
 
 LEAVING = """
 import atexit, sys, threading
-from holozen.process import leave
+from holozen.process import Ending
+ending = Ending()
+import zenoh
 atexit.register(print, "what was due")
 kept = threading.Event()
 target = {"kept": lambda: kept.wait() and print("a thread"), "daemon": threading.Event().wait}[sys.argv[1]]
 threading.Thread(target=target, daemon=sys.argv[1] == "daemon").start()
 threading.Timer(0.05, kept.set).start()
-leave(3)
+ending.leave(3)
 """
+
+
+def ended(code: str, *words: str) -> tuple[int, str, str]:
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, timeout=30)
+    return done.returncode, done.stdout, done.stderr
 
 
 @pytest.mark.parametrize(("thread", "told"), [("daemon", "what was due\n"), ("kept", "a thread\nwhat was due\n")])
 def test_a_process_leaves_when_no_thread_keeps_it(thread: str, told: str) -> None:
-    done = subprocess.run([sys.executable, "-c", LEAVING, thread], capture_output=True, text=True, timeout=30)
-    assert (done.returncode, done.stdout, done.stderr) == (3, told, "")
+    assert ended(LEAVING, thread) == (3, told, "")
+
+
+def test_the_interpreter_is_not_finalized_once_zenoh_is_there() -> None:
+    """Its threads abort in that, or panic. A value of a module is destroyed in it."""
+    code = (
+        "from holozen.process import Ending\nending = Ending()\n"
+        "class Late:\n    def __del__(self, print=print): print('finalized')\n"
+        "late = Late()\n"
+    )
+    assert ended(f"{code}import zenoh\nending.leave(0)") == (0, "", "")
+    assert ended(f"{code}ending.leave(0)") == (0, "finalized\n", "")
+
+
+def test_an_exception_that_nobody_caught_is_exit_code_1() -> None:
+    code, out, told = ended("from holozen.process import Ending\nEnding()\nimport zenoh\nprint('out')\n1 / 0")
+    assert (code, out) == (1, "out\n")
+    assert told.endswith("ZeroDivisionError: division by zero\n")
 
 
 def test_an_interrupt_ends_the_wait_for_threads() -> None:
     code = (
-        "import os, threading\nfrom holozen.process import leave\n"
+        "import os, threading, zenoh\nfrom holozen.process import Ending\n"
         "threading.Thread(target=threading.Event().wait).start()\n"
         "threading.Timer(0.05, os.kill, [os.getpid(), 2]).start()\n"
-        "leave(0)"
+        "Ending().leave(0)"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
-    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
+    assert ended(code) == (130, "", "")
+
+
+def test_an_interrupt_is_deferred_to_the_end_of_an_import() -> None:
+    code = (
+        "import os, signal\nfrom holozen.process import deferred_interrupt\n"
+        "try:\n    with deferred_interrupt():\n        os.kill(os.getpid(), 2)\n        print('within')\n"
+        "    print('after')\n"
+        "except KeyboardInterrupt:\n    print('interrupted', signal.getsignal(2) is signal.default_int_handler)\n"
+    )
+    assert ended(code) == (0, "within\ninterrupted True\n", "")

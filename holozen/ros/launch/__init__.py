@@ -1,1 +1,18 @@
-"""Launch files of the plain kind: what `from launch import ...` finds in `holozen launch`."""
+"""launch: what a launch file consists of."""
+
+from typing import Any
+
+from holozen.ros.launch.launch_context import LaunchContext, Substitution, text
+from holozen.ros.launch.launch_context import Text as SomeSubstitutionsType
+from holozen.ros.launch.launch_description import Action, Condition, LaunchDescription, LaunchDescriptionEntity
+from holozen.ros.launch.launch_description_sources import PythonLaunchDescriptionSource as LaunchDescriptionSource
+
+__all__ = [
+    "Action", "Condition", "LaunchContext", "LaunchDescription", "LaunchDescriptionEntity", "LaunchDescriptionSource",
+    "SomeSubstitutionsType", "Substitution", "perform_substitutions",
+]  # fmt: skip
+
+
+def perform_substitutions(context: LaunchContext, subs: Any) -> str:
+    """The concatenated texts of several substitutions. Raises LaunchError."""
+    return text(context, subs)

@@ -1,22 +1,35 @@
-"""ROS's own nodes in a launch file: which we do otherwise, and which are left out and why."""
+"""What ROS's own nodes, and Gazebo, are replaced with in a launch file, and which are skipped and why."""
 
+import contextlib
+import re
+import shlex
+import sys
+import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
 from fnmatch import fnmatch
 from pathlib import Path
 
+from holozen import data
+from holozen.console import report
+from holozen.flags import nearest
+from holozen.robot.errors import RobotError
 from holozen.robot.xacro import read_text
-from holozen.ros.launch.context import LaunchContext
-from holozen.ros.launch.entity import Action, Entities
-from holozen.ros.launch.gazebo import NO_WINDOW
-from holozen.ros.launch.simulation import Simulation, Spawning, gz_world
-from holozen.tell import say
+from holozen.ros import packages
+from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Program, Text, text
+from holozen.ros.launch.launch_description import Action, Entities, LaunchDescription
+
+ROOT = "/"  # the namespace of a robot without one: its keys are cmd_vel and odom
+SPAWN_TIMEOUT = "60"  # s for the sim to start
+NOWHERE = Path("/holozen-stands-in-for")  # the folder of packages that exist by name only
+NO_WINDOW = "launch: Gazebo's window is left out; `holozen map` in another terminal shows the robots"
 
 NEEDS_A_TERMINAL = "it needs a terminal of its own: `holozen teleop` in another one"
-LEFT_OUT = {
-    "robot_state_publisher/*": "the sim itself tells joint_states and tf",
-    "joint_state_publisher/*": "the sim itself tells joint_states",
-    "joint_state_publisher_gui/*": "the sim itself tells joint_states; `holozen topic pub joint_command` moves joints",
-    "rviz2/*": "`holozen map` in another terminal shows the robots, `holozen topic echo` what is told",
+SKIPPED = {
+    "robot_state_publisher/*": "the sim itself publishes joint_states and tf",
+    "joint_state_publisher/*": "the sim itself publishes joint_states",
+    "joint_state_publisher_gui/*": "the sim publishes joint_states; `holozen topic pub joint_command` moves joints",
+    "rviz2/*": "`holozen map` in another terminal shows the robots, `holozen topic echo` the messages",
     "gazebo_ros/gzclient": "`holozen map` in another terminal shows the robots",
     "ros_gz_bridge/*": "the sim is on the keys itself",
     "ros_ign_bridge/*": "the sim is on the keys itself",
@@ -25,50 +38,269 @@ LEFT_OUT = {
     "teleop_twist_keyboard/*": NEEDS_A_TERMINAL,
     "teleop_twist_joy/*": f"{NEEDS_A_TERMINAL}, with --joystick",
     "joy/*": f"{NEEDS_A_TERMINAL}, with --joystick",
-    "rqt*/*": "`holozen plot`, `holozen graph` and `holozen topic` show what it would",
-    "plotjuggler/*": "`holozen plot` in another terminal draws numbers",
+    "rqt*/*": "`holozen plot`, `holozen graph` and `holozen topic` show the same",
+    "plotjuggler/*": "`holozen plot` in another terminal plots numbers",
 }
-"""package/executable -> why it is left out, and what to use."""
+"""package/executable -> why it is skipped, and what to use."""
 
 ENDING = ("controller_manager/spawner", "controller_manager/spawner.py")
-"""Those that would end by themselves, for whose end others wait."""
+"""Skipped nodes that would end by themselves, and for whose end others wait."""
 
-Words = Sequence[str]
+SCRIPTS = {
+    "tf2_ros/static_transform_publisher": Path(__file__).parents[1] / "tf2_ros" / "static_transform_publisher.py"
+}
+"""package/executable -> a script of ours that does the same."""
+
+_CLASSIC_ARGUMENTS = (
+    "world", "gui", "server", "verbose", "pause", "headless", "server_required", "gui_required", "physics", "debug",
+    "extra_gazebo_args", "init", "factory", "force_system", "recording", "use_sim_time", "params_file",
+)  # fmt: skip
+_GZ_ARGUMENTS = ("gz_args", "ign_args", "gz_version", "ign_version", "on_exit_shutdown", "debugger")
+"""Arguments of Gazebo's launch files, of which only the world has an effect here."""
+
+_SPAWN_FLAGS = {f"-{letter}": f"-{letter}" for letter in "xyzRPY"} | {
+    "-entity": "--name", "-name": "--name", "-model": "--name", "-file": "-file", "-robot_namespace": "--namespace",
+    "-timeout": "--timeout", "-spawn_service_timeout": "--timeout",
+}  # fmt: skip
+"""Flags of spawn_entity.py and of ros_gz_sim's create -> those of `holozen spawn`."""
+_DESCRIPTION_FLAGS = ("-topic", "-string", "-param")  # other sources of the robot's description than a file
+_IGNORED_FLAGS = {
+    "-reference_frame": 1, "-gazebo_namespace": 1, "-world": 1, "-J": 2, "-wait": 1, "-unpause": 0,
+    "-package_to_model": 0, "-b": 0, "-bond": 0, "-allow_renaming": 1, "-urdf": 0, "-sdf": 0,
+}  # fmt: skip
+"""Flags without effect here, and how many words follow each."""
+_MENTIONED_PACKAGE = re.compile(r"package://([\w-]+)")
 
 
-class Wanted:
-    """A Node or program of the launch file: its package, executable and words, and the texts among its parameters."""
+@dataclass(frozen=True, slots=True, eq=False)
+class Executable:
+    """A Node or program in the launch file; `texts` are those of its parameters that are texts."""
 
-    def __init__(
-        self, action: Action, package: str, executable: str, words: Words, texts: dict[str, str] = {},
-        namespace: str = "",
-    ) -> None:  # fmt: skip
-        self.action, self.package, self.executable, self.words = action, package, executable, words
-        self.texts, self.namespace = texts, namespace
+    action: Action
+    package: str
+    name: str
+    words: Sequence[str]
+    texts: dict[str, str] = field(default_factory=dict)
+    namespace: str = ""
 
 
-def stand_in(context: LaunchContext, node: Wanted) -> Entities | None:
-    """What is done for a Node of ROS's own; None for one that is the user's. Raises LaunchError."""
-    name = f"{node.package}/{node.executable}"
-    if name in DONE:
-        return DONE[name](context, node)
-    reason = next((reason for pattern, reason in LEFT_OUT.items() if fnmatch(name, pattern)), None)
+def stand_in(context: LaunchContext, node: Executable) -> Entities | None:
+    """The replacement of one of ROS's own nodes; None for a node of the user's. Raises LaunchError."""
+    name = f"{node.package}/{node.name}"
+    if name in NODES:
+        return NODES[name](context, node)
+    reason = next((reason for pattern, reason in SKIPPED.items() if fnmatch(name, pattern)), None)
     if reason is None:
         return None
     if node.package == "robot_state_publisher":
-        _describe(context, node)
-    leave_out(context, node.action, f"{node.package} {node.executable}", reason, name in ENDING)
+        _remember_description(context, node)
+    skip(context, node.action, f"{node.package} {node.name}", reason, name in ENDING)
     return ()
 
 
-def leave_out(context: LaunchContext, action: Action, name: str, reason: str, ends: bool = False) -> None:
-    """Say that something is left out. What waits for its start goes on, and if it `ends` what waits for its end."""
-    say(f"launch: {name} is left out: {reason}")
-    context.stage.left_out(action, ends)
+def skip(context: LaunchContext, action: Action, name: str, reason: str, ends: bool = False) -> None:
+    """Report that a process is left out. Actions that wait for its start, or if it `ends` for its end, go on."""
+    report(f"launch: {name} is left out: {reason}")
+    context.runner.skip(action, ends)
 
 
-def _describe(context: LaunchContext, node: Wanted) -> None:
-    """Remember the robot that robot_state_publisher would tell."""
+def holozen_command(context: LaunchContext, verb: str, *words: str) -> list[str]:
+    """The command that runs a verb of ours in the system of this launch."""
+    flags = context.flags
+    before, after = (flags, []) if verb == "run" else ([], flags)  # what follows a script's name belongs to the script
+    return [sys.executable, "-m", "holozen", verb, *before, *words, *after]
+
+
+def package_flags(*names: str) -> list[str]:
+    """The flags for the packages that were given, and for those with these names that are found."""
+    found = dict(packages.given)
+    for name in names:
+        with contextlib.suppress(RobotError):
+            found[name] = packages.find(name)
+    return [word for name, folder in found.items() for word in ("--package", f"{name}={folder}")]
+
+
+def replace_gazebo_packages() -> None:
+    """Make the packages of Gazebo's launch files known, unless they are installed."""
+    packages.stand_ins.update({name: NOWHERE / name for name in GAZEBO_LAUNCH_FILES})
+
+
+def gazebo_launch_file(path: Path) -> LaunchDescription | None:
+    """The replacement of one of Gazebo's launch files; None for any other file. Raises LaunchError."""
+    if path.parts[: len(NOWHERE.parts)] != NOWHERE.parts:
+        return None
+    package = path.parts[len(NOWHERE.parts)]
+    known = GAZEBO_LAUNCH_FILES[package]
+    if path.name not in known or path.parent.name != "launch":
+        hint = nearest(path.name, known) or f"; files: {', '.join(known)}"
+        raise LaunchError(f"{package} is replaced here, and has no {'/'.join(path.parts[3:])!r}{hint}")
+    return LaunchDescription([known[path.name]()])
+
+
+class Simulation(Action):
+    """Starts our sim, once, without a robot."""
+
+    def __init__(self, world: Text = "", target: Action | None = None) -> None:
+        super().__init__()
+        self.world, self.target = world, target or self
+
+    def execute(self, context: LaunchContext) -> Entities | None:
+        """Start it. The launch ends when it does."""
+        if context.simulates:
+            return None
+        context.simulates = True
+        world = _world_file(text(context, self.world))
+        words = holozen_command(context, "sim", "--empty", "--world", world, *package_flags())
+        report("launch: `holozen sim` replaces Gazebo; `holozen map` in another terminal shows what is in it")
+        context.runner.start(self.target, Program("sim", words, environment=context.environment, required=True))
+        return None
+
+
+def _world_file(given: str) -> str:
+    """The world file with that name; ours for the names of Gazebo's own."""
+    stem = Path(given).stem or "empty"
+    ours = data.find("worlds", f"{stem}.world")
+    return str(ours) if not Path(given).is_file() and ours.is_file() else given
+
+
+def _gz_world(args: str) -> str:
+    """The world in the arguments of `gz sim`, such as `-r -v 4 empty.sdf`. Raises LaunchError."""
+    try:
+        words = shlex.split(args)
+    except ValueError as error:
+        raise LaunchError(f"gz_args {args!r}: {error}") from None
+    with_value = ("-v", "--verbose", "--seed", "-z", "--iterations", "--physics-engine", "--render-engine")
+    files = [
+        word
+        for before, word in zip(["", *words], words, strict=False)
+        if not word.startswith("-") and not (before in with_value and not word.endswith((".sdf", ".world")))
+    ]
+    if len(files) > 1:
+        raise LaunchError(f"gz_args {args!r} name {len(files)} worlds: {', '.join(files)}")
+    return files[0] if files else ""
+
+
+class _ClassicLaunchFile(Action):
+    """gazebo.launch.py and gzserver.launch.py."""
+
+    def execute(self, context: LaunchContext) -> Entities:
+        """Our sim, in the world of the launch argument."""
+        context.used.update(_CLASSIC_ARGUMENTS)
+        return [Simulation(context.launch_configurations.get("world", ""), self)]
+
+
+class _WindowLaunchFile(Action):
+    """gzclient.launch.py."""
+
+    def execute(self, context: LaunchContext) -> None:
+        """Report that there is no window."""
+        context.used.update(_CLASSIC_ARGUMENTS)
+        report(NO_WINDOW)
+
+
+class _GzLaunchFile(Action):
+    """gz_sim.launch.py."""
+
+    def execute(self, context: LaunchContext) -> Entities:
+        """Our sim, in the world of the launch arguments."""
+        context.used.update(_GZ_ARGUMENTS)
+        values = context.launch_configurations
+        words = " ".join(values.get(name, "") for name in ("gz_args", "ign_args"))
+        return [Simulation(_gz_world(words), self)] if "-g" not in words.split() else [_WindowLaunchFile()]
+
+
+GAZEBO_LAUNCH_FILES: dict[str, dict[str, Callable[[], Action]]] = {
+    "gazebo_ros": {
+        "gazebo.launch.py": _ClassicLaunchFile,
+        "gzserver.launch.py": _ClassicLaunchFile,
+        "gzclient.launch.py": _WindowLaunchFile,
+    },
+    "ros_gz_sim": {"gz_sim.launch.py": _GzLaunchFile},
+    "ros_ign_gazebo": {"ign_gazebo.launch.py": _GzLaunchFile},
+}
+"""The launch files that are replaced here, by package."""
+
+
+class Spawn(Action):
+    """Spawns a robot in the sim, as the arguments of spawn_entity.py or of ros_gz_sim's create specify."""
+
+    def __init__(self, node: Executable) -> None:
+        super().__init__()
+        self.node, self.place = node, node.action.place
+
+    def execute(self, context: LaunchContext) -> Entities | None:
+        """Spawn it; at the end of the launch file if its robot_state_publisher has not been seen before."""
+        flags, (source, name) = self._parse()
+        if source == "-topic":
+            topic = context.full_name(name, self.node.namespace)
+            if topic not in context.descriptions and context.runner.postpone(self):
+                return None
+            robot = context.descriptions.get(topic)
+        else:
+            robot = name if source == "-string" else self.node.texts.get(name)
+        if source and robot is None:
+            raise LaunchError(_no_description(context, source, name), self.place)
+        words = [*flags, *(_description_file(context, robot) if robot is not None else [])]
+        words += package_flags(*_MENTIONED_PACKAGE.findall(robot or ""))
+        words += [word for name in context.allow_env for word in ("--allow-env", name)]
+        if "--namespace" not in words:
+            words += ["--namespace", context.full_name("", self.node.namespace) or ROOT]
+        if "--timeout" not in words:
+            words += ["--timeout", SPAWN_TIMEOUT]
+        program = Program("spawn", holozen_command(context, "spawn", *words), environment=context.environment)
+        context.runner.start(self.node.action, program)
+        return None
+
+    def _parse(self) -> tuple[list[str], tuple[str, str]]:
+        """Arguments for `holozen spawn`, and the flag and value of the robot's description. Raises LaunchError."""
+        flags, description, words = [], ("", ""), list(self.node.words)
+        if "--ros-args" in words:
+            del words[words.index("--ros-args") :]
+        while words:
+            flag = words.pop(0)
+            flag = flag[1:] if flag.startswith("--") else flag
+            if flag in _IGNORED_FLAGS:
+                values = [word for word in words[: _IGNORED_FLAGS[flag]] if not word.startswith("-")]
+                del words[: len(values)]
+            elif flag in (*_SPAWN_FLAGS, *_DESCRIPTION_FLAGS):
+                if not words:
+                    raise LaunchError(f"{flag} needs a value", self.place)
+                value = words.pop(0)
+                if flag in _DESCRIPTION_FLAGS:
+                    description = flag, value
+                elif flag[1:] in "xyzRPY":
+                    flags.append(f"{_SPAWN_FLAGS[flag]}={value}")
+                else:
+                    flags += [_SPAWN_FLAGS[flag], value]
+            else:
+                known = [*_SPAWN_FLAGS, *_DESCRIPTION_FLAGS]
+                hint = nearest(flag, known) or f"; known: {', '.join(known)}"
+                raise LaunchError(f"unknown flag {flag!r} to spawn a robot{hint}", self.place)
+        if not description[0] and "-file" not in flags:
+            raise LaunchError("to spawn a robot, give -file FILE or -topic robot_description", self.place)
+        return flags, description
+
+
+def _description_file(context: LaunchContext, robot: str) -> list[str]:
+    """The file, with name:=value words, from which a robot's description was generated, or a new one."""
+    if origin := context.origins.get(robot.strip()):
+        return origin
+    with tempfile.NamedTemporaryFile("w", prefix="robot_description_", suffix=".urdf", delete=False) as file:
+        file.write(robot)
+    context.temporary_files.append(Path(file.name))
+    return [file.name]
+
+
+def _no_description(context: LaunchContext, flag: str, name: str) -> str:
+    if flag == "-param":
+        return f"-param {name}: this Node has no parameter {name!r} with a robot description"
+    topics = ", ".join(context.descriptions) or "none"
+    text = f"-topic {name}: nothing in this launch file publishes a robot description there (known topics: {topics})"
+    return f"{text}; add a robot_state_publisher with the parameter robot_description, or write -file FILE"
+
+
+def _remember_description(context: LaunchContext, node: Executable) -> None:
+    """Remember the robot that robot_state_publisher would publish."""
     robot = node.texts.get("robot_description", "")
     files = [word for word in node.words if word.endswith((".urdf", ".xml"))]
     if not robot and files:
@@ -78,52 +310,51 @@ def _describe(context: LaunchContext, node: Wanted) -> None:
         context.descriptions[context.full_name("robot_description", node.namespace)] = robot
 
 
-def _spawn(context: LaunchContext, node: Wanted) -> Entities:
-    return [Spawning(node.words, node.texts, node.action)]
+def _spawn(context: LaunchContext, node: Executable) -> Entities:
+    return [Spawn(node)]
 
 
-def _classic(context: LaunchContext, node: Wanted) -> Entities:
+def _classic(context: LaunchContext, node: Executable) -> Entities:
     worlds = [word for word in node.words if word.endswith((".world", ".sdf"))]
     return [Simulation(worlds[0] if worlds else "", node.action)]
 
 
-def _new(context: LaunchContext, node: Wanted) -> Entities:
-    return [Simulation(gz_world(" ".join(node.words)), node.action)]
+def _gz_server(context: LaunchContext, node: Executable) -> Entities:
+    return [Simulation(_gz_world(" ".join(node.words)), node.action)]
 
 
-def _gz(context: LaunchContext, node: Wanted) -> Entities:
+def _gz(context: LaunchContext, node: Executable) -> Entities:
     verb = "".join(node.words[:1])
     if verb in ("sim", "gazebo"):
-        return [Simulation(gz_world(" ".join(node.words[1:])), node.action)]
-    leave_out(context, node.action, f"`{node.executable} {verb}`", "only its sim is stood in for", ends=True)
+        return [Simulation(_gz_world(" ".join(node.words[1:])), node.action)]
+    skip(context, node.action, f"`{node.name} {verb}`", "only its sim is replaced here", ends=True)
     return ()
 
 
-def _window(context: LaunchContext, node: Wanted) -> Entities:
-    say(NO_WINDOW)
-    context.stage.left_out(node.action, ends=False)
+def _window(context: LaunchContext, node: Executable) -> Entities:
+    report(NO_WINDOW)
+    context.runner.skip(node.action, ends=False)
     return ()
 
 
-DONE: dict[str, Callable[[LaunchContext, Wanted], Entities]] = {
+StandIn = Callable[[LaunchContext, Executable], Entities]
+
+NODES: dict[str, StandIn] = {
     "gazebo_ros/spawn_entity.py": _spawn,
     "gazebo_ros/spawn_entity": _spawn,
     "ros_gz_sim/create": _spawn,
     "ros_ign_gazebo/create": _spawn,
     "gazebo_ros/gzserver": _classic,
     "gazebo_ros/gazebo": _classic,
-    "ros_gz_sim/gzserver": _new,
+    "ros_gz_sim/gzserver": _gz_server,
 }
-"""package/executable -> what is done instead."""
+"""package/executable -> its replacement."""
 
-SCRIPTS = {"tf2_ros/static_transform_publisher": Path(__file__).parents[1] / "static_transform_publisher.py"}
-"""package/executable -> a script of ours that does the same."""
-
-PROGRAMS: dict[str, Callable[[LaunchContext, Wanted], Entities]] = {
+PROGRAMS: dict[str, StandIn] = {
     "gazebo": _classic,
     "gzserver": _classic,
     "gz": _gz,
     "ign": _gz,
     "gzclient": _window,
 }
-"""The first word of an ExecuteProcess -> what is done instead."""
+"""The first word of an ExecuteProcess -> its replacement."""

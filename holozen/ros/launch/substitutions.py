@@ -1,53 +1,42 @@
-"""launch.substitutions and launch_ros.substitutions: texts that are known only when the launch file runs."""
+"""launch.substitutions and launch_ros.substitutions: texts that are evaluated when the launch file is executed."""
 
 import math
 import os
+import shlex
 import shutil
 from pathlib import Path
 from typing import Any
 
 from holozen.flags import nearest
 from holozen.robot.errors import RobotError
-from holozen.ros.launch.commands import OURS, output
-from holozen.ros.launch.context import LaunchContext
-from holozen.ros.launch.folders import ExecutableInPackage, FindPackage, FindPackagePrefix, FindPackageShare
-from holozen.ros.launch.logic import (
-    AndSubstitution,
-    EqualsSubstitution,
-    IfElseSubstitution,
-    NotEqualsSubstitution,
-    NotSubstitution,
-    OrSubstitution,
+from holozen.robot.xacro import expand_xacro, read_text
+from holozen.ros import executables, packages
+from holozen.ros.launch.launch_context import (
+    LaunchContext,
+    LaunchError,
+    Substitution,
+    Text,
+    describe,
+    here,
+    text,
+    truth,
 )
-from holozen.ros.launch.text import LaunchError, Substitution, Text, here, shown, text
 
 __all__ = [
-    "AndSubstitution",
-    "AnonName",
-    "Command",
-    "EnvironmentVariable",
-    "EqualsSubstitution",
-    "ExecutableInPackage",
-    "FileContent",
-    "FindExecutable",
-    "FindPackage",
-    "FindPackagePrefix",
-    "FindPackageShare",
-    "IfElseSubstitution",
-    "LaunchConfiguration",
-    "NotEqualsSubstitution",
-    "NotSubstitution",
-    "OrSubstitution",
-    "PathJoinSubstitution",
-    "PythonExpression",
-    "TextSubstitution",
-    "ThisLaunchFile",
-    "ThisLaunchFileDir",
-]
+    "AndSubstitution", "AnonName", "Command", "EnvironmentVariable", "EqualsSubstitution", "ExecutableInPackage",
+    "FileContent", "FindExecutable", "FindPackage", "FindPackagePrefix", "FindPackageShare", "IfElseSubstitution",
+    "LaunchConfiguration", "NotEqualsSubstitution", "NotSubstitution", "OrSubstitution", "PathJoinSubstitution",
+    "PythonExpression", "TextSubstitution", "ThisLaunchFile", "ThisLaunchFileDir",
+]  # fmt: skip
+
+REPLACED = ("xacro", "ros2", "gazebo", "gzserver", "gzclient", "gz", "ign", "rviz2")
+"""Programs that ROS's launch files name, and that are replaced here and never run."""
+
+_IGNORED = ("--inorder", "-i")  # flags of xacro for what it does anyway
 
 
 class TextSubstitution(Substitution):
-    """A text as it is."""
+    """A constant text."""
 
     def __init__(self, *, text: str) -> None:
         self.text = text
@@ -58,7 +47,7 @@ class TextSubstitution(Substitution):
 
 
 class LaunchConfiguration(Substitution):
-    """The value of a launch argument; `default` if it has none."""
+    """The value of a launch argument, or `default` if it has none."""
 
     def __init__(self, variable_name: Text, *, default: Any = None) -> None:
         self.variable_name, self.default, self.place = variable_name, default, here()
@@ -70,17 +59,17 @@ class LaunchConfiguration(Substitution):
         if name in values:
             return values[name]
         if self.default is None:
-            hint = nearest(name, values) or f"; there are {', '.join(values) or 'none'}"
+            hint = nearest(name, values) or f"; declared arguments: {', '.join(values) or 'none'}"
             raise LaunchError(f"launch argument {name!r} is not declared before it is used{hint}", self.place)
         return str(self.default) if isinstance(self.default, bool | int | float) else text(context, self.default)
 
     def describe(self) -> str:
         """Its name."""
-        return shown(self.variable_name)
+        return describe(self.variable_name)
 
 
 class PathJoinSubstitution(Substitution):
-    """Parts of a path, joined."""
+    """The joined parts of a path."""
 
     def __init__(self, substitutions: Any) -> None:
         self.substitutions = list(substitutions)
@@ -91,19 +80,19 @@ class PathJoinSubstitution(Substitution):
 
     def describe(self) -> str:
         """Its parts."""
-        return "/".join(map(shown, self.substitutions))
+        return "/".join(map(describe, self.substitutions))
 
 
 class Command(Substitution):
-    """What `xacro FILE name:=value ...` writes. Nothing but xacro and cat is run."""
+    """The output of `xacro FILE name:=value ...` or `cat FILE`. No other program is run."""
 
     def __init__(self, command: Text, *, on_stderr: str = "fail") -> None:
         self.command, self.place = command, here()
 
     def perform(self, context: LaunchContext) -> str:
-        """The text. Raises LaunchError."""
+        """The output. Raises LaunchError."""
         try:
-            return output(context, text(context, self.command))
+            return _output(context, text(context, self.command))
         except RobotError as error:
             raise LaunchError(str(error), self.place) from None
         except LaunchError as error:
@@ -117,9 +106,9 @@ class FindExecutable(Substitution):
         self.name, self.place = name, here()
 
     def perform(self, context: LaunchContext) -> str:
-        """The path; the name alone of what we stand in for. Raises LaunchError."""
+        """The path; only the name of a program that is replaced here. Raises LaunchError."""
         name = text(context, self.name)
-        if name in OURS:
+        if name in REPLACED:
             return name
         found = shutil.which(name)
         if found is None:
@@ -139,12 +128,14 @@ class EnvironmentVariable(Substitution):
         if name in context.environment:
             return context.environment[name]
         if self.default is None:
-            raise LaunchError(f"the environment has no {name!r}; set it, or give default_value", self.place)
+            raise LaunchError(
+                f"the environment variable {name!r} is not set; set it, or give default_value", self.place
+            )
         return text(context, self.default)
 
 
 class PythonExpression(Substitution):
-    """What a Python expression gives, with the names of math; `python_modules` names others."""
+    """The value of a Python expression, with the names of math; `python_modules` adds other modules."""
 
     def __init__(self, expression: Text, python_modules: Any = ()) -> None:
         self.expression, self.modules, self.place = expression, list(python_modules), here()
@@ -157,8 +148,8 @@ class PythonExpression(Substitution):
             names |= {name: __import__(name) for name in (text(context, module) for module in self.modules)}
             return str(eval(source, names))
         except Exception as error:
-            told = f"PythonExpression {source!r}: {type(error).__name__}: {error}"
-            raise LaunchError(told, self.place) from None
+            message = f"PythonExpression {source!r}: {type(error).__name__}: {error}"
+            raise LaunchError(message, self.place) from None
 
 
 class ThisLaunchFile(Substitution):
@@ -178,7 +169,7 @@ class ThisLaunchFileDir(Substitution):
 
 
 class FileContent(Substitution):
-    """What is in a file."""
+    """The content of a file."""
 
     def __init__(self, path: Text) -> None:
         self.path, self.place = path, here()
@@ -189,16 +180,170 @@ class FileContent(Substitution):
         try:
             return Path(path).read_text()
         except (OSError, UnicodeDecodeError) as error:
-            told = getattr(error, "strerror", "") or "it is no text"
-            raise LaunchError(f"cannot read {path}: {told}", self.place) from None
+            reason = getattr(error, "strerror", "") or "not a text file"
+            raise LaunchError(f"cannot read {path}: {reason}", self.place) from None
 
 
 class AnonName(Substitution):
-    """A name that no other process has."""
+    """A unique name."""
 
     def __init__(self, name: Text) -> None:
         self.name = name
 
     def perform(self, context: LaunchContext) -> str:
-        """The name with this process's number."""
+        """The name with the number of this process."""
         return f"{text(context, self.name)}_{os.getpid()}"
+
+
+class FindPackageShare(Substitution):
+    """The folder of a package, with its urdf, launch and worlds."""
+
+    def __init__(self, package: Text) -> None:
+        self.package, self.place = package, here()
+
+    def perform(self, context: LaunchContext) -> str:
+        """The folder. Raises LaunchError."""
+        return str(self._folder(context))
+
+    def find(self, package_name: str) -> str:
+        """The folder of any package, at once. Raises LaunchError."""
+        return type(self)(package_name).perform(LaunchContext())
+
+    def describe(self) -> str:
+        """The package."""
+        return f"share of {describe(self.package)}"
+
+    def _folder(self, context: LaunchContext) -> Path:
+        try:
+            return packages.find(text(context, self.package)).absolute()
+        except RobotError as error:
+            raise LaunchError(str(error), self.place) from None
+
+
+class FindPackagePrefix(FindPackageShare):
+    """Where a package is installed; the folder of its sources if it is not."""
+
+    def perform(self, context: LaunchContext) -> str:
+        """The folder. Raises LaunchError."""
+        return str(packages.prefix(self._folder(context)))
+
+
+FindPackage = FindPackagePrefix
+
+
+class ExecutableInPackage(Substitution):
+    """The path of an executable of a package."""
+
+    def __init__(self, executable: Text, package: Text) -> None:
+        self.executable, self.package, self.place = executable, package, here()
+
+    def perform(self, context: LaunchContext) -> str:
+        """The path. Raises LaunchError."""
+        try:
+            package, executable = text(context, self.package), text(context, self.executable)
+            return str(executables.find(package, executable, nameless=True).path)
+        except executables.NotFound as error:
+            raise LaunchError(str(error), self.place) from None
+
+
+class EqualsSubstitution(Substitution):
+    """true if two texts are equal, otherwise false."""
+
+    def __init__(self, left: Any, right: Any) -> None:
+        self.left, self.right = left, right
+
+    def perform(self, context: LaunchContext) -> str:
+        """true or false."""
+        return _word(_side(context, self.left) == _side(context, self.right))
+
+
+class NotEqualsSubstitution(EqualsSubstitution):
+    """false if two texts are equal, otherwise true."""
+
+    def perform(self, context: LaunchContext) -> str:
+        """true or false."""
+        return _word(_side(context, self.left) != _side(context, self.right))
+
+
+class NotSubstitution(Substitution):
+    """true for false, and false for true."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def perform(self, context: LaunchContext) -> str:
+        """true or false. Raises LaunchError if the value is neither."""
+        return _word(not truth(context, self.value, "the value of NotSubstitution"))
+
+
+class AndSubstitution(Substitution):
+    """true if both values are."""
+
+    def __init__(self, left: Any, right: Any) -> None:
+        self.left, self.right = left, right
+
+    def perform(self, context: LaunchContext) -> str:
+        """true or false. Raises LaunchError if a value is neither."""
+        return _word(all(self._values(context)))
+
+    def _values(self, context: LaunchContext) -> list[bool]:
+        return [truth(context, side, f"a value of {type(self).__name__}") for side in (self.left, self.right)]
+
+
+class OrSubstitution(AndSubstitution):
+    """true if one of two values is."""
+
+    def perform(self, context: LaunchContext) -> str:
+        """true or false. Raises LaunchError if a value is neither."""
+        return _word(any(self._values(context)))
+
+
+class IfElseSubstitution(Substitution):
+    """One of two texts, depending on a condition."""
+
+    def __init__(self, condition: Any, if_value: Text = "", else_value: Text = "") -> None:
+        self.condition, self.if_value, self.else_value = condition, if_value, else_value
+
+    def perform(self, context: LaunchContext) -> str:
+        """The text. Raises LaunchError."""
+        holds = truth(context, self.condition, "the condition of IfElseSubstitution")
+        return text(context, self.if_value if holds else self.else_value)
+
+
+def _side(context: LaunchContext, value: Any) -> str:
+    return _word(value) if isinstance(value, bool) else str(value) if value is None else text(context, value)
+
+
+def _word(value: bool) -> str:
+    return str(value).lower()
+
+
+def _output(context: LaunchContext, command: str) -> str:
+    """The output of a command. Raises LaunchError, and RobotError for the file."""
+    try:
+        words = shlex.split(command)
+    except ValueError as error:
+        raise LaunchError(f"Command {command!r}: {error}") from None
+    for start in (["ros2", "run", "xacro"], ["python3", "-m"]):
+        if words[: len(start)] == start:
+            del words[: len(start)]
+    name = Path(words[0]).name if words else ""
+    if name == "cat" and len(words) == 2:
+        return _with_origin(context, read_text(Path(words[1])), words[1:])
+    if name not in ("xacro", "xacro.py"):
+        raise LaunchError(f"Command {command!r:.200}: only `xacro FILE name:=value ...` and `cat FILE` are run here")
+    words = [word for word in words[1:] if word not in _IGNORED]
+    files = [word for word in words if ":=" not in word]
+    if len(files) != 1 or files[0].startswith("-"):
+        raise LaunchError(f"Command {command!r:.200}: write `xacro FILE name:=value ...`")
+    values = [word for word in words if ":=" in word]
+    arguments = dict(word.split(":=", 1) for word in values)
+    return _with_origin(
+        context, expand_xacro(Path(files[0]), arguments, packages.given, context.allow_env), [files[0], *values]
+    )
+
+
+def _with_origin(context: LaunchContext, text: str, origin: list[str]) -> str:
+    """The text; its origin is remembered, for errors that name lines and for meshes beside the file."""
+    context.origins[text.strip()] = origin
+    return text

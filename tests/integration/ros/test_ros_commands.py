@@ -7,12 +7,12 @@ from typing import Any
 
 import pytest
 
-from holozen.codec import WIRES
 from holozen.messages import CommandStatus
-from holozen.ros import context as contexts
-from holozen.ros.context import Context
+from holozen.messages.codec import WIRES
 from holozen.ros.generated import find
-from holozen.ros.node import Node
+from holozen.ros.rclpy import context as contexts
+from holozen.ros.rclpy.context import Context
+from holozen.ros.rclpy.node import Node
 from holozen.testing import Wire, wait_for
 from tests.integration.conftest import start_sim
 from tests.integration.robots import Robot, moves, rests

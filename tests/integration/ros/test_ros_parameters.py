@@ -7,19 +7,18 @@ from typing import Any
 
 import pytest
 
-from holozen import rcl_interfaces as r
 from holozen.cli import main
-from holozen.codec import WIRES
-from holozen.errors import ServiceError
-from holozen.parameters import ELSE, MOST
-from holozen.ros import context as contexts
-from holozen.ros.context import Context
-from holozen.ros.executors import SingleThreadedExecutor
+from holozen.messages import rcl_interfaces as r
+from holozen.messages.codec import WIRES
 from holozen.ros.generated import find
-from holozen.ros.node import Node
-from holozen.ros.parameter import Parameter
-from holozen.ros.parameters import result
+from holozen.ros.rclpy import context as contexts
+from holozen.ros.rclpy.context import Context
+from holozen.ros.rclpy.executors import SingleThreadedExecutor
+from holozen.ros.rclpy.node import Node
+from holozen.ros.rclpy.parameter import Parameter, set_result
 from holozen.testing import Wire
+from holozen.transport.errors import ServiceError
+from holozen.transport.parameters import ELSE, MOST
 
 Descriptor = find("rcl_interfaces/msg/ParameterDescriptor")
 Range = find("rcl_interfaces/msg/FloatingPointRange")
@@ -41,7 +40,7 @@ class Robot(Node):
 
     def check(self, parameters: list[Parameter]) -> Any:
         shapes = [each.value for each in parameters if each.name == "shape"]
-        return result("shapes are square and hexagon" if set(shapes) - {"square", "hexagon"} else "")
+        return set_result("shapes are square and hexagon" if set(shapes) - {"square", "hexagon"} else "")
 
     def values(self, *names: str) -> list[Any]:
         return [each.value for each in self.get_parameters(names)]
@@ -105,7 +104,7 @@ def test_they_are_read_and_set(run: Run, robot: Robot) -> None:
         ("speed", "1", "speed takes DOUBLE, and 1 is INTEGER; write 1.0"),
         ("goals", "[1, 2]", "goals takes DOUBLE_ARRAY, and [1, 2] is INTEGER_ARRAY"),
         ("shape", "circle", "shapes are square and hexagon"),
-        ("sped", "1.0", "lab/tom has no parameter 'sped'; did you mean speed?"),
+        ("sped", "1.0", "lab/tom has no parameter 'sped'; did you mean 'speed'?"),
         ("use_sim_time", "maybe", "use_sim_time takes BOOL, and 'maybe' is STRING"),
     ],
 )
@@ -160,14 +159,14 @@ def _named(value: Any) -> Any:
 
 def test_what_is_asked_wrongly_is_refused_and_the_node_spins_on(wire: Wire, run: Run, robot: Robot) -> None:
     assert run("get", "lab/tom", "sped") == (
-        1, "", "holozen param get: lab/tom has no parameter 'sped'; did you mean speed?\n",
+        1, "", "holozen param get: lab/tom has no parameter 'sped'; did you mean 'speed'?\n",
     )  # fmt: skip
     caller = wire.bus("caller")
     with pytest.raises(ServiceError, match=f"at most {MOST}"):
         caller.call("lab/tom/get_parameters", r.GetParametersRequest(["speed"] * (MOST + 1)), r.GetParametersReply)
     wrong = r.SetParametersRequest([r.Parameter("laps", r.ParameterValue(type=77))])
     (refused,) = caller.call("lab/tom/set_parameters", wrong, r.SetParametersReply).results
-    assert refused.reason == "77 is no type of a parameter; they go from 0 to 9"
+    assert refused.reason == "77 is not a parameter type; they go from 0 to 9"
     assert run("get", "lab/tom", "laps")[0] == 0
 
 

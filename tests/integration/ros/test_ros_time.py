@@ -7,15 +7,13 @@ import pytest
 
 from holozen.messages import Clock as ClockMessage
 from holozen.messages import Time as TimeMessage
-from holozen.ros import context as contexts
-from holozen.ros import logging
-from holozen.ros.clock_type import ClockType
-from holozen.ros.context import Context
-from holozen.ros.duration import Duration
-from holozen.ros.executors import SingleThreadedExecutor
-from holozen.ros.node import Node
-from holozen.ros.parameter import Parameter
-from holozen.ros.time import Time
+from holozen.ros.rclpy import context as contexts
+from holozen.ros.rclpy import logging
+from holozen.ros.rclpy.context import Context
+from holozen.ros.rclpy.executors import SingleThreadedExecutor
+from holozen.ros.rclpy.node import Node
+from holozen.ros.rclpy.parameter import Parameter
+from holozen.ros.rclpy.time import ClockType, Duration, Time
 from holozen.testing import Wire, wait_for
 
 SIMULATED = ["--ros-args", "-p", "use_sim_time:=true"]

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from holozen.bag.forms import form_of
+from holozen.bag.formats import format_of
 from holozen.bag.reader import Bag
 from holozen.bag.reader import Message as Found
 from holozen.bag.writer import BagWriter
-from holozen.codec import encode
 from holozen.messages import Message, Odometry, Twist
+from holozen.messages.codec import encode
 
 Types = tuple[type[Message], ...]
 SECOND = 1_000_000_000  # ns
@@ -18,7 +18,7 @@ def put(
     writer: BagWriter, key: str, payload: bytes, at: float = 0.0, encoding: str = "application/json", types: Types = ()
 ) -> bool:
     """Write one message, `at` seconds after START."""
-    form, _ = form_of(payload, encoding, types)
+    form, _ = format_of(payload, encoding, types)
     return writer.write(key, form, payload, START + round(at * SECOND))
 
 

@@ -33,7 +33,7 @@ def test_plot_says_what_it_drew(tmp_path: Path, capsys: pytest.CaptureFixture[st
 @pytest.mark.parametrize("verb", ["info", "plot"])
 def test_a_wrong_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], verb: str) -> None:
     (tmp_path / "a.mcap").write_text("hello")
-    for path, why in (("a.mcap", "is no MCAP file"), ("none.mcap", "No such file or directory")):
+    for path, why in (("a.mcap", "is not an MCAP file"), ("none.mcap", "No such file or directory")):
         assert main(["bag", verb, str(tmp_path / path)]) == 1
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith(f"holozen bag {verb}: ")
@@ -47,4 +47,5 @@ def test_a_missing_library_is_told_with_what_to_do(
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.delitem(sys.modules, "matplotlib.figure", raising=False)
     assert main(["bag", "plot", str(path)]) == 1
-    assert capsys.readouterr().err == "holozen bag needs matplotlib; run: pip install 'holozen[bag]'\n"
+    advice = "in the checkout of holozen, run: pip install '.[bag]'"
+    assert capsys.readouterr().err == f"holozen bag needs matplotlib; {advice}\n"

@@ -7,12 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from holozen.bag.drawing import draw
-from holozen.bag.errors import BagError
+from holozen.bag import BagError
+from holozen.bag.drawing import MOST, Track, draw, tracks
 from holozen.bag.reader import Channel, Message
-from holozen.bag.tracks import MOST, Track, tracks
-from holozen.codec import encode
 from holozen.messages import Odometry, Twist, TwistStamped
+from holozen.messages.codec import encode
 
 from .bags import a_bag
 

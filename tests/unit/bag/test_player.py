@@ -1,6 +1,5 @@
-"""A bag is played in time and in order; keys pause and step it, an event ends it."""
+"""What of a bag is played, where to and when."""
 
-import itertools
 import threading
 import time
 
@@ -8,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.bag.keys import meaning
-from holozen.bag.pace import Pace
-from holozen.bag.player import LOOK, PAUSE, STEP, Player
+from holozen.bag import BagError
+from holozen.bag.player import LOOK, PAUSE, STEP, Pace, Plan, Player, meaning, plan
 from holozen.bag.reader import Channel, Message
+from holozen.transport.graph import Endpoint
 
 A = Channel("a", "", "", "")
 MS = 1_000_000  # ns
@@ -40,14 +39,16 @@ class Pressed:
 class Played:
     """A player and what it did."""
 
-    def __init__(self, *keys: str, rate: float = 1.0) -> None:
+    def __init__(self, *keys: str, rate: float = 1.0, slow: float = 0.0) -> None:
         self.done: list[str] = []
+        self.slow = slow  # s that it takes to publish
         self.stop, self.keys = threading.Event(), Pressed(*keys)
         self.player = Player(self._publish, lambda: self.done.append("hold"), self.keys, self.stop, rate)
         self.end_after = 10**9
 
     def _publish(self, message: Message) -> None:
         self.done.append(message.payload.decode())
+        time.sleep(self.slow)
         if len(self.done) >= self.end_after:
             self.stop.set()
 
@@ -113,17 +114,104 @@ def test_after_a_pause_it_goes_on_where_it_was() -> None:
 
 
 def test_keys_are_looked_at_also_when_every_message_is_late() -> None:
-    played = Played(rate=1e6)
-    slow = itertools.islice(messages(*range(1000)), 1000)
-    publish = played.player._publish
-    played.player._publish = lambda message: (publish(message), time.sleep(0.0002))[0]  # type: ignore[func-returns-value]
-    assert played.player.play(slow)
+    played = Played(rate=1e6, slow=0.0002)
+    assert played.player.play(messages(*range(1000)))
     assert played.keys.looks > 2
 
 
-@pytest.mark.parametrize(
-    ("pressed", "told"),
-    [(b" ", PAUSE), (b"s", STEP), (b"\x1b[C", STEP), (b"\x1bOC", STEP), (b"x", ""), (b"\x1b[A", ""), (b"", "")],
-)
-def test_space_pauses_and_the_right_arrow_steps(pressed: bytes, told: str) -> None:
-    assert meaning(pressed) == told
+def test_space_pauses_and_the_right_arrow_steps() -> None:
+    for pressed, told in [
+        (b" ", PAUSE),
+        (b"s", STEP),
+        (b"\x1b[C", STEP),
+        (b"\x1bOC", STEP),
+        (b"x", ""),
+        (b"\x1b[A", ""),
+        (b"", ""),
+    ]:
+        assert meaning(pressed) == told
+
+
+TWIST, ODOMETRY = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry"
+
+
+def channel(key: str, kind: str = "") -> Channel:
+    return Channel(key, "application/json", "json", kind)
+
+
+ODOM, TF, CMD = channel("odom", ODOMETRY), channel("tf"), channel("cmd_vel", TWIST)
+SIM = [Endpoint("odom", "pub", ODOMETRY, "sim", "1"), Endpoint("cmd_vel", "sub", TWIST, "sim", "1")]
+
+
+def keys(made: Plan) -> dict[str, str]:
+    return {channel.key: key for channel, key in made.targets.items()}
+
+
+def test_all_but_commands_is_played_where_nobody_else_is() -> None:
+    made = plan([ODOM, TF, CMD], [])
+    assert keys(made) == {"odom": "odom", "tf": "tf"}
+    assert made.left_out == {"cmd_vel": "it moves robots; --commands plays it too"}
+
+
+def test_a_command_is_known_by_its_name_or_its_type() -> None:
+    for command in [
+        CMD,
+        channel("Fred/cmd_vel"),
+        channel("joint_command"),
+        channel("drive", TWIST),
+        channel("drive", "geometry_msgs/msg/TwistStamped"),
+    ]:
+        assert plan([command], []).targets == {}
+        asked = plan([command], [], commands=True)
+        assert asked.commands == {command.key}
+
+
+def test_what_is_played_to_a_key_that_moves_a_robot_is_a_command() -> None:
+    listener = [Endpoint("wheels", "sub", TWIST, "sim", "1")]
+    for endpoints, target in (([], "cmd_vel"), (listener, "wheels")):
+        with pytest.raises(BagError, match="it moves robots"):
+            plan([TF], endpoints, remap={"tf": target})
+
+
+def test_a_command_stays_one_under_another_name() -> None:
+    with pytest.raises(BagError, match="cmd_vel as old/speed: it moves robots"):
+        plan([CMD], [], remap={"cmd_vel": "old/speed"})
+
+
+def test_a_key_that_somebody_publishes_is_left_out_and_can_be_played_elsewhere() -> None:
+    made = plan([ODOM, TF], SIM)
+    assert keys(made) == {"tf": "tf"}
+    assert made.left_out == {"odom": "sim publishes it now; --remap odom:=NEW plays it elsewhere"}
+    assert keys(plan([ODOM, TF], SIM, remap={"odom": "old/odom"})) == {"odom": "old/odom", "tf": "tf"}
+
+
+def test_what_was_asked_for_by_name_and_must_not_be_played_is_an_error() -> None:
+    with pytest.raises(BagError, match="odom: sim publishes it now"):
+        plan([ODOM, TF], SIM, topics=["odom"])
+    with pytest.raises(BagError, match="cmd_vel: it moves robots; --commands"):
+        plan([ODOM, CMD], [], topics=["cmd_vel"])
+    assert keys(plan([ODOM, TF, CMD], SIM, topics=["*"])) == {"tf": "tf"}
+
+
+def test_commands_may_be_played_beside_other_sources() -> None:
+    """The sim decides among them, by priority."""
+    teleop = [*SIM, Endpoint("cmd_vel", "pub", TWIST, "teleop", "2")]
+    assert keys(plan([CMD], teleop, commands=True)) == {"cmd_vel": "cmd_vel"}
+
+
+def test_topics_choose_by_key_expression() -> None:
+    fred = channel("Fred/odom")
+    assert keys(plan([ODOM, TF, fred], [], topics=["**/odom"])) == {"odom": "odom", "Fred/odom": "Fred/odom"}
+
+
+@pytest.mark.parametrize("wrong", [{"topics": ["odm"]}, {"remap": {"odm": "b"}}])
+def test_a_key_that_is_not_in_the_bag_is_told_with_those_that_are(wrong: dict) -> None:  # type: ignore[type-arg]
+    with pytest.raises(BagError, match="there is no 'odm' in the bag; it has odom, tf"):
+        plan([ODOM, TF], [], **wrong)
+
+
+def test_a_key_of_a_hostile_bag_is_not_published_on() -> None:
+    for key in ["*/cmd_vel", "**", "a//b", "", "@holozen/x", "a$*", "a/"]:
+        made = plan([channel(key)], [], commands=True)
+        assert made.targets == {}
+        assert made.left_out == {key: "this is not a key to publish on"}

@@ -1,4 +1,4 @@
-"""A file may be cut off, damaged or hostile: one line, little memory, and all that was good before."""
+"""A bag may be cut off, damaged or hostile; what is in it is summed up."""
 
 import io
 import struct
@@ -11,13 +11,15 @@ import pytest
 import zstandard
 from hypothesis import given
 from hypothesis import strategies as st
+from mcap.writer import MCAP0_MAGIC as MAGIC
 from mcap.writer import CompressionType, Writer
 
-from holozen.bag.errors import BagError
-from holozen.bag.reader import Bag, Message
-from holozen.bag.records import LARGEST, MAGIC
+from holozen.bag import BagError
+from holozen.bag.formats import format_of
+from holozen.bag.reader import LARGEST, Bag, Channel, Message, Stream, Summary, summarize
+from holozen.bag.writer import BagWriter
 
-from .bags import a_bag, read
+from .bags import SECOND, START, a_bag, read
 
 
 @pytest.fixture(scope="module")
@@ -110,24 +112,21 @@ def test_a_file_without_chunks_is_read(file: Path) -> None:
     assert [(m.channel.key, m.at, m.payload) for m in read(file)] == [("a", 7, b"{}")]
 
 
-@pytest.mark.parametrize(
-    ("content", "part"),
-    [
-        (b"", "is no MCAP file: it is empty"),
-        (b"hello, I am a text", "is no MCAP file"),
-        (MAGIC + MESSAGE, "damaged at byte 8: a message of no channel"),
-        (MAGIC + record(0x05, b"x"), "a message of no channel"),
-        (MAGIC + record(0x04, b"\x01\x00\x00\x00\xff\xff\xff\xff"), "damaged at byte 8: it ends too early"),
-        (MAGIC + chunk(b"abc", "rot13", b"nop"), "compression 'rot13' is not understood; known: zstd, lz4"),
+def test_what_is_wrong_with_a_file_is_told_in_one_line(file: Path) -> None:
+    for content, part in [
+        (b"", "is not an MCAP file: it is empty"),
+        (b"hello, I am a text", "is not an MCAP file"),
+        (MAGIC + MESSAGE, "damaged before byte 41: a message without a channel"),
+        (MAGIC + record(0x05, b"x") + MAGIC, "a record is longer than the file"),
+        (MAGIC + record(0x04, b"\x01\x00\x00\x00\xff\xff\xff\xff") + MAGIC, "a record is longer than the file"),
+        (MAGIC + chunk(b"abc", "rot13", b"nop"), "unknown compression 'rot13'; known: zstd, lz4"),
         (MAGIC + chunk(CHANNEL, "", CHANNEL, checksum=1), "the checksum is wrong"),
         (MAGIC + chunk(b"", "zstd", b"no zstd at all", 10), "damaged"),
         (MAGIC + chunk(b"", "lz4", b"no lz4 at all", 10), "damaged"),
         (MAGIC + chunk(b"", "", b"", LARGEST + 1), f"at most {LARGEST} are read"),
         (MAGIC + chunk(b"", "", record(0x05, b"x" * 9)[:-1], 17), "a record is longer than its chunk"),
-    ],
-)
-def test_what_is_wrong_with_a_file_is_told_in_one_line(content: bytes, part: str, file: Path) -> None:
-    assert part in error_of(file, content)
+    ]:
+        assert part in error_of(file, content)
 
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
@@ -142,14 +141,14 @@ def test_a_few_bytes_do_not_become_all_of_memory(compression: str, file: Path) -
         assert tracemalloc.get_traced_memory()[1] < 16 << 20
     finally:
         tracemalloc.stop()
-    assert "has not the size it says" in line
+    assert "does not have the size it claims" in line
 
 
 def test_a_record_that_says_to_be_huge_is_not_read(file: Path) -> None:
     with file.open("wb") as stream:
         stream.write(MAGIC + struct.pack("<BQ", 0x06, LARGEST + 1))
         stream.truncate(LARGEST + 100)  # a hole: it takes no room on the disk
-    with Bag(file) as bag, pytest.raises(BagError, match=f"at most {LARGEST} are read"):
+    with Bag(file) as bag, pytest.raises(BagError, match=f"exceeds limit {LARGEST}"):
         list(bag.messages())
 
 
@@ -163,3 +162,55 @@ def test_a_file_that_is_not_there_or_is_a_folder_is_told(tmp_path: Path) -> None
     for path, why in ((tmp_path / "none.mcap", "No such file"), (tmp_path, "Is a directory")):
         with pytest.raises(BagError, match=why):
             Bag(path)
+
+
+def stream(*rows: tuple[float, int]) -> Stream:
+    """Messages at these seconds, with these numbers."""
+    made = Stream(Channel("a", "", "", ""))
+    for at, number in rows:
+        made.see(Message(made.channel, START + round(at * SECOND), b"0123456789", number))
+    return made
+
+
+def test_a_bag_is_summed_up_by_channel(tmp_path: Path) -> None:
+    with Bag(a_bag(tmp_path / "a.mcap")) as bag:
+        figures = summarize(bag).figures()
+    assert (figures["messages"], figures["duration"], figures["cut_off"]) == (31, 2.0, False)
+    topics = {topic["key"]: topic for topic in figures["topics"]}  # type: ignore[attr-defined]
+    assert list(topics) == ["cmd_vel", "note", "odom"]
+    assert (topics["odom"]["messages"], topics["odom"]["rate"], topics["odom"]["missing"]) == (20, 10.0, 0)
+    assert (topics["cmd_vel"]["type"], topics["cmd_vel"]["rate"]) == ("geometry_msgs/msg/Twist", 5.0)
+    assert (topics["note"]["type"], topics["note"]["rate"], topics["note"]["bytes"]) == ("", 0.0, 7)
+
+
+def test_missing_messages_are_counted_by_their_numbers() -> None:
+    found = stream((0, 0), (0.1, 1), (0.2, 4), (2.5, 5))
+    assert (found.missing, found.figures()["longest_gap"]) == (2, 2.3)
+    assert stream((0, 3), (1, 2), (2, 3)).missing == 3, "the first three never arrived"
+
+
+def test_two_messages_at_one_time_or_one_back_in_time_have_no_rate() -> None:
+    assert stream((1, 0)).rate == stream((1, 0), (1, 1)).rate == stream((2, 0), (1, 1)).rate == 0
+
+
+def test_a_recording_counts_what_was_lost_before_a_message(tmp_path: Path) -> None:
+    writer = BagWriter(str(tmp_path / "a"))
+    for missed in (0, 0, 3, 0):
+        writer.write("odom", format_of(b"{}", "", ())[0], b"{}", START, missed)
+    writer.close()
+    with Bag(tmp_path / "a.mcap") as bag:
+        assert [stream.missing for stream in summarize(bag).streams.values()] == [3]
+
+
+def test_the_lines_for_people_name_key_type_and_rate(tmp_path: Path) -> None:
+    with Bag(a_bag(tmp_path / "a.mcap")) as bag:
+        head, _, first, *_ = summarize(bag).lines()
+    assert "31 messages in 2.00 s" in head
+    assert first.split()[:5] == ["cmd_vel", "geometry_msgs/msg/Twist", "application/json", "10", "0"]
+
+
+def test_an_empty_bag_and_a_time_no_calendar_has_are_told_too() -> None:
+    assert Summary("a", 10).lines() == ["a: 10 bytes, 0 messages in 0.00 s"]
+    late = Stream(Channel("a", "", "", ""))
+    late.see(Message(late.channel, 2**64 - 1, b"x"))
+    assert len(Summary("a", 10, {late.channel: late}).lines()) == 3

@@ -1,6 +1,8 @@
 """Bags as the mcap library reads them, in files of a limited size, and on a disk that is full."""
 
+import errno
 import json
+import os
 import resource
 import subprocess
 import sys
@@ -9,7 +11,8 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from holozen.bag.errors import BagError
+from holozen import cli
+from holozen.bag import BagError
 from holozen.bag.writer import BagWriter
 
 from .bags import START, a_bag, put, read
@@ -77,7 +80,8 @@ def test_a_recording_of_nothing_leaves_no_file(tmp_path: Path) -> None:
 LIMITED = """
 import os, sys
 from tests.unit.bag.bags import put
-from holozen.bag.errors import BagError
+from holozen import cli
+from holozen.bag import BagError
 from holozen.bag.writer import BagWriter
 writer = BagWriter(sys.argv[1])
 try:
@@ -120,3 +124,18 @@ def test_where_the_next_file_cannot_be_made_the_last_one_is_whole(tmp_path: Path
     assert len(read(tmp_path / "a_0.mcap")) == writer.messages
     with (tmp_path / "a_0.mcap").open("rb") as stream:
         assert make_reader(stream).get_summary() is not None
+
+
+def test_without_space_for_the_end_of_a_file_the_space_that_is_needed_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_arguments: int) -> None:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(os, "posix_fallocate", full)
+    assert cli.main(["record", "odom", "-o", str(tmp_path / "a")]) == 1
+    fix = "free some space, or choose a folder on another disk with -o"
+    assert capsys.readouterr().err == (
+        f"holozen record: cannot write {tmp_path}/a.mcap: fewer than 8 MB of the disk are free; {fix}\n"
+    )
+    assert list(tmp_path.iterdir()) == []

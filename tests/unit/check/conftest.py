@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from holozen.check.finding import Finding
+from holozen.check.engine import Finding
 from holozen.check.report import check
 
 Findings = Callable[..., list[Finding]]

@@ -1,6 +1,6 @@
 """docs/check.md has the rules as they are."""
 
-from holozen.check.rules import RULES, table
+from holozen.check.report import RULES, table
 from tests.unit.check.conftest import HERE
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from holozen.messages import NextGoalReply, NextGoalRequest
-from holozen.ros import finder
+from holozen.ros import importer
 from holozen.ros.generated import find
 from holozen.testing import Wire
 
@@ -36,12 +36,12 @@ def thing(tmp_path: Path) -> Path:
 @pytest.fixture
 def theirs(wire: Wire, thing: Path) -> None:
     """A script's services of the type in that package: on a key that our table knows, and on one that it does not."""
-    finder.install({"my_if": thing})
+    importer.install({"my_if": thing})
     kind = find("my_if/srv/NextGoal")
     for key in ("next_goal", "my_goal"):
         bus = wire.bus(f"script_{key}")
         bus.serve(key, kind.Request, kind.Response, lambda r: kind.Response(count=len(r.name))).start()
-    finder.remove()
+    importer.remove()
 
 
 @pytest.mark.parametrize("where", [LESSON, LESSON / "hb_control", LESSON.parent])
@@ -73,7 +73,7 @@ def test_a_package_that_is_not_found_calls_a_service_of_the_same_name_and_says_s
     [
         ("std_srvs/srv/Trigger", "next_goal: its type is holozen/srv/NextGoal, not std_srvs/srv/Trigger\n"),
         ("std_srvs/srv/Triger", "no type 'std_srvs/srv/Triger'; did you mean std_srvs/srv/Trigger?"),
-        ("hb_interface/srv/GetPose", "say where it is: --package hb_interface=DIR; its type is holozen/srv/NextGoal\n"),
+        ("hb_interface/srv/GetPose", "give its folder: --package hb_interface=DIR; its type is holozen/srv/NextGoal\n"),
         ("geometry_msgs/msg/Twist", "next_goal: geometry_msgs/msg/Twist is a message; "),
     ],
 )

@@ -1,7 +1,7 @@
 """The command line names its verbs, and whatever fails is one line and an exit code."""
 
-import importlib
 import os
+import re
 import subprocess
 import sys
 from importlib.metadata import version
@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from holozen import cli
-from holozen.errors import BusError
+from holozen.cli.verb import Noun
+from holozen.transport.errors import BusError
 
 
 @pytest.mark.parametrize("flag", ["-h", "--help"])
@@ -31,46 +32,76 @@ def test_the_version_is_the_one_that_is_installed(flag: str, capsys: pytest.Capt
     assert capsys.readouterr().out == f"{version('holozen')}\n"
 
 
-def test_an_unknown_verb_is_named_with_those_there_are(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_unknown_verb_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["drive"]) == 2
     out, told = capsys.readouterr()
     assert out == ""
-    assert told == f"holozen: no verb 'drive'; there are {', '.join(cli.VERBS)}\n"
+    assert told == "holozen: no verb 'drive'; `holozen --help` lists the verbs\n"
 
 
-NOUNS = ("topic", "service", "node", "param", "interface", "bag")
+def test_an_unknown_verb_gets_the_nearest_or_what_there_is_instead(capsys: pytest.CaptureFixture[str]) -> None:
+    for word, hint in [
+        ("topics", "did you mean 'topic'?"),
+        ("view", "`holozen map` draws robots"),
+        ("rviz2", "`holozen map` draws robots"),
+        ("action", "there are no actions here"),
+        ("pkg", "`--package NAME=DIR`"),
+        ("tf2_echo", "write `holozen tf echo SOURCE TARGET`"),
+    ]:
+        assert cli.main([word]) == 2
+        told = capsys.readouterr().err
+        assert told.startswith(f"holozen: no verb {word!r}; {hint}")
+        assert (told.count("\n"), len(told) < 160) == (1, True)
 
 
-@pytest.mark.parametrize("verb", cli.VERBS)
-def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        cli.main([verb, "--help"])
-    assert end.value.code == 0
-    told = capsys.readouterr().out
-    assert told.startswith(f"usage: holozen {verb} ")
-    assert verb in NOUNS or "example: " in " ".join(told.split())
+def test_what_there_is_instead_of_a_verb_is_there() -> None:
+    for text in cli.ELSEWHERE.values():
+        for verb in re.findall(r"`holozen (\w+)", text):
+            assert verb in cli.VERBS
 
 
-@pytest.mark.parametrize("noun", NOUNS)
-def test_every_verb_of_a_noun_has_an_example(noun: str) -> None:
-    (verbs,) = (action for action in cli.module(noun).parser()._actions if isinstance(action.choices, dict))
-    for parser in verbs.choices.values():
-        assert (parser.epilog or "").startswith("example: "), parser.prog
+NOUNS = ("topic", "service", "node", "param", "tf", "interface", "bag")
 
 
-@pytest.mark.parametrize("verb", cli.VERBS)
-def test_every_verb_refuses_a_flag_that_it_does_not_have(verb: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        cli.main([verb, "--no-such-flag"])
-    assert end.value.code == 2
-    assert "Traceback" not in capsys.readouterr().err
+def test_every_verb_has_help(capsys: pytest.CaptureFixture[str]) -> None:
+    for verb in cli.VERBS:
+        with pytest.raises(SystemExit) as end:
+            cli.main([verb, "--help"])
+        assert end.value.code == 0
+        told = capsys.readouterr().out
+        assert told.startswith(f"usage: holozen {verb} ")
+        assert verb in NOUNS or "example: " in " ".join(told.split())
+
+
+def test_a_verb_that_starts_others_explains_its_own_flags() -> None:
+    assert "as for" not in " ".join(cli.command("up").parser().format_help().split())
+
+
+def test_every_verb_of_a_noun_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    for noun in NOUNS:
+        verbs = cli.VERBS[noun].split(", ")
+        made = cli.command(noun)
+        assert not isinstance(made, Noun) or list(made.modules) == verbs
+        for verb in verbs:
+            with pytest.raises(SystemExit) as end:
+                cli.main([noun, verb, "--help"])
+            assert end.value.code == 0
+            assert "\nexample: " in capsys.readouterr().out, f"{noun} {verb}"
+
+
+def test_every_verb_refuses_a_flag_that_it_does_not_have(capsys: pytest.CaptureFixture[str]) -> None:
+    for verb in cli.VERBS:
+        with pytest.raises(SystemExit) as end:
+            cli.main([verb, "--no-such-flag"])
+        assert end.value.code == 2
+        assert "Traceback" not in capsys.readouterr().err
 
 
 def failing(monkeypatch: pytest.MonkeyPatch, failure: BaseException) -> None:
     def main(_argv: list[str]) -> int:
         raise failure
 
-    monkeypatch.setattr(importlib.import_module("holozen.cli.node"), "main", main)
+    monkeypatch.setattr(cli.command("node"), "main", main)
 
 
 def test_a_failure_of_the_bus_is_one_line(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,7 +116,8 @@ def test_what_is_not_installed_is_named_with_its_extra(
 ) -> None:
     failing(monkeypatch, ModuleNotFoundError(name=name))
     assert cli.main(["node", "list"]) == 1
-    assert capsys.readouterr().err == f"holozen node needs {name}; run: pip install 'holozen[node]'\n"
+    advice = "in the checkout of holozen, run: pip install '.[node]'"
+    assert capsys.readouterr().err == f"holozen node needs {name}; {advice}\n"
 
 
 def test_a_module_of_ours_that_is_missing_is_a_bug_and_not_hidden(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -123,7 +155,7 @@ def test_output_into_a_full_disk_is_one_line(words: str) -> None:
 
 @pytest.mark.parametrize("verb", cli.SERVICES)
 def test_a_service_is_found_in_the_tree(verb: str) -> None:
-    assert cli.module(verb).__name__ == f"services.{cli.SERVICES[verb]}.__main__"
+    assert cli.command(verb).__name__ == f"services.{cli.SERVICES[verb]}.__main__"
 
 
 @pytest.mark.parametrize("words", ["param load sim -", "topic pub cmd_vel -", "teleop --script -", "teleop"])

@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import pytest
 
-from holozen import simulation_interfaces as si
-from holozen.errors import ServiceError
 from holozen.messages import Quaternion
+from holozen.messages import simulation_interfaces as si
+from holozen.transport.errors import ServiceError
 
 from .conftest import FakeSim
 

@@ -56,7 +56,7 @@ def test_each_source_is_told_with_its_priority_rate_and_whether_it_is_obeyed(sim
 
 def test_a_software_stop_is_told_with_who_set_it(sim: Bus, run: Run) -> None:
     tell(sim, CommandStatus(stopped="stop@a1b2c3"))
-    assert run("topic", "info", "Fred/cmd_vel")[1].splitlines()[-1] == "Obeyed: nobody; stopped by stop@a1b2c3"
+    assert run("topic", "info", "Fred/cmd_vel")[1].splitlines()[-1] == "Obeyed: none; stopped by stop@a1b2c3"
 
 
 def test_a_key_without_a_status_has_no_line_of_it(sim: Bus, teleop: Bus, run: Run) -> None:
@@ -87,4 +87,4 @@ def test_verbose_tells_priority_encoding_and_delivery(wire: Wire, run: Run) -> N
     finally:
         done.set()
         talker.join()
-    assert out.splitlines()[2].endswith(")  DATA_LOW  application/json  DROP when full, at once")
+    assert out.splitlines()[2].endswith(")  DATA_LOW  application/json  DROP when full")

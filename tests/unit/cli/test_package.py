@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from holozen import cdr
-from holozen.interfaces import Registry
+from holozen.messages import cdr
+from holozen.messages.registry import Registry
 from holozen.testing import Wire
 
 Run = Callable[..., tuple[int, str, str]]
@@ -42,7 +42,7 @@ def written(wire: Wire, thing: str) -> Iterator[None]:
 
 
 def test_echo_reads_the_bytes_of_a_package_that_is_given(run: Run, written: None, thing: str) -> None:
-    assert "; say where it is: --package my_if=DIR" in run("topic", "echo", "thing", "--once")[2]
+    assert "; give its folder: --package my_if=DIR" in run("topic", "echo", "thing", "--once")[2]
     for words in ([], [TYPE]):
         told = run("topic", "echo", "thing", *words, "--once", "--package", thing)
         assert told == (0, "width: 1.5\nname: box\n---\n", "")
@@ -55,16 +55,16 @@ def test_plot_draws_them(run: Run, written: None, thing: str) -> None:
 
 def test_pub_checks_the_fields_of_a_package_that_is_given(run: Run, wire: Wire, thing: str) -> None:
     words = ("topic", "pub", "--once", "thing", TYPE)
-    assert "; say where it is: --package my_if=DIR" in run(*words, "{width: 2}")[2]
+    assert "; give its folder: --package my_if=DIR" in run(*words, "{width: 2}")[2]
     assert "did you mean width?" in run(*words, "{widht: 2}", "--package", thing)[2]
-    tap = wire.bus("reader").tap("thing")
+    tap = wire.bus("reader").subscribe_raw("thing")
     assert run(*words, "{width: 2}", "--package", thing)[0] == 0
     assert tap.recv().payload == b'{"width": 2.0, "name": ""}'
 
 
 def test_pub_takes_the_type_of_who_reads_the_key(run: Run, wire: Wire, thing: str) -> None:
     reader = wire.bus("reader")
-    tap = reader.tap("thing")
+    tap = reader.subscribe_raw("thing")
     tap.ends.append(reader.announce("sub", TYPE, "thing"))
     assert "'thing' has no known type" in run("topic", "pub", "--once", "thing", "{width: 2}")[2]
     assert run("topic", "pub", "--once", "thing", "{width: 2}", "--package", thing)[0] == 0

@@ -9,8 +9,10 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.cli.param_file import LARGEST, lines, read, typed
-from holozen.errors import BusError
+from holozen.cli.param import LARGEST, typed
+from holozen.cli.param import file_lines as lines
+from holozen.cli.param import read_file as read
+from holozen.transport.errors import BusError
 
 WRITTEN = """
 /sim:
@@ -33,17 +35,15 @@ def file(tmp_path: Path) -> Path:
     return path
 
 
-@pytest.mark.parametrize(
-    ("word", "value"),
-    [
+def test_a_word_is_the_value_that_it_looks_like() -> None:
+    rows = [
         ("1", 1), ("-1", -1), ("1.5", 1.5), ("1e-3", 0.001), (".5", 0.5), ("true", True), ("False", False),
         ("square", "square"), ("nan", "nan"), (".inf", ".inf"), ("1_000", "1_000"), ("", ""), ("1" + "0" * 19, 1e19),
         ("[1, 2]", [1, 2]), ("[0.5, 1e3]", [0.5, 1000.0]), ("[a, b]", ["a", "b"]), ("[1, a]", "[1, a]"), ("[1", "[1"),
-    ],
-)  # fmt: skip
-def test_a_word_is_the_value_that_it_looks_like(word: str, value: Any) -> None:
-    assert typed(word) == pytest.approx(value) if isinstance(value, float) else typed(word) == value
-    assert type(typed(word)) is type(value)
+    ]  # fmt: skip
+    for word, value in rows:
+        assert typed(word) == pytest.approx(value) if isinstance(value, float) else typed(word) == value
+        assert type(typed(word)) is type(value)
 
 
 def test_a_file_says_something_for_a_node_for_all_and_for_namespaces(file: Path) -> None:
@@ -57,9 +57,8 @@ def test_a_file_may_come_from_standard_input(monkeypatch: pytest.MonkeyPatch) ->
     assert read("-", "sim") == {"max_linear": 2}
 
 
-@pytest.mark.parametrize(
-    ("text", "reason"),
-    [
+def test_what_is_no_such_file_is_told_in_one_line(tmp_path: Path) -> None:
+    for text, reason in [
         ("", "it has no names with values"),
         ("5", "it has no names with values"),
         ("a: [", "it is no YAML: "),
@@ -75,15 +74,13 @@ def test_a_file_may_come_from_standard_input(monkeypatch: pytest.MonkeyPatch) ->
         ("!!python/object:os.system {}", "it is no YAML: "),
         ("[" * 50_000, "it is "),
         ("x" * (LARGEST + 1), f"it is longer than {LARGEST} characters"),
-    ],
-)
-def test_what_is_no_such_file_is_told_in_one_line(tmp_path: Path, text: str, reason: str) -> None:
-    path = tmp_path / "wrong.yaml"
-    path.write_text(text)
-    with pytest.raises(BusError) as error:
-        read(str(path), "sim")
-    assert str(error.value).startswith(f"{path}: {reason}")
-    assert "\n" not in str(error.value)
+    ]:
+        path = tmp_path / "wrong.yaml"
+        path.write_text(text)
+        with pytest.raises(BusError) as error:
+            read(str(path), "sim")
+        assert str(error.value).startswith(f"{path}: {reason}")
+        assert "\n" not in str(error.value)
 
 
 def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:

@@ -10,12 +10,12 @@ import trimesh
 
 from holozen.bus import Bus
 from holozen.cli.spawn import Place, spawn_file
-from holozen.errors import ServiceError
 from holozen.messages import Point, Pose, Quaternion
+from holozen.robot.elements import read_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.model import parse
-from holozen.robot.tag import read_xml
+from holozen.robot.loading import parse
 from holozen.testing import Wire
+from holozen.transport.errors import ServiceError
 
 from .conftest import FakeSim
 
@@ -251,6 +251,22 @@ def test_a_robot_that_the_sim_refuses_leaves_the_old_one_where_it_is(sim: FakeSi
     sim.refusal = "too heavy"
     assert run("spawn", ball(tmp_path), "--replace")[2] == "holozen spawn: too heavy\n"
     assert sim.log == ["spawn"] and list(sim.entities) == ["ball"]
+
+
+def test_what_the_sim_replaced_is_printed_and_what_was_known_before_is_not(
+    sim: FakeSim, run: Run, tmp_path: Path
+) -> None:
+    gone = '<link name="m"><collision><geometry><mesh filename="gone.stl"/></geometry></collision></link>'
+    joint = '<joint name="j" type="fixed"><parent link="b&amp;c"/><child link="m"/></joint>'
+    replaced = (
+        "resource_string, line 9: <mesh> of <link name='{}'> (collision) is replaced by a box of 0.1 x 0.1 x 0.1 m: no"
+    )
+    sim.warnings = "\n".join([replaced.format("m"), replaced.format("n")])
+    code, out, err = run("spawn", ball(tmp_path, more=gone + joint))
+    assert (code, out) == (0, "ball stands at 0.000 0.000 0.500\n")
+    first, second = err.splitlines()
+    assert first.startswith(f"holozen spawn: {tmp_path}/ball.urdf, line 1: <mesh> of <link name='m'> (collision) is")
+    assert second == f"holozen spawn: the sim: {replaced.format('n')}"
 
 
 def test_from_python_a_file_is_spawned_and_replaced(sim: FakeSim, wire: Wire, tmp_path: Path) -> None:

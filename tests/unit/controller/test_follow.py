@@ -8,8 +8,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 import pytest
 
 from holozen.bus import Bus
-from holozen.drive import to_world
-from holozen.errors import ServiceError
+from holozen.kinematics import to_world
 from holozen.limits import STOP, Planar
 from holozen.messages import (
     CommandStatus,
@@ -25,9 +24,9 @@ from holozen.messages import (
     Twist,
     TwistWithCovariance,
 )  # fmt: skip
-from holozen.publisher import Publisher
-from holozen.readers import Subscription
 from holozen.testing import Wire, wait_for
+from holozen.transport.errors import ServiceError
+from holozen.transport.pubsub import Publisher, Subscription
 from services.controller.follow import Follower
 from services.controller.goto import Gains, Leg
 
@@ -124,7 +123,7 @@ def test_a_lap_visits_every_goal_and_ends_standing(case: Case) -> None:
 
 
 def test_commands_have_the_priority_of_an_autopilot(case: Case) -> None:
-    samples = case.robot.bus.tap("cmd_vel")
+    samples = case.robot.bus.subscribe_raw("cmd_vel")
     case.goals()
     case.lap().result(30)
     assert samples.recv().priority == "DATA_LOW"
@@ -136,14 +135,14 @@ def test_it_waits_for_the_service_and_says_so_once(case: Case) -> None:
     assert "waiting for goal 0: no reply from 'next_goal' within 0.5 s" in case.said[0]
     case.goals()
     assert len(lap.result(30)) == 2
-    assert case.said[1:] == ["goes on"]
+    assert case.said[1:] == ["continues"]
 
 
 def test_a_first_goal_that_is_refused_is_asked_for_again(case: Case) -> None:
     reasons = iter(["the list is being read"])
     case.goals(fail=lambda _: next(reasons, ""))
     assert len(case.lap().result(30)) == 2
-    assert case.said == ["goal 0: the list is being read", "goes on"]
+    assert case.said == ["goal 0: the list is being read", "continues"]
 
 
 def test_a_list_that_got_shorter_ends_the_lap(case: Case) -> None:
@@ -157,7 +156,7 @@ def test_without_odom_it_says_so_and_moves_nothing(case: Case) -> None:
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.said)
-    assert case.said == ["waiting for odom: it is stale or was never heard"]
+    assert case.said == ["waiting for odom: it is stale, or none was received"]
     assert case.robot.commands.try_recv() is None
     case.robot.moving.set()
     assert len(lap.result(30)) == 2
@@ -168,7 +167,7 @@ def test_when_odom_goes_stale_it_stops_the_robot_once(case: Case) -> None:
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
     case.robot.moving.clear()
-    wait_for(lambda: "waiting for odom: it is stale or was never heard" in case.said)
+    wait_for(lambda: "waiting for odom: it is stale, or none was received" in case.said)
     *_, last = [received.message for received in iter(case.robot.commands.try_recv, None)]
     assert last == Twist()
     case.robot.moving.set()
@@ -176,7 +175,7 @@ def test_when_odom_goes_stale_it_stops_the_robot_once(case: Case) -> None:
 
 
 def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) -> None:
-    wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.follower._status.count)
+    wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.follower.status.count)
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.said)
@@ -184,7 +183,7 @@ def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) 
     assert case.robot.heard == []
     case.robot.status(resumed=1)
     assert len(lap.result(30)) == 2
-    assert "goes on" in case.said
+    assert "continues" in case.said
 
 
 def test_a_stopped_robot_is_not_commanded_and_after_the_resume_it_begins_with_a_stop(case: Case) -> None:
@@ -193,7 +192,7 @@ def test_a_stopped_robot_is_not_commanded_and_after_the_resume_it_begins_with_a_
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
     wait_for(lambda: case.robot.status(stopped="stop@9", held=True) and case.said)
-    assert case.said[-1].startswith("yields: the robot is stopped by stop@9; `holozen release` frees it")
+    assert case.said[-1].startswith("yields: the robot is stopped by stop@9; `holozen release` ends that")
     wait_for(lambda: case.robot.status(held=True) and case.said[-1].startswith("yields to the stop by stop@9; "))
     before = len(case.robot.heard)
     case.robot.status(resumed=1)

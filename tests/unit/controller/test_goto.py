@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.drive import to_world
+from holozen.kinematics import to_world
 from holozen.limits import STOP, Planar
 from services.controller.goto import Gains, Leg, Pose, arrived, distance_to_line, error, velocity
 
@@ -111,12 +111,17 @@ def test_a_turning_robot_strafes_along_the_straight_line() -> None:
     assert max(distance_to_line(pose, start, goal) for pose, _ in drive(start, goal, Gains())) < 0.03
 
 
-@pytest.mark.parametrize(
-    ("point", "distance"),
-    [((1, 0), 0), ((1, 0.5), 0.5), ((1, -0.5), 0.5), ((-3, 4), 5), ((5, 4), 5), ((0, 0), 0), ((2, 0), 0)],
-)
-def test_the_distance_to_a_leg_ends_at_its_ends(point: tuple[float, float], distance: float) -> None:
-    assert distance_to_line((*point, 0), (0, 0, 0), (2, 0, 0)) == pytest.approx(distance)
+def test_the_distance_to_a_leg_ends_at_its_ends() -> None:
+    for point, distance in [
+        ((1, 0), 0),
+        ((1, 0.5), 0.5),
+        ((1, -0.5), 0.5),
+        ((-3, 4), 5),
+        ((5, 4), 5),
+        ((0, 0), 0),
+        ((2, 0), 0),
+    ]:
+        assert distance_to_line((*point, 0), (0, 0, 0), (2, 0, 0)) == pytest.approx(distance)
 
 
 def test_a_leg_without_length_is_a_point() -> None:
@@ -126,6 +131,6 @@ def test_a_leg_without_length_is_a_point() -> None:
 def test_a_leg_keeps_its_times_and_its_worst_error() -> None:
     leg = Leg(start=(0, 0, 0), goal=(2, 0, 0), began=10.0)
     for y, time in ((0.0, 10.0), (0.3, 11.0), (-0.1, 12.5)):
-        leg.see((1, y, 0), time)
+        leg.update((1, y, 0), time)
     assert (leg.began, leg.ended) == (10.0, 12.5)
     assert leg.path_error == pytest.approx(0.3)

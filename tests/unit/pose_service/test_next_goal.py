@@ -2,10 +2,9 @@
 
 import pytest
 
-from holozen.errors import ServiceError
 from holozen.messages import NextGoalReply, NextGoalRequest
-from services.pose_service.__main__ import parser
-from services.pose_service.route import next_goal
+from holozen.transport.errors import ServiceError
+from services.pose_service.__main__ import next_goal, parser
 
 GOALS = [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0, 9.0)]
 

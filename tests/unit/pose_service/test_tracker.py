@@ -1,16 +1,18 @@
 """The tracker tells the last odom of a robot, or why it has none."""
 
 import re
+from functools import partial
 
 import pytest
 
 from holozen.bus import Bus
-from holozen.errors import ServiceError
 from holozen.messages import GetPoseReply, GetPoseRequest, Odometry
-from holozen.publisher import Publisher
+from holozen.messages.codec import encode
 from holozen.testing import Wire, wait_for
+from holozen.transport.errors import ServiceError
+from holozen.transport.pubsub import Publisher
 from holozen.wire import TOPICS
-from services.pose_service.tracker import Tracker
+from services.pose_service.tracker import MAX_NAMES, MAX_ROBOTS, Tracker
 
 SILENCE = next(row.silence for row in TOPICS if row.key == "odom")
 
@@ -70,10 +72,10 @@ def test_the_last_odom_of_each_robot_is_told_with_its_age(robots: Robots) -> Non
 
 
 def test_a_robot_that_was_never_heard_is_named_with_those_that_were(robots: Robots) -> None:
-    assert robots.refusal("") == "no odom has been heard; robots heard: none"
+    assert robots.refusal("") == "no odom was received; robots with odom: none"
     told_until_heard(robots, "", 1.0)
     told_until_heard(robots, "Ann", 1.0)
-    assert robots.refusal("Fred") == "no Fred/odom has been heard; robots heard: '' (at the root), Ann"
+    assert robots.refusal("Fred") == "no Fred/odom was received; robots with odom: '' (at the root), Ann"
 
 
 @pytest.mark.parametrize("name", ["*", "a/b", "**", "9", "x" * 65])
@@ -84,7 +86,9 @@ def test_a_name_that_no_robot_may_have_is_refused(robots: Robots, name: str) -> 
 def test_odom_that_is_too_old_is_refused_with_its_age(robots: Robots) -> None:
     told_until_heard(robots, "Fred", 1.0)
     wait_for(lambda: not robots.heard("Fred", 1.0))
-    told = re.fullmatch(r"Fred/odom is stale: the last one came (.*) s ago; does the sim run\?", robots.refusal("Fred"))
+    told = re.fullmatch(
+        r"Fred/odom is stale: the last one came (.*) s ago; is the sim running\?", robots.refusal("Fred")
+    )
     assert told is not None
     assert float(told[1]) >= SILENCE
 
@@ -93,12 +97,28 @@ def test_what_is_no_odom_of_a_robot_is_left_out(robots: Robots) -> None:
     robots.tell("a/b/odom")
     robots.sim.session.put("Ann/odom", b"nonsense")
     told_until_heard(robots, "Fred", 1.0)  # which came after the others
-    assert robots.refusal("Ann") == "no Ann/odom has been heard; robots heard: Fred"
+    assert robots.refusal("Ann") == "no Ann/odom was received; robots with odom: Fred"
+
+
+def test_of_too_many_robots_the_one_that_has_been_silent_for_longest_is_forgotten(robots: Robots) -> None:
+    odom = encode(Odometry())
+
+    def told(name: str) -> GetPoseReply | None:
+        robots.sim.session.put(f"{name}/odom", odom)
+        return robots.heard(name, 0.0)
+
+    names = ["Silent", "Steady", *(f"R{number}" for number in range(MAX_ROBOTS - 2)), "Steady", "Last"]
+    for name in names:
+        wait_for(partial(told, name))
+    assert robots.heard("Steady", 0.0) or "stale" in robots.refusal("Steady")
+    refusal = robots.refusal("Silent")
+    assert refusal.startswith("no Silent/odom was received; robots with odom: Last, R")
+    assert refusal.count(",") == MAX_NAMES - 1
 
 
 def test_the_thread_ends_with_the_bus(wire: Wire) -> None:
     bus: Bus = wire.bus("pose_service")
     tracker = Tracker(bus.subscribe("**/odom", Odometry))
     bus.close()
-    with pytest.raises(ServiceError, match="no odom has been heard"):
+    with pytest.raises(ServiceError, match="no odom was received"):
         tracker.get_pose(GetPoseRequest())

@@ -2,9 +2,9 @@
 
 import pytest
 
-from holozen.robot.parts import Pose, Shape
-from holozen.robot.placeholder import placeholder
-from holozen.robot.tag import Tag, read_xml
+from holozen.robot.elements import Tag, read_xml
+from holozen.robot.model import Pose, Shape
+from holozen.robot.shapes import placeholder
 
 THERE = Pose((1, 2, 3))
 MASS = '<mass value="12"/>'
@@ -32,9 +32,8 @@ def test_in_sdf_it_stands_where_the_mesh_would() -> None:
     assert box.pose == THERE
 
 
-@pytest.mark.parametrize(
-    "inertial",
-    [
+def test_where_the_inertia_is_that_of_no_small_body_it_is_a_cube_where_the_mesh_would_be() -> None:
+    for inertial in [
         "",
         MASS,
         INERTIA,
@@ -45,40 +44,38 @@ def test_in_sdf_it_stands_where_the_mesh_would() -> None:
         MASS + '<inertia ixx="0.5" iyy="0.10" izz="0.05"/>',
         MASS + '<inertia ixx="0" iyy="0" izz="0"/>',
         MASS + '<inertia ixx="100" iyy="100" izz="100"/>',
-    ],
-)
-def test_where_the_inertia_is_that_of_no_small_body_it_is_a_cube_where_the_mesh_would_be(inertial: str) -> None:
-    assert placeholder(mesh(inertial), THERE) == Shape("box", (0.1, 0.1, 0.1), THERE)
+    ]:
+        assert placeholder(mesh(inertial), THERE) == Shape("box", (0.1, 0.1, 0.1), THERE)
 
 
 def test_an_inertial_frame_that_is_none_does_not_hide_the_mesh_s_own_fault() -> None:
     assert placeholder(mesh(f'<origin xyz="0 0 x"/>{MASS}{INERTIA}'), THERE).pose == THERE
 
 
-@pytest.mark.parametrize(
-    ("shape", "size"),
-    [
+def test_what_is_seen_has_the_size_of_what_is_touched() -> None:
+    for shape, size in [
         ('<box size="0.4 0.5 0.6"/>', (0.4, 0.5, 0.6)),
         ('<cylinder radius="0.2" length="0.1"/>', (0.4, 0.4, 0.1)),
         ('<sphere radius="0.7"/>', (1.4, 1.4, 1.4)),
         ("<box><size>0.4 0.5 0.6</size></box>", (0.4, 0.5, 0.6)),
         ("<cylinder><radius>0.2</radius><length>0.1</length></cylinder>", (0.4, 0.4, 0.1)),
-    ],
-)
-def test_what_is_seen_has_the_size_of_what_is_touched(shape: str, size: tuple[float, ...]) -> None:
-    small = '<collision><geometry><box size="0.01 0.01 0.01"/></geometry></collision>'
-    origin = '<origin xyz="0 0 0.5"/>'
-    link = mesh(MASS + INERTIA, f"{small}<collision>{origin}<geometry>{shape}</geometry></collision>")
-    assert placeholder(link, THERE) == Shape("box", size, THERE if "><" in shape else Pose((0, 0, 0.5)))
+    ]:
+        small = '<collision><geometry><box size="0.01 0.01 0.01"/></geometry></collision>'
+        origin = '<origin xyz="0 0 0.5"/>'
+        link = mesh(MASS + INERTIA, f"{small}<collision>{origin}<geometry>{shape}</geometry></collision>")
+        assert placeholder(link, THERE) == Shape("box", size, THERE if "><" in shape else Pose((0, 0, 0.5)))
 
 
-@pytest.mark.parametrize(
-    "shape",
-    ['<mesh filename="x"/>', '<box size="1 2"/>', '<sphere radius="0"/>', '<cylinder radius="x" length="1"/>', ""],
-)
-def test_a_collision_shape_without_a_size_tells_nothing(shape: str) -> None:
-    link = mesh(MASS + INERTIA, f"<collision><geometry>{shape}</geometry></collision>")
-    assert placeholder(link, THERE).size == pytest.approx((0.1, 0.2, 0.3))
+def test_a_collision_shape_without_a_size_tells_nothing() -> None:
+    for shape in [
+        '<mesh filename="x"/>',
+        '<box size="1 2"/>',
+        '<sphere radius="0"/>',
+        '<cylinder radius="x" length="1"/>',
+        "",
+    ]:
+        link = mesh(MASS + INERTIA, f"<collision><geometry>{shape}</geometry></collision>")
+        assert placeholder(link, THERE).size == pytest.approx((0.1, 0.2, 0.3))
 
 
 def test_what_is_touched_has_not_the_size_of_another_collision() -> None:

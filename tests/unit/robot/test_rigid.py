@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.robot.errors import RobotError
-from holozen.robot.model import RobotModel, load
-from holozen.robot.parts import Inertial, Joint, Limits, Link, Pose, Shape
+from holozen.robot.loading import load
+from holozen.robot.model import Inertial, Joint, Limits, Link, Pose, RobotModel, Shape
 from holozen.robot.rigid import Body, joint_axes, link_frames, lump
 from holozen.robot.rotation import Array, matrix_of, triple
 

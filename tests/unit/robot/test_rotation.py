@@ -7,7 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from holozen.robot.rotation import Array, Quaternion, matrix_of, principal, quaternion_of
+from holozen.robot.rotation import Array, matrix_of, principal, quaternion_of
+from holozen.rotation import XYZW
 
 angles = st.tuples(*[st.floats(-7, 7)] * 3)
 numbers = st.floats(-3, 3)
@@ -22,7 +23,7 @@ def about(axis: int, angle: float) -> Array:
     return matrix
 
 
-def turned(quaternion: Quaternion, vector: Array) -> Array:
+def turned(quaternion: XYZW, vector: Array) -> Array:
     """A vector turned by a unit quaternion: v + 2 w (q x v) + 2 q x (q x v)."""
     part, w = np.array(quaternion[:3]), quaternion[3]
     result: Array = vector + 2 * w * np.cross(part, vector) + 2 * np.cross(part, np.cross(part, vector))

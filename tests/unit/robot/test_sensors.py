@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from holozen.robot.model import RobotModel, parse
-from holozen.robot.parts import Sensor
+from holozen.robot.loading import parse
+from holozen.robot.model import RobotModel, Sensor
 
 ORIGIN = Path("somewhere/robot.urdf")
 PARTS = '<link name="a"/><link name="eye"/><joint name="j" type="fixed"><parent link="a"/><child link="eye"/></joint>'
@@ -23,9 +23,8 @@ def plugin(inside: str, filename: str = "libgazebo_ros_x.so") -> str:
     return f'<plugin name="p" filename="{filename}">{inside}</plugin>'
 
 
-@pytest.mark.parametrize(
-    ("inside", "expected"),
-    [
+def test_a_sensor_on_a_link_is_read_with_its_rate_and_topic() -> None:
+    for inside, expected in [
         ("", Sensor("s", "camera", "eye")),
         ("<update_rate>30.0</update_rate>", Sensor("s", "camera", "eye", 30)),
         (plugin("<updateRate>30</updateRate>"), Sensor("s", "camera", "eye", 30)),
@@ -38,17 +37,15 @@ def plugin(inside: str, filename: str = "libgazebo_ros_x.so") -> str:
         (plugin("<ros><remapping>~/out:=scan</remapping></ros>"), Sensor("s", "camera", "eye", 0, "scan")),
         (plugin("<ros><remapping>~/image_raw:=/view</remapping></ros>"), Sensor("s", "camera", "eye", 0, "view")),
         ("<topic>lidar</topic>", Sensor("s", "camera", "eye", 0, "lidar")),
-    ],
-)
-def test_a_sensor_on_a_link_is_read_with_its_rate_and_topic(inside: str, expected: Sensor) -> None:
-    model = robot(sensor(inside))
-    assert model.sensors == (expected,)
-    assert model.warnings == (f"{ORIGIN}, line 3: <sensor name='s'> (camera) is not simulated yet",)
+    ]:
+        model = robot(sensor(inside))
+        assert model.sensors == (expected,)
+        assert model.warnings == (f"{ORIGIN}, line 3: <sensor name='s'> (camera) is not simulated yet",)
 
 
-@pytest.mark.parametrize("kind", ["camera", "ray", "gpu_lidar", "imu", "contact"])
-def test_the_kind_of_a_sensor_is_that_of_the_file(kind: str) -> None:
-    assert robot(sensor("", kind)).sensors == (Sensor("s", kind, "eye"),)
+def test_the_kind_of_a_sensor_is_that_of_the_file() -> None:
+    for kind in ["camera", "ray", "gpu_lidar", "imu", "contact"]:
+        assert robot(sensor("", kind)).sensors == (Sensor("s", kind, "eye"),)
 
 
 def test_a_sensor_may_lack_name_type_and_link() -> None:
@@ -60,7 +57,7 @@ def test_a_rate_that_cannot_be_is_told() -> None:
     for word in ("-1", "fast", "nan"):
         model = robot(sensor(f"<update_rate>{word}</update_rate>"))
         assert model.sensors[0].rate == 0
-        told = f"{ORIGIN}, line 3: <update_rate> of <sensor name='s'> is {word!r}; it is taken as every step"
+        told = f"{ORIGIN}, line 3: <update_rate> of <sensor name='s'> is {word!r}; every step is used"
         assert model.warnings[0] == told
 
 
@@ -91,4 +88,4 @@ def test_a_sensor_on_a_link_that_is_not_there_is_told_once() -> None:
     model = robot(sensor("").replace("eye", "ey"))
     assert model.sensors == ()
     (warning,) = model.warnings
-    assert "reference='ey' names no link and no joint; the nearest is 'eye'; it is left out" in warning
+    assert "reference='ey' names no link and no joint; did you mean 'eye'?; it is left out" in warning

@@ -9,12 +9,11 @@ import pytest
 import trimesh
 
 from holozen.robot import shapes
+from holozen.robot.elements import Source, read_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.mesh.files import data_uri
-from holozen.robot.parts import Pose, Shape
+from holozen.robot.meshes import data_uri
+from holozen.robot.model import Pose, Shape
 from holozen.robot.shapes import mesh_shape, read_shape, solid
-from holozen.robot.source import Source
-from holozen.robot.tag import read_xml
 
 STL = trimesh.creation.box((1, 2, 3)).export(file_type="stl")
 CORNERS = {(x, y, z) for x in (-0.5, 0.5) for y in (-1, 1) for z in (-1.5, 1.5)}
@@ -86,8 +85,8 @@ def test_a_visual_mesh_is_found_but_not_read(source: Source, home: Path) -> None
 def test_another_file_with_the_name_is_taken_with_a_warning_that_says_which(source: Source, home: Path) -> None:
     assert shape(source, "/home/asha/ws/box.stl").path == home / "box.stl"
     (warning,) = source.warnings
-    told = f"(collision): there is no file '/home/asha/ws/box.stl'; {home}/box.stl is taken, which has its name"
-    assert warning == f"robot.urdf, line 2: <mesh> of <link name='a'> {told}"
+    told = f"(collision): there is no file '/home/asha/ws/box.stl'; {home}/box.stl, which has the same name, is used"
+    assert warning == f"robot.urdf, line 2: <mesh> of <link name='a'> {told}; write box.stl"
 
 
 def test_a_data_uri_is_a_hull_at_the_urdf_s_scale(source: Source, home: Path) -> None:
@@ -117,7 +116,7 @@ def test_a_confined_text_has_a_limited_number_of_meshes(
     monkeypatch.setattr(shapes, "MOST_MESHES", 2)
     uri, wire = data_uri(home / "box.stl"), replace(source, confined=True)
     assert [shape(wire, uri).kind for _ in range(3)] == ["hull", "hull", "box"]
-    assert "is number 3; of a text that was sent 2 collision meshes are read" in wire.warnings[0]
+    assert "is number 3; in text that was sent 2 collision meshes are read" in wire.warnings[0]
     assert [shape(source, uri).kind for _ in range(3)] == ["hull"] * 3
 
 
@@ -127,7 +126,7 @@ def test_a_confined_text_makes_nobody_read_a_large_file(
     monkeypatch.setattr(shapes, "MOST_BYTES", len(STL) - 1)
     wire = replace(source, confined=True, packages={"p": home})
     assert shape(wire, "package://p/box.stl").kind == "box"
-    assert f"{home}/box.stl: is too large to be read here; send the mesh itself" in wire.warnings[0]
+    assert f"{home}/box.stl: is too large to be read by the sim; send the mesh itself" in wire.warnings[0]
     assert shape(replace(source, packages={"p": home}), "package://p/box.stl").kind == "mesh"
 
 

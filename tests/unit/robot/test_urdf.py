@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from holozen.robot.model import RobotModel, parse
+from holozen.robot.loading import parse
+from holozen.robot.model import RobotModel
 
 ORIGIN = Path("somewhere/robot.urdf")
 
@@ -23,7 +24,7 @@ def test_a_limit_below_zero_is_none_and_is_told(name: str, kind: str) -> None:
     model = limited(f'<limit {name}="-1" lower="-1" upper="1"/>', kind)
     assert getattr(model.joints["j"].limits, name) == math.inf
     assert model.warnings == (
-        f"{ORIGIN}, line 2: <limit> of <joint name='j'> {name}: -1 is below zero; it is taken as unlimited",
+        f"{ORIGIN}, line 2: <limit> of <joint name='j'> {name}: -1 is negative; it is treated as unlimited",
     )
 
 

@@ -7,8 +7,9 @@ from typing import Any
 
 import pytest
 
-from holozen.ros import context, packages, rclpy
-from holozen.ros.node import Node
+from holozen.ros import packages, rclpy
+from holozen.ros.rclpy import context
+from holozen.ros.rclpy.node import Node
 from holozen.testing import Wire
 
 Write = Callable[..., Path]

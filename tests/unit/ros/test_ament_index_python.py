@@ -53,12 +53,12 @@ def test_an_unknown_package_is_an_error_that_says_how_to_mend_it(my_bot: Path, w
     told = str(error.value)
     assert told.startswith(f"no package 'my_bott' around {my_bot}, ")
     assert "did you mean 'my_bot'?" in told
-    assert told.endswith("say where it is: --package my_bott=DIR")
+    assert told.endswith("to give its folder: --package my_bott=DIR")
 
 
 @pytest.mark.parametrize("wrong", ["", None, 7])
 def test_what_is_no_name_is_refused(my_bot: Path, wrong: object) -> None:
-    with pytest.raises(ValueError, match="is no package name"):
+    with pytest.raises(ValueError, match="is not a package name"):
         ament.get_package_share_directory(wrong)  # type: ignore[arg-type]
 
 

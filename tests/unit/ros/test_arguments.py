@@ -6,9 +6,9 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from holozen.ros import arguments
-from holozen.ros.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
-from holozen.ros.severity import LoggingSeverity
+from holozen.ros.rclpy import arguments
+from holozen.ros.rclpy.exceptions import RCLInvalidROSArgsError, UnknownROSArgsError
+from holozen.ros.rclpy.logging import LoggingSeverity
 
 
 def parse(*words: str) -> arguments.Arguments:
@@ -49,19 +49,17 @@ def test_a_node_has_rules_of_its_own_before_those_of_all() -> None:
     assert merged.parameters_for("/tom") == {"x": 2, "y": 1}
 
 
-@pytest.mark.parametrize(
-    ("word", "value"),
-    [
+def test_a_value_has_the_type_that_yaml_gives_it() -> None:
+    rows = [
         ("1", 1), ("-7", -7), ("0x10", 16), ("1.0", 1.0), ("1e3", 1000.0), ("-.5", -0.5), (".inf", float("inf")),
         ("true", True), ("off", False), ("y", True), ("square", "square"), ("1:30", "1:30"), ("2026-11-21",) * 2,
         ("'1'", "1"), ('"true"', "true"), ("[1, 2]", [1, 2]), ("[0.5, 1.0]", [0.5, 1.0]), ("[a, 'b c']", ["a", "b c"]),
         ("[true, no]", [True, False]), ("[]", []), ("", ""), ("a b", "a b"), ("/dev/ttyUSB0", "/dev/ttyUSB0"),
-    ],
-)  # fmt: skip
-def test_a_value_has_the_type_that_yaml_gives_it(word: str, value: object) -> None:
-    found = parse("--ros-args", "-p", f"x:={word}").parameters_for("/tom")
-    assert found == {"x": value}
-    assert type(found["x"]) is type(value)
+    ]  # fmt: skip
+    for word, value in rows:
+        found = parse("--ros-args", "-p", f"x:={word}").parameters_for("/tom")
+        assert found == {"x": value}
+        assert type(found["x"]) is type(value)
 
 
 def test_a_map_is_parameters_with_dots() -> None:
@@ -93,9 +91,8 @@ def test_what_ros_takes_and_means_nothing_here_is_taken() -> None:
     assert (found.unparsed, found.quiet) == (["script.py"], True)
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
+def test_what_cannot_be_read_is_told_in_one_line() -> None:
+    for words, told in [
         (["-r"], "-r needs a value"),
         (["-r", "--"], "-r needs a value"),
         (["-r", "chat"], "-r chat: write FROM:=TO"),
@@ -103,26 +100,24 @@ def test_what_ros_takes_and_means_nothing_here_is_taken() -> None:
         (["-p", "x"], "NAME:=VALUE"),
         (["-p", ":x:=1"], "NAME:=VALUE"),
         (["-p", "x:=[1, 2.5]"], "write 1.0 for 1"),
-        (["-p", "x:=[1, a]"], "values of one type, and not int, str"),
-        (["-p", "x:=[[1]]"], "a list within a list"),
-        (["-p", "x:=[1"], "it is no YAML"),
-        (["-p", "x:=99999999999999999999"], "64 bits"),
+        (["-p", "x:=[1, a]"], "all values of a list must have one type, not int, str"),
+        (["-p", "x:=[[1]]"], "a parameter cannot be a list of lists"),
+        (["-p", "x:=[1"], "invalid YAML"),
+        (["-p", "x:=99999999999999999999"], "64-bit"),
         (["-p", "x:=" + "[" * 5000], "nested"),
         (["--params-file", "/nowhere.yaml"], "cannot read /nowhere.yaml"),
         (["--log-level", "loud"], "use one of unset, debug, info"),
-    ],
-)
-def test_what_cannot_be_read_is_told_in_one_line(words: list[str], told: str) -> None:
-    with pytest.raises(RCLInvalidROSArgsError) as error:
-        parse("--ros-args", *words)
-    assert told in str(error.value)
-    assert "\n" not in str(error.value)
+    ]:
+        with pytest.raises(RCLInvalidROSArgsError) as error:
+            parse("--ros-args", *words)
+        assert told in str(error.value)
+        assert "\n" not in str(error.value)
 
 
 def test_an_unknown_flag_is_told_with_the_nearest() -> None:
-    with pytest.raises(UnknownROSArgsError, match="'--params'; did you mean --param"):
+    with pytest.raises(UnknownROSArgsError, match="'--params'; did you mean '--param"):
         parse("--ros-args", "--params", "x")
-    with pytest.raises(UnknownROSArgsError, match="end ROS's words with --"):
+    with pytest.raises(UnknownROSArgsError, match="end the ROS arguments with --"):
         parse("--ros-args", "goal.txt")
     with pytest.raises(TypeError, match="a list of str"):
         arguments.parse([5])  # type: ignore[list-item]

@@ -7,13 +7,14 @@ from typing import Any
 
 import pytest
 
-from holozen.errors import ServiceError
 from holozen.messages import TriggerReply, TriggerRequest
-from holozen.ros import context, rclpy
-from holozen.ros.context import ExternalShutdownException
-from holozen.ros.exceptions import InvalidHandle, RCLError
+from holozen.ros import rclpy
 from holozen.ros.generated import find
+from holozen.ros.rclpy import context
+from holozen.ros.rclpy.context import ExternalShutdownException
+from holozen.ros.rclpy.exceptions import InvalidHandle, RCLError
 from holozen.testing import Wire, wait_for
+from holozen.transport.errors import ServiceError
 
 Trigger: Any = find("std_srvs/srv/Trigger")
 Spin = Callable[..., Any]
@@ -119,7 +120,7 @@ def test_a_wait_for_a_service_ends_with_rclpy(ros: Wire) -> None:
 
 
 def test_nobody_waits_for_a_service_after_a_signal(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(context, "LAST_WORDS", 1000.0)
+    monkeypatch.setattr(context, "GRACE", 1000.0)
     client = rclpy.create_node("tom").create_client(Trigger, "go")
     rclpy.get_default_context().interrupt()
     assert not client.service_is_ready()  # there is time for last words

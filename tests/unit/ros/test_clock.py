@@ -3,17 +3,21 @@
 import threading
 import time
 from collections.abc import Callable, Iterator
+from typing import Any
 
 import pytest
 
-from holozen.ros.clock import Clock, ROSClock
-from holozen.ros.clock_type import ClockType
-from holozen.ros.context import Context
-from holozen.ros.duration import Duration
-from holozen.ros.exceptions import NotInitializedException
-from holozen.ros.jumps import ClockChange, JumpThreshold, TimeJump
-from holozen.ros.time import Time
-from holozen.testing import wait_for
+from holozen.messages import Clock as ClockMessage
+from holozen.messages import Time as TimeMessage
+from holozen.messages import Twist
+from holozen.ros.rclpy.clock import Clock, ClockChange, JumpThreshold, ROSClock, TimeJump, TimeSource
+from holozen.ros.rclpy.context import Context
+from holozen.ros.rclpy.exceptions import NotInitializedException
+from holozen.ros.rclpy.node import Node
+from holozen.ros.rclpy.parameter import Parameter
+from holozen.ros.rclpy.time import ClockType, Duration, Time
+from holozen.testing import Wire, wait_for
+from holozen.transport.graph import Graph
 
 
 @pytest.fixture
@@ -127,11 +131,11 @@ def test_a_sleep_ends_when_simulated_time_begins_or_ends(context: Context) -> No
 def test_who_sleeps_wrongly_is_told(context: Context) -> None:
     with pytest.raises(NotInitializedException):
         Clock().sleep_for(Duration(seconds=1), Context())
-    with pytest.raises(ValueError, match="clock of SYSTEM_TIME, and the time of ROS_TIME"):
+    with pytest.raises(ValueError, match="clock of SYSTEM_TIME, and the time is of ROS_TIME"):
         Clock().sleep_until(at(1), context)
-    with pytest.raises(TypeError, match=r"sleeps until a Time, and 1\.0 is a float"):
+    with pytest.raises(TypeError, match=r"until must be a Time; 1\.0 is a float"):
         Clock().sleep_until(1.0, context)  # type: ignore[arg-type]
-    with pytest.raises(TypeError, match=r"sleeps for a Duration, and 1\.0 is a float"):
+    with pytest.raises(TypeError, match=r"rel_time must be a Duration; 1\.0 is a float"):
         Clock().sleep_for(1.0, context)  # type: ignore[arg-type]
 
 
@@ -168,14 +172,122 @@ def test_jumps_beyond_a_threshold_are_told_before_and_after() -> None:
 
 def test_a_wrong_threshold_is_refused() -> None:
     for forward, backward, told in (
-        (Duration(), None, "min_forward is more than zero"),
-        (None, Duration(), "min_backward is less than zero"),
+        (Duration(), None, "min_forward must be positive"),
+        (None, Duration(), "min_backward must be negative"),
     ):
         with pytest.raises(ValueError, match=told):
             JumpThreshold(min_forward=forward, min_backward=backward)
-    with pytest.raises(ValueError, match="tell no jump"):
+    with pytest.raises(ValueError, match="report no jump"):
         JumpThreshold(min_forward=None, min_backward=None, on_clock_change=False)
-    with pytest.raises(TypeError, match="min_forward is a Duration"):
+    with pytest.raises(TypeError, match="min_forward must be a Duration"):
         JumpThreshold(min_forward=1.0, min_backward=None)  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="give a pre_callback"):
         ROSClock().create_jump_callback(JumpThreshold(min_forward=None, min_backward=None))
+
+
+class Tom(Node):
+    """A node with a clock and a TimeSource of its own besides those of every node."""
+
+    def __init__(self, *words: str) -> None:
+        super().__init__("tom", cli_args=["--ros-args", *words], start_parameter_services=False)
+        self.clock, self.source = ROSClock(), TimeSource(self)
+        self.source.attach_clock(self.clock)
+
+    def use_sim_time(self, value: bool) -> None:
+        self.set_parameters([Parameter("use_sim_time", value=value)])
+
+    def seconds(self) -> float:
+        return self.clock.nanoseconds() / 1e9
+
+
+class Sim:
+    """Who tells the time."""
+
+    def __init__(self, wire: Wire, key: str = "clock") -> None:
+        self._clock = wire.bus("sim").publisher(key, ClockMessage)
+
+    def tell(self, node: Tom, seconds: float, clock: Clock | None = None) -> None:
+        def shown() -> Any:
+            self._clock.put(ClockMessage(TimeMessage.of(seconds)))
+            return (clock or node.clock).nanoseconds() == seconds * 1e9
+
+        wait_for(shown)
+
+
+def readers(graph: Graph) -> set[str]:
+    return {row.key for row in graph.endpoints() if row.kind == "sub"}
+
+
+def test_a_node_shows_the_systems_time_unless_told(ros: Wire) -> None:
+    node, told = Tom(), Tom("-p", "use_sim_time:=true")
+    assert node.seconds() > 1e9
+    assert told.seconds() == 0.0, "simulated time begins at zero"
+    assert (node.source.ros_time_is_active, told.source.ros_time_is_active) == (False, True)
+
+
+def test_time_passes_with_the_messages_while_nobody_spins(ros: Wire) -> None:
+    node, sim = Tom("-p", "use_sim_time:=true"), Sim(ros)
+    for seconds in (1.0, 2.5, 0.5):
+        sim.tell(node, seconds)
+
+
+def test_the_parameter_switches_it_on_and_off(ros: Wire) -> None:
+    node, sim = Tom(), Sim(ros)
+    node.use_sim_time(True)
+    sim.tell(node, 3.0)
+    graph = ros.bus().graph()
+    wait_for(lambda: readers(graph) == {"clock"})
+    node.use_sim_time(False)
+    assert node.seconds() > 1e9
+    wait_for(lambda: readers(graph) == set())
+    node.use_sim_time(True)
+    sim.tell(node, 4.0)
+    node.source.close()
+    assert node.seconds() > 1e9
+
+
+def test_the_topic_can_be_another_one(ros: Wire) -> None:
+    Sim(ros, "lab/clock").tell(Tom("-p", "use_sim_time:=true", "-r", "/clock:=/lab/clock"), 5.0)
+
+
+def test_more_clocks_get_the_time_and_lose_it(ros: Wire) -> None:
+    node, sim, another = Tom("-p", "use_sim_time:=true"), Sim(ros), ROSClock()
+    sim.tell(node, 2.0)
+    node.source.attach_clock(another)
+    assert another.nanoseconds() == 2_000_000_000
+    sim.tell(node, 3.0, another)
+    node.source.detach_clock(another)
+    sim.tell(node, 4.0)
+    assert another.nanoseconds() == 3_000_000_000
+    with pytest.raises(ValueError, match="only clocks of ROS_TIME"):
+        node.source.attach_clock(Clock())
+
+
+def test_what_is_no_time_is_told_and_changes_nothing(ros: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+    node, sim = Tom("-p", "use_sim_time:=true"), Sim(ros)
+    sim.tell(node, 2.0)
+    wrong = ros.bus("wrong").publisher("clock", Twist)
+    told: list[str] = []
+
+    def is_told() -> bool:
+        wrong.put(Twist())
+        told.append(capsys.readouterr().err)
+        return "[WARN]" in "".join(told)
+
+    wait_for(is_told)
+    assert "[tom]: invalid time on /clock: " in "".join(told)
+    assert "".join(told).count("\n") == 1
+    assert node.clock.now() == Time(seconds=2, clock_type=node.clock.clock_type)
+
+
+def test_time_goes_on_when_a_callback_for_jumps_fails(ros: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+    node, sim = Tom("-p", "use_sim_time:=true"), Sim(ros)
+
+    def fail(_jump: object) -> None:
+        raise RuntimeError("oh")
+
+    threshold = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1))
+    node.clock.create_jump_callback(threshold, post_callback=fail)
+    for seconds in (2.0, 1.0, 3.0):
+        sim.tell(node, seconds)
+    assert capsys.readouterr().err.count("RuntimeError: oh") == 1

@@ -1,13 +1,17 @@
 """A context begins once and ends once, and tells those who asked for it."""
 
+import signal
+import sys
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from holozen.ros.context import Context, get_default_context
-from holozen.ros.exceptions import RCLError
-from holozen.testing import wait_for
+from holozen.messages import Twist
+from holozen.ros.rclpy.context import Context, get_default_context
+from holozen.ros.rclpy.exceptions import RCLError
+from holozen.testing import Process, Wire, wait_for
 
 
 class Open:
@@ -101,7 +105,7 @@ def test_a_domain_is_told_to_separate_nobody(capfd: pytest.CaptureFixture[str]) 
     context = Context()
     context.init([], domain_id=7)
     context.shutdown()
-    assert "domain_id=7 separates nobody here" in capfd.readouterr().err
+    assert "domain_id=7 has no effect here" in capfd.readouterr().err
     assert context.get_domain_id() == 0
 
 
@@ -110,3 +114,164 @@ def test_the_default_context_is_another_after_its_end() -> None:
     assert get_default_context() is first
     assert get_default_context(shutting_down=True) is first
     assert get_default_context() is not first
+
+
+START = """
+import rclpy, sys, threading, time
+from geometry_msgs.msg import Twist
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.executors import ExternalShutdownException, MultiThreadedExecutor
+from rclpy.wait_for_message import wait_for_message
+from std_srvs.srv import Trigger
+rclpy.init()
+node = rclpy.create_node("script")
+pub = node.create_publisher(Twist, "cmd_vel", 1)
+node.create_subscription(Twist, "odom", print, 1)
+service = node.create_service(Trigger, "mine", lambda _, response: response)
+def up(): print("up", flush=True)
+timer = node.create_timer(0.01, up)
+"""
+SPIN = "rclpy.spin(node)"
+POLITE = """
+try:
+    rclpy.spin(node)
+except (KeyboardInterrupt, ExternalShutdownException):
+    pub.publish(Twist())
+    print("stopped", flush=True)
+finally:
+    node.destroy_node()
+    rclpy.shutdown()
+"""
+LOOP = "up()\nwhile True:\n    pub.publish(Twist())\n    time.sleep(0.01)"
+OK = "up()\nwhile rclpy.ok():\n    time.sleep(0.01)\nrclpy.try_shutdown()"
+RATE = """
+threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()
+rate = node.create_rate(50)
+while rclpy.ok():
+    rate.sleep()
+"""
+THREAD = "threading.Thread(target=rclpy.spin, args=(node,)).start()"
+# What the main thread does not see stands for what comes just before it waits.
+DEAF = """
+import signal
+def spin():
+    up()
+    rclpy.spin(node)
+thread = threading.Thread(target=spin)
+signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTERM})
+thread.start()
+thread.join()
+"""
+PENDING = """
+future = node.create_client(Trigger, "nobody").call_async(Trigger.Request())
+node.create_client(Trigger, "mine").call_async(Trigger.Request())
+rclpy.spin_until_future_complete(node, future)
+"""
+CALL = "up()\nnode.create_client(Trigger, 'nobody').call(Trigger.Request())"
+WAIT = """
+client = node.create_client(Trigger, 'nobody')
+up()
+while not client.wait_for_service(timeout_sec=0.05):
+    pass
+"""
+WAITS = "up()\nwait_for_message(Twist, node, 'x')"
+COUNT = "up()\nwhile pub.get_subscription_count() == 0:\n    time.sleep(0.01)"
+LOOK = "up()\nwhile node.count_publishers('odom') == 0:\n    time.sleep(0.01)"
+NODE = "up()\nwhile not node.wait_for_node('nobody', 0.05):\n    pass"
+FRAME = """
+from tf2_ros import Buffer
+buffer, long = Buffer(), rclpy.duration.Duration(seconds=1000)
+up()
+while not buffer.can_transform("map", "odom", rclpy.time.Time(), timeout=long):
+    pass
+"""
+MANY = """
+executor = MultiThreadedExecutor(4)
+executor.add_node(node)
+def block():
+    blocker.cancel()
+    time.sleep(1000)
+blocker = node.create_timer(0, block, callback_group=ReentrantCallbackGroup())
+executor.spin()
+"""
+NODES = "nodes = [rclpy.create_node(f'node{i}') for i in range(5)]\nrclpy.spin(node)"
+EXTERNAL = "ExternalShutdownException: rclpy was shut down, by a signal or from elsewhere"
+CASES = {
+    "spin, SIGINT": (SPIN, signal.SIGINT, 130, ""),
+    "spin, SIGTERM": (SPIN, signal.SIGTERM, 1, EXTERNAL),
+    "polite, SIGINT": (POLITE, signal.SIGINT, 0, ""),
+    "polite, SIGTERM": (POLITE, signal.SIGTERM, 0, ""),
+    "publish for ever, SIGINT": (LOOP, signal.SIGINT, 130, ""),
+    "publish for ever, SIGTERM": (LOOP, signal.SIGTERM, 1, EXTERNAL),
+    "while ok, SIGTERM": (OK, signal.SIGTERM, 0, ""),
+    "rate, SIGINT": (RATE, signal.SIGINT, 130, ""),
+    "a thread spins, SIGINT": (THREAD, signal.SIGINT, 130, ""),
+    "a thread spins, SIGTERM that the main thread does not see": (DEAF, signal.SIGTERM, 0, ""),
+    "calls wait, SIGINT": (PENDING, signal.SIGINT, 130, ""),
+    "a call, SIGINT": (CALL, signal.SIGINT, 130, ""),
+    "wait for a service, SIGTERM": (WAIT, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a message, SIGTERM": (WAITS, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a reader, SIGTERM": (COUNT, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a writer, SIGTERM": (LOOK, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a frame, SIGTERM": (FRAME, signal.SIGTERM, 1, EXTERNAL),
+    "wait for a node, SIGTERM": (NODE, signal.SIGTERM, 1, EXTERNAL),
+    "many threads, SIGINT": (MANY, signal.SIGINT, 130, ""),
+    "many threads, SIGTERM": (MANY, signal.SIGTERM, 1, EXTERNAL),
+    "many nodes, SIGINT": (NODES, signal.SIGINT, 130, ""),
+}
+
+
+Script = Callable[[str], Process]
+
+
+@pytest.fixture
+def script(wire: Wire, tmp_path: Path) -> Script:
+    """`with script(text) as process`: a script that begins as all here do, and goes on with a text."""
+
+    def start(text: str) -> Process:
+        path = tmp_path / "script.py"
+        path.write_text(START + text)
+        return Process([sys.executable, "-u", "-m", "holozen", "run", *wire.flags, str(path)])
+
+    return start
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_signal_ends_it(script: Script, case: str) -> None:
+    text, number, code, told = CASES[case]
+    with script(text) as process:
+        process.wait_for_line("up")
+        process.signal(number)
+        assert process.wait(5) == code, process.err
+        assert told in process.err if told else not process.err
+        assert "Fatal Python error" not in process.err
+        assert ("stopped" in process.out) == (text == POLITE)
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "told"),
+    [
+        ("pub.publish(Twist())", 0, ""),
+        ("sys.exit(3)", 3, ""),
+        ("node.create_timer(0.01, lambda: sys.exit(4))\nrclpy.spin(node)", 4, ""),
+        ("def mine(): 1 / 0\nnode.create_timer(0.01, mine)\nrclpy.spin(node)", 1, "in mine\n    def mine(): 1 / 0"),
+        ("node.create_timer(0.1, rclpy.shutdown)\nrclpy.spin(node)", 0, ""),
+        ("threading.Timer(0.05, rclpy.shutdown).start()\nrclpy.spin(node)", 0, ""),
+        ("node.create_client(Trigger, 'nobody').call_async(Trigger.Request())", 0, ""),
+        ("threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\nup()", 0, None),
+    ],
+)
+def test_it_ends_by_itself(script: Script, text: str, code: int, told: str | None) -> None:
+    with script(text) as process:
+        assert process.wait(10) == code, process.err
+        assert told is None or (told in process.err if told else not process.err)
+        assert "Fatal Python error" not in process.err
+
+
+def test_a_script_that_never_spins_publishes_and_leaves(wire: Wire, script: Script) -> None:
+    bus = wire.bus()
+    commands, graph = bus.subscribe("cmd_vel", Twist), bus.graph()
+    with script("while not pub.get_subscription_count(): pass\npub.publish(Twist())") as process:
+        assert commands.recv().sample.source.startswith("script@")
+        wait_for(lambda: any(node.source.startswith("script@") for node in graph.left()))
+        assert process.wait() == 0

@@ -25,7 +25,7 @@ def test_a_script_without_ending_has_to_be_executable_and_python(my_bot: Path, w
     path.chmod(0o755)
     assert find("my_bot", "drive").path == path
     path.write_text("\x7fELF\0")
-    with pytest.raises(NotFound, match="drive is no Python script, and only those run here"):
+    with pytest.raises(NotFound, match="drive is not a Python script; only those run here"):
         find("my_bot", "drive")
 
 
@@ -73,7 +73,7 @@ def test_console_scripts_are_read_from_setup_cfg(my_bot: Path, write: Write) -> 
 
 def test_a_console_script_without_its_module_is_told(my_bot: Path, write: Write) -> None:
     write("src/my_bot/setup.py", SETUP_PY)
-    with pytest.raises(NotFound, match=r"'drive' is my_bot.controller:main in its setup file, but there is no .*\.py"):
+    with pytest.raises(NotFound, match=r"'drive' is my_bot.controller:main in its setup file, but .*\.py does not"):
         find("my_bot", "drive")
 
 
@@ -105,14 +105,14 @@ def test_an_unknown_executable_is_told_with_all_there_are(my_bot: Path, write: W
     write("src/my_bot/my_bot/__init__.py")
     with pytest.raises(NotFound) as error:
         find("my_bot", "servce_node.py")
-    told = f"no executable 'servce_node.py'; did you mean 'service_node.py'?; in {my_bot} there are: "
+    told = f"no executable 'servce_node.py'; did you mean 'service_node.py'?; executables in {my_bot}: "
     assert str(error.value).endswith(f"{told}drive, pose, service_node.py, shape")
-    with pytest.raises(NotFound, match=r"^give one; in"):
+    with pytest.raises(NotFound, match=r"^give an executable; executables in"):
         find("my_bot", "")
 
 
 def test_an_unknown_package_is_told_with_those_around(my_bot: Path) -> None:
-    with pytest.raises(NotFound, match=r"no package 'my_boot' around .*; did you mean 'my_bot'\?; say .* --package"):
+    with pytest.raises(NotFound, match=r"no package 'my_boot' around .*; did you mean 'my_bot'\?; .* --package"):
         find("my_boot", "controller.py")
 
 
@@ -120,7 +120,7 @@ def test_a_folder_that_says_no_name_is_no_package_to_be_run(home: Path, write: W
     write("urdf/hb_bot.urdf.xacro")
     path = write("scripts/controller.py")
     packages.use({})
-    with pytest.raises(NotFound, match=rf"^no package 'hb_contrl' around {home}; packages found: none; say .*"):
+    with pytest.raises(NotFound, match=rf"^no package 'hb_contrl' around {home}; packages found: none; to give .*"):
         find("hb_contrl", "controller.py")
     with pytest.raises(NotFound, match=r"^no package 'hb_contrl'"):
         find("hb_contrl", "other.py", nameless=True)

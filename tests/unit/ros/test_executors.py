@@ -2,16 +2,17 @@
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
 from holozen.ros import rclpy
-from holozen.ros.context import Context
-from holozen.ros.exceptions import RCLError
-from holozen.ros.executors import Executor, ExternalShutdownException, SingleThreadedExecutor, TimeoutException
 from holozen.ros.generated import find
+from holozen.ros.rclpy.callback_groups import MutuallyExclusiveCallbackGroup, ReentrantCallbackGroup
+from holozen.ros.rclpy.context import Context, ExternalShutdownException
+from holozen.ros.rclpy.exceptions import RCLError
+from holozen.ros.rclpy.executors import Executor, MultiThreadedExecutor, SingleThreadedExecutor, TimeoutException
 from holozen.testing import Wire, wait_for
 
 Twist: Any = find("geometry_msgs/msg/Twist")
@@ -29,7 +30,7 @@ def test_entities_take_turns_however_much_one_has_to_do(ros: Wire) -> None:
 
 def test_nobody_is_woken_while_callbacks_run(ros: Wire, spin_for: Spin) -> None:
     node, waits, executor = rclpy.create_node("tom"), list[bool](), rclpy.get_global_executor()
-    node.create_timer(0.001, lambda: waits.append(executor._waker.waiting))
+    node.create_timer(0.001, lambda: waits.append(executor.waker.waiting))
     spin_for(lambda: len(waits) > 5, node)
     assert not any(waits)
 
@@ -40,7 +41,7 @@ def test_a_timeout_is_kept_and_zero_waits_for_nothing(ros: Wire, monkeypatch: py
     start = time.monotonic()
     executor.spin_once(timeout_sec=0.05)
     assert time.monotonic() - start >= 0.05
-    monkeypatch.setattr(executor._waker, "wait", pytest.fail)
+    monkeypatch.setattr(executor.waker, "wait", pytest.fail)
     executor.spin_once(timeout_sec=0)
     executor.spin_until_future_complete(rclpy.Future(), timeout_sec=0)
 
@@ -49,7 +50,7 @@ def test_a_future_that_another_thread_sets_ends_the_wait(ros: Wire) -> None:
     node, future, executor = rclpy.create_node("tom"), rclpy.Future(), rclpy.get_global_executor()
 
     def finish() -> None:
-        wait_for(lambda: executor._waker.waiting)
+        wait_for(lambda: executor.waker.waiting)
         future.set_result(5)
 
     thread = threading.Thread(target=finish)
@@ -111,7 +112,7 @@ def test_an_executor_that_is_shut_down_spins_no_more(ros: Wire) -> None:
 
 
 def test_no_executor_without_a_running_context() -> None:
-    with pytest.raises(RCLError, match="failed to make an executor: rclpy is not running"):
+    with pytest.raises(RCLError, match="failed to create an executor: rclpy is not running"):
         SingleThreadedExecutor(context=Context())
 
 
@@ -207,3 +208,159 @@ def test_a_signal_between_two_spins_is_told_by_the_next(ros: Wire) -> None:
             spin(node)
     with pytest.raises(ExternalShutdownException):
         SingleThreadedExecutor()
+
+
+@pytest.fixture
+def executor(ros: Wire) -> Iterator[MultiThreadedExecutor]:
+    with MultiThreadedExecutor(4) as executor:
+        yield executor
+
+
+def test_callbacks_of_a_reentrant_group_meet(executor: MultiThreadedExecutor) -> None:
+    node, group = rclpy.create_node("tom"), ReentrantCallbackGroup()
+    barrier = threading.Barrier(3)
+
+    def meet() -> None:
+        barrier.wait(10)
+        executor.shutdown(0)
+
+    for _ in range(3):
+        node.create_guard_condition(meet, callback_group=group).trigger()
+    executor.add_node(node)
+    executor.spin()
+    assert not barrier.broken
+
+
+def test_one_subscription_of_a_reentrant_group_runs_several_at_a_time(executor: MultiThreadedExecutor) -> None:
+    node, barrier, met = rclpy.create_node("tom"), threading.Barrier(2), list[int]()
+    node.create_subscription(
+        Twist,
+        "a",
+        lambda _: met.append(barrier.wait(10)),
+        10,
+        callback_group=ReentrantCallbackGroup(),
+    )
+    writer = node.create_publisher(Twist, "a", 10)
+    wait_for(writer.get_subscription_count)
+    writer.publish(Twist())
+    writer.publish(Twist())
+    executor.add_node(node)
+    while len(met) < 2:
+        executor.spin_once(0.01)
+    assert sorted(met) == [0, 1]
+
+
+@pytest.mark.parametrize("own", [True, False])
+def test_callbacks_of_one_exclusive_group_do_not_meet(executor: MultiThreadedExecutor, own: bool) -> None:
+    node, running, most, count = rclpy.create_node("tom"), list[int](), list[int](), 0
+    group = MutuallyExclusiveCallbackGroup() if own else None
+
+    def alone() -> None:
+        nonlocal count
+        running.append(1)
+        most.append(len(running))
+        threading.Event().wait(0.001)
+        running.pop()
+        count += 1
+
+    for _ in range(4):
+        node.create_timer(0, alone, callback_group=group)
+    executor.add_node(node)
+    while count < 40:
+        executor.spin_once(0.01)
+    assert set(most) == {1}
+
+
+def test_what_a_callback_raises_comes_out_of_the_spin(executor: MultiThreadedExecutor) -> None:
+    node = rclpy.create_node("tom")
+
+    def mine() -> None:
+        raise KeyError("x")
+
+    node.create_timer(0.001, mine)
+    executor.add_node(node)
+    with pytest.raises(KeyError) as error:
+        executor.spin()
+    assert error.traceback[-1].name == "mine"
+
+
+def test_while_all_threads_are_busy_the_newest_wait(ros: Wire) -> None:
+    executor = MultiThreadedExecutor(1)
+    node, got, gate = rclpy.create_node("tom"), list[float](), threading.Event()
+
+    def slow(message: Any) -> None:
+        got.append(message.linear.x)
+        gate.wait(10)
+
+    subscription = node.create_subscription(Twist, "a", slow, 2, callback_group=ReentrantCallbackGroup())
+    writer = node.create_publisher(Twist, "a", 10)
+    wait_for(writer.get_subscription_count)
+    executor.add_node(node)
+    for x in range(8):
+        message = Twist()
+        message.linear.x = float(x)
+        writer.publish(message)
+        while not got:
+            executor.spin_once(0.01)
+        if x:
+            wait_for(lambda: subscription.inbox.parked)  # its thread has nothing in its hand
+        executor.spin_once(0)
+    gate.set()
+    while len(got) < 3:
+        executor.spin_once(0.01)
+    executor.spin_once(0)
+    assert got == [0, 6, 7]
+    assert executor.shutdown()
+
+
+def test_a_shutdown_tells_whether_all_callbacks_have_ended(ros: Wire) -> None:
+    executor, gate, begun = MultiThreadedExecutor(2), threading.Event(), threading.Event()
+    node = rclpy.create_node("tom")
+
+    def wait() -> None:
+        begun.set()
+        gate.wait(10)
+
+    node.create_guard_condition(wait).trigger()
+    executor.add_node(node)
+    while not begun.is_set():
+        executor.spin_once(0.01)
+    assert not executor.shutdown(0.01)
+    gate.set()
+    assert executor.shutdown(10)
+
+
+def test_less_than_one_thread_is_refused(ros: Wire) -> None:
+    with pytest.raises(ValueError, match=r"^num_threads is 0; use 1 or more$"):
+        MultiThreadedExecutor(0)
+
+
+class Entity:
+    """Something with a callback."""
+
+
+def test_of_an_exclusive_group_one_runs_at_a_time() -> None:
+    group, one, other = MutuallyExclusiveCallbackGroup(), Entity(), Entity()
+    assert group.can_execute(one)
+    assert group.beginning_execution(one)
+    assert not group.can_execute(other)
+    assert not group.beginning_execution(one)
+    group.ending_execution(one)
+    assert group.can_execute(other)
+
+
+def test_of_a_reentrant_group_all_run() -> None:
+    group, one = ReentrantCallbackGroup(), Entity()
+    assert group.beginning_execution(one)
+    assert group.can_execute(one)
+    assert group.beginning_execution(one)
+    group.ending_execution(one)
+
+
+def test_a_group_knows_its_members_while_they_live() -> None:
+    group, one = ReentrantCallbackGroup(), Entity()
+    group.add_entity(one)
+    assert group.has_entity(one)
+    assert not group.has_entity(Entity())
+    del one
+    assert len(group.entities) == 0

@@ -2,36 +2,28 @@
 
 import array
 import copy
+import json
+import math
 import operator
 import pickle
+import struct
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 
-from holozen.interfaces import Constant, Field, Interface, InterfaceError
-from holozen.interfaces.parser import parse
-from holozen.interfaces.registry import Registry
+from holozen import messages as m
+from holozen.messages import struct_cdr
+from holozen.messages.cdr import Codec, Shape
+from holozen.messages.codec import WIRES, CodecError, convert, decode, encode, encoding
+from holozen.messages.definitions import Constant, Field, Interface, InterfaceError
+from holozen.messages.registry import Registry
 from holozen.ros import generated
+from tests.unit.ros.classes import made, refused
 
 TWIST, VECTOR = generated.find("geometry_msgs/msg/Twist"), generated.find("geometry_msgs/msg/Vector3")
 JOINTS, TIME = generated.find("sensor_msgs/msg/JointState"), generated.find("builtin_interfaces/msg/Time")
-
-
-def made(text: str, name: str = "t/msg/T") -> Any:
-    """The class of a definition."""
-    (section,) = parse(text, "here", Registry().find)
-    return generated.make(Interface(name, "msg", *section))
-
-
-def refused(message: Any, name: str, value: Any) -> str:
-    with pytest.raises(AssertionError) as error:
-        setattr(message, name, value)
-    with pytest.raises(AssertionError) as same:
-        type(message)(**{name: value})
-    assert str(same.value) == str(error.value)
-    assert "\n" not in str(error.value)
-    return str(error.value)
 
 
 def doubles(*values: float) -> "array.array[float]":
@@ -107,9 +99,8 @@ def test_fields_are_given_by_their_names_only() -> None:
         generated.find("std_msgs/msg/Empty")().x = 1
 
 
-@pytest.mark.parametrize(
-    ("kind", "value", "reason"),
-    [
+def test_a_value_that_does_not_fit_is_told() -> None:
+    for kind, value, reason in [
         ("float64", 1, "of type 'float', not 'int' (1); write 1.0, or float(...)"),
         ("float64", np.float32(1), "of type 'float', not 'float32' (np.float32(1.0)); write float(...)"),
         ("float64", "1", "of type 'float', not 'str' ('1')"),
@@ -131,37 +122,29 @@ def test_fields_are_given_by_their_names_only() -> None:
         ("float64[2]", [1.0], "a sequence of exactly 2 values of type 'float', not of 1 values"),
         ("float64[<=2]", [1.0] * 3, "a sequence of at most 2 values of type 'float', not of 3 values"),
         ("float64[]", np.array(1.0), "a sequence of values of type 'float', not 'ndarray' (array(1.))"),
-    ],
-    ids=str,
-)
-def test_a_value_that_does_not_fit_is_told(kind: str, value: Any, reason: str) -> None:
-    told = refused(made(f"{kind} some")(), "some", value)
-    assert told.startswith(f"The 'some' field of t.msg.T must be {reason}")
+    ]:
+        told = refused(made(f"{kind} some")(), "some", value)
+        assert told.startswith(f"The 'some' field of t.msg.T must be {reason}")
 
 
-@pytest.mark.parametrize(
-    ("kind", "values", "reason"),
-    [
+def test_an_element_that_does_not_fit_is_told_with_its_place() -> None:
+    for kind, values, reason in [
         ("float64[]", [1.0, 2], "[1]' field of t.msg.T must be of type 'float', not 'int' (2); write 2.0"),
         ("float64[]", np.array([1, 2]), "[0]' field of t.msg.T must be of type 'float', not 'int' (1)"),
         ("float64[]", np.zeros((2, 2)), "[0]' field of t.msg.T must be of type 'float', not 'list' ([0.0, 0.0])"),
         ("uint8[]", [1, 256], "[1]' field of t.msg.T must be of type 'int' in [0, 255], not 'int' (256)"),
         ("string[2]", ["a", 3], "[1]' field of t.msg.T must be of type 'str', not 'int' (3)"),
         ("geometry_msgs/Point[]", [VECTOR()], "[0]' field of t.msg.T must be a sub message of type 'Point', not 'Vec"),
-    ],
-    ids=str,
-)
-def test_an_element_that_does_not_fit_is_told_with_its_place(kind: str, values: Any, reason: str) -> None:
-    assert refused(made(f"{kind} some")(), "some", values).startswith(f"The 'some{reason}")
+    ]:
+        assert refused(made(f"{kind} some")(), "some", values).startswith(f"The 'some{reason}")
 
 
 class Text(str):
     """A text of another class."""
 
 
-@pytest.mark.parametrize(
-    ("kind", "value", "held"),
-    [
+def test_a_value_is_held_as_a_plain_one() -> None:
+    rows: list[tuple[str, Any, Any]] = [
         ("float64", np.float64(0.5), 0.5),
         ("int32", True, 1),
         ("byte", b"\x07", 7),
@@ -175,14 +158,12 @@ class Text(str):
         ("bool[]", [True, False], [True, False]),
         ("byte[]", [b"\x01", 2], [1, 2]),
         ("string<=2[]", ("ab",), ["ab"]),
-    ],
-    ids=str,
-)
-def test_a_value_is_held_as_a_plain_one(kind: str, value: Any, held: Any) -> None:
-    message = made(f"{kind} some")(some=value)
-    assert message.some == held
-    for inner, plain in [(message.some, held), *(zip(message.some, held, strict=True) if "]" in kind else ())]:
-        assert type(inner) is type(plain)
+    ]
+    for kind, value, held in rows:
+        message = made(f"{kind} some")(some=value)
+        assert message.some == held
+        for inner, plain in [(message.some, held), *(zip(message.some, held, strict=True) if "]" in kind else ())]:
+            assert type(inner) is type(plain)
 
 
 def test_a_list_of_numbers_is_copied_and_one_of_messages_is_the_one_that_was_given() -> None:
@@ -208,9 +189,9 @@ def test_a_service_has_two_messages_and_no_values() -> None:
     assert trigger.Request is generated.find("std_srvs/srv/Trigger_Request")
     assert trigger.ROS == trigger.Request.ROS == trigger.Response.ROS == "std_srvs/srv/Trigger"
     assert generated.find("nav_msgs/srv/LoadMap").Response.RESULT_INVALID_MAP_DATA == 2
-    with pytest.raises(NotImplementedError, match=r"make a Trigger\.Request\(\)"):
+    with pytest.raises(NotImplementedError, match=r"create a Trigger\.Request\(\)"):
         trigger()
-    with pytest.raises(InterfaceError, match="t/msg/T is no service"):
+    with pytest.raises(InterfaceError, match="t/msg/T is not a service"):
         generated.make_service(Interface("t/msg/T", "msg"))
 
 
@@ -232,9 +213,195 @@ def test_a_class_is_made_once_for_each_definition() -> None:
 )
 def test_a_name_that_no_class_can_have_is_told(member: Any) -> None:
     halves = ((member,), ()) if isinstance(member, Field) else ((), (member,))
-    with pytest.raises(InterfaceError, match=f"^t/msg/T: '{member.name}' is a word"):
+    with pytest.raises(InterfaceError, match=f"^t/msg/T: '{member.name}' is reserved"):
         generated.make(Interface("t/msg/T", "msg", *halves))
 
 
 def test_the_comparison_with_another_type_is_false() -> None:
     assert not operator.eq(VECTOR(), generated.find("geometry_msgs/msg/Point")())
+
+
+IMAGE, SCAN = generated.find("sensor_msgs/msg/Image"), generated.find("sensor_msgs/msg/LaserScan")
+CODES = {
+    "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q",
+    "uint64": "Q", "float32": "f", "float64": "d",
+}  # fmt: skip
+WIDTHS = {"char": "u1", "float32": "f4", "float64": "f8"}  # as numpy names them
+
+
+def same(value: Any, code: str, held: Any) -> bool:
+    return type(value) is array.array and (value.typecode, value.tolist()) == (code, held)
+
+
+def test_a_sequence_of_numbers_is_an_array_whatever_it_is_made_of() -> None:
+    for kind in CODES:
+        for bound in ["", "<=3"]:
+            message, code, width = made(f"{kind}[{bound}] some")(), CODES[kind], WIDTHS.get(kind, kind)
+            assert same(message.some, code, [])
+            held: list[Any] = [1.0, 2.0, 0.5] if code in "fd" else [1, 2, 3]
+            numbers: Any = np.array(held, width)
+            swapped = numbers.astype(numbers.dtype.newbyteorder())
+            for value in (
+                held,
+                tuple(held),
+                array.array(code, held),
+                numbers,
+                numbers.repeat(2)[::2],
+                memoryview(numbers),
+                swapped,
+            ):
+                message.some = value
+                assert same(message.some, code, held), value
+                for wire in WIRES:
+                    read: Any = decode(encode(message, wire), encoding(wire, type(message)), (type(message),))
+                    assert same(read.some, code, held)
+                    assert read == message
+
+
+def test_an_image_is_what_scripts_with_numpy_take_and_give() -> None:
+    pixels = np.arange(12, dtype=np.uint8).reshape(2, 2, 3)
+    for data in (pixels.tobytes(), bytearray(pixels.tobytes()), pixels.ravel(), pixels.flatten().tolist()):
+        image = IMAGE(height=2, width=2, data=data)
+        assert (np.frombuffer(image.data, dtype=np.uint8).reshape(2, 2, 3) == pixels).all()
+        assert image.data.tobytes() == pixels.tobytes()
+    scan = SCAN(ranges=np.array([1.0, math.inf], np.float32))
+    assert scan.ranges.tolist() == [1.0, math.inf]
+    assert np.isinf(np.array(scan.ranges)).tolist() == [False, True]
+
+
+def test_the_rest_are_lists() -> None:
+    for kind in ["bool[]", "byte[]", "string[]", "geometry_msgs/Point[]", "float64[2]", "uint8[<=3]"]:
+        message = made(f"{kind} some")()
+        assert (type(message.some) is list) is (kind != "uint8[<=3]")
+        read: Any = decode(encode(message, "cdr"), WIRES["cdr"], (type(message),))
+        assert type(read.some) is type(message.some)
+
+
+def test_an_array_is_the_one_that_was_given_unless_it_has_another_typecode() -> None:
+    ranges = array.array("f", [1.0])
+    scan = SCAN(ranges=ranges)
+    assert scan.ranges is ranges
+    scan.ranges = array.array("d", [0.1])
+    assert same(scan.ranges, "f", [np.float32(0.1)])
+
+
+def test_what_no_array_of_its_type_holds_is_told() -> None:
+    rows = [
+        ("uint8[]", "ab", "' field of t.msg.T must be a sequence of values of type 'int' in [0, 255], not 'str'"),
+        ("uint8[]", 3, "' field of t.msg.T must be a sequence of values of type 'int' in [0, 255], not 'int'"),
+        ("int8[]", b"\xff", "[0]' field of t.msg.T must be of type 'int' in [-128, 127], not 'int' (255)"),
+        ("int8[]", array.array("i", [1, 128]), "[1]' field of t.msg.T must be of type 'int' in [-128, 127], "),
+        ("uint8[]", np.zeros((1, 2), np.uint8), "[0]' field of t.msg.T must be of type 'int' in [0, 255], not 'list'"),
+        ("uint8[]", np.array([1.0]), "[0]' field of t.msg.T must be of type 'int' in [0, 255], not 'float' (1.0)"),
+        ("float32[]", array.array("i", [1]), "[0]' field of t.msg.T must be of type 'float' within a float32, "),
+        ("float32[]", [0.0, 1e39], "[1]' field of t.msg.T must be of type 'float' within a float32, not "),
+        ("float32[]", np.array([1e39]), "[0]' field of t.msg.T must be of type 'float' within a float32, not "),
+        ("float64[]", np.array([True]), "[0]' field of t.msg.T must be of type 'float', not 'bool' (True)"),
+        ("uint8[<=2]", b"abc", "' field of t.msg.T must be a sequence of at most 2 values of type 'int', not of 3"),
+        ("uint8[<=2]", array.array("B", b"abc"), "' field of t.msg.T must be a sequence of at most 2 values of type "),
+        ("uint8[]", np.array(["2020"], "datetime64[D]"), "[0]' field of t.msg.T must be of type 'int' in [0, 255], "),
+    ]  # fmt: skip
+    for kind, value, reason in rows:
+        assert refused(made(f"{kind} some")(), "some", value).startswith(f"The 'some{reason}")
+
+
+def test_a_repr_a_copy_and_a_pickle_are_those_of_a_message() -> None:
+    scan = SCAN(ranges=[1.5, 2.0])
+    assert "ranges=[1.5, 2.0], intensities=[])" in repr(scan)
+    for other in (copy.deepcopy(scan), pickle.loads(pickle.dumps(scan))):
+        assert other == scan
+        other.ranges.append(3.0)
+        assert other != scan
+        assert scan.ranges.tolist() == [1.5, 2.0]
+    assert copy.copy(scan).ranges is scan.ranges
+
+
+def test_no_two_messages_share_a_default() -> None:
+    kind = made("int32[] some [1, 2]\nint32[] none")
+    first = kind()
+    assert same(first.some, "i", [1, 2])
+    first.some.append(3)
+    first.none.append(3)
+    assert (kind().some.tolist(), kind().none.tolist()) == ([1, 2], [])
+
+
+def test_an_array_itself_refuses_what_is_put_into_it() -> None:
+    image = IMAGE()
+    with pytest.raises(OverflowError):
+        image.data.append(256)
+    with pytest.raises(TypeError):
+        image.data.append("a")
+    assert same(image.data, "B", [])
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_what_was_appended_beyond_a_bound_is_refused_when_it_is_written(wire: str) -> None:
+    message = made("uint8[<=2] some")(some=b"ab")
+    assert encode(message, wire)
+    message.some.append(3)
+    with pytest.raises(CodecError, match=r"^T\.some: 3 values does not fit a uint8\[<=2\]$"):
+        encode(message, wire)
+
+
+def test_numbers_from_the_wire_that_do_not_fit_are_told_in_one_line() -> None:
+    for kind, value, reason in [
+        ("uint8[]", [1, 256], "not a T: Expected `int` <= 255 - at `$.some[1]`"),
+        ("uint8[]", [True], "not a T: Expected `int`, got `bool` - at `$.some[0]`"),
+        ("int64[]", [2**63], "not a T: "),
+        ("uint64[]", [1, 2**64], "not a T: some[1] of 18446744073709551616 is too large"),
+        ("uint64[]", [-1], "not a T: Expected `int` >= 0 - at `$.some[0]`"),
+        ("float64[]", [None], "not a T: Expected `float`, got `null` - at `$.some[0]`"),
+        ("float64[]", 3, "not a T: Expected `array`, got `int` - at `$.some`"),
+        ("float32[]", [1.0, -1e39], "not a T: some[1] of -1e+39 is too large"),
+        ("float32[<=1]", [1.0, 1.0], "not a T: Expected `array` of length <= 1 - at `$.some`"),
+    ]:
+        reader = made(f"{kind} some")
+        with pytest.raises(CodecError) as error:
+            decode(json.dumps({"some": value}).encode(), "", (reader,))
+        assert str(error.value).startswith(reason)
+        with pytest.raises(CodecError) as same_error:
+            convert({"some": value}, (reader,))
+        assert str(same_error.value).startswith("not a T: ")
+        assert "\n" not in str(error.value) + str(same_error.value)
+
+
+@pytest.mark.parametrize("wrong", [b"\xff\xff\xff\xff", b"\5\0\0\0abcd", b"\3\0\0\0abc", b"\1\0"])
+def test_cdr_that_is_cut_off_or_too_long_is_told(wrong: bytes) -> None:
+    with pytest.raises(CodecError, match=r"^not a T: (a sequence of|cut off)"):
+        decode(b"\0\1\0\0" + wrong, WIRES["cdr"], (made("uint8[<=2] some"),))
+
+
+def test_both_byte_orders_of_cdr_are_read() -> None:
+    for kind in CODES:
+        for order in "<>":
+            held, code = [1, 2, 3] if CODES[kind] not in "fd" else [0.5, -math.inf, 2.0], CODES[kind]
+            gap = 4 if struct.calcsize(code) == 8 else 0  # 8 bytes stand before the first number
+            kinds = (made(f"{kind}[] some"), made(f"int32 a\n{kind}[] some"))
+            for reader, before in zip(kinds, (b"", b"\0" * 4), strict=True):
+                numbers = struct.pack(f"{order}I{0 if before else gap}x3{code}", 3, *held)
+                read: Any = decode(
+                    b"\0" + (b"\0" if order == ">" else b"\1") + b"\0\0" + before + numbers, WIRES["cdr"], (reader,)
+                )
+                assert same(read.some, code, held)
+
+
+def test_cdr_is_read_into_an_array_without_a_list_between() -> None:
+    shape = Shape()
+    shape.arrays = True
+    read = Codec(struct_cdr.interface(SCAN), shape).read(encode(SCAN(ranges=[0.5]), "cdr"))
+    assert same(read["ranges"], "f", [0.5])
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_our_own_message_is_the_same_bytes(wire: str) -> None:
+    ours = m.JointState(name=["a"], position=[0.1, 2.0], effort=[1e300])
+    theirs: Any = generated.find(ours.ROS)(name=["a"], position=[0.1, 2.0], effort=np.array([1e300]))
+    assert encode(theirs, wire) == encode(ours, wire)
+    read = decode(encode(ours, wire), encoding(wire, m.JointState), (m.JointState,))
+    assert type(read.position) is list
+
+
+def test_an_array_is_nothing_for_a_field_of_another_type() -> None:
+    with pytest.raises(TypeError, match=r"^a message cannot hold a complex$"):
+        encode(m.TriggerReply(message=1j))  # type: ignore[arg-type]
+    assert msgspec.json.decode(encode(IMAGE(data=b"\1\2")))["data"] == [1, 2]

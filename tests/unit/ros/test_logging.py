@@ -5,13 +5,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from holozen.ros import arguments, log_line, logging
-from holozen.ros.clock import ROSClock
-from holozen.ros.clock_type import ClockType
-from holozen.ros.duration import Duration
-from holozen.ros.log_line import Place
-from holozen.ros.severity import LoggingSeverity
-from holozen.ros.time import Time
+from holozen.ros.rclpy import logging
+from holozen.ros.rclpy.clock import ROSClock
+from holozen.ros.rclpy.context import Context
+from holozen.ros.rclpy.logging import LoggingSeverity, Place
+from holozen.ros.rclpy.time import ClockType, Duration, Time
 
 Capture = pytest.CaptureFixture[str]
 
@@ -61,10 +59,10 @@ def test_the_level_is_that_of_the_nearest_parent(capsys: Capture) -> None:
 
 def test_the_command_line_sets_levels(capsys: Capture) -> None:
     words = ["--ros-args", "--log-level", "error", "--log-level", "tom:=debug"]
-    arguments.parse(words).apply_log_levels()
+    Context().init(words)
     assert logging.get_logger("tom").debug("shown")
     assert not logging.get_logger("anna").warning("not shown")
-    arguments.parse(["--ros-args", "--disable-stdout-logs"]).apply_log_levels()
+    Context().init(["--ros-args", "--disable-stdout-logs"])
     assert not logging.get_logger("tom").fatal("not shown")
     assert capsys.readouterr().err.count("shown") == 1
 
@@ -101,7 +99,7 @@ def test_a_throttle_counts_on_the_clock_it_is_given(capsys: Capture) -> None:
 
 def test_a_place_that_counts_has_one_level() -> None:
     logger = logging.get_logger("tom")
-    with pytest.raises(ValueError, match="logs at ERROR and before at INFO"):
+    with pytest.raises(ValueError, match="logs at ERROR, and before at INFO"):
         for level in (LoggingSeverity.INFO, LoggingSeverity.ERROR):
             logger.log("x", level, once=True)
 
@@ -125,7 +123,7 @@ def test_what_is_wrong_is_told() -> None:
 def test_the_environment_gives_the_form(monkeypatch: pytest.MonkeyPatch) -> None:
     form = r"{severity}\t{name} {message} {file_name}:{line_number} {function_name} {time_as_nanoseconds} {what}"
     monkeypatch.setenv("RCUTILS_CONSOLE_OUTPUT_FORMAT", form)
-    line = log_line.formatted(LoggingSeverity.WARN, "tom", "{name}", Place("a.py", "run", 7), 1_500_000_000)
+    line = logging.formatted(LoggingSeverity.WARN, "tom", "{name}", Place("a.py", "run", 7), 1_500_000_000)
     assert line == "WARN\ttom {name} a.py:7 run 1500000000 {what}"
 
 

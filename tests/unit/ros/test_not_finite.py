@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from holozen import messages as m
-from holozen.codec import WIRES, CodecError, decode, encode, encoding, written
-from holozen.interfaces import Field, Interface
-from holozen.ros import context, rclpy
+from holozen.messages.codec import WIRES, CodecError, decode, encode, encoding, written
+from holozen.messages.definitions import Field, Interface
+from holozen.ros import rclpy
 from holozen.ros.generated import find, make
-from holozen.ros.qos import DurabilityPolicy, QoSProfile
+from holozen.ros.rclpy import context
+from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile
 from holozen.testing import Wire, wait_for
-from tests.unit.test_publisher import last
 
 Scan: Any = find("sensor_msgs/msg/LaserScan")
 Battery: Any = find("sensor_msgs/msg/BatteryState")
@@ -34,7 +34,7 @@ def test_a_scan_with_an_infinite_range_is_published_and_read(ros: Wire, used: st
     node, reader, got = rclpy.create_node("tom"), rclpy.create_node("reader"), list[Any]()
     reader.create_subscription(Scan, "scan", got.append, 10)
     publisher, bus = node.create_publisher(Scan, "scan", 10), ros.bus()
-    tap = bus.tap("scan")
+    tap = bus.subscribe_raw("scan")
     wait_for(publisher.get_subscription_count)
     for ranges, named in (
         ([1.0], encoding(used, Scan)),
@@ -44,7 +44,9 @@ def test_a_scan_with_an_infinite_range_is_published_and_read(ros: Wire, used: st
         publisher.publish(Scan(ranges=ranges))
         sample = tap.recv()
         assert sample.encoding == named
-        assert last(bus, "scan") == [(sample.payload, named)]
+        (reply,) = bus.session.get("scan", timeout=10)
+        assert reply.ok
+        assert (bytes(reply.ok.payload), str(reply.ok.encoding)) == (sample.payload, named)
     spin_for(lambda: len(got) == 3, reader)
     assert [repr(each.ranges.tolist()) for each in got] == ["[1.0]", "[1.0, inf, nan]", "[2.0]"]
 
@@ -97,7 +99,7 @@ def test_what_cdr_cannot_hold_is_told() -> None:
     assert written(kind(x=[1.0]), "json")[1] == "json"
     with pytest.raises(CodecError) as error:
         written(kind(x=[1.0, math.nan]), "json")
-    told = "Wide.x[1] is not a finite number, which takes CDR, and that cannot hold the rest: "
+    told = "Wide.x[1] is not a finite number, which needs CDR, and that cannot hold the rest: "
     assert str(error.value).startswith(told)
     assert "wstring" in str(error.value)
     for finite in (kind(x=[1.0], text="null"), kind(x=[1.0])):

@@ -2,16 +2,14 @@
 
 import threading
 from collections.abc import Callable, Sequence
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from holozen.ros import arguments
-from holozen.ros import exceptions as e
 from holozen.ros.generated import find
-from holozen.ros.parameter import Parameter
-from holozen.ros.parameters import NodeParameters, begin, result
+from holozen.ros.rclpy import exceptions as e
+from holozen.ros.rclpy.node import Node
+from holozen.ros.rclpy.parameter import Parameter, set_result
 
 Type = Parameter.Type
 Descriptor = find("rcl_interfaces/msg/ParameterDescriptor")
@@ -19,13 +17,17 @@ IntegerRange = find("rcl_interfaces/msg/IntegerRange")
 FloatRange = find("rcl_interfaces/msg/FloatingPointRange")
 
 
-class Node(NodeParameters):
-    """A node's parameters, without services."""
+pytestmark = pytest.mark.usefixtures("ros")
+
+
+class Tom(Node):
+    """A node in the namespace /lab, with parameters from the command line."""
 
     def __init__(self, *words: str, overrides: Sequence[Parameter] = (), **options: Any) -> None:
-        core: Any = SimpleNamespace(fqn="/lab/tom", arguments=arguments.parse(["--ros-args", *words]))
-        self._holozen = core
-        begin(self, overrides, start_services=False, **options)
+        super().__init__(
+            "tom", namespace="/lab", cli_args=["--ros-args", *words], parameter_overrides=list(overrides),
+            start_parameter_services=False, **options,
+        )  # fmt: skip
 
     def set(self, **values: Any) -> list[str]:
         results = self.set_parameters([Parameter(name, value=value) for name, value in values.items()])
@@ -37,11 +39,11 @@ class Node(NodeParameters):
 
 
 def refuse(_parameters: list[Parameter]) -> Any:
-    return result("not today")
+    return set_result("not today")
 
 
 def test_a_default_is_the_value_unless_another_one_was_given() -> None:
-    node = Node("-p", "speed:=0.5", "-p", "speed2:=0.5", "-p", "tom:size:=9")
+    node = Tom("-p", "speed:=0.5", "-p", "speed2:=0.5", "-p", "tom:size:=9")
     assert node.declare_parameter("speed", 1.0).value == 0.5
     assert node.declare_parameter("size", 3).value == 3, "that one was for /tom"
     assert node.declare_parameter("speed2", 1.0, ignore_override=True).value == 1.0
@@ -49,14 +51,14 @@ def test_a_default_is_the_value_unless_another_one_was_given() -> None:
 
 
 def test_values_of_the_script_go_before_those_of_the_command_line() -> None:
-    node = Node("-p", "speed:=0.5", overrides=[Parameter("speed", value=0.7)])
+    node = Tom("-p", "speed:=0.5", overrides=[Parameter("speed", value=0.7)])
     assert node.declare_parameter("speed", 1.0).value == 0.7
     with pytest.raises(TypeError, match="list of rclpy"):
-        Node(overrides=[0.7])  # type: ignore[list-item]
+        Tom(overrides=[0.7])  # type: ignore[list-item]
 
 
 def test_many_are_declared_with_a_prefix() -> None:
-    node = Node("-p", "pid.i:=2.0")
+    node = Tom("-p", "pid.i:=2.0")
     made = node.declare_parameters(
         "pid", [("p", 1.0), ("i", 0.0, Descriptor(description="integral")), ("n", Type.STRING)]
     )
@@ -69,7 +71,7 @@ def test_many_are_declared_with_a_prefix() -> None:
 
 
 def test_a_declared_type_needs_a_value_before_it_is_read() -> None:
-    node = Node("-p", "there:=1")
+    node = Tom("-p", "there:=1")
     node.declare_parameters("", [("there", Type.INTEGER), ("later", Type.INTEGER)])
     assert node.values("there") == [1]
     with pytest.raises(e.ParameterUninitializedException, match="later: it has no value yet"):
@@ -81,8 +83,8 @@ def test_a_declared_type_needs_a_value_before_it_is_read() -> None:
 
 
 def test_declaring_by_name_alone_is_warned_of() -> None:
-    node = Node("-p", "x:=[1, 2]")
-    with pytest.warns(UserWarning, match="'.' takes any type: give it a default") as told:
+    node = Tom("-p", "x:=[1, 2]")
+    with pytest.warns(UserWarning, match="'.' accepts any type: give it a default") as told:
         assert node.declare_parameter("x").value == [1, 2]
         node.declare_parameters("", [("y",)])
     assert [each.filename for each in told] == [__file__] * 2
@@ -90,39 +92,37 @@ def test_declaring_by_name_alone_is_warned_of() -> None:
     assert node.describe_parameter("x").dynamic_typing
 
 
-@pytest.mark.parametrize(
-    ("declare", "error", "told"),
-    [
+def test_what_cannot_be_declared_is_told() -> None:
+    rows: list[tuple[Any, type[Exception], str]] = [
         (("a", 1), e.ParameterAlreadyDeclaredException, "a: declared twice"),
-        (("", 1), e.InvalidParameterException, "no name"),
-        ((5, 1), TypeError, "name is a str"),
+        (("", 1), e.InvalidParameterException, "not a valid parameter name"),
+        ((5, 1), TypeError, "must be a str"),
         (("x", None, Descriptor()), ValueError, "give it a default, a Parameter.Type, or dynamic_typing"),
         (("x", Type.INTEGER, Descriptor(dynamic_typing=True)), ValueError, "and not both"),
-        (("x", 1, "what it is"), TypeError, "'what it is' is no ParameterDescriptor"),
-        (("x", {"a": 1}), TypeError, "is no value of a parameter"),
+        (("x", 1, "what it is"), TypeError, "'what it is' is not a ParameterDescriptor"),
+        (("x", {"a": 1}), TypeError, "cannot be the value of a parameter"),
         (("word", 1.0), e.InvalidParameterTypeException, "'word' takes DOUBLE, and 'fast' is STRING"),
         (("whole", 1.0), e.InvalidParameterTypeException, "'whole' takes DOUBLE, and 1 is INTEGER; write 1.0"),
         (("whole", 7, Descriptor(integer_range=[IntegerRange(from_value=2, to_value=8)])),
-         e.InvalidParameterValueException, "'whole' refuses 1: use a number from 2 to 8"),
-    ],
-)  # fmt: skip
-def test_what_cannot_be_declared_is_told(declare: Any, error: type[Exception], told: str) -> None:
-    node = Node("-p", "word:=fast", "-p", "whole:=1")
-    node.declare_parameter("a", 1)
-    with pytest.raises(error) as found:
-        node.declare_parameter(*declare)
-    assert told in str(found.value)
-    assert not isinstance(declare[0], str) or declare[0] == "a" or not node.has_parameter(declare[0])
+         e.InvalidParameterValueException, "'whole' rejects 1: use a number from 2 to 8"),
+    ]  # fmt: skip
+    for declare, error, told in rows:
+        node = Tom("-p", "word:=fast", "-p", "whole:=1")
+        node.declare_parameter("a", 1)
+        with pytest.raises(error) as found:
+            node.declare_parameter(*declare)
+        assert told in str(found.value)
+        assert not isinstance(declare[0], str) or declare[0] == "a" or not node.has_parameter(declare[0])
 
 
 def test_what_is_no_entry_is_told() -> None:
     for wrong in ("speed", (), ("a", 1, None, None)):
-        with pytest.raises(TypeError, match="declares no parameter"):
-            Node().declare_parameters("", [wrong])  # type: ignore[list-item]
+        with pytest.raises(TypeError, match="does not declare a parameter"):
+            Tom().declare_parameters("", [wrong])  # type: ignore[list-item]
 
 
 def test_an_undeclared_one_is_refused_unless_that_is_allowed() -> None:
-    strict, free = Node(), Node(allow_undeclared=True)
+    strict, free = Tom(), Tom(allow_undeclared_parameters=True)
     accesses: list[Callable[[Node], Any]] = [
         lambda node: node.get_parameter("x"),
         lambda node: node.set_parameters([Parameter("x", value=1)]),
@@ -142,12 +142,14 @@ def test_an_undeclared_one_is_refused_unless_that_is_allowed() -> None:
 
 
 def test_all_that_was_given_can_be_declared_by_itself() -> None:
-    node = Node("-p", "a:=1", "-p", "b.c:=x", "-p", "use_sim_time:=true", automatic=True)
+    node = Tom(
+        "-p", "a:=1", "-p", "b.c:=x", "-p", "use_sim_time:=true", automatically_declare_parameters_from_overrides=True
+    )
     assert node.values("a", "b.c", "use_sim_time") == [1, "x", True]
 
 
 def test_each_is_set_by_itself_or_all_or_none() -> None:
-    node = Node()
+    node = Tom()
     node.declare_parameters("", [("a", 1), ("b", 1.0), ("c", 1, Descriptor(read_only=True)), ("d", [1.0])])
     assert node.set(a=2, b=3, c=4, d=[]) == ["", "b takes DOUBLE, and 3 is INTEGER; write 3.0", "c is read-only", ""]
     assert node.values("a", "b", "c", "d") == [2, 1.0, 1, []]
@@ -161,22 +163,20 @@ def test_each_is_set_by_itself_or_all_or_none() -> None:
         node.set_parameters([("a", 1)])  # type: ignore[list-item]
 
 
-@pytest.mark.parametrize(
-    ("value", "reason"),
-    [
+def test_a_number_stays_within_its_range_and_on_its_steps() -> None:
+    rows = [
         (0.0, ""), (1.0, ""), (0.3, ""), (0.95, "0.95: use a number from 0.0 to 1.0 in steps of 0.1"),
         (1.1, "1.1: use a number from 0.0 to 1.0"), (float("nan"), "nan: use a number from 0.0 to 1.0"),
-    ],
-)  # fmt: skip
-def test_a_number_stays_within_its_range_and_on_its_steps(value: float, reason: str) -> None:
-    node = Node()
-    limits = [FloatRange(from_value=0.0, to_value=1.0, step=0.1)]
-    node.declare_parameter("x", 0.5, Descriptor(floating_point_range=limits))
-    assert node.set(x=value) == [f"x: {reason}" if reason else ""]
+    ]  # fmt: skip
+    for value, reason in rows:
+        node = Tom()
+        limits = [FloatRange(from_value=0.0, to_value=1.0, step=0.1)]
+        node.declare_parameter("x", 0.5, Descriptor(floating_point_range=limits))
+        assert node.set(x=value) == [f"x: {reason}" if reason else ""]
 
 
 def test_callbacks_change_refuse_and_hear_what_is_set() -> None:
-    node, heard = Node(), list[Any]()
+    node, heard = Tom(), list[Any]()
     node.declare_parameter("x", 1)
 
     def double(parameters: list[Parameter]) -> list[Parameter]:
@@ -184,7 +184,7 @@ def test_callbacks_change_refuse_and_hear_what_is_set() -> None:
 
     def check(parameters: list[Parameter]) -> Any:
         heard.append(("on", parameters[0].value, node.values("x")))
-        return result("" if parameters[0].value < 10 else "too many")
+        return set_result("" if parameters[0].value < 10 else "too many")
 
     def told(parameters: list[Parameter]) -> None:
         heard.append(("post", parameters[0].value, node.values("x")))
@@ -203,14 +203,14 @@ def test_callbacks_change_refuse_and_hear_what_is_set() -> None:
 
 
 def test_others_read_while_a_callback_is_asked() -> None:
-    node, seen = Node(), list[Any]()
+    node, seen = Tom(), list[Any]()
     node.declare_parameter("x", 1)
 
     def check(_parameters: list[Parameter]) -> Any:
         reader = threading.Thread(target=lambda: seen.extend(node.values("x")), daemon=True)
         reader.start()
         reader.join(10)
-        return result("")
+        return set_result("")
 
     node.add_on_set_parameters_callback(check)
     assert node.set(x=2) == [""]
@@ -218,25 +218,25 @@ def test_others_read_while_a_callback_is_asked() -> None:
 
 
 def test_a_callback_refuses_a_declaration_too() -> None:
-    node = Node()
+    node = Tom()
     node.add_on_set_parameters_callback(refuse)
-    with pytest.raises(e.InvalidParameterValueException, match="'x' refuses 1: not today"):
+    with pytest.raises(e.InvalidParameterValueException, match="'x' rejects 1: not today"):
         node.declare_parameter("x", 1)
     assert not node.has_parameter("x")
 
 
 def test_a_callback_that_returns_nothing_is_told() -> None:
-    node = Node(allow_undeclared=True)
+    node = Tom(allow_undeclared_parameters=True)
     node.add_on_set_parameters_callback(lambda _parameters: None)
     with pytest.raises(TypeError, match=r"<lambda> returned None; return a SetParametersResult\(successful=True\)"):
         node.set(x=1)
     node.add_pre_set_parameters_callback(lambda _parameters: 5)
-    with pytest.raises(TypeError, match="returned 5; return a list of Parameter"):
+    with pytest.raises(TypeError, match="returned 5; it must return a list of Parameter"):
         node.set(x=1)
 
 
 def test_one_is_undeclared() -> None:
-    node = Node()
+    node = Tom()
     node.declare_parameters(
         "", [("x", 1), ("fixed", 1, Descriptor(read_only=True)), ("any", 1, Descriptor(dynamic_typing=True))]
     )
@@ -249,14 +249,14 @@ def test_one_is_undeclared() -> None:
     assert node.set(any=None) == [""]
     assert not node.has_parameter("any")
     assert node.set(fixed=None) == ["fixed is read-only"]
-    assert node.set(use_sim_time=None) == ["use_sim_time takes BOOL, and not no value"]
+    assert node.set(use_sim_time=None) == ["use_sim_time takes BOOL, and cannot be without a value"]
 
 
 def test_what_it_takes_can_be_changed() -> None:
-    node = Node()
+    node = Tom()
     node.declare_parameter("x", 5)
     tight = Descriptor(integer_range=[IntegerRange(from_value=0, to_value=3)], description="new")
-    with pytest.raises(e.InvalidParameterValueException, match="'x' refuses 5: use a number from 0 to 3"):
+    with pytest.raises(e.InvalidParameterValueException, match="'x' rejects 5: use a number from 0 to 3"):
         node.set_descriptor("x", tight)
     assert node.set_descriptor("x", tight, Parameter("x", value=2).get_parameter_value()).integer_value == 2
     found = node.describe_parameter("x")

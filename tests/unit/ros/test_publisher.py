@@ -4,11 +4,12 @@ from typing import Any
 
 import pytest
 
-from holozen.ros import context, qos, rclpy
-from holozen.ros.context import ExternalShutdownException
-from holozen.ros.exceptions import InvalidHandle, RCLError
+from holozen.ros import rclpy
 from holozen.ros.generated import find
-from holozen.ros.qos import QoSProfile
+from holozen.ros.rclpy import context, qos
+from holozen.ros.rclpy.context import ExternalShutdownException
+from holozen.ros.rclpy.exceptions import InvalidHandle, RCLError
+from holozen.ros.rclpy.qos import QoSProfile
 from holozen.testing import Wire, wait_for
 
 Twist: Any = find("geometry_msgs/msg/Twist")
@@ -18,7 +19,7 @@ Twist: Any = find("geometry_msgs/msg/Twist")
 def test_what_it_sends_has_priority_data_and_waits_only_to_keep_all(ros: Wire, keep: qos.HistoryPolicy) -> None:
     profile = QoSProfile(history=keep, depth=3)
     publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", profile)
-    tap = ros.bus().tap("cmd_vel")
+    tap = ros.bus().subscribe_raw("cmd_vel")
     wait_for(publisher.get_subscription_count)
     publisher.publish(Twist())
     publisher.publish(b"{}")
@@ -60,12 +61,12 @@ def test_nothing_is_sent_after_rclpy_has_ended(ros: Wire) -> None:
 
 def test_after_a_signal_there_is_time_for_a_stop_and_no_more(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
     publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", 1)
-    tap = ros.bus().tap("cmd_vel")
+    tap = ros.bus().subscribe_raw("cmd_vel")
     wait_for(publisher.get_subscription_count)
     rclpy.get_default_context().interrupt()
     assert not rclpy.ok()
     publisher.publish(Twist())
     assert tap.recv().priority == "DATA"
-    monkeypatch.setattr(context, "LAST_WORDS", 0.0)
+    monkeypatch.setattr(context, "GRACE", 0.0)
     with pytest.raises(ExternalShutdownException):
         publisher.publish(Twist())

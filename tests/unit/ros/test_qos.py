@@ -5,9 +5,8 @@ from typing import Any
 
 import pytest
 
-from holozen.ros import qos
-from holozen.ros.duration import Duration
-from holozen.ros.qos import (
+from holozen.ros.rclpy import qos
+from holozen.ros.rclpy.qos import (
     DurabilityPolicy,
     HistoryPolicy,
     InvalidQoSProfileException,
@@ -16,6 +15,7 @@ from holozen.ros.qos import (
     QoSProfile,
     ReliabilityPolicy,
 )
+from holozen.ros.rclpy.time import Duration
 
 
 def test_a_depth_is_enough() -> None:
@@ -27,24 +27,22 @@ def test_a_depth_is_enough() -> None:
 
 @pytest.mark.parametrize("said", [{}, {"reliability": 1}, {"history": HistoryPolicy.KEEP_LAST}])
 def test_a_profile_that_says_too_little_is_refused(said: dict[str, Any]) -> None:
-    with pytest.raises(InvalidQoSProfileException, match="say its depth"):
+    with pytest.raises(InvalidQoSProfileException, match="give its depth"):
         QoSProfile(**said)
 
 
-@pytest.mark.parametrize(
-    ("said", "told"),
-    [
+def test_a_wrong_argument_is_told() -> None:
+    rows: list[tuple[dict[str, Any], str]] = [
         ({"deepth": 1}, "QoSProfile has no deepth; use history, depth"),
         ({"depth": "10"}, r"depth: '10' is a str; use a int"),
         ({"depth": True}, "depth: True is a bool"),
         ({"reliability": DurabilityPolicy.VOLATILE}, "reliability: .*DurabilityPolicy; use a ReliabilityPolicy"),
         ({"deadline": 5}, "deadline: 5 is a int; use a Duration"),
         ({"avoid_ros_namespace_conventions": 1}, "use a bool"),
-    ],
-)
-def test_a_wrong_argument_is_told(said: dict[str, Any], told: str) -> None:
-    with pytest.raises(AssertionError, match=told):
-        QoSProfile(**{"depth": 1, **said})
+    ]
+    for said, told in rows:
+        with pytest.raises(AssertionError, match=told):
+            QoSProfile(**{"depth": 1, **said})
 
 
 def test_numbers_are_policies_and_fields_can_be_changed() -> None:
@@ -61,9 +59,9 @@ def test_numbers_are_policies_and_fields_can_be_changed() -> None:
 
 
 def test_keep_last_of_nothing_is_warned_of() -> None:
-    with pytest.warns(UserWarning, match="10 are kept"):
+    with pytest.warns(UserWarning, match="10 messages are kept"):
         profile = QoSProfile(depth=0)
-    assert qos.kept(profile) == 10
+    assert qos.queue_length(profile) == 10
 
 
 def test_profiles_are_equal_copied_and_shown() -> None:
@@ -90,20 +88,20 @@ def test_the_presets_are_those_of_ros() -> None:
 
 
 def test_whoever_takes_a_profile_takes_a_depth() -> None:
-    assert qos.checked(7) == QoSProfile(depth=7)
-    assert qos.checked(0).depth == 10
-    assert qos.checked(qos.qos_profile_parameters) is qos.qos_profile_parameters
+    assert qos.as_profile(7) == QoSProfile(depth=7)
+    assert qos.as_profile(0).depth == 10
+    assert qos.as_profile(qos.qos_profile_parameters) is qos.qos_profile_parameters
     for wrong in ("10", True, None, 1.5):
         with pytest.raises(TypeError, match="use a QoSProfile, or the depth"):
-            qos.checked(wrong)  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="0 or more, and not -1"):
-        qos.checked(-1)
+            qos.as_profile(wrong)  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="0 or more, not -1"):
+        qos.as_profile(-1)
 
 
 def test_a_queue_is_bounded_whatever_the_profile() -> None:
-    assert qos.kept(QoSProfile(depth=7)) == 7
-    assert qos.kept(qos.qos_profile_system_default) == qos.UNSAID
-    assert qos.kept(QoSProfile(history=HistoryPolicy.KEEP_ALL)) == qos.UNBOUNDED
+    assert qos.queue_length(QoSProfile(depth=7)) == 7
+    assert qos.queue_length(qos.qos_profile_system_default) == qos.DEFAULT_DEPTH
+    assert qos.queue_length(QoSProfile(history=HistoryPolicy.KEEP_ALL)) == qos.UNBOUNDED
 
 
 def test_two_profiles_go_together_or_not_as_in_ros() -> None:

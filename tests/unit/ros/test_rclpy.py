@@ -6,10 +6,9 @@ from collections.abc import Callable
 import pytest
 
 from holozen.ros import rclpy
-from holozen.ros.context import Context
-from holozen.ros.exceptions import RCLError
-from holozen.ros.executors import SingleThreadedExecutor
-from holozen.ros.signals import SignalHandlerOptions, get_current_signal_handlers_options
+from holozen.ros.rclpy.context import Context, SignalHandlerOptions, get_current_signal_handlers_options
+from holozen.ros.rclpy.exceptions import RCLError
+from holozen.ros.rclpy.executors import SingleThreadedExecutor
 from holozen.testing import Wire
 
 

@@ -61,9 +61,8 @@ def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Pat
     assert (done.stdout, done.returncode) == ("a function my_bot.b\n", 7)
 
 
-@pytest.mark.parametrize(
-    ("end", "code", "told"),
-    [
+def test_the_exit_code_is_the_scripts(run: Run, write: Write) -> None:
+    for end, code, told in [
         ("", 0, ""),
         ("sys.exit()", 0, ""),
         ("sys.exit(3)", 3, ""),
@@ -73,12 +72,10 @@ def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Pat
         ("import rclpy; rclpy.init(); node = rclpy.create_node('a'); sys.exit('no robot')", 1, "no robot\n"),
         ("raise KeyboardInterrupt", 130, ""),
         ("os.kill(os.getpid(), 2); time.sleep(60)", 130, ""),
-    ],
-)
-def test_the_exit_code_is_the_scripts(run: Run, write: Write, end: str, code: int, told: str) -> None:
-    write("a.py", f"import os, sys, time\n{end}")
-    done = run("a.py")
-    assert (done.returncode, done.stderr) == (code, told)
+    ]:
+        write("a.py", f"import os, sys, time\n{end}")
+        done = run("a.py")
+        assert (done.returncode, done.stderr) == (code, told)
 
 
 def test_what_a_script_wrote_to_a_file_that_it_left_open_is_there(run: Run, write: Write, home: Path) -> None:
@@ -135,23 +132,20 @@ def test_a_name_that_is_not_there_is_told_in_the_users_traceback(run: Run, write
     assert "Twist" in done.stderr.splitlines()[-1]
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
+def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> None:
+    for words, told in [
         (["q.py"], "no file 'q.py'; Python files there: controller.py"),
         (["scripts/b.py"], "no file 'scripts/b.py'"),
         (["my_boot", "a.py"], "no package 'my_boot' around "),
         (["my_bot", "c.py"], "package 'my_bot' has no executable 'c.py'"),
-        (["my_bot"], "give one; in "),
-        (["my_bot", "--ros-args"], "give one; in "),
-    ],
-)
-def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path, words: list[str], told: str) -> None:
-    write("controller.py")
-    done = run(*words)
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert told in done.stderr
-    assert done.stderr.startswith("holozen run: ")
+        (["my_bot"], "give an executable; executables in "),
+        (["my_bot", "--ros-args"], "give an executable; executables in "),
+    ]:
+        write("controller.py")
+        done = run(*words)
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+        assert told in done.stderr
+        assert done.stderr.startswith("holozen run: ")
 
 
 def test_where_ros_is_sourced_it_refuses_unless_forced(run: Run, write: Write) -> None:
@@ -182,7 +176,7 @@ def test_under_python_alone_it_fails_as_ever(write: Write) -> None:
 
 
 def test_the_connection_is_that_of_the_flags(run: Run, write: Write, wire: Wire) -> None:
-    write("a.py", "from holozen.ros import context; print(context.connection.connect, context.connection.wire)")
+    write("a.py", "from holozen.ros.rclpy import context; print(context.connection.connect, context.connection.wire)")
     assert run("a.py", flags=("--wire", "cdr")).stdout == f"('{wire.endpoint}',) cdr\n"
 
 
@@ -196,6 +190,26 @@ def test_a_signal_ends_a_script_that_spins(wire: Wire, write: Write, number: int
         process.wait(within=10)
         assert "holozen/" not in process.err
         assert process.returncode in ((130,) if number == signal.SIGINT else (1, -15, 143))
+
+
+def test_our_flags_behind_the_script_are_ours_unless_the_script_has_them(run: Run, write: Write, home: Path) -> None:
+    write("far/elsewhere/msg/Shape.msg", "string name\n")
+    package = f"elsewhere={home}/far/elsewhere"
+    imports = "import sys\nfrom holozen.ros.rclpy import context\nfrom elsewhere.msg import Shape\n"
+    write("a.py", f"{imports}print(sys.argv[1:], context.connection.mode, context.connection.wire)")
+    done = run("a.py", "x", "--package", package, "--wire=msgpack", "--mode", "fast", "--ros-args", "--wire", "cdr")
+    assert (done.stdout, done.stderr) == ("['x', '--mode', 'fast', '--ros-args', '--wire', 'cdr'] peer msgpack\n", "")
+    write("b.py", f"{imports}print(sys.argv[1:], 'has --wire', context.connection.wire)")
+    assert run("b.py", "--wire", "cdr", "--package", package).stdout == "['--wire', 'cdr'] has --wire json\n"
+
+
+def test_a_package_three_folders_below_the_working_one_is_found(run: Run, write: Write) -> None:
+    write("examples/lesson/deep_bot/package.xml", "<package><name>deep_bot</name></package>")
+    write("examples/lesson/deep_bot/scripts/a.py", "print('found')")
+    write("build/lesson/deep_bot/package.xml", "<package><name>deep_bot</name></package>")
+    assert run("deep_bot", "a").stdout == "found\n"
+    write("examples/lesson/COLCON_IGNORE")
+    assert "no package 'deep_bot'" in run("deep_bot", "a").stderr
 
 
 def test_a_srv_of_the_script_s_own_package_is_there(run: Run, write: Write, my_bot: Path) -> None:
@@ -271,7 +285,7 @@ thread.start()
         ("rclpy.shutdown(); rclpy.shutdown(); rclpy.create_node('b')", "RuntimeError: "),
         ("rclpy.shutdown(); rclpy.create_node('b')", "rclpy.exceptions.NotInitializedException: "),
         ("import tf2_ros; raise tf2_ros.LookupException('no')", "tf2_ros.LookupException: no"),
-        ("from holozen.codec import CodecError; raise CodecError('no')", "CodecError: no"),
+        ("from holozen.messages.codec import CodecError; raise CodecError('no')", "CodecError: no"),
     ],
 )
 def test_an_error_of_ours_is_called_as_in_ros(run: Run, write: Write, line: str, told: str) -> None:

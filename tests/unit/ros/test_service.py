@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from holozen.bus import Bus
-from holozen.errors import ServiceError
 from holozen.messages import TriggerReply, TriggerRequest
 from holozen.ros import rclpy
-from holozen.ros.callback_groups import ReentrantCallbackGroup
 from holozen.ros.generated import find
-from holozen.ros.service import Refusal
+from holozen.ros.rclpy.callback_groups import ReentrantCallbackGroup
+from holozen.ros.rclpy.service import Refusal
 from holozen.testing import Wire
+from holozen.transport.errors import ServiceError
 
 Trigger: Any = find("std_srvs/srv/Trigger")
 SetBool: Any = find("std_srvs/srv/SetBool")

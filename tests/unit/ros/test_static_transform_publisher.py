@@ -4,27 +4,24 @@ import math
 
 import pytest
 
-from holozen.ros.static_transform_publisher import read, transform
+from holozen.ros.tf2_ros.static_transform_publisher import read, transform
 
 HALF = math.sqrt(0.5)
 
 
-@pytest.mark.parametrize(
-    ("words", "place", "turn"),
-    [
+def test_the_words_are_a_transform() -> None:
+    for words, place, turn in [
         ("1 -2 3 1.5707963 0 0 map odom", (1, -2, 3), (0, 0, HALF, HALF)),
         ("1 2 3 0 0 0.6 0.8 map odom", (1, 2, 3), (0, 0, 0.6, 0.8)),
         ("--x 1 --z -1e-3 --frame-id map --child-frame-id odom", (1, 0, -0.001), (0, 0, 0, 1)),
         ("--roll 3.14159265 --frame-id map --child-frame-id odom", (0, 0, 0), (1, 0, 0, 0)),
         ("--frame-id map --child-frame-id odom --qw 0 --qy 1", (0, 0, 0), (0, 1, 0, 0)),
-    ],
-)
-def test_the_words_are_a_transform(words: str, place: tuple[float, ...], turn: tuple[float, ...]) -> None:
-    message = transform(read(words.split()))
-    t, q = message.transform.translation, message.transform.rotation
-    assert (message.header.frame_id, message.child_frame_id) == ("map", "odom")
-    assert (t.x, t.y, t.z) == place
-    assert [q.x, q.y, q.z, q.w] == pytest.approx(turn, abs=1e-7)
+    ]:
+        message = transform(read(words.split()))
+        t, q = message.transform.translation, message.transform.rotation
+        assert (message.header.frame_id, message.child_frame_id) == ("map", "odom")
+        assert (t.x, t.y, t.z) == place
+        assert [q.x, q.y, q.z, q.w] == pytest.approx(turn, abs=1e-7)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Messages reach callbacks in spin only, in order, the newest of them."""
 
+import sys
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -9,10 +10,14 @@ import pytest
 
 from holozen.bus import Bus
 from holozen.messages import Twist as OurTwist
-from holozen.ros import qos, rclpy
+from holozen.ros import rclpy
 from holozen.ros.generated import find
-from holozen.ros.node import Node
-from holozen.ros.qos import QoSProfile
+from holozen.ros.rclpy import qos
+from holozen.ros.rclpy.exceptions import RCLError
+from holozen.ros.rclpy.executors import SingleThreadedExecutor
+from holozen.ros.rclpy.node import Node
+from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile
+from holozen.ros.rclpy.subscription import wait_for_message
 from holozen.testing import Wire, wait_for
 
 Twist: Any = find("geometry_msgs/msg/Twist")
@@ -31,7 +36,7 @@ def numbers(messages: list[Any]) -> list[float]:
 
 def meet(writer: Bus, node: Node) -> Callable[[], object]:
     """A function that waits until all that `writer` has put so far is here."""
-    end, marks = node._holozen.bus.tap("end"), iter(range(10_000))
+    end, marks = node._holozen.bus.subscribe_raw("end"), iter(range(10_000))
 
     def arrived(mark: bytes) -> bool:
         writer.session.put("end", mark)
@@ -144,7 +149,7 @@ def test_what_cannot_be_read_is_told_once_and_left_out(
     assert (numbers(got), subscription.bad) == ([1.0], 3)
     (line,) = capfd.readouterr().err.splitlines()
     assert "[WARN]" in line
-    assert f"[tom]: /a: a message of {bus.source} is left out (1 by now): not a Twist" in line
+    assert f"[tom]: /a: dropped a message from {bus.source} (1 so far): not a Twist" in line
 
 
 def test_a_callback_may_ask_when_a_message_came_or_for_its_bytes(ros: Wire, spin_for: Spin) -> None:
@@ -163,7 +168,7 @@ def test_a_callback_that_takes_no_message_is_refused(ros: Wire) -> None:
     node = rclpy.create_node("tom")
     with pytest.raises(RuntimeError, match=r"takes \(\); a subscription's callback takes one argument, the message$"):
         node.create_subscription(Twist, "a", lambda: None, 10)
-    with pytest.raises(TypeError, match=r"^a callback is a function, and 3 is a int$"):
+    with pytest.raises(TypeError, match=r"^a callback must be a function, and 3 is a int$"):
         node.create_subscription(Twist, "a", 3, 10)  # type: ignore[arg-type]
 
 
@@ -199,3 +204,125 @@ def test_an_async_callback_runs_to_its_end(ros: Wire, spin_for: Spin) -> None:
     future.set_result("there")
     spin_for(lambda: len(got) == 2, node)
     assert got == [1.0, "there"]
+
+
+String: Any = find("std_msgs/msg/String")
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+LARGE = 1_000_000  # bytes
+
+
+def test_who_comes_late_gets_the_last_of_each_publisher(ros: Wire, spin_for: Spin) -> None:
+    node, got = rclpy.create_node("tom"), list[str]()
+    for name, texts in (("one", "ab"), ("two", "cd")):
+        writer = rclpy.create_node(name).create_publisher(String, "map", LATCHED)
+        for text in texts:
+            writer.publish(String(data=text))
+    node.create_subscription(String, "map", lambda message: got.append(message.data), LATCHED)
+    spin_for(lambda: len(got) == 2, node)
+    assert sorted(got) == ["b", "d"]
+
+
+def test_a_publisher_that_comes_later_is_heard_from_its_first_message_and_each_once(ros: Wire, spin_for: Spin) -> None:
+    node, got = rclpy.create_node("tom"), list[str]()
+    node.create_subscription(String, "map", lambda message: got.append(message.data), LATCHED)
+    rclpy.spin_once(node, timeout_sec=0)
+    writer = rclpy.create_node("late").create_publisher(String, "map", LATCHED)
+    writer.publish(String(data="first"))
+    spin_for(lambda: got, node)
+    wait_for(writer.get_subscription_count)
+    writer.publish(String(data="second"))
+    spin_for(lambda: "second" in got, node)
+    end = ros.bus("end").publisher("map", OurTwist)  # one more token, so one more question to all
+    end.close()
+    writer.publish(String(data="third"))
+    spin_for(lambda: "third" in got, node)
+    assert got == ["first", "second", "third"]
+
+
+def test_what_came_does_not_stay_in_memory(ros: Wire, spin_for: Spin) -> None:
+    node, got = rclpy.create_node("tom"), list[int]()
+    reader = node.create_subscription(String, "map", lambda message: got.append(len(message.data)), LATCHED)
+    writer = rclpy.create_node("one").create_publisher(String, "map", LATCHED)
+    writer.publish(String(data=LARGE * "x"))
+    spin_for(lambda: got == [LARGE], node)
+    assert reader.latched
+    assert sum(map(sys.getsizeof, reader.latched.seen)) < LARGE
+
+
+def test_a_volatile_one_gets_nothing_old(ros: Wire, spin_for: Spin) -> None:
+    node, got = rclpy.create_node("tom"), list[str]()
+    other, end = rclpy.create_node("one"), node._holozen.bus.subscribe_raw("end")
+    writer = other.create_publisher(String, "map", LATCHED)
+    writer.publish(String(data="old"))
+    # What was sent before it has come by now, to nobody.
+    wait_for(lambda: other._holozen.bus.session.put("end", b"") or end.try_recv())
+    node.create_subscription(String, "map", lambda message: got.append(message.data), 10)
+    wait_for(writer.get_subscription_count)
+    writer.publish(String(data="new"))
+    spin_for(lambda: got, node)
+    assert got == ["new"]
+
+
+def test_it_can_be_destroyed(ros: Wire) -> None:
+    node = rclpy.create_node("tom")
+    subscription = node.create_subscription(String, "map", print, LATCHED)
+    latched = subscription.latched
+    assert latched
+    thread = wait_for(lambda: latched.writers.thread)
+    assert thread
+    assert node.destroy_subscription(subscription)
+    thread.join(10)
+    assert not thread.is_alive()
+
+
+def test_the_next_message_is_given_also_while_another_thread_spins(ros: Wire) -> None:
+    node, writer = rclpy.create_node("tom"), ros.bus().publisher("cmd_vel", OurTwist)
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    spins = threading.Thread(target=executor.spin)
+    spins.start()
+
+    def tell() -> None:
+        wait_for(lambda: writer.matched)
+        writer.put(OurTwist.planar(0.5))
+
+    teller = threading.Thread(target=tell)
+    teller.start()
+    there, message = wait_for_message(Twist, node, "cmd_vel", time_to_wait=10)
+    assert (there, message.linear.x) == (True, 0.5)
+    teller.join()
+    wait_for(lambda: not writer.matched)
+    executor.shutdown()
+    spins.join()
+
+
+def test_it_waits_no_longer_than_it_was_told(ros: Wire) -> None:
+    node = rclpy.create_node("tom")
+    assert wait_for_message(Twist, node, "cmd_vel", time_to_wait=0.02) == (False, None)
+    assert node.count_subscribers("cmd_vel") == 0
+
+
+def test_what_was_latched_counts(ros: Wire) -> None:
+    from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile
+
+    node = rclpy.create_node("tom")
+    lasting = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    node.create_publisher(Twist, "cmd_vel", lasting).publish(Twist())
+    there, message = wait_for_message(Twist, rclpy.create_node("jerry"), "cmd_vel", qos_profile=lasting)
+    assert (there, message) == (True, Twist())
+
+
+def test_it_ends_with_rclpy(ros: Wire) -> None:
+    node, ended = rclpy.create_node("tom"), list[str]()
+
+    def wait() -> None:
+        with pytest.raises(RCLError) as caught:
+            wait_for_message(Twist, node, "cmd_vel")
+        ended.append(str(caught.value))
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    wait_for(lambda: node.count_subscribers("cmd_vel"))
+    rclpy.shutdown()
+    thread.join(10)
+    assert ended == ["failed to wait for a message on /cmd_vel: rclpy was shut down"]

@@ -2,11 +2,11 @@
 
 import pytest
 
-from holozen.ros.inbox import Waker
-from holozen.ros.task import Future, Task, Tasks
+from holozen.ros.rclpy.task import Future, Task, TaskQueue
+from holozen.ros.rclpy.waitable import Waker
 
 
-def run(tasks: Tasks) -> int:
+def run(tasks: TaskQueue) -> int:
     """Run what waits; how many that were."""
     return sum(work() is None for work in iter(tasks.take, None))
 
@@ -38,7 +38,7 @@ def test_an_exception_that_nobody_asks_for_is_told(capsys: pytest.CaptureFixture
     future = Future()
     future.set_exception(ValueError("no"))
     del future
-    assert capsys.readouterr().err == "nobody asked for this exception of a Future: ValueError('no')\n"
+    assert capsys.readouterr().err == "the exception of a Future was never retrieved: ValueError('no')\n"
 
 
 def test_done_callbacks_without_an_executor_run_at_once_also_late_ones() -> None:
@@ -53,7 +53,7 @@ def test_done_callbacks_without_an_executor_run_at_once_also_late_ones() -> None
 
 
 def test_done_callbacks_with_an_executor_wait_for_it() -> None:
-    tasks, called = Tasks(), list[Future]()
+    tasks, called = TaskQueue(), list[Future]()
     future = Future(executor=tasks)
     future.add_done_callback(called.append)
     future.cancel()
@@ -64,7 +64,7 @@ def test_done_callbacks_with_an_executor_wait_for_it() -> None:
 
 
 def test_a_watcher_is_told_in_the_same_moment_unless_it_gave_up() -> None:
-    future, told = Future(executor=Tasks()), list[str]()
+    future, told = Future(executor=TaskQueue()), list[str]()
 
     def first() -> None:
         told.append("first")
@@ -82,7 +82,7 @@ def test_a_watcher_is_told_in_the_same_moment_unless_it_gave_up() -> None:
 
 
 def test_a_task_is_the_future_of_what_its_function_returns() -> None:
-    tasks = Tasks()
+    tasks = TaskQueue()
     task = tasks.create_task(lambda a, b: a + b, 1, b=2)
     assert not task.done()
     assert run(tasks) == 1
@@ -90,7 +90,7 @@ def test_a_task_is_the_future_of_what_its_function_returns() -> None:
 
 
 def test_what_a_task_raises_comes_out_of_its_work() -> None:
-    tasks = Tasks()
+    tasks = TaskQueue()
     task = tasks.create_task(lambda: 1 / 0)
     work = tasks.take()
     assert work
@@ -100,7 +100,7 @@ def test_what_a_task_raises_comes_out_of_its_work() -> None:
 
 
 def test_a_coroutine_goes_on_when_what_it_awaits_is_done() -> None:
-    tasks, future, waker = Tasks(), Future(), Waker()
+    tasks, future, waker = TaskQueue(), Future(), Waker()
 
     async def double() -> int:
         return 2 * int(await future)
@@ -116,7 +116,7 @@ def test_a_coroutine_goes_on_when_what_it_awaits_is_done() -> None:
 
 
 def test_a_coroutine_that_only_yields_comes_again() -> None:
-    tasks = Tasks()
+    tasks = TaskQueue()
 
     class Pause:
         def __await__(self):

@@ -10,14 +10,13 @@ import pytest
 from holozen.messages import Clock as ClockMessage
 from holozen.messages import Time as TimeMessage
 from holozen.ros import rclpy
-from holozen.ros.callback_groups import MutuallyExclusiveCallbackGroup
-from holozen.ros.clock import ROSClock
-from holozen.ros.clock_type import ClockType
-from holozen.ros.exceptions import InvalidHandle, ROSInterruptException
-from holozen.ros.inbox import Waker
-from holozen.ros.parameter import Parameter
-from holozen.ros.time import Time
-from holozen.ros.timer import Timer
+from holozen.ros.rclpy.callback_groups import MutuallyExclusiveCallbackGroup
+from holozen.ros.rclpy.clock import ROSClock
+from holozen.ros.rclpy.exceptions import InvalidHandle, ROSInterruptException
+from holozen.ros.rclpy.parameter import Parameter
+from holozen.ros.rclpy.time import ClockType, Time
+from holozen.ros.rclpy.timer import Timer
+from holozen.ros.rclpy.waitable import Waker
 from holozen.testing import Wire, wait_for
 
 Spin = Callable[..., Any]
@@ -186,7 +185,7 @@ def test_a_rate_does_not_wait_for_the_time_of_a_clock_that_was_set_back(ros: Wir
 
 
 def rclpy_duration(seconds: float) -> Any:
-    from holozen.ros.duration import Duration
+    from holozen.ros.rclpy.time import Duration
 
     return Duration(seconds=seconds)
 

@@ -5,8 +5,8 @@ from contextlib import closing
 
 import pytest
 
-from services.sim.world import World
-from services.sim.worldfile import WorldSpec
+from holozen.robot.model import WorldSpec
+from services.sim.physics.world import World
 
 
 @pytest.fixture

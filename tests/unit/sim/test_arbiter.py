@@ -8,9 +8,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from holozen.limits import STOP, Planar
-from holozen.readers import PRIORITIES
-from services.sim.arbiter import AUTOPILOT, HELD, MOST_HELD, Arbiter, Driver
-from services.sim.motion import JointMotion, Motion
+from holozen.transport.pubsub import PRIORITIES
+from services.sim.command.arbiter import AUTOPILOT, HELD, MAX_HELD, Arbiter, Driver
+from services.sim.command.motion import JointMotion, Motion
 
 FORWARD: Planar = (0.3, 0.0, 0.0)
 LEFT: Planar = (0.0, 0.3, 0.0)
@@ -54,7 +54,7 @@ def test_a_command_is_obeyed_at_once(arbiter: Arbiter) -> None:
 
 def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbiter) -> None:
     arbiter.offer("script", SCRIPT, FORWARD, 1.0)
-    arbiter.wait_for(2.0, now=1.6)
+    arbiter.set_timeout(2.0, now=1.6)
     assert (arbiter.motion(1.6), arbiter.driver(1.6)) == (STOP, None)
     arbiter.offer("script", SCRIPT, FORWARD, 2.0)
     assert (arbiter.motion(3.9), arbiter.motion(4.1)) == (FORWARD, STOP)
@@ -62,7 +62,7 @@ def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbite
 
 def test_a_shorter_watchdog_stops_a_robot_that_was_not_told_to_go_on(arbiter: Arbiter) -> None:
     arbiter.offer("script", SCRIPT, FORWARD, 1.0)
-    arbiter.wait_for(0.1, now=1.05)
+    arbiter.set_timeout(0.1, now=1.05)
     assert (arbiter.motion(1.09), arbiter.motion(1.11)) == (FORWARD, STOP)
 
 
@@ -136,14 +136,14 @@ def test_a_held_source_may_stop_the_robot_but_not_drive_it(arbiter: Arbiter) -> 
 
 
 def test_a_command_is_as_old_as_it_may_have_waited(arbiter: Arbiter) -> None:
-    assert arbiter.offer("teleop", PERSON, FORWARD, now=1.0, heard=0.7) == ""
+    assert arbiter.offer("teleop", PERSON, FORWARD, now=1.0, sent=0.7) == ""
     assert arbiter.motion(1.2) == FORWARD
     assert arbiter.motion(1.2 + 1e-6) == STOP
 
 
 def test_a_stop_of_any_age_stops_the_robot(arbiter: Arbiter) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
-    assert arbiter.offer("teleop", PERSON, STOP, now=1.1, heard=-math.inf) == ""
+    assert arbiter.offer("teleop", PERSON, STOP, now=1.1, sent=-math.inf) == ""
     assert arbiter.motion(1.1) == STOP
 
 
@@ -257,17 +257,41 @@ class TestWithoutATimeout:
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.2) == ""
 
 
-def test_a_flood_of_names_takes_bounded_memory_and_lets_nobody_through(arbiter: Arbiter) -> None:
+@pytest.mark.parametrize("rank", [SCRIPT, BACKGROUND])
+def test_a_flood_of_names_holds_its_own_rank_and_no_higher_one_and_frees_no_one(arbiter: Arbiter, rank: int) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
-    for number in range(MOST_HELD + 10):
-        arbiter.offer(f"script {number}", SCRIPT, FORWARD, 1.1)
-    assert len(arbiter._held) <= MOST_HELD
-    for number in (0, MOST_HELD + 5, MOST_HELD + 500):
-        assert arbiter.offer(f"script {number}", SCRIPT, FORWARD, 9.0) == HELD
+    for number in range(12 * MAX_HELD):
+        assert arbiter.offer(f"forged {number}", rank, LEFT, 1.1) == "overruled: teleop drives"
+    assert arbiter.motion(1.1) == FORWARD
+    for source in ("forged 0", f"forged {MAX_HELD + 5}", "never heard of"):
+        assert arbiter.offer(source, rank, LEFT, 9.0) == HELD
+    for now, source in ((9.0, "teleop"), (10.0, "another teleop")):
+        assert not arbiter.holds(source, PERSON, now)
+        assert arbiter.offer(source, PERSON, FORWARD, now) == ""
+    assert arbiter.resume(11.0) == ""
+    assert arbiter.offer("never heard of", rank, LEFT, 11.0) == ""
+
+
+def test_a_name_that_is_forged_at_a_lower_rank_neither_holds_nor_replaces_its_owner(arbiter: Arbiter) -> None:
+    arbiter.offer("teleop", PERSON, FORWARD, 1.0)
+    assert arbiter.offer("teleop", BACKGROUND, LEFT, 1.1) == "overruled: teleop drives"
+    assert arbiter.offer("teleop", BACKGROUND, STOP, 1.1) == "overruled: teleop drives"
+    assert arbiter.motion(1.1) == FORWARD
+    assert arbiter.offer("teleop", PERSON, LEFT, 1.2) == ""
+
+
+def test_of_equals_that_fill_the_table_with_stops_the_last_one_drives_on(arbiter: Arbiter) -> None:
+    arbiter.offer("script", SCRIPT, FORWARD, 1.0)
+    for number in range(2 * MAX_HELD):
+        assert arbiter.offer(f"stopper {number}", SCRIPT, STOP, 1.0) == ""
+    last = f"stopper {2 * MAX_HELD - 1}"
+    assert arbiter.offer("script", SCRIPT, FORWARD, 1.0) != ""
+    assert arbiter.offer(last, SCRIPT, FORWARD, 1.0) == ""
+    assert not arbiter.holds("teleop", PERSON, 1.0)
 
 
 class TestSoftwareStop:
-    """`stop` and `release`; the rules of letting go are those of the latch."""
+    """`stop` and `release`; the rules of letting go are those of the software_stop."""
 
     def test_the_robot_stands_at_once_and_whatever_is_commanded(self, arbiter: Arbiter) -> None:
         arbiter.offer("teleop", PERSON, FORWARD, 1.0)
@@ -283,7 +307,7 @@ class TestSoftwareStop:
         arbiter = Arbiter(timeout)
         arbiter.offer("script", SCRIPT, FORWARD, 1.0)
         arbiter.stop("ann@1", 1.1)
-        arbiter.latch.release()
+        arbiter.software_stop.release()
         assert arbiter.motion(1.2) == STOP
         assert arbiter.offer("script", SCRIPT, FORWARD, 1.3).startswith("let go first: ")
         assert arbiter.offer("script", SCRIPT, STOP, 1.4) == ""
@@ -293,7 +317,7 @@ class TestSoftwareStop:
         arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
         arbiter.stop("ann@1", 1.1)
         assert arbiter.held
-        arbiter.latch.release()
+        arbiter.software_stop.release()
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == HELD
         assert arbiter.resume(9.1) == ""
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.2) == ""
@@ -301,7 +325,7 @@ class TestSoftwareStop:
     def test_resume_does_not_make_up_for_letting_go(self, arbiter: Arbiter) -> None:
         arbiter.stop("ann@1", 1.0)
         arbiter.offer("controller", CONTROLLER, FORWARD, 2.0)
-        arbiter.latch.release()
+        arbiter.software_stop.release()
         assert arbiter.resume(2.1) == ""
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 2.2).startswith("let go first: ")
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 2.8) == ""
@@ -379,7 +403,7 @@ SOURCES = {"teleop": PERSON, "second teleop": PERSON, "script": SCRIPT, "another
 
 
 class Robot(RuleBasedStateMachine):
-    """Any commands from any sources, pauses, stops, losses and resumes, beside what each source was told."""
+    """Any commands from any sources, pauses, stops, losses and resumes, beside a record of each source's replies."""
 
     timeout = 0.5
 
@@ -398,16 +422,16 @@ class Robot(RuleBasedStateMachine):
     @rule(source=st.sampled_from(sorted(SOURCES)), velocity=st.sampled_from([STOP, FORWARD, LEFT]))
     def speak(self, source: str, velocity: Planar) -> None:
         before = self.arbiter.driver(self.now)
-        waits = self.arbiter.latch.waits(source, self.now) and velocity != STOP
+        waits = self.arbiter.software_stop.must_let_go(source, SOURCES[source], self.now) and velocity != STOP
         refused = self.arbiter.offer(source, SOURCES[source], velocity, self.now)
         after = self.arbiter.driver(self.now)
-        if self.arbiter.latch.setter or waits:
-            assert refused.startswith("stopped: " if self.arbiter.latch.setter else "let go first: ")
+        if self.arbiter.software_stop.setter or waits:
+            assert refused.startswith("stopped: " if self.arbiter.software_stop.setter else "let go first: ")
             assert after == before
             return
         if not refused:
             assert after is not None
-            assert (after.source, after.motion, after.heard) == (source, velocity, self.now)
+            assert (after.source, after.motion, after.sent) == (source, velocity, self.now)
             assert source not in self.lost or velocity == STOP
             self.heard[source], self.said[source] = self.now, velocity
         else:
@@ -432,7 +456,7 @@ class Robot(RuleBasedStateMachine):
         driver = self.arbiter.driver(self.now)
         refused = self.arbiter.resume(self.now)
         driven = driver and driver.rank < AUTOPILOT and driver.motion != STOP
-        assert bool(refused) == bool(driven or self.arbiter.latch.setter)
+        assert bool(refused) == bool(driven or self.arbiter.software_stop.setter)
         if not refused:
             self.lost.clear()
             assert not self.arbiter.held
@@ -446,7 +470,7 @@ class Robot(RuleBasedStateMachine):
     @rule()
     def release(self) -> None:
         before = self.arbiter.motion(self.now)
-        self.arbiter.latch.release()
+        self.arbiter.software_stop.release()
         assert self.arbiter.motion(self.now) == before
 
     @rule(source=st.sampled_from(sorted(SOURCES)))
@@ -460,7 +484,7 @@ class Robot(RuleBasedStateMachine):
 
     @invariant()
     def a_stopped_robot_stands(self) -> None:
-        assert not self.arbiter.latch.setter or self.arbiter.driver(self.now) is None
+        assert not self.arbiter.software_stop.setter or self.arbiter.driver(self.now) is None
 
     @invariant()
     def the_robot_does_what_its_one_driver_said_last(self) -> None:

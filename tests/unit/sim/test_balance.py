@@ -10,13 +10,16 @@ import pytest
 
 from holozen.limits import STOP, Planar
 from holozen.robot.errors import RobotError
-from holozen.robot.model import RobotModel, load, parse
-from holozen.robot.standing import lowest
+from holozen.robot.loading import load, parse
+from holozen.robot.model import RobotModel
+from holozen.robot.rigid import lowest
 from holozen.robot.xacro import expand
-from services.sim.balance import BalanceMover
-from services.sim.drives import mover_for
-from services.sim.engine import UPRIGHT, turned, yaw_of
-from services.sim.world import World
+from holozen.rotation import rotate
+from holozen.rotation import yaw as yaw_of
+from services.sim.physics.balance import BalanceMover
+from services.sim.physics.engine import UPRIGHT
+from services.sim.physics.movers import mover_for
+from services.sim.physics.world import World
 
 FILE = Path(__file__).parents[3] / "urdf" / "wheely_boi.xacro"
 DT = 1 / 240
@@ -54,7 +57,7 @@ class Rider:
 
     @property
     def lean(self) -> float:
-        return math.acos(min(1.0, turned(self.mover.body.pose()[1], UPSIDE)[2]))
+        return math.acos(min(1.0, rotate(self.mover.body.pose()[1], UPSIDE)[2]))
 
     @property
     def place(self) -> Planar:

@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.limits import STOP, Planar
-from holozen.robot.drives import Differential
-from holozen.robot.model import RobotModel, load
-from holozen.robot.standing import lowest
-from services.sim.differential import Odometer, WheelMover, separation_of
-from services.sim.drives import mover_for
-from services.sim.engine import yaw_of
-from services.sim.world import World
+from holozen.robot.loading import load
+from holozen.robot.model import Differential, RobotModel
+from holozen.robot.rigid import lowest
+from holozen.rotation import yaw as yaw_of
+from services.sim.physics.differential import Odometer, WheelMover, separation_of
+from services.sim.physics.movers import mover_for
+from services.sim.physics.world import World
 
 URDF = Path(__file__).parents[3] / "urdf"
 TWO = load(URDF / "differential.urdf.xacro")
@@ -179,14 +179,14 @@ def test_against_a_wall_encoders_go_on_and_the_world_does_not(ground: World) -> 
 @given(st.floats(-2, 2), st.floats(-2, 2), st.integers(1, 50))
 def test_an_arc_ends_at_the_same_place_in_one_look_or_in_many(left: float, right: float, looks: int) -> None:
     once, often = Odometer(), Odometer()
-    one = once.see(left, right, 0.3)
+    one = once.update(left, right, 0.3)
     for look in range(1, looks + 1):
-        many = often.see(left * look / looks, right * look / looks, 0.3)
+        many = often.update(left * look / looks, right * look / looks, 0.3)
     assert many[0] == pytest.approx(one[0], abs=1e-9)
     assert abs(sum(a * b for a, b in zip(many[1], one[1], strict=True))) == pytest.approx(1)
 
 
 def test_an_arc_is_a_circle_about_a_point_beside() -> None:
     # A quarter to the left on a radius of 1 m, the wheels 0.2 m apart.
-    (x, y, _), rotation = Odometer().see(0.9 * math.pi / 2, 1.1 * math.pi / 2, 0.2)
+    (x, y, _), rotation = Odometer().update(0.9 * math.pi / 2, 1.1 * math.pi / 2, 0.2)
     assert (x, y, yaw_of(rotation)) == pytest.approx((1, 1, math.pi / 2))

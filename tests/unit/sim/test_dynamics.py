@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from holozen.robot.assembly import Part, assemble
-from holozen.robot.model import load, parse
-from services.sim.dynamics import damping_of, load_on
+from holozen.robot.loading import load, parse
+from holozen.robot.rigid import Part, assemble
+from services.sim.physics.dynamics import damping_of, load_on
 
 ROVER = assemble(load(Path(__file__).parents[3] / "urdf" / "rover.urdf.xacro"))
 DT = 1 / 240

@@ -1,8 +1,9 @@
-"""Robots and objects come into the world and leave it by requests; what is wrong is told, and nothing stays behind."""
+"""Entities are added and removed by requests; errors are reported, and nothing stays behind."""
 
 import json
 import math
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from functools import partial
@@ -12,19 +13,29 @@ from typing import Any
 import pytest
 import zenoh
 
-from holozen import simulation_interfaces as si
-from holozen.errors import ServiceError
-from holozen.messages import Header, JointState, Message, Point, Pose, Quaternion, TriggerRequest, Twist, Vector3
-from holozen.robot.model import parse
+from holozen.messages import (
+    Header,
+    JointState,
+    Message,
+    Point,
+    Pose,
+    PoseStamped,
+    Quaternion,
+    Twist,
+    Vector3,
+)
+from holozen.messages import simulation_interfaces as si
+from holozen.robot.loading import parse
+from holozen.robot.model import WorldSpec
 from holozen.robot.xacro import expand
 from holozen.testing import Wire, wait_for
+from holozen.transport.errors import ServiceError
 from services.sim import entities as entities_module
-from services.sim.engine import UPRIGHT, bullet
 from services.sim.entities import Entities, Entity
-from services.sim.entity_services import EntityServices
+from services.sim.io.entity_services import EntityServices
 from services.sim.loop import Loop
-from services.sim.world import World
-from services.sim.worldfile import WorldSpec
+from services.sim.physics.engine import UPRIGHT, bullet
+from services.sim.physics.world import World
 
 REPO = Path(__file__).parents[3]
 HB_BOT = expand(REPO / "urdf" / "hb_bot.urdf.xacro")
@@ -52,7 +63,7 @@ class Town:
     def spawn(self, name: str = "Fred", text: str = HB_BOT, z: float = 0.0, **fields: object) -> Entity:
         """Put one in without the wire."""
         request = si.SpawnEntityRequest(name=name, resource_string=text, initial_pose=at(0, 0, z), **fields)  # type: ignore[arg-type]
-        return self.entities.named(self.services._spawn(request).entity_name)
+        return self.entities.named(self.services.spawn(request).entity_name)
 
     def refusal(self, ask: Callable[[], object]) -> tuple[int, str]:
         """The code and the reason of a request that fails."""
@@ -67,8 +78,8 @@ class Town:
         return {endpoint.key for endpoint in self.client.graph().settled(self.client.connected) if endpoint.key}
 
 
-def at(x: float, y: float, z: float, frame: str = "", q: Quaternion | None = None) -> si.PoseStamped:
-    return si.PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), q or Quaternion()))
+def at(x: float, y: float, z: float, frame: str = "", q: Quaternion | None = None) -> PoseStamped:
+    return PoseStamped(Header(frame_id=frame), Pose(Point(x, y, z), q or Quaternion()))
 
 
 @pytest.fixture
@@ -85,7 +96,7 @@ def town(wire: Wire, world: World) -> Town:
 def test_a_robot_is_put_where_the_request_says_and_has_keys_by_its_name(town: Town) -> None:
     turned = Quaternion(0, 0, math.sqrt(0.5), math.sqrt(0.5))
     request = si.SpawnEntityRequest("Fred", resource_string=HB_BOT, initial_pose=at(1, 2, 0.5, "world", turned))
-    assert town.services._spawn(request).entity_name == "Fred"
+    assert town.services.spawn(request).entity_name == "Fred"
     position, rotation = town.entities.named("Fred").body.pose()
     assert position == pytest.approx((1, 2, 0.5), abs=1e-6)
     assert rotation == pytest.approx((0, 0, math.sqrt(0.5), math.sqrt(0.5)), abs=1e-6)
@@ -95,8 +106,8 @@ def test_a_robot_is_put_where_the_request_says_and_has_keys_by_its_name(town: To
 def test_a_namespace_in_the_request_is_where_the_keys_are(town: Town) -> None:
     town.spawn("Fred", entity_namespace="lab")
     assert {"lab/cmd_vel", "lab/odom"} <= town.tokens()
-    assert town.refusal(lambda: town.spawn("Ann", entity_namespace="lab"))[0] == si.NAME_NOT_UNIQUE
-    assert town.refusal(lambda: town.spawn("Ann", entity_namespace="a/*"))[0] == si.NAMESPACE_INVALID
+    assert town.refusal(lambda: town.spawn("Ann", entity_namespace="lab"))[0] == si.SpawnEntityReply.NAME_NOT_UNIQUE
+    assert town.refusal(lambda: town.spawn("Ann", entity_namespace="a/*"))[0] == si.SpawnEntityReply.NAMESPACE_INVALID
 
 
 def test_a_slash_as_namespace_is_the_root(town: Town) -> None:
@@ -113,7 +124,7 @@ def test_two_robots_never_share_a_key_whatever_their_files_say(town: Town) -> No
     told = "lab/Ann/cmd_vel is the key of 'root'; use another name"
     other = parse(inside.replace(">Ann<", ">lab/Ann<"), Path("r"))
     found = town.refusal(lambda: town.entities.add("third", other, ((9, 0, 0), UPRIGHT), ""))
-    assert found == (si.NAME_NOT_UNIQUE, told)
+    assert found == (si.SpawnEntityReply.NAME_NOT_UNIQUE, told)
 
 
 def test_a_robot_without_a_drive_is_an_object_without_keys(town: Town) -> None:
@@ -130,28 +141,62 @@ def test_an_object_from_sdf_lies_in_the_world(town: Town) -> None:
     assert entity.body.pose()[0][2] == pytest.approx(0.5, abs=2e-3)
 
 
+def test_xacro_in_a_comment_is_no_xacro(town: Town) -> None:
+    comment = '<!-- <xacro:include filename="$(find a)/b.xacro"/> ${1/0} $(arg x) -->'
+    assert town.spawn("Fred", BALL.replace("<link", f"{comment}<link", 1)).name == "Fred"
+    for text in ('<a b="${x}"/>', "<a>$(arg x)</a>", "<xacro:m/>"):
+        code, _ = town.refusal(partial(town.spawn, "Ann", BALL.replace("<link", f"{text}<link", 1)))
+        assert code == si.SpawnEntityReply.UNSUPPORTED_FORMAT, text
+
+
+def test_a_reply_holds_what_was_replaced_in_the_text(town: Town) -> None:
+    mesh = "<collision><geometry><mesh filename='gone.stl'/></geometry></collision>"
+    request = si.SpawnEntityRequest("Fred", resource_string=BALL.replace("</link>", f"{mesh}</link>"))
+    reply = town.services.spawn(request)
+    assert reply.result.result == si.Result.OK
+    assert reply.result.error_message.startswith(
+        "resource_string, line 1: <mesh> of <link name='a'> (collision) is replaced by a box of "
+    )
+    many = BALL.replace("</link>", f"{mesh * 30}</link>")
+    told = town.services.spawn(si.SpawnEntityRequest("Ann", resource_string=many)).result.error_message.splitlines()
+    assert (len(told), told[-1]) == (21, "and 10 more warnings")
+    assert town.services.spawn(si.SpawnEntityRequest("Bob", resource_string=BALL)).result.error_message == ""
+
+
 def test_a_name_is_made_where_none_is_given_or_renaming_is_allowed(town: Town) -> None:
     names = [town.spawn("", BALL, z=1).name, town.spawn("", BALL, z=2).name]
     assert names == ["ball", "ball_1"]
     assert town.spawn("ball", BALL, z=3, allow_renaming=True).name == "ball_2"
 
 
-NOT_THERE = "there is no entity 'Ann'; there are Fred"
+NOT_THERE = "there is no entity 'Ann'; the entities are Fred"
 EXPRESSION = "<robot xmlns:xacro=''>${9**9**9}</robot>"
 FILE: dict[str, object] = {"resource_string": "", "uri": "file:///etc/passwd"}
 TURNED_BY_NOTHING = at(0, 0, 0, "", Quaternion(0, 0, 0, 0))
 REFUSED: dict[str, tuple[dict[str, object], int, str]] = {
-    "the same name": ({"name": "Fred"}, si.NAME_NOT_UNIQUE, "there is an entity 'Fred' already; there are Fred"),
-    "a wildcard for a name": ({"name": "*"}, si.NAME_INVALID, "robot name '*': use a letter"),
-    "a path for a name": ({"name": "a/b"}, si.NAME_INVALID, "robot name 'a/b': use a letter"),
-    "no text": ({"resource_string": ""}, si.NO_RESOURCE, "resource_string is empty"),
-    "a file": (FILE, si.UNSUPPORTED_ASSETS, "resource_string is empty"),
-    "xacro": ({"resource_string": EXPRESSION}, si.UNSUPPORTED_FORMAT, "is xacro; expand it first"),
-    "broken XML": ({"resource_string": "<robot>"}, si.RESOURCE_PARSE_ERROR, "line 1: broken XML"),
-    "no robot": ({"resource_string": "<a/>"}, si.RESOURCE_PARSE_ERROR, "<a>"),
-    "another frame": ({"initial_pose": at(0, 0, 0, "Fred/base")}, si.INVALID_POSE, "in the frame 'world'"),
-    "a far place": ({"initial_pose": at(1e300, 0, 0)}, si.INVALID_POSE, "use finite numbers up to 10000 m"),
-    "no rotation": ({"initial_pose": TURNED_BY_NOTHING}, si.INVALID_POSE, "no unit quaternion"),
+    "the same name": (
+        {"name": "Fred"},
+        si.SpawnEntityReply.NAME_NOT_UNIQUE,
+        "there is an entity 'Fred' already; the entities are Fred",
+    ),
+    "a wildcard for a name": ({"name": "*"}, si.SpawnEntityReply.NAME_INVALID, "robot name '*': use a letter"),
+    "a path for a name": ({"name": "a/b"}, si.SpawnEntityReply.NAME_INVALID, "robot name 'a/b': use a letter"),
+    "no text": ({"resource_string": ""}, si.SpawnEntityReply.NO_RESOURCE, "resource_string is empty"),
+    "a file": (FILE, si.SpawnEntityReply.UNSUPPORTED_ASSETS, "resource_string is empty"),
+    "xacro": ({"resource_string": EXPRESSION}, si.SpawnEntityReply.UNSUPPORTED_FORMAT, "is xacro; expand it first"),
+    "broken XML": ({"resource_string": "<robot>"}, si.SpawnEntityReply.RESOURCE_PARSE_ERROR, "line 1: broken XML"),
+    "no robot": ({"resource_string": "<a/>"}, si.SpawnEntityReply.RESOURCE_PARSE_ERROR, "<a>"),
+    "another frame": (
+        {"initial_pose": at(0, 0, 0, "Fred/base")},
+        si.SpawnEntityReply.INVALID_POSE,
+        "in the frame 'world'",
+    ),
+    "a far place": (
+        {"initial_pose": at(1e300, 0, 0)},
+        si.SpawnEntityReply.INVALID_POSE,
+        "use finite numbers up to 10000 m",
+    ),
+    "no rotation": ({"initial_pose": TURNED_BY_NOTHING}, si.SpawnEntityReply.INVALID_POSE, "no unit quaternion"),
 }
 
 
@@ -160,10 +205,10 @@ def test_a_request_that_is_wrong_is_refused_with_a_code_and_changes_nothing(town
     town.spawn("Fred")
     fields, code, told = REFUSED[fault]
     request = si.SpawnEntityRequest(**({"name": "Ann", "resource_string": HB_BOT} | fields))  # type: ignore[arg-type]
-    found, reason = town.refusal(lambda: town.services._spawn(request))
+    found, reason = town.refusal(lambda: town.services.spawn(request))
     assert (found, told in reason, reason.isprintable()) == (code, True, True), reason
     assert [entity.name for entity in town.entities] == ["Fred"]
-    assert len(town.entities.vehicles) == 1
+    assert len(town.entities.robots) == 1
 
 
 def test_an_error_reply_carries_the_result_of_the_ros_service(wire: Wire, town: Town) -> None:
@@ -184,7 +229,7 @@ def test_an_error_reply_carries_the_result_of_the_ros_service(wire: Wire, town: 
             return None
 
     told = json.loads(bytes(wait_for(reply).err.payload))
-    assert told == {"error": NOT_THERE, "result": {"result": si.NOT_FOUND, "error_message": NOT_THERE}}
+    assert told == {"error": NOT_THERE, "result": {"result": si.Result.NOT_FOUND, "error_message": NOT_THERE}}
 
 
 def test_what_is_deleted_leaves_no_key_and_no_token_and_its_name_is_free(town: Town) -> None:
@@ -192,17 +237,17 @@ def test_what_is_deleted_leaves_no_key_and_no_token_and_its_name_is_free(town: T
     for _ in range(3):
         town.spawn("Fred")
         town.loop.run(steps(), 24)
-        town.services._delete(si.DeleteEntityRequest("Fred"))
+        town.services.delete(si.DeleteEntityRequest("Fred"))
         town.loop.run(steps(), 24)
         wait_for(lambda: town.tokens() == before)
-    assert list(town.entities) == [] and town.entities.vehicles == []
-    assert town.refusal(lambda: town.services._delete(si.DeleteEntityRequest("Fred")))[0] == si.NOT_FOUND
+    assert list(town.entities) == [] and town.entities.robots == []
+    assert town.refusal(lambda: town.services.delete(si.DeleteEntityRequest("Fred")))[0] == si.Result.NOT_FOUND
 
 
 def test_a_deleted_robot_is_out_of_the_way_of_others(town: Town) -> None:
     town.spawn("low", BALL, z=0.2)
     high = town.spawn("high", BALL, z=0.7)
-    town.services._delete(si.DeleteEntityRequest("low"))
+    town.services.delete(si.DeleteEntityRequest("low"))
     town.loop.run(steps(), 480)
     assert high.body.pose()[0] == pytest.approx((0, 0, 0.2), abs=2e-3)
 
@@ -212,7 +257,7 @@ def test_entities_are_listed_and_filtered_by_a_simple_pattern(town: Town) -> Non
         town.spawn(name, BALL, z=len(name))
 
     def listed(pattern: str) -> list[str]:
-        return town.services._list(si.GetEntitiesRequest(si.EntityFilters(pattern))).entities
+        return town.services.names(si.GetEntitiesRequest(si.EntityFilters(pattern))).entities
 
     assert listed("") == ["ball_a", "ball_b", "crate"]
     assert listed("^ball_.$|crate") == ["ball_a", "ball_b", "crate"]
@@ -224,7 +269,7 @@ def test_entities_are_listed_and_filtered_by_a_simple_pattern(town: Town) -> Non
 def test_the_state_is_the_pose_and_the_velocity_in_the_world(town: Town) -> None:
     town.spawn("ball", BALL, z=5)
     town.loop.run(steps(), 24)
-    state = town.services._state(si.GetEntityStateRequest("ball")).state
+    state = town.services.state(si.GetEntityStateRequest("ball")).state
     assert state.header.frame_id == "world" and state.header.stamp.seconds() == pytest.approx(0.1)
     assert state.twist.linear.z == pytest.approx(-0.98, abs=1e-3)
     assert state.pose.position.z < 5
@@ -233,7 +278,7 @@ def test_the_state_is_the_pose_and_the_velocity_in_the_world(town: Town) -> None
 def test_an_entity_can_be_put_elsewhere_with_a_velocity(town: Town) -> None:
     ball = town.spawn("ball", BALL, z=1)
     twist = Twist(Vector3(1, 2, 3), Vector3(0, 0, 0.5))
-    town.services._put(si.SetEntityStateRequest("ball", si.EntityState(pose=at(3, 4, 5).pose, twist=twist)))
+    town.services.put(si.SetEntityStateRequest("ball", si.EntityState(pose=at(3, 4, 5).pose, twist=twist)))
     assert ball.body.pose()[0] == pytest.approx((3, 4, 5))
     linear, angular = ball.body.twist()
     assert linear == pytest.approx((1, 2, 3))
@@ -253,22 +298,24 @@ def test_an_entity_can_be_put_elsewhere_with_a_velocity(town: Town) -> None:
 )
 def test_a_state_that_no_engine_survives_is_refused(town: Town, state: si.EntityState) -> None:
     ball = town.spawn("ball", BALL, z=1)
-    town.refusal(lambda: town.services._put(si.SetEntityStateRequest("ball", state)))
+    town.refusal(lambda: town.services.put(si.SetEntityStateRequest("ball", state)))
     assert ball.body.pose()[0] == pytest.approx((0, 0, 1))
 
 
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda services: services._delete(si.DeleteEntityRequest("Ann")),
-        lambda services: services._state(si.GetEntityStateRequest("Ann")),
-        lambda services: services._put(si.SetEntityStateRequest("Ann")),
+        lambda services: services.delete(si.DeleteEntityRequest("Ann")),
+        lambda services: services.state(si.GetEntityStateRequest("Ann")),
+        lambda services: services.put(si.SetEntityStateRequest("Ann")),
     ],
     ids=["delete", "get state", "set state"],
 )
-def test_an_unknown_entity_is_told_with_those_that_there_are(town: Town, ask: Callable[[object], Message]) -> None:
+def test_an_unknown_entity_is_refused_with_the_names_of_the_known_ones(
+    town: Town, ask: Callable[[object], Message]
+) -> None:
     town.spawn("Fred")
-    assert town.refusal(lambda: ask(town.services)) == (si.NOT_FOUND, NOT_THERE)
+    assert town.refusal(lambda: ask(town.services)) == (si.Result.NOT_FOUND, NOT_THERE)
 
 
 def steps() -> threading.Event:
@@ -290,78 +337,82 @@ def test_a_robot_that_cannot_be_leaves_nothing_in_the_world(town: Town, world: W
     text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
     town.spawn("ball", BALL, z=1.0)
     code, told = town.refusal(lambda: town.spawn("Fred", text, z=0.3))
-    assert (code, "cannot balance" in told) == (si.RESOURCE_PARSE_ERROR, True)
-    assert bullet.getNumBodies(world._id) == 2  # the ground and the ball
+    assert (code, "cannot balance" in told) == (si.SpawnEntityReply.RESOURCE_PARSE_ERROR, True)
+    assert bullet.getNumBodies(world.id) == 2  # the ground and the ball
 
 
-def test_what_is_wrong_with_a_robot_is_told_before_its_name_is_taken(town: Town) -> None:
+def test_errors_of_a_robot_are_reported_before_its_name_is_checked(town: Town) -> None:
     town.spawn("Fred")
     text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
-    assert town.refusal(lambda: town.spawn("Fred", text))[0] == si.RESOURCE_PARSE_ERROR
+    assert town.refusal(lambda: town.spawn("Fred", text))[0] == si.SpawnEntityReply.RESOURCE_PARSE_ERROR
 
 
-def test_a_robot_in_the_place_of_another_obeys_nobody_whom_that_one_held(town: Town) -> None:
+def test_a_respawned_robot_inherits_held_sources(town: Town) -> None:
     town.spawn("Fred")
-    (vehicle,) = town.entities.vehicles
-    assert vehicle.arbiter.offer("script", 4, (0.5, 0, 0), 10.0) == ""
-    assert vehicle.arbiter.offer("person", 1, (0.5, 0, 0), 10.1) == ""
-    town.services._delete(si.DeleteEntityRequest("Fred"))
+    (robot,) = town.entities.robots
+    assert robot.arbiter.offer("script", 4, (0.5, 0, 0), 10.0) == ""
+    assert robot.arbiter.offer("person", 1, (0.5, 0, 0), 10.1) == ""
+    town.services.delete(si.DeleteEntityRequest("Fred"))
     town.spawn("Fred")
-    (vehicle,) = town.entities.vehicles
-    assert vehicle.arbiter.offer("script", 4, (0.5, 0, 0), 20.0).startswith("held")
-    assert vehicle.arbiter.resume(20.1) == ""
-    assert vehicle.arbiter.offer("script", 4, (0.5, 0, 0), 20.2) == ""
+    (robot,) = town.entities.robots
+    assert robot.arbiter.offer("script", 4, (0.5, 0, 0), 20.0).startswith("held")
+    assert robot.arbiter.resume(20.1) == ""
+    assert robot.arbiter.offer("script", 4, (0.5, 0, 0), 20.2) == ""
 
 
 def test_a_stop_outlives_its_robot_and_a_thousand_others(
     town: Town, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(entities_module, "MOST", 2)
+    monkeypatch.setattr(entities_module, "MAX_ENTITIES", 2)
     for name in ("Fred", "Ann", "Bob", "Eve"):
         town.spawn(name)
-        (vehicle,) = town.entities.vehicles
+        (robot,) = town.entities.robots
         if name == "Fred":
-            vehicle.arbiter.stop("ann@1", 10.0)
-        town.services._delete(si.DeleteEntityRequest(name))
-    assert len(town.entities._before) == 2
+            robot.arbiter.stop("ann@1", 10.0)
+        town.services.delete(si.DeleteEntityRequest(name))
+    assert len(town.entities.before) == 2
     town.spawn("Fred")
-    (vehicle,) = town.entities.vehicles
-    assert vehicle.arbiter.offer("person", 1, (0.5, 0, 0), 20.0).startswith("stopped: by ann@1; ")
-    assert "sim: Fred is stopped by ann@1, as the one before it was" in capsys.readouterr().err
+    (robot,) = town.entities.robots
+    assert robot.arbiter.offer("person", 1, (0.5, 0, 0), 20.0).startswith("stopped: by ann@1; ")
+    assert "sim: Fred is still stopped by ann@1, as the robot before it" in capsys.readouterr().err
 
 
-def test_an_arm_can_be_stopped_too(town: Town) -> None:
+def test_an_arm_can_be_stopped_too(town: Town, capsys: pytest.CaptureFixture[str]) -> None:
     """It has joints and no drive."""
+    shown: list[str] = []
     town.spawn("arm", ARM, z=0.05)
-    (vehicle,) = town.entities.vehicles
+    (robot,) = town.entities.robots
     commands = town.client.publisher("arm/joint_command", JointState)
     wait_for(lambda: commands.matched)
-    vehicle._calls._on_stop(TriggerRequest())
+    asked = town.client.session.get("arm/stop")
 
-    def refused() -> int:
+    def refused() -> bool:
         commands.put(JointState(name=["j"], velocity=[1.0]))
         town.loop.run(steps(), 24)
-        return vehicle._joints._intake._ledger.refused["stopped"]
+        shown.append(capsys.readouterr().err)
+        return "arm/joint_command: from client@" in "".join(shown) and ": stopped: by " in "".join(shown)
 
-    wait_for(refused)
-    assert vehicle.joint_arbiter.driver(vehicle._now) is None
+    wait_for(refused, what=lambda: "".join(shown))
+    assert len(list(asked)) == 1
+    assert robot.joint_arbiter.driver(time.monotonic()) is None
 
 
 def test_a_robot_with_joints_and_no_drive_has_a_resume_of_its_own(town: Town) -> None:
     town.spawn("arm", ARM, z=0.05)
-    assert {"arm/resume", "arm/stop", "arm/release", "arm/joint_command", "arm/joint_states"} <= town.tokens()
+    keys = {"arm/resume", "arm/stop", "arm/release", "arm/joint_command", "arm/joint_states"}
+    wait_for(lambda: keys <= town.tokens())
     other = town.refusal(lambda: town.spawn("second", ARM, entity_namespace="arm"))
-    assert other[0] == si.NAME_NOT_UNIQUE
+    assert other[0] == si.SpawnEntityReply.NAME_NOT_UNIQUE
 
 
 def test_a_static_robot_is_never_driven(town: Town) -> None:
     moved = '<plugin name="p" filename="libgazebo_ros_planar_move.so"/>'
     entity = town.spawn("wall", BOX.replace("<link", f"<static>true</static>{moved}<link"), z=0.5)
-    assert entity.vehicle is None
+    assert entity.robot is None
     town.loop.run(steps(), 240)
     assert entity.body.pose()[0] == pytest.approx((0, 0, 0.5), abs=1e-6)
     state = si.EntityState(pose=at(1, 0, 0.5).pose, twist=Twist(Vector3(1, 0, 0)))
-    assert "is static" in town.refusal(lambda: town.services._put(si.SetEntityStateRequest("wall", state)))[1]
+    assert "is static" in town.refusal(lambda: town.services.put(si.SetEntityStateRequest("wall", state)))[1]
 
 
 @pytest.mark.parametrize("tag", ["clock", "spawn_entity", "tf", "odom"])
@@ -369,7 +420,7 @@ def test_a_robots_file_puts_nothing_on_a_key_that_is_taken(town: Town, tag: str)
     text = HB_BOT.replace("<commandTopic>cmd_vel<", f"<commandTopic>/{tag}<")
     model = parse(text, Path("r"))
     code, told = town.refusal(lambda: town.entities.add("Fred", model, ((0, 0, 0), UPRIGHT), ""))
-    assert (code, repr(tag) in told) == (si.NAMESPACE_INVALID, True)
+    assert (code, repr(tag) in told) == (si.SpawnEntityReply.NAMESPACE_INVALID, True)
 
 
 def test_a_robot_that_moves_to_nowhere_is_taken_out_and_the_others_go_on(
@@ -377,10 +428,10 @@ def test_a_robot_that_moves_to_nowhere_is_taken_out_and_the_others_go_on(
 ) -> None:
     town.spawn("Fred")
     ann = town.spawn("Ann", entity_namespace="ann")
-    (fred, _) = town.entities.vehicles
+    (fred, _) = town.entities.robots
     lost = ((math.nan, 0.0, 0.0), UPRIGHT, (0.0, 0.0, 0.0))
     monkeypatch.setattr(fred.mover, "moved", lambda time, dt: lost)
     town.loop.run(steps(), 24)
     assert [entity.name for entity in town.entities] == ["Ann"]
-    assert "sim: Fred was taken out of the world: " in capsys.readouterr().err
-    assert ann.vehicle in town.entities.vehicles
+    assert "sim: Fred was removed from the world: " in capsys.readouterr().err
+    assert ann.robot in town.entities.robots

@@ -1,4 +1,4 @@
-"""Robots of parts with joints, in the real engine: against closed forms, and in whatever order a file tells them."""
+"""Robots of parts with joints, in the real engine: against closed forms, and in whatever order a file lists them."""
 
 import itertools
 import math
@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 from holozen.robot.errors import RobotError
-from holozen.robot.model import RobotModel, parse
-from services.sim.engine import bullet
-from services.sim.jointed import JointedBody
-from services.sim.world import World
+from holozen.robot.loading import parse
+from holozen.robot.model import RobotModel
+from services.sim.physics.engine import bullet
+from services.sim.physics.jointed import JointedBody
+from services.sim.physics.world import World
 
 DT = 1 / 240
 G = 9.8
@@ -77,7 +78,9 @@ TREE = [("j1", "a", "b", 1.0), ("j2", "a", "c", 2.0), ("j3", "b", "d", 3.0), ("j
 
 
 @pytest.mark.parametrize("order", list(itertools.permutations(range(4)))[::5])
-def test_each_joint_turns_its_own_part_in_whatever_order_they_are_told(space: World, order: tuple[int, ...]) -> None:
+def test_each_joint_turns_its_own_part_in_whatever_order_they_are_commanded(
+    space: World, order: tuple[int, ...]
+) -> None:
     links = [link("a", HEAVY, HEAVY), *(link(TREE[number][2]) for number in order)]
     joints = [joint(*TREE[number][:3]) for number in reversed(order)]
     body = space.add_jointed(robot(*links, *joints), (0, 0, 0))
@@ -213,7 +216,7 @@ def test_a_push_speeds_a_joint_up_by_newton(space: World) -> None:
 
 
 @pytest.mark.parametrize("effort", [1, 5, 100])
-def test_a_slide_goes_where_it_is_told_and_stays(space: World, effort: float) -> None:
+def test_a_slide_moves_to_its_commanded_position_and_stays(space: World, effort: float) -> None:
     body = space.add_jointed(on_a_rock(limit(effort=effort), "prismatic"), (0, 0, 0))
     body.go("j", 0.3)
     run(space, 4)
@@ -325,7 +328,7 @@ def test_two_hundred_robots_added_and_removed_leave_little_behind(ground: World)
     before = resident()
     come_and_go(200)
     assert resident() - before < 10e6
-    assert bullet.getNumBodies(ground._id) == 1
+    assert bullet.getNumBodies(ground.id) == 1
 
 
 def resident() -> int:

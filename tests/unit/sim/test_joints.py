@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 
 from holozen.messages import JointState
-from holozen.robot.model import RobotModel, load, parse
-from holozen.robot.standing import lowest
-from services.sim.drives import mover_for
-from services.sim.jointed import JointedBody
-from services.sim.joints import Motors
-from services.sim.motion import JointMotion, motion_of
-from services.sim.world import World
+from holozen.robot.loading import load, parse
+from holozen.robot.model import RobotModel
+from holozen.robot.rigid import lowest
+from services.sim.command.motion import JointMotion, motion_of
+from services.sim.physics.jointed import JointedBody, Motors
+from services.sim.physics.movers import mover_for
+from services.sim.physics.world import World
 
 ROVER = load(Path(__file__).parents[3] / "urdf" / "rover.urdf.xacro")
 WHEELS = frozenset(("jFL", "jFR", "jBL", "jBR"))
@@ -54,7 +54,7 @@ def test_a_position_is_where_it_goes_and_stays(space: World) -> None:
     assert (bench.angles()["jFL"], bench.angles()["jBR"]) == pytest.approx((1.5, -0.5), abs=1e-3)
 
 
-def test_an_effort_speeds_it_up_and_no_longer_than_it_is_told(space: World) -> None:
+def test_an_effort_accelerates_it_only_while_commanded(space: World) -> None:
     bench = Bench(space)
     bench.do(JointMotion("effort", (("jFL", 0.01),)), 0.25)
     first = bench.rates()["jFL"]

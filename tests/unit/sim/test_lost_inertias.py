@@ -7,12 +7,11 @@ from pathlib import Path
 import pytest
 
 from holozen.limits import STOP
-from holozen.robot.model import parse
-from holozen.robot.rigid import lump
-from holozen.robot.standing import lowest
+from holozen.robot.loading import parse
+from holozen.robot.rigid import lowest, lump
 from holozen.robot.xacro import expand
-from services.sim.drives import mover_for
-from services.sim.world import World
+from services.sim.physics.movers import mover_for
+from services.sim.physics.world import World
 
 ROVER = Path(__file__).parents[3] / "urdf" / "rover.urdf.xacro"
 DT = 1 / 240

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from holozen.robot.drives import Mecanum
-from holozen.robot.model import RobotModel, load
-from services.sim.wheels import MecanumWheels
+from holozen.robot.loading import load
+from holozen.robot.model import Mecanum, RobotModel
+from services.sim.physics.wheels import MecanumWheels
 
 MODEL = load(Path(__file__).parents[3] / "urdf" / "mecanum.urdf.xacro")
 NAMES = ["front_left_joint", "front_right_joint", "back_left_joint", "back_right_joint"]

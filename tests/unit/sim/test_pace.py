@@ -61,9 +61,9 @@ def test_another_factor_holds_from_now_on_and_nothing_is_raced_after() -> None:
     pace = Pace(0.01, 0.001, now=0.0)
     pace.stepped(0.0)
     assert pace.left(0.0) == pytest.approx(10)
-    pace.keep(2.0, now=5.0)
+    pace.set_factor(2.0, now=5.0)
     assert (pace.left(5.0), pace.rtf, pace.lost) == (0, 2.0, 0)
     pace.stepped(5.0)
     assert pace.left(5.0) == pytest.approx(0.005)
-    pace.keep(0.0, now=6.0)
+    pace.set_factor(0.0, now=6.0)
     assert pace.left(6.0) == 0

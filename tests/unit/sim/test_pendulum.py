@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from services.sim.pendulum import GRAVITY, Pendulum, gains
+from services.sim.physics.balance import GRAVITY, Pendulum, gains
 
 WHEELY = Pendulum(
     body_mass=0.18,
@@ -63,11 +63,11 @@ def test_the_gains_are_those_for_the_step(dt: float) -> None:
     assert held(WHEELY, WHEELY, 0.1, 10, dt) == pytest.approx([0, 0, 0, 0], abs=2e-3)
 
 
-@pytest.mark.parametrize("factor", [0.7, 1.4])
-@pytest.mark.parametrize("name", ["body_mass", "wheel_mass", "radius", "height", "body_inertia", "wheel_inertia"])
-def test_a_body_that_is_not_quite_as_told_is_held_as_well(name: str, factor: float) -> None:
-    real = replace(WHEELY, **{name: getattr(WHEELY, name) * factor})
-    assert held(real, WHEELY, 0.1, 15) == pytest.approx([0, 0, 0, 0], abs=5e-3)
+def test_a_body_that_differs_from_its_model_is_held_as_well() -> None:
+    for name in ["body_mass", "wheel_mass", "radius", "height", "body_inertia", "wheel_inertia"]:
+        for factor in [0.7, 1.4]:
+            real = replace(WHEELY, **{name: getattr(WHEELY, name) * factor})
+            assert held(real, WHEELY, 0.1, 15) == pytest.approx([0, 0, 0, 0], abs=5e-3)
 
 
 def test_without_a_push_it_falls() -> None:

@@ -1,4 +1,4 @@
-"""What a robot tells: rates kept exactly, Gazebo's covariances, frames that numpy agrees with."""
+"""What a robot publishes: rates kept exactly, Gazebo's covariances, frames that numpy agrees with."""
 
 import math
 from pathlib import Path
@@ -9,21 +9,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.messages import Header, Quaternion, Time, Twist
-from holozen.robot.model import Drive, RobotModel, load
-from holozen.robot.parts import Joint, Limits, Link, Pose
+from holozen.robot.loading import load
+from holozen.robot.model import Drive, Joint, Limits, Link, Pose, RobotModel
 from holozen.robot.rotation import Array, matrix_of, quaternion_of
-from services.sim.reports import JointFrames, Schedule, covariance, odometry, transform
+from services.sim.io.topics import JointFrames, Schedule, covariance, odometry, transform
 
 REPO = Path(__file__).parents[3]
 HB_BOT = load(REPO / "urdf" / "hb_bot.urdf.xacro")
 angles = st.floats(-3, 3)
 
 
-@pytest.mark.parametrize("rate", [1, 7, 10, 20, 30, 50, 60, 100, 200, 240])
-def test_an_hour_at_240_hz_has_every_message_and_not_one_more(rate: float) -> None:
-    schedule = Schedule(rate)
-    first = rate < 240  # the one at the first step, before a period has passed
-    assert sum(schedule.due(step / 240) for step in range(1, 3600 * 240 + 1)) == 3600 * rate + first
+def test_an_hour_at_240_hz_has_every_message_and_not_one_more() -> None:
+    for rate in [1, 7, 10, 20, 30, 50, 60, 100, 200, 240]:
+        schedule = Schedule(rate)
+        first = rate < 240  # the one at the first step, before a period has passed
+        assert sum(schedule.due(step / 240) for step in range(1, 3600 * 240 + 1)) == 3600 * rate + first
 
 
 @pytest.mark.parametrize("rate", [20, 30, 50, 60])
@@ -42,7 +42,7 @@ def test_a_rate_above_the_steps_is_due_at_each_step() -> None:
 def test_another_rate_holds_at_once(rate: float) -> None:
     schedule = Schedule(50)
     assert schedule.due(100.0)
-    schedule.keep(rate)
+    schedule.set_rate(rate)
     assert schedule.due(100.001)
     assert not schedule.due(100.0011)
     assert schedule.due(100.002 + 1 / rate)
@@ -73,7 +73,7 @@ def test_odometry_is_the_world_pose_and_the_body_velocity_with_both_covariances(
     assert odom.pose.covariance == odom.twist.covariance == variances
 
 
-def test_a_transform_tells_the_child_in_the_header_frame() -> None:
+def test_a_transform_gives_the_child_in_the_header_frame() -> None:
     told = transform(Header(Time(1), "odom"), "base", (1, 2, 3), (0, 0, 1, 0))
     assert (told.header.frame_id, told.child_frame_id) == ("odom", "base")
     assert (told.transform.translation.x, told.transform.translation.z) == (1, 3)
@@ -101,7 +101,7 @@ def test_a_joint_turns_its_child_about_its_axis_in_the_parents_frame(
     assert (told.transform.translation.x, told.transform.translation.y) == (1, 2)
 
 
-def test_every_joint_of_the_robot_is_told_with_its_prefix() -> None:
+def test_every_joint_of_the_robot_has_a_transform_with_its_prefix() -> None:
     told = JointFrames(HB_BOT, "Fred/").transforms(Time(7), {})
     assert {(t.header.frame_id, t.child_frame_id) for t in told} == {
         ("Fred/footprint_link", "Fred/base_link"),

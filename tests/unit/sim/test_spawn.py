@@ -1,4 +1,4 @@
-"""Robots from their files into the world: side by side, each with a name, or one line that says why not."""
+"""Robots from their files into the world: side by side, each with a name, or one line with the reason."""
 
 import argparse
 from collections.abc import Iterator
@@ -8,12 +8,12 @@ from pathlib import Path
 import pytest
 
 from holozen.bus import Bus
-from holozen.robot.model import RobotError
+from holozen.robot.errors import RobotError
+from holozen.robot.model import WorldSpec
 from holozen.testing import Wire, wait_for
 from services.sim.entities import Entities, Entity
+from services.sim.physics.world import World
 from services.sim.spawn import GAP, spawn_all
-from services.sim.world import World
-from services.sim.worldfile import WorldSpec
 
 HB_BOT = Path(__file__).parents[3] / "urdf" / "hb_bot.urdf.xacro"
 DRIVE = '<gazebo><plugin name="p" filename="libgazebo_ros_planar_move.so">{}</plugin></gazebo>'
@@ -37,7 +37,7 @@ def bus(wire: Wire) -> Bus:
 
 
 def wanted(*robots: tuple[Path, str], drive: str = "") -> argparse.Namespace:
-    return argparse.Namespace(robot=list(robots), package=[], drive=drive)
+    return argparse.Namespace(robot=list(robots), package=[], drive=drive, allow_env=[])
 
 
 def file(folder: Path, body: str) -> Path:
@@ -129,7 +129,7 @@ def test_two_robots_of_one_name_are_refused(bus: Bus, world: World, robots: list
 @pytest.mark.parametrize(
     ("body", "told"),
     [
-        (LINK.format(BALL), "no plugin drives it; add one, or have it moved as a whole: --drive planar_move"),
+        (LINK.format(BALL), "no plugin drives it; add one, or move the whole body: --drive planar_move"),
         (
             LINK.format("") + DRIVE,
             "no collision shape to stand on; give a link a <box>, <cylinder>, <sphere> or <mesh>",
@@ -146,7 +146,7 @@ def test_a_robot_that_cannot_be_simulated_is_refused_with_its_file(
     assert str(error.value) == f"{path}: {told}"
 
 
-def test_a_collision_mesh_that_is_missing_is_told_and_a_box_carries_the_robot(
+def test_a_missing_collision_mesh_is_reported_and_a_box_carries_the_robot(
     bus: Bus, world: World, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     path = file(tmp_path, LINK.format(MESH) + DRIVE)
@@ -157,7 +157,20 @@ def test_a_collision_mesh_that_is_missing_is_told_and_a_box_carries_the_robot(
     assert entity.body.pose()[0][2] > 0.01
 
 
-def test_a_robot_without_a_drive_is_moved_as_a_whole_when_asked(bus: Bus, world: World, tmp_path: Path) -> None:
+def test_a_robots_file_reads_an_environment_variable_only_if_it_is_allowed(
+    bus: Bus, world: World, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TOKEN", "secret")
+    path = file(tmp_path, LINK.format(BALL) + DRIVE).rename(tmp_path / "robot.xacro")
+    path.write_text(path.read_text().replace('name="r"', 'name="$(env TOKEN)"'))
+    args = wanted((path, ""))
+    with pytest.raises(RobotError, match="--allow-env TOKEN"):
+        spawn(bus, world, args)
+    args.allow_env = ["TOKEN"]
+    assert spawn(bus, world, args)[0].name == "secret"
+
+
+def test_a_robot_without_a_drive_gets_a_planar_drive_on_request(bus: Bus, world: World, tmp_path: Path) -> None:
     (entity,) = spawn(bus, world, wanted((file(tmp_path, LINK.format(BALL)), "Fred"), drive="planar_move"))
     assert entity.model.drive is not None
     assert "Fred/cmd_vel" in keys(bus)

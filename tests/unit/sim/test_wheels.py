@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from holozen.robot.model import RobotModel, load
-from holozen.robot.parts import Joint, Pose, Shape
-from services.sim.wheels import Wheels
+from holozen.robot.loading import load
+from holozen.robot.model import Joint, Pose, RobotModel, Shape
+from services.sim.physics.wheels import Wheels
 
 REPO = Path(__file__).parents[3]
 HB_BOT = load(REPO / "urdf" / "hb_bot.urdf.xacro")

@@ -11,12 +11,13 @@ import pytest
 
 from holozen.limits import STOP, Planar
 from holozen.messages import Quaternion
-from holozen.robot.model import load
-from holozen.robot.parts import Pose, Shape
+from holozen.robot.loading import load, parse
+from holozen.robot.model import Pose, Shape, WorldSpec
 from holozen.robot.rigid import Body, PlacedShape, lump
-from services.sim.planar import PlanarBody
-from services.sim.world import World
-from services.sim.worldfile import WorldSpec
+from holozen.robot.sdf_world import load_world
+from holozen.rotation import from_rpy, rotate
+from services.sim.physics.planar import PlanarBody
+from services.sim.physics.world import World
 
 REPO = Path(__file__).parents[3]
 HB_BOT = lump(load(REPO / "urdf" / "hb_bot.urdf.xacro"))
@@ -164,7 +165,7 @@ def test_a_robot_that_is_no_longer_driven_is_stopped_by_the_next_command(world: 
 
 
 @pytest.mark.parametrize("name", ["hb_bot", "off-centre"])
-def test_a_robot_that_is_told_to_stand_holds_its_place_on_a_slope(name: str) -> None:
+def test_a_stopped_robot_holds_its_place_on_a_slope(name: str) -> None:
     steep = 0.25  # rad
     gravity = (9.8 * math.sin(steep), 0, -9.8 * math.cos(steep))  # as seen from the slope
     with closing(World(WorldSpec(gravity=gravity, ground=True))) as world:
@@ -219,6 +220,109 @@ def test_the_step_of_the_world_is_the_engines() -> None:
 
 
 def test_loading_the_engine_prints_nothing_and_leaves_standard_error_open() -> None:
-    words = [sys.executable, "-c", "import services.sim.world, sys; print('still here', file=sys.stderr)"]
+    words = [sys.executable, "-c", "import services.sim.physics.world, sys; print('still here', file=sys.stderr)"]
     done = subprocess.run(words, capture_output=True, text=True, cwd=REPO, timeout=60)
     assert (done.stdout, done.stderr) == ("", "still here\n")
+
+
+CAMERA = (
+    '<robot name="camera"><link name="c"><inertial><mass value="0.1"/><inertia ixx="1e-3" iyy="1e-3" izz="1e-3"/>'
+    '</inertial><collision><geometry><box size="0.1 0.1 0.1"/></geometry></collision></link>{}</robot>'
+)
+OFF = '<gazebo reference="c"><{0}>{1}</{0}></gazebo>'
+SDF_CAMERA = (
+    '<sdf version="1.6"><model name="camera"><link name="c"><gravity>{}</gravity><inertial><mass>0.1</mass></inertial>'
+    '<collision name="c"><geometry><box><size>0.1 0.1 0.1</size></box></geometry></collision></link></model></sdf>'
+)
+
+
+def fallen(world: World, text: str, *joints: str) -> float:
+    """Metres by which a robot sinks in a second from 18 m."""
+    body = world.add_jointed(parse(text, Path("camera.urdf")), (0, 0, 18))
+    for _ in range(240):
+        world.step()
+    (x, y, z), _ = body.pose()
+    assert abs(x) + abs(y) < 1e-6
+    body.remove()
+    world.step()
+    return 18 - z
+
+
+def test_a_link_without_gravity_floats(world: World) -> None:
+    for text in (OFF.format("gravity", "false"), OFF.format("gravity", "0"), OFF.format("turnGravityOff", "true")):
+        assert fallen(world, CAMERA.format(text)) == pytest.approx(0, abs=1e-6), text
+    for word in ("0", "false"):
+        assert fallen(world, SDF_CAMERA.format(word)) == pytest.approx(0, abs=1e-6), word
+    assert fallen(world, SDF_CAMERA.format("true")) == pytest.approx(4.9, abs=0.05)
+    assert fallen(world, CAMERA.format(OFF.format("gravity", "true"))) == pytest.approx(4.9, abs=0.05)
+
+
+def test_gravity_pulls_the_links_of_a_body_that_have_it(world: World) -> None:
+    part = CAMERA.split("<link", 1)[1].split("{}")[0].replace('"c"', '"d"').replace('"0.1"', '"0.3"', 1)
+    ends = '<parent link="c"/><child link="d"/><origin xyz="0 0 -0.1"/><axis xyz="0 0 1"/>'
+    joint = f'<joint name="j" type="{{}}">{ends}</joint>'
+    off = OFF.format("gravity", "0")
+    assert fallen(world, CAMERA.format(f"<link{part}{joint.format('fixed')}{off}")) == pytest.approx(
+        4.9 * 3 / 4, abs=0.05
+    )
+    both = off + off.replace('"c"', '"d"')
+    assert fallen(world, CAMERA.format(f"<link{part}{joint.format('continuous')}{both}")) == pytest.approx(0, abs=1e-6)
+
+
+def test_a_driven_robot_without_gravity_stays_at_its_height(world: World) -> None:
+    base = world.add(lump(parse(CAMERA.format(OFF.format("gravity", "0")), Path("camera.urdf"))), (0, 0, 1))
+    run(world, (base, (0.5, 0, 0)), seconds=1)
+    assert base.pose()[0] == pytest.approx((0.5, 0, 1), abs=1e-3)
+
+
+BUMP = (
+    '<sdf version="1.7"><model name="bump"><static>true</static><link name="l"><collision name="c"><geometry><box>'
+    "<size>0.2 {} {}</size></box></geometry></collision></link></model></sdf>"
+)
+UPRIGHT_BOX = body(shape("box", (0.3, 0.3, 0.2), 0.1), inertia=(0.01, 0.01, 0.01))
+
+
+def tilt(base: PlanarBody) -> float:
+    """Degrees by which the robot's z axis is off the vertical."""
+    return math.degrees(math.acos(min(1.0, rotate(base.pose()[1], (0, 0, 1))[2])))
+
+
+def steepest(world: World, base: PlanarBody, velocity: Planar, seconds: float) -> float:
+    """The largest tilt while the robot drives."""
+    most = 0.0
+    for _ in range(round(seconds / DT)):
+        base.drive(velocity, DT)
+        world.step()
+        most = max(most, tilt(base))
+    return most
+
+
+def test_a_robot_that_meets_a_low_edge_climbs_it_or_stands(world: World) -> None:
+    for robot in (HB_BOT, UPRIGHT_BOX):
+        for width, height in ((0.1, 0.02), (3, 0.02), (3, 0.01)):
+            for heading in (0.0, 0.4, math.pi / 3):
+                start = -1.5 if robot is UPRIGHT_BOX else -2.0
+                base = world.add(robot, (start, 0, -0.04 * (robot is HB_BOT)), from_rpy(0, 0, heading))
+                run(world, (base, STOP), seconds=0.5)
+                bump = world.add_jointed(parse(BUMP.format(width, height), Path("b")), (0, 0, height / 2))
+                ahead = (0.5 * math.cos(heading), -0.5 * math.sin(heading), 0)
+                assert steepest(world, base, ahead, 5) < 20, (width, height, heading)
+                bump.remove()
+                run(world, (base, STOP), seconds=0.5)
+                assert tilt(base) < 1
+                run(world, (base, ahead), seconds=1)  # with nothing in its way it comes up to its speed
+                before = pose(base)
+                run(world, (base, ahead), seconds=1)
+                assert math.dist(before[:2], pose(base)[:2]) == pytest.approx(0.5, abs=5e-3)
+                base.remove()
+
+
+def test_a_robot_that_meets_the_side_of_the_ramp_stays_upright() -> None:
+    spec = load_world(REPO / "worlds" / "arena.world")
+    for y in (-0.8, 0.5, 1.3):
+        with closing(World(spec)) as world:
+            for model in spec.models:
+                world.add_jointed(model, model.pose.xyz, from_rpy(*model.pose.rpy))
+            base = world.add(HB_BOT, (1.2, y, -0.04))
+            run(world, (base, STOP), seconds=0.5)
+            assert steepest(world, base, (0.5, 0, 0), 5) < 20, y

@@ -7,13 +7,17 @@ import html
 import math
 import re
 import sys
+from collections.abc import Callable
 from itertools import groupby
 
 import pyte
+from prompt_toolkit.application import Application
+from prompt_toolkit.input import DummyInput
+from prompt_toolkit.layout import Layout
 
-from services.teleop.layouts import load
-from services.teleop.painter import Painter
-from services.teleop.view import Source, State, render
+from services.teleop.control.layout_file import load
+from services.teleop.screen import STYLE, Picture, TerminalOutput
+from services.teleop.view import Line, Source, State, render
 
 COLUMNS, ROWS = 80, 24
 WIDE, HIGH = 9, 19  # units of a character
@@ -41,7 +45,7 @@ def scene() -> State:
     (x0, y0), (x, y) = trail[-2:]
     me = "teleop@1a2b3c"
     return State(
-        robot="Fred", others=["Barney"], mode="hold", why="this terminal tells when a key is released",
+        robot="Fred", others=["Barney"], mode="hold", why="this terminal reports key releases",
         speed=0.5, turn=1.0, speed_limit=1.5, turn_limit=3.0,
         command=(0.5, 0.25, -1.0), measured=(0.4712, 0.2214, -0.8126),
         odom_age=0.012, stale=False, round_trip=0.00061, real_time_factor=1.0, listeners=["sim", "recorder"],
@@ -54,13 +58,34 @@ def scene() -> State:
     )  # fmt: skip
 
 
+class Drawing:
+    """Pictures on a terminal of this size, columns and rows; `write` gets what is drawn."""
+
+    def __init__(self, write: Callable[[str], None], size: tuple[int, int], colour: bool = True) -> None:
+        self.size = size
+        self._picture = Picture()
+        output = TerminalOutput(write, lambda: self.size, colour)
+        self._app: Application[None] = Application(
+            layout=Layout(self._picture), style=STYLE, full_screen=True, input=DummyInput(), output=output
+        )
+
+    def draw(self, lines: list[Line]) -> None:
+        """Show them."""
+        self._picture.lines = lines
+        self._app.renderer.render(self._app, self._app.layout)
+
+    def forget(self) -> None:
+        """What is shown is not known any more."""
+        self._app.renderer.reset(leave_alternate_screen=False)
+
+
 def terminal(state: State, columns: int = COLUMNS, rows: int = ROWS) -> pyte.Screen:
     """A terminal that shows `state`."""
     screen = pyte.Screen(columns, rows)
     stream = pyte.Stream(screen)
     # pyte does not know faint letters; they are grey ones here.
-    painter = Painter(lambda text: stream.feed(text.replace("\x1b[0;2m", "\x1b[0;90m")))
-    painter.paint(render(state, columns, rows), columns, rows)
+    drawing = Drawing(lambda text: stream.feed(text.replace("\x1b[0;2m", "\x1b[0;90m")), (columns, rows))
+    drawing.draw(render(state, columns, rows))
     return screen
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 from hypothesis import strategies as st
 
-from services.teleop.state import Source, State
+from services.teleop.view import Source, State
 from tests.unit.teleop.picture import scene
 
 BROKEN = replace(

@@ -5,15 +5,14 @@ from pathlib import Path
 
 import pytest
 
-from services.teleop import layout_help
-from services.teleop.fixed_keys import FIXED
-from services.teleop.layout_file import MOTIONS
-from services.teleop.layouts import ACTIONS, LAYOUTS, load
-from services.teleop.ros_words import ros_arguments
+from services.teleop.control import layouts
+from services.teleop.control.layout_file import MOTIONS, load
+from services.teleop.control.layouts import ACTIONS, FIXED, LAYOUTS
+from services.teleop.ros_args import ros_arguments
 from services.teleop.settings import NAMES, read
 
 DOCS = Path(__file__).parents[3] / "docs" / "teleop.md"
-TABLES = {name: layout.markdown() for name, layout in LAYOUTS.items()} | {"fixed": layout_help.markdown({}, {}, FIXED)}
+TABLES = {name: layout.markdown() for name, layout in LAYOUTS.items()} | {"fixed": layouts.help_markdown({}, {}, FIXED)}
 
 
 def examples() -> list[str]:

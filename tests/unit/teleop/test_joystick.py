@@ -10,12 +10,31 @@ from pathlib import Path
 
 import pytest
 
-from services.teleop import evdev
-from services.teleop.evdev import AXES, AXIS, EV_ABS, EV_KEY, EV_SYN, KEYS, KEYS_DOWN, NAME, SYN_DROPPED, Device
-from services.teleop.gamepad import ABS_HAT0Y, ABS_RX, ABS_X, ABS_Y, BTN_SOUTH, BTN_START, BTN_TL, REST
-from services.teleop.joystick import Joystick, JoystickError
+from services.teleop.input import gamepad
+from services.teleop.input.gamepad import (
+    ABS_HAT0Y,
+    ABS_RX,
+    ABS_X,
+    ABS_Y,
+    BTN_SOUTH,
+    BTN_START,
+    BTN_TL,
+    EV_ABS,
+    EV_KEY,
+    EV_SYN,
+    GET_AXES,
+    GET_AXIS,
+    GET_KEYS,
+    GET_KEYS_DOWN,
+    GET_NAME,
+    REST,
+    SYN_DROPPED,
+    Device,
+    Joystick,
+    JoystickError,
+)
 
-REPORT = (EV_SYN, evdev.SYN_REPORT, 0)
+REPORT = (EV_SYN, gamepad.SYN_REPORT, 0)
 AHEAD = pytest.approx((1, 0, 0), abs=1e-4)  # a pad of whole numbers has no exact middle
 STICKS = (ABS_X, ABS_Y, ABS_RX)
 
@@ -36,12 +55,12 @@ class Recorded(Device):
         self._rest = b""
         middle = absinfo((low + high + 1) // 2, low, high)
         self.answers = {
-            NAME: b"Pad of a test\0\0\0",
-            AXES: bits([*STICKS, 4, ABS_HAT0Y], 8),
-            KEYS: bits([BTN_SOUTH, BTN_TL, BTN_START], 96),
-            KEYS_DOWN: bytes(96),
-            **{AXIS + axis: middle for axis in STICKS},
-            AXIS + ABS_HAT0Y: absinfo(0, -1, 1),
+            GET_NAME: b"Pad of a test\0\0\0",
+            GET_AXES: bits([*STICKS, 4, ABS_HAT0Y], 8),
+            GET_KEYS: bits([BTN_SOUTH, BTN_TL, BTN_START], 96),
+            GET_KEYS_DOWN: bytes(96),
+            **{GET_AXIS + axis: middle for axis in STICKS},
+            GET_AXIS + ABS_HAT0Y: absinfo(0, -1, 1),
         }
 
     def _ask(self, number: int, size: int) -> bytes:
@@ -62,9 +81,9 @@ def device() -> Iterator[Recorded]:
 
 def test_the_requests_are_those_of_the_kernels_headers() -> None:
     """As a C program prints them: EVIOCGNAME(256), EVIOCGBIT(EV_KEY, 96), EVIOCGBIT(EV_ABS, 8), ..."""
-    assert (NAME, KEYS, AXES) == (0x81004506, 0x80604521, 0x80084523)
-    assert (KEYS_DOWN, AXIS + ABS_RX) == (0x80604518, 0x80184543)
-    assert evdev.EVENT.size == 24 or struct.calcsize("l") == 4
+    assert (GET_NAME, GET_KEYS, GET_AXES) == (0x81004506, 0x80604521, 0x80084523)
+    assert (GET_KEYS_DOWN, GET_AXIS + ABS_RX) == (0x80604518, 0x80184543)
+    assert gamepad.EVENT.size == 24 or struct.calcsize("l") == 4
 
 
 def test_a_pad_drives_while_the_dead_man_is_held(device: Recorded) -> None:
@@ -81,7 +100,7 @@ def test_a_pad_drives_while_the_dead_man_is_held(device: Recorded) -> None:
 
 
 def test_a_stick_that_points_away_from_the_start_counts(device: Recorded) -> None:
-    device.answers[AXIS + ABS_Y] = absinfo(-32768, -32768, 32767)
+    device.answers[GET_AXIS + ABS_Y] = absinfo(-32768, -32768, 32767)
     with Joystick(device, "") as joystick:
         device.play((EV_KEY, BTN_TL, 1), REPORT)
         joystick.read()
@@ -89,7 +108,7 @@ def test_a_stick_that_points_away_from_the_start_counts(device: Recorded) -> Non
 
 
 def test_a_dead_man_that_is_held_at_the_start_does_not_count(device: Recorded) -> None:
-    device.answers[KEYS_DOWN] = bits([BTN_TL], 96)
+    device.answers[GET_KEYS_DOWN] = bits([BTN_TL], 96)
     with Joystick(device, "") as joystick:
         device.play((EV_ABS, ABS_Y, -32768), (EV_KEY, BTN_TL, 1), REPORT)
         joystick.read()
@@ -121,8 +140,8 @@ def test_after_lost_events_the_state_is_read_anew_and_the_dead_man_must_be_relea
         device.play((EV_KEY, BTN_TL, 1), (EV_ABS, ABS_Y, -32768), REPORT)
         joystick.read()
         assert joystick.direction == AHEAD
-        device.answers[KEYS_DOWN] = bits([BTN_TL], 96)
-        device.answers[AXIS + ABS_Y] = absinfo(32767, -32768, 32767)
+        device.answers[GET_KEYS_DOWN] = bits([BTN_TL], 96)
+        device.answers[GET_AXIS + ABS_Y] = absinfo(32767, -32768, 32767)
         device.play((EV_SYN, SYN_DROPPED, 0), (EV_KEY, BTN_TL, 1), REPORT)
         joystick.read()
         assert joystick.direction == REST
@@ -135,8 +154,8 @@ def test_after_letting_go_only_a_new_press_drives(device: Recorded) -> None:
     with Joystick(device, "") as joystick:
         device.play((EV_KEY, BTN_TL, 1), (EV_ABS, ABS_Y, -32768), REPORT)
         joystick.read()
-        device.answers[AXIS + ABS_Y] = absinfo(-32768, -32768, 32767)
-        device.answers[KEYS_DOWN] = bits([BTN_TL], 96)
+        device.answers[GET_AXIS + ABS_Y] = absinfo(-32768, -32768, 32767)
+        device.answers[GET_KEYS_DOWN] = bits([BTN_TL], 96)
         device.play((EV_KEY, BTN_TL, 0), REPORT, (EV_KEY, BTN_TL, 1), (EV_KEY, BTN_START, 1), REPORT)
         joystick.let_go()
         assert joystick.direction == REST
@@ -167,7 +186,7 @@ def test_letting_go_as_a_pad_is_unplugged_rests(device: Recorded) -> None:
 
 
 def test_a_press_right_after_letting_go_drives_if_the_dead_man_was_up(device: Recorded) -> None:
-    device.answers[AXIS + ABS_Y] = absinfo(-32768, -32768, 32767)
+    device.answers[GET_AXIS + ABS_Y] = absinfo(-32768, -32768, 32767)
     with Joystick(device, "") as joystick:
         joystick.let_go()
         device.play((EV_KEY, BTN_TL, 1), REPORT)
@@ -175,7 +194,7 @@ def test_a_press_right_after_letting_go_drives_if_the_dead_man_was_up(device: Re
         assert joystick.direction == AHEAD
 
 
-def test_a_flood_does_not_hold_the_pilot_and_nothing_of_it_is_lost(device: Recorded) -> None:
+def test_a_flood_does_not_hold_the_mapper_and_nothing_of_it_is_lost(device: Recorded) -> None:
     with Joystick(device, "") as joystick:
         for _ in range(12):
             device.play(*[(EV_ABS, ABS_X, 5)] * 100)
@@ -210,11 +229,11 @@ def test_a_pad_that_is_closed_rests(device: Recorded) -> None:
 @pytest.mark.parametrize(
     ("answers", "words"),
     [
-        ({AXES: bits([ABS_X, ABS_Y], 8)}, "is no gamepad: it has no ABS_RX"),
-        ({AXES: bytes(8)}, "is no gamepad: it has no ABS_X, ABS_Y, ABS_RX"),
-        ({KEYS: bytes(96)}, "is no gamepad: it has no BTN_SOUTH, BTN_TL"),  # a pad's motion sensors
-        ({AXIS + ABS_RX: absinfo(0, 0, 0)}, "has no range for ABS_RX: 0 to 0"),
-        ({AXIS + ABS_X: absinfo(0, 255, 0)}, "has no range for ABS_X: 255 to 0"),
+        ({GET_AXES: bits([ABS_X, ABS_Y], 8)}, "is no gamepad: it has no ABS_RX"),
+        ({GET_AXES: bytes(8)}, "is no gamepad: it has no ABS_X, ABS_Y, ABS_RX"),
+        ({GET_KEYS: bytes(96)}, "is no gamepad: it has no BTN_SOUTH, BTN_TL"),  # a pad's motion sensors
+        ({GET_AXIS + ABS_RX: absinfo(0, 0, 0)}, "has no range for ABS_RX: 0 to 0"),
+        ({GET_AXIS + ABS_X: absinfo(0, 255, 0)}, "has no range for ABS_X: 255 to 0"),
     ],
 )
 def test_what_is_no_gamepad_is_refused(device: Recorded, answers: dict[int, bytes], words: str) -> None:
@@ -225,7 +244,7 @@ def test_what_is_no_gamepad_is_refused(device: Recorded, answers: dict[int, byte
 
 
 def test_a_name_that_moves_the_cursor_is_made_harmless(device: Recorded) -> None:
-    device.answers[NAME] = b"Pad\x1b[2J\xff\0"
+    device.answers[GET_NAME] = b"Pad\x1b[2J\xff\0"
     assert Joystick(device, "").name == "Pad?[2J\ufffd"
 
 
@@ -244,15 +263,16 @@ def test_what_is_no_input_device_is_refused_and_never_waited_for(tmp_path: Path)
         assert str(error.value) == f"joystick {path}: {words}".replace("\0", "?")
 
 
-def test_a_folder_without_gamepads_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_folder_without_gamepads_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for folder in (f"{tmp_path}/none", str(tmp_path)):
+        monkeypatch.setattr(gamepad, "FOLDER", folder)
         with pytest.raises(JoystickError) as error:
-            Joystick._first(folder)
+            Joystick.open("")
         assert str(error.value) == f"joystick: no gamepad: there are no input devices in {folder}"
     for name in ("event0", "event12", "js0", "mice", "eventually"):
         (tmp_path / name).touch()
     with pytest.raises(JoystickError) as error:
-        Joystick._first(str(tmp_path))
+        Joystick.open("")
     assert str(error.value) == f"joystick: none of the 2 devices in {tmp_path} is a gamepad"
 
 
@@ -267,11 +287,12 @@ def nobody() -> Iterator[None]:
         os.seteuid(before)
 
 
-def test_devices_that_may_not_be_read_are_told() -> None:
+def test_devices_that_may_not_be_read_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o755)
         Path(folder, "event0").touch(0)
+        monkeypatch.setattr(gamepad, "FOLDER", folder)
         with nobody(), pytest.raises(JoystickError, match=r"event0: no permission; join the group .* input "):
             Joystick.open(f"{folder}/event0")
         with nobody(), pytest.raises(JoystickError, match=r"1 of 1 devices in .* may not be read; join the group"):
-            Joystick._first(folder)
+            Joystick.open("")

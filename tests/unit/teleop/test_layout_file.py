@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.teleop.fixed_keys import FIXED
-from services.teleop.layout_file import MOTIONS
-from services.teleop.layouts import LayoutError, load
+from services.teleop.control.layout_file import MOTIONS, load
+from services.teleop.control.layouts import FIXED, LayoutError
 
 GOOD = """
 name = "my keys"
@@ -61,9 +60,8 @@ def test_moves_are_enough_and_the_file_gives_the_name(tmp_path: Path) -> None:
     assert layout.help == ["w forward/back   ? all keys", "ctrl+c quit   others stop"]
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    rows = [
         ("", ': [moves] has no key, so nothing would drive; write lines such as w = "forward"'),
         ("[moves]", ': [moves] has no key, so nothing would drive; write lines such as w = "forward"'),
         ('[move]\nw = "forward"', ": 'move' is unknown; did you mean 'moves'?"),
@@ -101,10 +99,9 @@ def test_moves_are_enough_and_the_file_gives_the_name(tmp_path: Path) -> None:
                                       "write both, speed or turn and up to 90 %, such as 'both +10%'"),
         ('[speeds]\na = "trun +10%"', ": [speeds] 'a' = 'trun +10%': 'trun' is unknown; did you mean 'turn'?"),
         ('[actions]\na = "resum"', ": [actions] 'a' = 'resum': is unknown; did you mean 'resume'?"),
-    ],
-)  # fmt: skip
-def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
-    assert refusal(tmp_path, text) == words
+    ]  # fmt: skip
+    for text, words in rows:
+        assert refusal(tmp_path, text) == words
 
 
 def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path: Path) -> None:

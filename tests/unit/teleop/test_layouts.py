@@ -4,9 +4,18 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.teleop.fixed_keys import FIXED, key_name
-from services.teleop.layout_help import WIDTH
-from services.teleop.layouts import ACTIONS, LAYOUTS, TTK, WASD, Layout, LayoutError, load
+from services.teleop.control.layout_file import load
+from services.teleop.control.layouts import (
+    ACTIONS,
+    FIXED,
+    LAYOUTS,
+    TTK,
+    WASD,
+    WIDTH,
+    Layout,
+    LayoutError,
+    key_name,
+)
 
 # Key, forward, left, up, turn: the bindings of teleop_twist_keyboard 2.4, shifted keys strafe.
 TABLE = """
@@ -36,19 +45,19 @@ ARROWS = {
 EVERY = pytest.mark.parametrize("layout", LAYOUTS.values(), ids=lambda layout: layout.name)
 
 
-@pytest.mark.parametrize("row", TABLE.strip().splitlines())
-def test_a_moving_key_means_what_it_does_in_teleop_twist_keyboard(row: str) -> None:
-    key, *direction = row.split()
-    assert TTK.moves[key] == tuple(map(int, direction))
+def test_a_moving_key_means_what_it_does_in_teleop_twist_keyboard() -> None:
+    for row in TABLE.strip().splitlines():
+        key, *direction = row.split()
+        assert TTK.moves[key] == tuple(map(int, direction))
 
 
 def test_there_are_no_other_moving_keys_but_the_arrows() -> None:
     assert set(TTK.moves) == {row[0] for row in TABLE.strip().splitlines()} | set(ARROWS)
 
 
-@pytest.mark.parametrize("arrow", ARROWS)
-def test_an_arrow_means_what_its_letter_does(arrow: str) -> None:
-    assert TTK.moves[arrow] == TTK.moves[ARROWS[arrow]] == LAYOUTS["arrows"].moves[arrow]
+def test_an_arrow_means_what_its_letter_does() -> None:
+    for arrow in ARROWS:
+        assert TTK.moves[arrow] == TTK.moves[ARROWS[arrow]] == LAYOUTS["arrows"].moves[arrow]
 
 
 def test_speed_keys_change_a_tenth() -> None:
@@ -115,9 +124,8 @@ def test_the_help_reads_well() -> None:
     assert TTK.table[-2:] == ["stop                 space escape k K", "                     others"]
 
 
-@pytest.mark.parametrize(
-    ("keyboard", "name", "typed", "base", "key"),
-    [
+def test_a_press_means_a_key_of_the_layout() -> None:
+    for keyboard, name, typed, base, key in [
         ("US", "ttk", "i", "i", "i"),
         ("US", "ttk", "<", "<", "<"),
         ("any, no place told", "ttk", "i", "", "i"),
@@ -149,10 +157,8 @@ def test_the_help_reads_well() -> None:
         ("QWERTZ: not by the place", "wasd", "_", "?", "_"),
         ("US", "arrows", "shift+left", "", "shift+left"),
         ("US", "wasd", "space", "space", "space"),
-    ],
-)
-def test_a_press_means_a_key_of_the_layout(keyboard: str, name: str, typed: str, base: str, key: str) -> None:
-    assert LAYOUTS[name].key_for(typed, base) == key
+    ]:
+        assert LAYOUTS[name].key_for(typed, base) == key, keyboard
 
 
 def test_a_fixed_key_goes_by_what_it_types_also_where_its_place_has_a_meaning() -> None:

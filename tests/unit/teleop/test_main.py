@@ -8,9 +8,8 @@ from services.teleop.__main__ import latches, main, parser
 from services.teleop.settings import parse
 
 
-@pytest.mark.parametrize(
-    ("text", "words", "latch"),
-    [
+def test_keys_latch_only_where_nothing_nearer_says_hold(tmp_path: Path) -> None:
+    for text, words, latch in [
         ("", [], False),
         ("", ["--mode", "client"], False),
         ('mode = "latch"', ["--mode", "client"], True),
@@ -18,14 +17,10 @@ from services.teleop.settings import parse
         ("key_timeout = 0", [], True),
         ("key_timeout = 0", ["--mode", "hold"], False),
         ("key_timeout = 0", ["--key-timeout", "0.5"], False),
-    ],
-)
-def test_keys_latch_only_where_nothing_nearer_says_hold(
-    tmp_path: Path, text: str, words: list[str], latch: bool
-) -> None:
-    file = tmp_path / "teleop.toml"
-    file.write_text(text)
-    assert latches(parse(parser(), words, str(file))) is latch
+    ]:
+        file = tmp_path / "teleop.toml"
+        file.write_text(text)
+        assert latches(parse(parser(), words, str(file))) is latch
 
 
 @pytest.mark.parametrize("words", [["--script", "x"], ["--mode", "latch"], ["--key-timeout", "0"]])

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from services.teleop.multiplexer import attached
+from services.teleop.input.terminal_liveness import attached
 
 
 def test_elsewhere_somebody_is_always_there() -> None:

@@ -8,13 +8,13 @@ from pathlib import Path
 import pytest
 
 from holozen.messages import CommandSource, CommandStatus, Twist
-from holozen.readers import Subscription
 from holozen.testing import Wire, wait_for
+from holozen.transport.pubsub import Subscription
 from services.teleop import script
-from services.teleop.cockpit import Cockpit
-from services.teleop.layouts import TTK
-from services.teleop.pilot import Pilot, Settings
+from services.teleop.control.layouts import TTK
+from services.teleop.control.twist_mapper import Settings, TwistMapper
 from services.teleop.script import ScriptError, Step
+from services.teleop.session import Session
 
 FORWARD, STRAFE, STOP = Twist.planar(0.5), Twist.planar(0, 0.5), Twist()
 
@@ -30,9 +30,8 @@ def test_each_line_is_a_step() -> None:
     ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("line", "reason"),
-    [
+def test_a_wrong_line_is_told_with_its_number() -> None:
+    for line, reason in [
         ("0.5s y", "'y' is no key of ttk"),
         ("i", "how long is 'i' held? write `0.5s i`"),
         ("0s i", "how long is 'i' held?"),
@@ -43,13 +42,11 @@ def test_each_line_is_a_step() -> None:
         ("0.5s ctrl+c", "'ctrl+c' is no key"),
         ("stop now", "'stop' is no key"),
         ("1s \x1b[A", "is no key"),
-    ],
-)
-def test_a_wrong_line_is_told_with_its_number(line: str, reason: str) -> None:
-    with pytest.raises(ScriptError, match=r"^drive\.txt, line 2: ") as told:
-        parse(f"0.1s i\n{line}\n0.1s J")
-    assert reason in str(told.value)
-    assert "\n" not in str(told.value)
+    ]:
+        with pytest.raises(ScriptError, match=r"^drive\.txt, line 2: ") as told:
+            parse(f"0.1s i\n{line}\n0.1s J")
+        assert reason in str(told.value)
+        assert "\n" not in str(told.value)
 
 
 def test_a_script_without_an_end_is_refused() -> None:
@@ -71,10 +68,10 @@ def commands(wire: Wire) -> Subscription[Twist]:
 
 
 @pytest.fixture
-def cockpit(wire: Wire, commands: Subscription[Twist]) -> Cockpit:
-    cockpit = Cockpit(wire.bus("teleop"), [], Pilot(Settings(), TTK), None)
-    wait_for(cockpit.listeners)
-    return cockpit
+def session(wire: Wire, commands: Subscription[Twist]) -> Session:
+    session = Session(wire.bus("teleop"), [], TwistMapper(Settings(), TTK), None)
+    wait_for(session.listeners)
+    return session
 
 
 def heard(commands: Subscription[Twist]) -> list[Twist | None]:
@@ -83,33 +80,33 @@ def heard(commands: Subscription[Twist]) -> list[Twist | None]:
     return [message for number, message in enumerate(said) if number == 0 or said[number - 1] != message]
 
 
-def test_a_script_is_driven_as_written_and_ends_in_a_stop(cockpit: Cockpit, commands: Subscription[Twist]) -> None:
-    assert script.run(parse("100ms i\n100ms J\nq\n50ms i\nstop"), cockpit, threading.Event()) == ""
-    cockpit.halt()
-    wait_for(lambda: not cockpit.pilot.engaged)
+def test_a_script_is_driven_as_written_and_ends_in_a_stop(session: Session, commands: Subscription[Twist]) -> None:
+    assert script.run(parse("100ms i\n100ms J\nq\n50ms i\nstop"), session, threading.Event()) == ""
+    session.halt()
+    wait_for(lambda: not session.mapper.engaged)
     told = heard(commands)
     assert told[0] == FORWARD
     assert [message for message in told if message != STOP] == [FORWARD, STRAFE, Twist.planar(0.55)]
     assert told[-1] == STOP
 
 
-def test_a_script_that_is_told_to_end_lets_go(cockpit: Cockpit, commands: Subscription[Twist]) -> None:
+def test_a_script_that_is_told_to_end_lets_go(session: Session, commands: Subscription[Twist]) -> None:
     stop = threading.Event()
     stop.set()
-    assert script.run(parse("60s i"), cockpit, stop) == "ended by a signal"
-    cockpit.halt()
+    assert script.run(parse("60s i"), session, stop) == "ended by a signal"
+    session.halt()
     assert heard(commands)[-1] == STOP
 
 
-def test_a_script_that_somebody_stopped_breaks_off(wire: Wire, cockpit: Cockpit, commands: Subscription[Twist]) -> None:
+def test_a_script_that_somebody_stopped_breaks_off(wire: Wire, session: Session, commands: Subscription[Twist]) -> None:
     """The robot obeys nobody then, and stands."""
     status = wire.bus("sim").publisher("cmd_vel_status", CommandStatus)
     wait_for(lambda: status.matched)
     wait_for(lambda: status.matched)
-    status.put(CommandStatus(sources=[CommandSource(cockpit.bus.source, "INTERACTIVE_HIGH", 20.0, False, True)]))
-    wait_for(lambda: cockpit.helm.status().sources)
-    told = script.run(parse("60s i"), cockpit, threading.Event())
-    assert told.startswith("somebody stopped the robot or took it over")
+    status.put(CommandStatus(sources=[CommandSource(session.bus.source, "INTERACTIVE_HIGH", 20.0, False, True)]))
+    wait_for(lambda: session.client.status().sources)
+    told = script.run(parse("60s i"), session, threading.Event())
+    assert told.startswith("the robot was stopped or taken over")
 
 
 @pytest.mark.parametrize("words", [["--mode", "latch"], ["--key-timeout", "0"]])

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from holozen import flags
-from services.teleop.ros_words import RosWordError
+from services.teleop.ros_args import RosArgError
 from services.teleop.settings import NAMES, SettingsError, apply, parse, path, read
 
 
@@ -46,19 +46,16 @@ def refusal(folder: Path, text: str) -> str:
     return str(error.value).removeprefix(file)
 
 
-@pytest.mark.parametrize(
-    ("environ", "there"),
-    [
+def test_the_file_lies_in_the_config_folder_if_there_is_one() -> None:
+    for environ, there in [
         ({"XDG_CONFIG_HOME": "/c", "HOME": "/h"}, "/c/holozen/teleop.toml"),
         ({"HOME": "/h"}, "/h/.config/holozen/teleop.toml"),
         ({"XDG_CONFIG_HOME": "", "HOME": "/h"}, "/h/.config/holozen/teleop.toml"),
         ({"XDG_CONFIG_HOME": "relative", "HOME": "/h"}, "/h/.config/holozen/teleop.toml"),
         ({"HOME": ""}, None),
         ({}, None),
-    ],
-)
-def test_the_file_lies_in_the_config_folder_if_there_is_one(environ: dict[str, str], there: str | None) -> None:
-    assert path(environ) == there
+    ]:
+        assert path(environ) == there
 
 
 def test_no_file_and_no_folder_set_nothing(tmp_path: Path) -> None:
@@ -85,7 +82,7 @@ def test_a_flag_and_a_ros_spelling_can_take_back_what_the_file_switches_on(tmp_p
 
 def test_a_ros_spelling_wins_over_the_file(tmp_path: Path) -> None:
     assert given(tmp_path, "speed = 0.9", "_speed:=0.3").speed == 0.3
-    with pytest.raises(RosWordError):
+    with pytest.raises(RosArgError):
         given(tmp_path, "", "_sped:=0.3")
 
 
@@ -104,9 +101,8 @@ def test_a_file_of_keys_is_looked_for_beside_the_settings(tmp_path: Path, monkey
     assert given(tmp_path, 'keys = "wasd"').keys == "wasd"
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    rows = [
         ("sped = 1", ": 'sped' is unknown; did you mean 'speed'?"),
         ("key-timeout = 1", ": 'key-timeout' is unknown; did you mean 'key_timeout'?"),
         ('connect = "tcp/1.2.3.4:7447"', f": 'connect' is unknown; use {', '.join(NAMES)}"),
@@ -127,10 +123,9 @@ def test_a_file_of_keys_is_looked_for_beside_the_settings(tmp_path: Path, monkey
         ("speed = 1\nspeed = 2", ":2: is not TOML: Cannot overwrite a value: 'speed = 2'"),
         ("speed =", ":1: is not TOML: Invalid value: 'speed ='"),
         ('frame_id = "\x1b[2J', ":1: is not TOML: Illegal character '\\x1b': 'frame_id = \"\\x1b[2J'"),
-    ],
-)  # fmt: skip
-def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, text: str, words: str) -> None:
-    assert refusal(tmp_path, text) == words
+    ]  # fmt: skip
+    for text, words in rows:
+        assert refusal(tmp_path, text) == words
 
 
 def test_wrong_flags_and_help_come_before_a_wrong_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-from holozen.ros.launch import gazebo
-from holozen.ros.launch.context import LaunchContext, Program
-from holozen.ros.launch.entity import Entities, LaunchDescription
-from holozen.ros.launch.text import LaunchError
+from holozen.ros.launch import stand_ins
+from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Program
+from holozen.ros.launch.launch_description import Entities, LaunchDescription
 
 Follow = Callable[..., "Kept"]
 
@@ -26,7 +25,7 @@ class Kept:
         self.timers: list[tuple[float, Entities]] = []
         self.handlers: list[Any] = []
         self.reason = ""
-        self._later: list[Any] = []
+        self.postponed: list[Any] = []
 
     def follow(self, entities: Any) -> None:
         """Do what the entities say, each with the scope that it has."""
@@ -42,7 +41,7 @@ class Kept:
     def start(self, _action: Any, program: Program) -> None:
         self.programs.append(program)
 
-    def left_out(self, action: Any, ends: bool) -> None:
+    def skip(self, action: Any, ends: bool) -> None:
         self.left.append((action, ends))
 
     def after(self, seconds: float, actions: Entities) -> object:
@@ -52,16 +51,16 @@ class Kept:
     def cancel(self, timer: Any) -> None:
         self.timers.remove(timer)
 
-    def last(self, action: Any) -> bool:
-        if action in self._later:
+    def postpone(self, action: Any) -> bool:
+        if action in self.postponed:
             return False
-        self._later.append(action)
+        self.postponed.append(action)
         return True
 
-    def handle(self, handler: Any) -> None:
+    def register(self, handler: Any) -> None:
         self.handlers.append(handler)
 
-    def unhandle(self, handler: Any) -> None:
+    def unregister(self, handler: Any) -> None:
         self.handlers.remove(handler)
 
     def stop(self, reason: str) -> None:
@@ -81,17 +80,14 @@ class Kept:
 @pytest.fixture
 def follow(my_bot: Path) -> Iterator[Follow]:
     """`follow([actions], name="value")`: what they do in a launch file of my_bot, with values of its arguments."""
-    gazebo.stand_in()
+    stand_ins.replace_gazebo_packages()
     made: list[Path] = []
 
     def follow(actions: list[Any], **values: str) -> Kept:
         kept = Kept(values, my_bot / "launch" / "a.launch.py")
-        kept.context.made = made
+        kept.context.temporary_files = made
         kept.follow([LaunchDescription(actions)])
-        while kept._later:
-            later, kept._later = kept._later, list(kept._later)
-            kept.follow(later)
-            break
+        kept.follow(list(kept.postponed))
         return kept
 
     yield follow

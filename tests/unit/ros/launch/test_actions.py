@@ -7,13 +7,13 @@ from typing import Any
 import pytest
 
 from holozen.ros.launch import actions as a
-from holozen.ros.launch.entity import LaunchDescription
-from holozen.ros.launch.events import OnProcessExit, OnProcessStart, OnShutdown, ProcessExited, ProcessStarted
-from holozen.ros.launch.events import Shutdown as ShutdownEvent
-from holozen.ros.launch.nodes import Node
-from holozen.ros.launch.sources import PythonLaunchDescriptionSource
+from holozen.ros.launch.event_handlers import OnProcessExit, OnProcessStart, OnShutdown, ProcessExited, ProcessStarted
+from holozen.ros.launch.event_handlers import Shutdown as ShutdownEvent
+from holozen.ros.launch.launch_context import LaunchError
+from holozen.ros.launch.launch_description import LaunchDescription
+from holozen.ros.launch.launch_description_sources import PythonLaunchDescriptionSource
 from holozen.ros.launch.substitutions import EnvironmentVariable, LaunchConfiguration, ThisLaunchFileDir
-from holozen.ros.launch.text import LaunchError
+from holozen.ros.launch_ros import Node
 
 from ..conftest import Write
 from .conftest import Follow
@@ -37,7 +37,7 @@ def test_an_argument_has_the_value_given_or_its_default(follow: Follow, capsys: 
     ("declared", "told"),
     [
         (a.DeclareLaunchArgument("which"), "launch argument 'which' has no value; give which:=VALUE"),
-        (a.DeclareLaunchArgument("who", choices=["Ann", "Bob"]), "who:=Fred: it has to be one of Ann, Bob"),
+        (a.DeclareLaunchArgument("who", choices=["Ann", "Bob"]), "who:=Fred: it must be one of Ann, Bob"),
     ],
 )
 def test_an_argument_without_a_good_value_is_told(follow: Follow, declared: Any, told: str) -> None:
@@ -65,7 +65,7 @@ def test_a_launch_file_is_included_with_values(
 ) -> None:
     text = """
 from holozen.ros.launch.actions import DeclareLaunchArgument, LogInfo
-from holozen.ros.launch.entity import LaunchDescription
+from holozen.ros.launch import LaunchDescription
 from holozen.ros.launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 def generate_launch_description():
     who = DeclareLaunchArgument("who", default_value="nobody")
@@ -82,8 +82,8 @@ def generate_launch_description():
 @pytest.mark.parametrize(
     ("name", "text", "told"),
     [
-        ("b.launch.xml", "<launch/>", "launch files in XML and YAML are not read; Python only"),
-        ("b.launch.txt", "", "only launch files in Python are read here"),
+        ("b.launch.xml", "<launch/>", "launch files in XML and YAML are not supported; Python only"),
+        ("b.launch.txt", "", "only launch files in Python are supported"),
         ("b.launch.py", "x = 1", "has no function generate_launch_description"),
         ("b.launch.py", "def generate_launch_description(): return 7", r"returned 7, not a LaunchDescription"),
         ("c.launch.py", "", r"no launch file '.*/b.launch.py'; did you mean 'c.launch.py'"),
@@ -99,11 +99,11 @@ def test_a_file_that_cannot_be_included_is_told(follow: Follow, write: Write, na
 def test_files_that_include_themselves_are_told(follow: Follow, write: Write) -> None:
     text = """
 from holozen.ros.launch.actions import IncludeLaunchDescription
-from holozen.ros.launch.entity import LaunchDescription
+from holozen.ros.launch import LaunchDescription
 def generate_launch_description():
     return LaunchDescription([IncludeLaunchDescription(__file__)])
 """
-    with pytest.raises(LaunchError, match="launch files within launch files, more than 30 deep"):
+    with pytest.raises(LaunchError, match="launch files include one another more than 30 levels deep"):
         follow([a.IncludeLaunchDescription(write("b.launch.py", text))])
 
 
@@ -123,7 +123,7 @@ def test_a_function_is_called_and_what_it_returns_is_done(follow: Follow, capsys
 
 @pytest.mark.parametrize("function", [lambda _context: [7], lambda _context: 7])
 def test_a_function_that_returns_no_actions_is_told(follow: Follow, function: Any) -> None:
-    with pytest.raises(LaunchError, match=r"7 is no action; actions are such as Node"):
+    with pytest.raises(LaunchError, match=r"7 is not an action; write Node"):
         follow([a.OpaqueFunction(function=function)])
 
 
@@ -145,12 +145,12 @@ def test_a_handler_answers_for_its_own_action(follow: Follow) -> None:
     mine, other = a.ExecuteProcess(cmd=["true"]), a.ExecuteProcess(cmd=["true"])
     context = follow([]).context
     ended, started = ProcessExited(mine, "true-1", 3), ProcessStarted(mine, "true-1")
-    assert list(OnProcessExit(target_action=mine, on_exit=[SAY]).answer(ended, context)) == [SAY]
-    assert list(OnProcessExit(target_action=mine, on_exit=SAY).answer(started, context)) == []
-    assert list(OnProcessStart(target_action=other, on_start=[SAY]).answer(started, context)) == []
-    assert list(OnProcessStart(on_start=[SAY]).answer(started, context)) == [SAY]
+    assert list(OnProcessExit(target_action=mine, on_exit=[SAY]).handle(ended, context)) == [SAY]
+    assert list(OnProcessExit(target_action=mine, on_exit=SAY).handle(started, context)) == []
+    assert list(OnProcessStart(target_action=other, on_start=[SAY]).handle(started, context)) == []
+    assert list(OnProcessStart(on_start=[SAY]).handle(started, context)) == [SAY]
     said: list[Any] = []
-    OnProcessExit(on_exit=lambda event, _context: said.append(event.returncode)).answer(ended, context)
+    OnProcessExit(on_exit=lambda event, _context: said.append(event.returncode)).handle(ended, context)
     OnProcessExit(target_action=lambda action: action is other, on_exit=[SAY])
     assert said == [3]
 
@@ -208,31 +208,29 @@ def test_other_programs_are_started_as_they_are(follow: Follow) -> None:
     assert third.respawn == 2.0
 
 
-@pytest.mark.parametrize(
-    ("make", "told"),
-    [
+def test_what_is_written_wrong_is_told_with_its_place() -> None:
+    rows: list[tuple[Any, str]] = [
         (
             lambda: a.ExecuteProcess(cmd="echo a"),
             "cmd='echo a' is one text; write a list of words",
         ),
         (lambda: a.LogInfo(msg="", mesg=""), "LogInfo has no argument 'mesg'; did you mean 'msg'"),
-        (lambda: LaunchDescription(["x"]), "'x' is no action; actions are such as Node"),
-        (lambda: a.GroupAction([None]), "None is no action"),
-        (lambda: a.OpaqueFunction(function="f"), "function='f' is no function"),
-        (lambda: a.EmitEvent(event="stop"), r"only launch.events.Shutdown\(\) is known here"),
-    ],
-)
-def test_what_is_written_wrong_is_told_with_its_place(make: Any, told: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
-        make()
+        (lambda: LaunchDescription(["x"]), "'x' is not an action; write Node"),
+        (lambda: a.GroupAction([None]), "None is not an action"),
+        (lambda: a.OpaqueFunction(function="f"), "function='f' is not a function"),
+        (lambda: a.EmitEvent(event="stop"), r"only launch.events.Shutdown\(\) can be emitted here"),
+    ]
+    for make, told in rows:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+            make()
 
 
 @pytest.mark.parametrize(
     ("action", "told"),
     [
         (lambda: a.ExecuteProcess(), "ExecuteProcess has no cmd"),
-        (lambda: a.TimerAction(period=-1, actions=[]), "period is '-1'; it has to be a number from 0 up"),
-        (lambda: a.GroupAction([], scoped="perhaps"), "scoped is 'perhaps'; it has to be true or false"),
+        (lambda: a.TimerAction(period=-1, actions=[]), "period is '-1'; it must be a number from 0 up"),
+        (lambda: a.GroupAction([], scoped="perhaps"), "scoped is 'perhaps'; it must be true or false"),
     ],
 )
 def test_what_cannot_be_done_is_told_with_its_place(follow: Follow, action: Any, told: str) -> None:

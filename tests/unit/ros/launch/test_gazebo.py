@@ -7,11 +7,11 @@ import pytest
 
 from holozen import data
 from holozen.ros.ament_index_python import get_package_share_directory
-from holozen.ros.launch.actions import ExecuteProcess, IncludeLaunchDescription
-from holozen.ros.launch.nodes import Node, ParameterValue
-from holozen.ros.launch.sources import PythonLaunchDescriptionSource
+from holozen.ros.launch.actions import ExecuteProcess, GroupAction, IncludeLaunchDescription, OpaqueFunction
+from holozen.ros.launch.launch_context import LaunchContext, LaunchError
+from holozen.ros.launch.launch_description_sources import PythonLaunchDescriptionSource
 from holozen.ros.launch.substitutions import Command, FindPackageShare, LaunchConfiguration, PathJoinSubstitution
-from holozen.ros.launch.text import LaunchError
+from holozen.ros.launch_ros import Node, ParameterValue, PushROSNamespace
 
 from ..conftest import Write
 from .conftest import Follow
@@ -35,9 +35,8 @@ def publisher(robot: Any, **more: Any) -> Node:
     return Node(package="robot_state_publisher", executable="robot_state_publisher", parameters=texts, **more)
 
 
-@pytest.mark.parametrize(
-    ("package", "name", "arguments", "world"),
-    [
+def test_gazebos_launch_files_start_the_sim(follow: Follow) -> None:
+    for package, name, arguments, world in [
         ("gazebo_ros", "gazebo.launch.py", {}, EMPTY),
         ("gazebo_ros", "gazebo.launch.py", {"world": "", "gui": "false"}, EMPTY),
         ("gazebo_ros", "gzserver.launch.py", {"world": "worlds/empty.world"}, EMPTY),
@@ -47,14 +46,10 @@ def publisher(robot: Any, **more: Any) -> Node:
         ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": "-r my.sdf -v4"}, "my.sdf"),
         ("ros_gz_sim", "gz_sim.launch.py", {"gz_args": ""}, EMPTY),
         ("ros_ign_gazebo", "ign_gazebo.launch.py", {"ign_args": "-r arena.sdf"}, ARENA),
-    ],
-)
-def test_gazebos_launch_files_start_the_sim(
-    follow: Follow, package: str, name: str, arguments: dict[str, str], world: str
-) -> None:
-    kept = follow([included(package, name, **arguments)])
-    assert kept.words() == ["sim", "--empty", "--world", world]
-    assert kept.programs[0].required
+    ]:
+        kept = follow([included(package, name, **arguments)])
+        assert kept.words() == ["sim", "--empty", "--world", world]
+        assert kept.programs[0].required
 
 
 def test_a_world_of_the_package_is_used_as_it_is(follow: Follow, write: Write) -> None:
@@ -129,6 +124,14 @@ def test_a_namespace_and_a_timeout_are_kept(follow: Follow) -> None:
     assert follow([spawn(*words)]).words() == ["spawn", "-file", "a.urdf", "--namespace", "fred", "--timeout", "9"]
 
 
+def test_what_the_launch_lets_a_file_read_the_spawner_may_read(follow: Follow, write: Write) -> None:
+    def allow(context: LaunchContext) -> None:
+        context.allow_env = ["TOKEN"]
+
+    kept = follow([OpaqueFunction(function=allow), spawn("-file", "a.urdf")])
+    assert kept.words()[:5] == ["spawn", "-file", "a.urdf", "--allow-env", "TOKEN"]
+
+
 @pytest.mark.parametrize("first", [True, False])
 def test_topic_robot_description_is_what_robot_state_publisher_has(follow: Follow, write: Write, first: bool) -> None:
     """Whichever of the two comes first in the launch file."""
@@ -143,7 +146,7 @@ def test_a_text_that_no_file_holds_is_written_into_one(follow: Follow) -> None:
     kept = follow([publisher(ROBOT, namespace="fred"), spawn("-topic", "/fred/robot_description")])
     path = Path(kept.words()[1])
     assert path.read_text() == ROBOT
-    assert kept.context.made == [path]
+    assert kept.context.temporary_files == [path]
     path.unlink()
 
 
@@ -151,6 +154,22 @@ def test_robot_state_publisher_may_have_the_file_as_its_word(follow: Follow, wri
     path = str(write("r.urdf", ROBOT))
     state = Node(package="robot_state_publisher", executable="robot_state_publisher", arguments=[path])
     assert follow([state, spawn("-topic", "robot_description")]).words()[:2] == ["spawn", path]
+
+
+def test_three_robots_of_one_file_come_from_the_topics_of_their_namespaces(follow: Follow, write: Write) -> None:
+    groups = []
+    for name in ("ann", "bob"):
+        robot = Command(["cat ", str(write(f"{name}.urdf", ROBOT.replace("r", name, 1)))])
+        group = [publisher(robot), spawn("-topic", "robot_description", "-entity", name)]
+        groups.append(GroupAction([PushROSNamespace(name), *group]))
+    robot = Command(["cat ", str(write("cyd.urdf", ROBOT))])
+    state = publisher(robot, namespace="cyd")
+    kept = follow([*groups, state, spawn("-topic", "robot_description", "-entity", "cyd", namespace="cyd")])
+    for number, name in enumerate(("ann", "bob", "cyd")):
+        words = kept.words(number)
+        assert words[:3] == ["spawn", "--name", name]
+        assert Path(words[3]).name == f"{name}.urdf"
+        assert words[words.index("--namespace") + 1] == name
 
 
 def test_the_spawner_of_new_gazebo_takes_texts_too(follow: Follow) -> None:
@@ -164,17 +183,17 @@ def test_the_spawner_of_new_gazebo_takes_texts_too(follow: Follow) -> None:
     assert Path(kept.words()[1]).read_text() == ROBOT
 
 
-@pytest.mark.parametrize(
-    ("words", "told"),
-    [
-        (["-topic", "robot_description"], "-topic robot_description: nothing in this launch file tells a robot there"),
+def test_a_robot_that_cannot_be_found_is_one_line(follow: Follow) -> None:
+    for words, told in [
+        (
+            ["-topic", "robot_description"],
+            "-topic robot_description: nothing in this launch file publishes",
+        ),
         (["-param", "robot"], "-param robot: this Node has no parameter 'robot'"),
         (["-entity", "r"], "give -file FILE or -topic robot_description"),
-        (["-enttiy", "r"], "'-enttiy' means nothing here; did you mean '-entity'"),
-        (["-database", "r"], "'-database' means nothing here"),
-        (["-file"], "-file needs a word after it"),
-    ],
-)
-def test_a_robot_that_cannot_be_found_is_one_line(follow: Follow, words: list[str], told: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
-        follow([spawn(*words)])
+        (["-enttiy", "r"], "unknown flag '-enttiy' to spawn a robot; did you mean '-entity'"),
+        (["-database", "r"], "unknown flag '-database' to spawn a robot"),
+        (["-file"], "-file needs a value"),
+    ]:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+            follow([spawn(*words)])

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from holozen.codec import decode
 from holozen.messages import TFMessage
-from holozen.tap import Sample
+from holozen.messages.codec import decode
 from holozen.testing import Process, Wire, wait_for
+from holozen.transport.pubsub import Sample
 
 from ..conftest import Write
 
@@ -48,6 +48,19 @@ def described(*entities: str) -> str:
     return f"{HEAD}\ndef generate_launch_description():\n    return LaunchDescription([{', '.join(entities)}])\n"
 
 
+def test_a_launch_file_with_components_or_missing_modules_gets_a_hint(launch: Launch, write: Write) -> None:
+    for imported, hint in [
+        ("from launch_ros.actions import ComposableNodeContainer", "start each as a Node of its own"),
+        ("from launch_ros.descriptions import ComposableNode", "start each as a Node of its own"),
+        ("import interactive_markers.interactive_marker_server", "there are no interactive markers here"),
+    ]:
+        path = write("a.launch.py", f"import os\n{imported}\n")
+        done = launch(str(path))
+        assert done.stderr.startswith(f"holozen launch: {path}:2: ")
+        assert hint in done.stderr
+        assert done.stderr.count("\n") == 1
+
+
 CONTROLLER = """#!/usr/bin/env python3
 import sys
 import rclpy
@@ -80,7 +93,7 @@ def test_show_args_tells_the_arguments_and_starts_nothing(launch: Launch, write:
     lines = [
         "kp:= how eager (default: 1.5)",
         "gui:= (default: <a/b>; one of a, b)",
-        "world:= (it has to be given)",
+        "world:= (required)",
     ]
     assert (done.returncode, done.stdout.splitlines(), done.stderr) == (0, lines, "")
     write("a.launch.py", described())
@@ -124,12 +137,11 @@ def test_a_launch_file_of_a_package_in_xml_is_not_read(launch: Launch, write: Wr
     write("src/my_bot/launch/a.launch.xml", "<launch/>")
     done = launch("my_bot", "a.launch.xml")
     assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert done.stderr.endswith("a.launch.xml: launch files in XML and YAML are not read; Python only\n")
+    assert done.stderr.endswith("a.launch.xml: launch files in XML and YAML are not supported; Python only\n")
 
 
-@pytest.mark.parametrize(
-    ("text", "told"),
-    [
+def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> None:
+    for text, told in [
         ("from launch.actions import ExecuteLocal", "a.launch.py:1: launch.actions has no 'ExecuteLocal' here"),
         ("import launch.frontend", "a.launch.py:1: launch has no 'frontend' here"),
         ("import launch_testing", "a.launch.py:1: "),
@@ -148,30 +160,28 @@ def test_a_launch_file_of_a_package_in_xml_is_not_read(launch: Launch, write: Wr
         ),
         (
             described("Node(package='my_bot', node_executable='x')"),
-            "a.launch.py:8: Node has no argument 'node_executable', which is ROS's old word; write executable=...",
+            "a.launch.py:8: Node has no argument 'node_executable', which is ROS's old name; write executable=...",
         ),
         (described("Node(package='my_bot')"), "a.launch.py:8: Node lacks executable='...'"),
         (
             described("Node(package='my_bot', executable='x', remappings=['cmd_vel', '/drive'])"),
-            "a.launch.py:8: remappings=['cmd_vel', '/drive'] is no list of pairs; write such as [(",
+            "a.launch.py:8: remappings=['cmd_vel', '/drive'] is not a list of pairs; write [(",
         ),
         (
             described("IncludeLaunchDescription('b.launch.py', launch_arguments=['ab'])"),
-            "a.launch.py:8: launch_arguments=['ab'] is no list of pairs",
+            "a.launch.py:8: launch_arguments=['ab'] is not a list of pairs",
         ),
         (described("GroupAction([], launch_configurations=[1])"), "a.launch.py:8: "),
         (described("ExecuteProcess(cmd=['true'], env=['ab', 'c'])"), "a.launch.py:8: ExecuteProcess: "),
         (described("Node(package='nav2', executable='x')"), "a.launch.py:8: no package 'nav2' around "),
-        (described("'x'"), "a.launch.py:8: 'x' is no action"),
+        (described("'x'"), "a.launch.py:8: 'x' is not an action"),
         ("", "/a.launch.py has no function generate_launch_description()"),
-    ],
-)
-def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write, text: str, told: str) -> None:
-    write("a.launch.py", text)
-    done = launch(str(Path("a.launch.py").absolute()))
-    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-    assert done.stderr.startswith("holozen launch: ")
-    assert told in done.stderr
+    ]:
+        write("a.launch.py", text)
+        done = launch(str(Path("a.launch.py").absolute()))
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
+        assert done.stderr.startswith("holozen launch: ")
+        assert told in done.stderr
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,10 @@ from typing import Any
 
 import pytest
 
-from holozen.ros import arguments
 from holozen.ros.launch.actions import GroupAction, SetLaunchConfiguration
-from holozen.ros.launch.nodes import (
+from holozen.ros.launch.launch_context import LaunchError
+from holozen.ros.launch.substitutions import LaunchConfiguration
+from holozen.ros.launch_ros import (
     Node,
     Parameter,
     ParameterFile,
@@ -19,8 +20,7 @@ from holozen.ros.launch.nodes import (
     SetRemap,
     SetUseSimTime,
 )
-from holozen.ros.launch.substitutions import LaunchConfiguration
-from holozen.ros.launch.text import LaunchError
+from holozen.ros.rclpy import arguments
 
 from ..conftest import Write
 from .conftest import Follow, Kept
@@ -61,9 +61,8 @@ def test_remappings_are_its_own_before_those_of_its_group(follow: Follow) -> Non
     assert kept.words()[3:] == ["--ros-args", "-r", "/cmd_vel:=fred/cmd_vel", "-r", "b:=c"]
 
 
-@pytest.mark.parametrize(
-    ("given", "read"),
-    [
+def test_a_parameter_arrives_as_it_was_meant(follow: Follow) -> None:
+    rows = [
         (1, 1), (1.0, 1.0), (1e-7, 1e-7), (1e30, 1e30), (math.inf, math.inf), (True, True), ("1", "1"), ("", ""),
         ("a: 'b' \"c\"\n#", "a: 'b' \"c\"\n#"), ([1, 2], [1, 2]), ([0.5, 1.0], [0.5, 1.0]), (["a", "b"], ["a", "b"]),
         (("true", "x"), ["true", "x"]), (VALUE, 7), ([VALUE, ".5"], 7.5), (ParameterValue(VALUE, value_type=str), "7"),
@@ -71,12 +70,11 @@ def test_remappings_are_its_own_before_those_of_its_group(follow: Follow) -> Non
         (ParameterValue([VALUE, "0"], value_type=int), 70), (LaunchConfiguration("yes"), True),
         (LaunchConfiguration("list"), [1, 2]), (LaunchConfiguration("broken"), "[1, 2"),
         (LaunchConfiguration("robot"), ROBOT),
-    ],
-)  # fmt: skip
-def test_a_parameter_arrives_as_it_was_meant(follow: Follow, given: Any, read: Any) -> None:
-    values = {"value": "7", "yes": "true", "list": "[1, 2]", "broken": "[1, 2", "robot": ROBOT}
-    found = parameters(follow([node(parameters=[{"p": given}])], **values))["p"]
-    assert (found, type(found)) == (read, type(read))
+    ]  # fmt: skip
+    for given, read in rows:
+        values = {"value": "7", "yes": "true", "list": "[1, 2]", "broken": "[1, 2", "robot": ROBOT}
+        found = parameters(follow([node(parameters=[{"p": given}])], **values))["p"]
+        assert (found, type(found)) == (read, type(read))
 
 
 def test_parameters_come_from_maps_files_and_the_group(follow: Follow, write: Write) -> None:
@@ -92,22 +90,20 @@ def test_parameters_come_from_maps_files_and_the_group(follow: Follow, write: Wr
     assert parameters(kept) == want
 
 
-@pytest.mark.parametrize(
-    ("wrong", "told"),
-    [
-        ({"parameters": {"a": 1}}, r"parameters={'a': 1} is no list; write \[{'name': value}, 'file.yaml'\]"),
-        ({"parameters": [{"a": None}]}, "a parameter cannot be None; it is a bool, a number, a text"),
-        ({"parameters": [{"a": ParameterValue("x", value_type=int)}]}, "the parameter is 'x', no int"),
+def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
+    rows: list[tuple[dict[str, Any], str]] = [
+        ({"parameters": {"a": 1}}, r"parameters={'a': 1} is not a list; write \[{'name': value}, 'file.yaml'\]"),
+        ({"parameters": [{"a": None}]}, "a parameter cannot be None; it must be a bool, a number, a text"),
+        ({"parameters": [{"a": ParameterValue("x", value_type=int)}]}, "the parameter is 'x', not a int"),
         ({"arguments": "-x 1"}, "arguments='-x 1' is one text; write a list of words"),
-        ({"condition": "true"}, "condition='true' is no condition"),
+        ({"condition": "true"}, "condition='true' is not a condition"),
         ({"paramters": []}, "Node has no argument 'paramters'; did you mean 'parameters'"),
-        ({"cwd": "nowhere"}, "cwd='nowhere' is no folder"),
-        ({"respawn": "often"}, "respawn is 'often'; it has to be true or false"),
-    ],
-)
-def test_a_wrong_node_is_one_line_with_its_place(follow: Follow, wrong: dict[str, Any], told: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
-        follow([node(**wrong)])
+        ({"cwd": "nowhere"}, "cwd='nowhere' is not a folder"),
+        ({"respawn": "often"}, "respawn is 'often'; it must be true or false"),
+    ]
+    for wrong, told in rows:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+            follow([node(**wrong)])
 
 
 @pytest.mark.parametrize(
@@ -144,24 +140,19 @@ def test_a_group_that_is_not_scoped_lets_it_out(follow: Follow) -> None:
     assert follow([group, node(arguments=[VALUE])], value="1").words()[-1] == "1"
 
 
-@pytest.mark.parametrize(
-    ("package", "executable", "told"),
-    [
+def test_what_is_left_out_is_named_with_what_to_use(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    for package, executable, told in [
         ("rviz2", "rviz2", "rviz2 rviz2 is left out: `holozen map` in another terminal"),
         ("rqt_graph", "rqt_graph", "is left out: `holozen plot`"),
-        ("joint_state_publisher_gui", "joint_state_publisher_gui", "is left out: the sim itself tells joint_states"),
+        ("joint_state_publisher_gui", "joint_state_publisher_gui", "is left out: the sim publishes joint_states"),
         ("ros_gz_bridge", "parameter_bridge", "is left out: the sim is on the keys itself"),
         ("teleop_twist_keyboard", "teleop_twist_keyboard", "`holozen teleop` in another one"),
-        ("robot_state_publisher", "robot_state_publisher", "the sim itself tells joint_states and tf"),
-    ],
-)
-def test_what_is_left_out_is_named_with_what_to_use(
-    follow: Follow, capsys: pytest.CaptureFixture[str], package: str, executable: str, told: str
-) -> None:
-    action = Node(package=package, executable=executable)
-    kept = follow([action])
-    assert told in capsys.readouterr().err
-    assert (kept.programs, kept.left) == ([], [(action, False)])
+        ("robot_state_publisher", "robot_state_publisher", "the sim itself publishes joint_states and tf"),
+    ]:
+        action = Node(package=package, executable=executable)
+        kept = follow([action])
+        assert told in capsys.readouterr().err
+        assert (kept.programs, kept.left) == ([], [(action, False)])
 
 
 def test_a_spawner_of_controllers_is_as_good_as_over(follow: Follow) -> None:

@@ -9,10 +9,9 @@ from typing import Any
 import pytest
 
 from holozen.ros.launch import actions as a
-from holozen.ros.launch.context import Program
-from holozen.ros.launch.events import OnProcessExit, OnProcessStart, OnShutdown
-from holozen.ros.launch.stage import Stage
-from holozen.ros.launch.text import LaunchError
+from holozen.ros.launch.event_handlers import OnProcessExit, OnProcessStart, OnShutdown
+from holozen.ros.launch.launch_context import LaunchError, Program
+from holozen.ros.launch.launch_service import LaunchService
 from holozen.testing import wait_for
 
 Play = Callable[..., tuple[bool, list[str], list[str]]]
@@ -31,7 +30,7 @@ def play(capfd: pytest.CaptureFixture[str], my_bot: Path) -> Play:
     """`play(*actions)`: do them to their end; whether all went well, and the lines on both outputs."""
 
     def play(*actions: Any, stop: threading.Event | None = None) -> tuple[bool, list[str], list[str]]:
-        with Stage([], stop or threading.Event()) as stage:
+        with LaunchService([], stop or threading.Event()) as stage:
             good = stage.run(actions)
         out, err = capfd.readouterr()
         return good, out.splitlines(), err.splitlines()
@@ -59,7 +58,7 @@ def test_much_is_passed_on_whole(play: Play) -> None:
 
 
 def test_bytes_that_are_no_text_come_as_they_are(capfdbinary: pytest.CaptureFixture[bytes], my_bot: Path) -> None:
-    with Stage([], threading.Event()) as stage:
+    with LaunchService([], threading.Event()) as stage:
         stage.run([sh("printf '\\377\\n'")])
     assert capfdbinary.readouterr().out == b"[p-1] \xff\n"
 
@@ -81,10 +80,10 @@ def test_a_process_that_fails_is_told_and_the_others_go_on(play: Play, script: s
 def test_a_required_process_ends_all(play: Play) -> None:
     class Needed(a.LogInfo):
         def execute(self, context: Any) -> None:
-            context.stage.start(self, Program("sim", ["true"], environment=dict(os.environ), required=True))
+            context.runner.start(self, Program("sim", ["true"], environment=dict(os.environ), required=True))
 
     good, _, err = play(sh("sleep 60"), Needed(msg=""))
-    assert (good, err) == (True, ["launch: ends: sim-2 has ended, and nothing here goes on without it"])
+    assert (good, err) == (True, ["launch: ends: sim-2 has ended, which everything here depends on"])
 
 
 def test_what_waits_for_a_start_or_an_end_is_done_then(play: Play) -> None:
@@ -141,7 +140,7 @@ def test_respawn_starts_it_again(play: Play, tmp_path: Path) -> None:
     end = OnProcessExit(on_exit=lambda event, _context: [a.Shutdown()] if event.returncode else None)
     _, _, err = play(a.RegisterEventHandler(end), sh(script, respawn=True))
     assert count.read_text() == "x\n" * 3
-    assert err == ["launch: p-3 failed with exit code 1", "launch: ends: the launch file says so"]
+    assert err == ["launch: p-3 failed with exit code 1", "launch: ends: the launch file requested it"]
 
 
 def test_a_program_that_is_not_there_is_told_with_its_place(play: Play) -> None:
@@ -161,7 +160,7 @@ def test_a_stop_ends_all_kindly_first(
     capfd: pytest.CaptureFixture[str], my_bot: Path, tmp_path: Path, script: str, last: str
 ) -> None:
     stop, pid = threading.Event(), tmp_path / "pid"
-    stage = Stage([], stop)
+    stage = LaunchService([], stop)
 
     def end() -> None:
         wait_for(lambda: pid.exists() and pid.read_text())
@@ -185,7 +184,7 @@ def test_a_failure_of_the_launch_file_ends_what_runs(my_bot: Path, tmp_path: Pat
         wait_for(lambda: pid.exists() and pid.read_text())
         raise KeyError("the user's")
 
-    with pytest.raises(KeyError), Stage([], threading.Event()) as stage:
+    with pytest.raises(KeyError), LaunchService([], threading.Event()) as stage:
         stage.run([sh(f"echo $$ > {pid}; sleep 60"), a.OpaqueFunction(function=fail)])
     assert gone(int(pid.read_text()))
 
@@ -197,7 +196,7 @@ def test_what_a_process_started_ends_with_it(my_bot: Path, tmp_path: Path) -> No
         wait_for(lambda: pid.exists() and pid.read_text())
         stop.set()
 
-    with Stage([], stop) as stage:
+    with LaunchService([], stop) as stage:
         stage.run([sh(f"sleep 60 & echo $! > {pid}; wait"), a.OpaqueFunction(function=end)])
     wait_for(lambda: gone(int(pid.read_text())))
 
@@ -205,6 +204,6 @@ def test_what_a_process_started_ends_with_it(my_bot: Path, tmp_path: Path) -> No
 def test_files_that_were_made_are_deleted(my_bot: Path, tmp_path: Path) -> None:
     path = tmp_path / "robot.urdf"
     path.touch()
-    with Stage([], threading.Event()) as stage:
-        stage.context.made.append(path)
+    with LaunchService([], threading.Event()) as stage:
+        stage.context.temporary_files.append(path)
     assert not path.exists()

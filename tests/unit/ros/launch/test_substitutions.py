@@ -2,15 +2,13 @@
 
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from holozen.ros.launch import conditions as c
 from holozen.ros.launch import substitutions as s
 from holozen.ros.launch.actions import DeclareLaunchArgument, LogInfo
-from holozen.ros.launch.context import LaunchContext
-from holozen.ros.launch.text import LaunchError, text
+from holozen.ros.launch.launch_context import LaunchContext, LaunchError, text
 
 from ..conftest import Write
 from .conftest import Follow
@@ -26,9 +24,8 @@ def context(my_bot: Path) -> LaunchContext:
     return context
 
 
-@pytest.mark.parametrize(
-    ("substitution", "found"),
-    [
+def test_a_substitution_is_a_text(context: LaunchContext) -> None:
+    for substitution, found in [
         (s.TextSubstitution(text="a b"), "a b"),
         (VALUE, "7"),
         (s.LaunchConfiguration("other", default="x"), "x"),
@@ -47,10 +44,8 @@ def context(my_bot: Path) -> LaunchContext:
         (s.IfElseSubstitution("true", "yes", "no"), "yes"),
         (s.IfElseSubstitution(s.EqualsSubstitution(VALUE, "8"), "yes", ["no", VALUE]), "no7"),
         (s.FindExecutable(name="xacro"), "xacro"),
-    ],
-)
-def test_a_substitution_is_a_text(context: LaunchContext, substitution: s.TextSubstitution, found: str) -> None:
-    assert text(context, substitution) == found
+    ]:
+        assert text(context, substitution) == found
 
 
 def test_places_of_the_launch_file_and_of_packages(context: LaunchContext, my_bot: Path, write: Write) -> None:
@@ -66,22 +61,21 @@ def test_places_of_the_launch_file_and_of_packages(context: LaunchContext, my_bo
     assert text(context, s.FindExecutable(name=sys.executable)) == sys.executable
 
 
-@pytest.mark.parametrize(
-    ("substitution", "told"),
-    [
+def test_what_gives_no_text_is_told_with_its_place(context: LaunchContext) -> None:
+    for substitution, told in [
         (
             s.LaunchConfiguration("valu"),
             "launch argument 'valu' is not declared before it is used; did you mean 'value'",
         ),
-        (s.EnvironmentVariable("NOT_SET"), "the environment has no 'NOT_SET'"),
+        (s.EnvironmentVariable("NOT_SET"), "the environment variable 'NOT_SET' is not set"),
         (s.FindPackageShare("my_boot"), "no package 'my_boot' around .*; did you mean 'my_bot'"),
         (s.ExecutableInPackage("a.py", "my_bot"), "package 'my_bot' has no executable 'a.py'"),
         (s.FindExecutable(name="no_such_program"), "no program 'no_such_program' on the PATH"),
         (s.PythonExpression(["1 / 0"]), "PythonExpression '1 / 0': ZeroDivisionError: division by zero"),
         (s.PythonExpression(["a b"]), "PythonExpression 'a b': SyntaxError"),
         (s.FileContent("nowhere.txt"), "cannot read nowhere.txt: No such file"),
-        (s.NotSubstitution("maybe"), "what NotSubstitution turns round is 'maybe'; it has to be true or false"),
-        (7, "7 is no text; write a str, a substitution, or a list of both"),
+        (s.NotSubstitution("maybe"), "the value of NotSubstitution is 'maybe'; it must be true or false"),
+        (7, "7 is not a text; write a str, a substitution, or a list of both"),
         (
             s.Command(["rm -r ", "x"]),
             "Command 'rm -r x': only `xacro FILE name:=value ...` and `cat FILE` are run here",
@@ -89,14 +83,12 @@ def test_places_of_the_launch_file_and_of_packages(context: LaunchContext, my_bo
         (s.Command("xacro"), "Command 'xacro': write `xacro FILE"),
         (s.Command("xacro nowhere.xacro"), "nowhere.xacro: No such file"),
         (s.Command("xacro 'a"), "No closing quotation"),
-    ],
-)
-def test_what_gives_no_text_is_told_with_its_place(context: LaunchContext, substitution: Any, told: str) -> None:
-    with pytest.raises(LaunchError, match=told) as error:
-        text(context, substitution)
-    placed = not isinstance(substitution, int | s.NotSubstitution)
-    assert str(error.value).startswith(f"{__file__}:") == placed
-    assert str(error.value).isprintable()
+    ]:
+        with pytest.raises(LaunchError, match=told) as error:
+            text(context, substitution)
+        placed = not isinstance(substitution, int | s.NotSubstitution)
+        assert str(error.value).startswith(f"{__file__}:") == placed
+        assert str(error.value).isprintable()
 
 
 XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
@@ -111,14 +103,24 @@ def test_xacro_is_expanded_here(context: LaunchContext, write: Write, start: str
     assert context.origins[found.strip()] == ["my bot.xacro", "who:=7"]
 
 
+def test_xacro_reads_an_environment_variable_only_if_the_launch_allows_it(
+    context: LaunchContext, write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TOKEN", "secret")
+    write("bot.xacro", XACRO.replace("$(arg who)", "$(env TOKEN)"))
+    with pytest.raises(LaunchError, match="--allow-env TOKEN"):
+        text(context, s.Command("xacro bot.xacro"))
+    context.allow_env = ["TOKEN"]
+    assert '"secret"' in text(context, s.Command("xacro bot.xacro"))
+
+
 def test_cat_reads_a_file(context: LaunchContext, write: Write) -> None:
     write("a.urdf", "<robot/>")
     assert text(context, s.Command(["cat ", "a.urdf"])) == "<robot/>"
 
 
-@pytest.mark.parametrize(
-    ("condition", "holds"),
-    [
+def test_an_action_is_done_if_its_condition_holds(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
+    for condition, holds in [
         (c.IfCondition("true"), True),
         (c.IfCondition("False"), False),
         (c.IfCondition(s.LaunchConfiguration("one")), True),
@@ -128,22 +130,18 @@ def test_cat_reads_a_file(context: LaunchContext, write: Write) -> None:
         (c.LaunchConfigurationEquals("two", "2"), False),
         (c.LaunchConfigurationEquals("two", None), True),
         (c.LaunchConfigurationNotEquals("one", "1"), False),
-    ],
-)
-def test_an_action_is_done_if_its_condition_holds(
-    follow: Follow, condition: Any, holds: bool, capsys: pytest.CaptureFixture[str]
-) -> None:
-    follow([LogInfo(msg="done", condition=condition)], one="1")
-    assert capsys.readouterr().err == ("done\n" if holds else "")
+    ]:
+        follow([LogInfo(msg="done", condition=condition)], one="1")
+        assert capsys.readouterr().err == ("done\n" if holds else "")
 
 
 def test_a_condition_that_says_neither_is_told_with_its_place(follow: Follow) -> None:
-    with pytest.raises(LaunchError, match=rf"{__file__}:\d+: the condition is 'perhaps'; it has to be true or false"):
+    with pytest.raises(LaunchError, match=rf"{__file__}:\d+: the condition is 'perhaps'; it must be true or false"):
         follow(
             [DeclareLaunchArgument("gui"), LogInfo(msg="", condition=c.IfCondition(VALUE))], gui="1", value="perhaps"
         )
 
 
 def test_what_is_no_condition_is_told(follow: Follow) -> None:
-    with pytest.raises(LaunchError, match=r"condition=True is no condition; write IfCondition\(...\)"):
+    with pytest.raises(LaunchError, match=r"condition=True is not a condition; write IfCondition\(...\)"):
         LogInfo(msg="", condition=True)

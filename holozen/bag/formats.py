@@ -1,0 +1,152 @@
+"""How messages are stored in a bag: MCAP's message encoding, and a schema where the type is known.
+
+Payloads stay as they arrived, and so does their Zenoh Encoding, in the channel's metadata. Viewers (Foxglove,
+Lichtblick) and ROS 2 choose what to draw by the schema's name, which is the ROS name: `nav_msgs/msg/Odometry`. Their
+readers of JSON schemas do not resolve `$ref`, so nothing is referenced. For CDR the schema is the text of the .msg
+files, one after another.
+"""
+
+import json
+from collections.abc import Callable
+from functools import cache, lru_cache
+from typing import Any, NamedTuple
+
+import msgspec
+
+from holozen import wire
+from holozen.messages import Message, codec
+from holozen.messages.definitions import Interface, InterfaceError
+from holozen.messages.registry import Registry
+
+# Encodings that may carry JSON; the first ones do not describe the content.
+_MAYBE_JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
+_MCAP = {"application/msgpack": "msgpack", "application/cdr": "cdr", "application/protobuf": "protobuf"}
+_SEPARATOR = "=" * 80  # between two definitions
+_KEPT = ("type", "items", "properties")
+
+
+class Format(NamedTuple):
+    """The description of a channel in a bag. `schema` is a ROS name, empty if the type is unknown."""
+
+    encoding: str
+    zenoh_encoding: str
+    schema: str = ""
+    schema_encoding: str = ""
+    schema_data: bytes = b""
+
+
+def format_of(payload: bytes, encoding: str, types: tuple[type[Message], ...]) -> tuple[Format, Message | None]:
+    """The format of a sample, and its message if it is one of `types`."""
+    message = _message(payload, encoding, types)
+    mcap = _mcap_encoding(payload, encoding, message)
+    return _format(mcap, encoding, type(message) if message is not None else None), message
+
+
+def as_cdr(message: Message) -> tuple[Format, bytes]:
+    """A message as ROS 2 writes it, and its format. Raises CodecError for a number that is not finite."""
+    return _format("cdr", codec.encoding("cdr", type(message)), type(message)), codec.encode(message, "cdr")
+
+
+def types_of(key: str, names: Callable[[], set[str]]) -> tuple[type[Message], ...]:
+    """The types that a key may carry: those of the wire's table, else those that its publishers announce (`names`)."""
+    row = wire.topic(key)
+    return row.types if row else tuple(known()[name] for name in sorted(names()) if name in known())
+
+
+@lru_cache(maxsize=1024)
+def _format(mcap: str, encoding: str, kind: type[Message] | None) -> Format:
+    if mcap == "json" and kind:
+        return Format(mcap, encoding, kind.ROS, "jsonschema", json_schema(kind))
+    name = kind.ROS if kind else encoding.partition(";")[2]
+    if mcap == "cdr" and (schema := msg_schema(name)):
+        return Format(mcap, encoding, name, "ros2msg", schema)
+    return Format(mcap, encoding, kind.ROS if kind else "")
+
+
+def _message(payload: bytes, encoding: str, types: tuple[type[Message], ...]) -> Message | None:
+    if not types:
+        return None
+    try:
+        return codec.decode(payload, encoding, types, tolerant=not wire.is_command("", types))
+    except codec.CodecError:
+        return None
+
+
+def _mcap_encoding(payload: bytes, encoding: str, message: Message | None) -> str:
+    name = encoding.partition(";")[0]
+    if name in _MAYBE_JSON:
+        if message is not None and payload[:1] == b"\0":  # bridges to ROS 2 write CDR without an Encoding
+            return "cdr"
+        return "json" if message is not None or _is_json(payload) else name or "zenoh/bytes"
+    return _MCAP.get(name, name)
+
+
+def _is_json(payload: bytes) -> bool:
+    """Whether it is an object or a list in JSON; a single word or number counts as text."""
+    if payload[:1] not in (b"{", b"["):
+        return False
+    try:
+        msgspec.json.decode(payload, type=msgspec.Raw)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return False
+    return True
+
+
+@cache
+def known() -> dict[str, type[Message]]:
+    """The messages that travel on topics, by their ROS names."""
+    return {kind.ROS: kind for row in wire.TOPICS for kind in row.types}
+
+
+@cache
+def json_schema(kind: type[Message]) -> bytes:
+    """The JSON schema of a message."""
+    schema = msgspec.json.schema(kind)
+    return json.dumps({"title": kind.ROS, **_in_place(schema, schema.get("$defs", {}))}).encode()
+
+
+def _in_place(schema: dict[str, Any], parts: dict[str, Any]) -> dict[str, Any]:
+    """`schema` with each reference replaced by what it names, without keywords that viewers ignore."""
+    if "$ref" in schema:
+        return _in_place(parts[schema["$ref"].rpartition("/")[2]], parts)
+    plain: dict[str, Any] = {name: value for name, value in schema.items() if name in _KEPT}
+    if isinstance(plain.get("items"), dict):
+        plain["items"] = _in_place(plain["items"], parts)
+    if plain["type"] == "object":  # viewers expect properties, also in a mapping
+        fields = plain.get("properties", {})
+        plain["properties"] = {name: _in_place(field, parts) for name, field in fields.items()}
+    return plain
+
+
+@lru_cache(maxsize=1024)
+def msg_schema(name: str) -> bytes:
+    """The definitions of a ROS type and of the types nested in it; empty for an unknown type."""
+    try:
+        interface = _registry().find(name)
+    except InterfaceError:
+        return b""
+    parts: dict[str, Interface] = {}
+    _collect(interface, parts)
+    others = [f"{_SEPARATOR}\nMSG: {one.name.replace('/msg/', '/')}\n{_definition(one)}" for one in parts.values()]
+    return "\n".join([_definition(interface), *others]).encode()
+
+
+@cache
+def _registry() -> Registry:
+    return Registry()
+
+
+def _collect(interface: Interface, found: dict[str, Interface]) -> None:
+    for field in interface.fields:
+        if field.nested and field.nested.name not in found:
+            found[field.nested.name] = field.nested
+            _collect(field.nested, found)
+
+
+def _definition(interface: Interface) -> str:
+    constants = [f"{one.type} {one.name}={one.value}" for one in interface.constants]
+    fields = []
+    for field in interface.fields:
+        default = "" if field.default is None else f" {json.dumps(field.default)}"
+        fields.append(f"{field.spelled()} {field.name}{default}")
+    return "\n".join(constants + fields)

@@ -1,0 +1,561 @@
+"""A robot file under check: its sources, its elements with their lines, and the mistakes that rules find in it."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+from holozen.robot.elements import Source, Tag
+from holozen.robot.sdf_models import parse_sdf
+
+if TYPE_CHECKING:
+    pass  # dropped
+import os
+import re
+import tempfile
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import field
+from functools import cached_property
+from pathlib import Path
+from xml.parsers import expat
+
+from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
+from holozen.robot.elements import read_xml, repair_xml
+from holozen.robot.errors import RobotError
+from holozen.robot.gazebo_plugins import KNOWN, kind_of
+from holozen.robot.loading import parse
+from holozen.robot.model import RobotModel
+from holozen.robot.packages import find_by_name, find_package
+from holozen.robot.xacro import Outcome, expand_in_child, is_xacro, process, read_text
+
+Severity = Literal["error", "warning"]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A file and line; line 0 means the file as a whole. `expanded`: a line of the text that `holozen xacro` prints."""
+
+    file: str
+    line: int = 0
+    expanded: bool = False
+
+    def __str__(self) -> str:
+        if not self.line:
+            return self.file
+        return f"{self.file}:{self.line}" + (" (line of `holozen xacro`'s output)" if self.expanded else "")
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A finding of a rule: at an element, at a place, or (None) in the file as a whole."""
+
+    at: Tag | Place | None
+    problem: str
+    mend: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """`finds` and `why` are descriptions; `find` inspects a robot file. With an error the robot cannot be used as
+    intended; with a warning it can.
+    """
+
+    name: str
+    severity: Severity
+    finds: str
+    why: str
+    find: "Callable[[Subject], Iterator[Mistake]]"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A mistake with the rule that found it."""
+
+    rule: str
+    severity: Severity
+    place: Place
+    problem: str
+    why: str
+    mend: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.severity}: {self.problem} [{self.rule}]\n    {self.why}; {self.mend}"
+
+    def fields(self) -> dict[str, object]:
+        """For JSON: flat, with the line as a number or null."""
+        return {
+            "severity": self.severity,
+            "rule": self.rule,
+            "file": self.place.file,
+            "line": self.place.line or None,
+            "expanded": self.place.expanded,
+            "problem": self.problem,
+            "reason": self.why,
+            "mend": self.mend,
+        }
+
+
+# Suggestions for misspelt words.
+
+
+MOST_NAMES = 1000  # compared with one word
+
+ALIASES = {
+    "height": "length",
+    "min": "lower",
+    "max": "upper",
+    "torque": "effort",
+    "speed": "velocity",
+    "file": "filename",
+    "uri": "filename",
+    "colour": "color",
+    "rgb": "rgba",
+    "kg": "value",
+    "kind": "type",
+    "pos": "xyz",
+    "position": "xyz",
+    "rotation": "rpy",
+    "intertia": "inertia",
+}
+"""Words commonly written instead of one of the file format."""
+
+
+def distance(one: str, other: str) -> int:
+    """Edit distance: letters to insert, delete, change or swap with the next one (optimal string alignment); the
+    difference in length if that is 3 or more.
+    """
+    if abs(len(one) - len(other)) > 2:
+        return abs(len(one) - len(other))
+    before: list[int] = []
+    last = list(range(len(other) + 1))
+    for i, a in enumerate(one, 1):
+        row = [i]
+        for j, b in enumerate(other, 1):
+            best = min(last[j] + 1, row[-1] + 1, last[j - 1] + (a != b))
+            if i > 1 and j > 1 and a == other[j - 2] and one[i - 2] == b:
+                best = min(best, before[j - 2] + 1)
+            row.append(best)
+        before, last = last, row
+    return last[-1]
+
+
+def nearest(word: str, known: Iterable[str], shortest: int = 2) -> str | None:
+    """The known word that `word` is a misspelling of, or None. Words shorter than `shortest` are not guessed at.
+
+    One wrong letter is allowed, two from eight letters on; case and underscores are ignored.
+    """
+    words, plain = list(known), _plain(word)
+    if len(word) > 40 or len(plain) < shortest:
+        return None
+    if ALIASES.get(plain) in words:
+        return ALIASES[plain]
+    allowed = 2 if len(plain) >= 8 else 1
+    near = [other for other in words if distance(plain, _plain(other)) <= allowed]
+    # Of two spellings of one word, prefer the one in the same style.
+    return min(near, key=lambda other: (distance(plain, _plain(other)), distance(word, other)), default=None)
+
+
+def closest(word: str, known: Iterable[str]) -> str:
+    """` (did you mean 'x'?)` with the closest existing name, else nothing."""
+    words = list(known)
+    if len(words) > MOST_NAMES:
+        return ""
+    found = nearest(word, words)
+    if found is None:
+        parts = [other for other in words if len(word) > 2 and (word.lower() in other.lower())]
+        found = min(parts, key=len, default=None)
+    return f" (did you mean {found!r}?)" if found else ""
+
+
+def _plain(word: str) -> str:
+    return word.lower().replace("_", "").replace("-", "")
+
+
+# The source files, and the line of each element of the expanded text in them.
+
+
+MARK = "holozen-line"  # the attribute that carries file and line through xacro
+MOST_FILES = 200
+
+_FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
+_FILENAME = re.compile(rb"""(filename\s*=\s*)("[^"]*"|'[^']*')""")
+
+
+@dataclass(frozen=True, slots=True)
+class SourceFile:
+    """A file as written. `includes`: the filename of each include -> the file, None if it is computed."""
+
+    path: Path
+    text: str
+    root: Tag
+    includes: Mapping[str, Path | None]
+
+
+def read_sources(path: Path, packages: Mapping[str, Path]) -> list[SourceFile]:
+    """The robot file, and the files it includes by a literal name.
+
+    Raises RobotError for a file that cannot be read or parsed.
+    """
+    files: dict[Path, SourceFile] = {}
+    waiting = [path]
+    while waiting and len(files) < MOST_FILES:
+        here = waiting.pop()
+        if here not in files:
+            files[here] = _read(here, path, packages)
+            waiting += [found for found in files[here].includes.values() if found]
+    return list(files.values())
+
+
+def trace(
+    plain: Tag,
+    sources: list[SourceFile],
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    allow_env: Collection[str] = (),
+) -> list[str]:
+    """For each element of the expanded text in order: "source file number:line", or nothing if unknown.
+
+    The files are expanded a second time, with a mark in each start tag. The result is used only if the text is the
+    same otherwise. Raises RobotError if the copies cannot be read.
+    """
+    try:
+        with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
+            outcome = _expanded(Path(folder), sources, args, packages, allow_env)
+    except OSError:  # there is no writable folder
+        return []
+    if outcome.error:
+        return []
+    marked = list(elements(read_xml(outcome.text, "marked")))
+    places = [tag.attributes.pop(MARK, "") for tag in marked]
+    same = [(tag.name, tag.attributes) for tag in marked] == [(tag.name, tag.attributes) for tag in elements(plain)]
+    return places if same else []
+
+
+def _expanded(
+    folder: Path,
+    sources: list[SourceFile],
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    allow_env: Collection[str],
+) -> Outcome:
+    """The expansion of the marked copies in `folder`."""
+    copies = {source.path: folder / f"{number}.xacro" for number, source in enumerate(sources)}
+    for number, source in enumerate(sources):
+        copies[source.path].write_bytes(_marked(source, number, copies))
+    return expand_in_child(copies[sources[0].path], args, {**_packages(sources, packages), **packages}, allow_env)
+
+
+def elements(root: Tag) -> Iterator[Tag]:
+    """`root` and all below it, in file order."""
+    waiting = [root]
+    while waiting:
+        tag = waiting.pop()
+        yield tag
+        waiting += tag.children[::-1]
+
+
+def _read(path: Path, start: Path, packages: Mapping[str, Path]) -> SourceFile:
+    text = read_text(path)
+    root = read_xml(text, str(path))
+    names = [tag.attributes.get("filename", "") for tag in root.below("xacro:include")]
+    return SourceFile(path, text, root, {name: _included(name, path, start, packages) for name in names})
+
+
+def _included(name: str, path: Path, start: Path, packages: Mapping[str, Path]) -> Path | None:
+    try:
+        found = path.parent / _FIND.sub(lambda match: str(find_package(match[1], start, packages)), name)
+        if "$" in str(found) or found.is_file():
+            return found if "$" not in str(found) else None
+        return find_by_name(name, start, packages) if os.path.isabs(name) else None
+    except (RobotError, OSError, ValueError):
+        return None
+
+
+def _packages(sources: list[SourceFile], packages: Mapping[str, Path]) -> dict[str, Path]:
+    """The packages as found from the original file, since the copies are elsewhere."""
+    found = {}
+    for name in {name for source in sources for name in _FIND.findall(source.text)}:
+        try:
+            found[name] = find_package(name, sources[0].path, packages)
+        except RobotError:
+            continue
+    return found
+
+
+def _marked(source: SourceFile, number: int, copies: Mapping[Path, Path]) -> bytes:
+    """The text with a mark in each start tag that is not xacro's own, and with includes of the copies."""
+    text, pieces, done = source.text.encode("utf-8", "replace"), [], 0
+    for offset, line, name in _starts(text):
+        after = offset + 1 + len(name.encode())
+        pieces.append(text[done:after])
+        done = after
+        if not name.startswith("xacro:"):
+            pieces.append(f' {MARK}="{number}:{line}"'.encode())
+        elif name == "xacro:include" and (match := _FILENAME.search(text, after)):
+            pieces += [text[after : match.start()], match[1], _copy(match[2][1:-1].decode(), source, copies)]
+            done = match.end()
+    return b"".join([*pieces, text[done:]])
+
+
+def _copy(name: str, source: SourceFile, copies: Mapping[Path, Path]) -> bytes:
+    found = source.includes.get(name)
+    path = str(copies.get(found, found)) if found else name
+    full = path.startswith(("/", "$(find", "$(env", "$(optenv", "$(cwd", "$(dirname"))
+    return f'"{path if full else source.path.parent.absolute() / path}"'.encode()
+
+
+def _starts(text: bytes) -> list[tuple[int, int, str]]:
+    """Byte offset, line and name of each start tag."""
+    found: list[tuple[int, int, str]] = []
+    parser = expat.ParserCreate("utf-8")
+    parser.StartElementHandler = lambda name, _: found.append((parser.CurrentByteIndex, parser.CurrentLineNumber, name))
+    parser.Parse(text, True)
+    return found
+
+
+_WHERE = re.compile(r"(?P<file>.*?)(?:, line (?P<line>\d+))?: (?P<text>.*)", re.DOTALL)
+
+PLUGIN_OWNERS = ("model", "world", "sensor")  # in SDF
+
+
+@dataclass(frozen=True, slots=True)
+class LoaderMessage:
+    """A message of the loader, and the element that it is about, if known."""
+
+    severity: str
+    at: Tag | Place | None
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Requirements:
+    """Requirements on the robot. `fits`: length, width and, if given, height in metres. `require`: a file of names."""
+
+    fits: tuple[float, ...] = ()
+    require: Path | None = None
+
+
+@dataclass(eq=False)
+class Subject:
+    """`root` is the <robot>, or the <model> of an SDF file (`sdf`), xacro expanded. `model` is None if the file
+    cannot be loaded; `messages` are the loader's. `origins` maps elements to their source lines.
+    `forgiven` are XML mistakes that Gazebo tolerates.
+    """
+
+    path: Path
+    root: Tag
+    sources: list[SourceFile]
+    packages: Mapping[str, Path] = field(default_factory=dict)
+    requirements: Requirements = Requirements()
+    sdf: bool = False
+    model: RobotModel | None = None
+    messages: list[LoaderMessage] = field(default_factory=list)
+    origins: Mapping[Tag, Place] = field(default_factory=dict)
+    forgiven: list[Mistake] = field(default_factory=list)
+
+    @cached_property
+    def links(self) -> dict[str, Tag]:
+        """Link name -> its element; the first of duplicates."""
+        return named(self.root.all("link"))
+
+    @cached_property
+    def joints(self) -> dict[str, Tag]:
+        """Joint name -> its element; the first of duplicates."""
+        return named(self.root.all("joint"))
+
+    @cached_property
+    def placed(self) -> list[Placed]:
+        """Every shape, placed with all joints at zero; empty for a robot that cannot be loaded."""
+        return list(place_shapes(self.model)) if self.model else []
+
+    @property
+    def guessed(self) -> bool:
+        """Whether a mesh is missing, so that the extent of some part is unknown."""
+        return any("is replaced by a box" in message.text for message in self.messages)
+
+    @cached_property
+    def wheels(self) -> list[Wheel]:
+        """The wheels; empty for a robot that cannot be loaded."""
+        return find_wheels(self.model, self.placed, self.plugin_joints) if self.model else []
+
+    @cached_property
+    def plugins(self) -> list[Tag]:
+        """Every <plugin> that a simulator reads: in URDF inside a <gazebo>, in SDF of a model, world or sensor."""
+        holders = [self.root] if self.sdf else self.root.all("gazebo")
+        found = [plugin for holder in holders for plugin in holder.below("plugin")]
+        return [tag for tag in found if not self.sdf or (tag.parent and tag.parent.name in PLUGIN_OWNERS)]
+
+    @cached_property
+    def plugin_joints(self) -> list[tuple[Tag, str]]:
+        """(element, joint name) for each joint that a known plugin names as one of its wheels'."""
+        known = [plugin for plugin in self.plugins if kind_of(plugin) in KNOWN]
+        return [pair for plugin in known for tag in plugin.children for pair in _joint_names(tag)]
+
+    def part(self, tag: Tag) -> Tag:
+        """The link, joint or other direct child of the robot that contains `tag`; the robot itself for its own tag."""
+        while tag.parent is not None and tag is not self.root and tag.parent is not self.root:
+            tag = tag.parent
+        return tag
+
+    def place(self, at: Tag | Place | None) -> Place:
+        """The location of an element: in its source file if known."""
+        if isinstance(at, Place):
+            return at
+        if at is None:
+            return Place(str(self.path))
+        return self.origins.get(at) or read_place(at.place)
+
+    def is_source(self, tag: Tag) -> bool:
+        """Whether the element is in the robot file itself, not in an included one."""
+        return self.place(tag).file == str(self.path)
+
+    def tags(self) -> Iterator[Tag]:
+        """Every element of the robot."""
+        return elements(self.root)
+
+
+def named(tags: list[Tag]) -> dict[str, Tag]:
+    """Name -> element; the first of duplicates, none without a name."""
+    return {name: tag for tag in reversed(tags) if (name := tag.attributes.get("name", "").strip())}
+
+
+def read_place(text: str) -> Place:
+    """The place in "FILE, line N"."""
+    file, comma, line = text.rpartition(", line ")
+    return Place(file, int(line)) if comma and line.isdecimal() else Place(text)
+
+
+def split(message: str, path: Path) -> tuple[Place, str]:
+    """Place and text of a message "FILE, line N: text" or "FILE: text"; else the file and the whole message."""
+    match = _WHERE.fullmatch(message)
+    if match is None or not (match["line"] or match["file"].startswith(str(path))):
+        return Place(str(path)), message
+    return Place(match["file"], int(match["line"] or 0)), match["text"]
+
+
+def _joint_names(tag: Tag) -> Iterator[tuple[Tag, str]]:
+    if tag.name.lower().replace("_", "").endswith("joint"):
+        yield from ((tag, name) for name in tag.text.replace(",", " ").split())
+
+
+# Loading.
+
+
+EXPANDED = " (expanded)"  # after the file's name, in messages about the expanded text
+SEE_WORLD = "; see it with: holozen sim --world FILE"
+FORGIVEN = "correct it: other parsers reject the file"
+SILENT = ("gazebo", "plugin", "sensor", "material", "inertial", "mesh")
+"""Elements whose loader warnings are not mistakes of the file, or have rules of their own."""
+
+
+def read(
+    path: Path,
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    requirements: Requirements,
+    allow_env: Collection[str] = (),
+) -> Subject:
+    """The file, expanded and loaded as far as possible. Raises RobotError if it is not the XML of a robot."""
+    text = read_text(path)
+    expanded = is_xacro(path, text)
+    outcome = process(path, args, packages, allow_env) if expanded else Outcome(text)
+    if outcome.error:
+        raise RobotError(outcome.error)
+    plain, place = outcome.text, f"{path}{EXPANDED}" if expanded else str(path)
+    plain, mistakes = (plain, []) if expanded else repair_xml(plain)
+    root = read_xml(plain, place)
+    sources = read_sources(path, packages) if expanded else []
+    robot = _robot(root)
+    subject = Subject(path, robot, sources, packages, requirements, robot.name == "model")
+    subject.forgiven = [Mistake(Place(place, line), problem, FORGIVEN) for line, problem in mistakes]
+    subject.origins = _origins(root, sources, args, packages, path, allow_env) if expanded else {}
+    for line in outcome.warnings:
+        at, message = split(line, path)
+        subject.messages.append(LoaderMessage("warning", at, message))
+    if not (expanded and is_library(subject)):
+        _load(subject, root, plain, place)
+    return subject
+
+
+def is_library(subject: Subject) -> bool:
+    """Whether a xacro file only contains colours, properties and macros for others to include."""
+    own = subject.sources[0].root.children if subject.sources else []
+    offers = any(tag.name in ("xacro:macro", "xacro:property", "xacro:include", "material", "gazebo") for tag in own)
+    return offers and all(tag.name in ("material", "gazebo") for tag in subject.root.children)
+
+
+def loader_mistakes(subject: Subject, severity: str) -> list[Mistake]:
+    """The loader's messages of this severity."""
+    fix = "fix it as described" if severity == "error" else "check that this is intended"
+    return [Mistake(each.at, each.text, fix) for each in subject.messages if each.severity == severity]
+
+
+def _robot(root: Tag) -> Tag:
+    if root.name == "robot":
+        return root
+    if root.name == "sdf" and root.first("world") is None:
+        model = root.first("model")
+        if model is None:
+            raise root.wrong("holds no <model>")
+        return model
+    if root.name == "sdf":
+        raise root.wrong(f"is a world{SEE_WORLD}")
+    raise root.wrong("is not a robot; a URDF file starts with <robot name=...>, an SDF file with <sdf version=...>")
+
+
+def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
+    by_line: dict[int, list[Tag]] = {}
+    for tag in elements(root):
+        by_line.setdefault(_line(tag), []).append(tag)
+    try:
+        subject.model = _model(subject, root, text, place)
+        lines = [("warning", line) for line in subject.model.warnings]
+    except RobotError as error:
+        lines = [("error", str(error))]
+    for severity, line in lines:
+        where, message = split(line, subject.path)
+        here = by_line.get(where.line, []) if where.file == place else []
+        # A line may contain several elements; the message starts with the one it is about.
+        at = next((tag for tag in here if message.startswith(f"{tag} ")), here[0] if here else where)
+        quiet = isinstance(at, Tag) and (_within(at, SILENT) or at.attributes.get("name") == "world")
+        if severity == "error" or not quiet:
+            subject.messages.append(LoaderMessage(severity, at, message))
+
+
+def _model(subject: Subject, root: Tag, text: str, place: str) -> RobotModel:
+    if not subject.sdf:
+        return parse(text, subject.path, subject.packages, place)
+    return parse_sdf(root, Source(subject.path, subject.packages))
+
+
+def _within(tag: Tag | None, names: tuple[str, ...]) -> bool:
+    while tag is not None:
+        if tag.name in names:
+            return True
+        tag = tag.parent
+    return False
+
+
+def _origins(
+    root: Tag,
+    sources: list[SourceFile],
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    path: Path,
+    allow_env: Collection[str],
+) -> dict[Tag, Place]:
+    """Element of the expanded text -> its place in a source file, or in the text if unknown."""
+    try:
+        marks = trace(root, sources, args, packages, allow_env)
+    except (RobotError, OSError):
+        marks = []
+    tags = list(elements(root))
+    places = {tag: Place(str(path), _line(tag), True) for tag in tags}
+    for tag, mark in zip(tags, marks, strict=False):
+        number, colon, line = mark.partition(":")
+        if colon:
+            places[tag] = Place(str(sources[int(number)].path), int(line))
+    return places
+
+
+def _line(tag: Tag) -> int:
+    return int(tag.place.rpartition(", line ")[2])

@@ -1,0 +1,89 @@
+"""What a task requires of a robot: a size (--fits), and names of links and joints (--require)."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from holozen.check.engine import Mistake, Place, Subject, closest
+from holozen.check.geometry import box_of, size_of
+from holozen.check.rules_inertia import dimensions
+from holozen.robot.errors import RobotError, listed
+from holozen.robot.model import JOINT_KINDS
+from holozen.robot.xacro import read_text
+
+GRAIN = 1e-6  # m; rounding error of sums of decimals
+
+
+@dataclass(frozen=True, slots=True)
+class Need:
+    """A required link or joint, optionally with a joint type."""
+
+    kind: str
+    name: str
+    type: str = ""
+
+
+def too_large(subject: Subject) -> Iterator[Mistake]:
+    """A robot larger than --fits: collision shapes, and visual ones except meshes, all joints at zero."""
+    fits = subject.requirements.fits
+    shapes = [shape for shape in subject.placed if shape.use == "collision" or not shape.points]
+    box = box_of(shapes)
+    if not fits or subject.model is None:
+        return
+    if box is None:
+        yield Mistake(subject.root, "the robot has no shape to measure", "give its links <collision> shapes")
+        return
+    size = size_of(box)
+    names = ("length (x)", "width (y)", "height (z)")
+    over = [f"{name} {size[i]:.3g} m" for i, name in enumerate(names) if i < len(fits) and size[i] > fits[i] + GRAIN]
+    if over:
+        limit = " x ".join(f"{value:g}" for value in fits)
+        problem = f"the robot measures {dimensions(size)}, and has to fit into {limit} m: {', '.join(over)} is too much"
+        yield Mistake(subject.root, problem, "make it smaller, or bring its parts together")
+
+
+def bad_needs(subject: Subject) -> Iterator[Mistake]:
+    """Invalid lines of the --require file."""
+    for line, need in _needs(subject):
+        if isinstance(need, str):
+            fix = "write `link NAME` or `joint NAME`, or `joint NAME TYPE`; # starts a comment"
+            yield Mistake(Place(str(subject.requirements.require), line), need, fix)
+
+
+def missing_names(subject: Subject) -> Iterator[Mistake]:
+    """Links and joints of the --require file that are missing, or joints of another type."""
+    for _, need in _needs(subject):
+        if isinstance(need, str):
+            continue
+        there = subject.links if need.kind == "link" else subject.joints
+        if need.name not in there:
+            problem = f"there is no {need.kind} {need.name!r}{closest(need.name, there)}"
+            yield Mistake(subject.root, problem, f"rename or add one; there are: {listed(list(there))}")
+        elif need.type and (kind := there[need.name].attributes.get("type")) != need.type:
+            yield Mistake(there[need.name], f"joint {need.name!r} is {kind}, not {need.type}", f'type="{need.type}"')
+
+
+def _needs(subject: Subject) -> Iterator[tuple[int, Need | str]]:
+    """Line number, and the requirement or what is wrong with the line."""
+    return iter(read_needs(subject.requirements.require)) if subject.requirements.require else iter(())
+
+
+def read_needs(path: Path) -> list[tuple[int, Need | str]]:
+    """The lines of a --require file: line number, and the requirement or what is wrong with the line."""
+    try:
+        lines = read_text(path).splitlines()
+    except RobotError as error:
+        return [(0, str(error))]
+    words = [(number, line.partition("#")[0].split()) for number, line in enumerate(lines, 1)]
+    return [(number, _need(line)) for number, line in words if line]
+
+
+def _need(words: list[str]) -> Need | str:
+    kind, *rest = words
+    if kind not in ("link", "joint"):
+        return f"{kind[:40]!r} is not a kind; write link or joint"
+    if not rest or len(rest) > (1 if kind == "link" else 2):
+        return f"{' '.join(words)[:60]!r} has {len(rest)} words after {kind!r}"
+    if len(rest) == 2 and rest[1] not in JOINT_KINDS:
+        return f"there is no joint type {rest[1][:40]!r}; there are {', '.join(JOINT_KINDS)}"
+    return Need(kind, *rest)

@@ -1,0 +1,238 @@
+"""Mass and inertia: whether a body can have them, and whether this one could."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from holozen.check.engine import Mistake, Subject
+from holozen.check.geometry import MOVING, box_of, fixed_bodies, half_sizes, size_of
+from holozen.robot.elements import Tag, Vector, number
+from holozen.robot.errors import listed
+from holozen.robot.inertia import positive_definite
+from holozen.robot.model import Link, Shape
+
+FACTOR = 10.0  # between the given inertia and that of the solid shape
+MINOR = 0.1  # of the mass of what a link is fixed to; the inertia of a smaller part is irrelevant
+DENSEST = 25_000.0  # kg/m^3; osmium has 22 600
+STEEL = 8_000.0  # kg/m^3
+ROUNDING = 0.01  # of the trace: numbers are written with few digits
+
+Tensor = tuple[float, float, float, float, float, float]
+WORDS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """The values of an <inertial>: kg and kg m^2, None if not a number."""
+
+    tag: Tag
+    mass_tag: Tag | None
+    mass: float | None
+    inertia_tag: Tag | None
+    inertia: Tensor | None
+
+
+def read_inertial(link: Tag, sdf: bool) -> Given | None:
+    """The <inertial> of a link's element."""
+    tag = link.first("inertial")
+    if tag is None:
+        return None
+    mass, inertia = tag.first("mass"), tag.first("inertia")
+    value = number((mass.text if sdf else mass.attributes.get("value", "")).strip()) if mass else None
+    return Given(tag, mass, value, inertia, _tensor(inertia, sdf) if inertia else None)
+
+
+def no_inertia(subject: Subject) -> Iterator[Mistake]:
+    """Bodies without mass: a link, with all that is fixed to it, that a joint moves or that others move on."""
+    if subject.model is None or subject.model.static or subject.sdf:
+        return  # SDF: a link without <inertial> has 1 kg
+    weighed = {name for name, tag in subject.links.items() if tag.first("inertial")}
+    if not weighed:
+        yield Mistake(subject.root, "no link has an <inertial>", "give each link that is a real part mass and inertia")
+        return
+    for group in fixed_bodies(subject.model):
+        if group == ["world"]:
+            continue
+        lead = subject.links[group[0]]
+        solid = [name for name in group if subject.model.links[name].collisions and name not in weighed]
+        carrying = [name for name in solid if _carries(name, subject)]
+        if not weighed & set(group) and (len(fixed_bodies(subject.model)) > 1 or solid):
+            yield Mistake(lead, f"link {group[0]!r} has no <inertial>{_and_fixed(group)}", "add mass and inertia")
+        elif carrying:
+            tag = subject.links[carrying[0]]
+            yield Mistake(tag, f"link {carrying[0]!r} has a collision and moving parts but no <inertial>", "add one")
+
+
+def bad_mass(subject: Subject) -> Iterator[Mistake]:
+    """Negative or missing masses."""
+    for name, tag in subject.links.items():
+        given = read_inertial(tag, subject.sdf)
+        if given is None or (given.mass_tag is None and subject.sdf) or (given.mass == 0 and _is_frame(name, subject)):
+            continue
+        if given.mass_tag is None:
+            yield Mistake(given.tag, f"the <inertial> of link {name!r} has no <mass>", 'add <mass value="..."/>, in kg')
+        elif given.mass is None and not subject.sdf and "value" not in given.mass_tag.attributes:
+            continue  # misspelt, or reported by the loader
+        elif given.mass is None:
+            yield Mistake(given.mass_tag, f"the mass of link {name!r} is not a number", "write one, in kg")
+        elif given.mass < 0:
+            yield Mistake(given.mass_tag, f"link {name!r} has a mass of {given.mass:g} kg", "give it its mass in kg")
+
+
+def no_mass(subject: Subject) -> Iterator[Mistake]:
+    """Links with a mass of zero or without moments of inertia, which are loaded nevertheless."""
+    for name, tag in subject.links.items():
+        given = read_inertial(tag, subject.sdf)
+        if given and given.mass == 0 and given.mass_tag and not _is_frame(name, subject):
+            fix = "give it its mass in kg, or remove the <inertial> if it is only a frame"
+            yield Mistake(given.mass_tag, f"link {name!r} has a mass of 0 kg", fix)
+        elif given and given.mass and given.inertia and not any(given.inertia):
+            yield Mistake(given.inertia_tag, f"the inertia of link {name!r} is zero", "compute it from the shape")
+
+
+def absurd_mass(subject: Subject) -> Iterator[Mistake]:
+    """Links denser than any metal, and robots denser than steel."""
+    total = 0.0
+    for name, tag in subject.links.items():
+        given = read_inertial(tag, subject.sdf)
+        mass = given.mass if given and given.mass else 0.0
+        total += max(mass, 0.0)
+        box = box_of([shape for shape in subject.placed if shape.link == name])
+        if given and box and mass > 10 and _volume(size_of(box)) * DENSEST < mass:
+            problem = f"link {name!r} has {mass:g} kg in {dimensions(size_of(box))}, denser than any metal"
+            yield Mistake(given.mass_tag, problem, "write kilograms, and sizes in metres")
+            return
+    box = box_of(subject.placed)
+    if box and total > 100 and _volume(size_of(box)) * STEEL < total:
+        problem = f"the robot has {total:g} kg in {dimensions(size_of(box))}, denser than a block of steel"
+        yield Mistake(subject.root, problem, "write kilograms, and sizes in metres")
+
+
+def impossible_inertia(subject: Subject) -> Iterator[Mistake]:
+    """Impossible inertias: missing, not positive definite, or one moment above the sum of the other two."""
+    for name, tag in subject.links.items():
+        given = read_inertial(tag, subject.sdf)
+        if given is None or not given.mass or (given.inertia_tag is None and subject.sdf):
+            continue
+        if given.inertia_tag is None:
+            yield Mistake(given.tag, f"link {name!r} has a mass and no <inertia>", "add one")
+        elif given.inertia and any(given.inertia) and (problem := impossible(given.inertia)):
+            yield Mistake(given.inertia_tag, f"the inertia of link {name!r} {problem}", "compute it from the shape")
+
+
+def unlike_shape(subject: Subject) -> Iterator[Mistake]:
+    """Inertias that differ tenfold from those of the link's shape, solid and of the link's mass."""
+    if subject.model is None:
+        return
+    for group in fixed_bodies(subject.model):
+        weight = sum(inertial.mass for name in group if (inertial := subject.model.links[name].inertial))
+        for name in group:
+            given, link = read_inertial(subject.links[name], subject.sdf), subject.model.links[name]
+            if given is None or not given.inertia or not given.mass or given.mass < MINOR * weight:
+                continue
+            solid = solid_moment(link, given.mass)
+            largest = max(given.inertia[0], given.inertia[3], given.inertia[5])
+            if solid and not impossible(given.inertia) and not solid / FACTOR <= largest <= solid * FACTOR:
+                problem = f"link {name!r} has moments of inertia up to {largest:.3g} kg m^2"
+                shape = f"; a solid body of its shape and {given.mass:g} kg has {solid:.3g}"
+                yield Mistake(given.inertia_tag, problem + shape, "compute it from the shape and the mass")
+
+
+def floating(subject: Subject) -> Iterator[Mistake]:
+    """Bodies that gravity does not pull, or only by less than half of their mass."""
+    if subject.model is None or subject.model.static:
+        return
+    for group in fixed_bodies(subject.model):
+        masses = {name: inertial.mass for name in group if (inertial := subject.model.links[name].inertial)}
+        light = [name for name in masses if not subject.model.links[name].gravity]
+        if light and sum(masses[name] for name in light) > sum(masses.values()) / 2:
+            problem = f"gravity is off for link {light[0]!r}, so {_whole(light[0], group)} floats"
+            yield Mistake(_gravity(light[0], subject), problem, "remove that setting unless it is meant to float")
+
+
+def _whole(name: str, group: list[str]) -> str:
+    return "it" if group == [name] else f"what is fixed together with it ({listed(group)})"
+
+
+def _gravity(link: str, subject: Subject) -> Tag:
+    """The element that switches gravity off for a link."""
+    owners = [gazebo for gazebo in subject.root.all("gazebo") if gazebo.attributes.get("reference", "").strip() == link]
+    settings = [tag for owner in (*owners, subject.links[link]) for tag in owner.children]
+    return next((tag for tag in settings if "gravity" in tag.name.lower()), subject.links[link])
+
+
+def impossible(inertia: Tensor) -> str:
+    """Why no body can have this tensor, else nothing."""
+    xx, xy, xz, yy, yz, zz = inertia
+    if not positive_definite(xx, xy, xz, yy, yz, zz):
+        return "is negative or not positive definite"
+    # The triangle inequality, for any axes: the second moments of mass, half the trace minus the tensor, are
+    # not negative (P. Wensing et al., "Linear matrix inequalities for physically consistent inertial parameter
+    # identification", IEEE Robotics and Automation Letters 3, 2018).
+    half = (xx + yy + zz) * (0.5 + ROUNDING)
+    if not positive_definite(half - xx, -xy, -xz, half - yy, -yz, half - zz):
+        return f"has one moment above the sum of the other two (ixx={xx:g}, iyy={yy:g}, izz={zz:g})"
+    return ""
+
+
+def solid_moment(link: Link, mass: float) -> float:
+    """The largest moment of inertia, about its centre, of the link's solid shape; 0 if it has none.
+
+    Uses the collision shape, else the visual one; of several the one that contains nearly all of their volume.
+    """
+    halves = [(half, shape) for shape in link.collisions or link.visuals if (half := half_sizes(shape))]
+    if not halves or len(halves) < len(link.collisions or link.visuals):
+        return 0.0
+    volumes = [_volume(half) for half, _ in halves]
+    largest = max(volumes)
+    return _moment(halves[volumes.index(largest)][1], mass) if sum(volumes) < 1.25 * largest else 0.0
+
+
+def dimensions(size: Vector) -> str:
+    """0.4 x 0.2 x 0.1 m."""
+    return " x ".join(f"{value:.3g}" for value in size) + " m"
+
+
+def _moment(shape: Shape, mass: float) -> float:
+    half = half_sizes(shape)
+    if half is None:
+        return 0.0
+    x, y, z = (value * value for value in half)
+    if shape.kind == "sphere":
+        return 0.4 * mass * x
+    if shape.kind == "cylinder":
+        return mass * max(x / 2, x / 4 + z / 3)
+    return mass * (x + y + z - min(x, y, z)) / 3
+
+
+def _tensor(tag: Tag, sdf: bool) -> Tensor | None:
+    """Omitted values are 0, in SDF 1 on the diagonal."""
+    values = []
+    for word in WORDS:
+        default = "1" if sdf and word[1] == word[2] else "0"
+        child = tag.first(word) if sdf else None
+        text = (child.text if child else default) if sdf else tag.attributes.get(word, default)
+        values.append(number(text.strip()))
+    if any(value is None for value in values):
+        return None
+    xx, xy, xz, yy, yz, zz = (value or 0.0 for value in values)
+    return xx, xy, xz, yy, yz, zz
+
+
+def _is_frame(name: str, subject: Subject) -> bool:
+    """Whether a link is only a frame on another one: it has no shape, and its parent joint is fixed."""
+    if subject.model is None or subject.links[name].first("visual") or subject.links[name].first("collision"):
+        return False
+    return all(joint.kind == "fixed" for joint in subject.model.joints.values() if name in (joint.child, joint.parent))
+
+
+def _carries(name: str, subject: Subject) -> bool:
+    assert subject.model is not None
+    return any(joint.parent == name and joint.kind in MOVING for joint in subject.model.joints.values())
+
+
+def _and_fixed(group: list[str]) -> str:
+    return f", and none of {len(group) - 1} fixed to it has one" if len(group) > 1 else ""
+
+
+def _volume(size: Vector) -> float:
+    return size[0] * size[1] * size[2]

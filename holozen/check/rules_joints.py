@@ -1,0 +1,103 @@
+"""Joint limits, mimics, and angles in degrees."""
+
+import math
+from collections.abc import Iterator
+
+from holozen.check.engine import Mistake, Subject, closest
+from holozen.robot.elements import Tag, number
+
+LARGE_ANGLE = 20.0  # rad; more than three turns, and written as a round number of degrees
+
+
+def no_limit(subject: Subject) -> Iterator[Mistake]:
+    """Revolute and prismatic joints without a <limit>; in SDF they are unlimited."""
+    for tag in subject.root.all("joint") if not subject.sdf else ():
+        if _is_bounded(tag) and tag.first("limit") is None:
+            kind = tag.attributes["type"]
+            free = ', or make it type="continuous"' if kind == "revolute" else ""
+            fix = f'add <limit lower="-1" upper="1" effort="5" velocity="5"/>{free}'
+            yield Mistake(tag, f"{tag} is {kind} and has no <limit>", fix)
+
+
+def empty_limit(subject: Subject) -> Iterator[Mistake]:
+    """Limits without range: lower above upper, or both the same."""
+    for tag in subject.root.all("joint"):
+        limit = _limit(tag, subject.sdf)
+        if limit is None or not _is_bounded(tag):
+            continue
+        lower, upper = (_value(limit, word, subject.sdf, None if subject.sdf else 0.0) for word in ("lower", "upper"))
+        if lower is not None and upper is not None and lower > upper:
+            yield Mistake(limit, f"{tag} has lower={lower:g} above upper={upper:g}", "swap them")
+        elif lower is not None and lower == upper:
+            fix = 'set lower and upper, in rad or m, or make it type="fixed"'
+            yield Mistake(limit, f"{tag} cannot move: lower and upper are both {lower:g}", fix)
+
+
+def no_effort(subject: Subject) -> Iterator[Mistake]:
+    """Moving joints whose limit gives no effort or velocity, or 0."""
+    for tag in subject.root.all("joint"):
+        limit = _limit(tag, subject.sdf)
+        if limit is None or not _moves(tag) or tag.first("mimic"):
+            continue
+        for word, unit in (("effort", "N m (or N)"), ("velocity", "rad/s (or m/s)")):
+            value = _value(limit, word, subject.sdf, math.inf if subject.sdf or not _is_bounded(tag) else None)
+            if value is None and not limit.attributes.get(word):
+                yield Mistake(limit, f"the limit of {tag} has no {word}", f'add {word}="...", in {unit}')
+            elif value == 0:
+                yield Mistake(limit, f"the limit of {tag} has {word} 0", f"give it a {word} above 0, in {unit}")
+
+
+def mimics(subject: Subject) -> Iterator[Mistake]:
+    """Joints that mimic a missing joint, or themselves, directly or through others."""
+    leaders = {name: tag.first("mimic") for name, tag in subject.joints.items()}
+    for name, mimic in leaders.items():
+        leader = mimic.attributes.get("joint", "").strip() if mimic else ""
+        if mimic and leader and leader not in subject.joints:
+            problem = f"joint {name!r} mimics {leader!r}, which does not exist{closest(leader, subject.joints)}"
+            yield Mistake(mimic, problem, "name a joint of this robot")
+        elif mimic and _comes_back(name, leaders):
+            yield Mistake(
+                mimic, f"joint {name!r} mimics itself through {leader!r}", "remove the <mimic> of one of them"
+            )
+
+
+def degrees(subject: Subject) -> Iterator[Mistake]:
+    """Angles that can only be degrees."""
+    for tag in subject.tags():
+        words = [tag.attributes.get("rpy", "")] if tag.name == "origin" else []
+        if tag.name == "limit" and tag.parent and tag.parent.attributes.get("type") == "revolute":
+            words = [tag.attributes.get(name, "") for name in ("lower", "upper")]
+        angles = [value for text in words for word in text.split() if (value := number(word)) is not None]
+        if large := [angle for angle in angles if LARGE_ANGLE < abs(angle) <= 720 and angle % 5 == 0]:
+            fix = f"write {math.radians(large[0]):.4g}, or ${{radians({large[0]:g})}} in xacro"
+            yield Mistake(tag, f"{tag} has the angle {large[0]:g}, which looks like degrees", fix)
+
+
+def _is_bounded(tag: Tag) -> bool:
+    return tag.attributes.get("type") in ("revolute", "prismatic")
+
+
+def _moves(tag: Tag) -> bool:
+    return tag.attributes.get("type") in ("revolute", "prismatic", "continuous")
+
+
+def _limit(tag: Tag, sdf: bool) -> Tag | None:
+    axis = tag.first("axis") if sdf else tag
+    return axis.first("limit") if axis else None
+
+
+def _value(limit: Tag, word: str, sdf: bool, default: float | None) -> float | None:
+    """A number of a <limit>: an attribute in URDF, an element in SDF. None if missing or not a number."""
+    if sdf:
+        tag = limit.first(word)
+        return number(tag.text) if tag else default
+    return number(limit.attributes[word]) if word in limit.attributes else default
+
+
+def _comes_back(name: str, leaders: dict[str, Tag | None]) -> bool:
+    here, seen = name, set[str]()
+    while here not in seen:
+        seen.add(here)
+        mimic = leaders.get(here)
+        here = mimic.attributes.get("joint", "").strip() if mimic else ""
+    return here == name

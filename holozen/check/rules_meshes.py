@@ -1,0 +1,138 @@
+"""Mesh files: present, not empty, and in metres."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+from holozen.check.engine import Mistake, Subject
+from holozen.check.geometry import Placed, around, box_of, size_of
+from holozen.robot.elements import Tag, Vector, number
+from holozen.robot.errors import RobotError
+from holozen.robot.meshes import bounds
+from holozen.robot.packages import is_data, resolve_uri
+from holozen.robot.rigid import link_frames
+
+PACKAGE = "put the file there, or write package://PACKAGE/PATH"
+MODEL = "put the file into MODEL beside this model, or add the folder that contains MODEL to GAZEBO_MODEL_PATH"
+FACTOR = 20.0  # larger than all the rest, or smaller than the rest of its link
+TINY = 500.0  # smaller than all the rest
+ALONE = 200.0  # larger than all other shapes
+LARGEST, SMALLEST = 100.0, 0.001  # m; for a mesh without other shapes
+UNITS = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 1000.0: "", 100.0: "", 1 / 0.0254: ""}
+"""Factor to metres, and the unit that the file may be in; without one it may have been scaled twice."""
+
+
+def missing(subject: Subject) -> Iterator[Mistake]:
+    """Meshes that are not found. The places searched are reported once."""
+    searched = ""
+    for tag, uri, _ in _meshes(subject):
+        try:
+            resolve_uri(uri, subject.path, subject.packages)
+        except RobotError as error:
+            short, places, rest = str(error).partition("; packages found: ")
+            problem = short if searched and searched == rest else str(error)
+            searched = rest if places else searched
+            yield Mistake(tag, f"mesh: {problem}", MODEL if uri.lower().startswith("model:") else PACKAGE)
+
+
+def elsewhere(subject: Subject) -> Iterator[Mistake]:
+    """Meshes at an absolute path on another machine, found here by their file name."""
+    for tag, uri, _ in _meshes(subject):
+        lines: list[str] = []
+        try:
+            resolve_uri(uri, subject.path, subject.packages, warn=lines.append)
+        except RobotError:
+            continue
+        for line in lines:
+            yield Mistake(tag, f"mesh: {line}", "write package://PACKAGE/PATH")
+
+
+def unreadable(subject: Subject) -> Iterator[Mistake]:
+    """Meshes that are empty or broken."""
+    for tag, uri, _ in _meshes(subject):
+        path = _path(uri, subject)
+        if path:
+            try:
+                bounds(path)
+            except RobotError as error:
+                again = "then check again" if "git lfs pull" in str(error) else "export it again"
+                yield Mistake(tag, f"mesh {error}", again)
+
+
+def units(subject: Subject) -> Iterator[Mistake]:
+    """Meshes whose size does not match the rest of the robot."""
+    if subject.model is None:
+        return
+    for tag, uri, scale in _meshes(subject):
+        path = _path(uri, subject)
+        size = _size(path, scale) if path else 0.0
+        if path and size:
+            other = _other(subject, tag, path, size)
+            if other:
+                factor = min(UNITS, key=lambda factor: abs(math.log(size * factor / other)))
+                unit = f"; its file may be in {UNITS[factor]}" if UNITS[factor] else ""
+                scaled = " ".join(f"{value * factor:.4g}" for value in scale)
+                problem = f"mesh {path.name} is {size:.3g} m large, where {other:.3g} m would match the rest{unit}"
+                yield Mistake(tag, problem, f'scale="{scaled}" makes it {size * factor:.3g} m')
+
+
+def _other(subject: Subject, tag: Tag, path: Path, size: float) -> float:
+    """The size in metres that the mesh should have, 0 if its own is plausible."""
+    rest = [shape for shape in subject.placed if shape.shape.path != path]
+    link = subject.part(tag).attributes.get("name", "")
+    own, every, bare = (
+        _largest([shape for shape in rest if shape.link == link]),
+        _largest(rest, subject),
+        _largest([shape for shape in rest if shape.shape.path is None], subject),
+    )
+    if every and size > FACTOR * every:
+        return every
+    if bare > 0.01 and size > ALONE * bare:
+        return bare
+    if (own and size < own / FACTOR) or (every and size < every / TINY):
+        return own or every
+    alone = subject.plugins and not every and not SMALLEST < size < LARGEST
+    return 0.3 if alone else 0.0
+
+
+def _largest(shapes: list[Placed], origins: Subject | None = None) -> float:
+    """The longest edge of the box around shapes, and around the links' origins if asked."""
+    box = box_of(shapes)
+    points = list(box) if box else []
+    if origins is not None and origins.model is not None:
+        points += [frame.xyz for frame in link_frames(origins.model).values()]
+    return max(size_of(around(points))) if points else 0.0
+
+
+def _meshes(subject: Subject) -> Iterator[tuple[Tag, str, Vector]]:
+    """Each mesh of a link, its URI, and its scale."""
+    for link in subject.root.all("link"):
+        for tag in link.below("mesh"):
+            uri = _word(tag, "uri" if subject.sdf else "filename", subject.sdf)
+            if uri and not is_data(uri):
+                yield tag, uri, _scale(_word(tag, "scale", subject.sdf))
+
+
+def _word(tag: Tag, name: str, sdf: bool) -> str:
+    child = tag.first(name) if sdf else None
+    return child.text.strip() if child else tag.attributes.get(name, "").strip()
+
+
+def _scale(text: str) -> Vector:
+    values = [number(word) for word in text.split()]
+    x, y, z = values if len(values) == 3 and all(values) else (1.0, 1.0, 1.0)
+    return x or 1.0, y or 1.0, z or 1.0
+
+
+def _path(uri: str, subject: Subject) -> Path | None:
+    try:
+        return resolve_uri(uri, subject.path, subject.packages)
+    except RobotError:
+        return None
+
+
+def _size(path: Path, scale: Vector) -> float:
+    try:
+        return max(size_of(bounds(path, scale)))
+    except RobotError:
+        return 0.0

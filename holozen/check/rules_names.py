@@ -1,0 +1,176 @@
+"""Duplicate, unknown and unused names."""
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+
+from holozen.check.engine import Mistake, SourceFile, Subject, closest
+from holozen.robot.elements import Tag
+from holozen.robot.errors import listed
+
+PALETTE = 2  # this many unused colours are a palette shared by several robots
+
+
+def duplicates(subject: Subject) -> Iterator[Mistake]:
+    """Two links or two joints with one name."""
+    for kind in ("link", "joint"):
+        seen: dict[str, Tag] = {}
+        for tag in subject.root.all(kind):
+            name = tag.attributes.get("name", "").strip()
+            first = seen.setdefault(name, tag)
+            if name and first is not tag:
+                yield Mistake(
+                    tag, f"{tag} is defined twice, first at {subject.place(first)}", "give each a unique name"
+                )
+
+
+def unknown_links(subject: Subject) -> Iterator[Mistake]:
+    """Joints that name a missing link."""
+    for joint in subject.root.all("joint"):
+        for end in ("parent", "child"):
+            tag = joint.first(end)
+            name = _end(tag, subject.sdf) if tag else ""
+            if tag and name and not _is_link(name, subject):
+                yield _unknown(tag, f"{joint} names the {end} link {name!r}, which does not exist", name, subject.links)
+
+
+def unknown_references(subject: Subject) -> Iterator[Mistake]:
+    """<gazebo> tags that name a missing link; a file without links is meant to be included by others."""
+    for gazebo in subject.root.all("gazebo") if subject.links else ():
+        name = gazebo.attributes.get("reference", "").strip()
+        if name and name not in subject.links and name not in subject.joints:
+            known = [*subject.links, *subject.joints]
+            yield _unknown(gazebo, f"reference={name!r} is no link and no joint", name, known)
+
+
+def unconnected(subject: Subject) -> Iterator[Mistake]:
+    """Links other than the root without a parent joint, and links with two parents."""
+    children = Counter[str]()
+    for joint in subject.root.all("joint"):
+        tag = joint.first("child")
+        child = _end(tag, subject.sdf) if tag else ""
+        children[child] += 1
+        if tag and children[child] == 2 and child in subject.links:
+            yield Mistake(tag, f"link {child!r} is the child of two joints", "remove one of them")
+    roots = [name for name in subject.links if name not in children]
+    if not subject.sdf:
+        yield from _circles(subject, roots)
+    if len(roots) > 1 and not subject.sdf:
+        family = Counter(_end(tag, False) for joint in subject.root.all("joint") if (tag := joint.first("parent")))
+        root = max(roots, key=lambda name: family[name])
+        for name in roots:
+            if name != root:
+                fix = "add a joint with it as <child>, or remove the link"
+                yield Mistake(subject.links[name], f"link {name!r} has no parent joint; the root is {root!r}", fix)
+
+
+def _circles(subject: Subject, roots: list[str]) -> Iterator[Mistake]:
+    children: dict[str, list[str]] = {}
+    for joint in subject.root.all("joint"):
+        parent, child = (joint.first(end) for end in ("parent", "child"))
+        if parent and child:
+            children.setdefault(_end(parent, False), []).append(_end(child, False))
+    waiting = [*roots, *(name for name in children if name not in subject.links)]
+    reached = set(waiting)
+    while waiting:
+        fresh = set(children.get(waiting.pop(), ())) - reached
+        reached |= fresh
+        waiting += fresh
+    lost = [name for name in subject.links if name not in reached]
+    if lost:
+        problem = f"joints form a loop through {listed(lost)}"
+        yield Mistake(subject.links[lost[0]], problem, "remove one of the joints")
+
+
+def colours(subject: Subject) -> Iterator[Mistake]:
+    """Used materials without a colour, or with two; in URDF only."""
+    if subject.sdf:
+        return
+    given: dict[str, Tag] = {}
+    for tag in _materials(subject):
+        first = given.setdefault(tag.attributes.get("name", ""), tag)
+        if tag.children and not first.children:
+            given[tag.attributes.get("name", "")] = tag
+        elif _colour(tag) != _colour(first) and tag.children:
+            yield Mistake(tag, f"{tag} has another colour at {subject.place(first)}", "give each colour a unique name")
+    known = [name for name, tag in given.items() if tag.children]
+    for name, tag in given.items():
+        if name and not tag.children and not name.startswith("Gazebo/"):
+            fix = f'write <material name="{name}"> with a <color rgba="..."/> in it, next to the links'
+            yield Mistake(tag, f"material {name!r} has no colour anywhere{closest(name, known)}", fix)
+
+
+def unused_colours(subject: Subject) -> Iterator[Mistake]:
+    """Materials of the file itself that no visual uses; a palette of several is left alone."""
+    used = {tag.attributes.get("name", "") for tag in _materials(subject) if tag.parent is not subject.root}
+    own = [tag for tag in subject.root.all("material") if subject.is_source(tag)]
+    unused = [tag for tag in own if tag.attributes.get("name", "") not in used]
+    if used and len(unused) < PALETTE and not any(colours(subject)):
+        for tag in unused:
+            yield Mistake(tag, f"{tag} is used by no visual", "use it or remove it")
+
+
+def macros_twice(subject: Subject) -> Iterator[Mistake]:
+    """A macro that is defined twice in one file, outside of conditions."""
+    for source in subject.sources:
+        seen: dict[str, Tag] = {}
+        for tag in source.root.all("xacro:macro"):
+            name = tag.attributes.get("name", "")
+            first = seen.setdefault(name, tag)
+            if first is not tag:
+                yield Mistake(tag, f"macro {name!r} is defined twice, first at {subject.place(first)}", "rename one")
+
+
+def unused_macros(subject: Subject) -> Iterator[Mistake]:
+    """Properties and macros of the robot file that nothing uses."""
+    if (
+        not subject.sources
+        or not subject.links
+        or any(found is None for source in subject.sources for found in source.includes.values())
+    ):
+        return  # a computed file name may use anything
+    words = Counter(word for source in subject.sources for word in _words(source))
+    for kind in ("property", "macro"):
+        for tag in subject.sources[0].root.below(f"xacro:{kind}"):
+            name = tag.attributes.get("name", "").removeprefix("xacro:")
+            given = sum(1 for source in subject.sources for other in _given(source, kind) if other == name)
+            if name.isidentifier() and words[name] <= given:
+                yield Mistake(tag, f"{kind} {name!r} is not used", "use it or remove it")
+
+
+def _given(source: SourceFile, kind: str) -> Iterator[str]:
+    return (tag.attributes.get("name", "").removeprefix("xacro:") for tag in source.root.below(f"xacro:{kind}"))
+
+
+def _words(source: SourceFile) -> list[str]:
+    return re.findall(r"[A-Za-z_]\w*", re.sub(r"<!--.*?-->", "", source.text, flags=re.DOTALL))
+
+
+def _end(tag: Tag, sdf: bool) -> str:
+    return (tag.text if sdf else tag.attributes.get("link", "")).strip()
+
+
+def _is_link(name: str, subject: Subject) -> bool:
+    # SDF may name the world, frames, and links of nested models.
+    return name in subject.links or (subject.sdf and (name == "world" or "::" in name or _has_parts(subject)))
+
+
+def _has_parts(subject: Subject) -> bool:
+    return any(tag.name in ("frame", "model", "include") for tag in subject.root.children)
+
+
+def _unknown(tag: Tag, problem: str, name: str, known: object) -> Mistake:
+    names = list(known)  # type: ignore[call-overload]
+    return Mistake(tag, problem + closest(name, names), f"known names: {listed(names)}")
+
+
+def _materials(subject: Subject) -> Iterator[Tag]:
+    yield from subject.root.all("material")
+    for link in subject.root.all("link"):
+        for visual in link.all("visual"):
+            yield from visual.all("material")
+
+
+def _colour(tag: Tag) -> list[list[str]]:
+    colour = tag.first("color")
+    return [colour.attributes.get("rgba", "").split()] if colour else []

@@ -1,0 +1,94 @@
+"""Plugins: whether they exist, whether what they name exists, and whether one of them drives."""
+
+import re
+from collections.abc import Iterator
+
+from holozen.check.engine import Mistake, Subject, closest, nearest
+from holozen.robot.elements import Tag
+from holozen.robot.errors import listed
+from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
+
+SUGGESTED = ("gazebo_ros_planar_move", "gazebo_ros_diff_drive", "gazebo_ros_skid_steer_drive")  # to drive with
+FAMILIES = re.compile(
+    r"gazebo_|gz|ign|hector_|roboticsgroup_|velodyne|ros_control|realsense|.*Plugin$|mimic|joint_state", re.IGNORECASE
+)
+"""Plugins that are known to exist, but are not supported."""
+
+LINK_TAGS = ("robotbaseframe", "robotbaselink", "bodyname")
+FRAME_TAGS = ("framename", "frameid", "childframeid")
+
+
+def misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
+    """Plugins whose file name is similar to a known one."""
+    for plugin in subject.plugins:
+        kind = kind_of(plugin)
+        suggestion = None if kind in KNOWN else nearest(kind, KNOWN, 6)
+        if suggestion:
+            yield Mistake(
+                plugin, f"there is no plugin {plugin.attributes['filename']!r}", f"write {file_name(suggestion)}"
+            )
+
+
+def unknown_plugins(subject: Subject) -> Iterator[Mistake]:
+    """Plugins that are neither known nor of a known family."""
+    for plugin in subject.plugins:
+        kind = kind_of(plugin)
+        if not file_of(plugin):
+            yield Mistake(plugin, f"{plugin} has no filename", f"write one, such as {file_name(SUGGESTED[0])}")
+        elif kind not in KNOWN and not FAMILIES.match(kind) and not nearest(kind, KNOWN, 6):
+            fix = f"to drive use one of {', '.join(map(file_name, SUGGESTED))}"
+            yield Mistake(plugin, f"plugin {plugin.attributes['filename']!r} is unknown and is ignored", fix)
+
+
+def plugin_links(subject: Subject) -> Iterator[Mistake]:
+    """Plugin frames that do not name a link."""
+    for tag in _settings(subject):
+        name = tag.text.strip().rpartition("/")[2]
+        sort = tag.name.lower().replace("_", "")
+        if not name or name in subject.links or "::" in name or not subject.links:
+            continue
+        if sort in LINK_TAGS:
+            problem = f"<{tag.name}> is {name!r}, which names no link{closest(name, subject.links)}"
+            yield Mistake(tag, problem, f"links: {listed(list(subject.links))}")
+        elif sort in FRAME_TAGS and (suggestion := nearest(name, subject.links)):
+            yield Mistake(tag, f"<{tag.name}> is {name!r}, which names no link", f"write {suggestion}")
+
+
+def plugin_joints(subject: Subject) -> Iterator[Mistake]:
+    """Plugin joints that do not exist."""
+    for tag, name in subject.plugin_joints:
+        if name not in subject.joints and "::" not in name and subject.joints:
+            problem = f"<{tag.name}> is {name!r}, which names no joint{closest(name, subject.joints)}"
+            yield Mistake(tag, problem, f"joints: {listed(list(subject.joints))}")
+
+
+def two_drives(subject: Subject) -> Iterator[Mistake]:
+    """A second plugin that drives the robot."""
+    driving = [plugin for plugin in subject.plugins if kind_of(plugin) in DRIVES]
+    for plugin in driving[1:]:
+        yield Mistake(plugin, f"{plugin} drives the robot, and so does {driving[0]}", "keep one of them")
+
+
+def no_drive(subject: Subject) -> Iterator[Mistake]:
+    """A robot on wheels with plugin tags, but no drive plugin. A file without any is a plain description."""
+    controls = [tag for tag in subject.plugins if kind_of(tag) in MOVING_ELSEWHERE] + subject.root.all("ros2_control")
+    wheels = [wheel for wheel in subject.wheels if wheel.sure]
+    simulated = controls or subject.plugins or subject.root.all("gazebo")
+    if not simulated or len(wheels) < 2 or _is_driven(subject):
+        return
+    problem = f"the robot has {len(wheels)} wheels but no drive plugin"
+    if controls:
+        problem += f"; not supported: {kind_of(controls[0]) or controls[0].name}"
+    fix = f"add <gazebo><plugin> with filename={file_name(SUGGESTED[1])!r}, or spawn it with --drive planar_move"
+    yield Mistake(controls[0] if controls else subject.root, problem, fix)
+
+
+def _is_driven(subject: Subject) -> bool:
+    kinds = [kind_of(plugin) for plugin in subject.plugins]
+    near = any(kind in DRIVES or nearest(kind, DRIVES, 6) for kind in kinds)
+    return near or (subject.model is not None and subject.model.drive is not None)
+
+
+def _settings(subject: Subject) -> Iterator[Tag]:
+    """Tags of known plugins: those of others may mean anything."""
+    return (tag for plugin in subject.plugins if kind_of(plugin) in KNOWN for tag in plugin.children)

@@ -1,0 +1,250 @@
+"""Misspelt and misplaced elements and attributes: parsers silently ignore both."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from holozen.check.engine import Mistake, Subject, nearest
+from holozen.robot.elements import Tag
+from holozen.robot.gazebo_plugins import KNOWN, kind_of
+from holozen.robot.model import JOINT_KINDS
+
+# The words of URDF, of its Gazebo elements, and of SDF.
+
+
+@dataclass(frozen=True, slots=True)
+class Words:
+    """The allowed contents of an element."""
+
+    attributes: frozenset[str]
+    children: frozenset[str]
+
+
+def _set(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+def _words(attributes: str, children: str = "") -> Words:
+    return Words(_set(attributes), _set(children))
+
+
+URDF = {
+    "robot": _words("name version", "link joint material gazebo transmission ros2_control sensor"),
+    "link": _words("name type", "inertial visual collision"),
+    "inertial": _words("", "origin mass inertia"),
+    "origin": _words("xyz rpy quat_xyzw"),
+    "mass": _words("value"),
+    "inertia": _words("ixx ixy ixz iyy iyz izz"),
+    "visual": _words("name", "origin geometry material"),
+    "collision": _words("name group", "origin geometry material"),
+    "geometry": _words("", "box cylinder sphere mesh capsule"),
+    "box": _words("size"),
+    "cylinder": _words("radius length"),
+    "capsule": _words("radius length"),
+    "sphere": _words("radius"),
+    "mesh": _words("filename scale"),
+    "material": _words("name", "color texture"),
+    "color": _words("rgba"),
+    "texture": _words("filename"),
+    "joint": _words("name type", "origin parent child axis limit dynamics calibration mimic safety_controller"),
+    "parent": _words("link"),
+    "child": _words("link"),
+    "axis": _words("xyz"),
+    "limit": _words("lower upper effort velocity acceleration deceleration jerk"),
+    "dynamics": _words("damping friction"),
+    "calibration": _words("rising falling reference_position"),
+    "mimic": _words("joint multiplier offset"),
+    "safety_controller": _words("soft_lower_limit soft_upper_limit k_position k_velocity"),
+    "gazebo": _words("reference"),
+    "transmission": _words("name type"),
+}
+"""Elements of URDF; the contents of <gazebo> and <transmission> are not listed."""
+
+MISPLACED = {
+    "origin": ("inertial", "visual", "collision", "joint"),
+    "mass": ("inertial",),
+    "inertia": ("inertial",),
+    "geometry": ("visual", "collision"),
+    "inertial": ("link",),
+    "visual": ("link",),
+    "collision": ("link",),
+    "axis": ("joint",),
+    "limit": ("joint",),
+    "parent": ("joint",),
+    "child": ("joint",),
+    "mimic": ("joint",),
+    "dynamics": ("joint",),
+    "link": ("robot",),
+    "joint": ("robot",),
+    "box": ("geometry",),
+    "cylinder": ("geometry",),
+    "sphere": ("geometry",),
+    "mesh": ("geometry",),
+    "color": ("material",),
+}
+"""Elements that parsers silently ignore anywhere else."""
+
+IGNORED = {
+    "surface": 'write <gazebo reference="LINK"> with <mu1> and <mu2> in it, next to the links',
+    "pose": 'write <origin xyz="..." rpy="..."/> in the joint, inertial, visual or collision',
+    "joint_properties": 'write <dynamics damping="..." friction="..."/>',
+    "plugin": "write it into a <gazebo>",
+    "self_collide": 'write <gazebo reference="LINK"><selfCollide>true</selfCollide></gazebo>',
+}
+"""Elements of SDF and of older URDF often found in URDF, and what to write instead."""
+
+GAZEBO = _set(
+    """material mu mu1 mu2 kp kd fdir1 selfCollide self_collide maxVel minDepth maxContacts max_contacts laserRetro
+    turnGravityOff gravity dampingFactor implicitSpringDamper provideFeedback springStiffness springReference stopCfm
+    stopErp fudgeFactor preserveFixedJoint disableFixedJointLumping sensor plugin visual collision static pose
+    canonical_body joint link light ode surface friction"""
+)
+"""Elements in <gazebo>, which may contain others too."""
+
+PLUGIN = _set(
+    """alwaysOn always_on updateRate update_rate robotNamespace namespace ros remapping commandTopic command_topic
+    odometryTopic odometry_topic odometryFrame odometry_frame odometryRate odometry_rate robotBaseFrame
+    robot_base_frame publishOdom publish_odom publishOdomTF publish_odom_tf publishTf publishWheelTF publish_wheel_tf
+    publishWheelJointState publishRate publish_rate covariance_x covariance_y covariance_yaw cmdTimeout cmd_timeout
+    commandTimeout command_timeout leftJoint left_joint rightJoint right_joint frontLeftJoint frontRightJoint
+    backLeftJoint backRightJoint leftFrontJoint rightFrontJoint leftRearJoint rightRearJoint front_left_joint
+    front_right_joint back_left_joint back_right_joint rear_left_joint rear_right_joint wheelSeparation
+    wheel_separation wheelDiameter wheel_diameter wheelTorque max_wheel_torque max_wheel_acceleration
+    wheelAcceleration wheel_radius wheelbase odometrySource odometry_source broadcastTF rosDebugLevel legacyMode
+    num_wheel_pairs topic odom_topic tf_topic frame_id child_frame_id odom_publish_frequency robot_base_link
+    dimensions min_velocity max_velocity min_acceleration max_acceleration frameName frame_name frameId bodyName
+    body_name topicName topic_name serviceName imageTopicName cameraInfoTopicName cameraName camera_name
+    gaussianNoise xyzOffset xyzOffsets rpyOffset rpyOffsets jointName joint_name robotParam robotSimType
+    controlPeriod parameters robot_param initial_position"""
+)
+"""Elements in a <plugin>, in the spelling of ROS 1, ROS 2 and gz-sim; a plugin may have others too."""
+
+SDF = _set(
+    """sdf world model include link joint pose static uri name inertial mass inertia ixx ixy ixz iyy iyz izz visual
+    collision geometry box size cylinder radius length sphere mesh scale plane normal capsule ellipsoid radii
+    polyline heightmap empty submesh center material script ambient diffuse specular emissive lighting shader pbr
+    metal metallic roughness albedo_map normal_map metalness_map roughness_map transparency cast_shadows parent child
+    axis axis2 xyz limit lower upper effort velocity stiffness dissipation dynamics damping friction spring_reference
+    spring_stiffness surface contact ode bullet torsional mu mu2 fdir1 slip1 slip2 kp kd soft_cfm soft_erp max_vel
+    min_depth bounce restitution_coefficient threshold max_contacts laser_retro collide_bitmask category_bitmask
+    collide_without_contact collide_without_contact_bitmask sensor plugin always_on update_rate visualize topic
+    camera ray lidar imu gps altimeter magnetometer contact noise type mean stddev bias_mean bias_stddev image width
+    height format horizontal_fov clip near far distortion scan horizontal vertical samples resolution min_angle
+    max_angle range min max self_collide kinematic gravity enable_wind allow_auto_disable velocity_decay linear
+    angular must_be_base_link light direction attenuation constant quadratic spot inner_angle outer_angle falloff
+    frame physics max_step_size real_time_factor real_time_update_rate solver iters sor cfm erp scene background
+    shadows sky grid state wind magnetic_field atmosphere gui audio road population spherical_coordinates
+    provide_feedback cfm_damping implicit_spring_damper limit suspension use_parent_model_frame gearbox_ratio
+    gearbox_reference_body screw_thread_pitch thread_pitch sensor_frame_id optical_frame_id gz_frame_id
+    ignition_frame_id density auto_inertia_params meta visibility_flags anti_aliasing cascade placement_frame
+    initial_position has_force_control density fluid_added_mass"""
+)
+"""Elements of SDF."""
+
+# Spelling.
+
+
+MOST_GUESSES = 500  # of different words
+FREE = ("gazebo", "transmission")  # may contain non-URDF elements
+SDF_JOINT_KINDS = (*JOINT_KINDS, "revolute2", "universal", "ball", "screw", "gearbox")
+
+
+def forgiven(subject: Subject) -> Iterator[Mistake]:
+    """Broken XML that Gazebo tolerates."""
+    yield from subject.forgiven
+
+
+def misspelt_tags(subject: Subject) -> Iterator[Mistake]:
+    """Unknown elements similar to one allowed there."""
+    guessed: dict[tuple[str, frozenset[str]], str | None] = {}
+    for tag, known, shortest in _read_elements(subject):
+        if tag.name in known or ":" in tag.name or len(guessed) > MOST_GUESSES:
+            continue
+        if (tag.name, known) not in guessed:
+            guessed[tag.name, known] = nearest(tag.name, known, shortest)
+        suggestion = guessed[tag.name, known]
+        if shortest >= 4 and suggestion and tag.name.startswith(suggestion):
+            continue  # another word with the same beginning, as some plugin may have
+        if suggestion and suggestion.lower() != tag.name.replace("_", "").lower():
+            yield Mistake(tag, f"there is no element <{tag.name}>", f"write <{suggestion}>")
+        elif suggestion and shortest < 4:
+            yield Mistake(
+                tag, f"<{tag.name}> is not <{suggestion}>: case and underscores matter", f"write <{suggestion}>"
+            )
+
+
+def misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
+    """Unknown attributes of URDF elements similar to a known one."""
+    for tag in _urdf_elements(subject):
+        given = set(tag.attributes)
+        known = URDF[tag.name].attributes
+        for word in sorted(given - known):
+            # Of equally similar words, prefer one that is missing.
+            suggestion = None if ":" in word else nearest(word, sorted(known - given)) or nearest(word, sorted(known))
+            if suggestion:
+                yield Mistake(tag, f"{tag} has no attribute {word!r}", f"write {suggestion}=")
+
+
+def misplaced(subject: Subject) -> Iterator[Mistake]:
+    """Elements of URDF in an element where they are not read."""
+    for parent in _urdf_elements(subject):
+        for tag in parent.children if parent.name not in FREE else ():
+            if tag.name in MISPLACED and tag.name not in URDF[parent.name].children:
+                owners = " or ".join(f"<{name}>" for name in MISPLACED[tag.name])
+                yield Mistake(tag, f"<{tag.name}> does not belong in {parent}", f"move it into {owners}")
+
+
+def ignored(subject: Subject) -> Iterator[Mistake]:
+    """Elements of SDF, or of older URDF, in a URDF."""
+    for parent in _urdf_elements(subject):
+        for tag in parent.children if parent.name not in FREE else ():
+            if tag.name in IGNORED:
+                yield Mistake(tag, f"<{tag.name}> in {parent} is not read", IGNORED[tag.name])
+
+
+def joint_kinds(subject: Subject) -> Iterator[Mistake]:
+    """Joint types that do not exist."""
+    kinds = SDF_JOINT_KINDS if subject.sdf else JOINT_KINDS
+    for tag in subject.root.all("joint"):
+        kind = tag.attributes.get("type")
+        if kind is not None and kind not in kinds:
+            suggestion = nearest(kind, kinds)
+            fix = f'write type="{suggestion}"' if suggestion else f"write one of {', '.join(kinds)}"
+            yield Mistake(tag, f"{tag} has unknown type {kind!r}", fix)
+
+
+def _read_elements(subject: Subject) -> Iterator[tuple[Tag, frozenset[str], int]]:
+    """Each element with the words allowed in its place, and the minimum length of a word for suggestions."""
+    if subject.sdf:
+        yield from ((tag, SDF, 4) for tag in _outside_plugins(subject.root) if tag.name not in MISPLACED)
+        yield from _settings(subject.plugins)
+        return
+    for parent in _urdf_elements(subject):
+        if parent.name not in FREE:
+            yield from ((tag, URDF[parent.name].children, 3) for tag in parent.children if tag.name not in URDF)
+    for gazebo in subject.root.all("gazebo"):
+        yield from ((tag, GAZEBO, 4) for tag in gazebo.children)
+        yield from _settings(gazebo.below("plugin"))
+
+
+def _settings(plugins: Iterable[Tag]) -> Iterator[tuple[Tag, frozenset[str], int]]:
+    """The elements in known plugins: those of others may have any name."""
+    return ((tag, PLUGIN, 6) for plugin in plugins if kind_of(plugin) in KNOWN for tag in plugin.children)
+
+
+def _urdf_elements(subject: Subject) -> Iterator[Tag]:
+    """The elements of URDF in their place; the contents of <gazebo> and <transmission> are not checked."""
+    waiting = [] if subject.sdf else [subject.root]
+    while waiting:
+        tag = waiting.pop()
+        yield tag
+        known = URDF[tag.name].children  # none for those two
+        waiting += [child for child in reversed(tag.children) if child.name in known and child.name in URDF]
+
+
+def _outside_plugins(root: Tag) -> Iterator[Tag]:
+    waiting = [root]
+    while waiting:
+        tag = waiting.pop()
+        yield tag
+        if tag.name != "plugin":
+            waiting += tag.children[::-1]

@@ -1,0 +1,267 @@
+"""`holozen topic pub`: publish validated messages on a key, and report whether they arrive and are obeyed."""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import json
+import queue
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+
+from holozen import wire
+from holozen.bus import Bus
+from holozen.cli import values
+from holozen.cli.values import Form, Ours
+from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE, suggest_key
+from holozen.console import report
+from holozen.messages import CommandStatus, Message
+from holozen.process import stop_event
+from holozen.transport.graph import Endpoint, on_key
+from holozen.transport.pubsub import Publisher
+
+STOPS, STOP_EVERY = 5, 0.02  # s
+CLOCK_PATIENCE = 0.2  # s to wait for the robot to ask for our clock
+LOOK = 0.1  # s between two checks for a line of standard input
+VERDICT = 0.3  # s that a single command waits for the sim's status, which comes at 10 Hz
+FRESH = 1.0  # s; an older status is ignored
+
+
+class Refused(Exception):
+    """A value or command line that cannot be published: a one-line message, and the exit code."""
+
+    def __init__(self, text: str, code: int = 1) -> None:
+        super().__init__(text)
+        self.code = code
+
+
+def publish(bus: Bus, args: argparse.Namespace, looking: Callable[[], list[Endpoint]]) -> int:
+    """Publish according to the flags. `looking` waits for the first query of the graph and returns its endpoints."""
+    if set(args.key) & set("*$?#"):
+        report(f"holozen topic pub: {args.key!r}: write to one key; a wildcard would move every robot")
+        return 1
+    try:
+        form = _form(args)
+        payload = _payload(form, args) if form else None
+        _ = bus.session  # open it first, so that Ctrl-C also ends the wait for a router
+        stop = stop_event()
+        form = form or _form_of_listener(looking(), args)
+        return _run(bus, args, form, payload or _payload(form, args), stop, looking)
+    except Refused as error:
+        report(f"holozen topic pub: {error}")
+        return error.code
+
+
+def _run(
+    bus: Bus,
+    args: argparse.Namespace,
+    form: Form,
+    payload: bytes,
+    stop: threading.Event,
+    looking: Callable[[], list[Endpoint]],
+) -> int:
+    publisher: Publisher[Message] = bus.publisher(args.key, form.kind)
+    matched = 0 if args.no_wait else _matched(bus, publisher, args, stop, looking)
+    if not args.no_wait:
+        counted = f"{matched or 'no'} subscriber{'s' * (matched != 1)} of {args.key}"
+        report(counted if matched else f"{counted}{suggest_key(bus, [args.key], ('sub',))}")
+        if not matched and (args.once or args.times):
+            return 1
+        if args.wait and matched < args.wait and not stop.is_set():
+            raise Refused(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
+    feedback = CommandFeedback(bus, args.key) if form.stop() else None
+    if feedback and matched:
+        bus.clock_asked.wait(CLOCK_PATIENCE)  # a robot obeys a command once it knows our clock
+    turns = _lines(form, args, stop) if args.stdin else _turns(form, payload, args, stop)
+    sent = 0
+    try:
+        for each in turns:
+            publisher.put_bytes(each)
+            sent += 1
+            if feedback:
+                feedback.look()
+        if feedback and args.once and matched:
+            feedback.wait(stop)
+    finally:
+        stopping = form.stop()
+        if stopping and not args.once:
+            _stop_robot(publisher, stopping)
+    if args.json:
+        print(json.dumps({"key": args.key, "type": form.kind.ROS, "subscribers": matched, "published": sent}))
+    return 0
+
+
+def _form(args: argparse.Namespace) -> Form | None:
+    """The form of the given type, else of the wire table's row; None if only a subscriber can determine it."""
+    words = list(args.words)
+    given = words.pop(0) if words and values.TYPE.fullmatch(words[0]) else ""
+    if len(words) > 1 or (args.stdin and words):
+        raise Refused(f"{args.key}: {words[-1]!r} is too much; write KEY [TYPE] VALUE", 2)
+    if not (words or given or args.stdin):
+        raise Refused(f"{args.key}: a value is missing; write holozen topic pub {PUB_EXAMPLE}", 2)
+    args.value = words[0] if words else "{}"
+    if args.value == "-":
+        args.value = sys.stdin.read(values.LARGEST + 1)
+    row = wire.topic(args.key)
+    if given:
+        try:
+            form = values.form_named(given, args.wire, args.force, args.package)
+        except ValueError as error:
+            raise Refused(f"{args.key}: {error}") from None
+        right = [kind.ROS for kind in row.types] if row else [form.kind.ROS]
+        if form.kind.ROS not in right and not args.force:
+            raise Refused(f"{args.key}: its type is {' or '.join(right)}, not {given}{values.FORCE}")
+        return form
+    return Ours(row.types, args.wire, args.force) if row else None
+
+
+def _form_of_listener(found: list[Endpoint], args: argparse.Namespace) -> Form:
+    """The form of the type that the key's subscribers expect: a robot's file may give its topics any name."""
+    wanted = {end.type for end in on_key(found, args.key, "sub")}
+    if kinds := values.kinds_of(wanted):
+        return Ours(kinds, args.wire, args.force)
+    for name in sorted(wanted):
+        with contextlib.suppress(ValueError):
+            return values.form_named(name, args.wire, args.force, args.package)
+    known = ", ".join(topic.key for topic in wire.TOPICS)
+    raise Refused(
+        f"{args.key!r} has no known type; known keys: {known}, each also as ROBOT/key;"
+        f" for any other give the type: holozen topic pub {args.key} geometry_msgs/msg/Twist VALUE"
+    )
+
+
+def _payload(form: Form, args: argparse.Namespace) -> bytes:
+    try:
+        return b"" if args.stdin else form.payload(args.value)
+    except ValueError as error:
+        raise Refused(f"{args.key}: refused: {error}") from None
+
+
+def _matched(
+    bus: Bus,
+    publisher: Publisher[Message],
+    args: argparse.Namespace,
+    stop: threading.Event,
+    looking: Callable[[], list[Endpoint]],
+) -> int:
+    """Wait for subscribers and return their number. Foreign nodes only show that there are any, and count as one."""
+    wanted, deadline = args.wait or 1, None if args.wait else time.monotonic() + PUB_PATIENCE
+    if args.max_wait:
+        deadline = time.monotonic() + args.max_wait
+    graph, reported = None, False
+    while True:
+        while not publisher.matched and (deadline is None or time.monotonic() < deadline):
+            if stop.wait(0.002):
+                return 0
+        if len(ends := on_key(looking(), args.key, "sub")) < wanted:  # the first query was too early
+            graph = graph or bus.graph()
+            ends = on_key(graph.settled(bus.connected), args.key, "sub")
+        found = max(len(ends), int(publisher.matched))
+        if found >= wanted or (deadline and time.monotonic() > deadline) or stop.wait(0.01):
+            return found
+        if not reported:
+            report(f"waiting for {wanted} subscribers of {args.key}; {found} by now")
+            reported = True
+
+
+def _turns(form: Form, payload: bytes, args: argparse.Namespace, stop: threading.Event) -> Iterator[bytes]:
+    """The value, as often as requested, paced by the rate."""
+    row = wire.topic(args.key)
+    period = 1 / (args.rate or (row.rate if row else 1.0))
+    left, due = 1 if args.once else args.times, time.monotonic()
+    while not stop.is_set() and left != 0:
+        yield payload
+        payload = _payload(form, args) if values.is_time_dependent(args.value) else payload
+        left = left and left - 1
+        due += period
+        if not args.once:  # the last message also lasts one period
+            stop.wait(max(0.0, due - time.monotonic()))
+
+
+def _lines(form: Form, args: argparse.Namespace, stop: threading.Event) -> Iterator[bytes]:
+    """The bytes of each line of standard input, no faster than the rate."""
+    lines: queue.Queue[str] = queue.Queue(maxsize=1000)
+    number = sys.stdin.fileno()
+
+    def read() -> None:
+        # Invalid UTF-8 is passed on as text that no form accepts, so that the error names its line.
+        with open(number, encoding="utf-8", errors="surrogateescape", closefd=False) as source:
+            while line := source.readline(values.LARGEST + 1):
+                lines.put(line)
+        lines.put("")
+
+    threading.Thread(target=read, daemon=True).start()
+    at = 0
+    while not stop.is_set():
+        try:
+            line = lines.get(timeout=LOOK)
+        except queue.Empty:
+            continue
+        at += 1
+        if not line:
+            return
+        if not line.strip():
+            continue
+        try:
+            yield form.payload(line.strip())
+        except ValueError as error:
+            raise Refused(f"{args.key}: line {at} refused: {error}") from None
+        if args.rate:
+            stop.wait(1 / args.rate)
+
+
+def _stop_robot(publisher: Publisher[Message], payload: bytes) -> None:
+    """Send several stops, because a congested link may drop some."""
+    for _ in range(STOPS):
+        publisher.put_bytes(payload)
+        time.sleep(STOP_EVERY)
+
+
+LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
+HELD = "held, since a higher source took over; `holozen service call resume` lets it drive again"
+
+
+def verdict(status: CommandStatus, source: str) -> str | None:
+    """Why the robot does not follow the commands of `source`; empty if it does. None if the sim has not received any
+    yet: a status sent before the command arrived does not cover it.
+    """
+    mine = next((each for each in status.sources if each.source == source), None)
+    own_refusal = status.last_refusal.removeprefix(f"{source}: ")
+    if own_refusal == status.last_refusal:
+        own_refusal = ""
+    if status.stopped:
+        return f"{status.stopped} has set the software stop"
+    if status.obeyed == source or (mine and mine.obeyed):
+        return own_refusal if own_refusal.startswith(LIMITED) else ""
+    if mine and mine.held:
+        return HELD
+    if mine and status.obeyed:
+        return f"{status.obeyed} drives"
+    return own_refusal or None
+
+
+class CommandFeedback:
+    """Reports when the robot on a command key starts or stops obeying."""
+
+    def __init__(self, bus: Bus, key: str) -> None:
+        self._bus, self._reported = bus, ""
+        self._latest = bus.latest(f"{key}_status", CommandStatus)
+
+    def look(self) -> bool:
+        """Report any change; returns whether the sim has judged our commands yet."""
+        status, age = self._latest.read()
+        why = verdict(status, self._bus.source) if status and age < FRESH else None
+        if why is None:
+            return False
+        if why != self._reported:
+            report(why if why.startswith(LIMITED) else f"not obeyed: {why}" if why else "obeyed again")
+        self._reported = why
+        return True
+
+    def wait(self, stop: threading.Event) -> None:
+        """Wait until the sim has judged our commands, at most VERDICT seconds."""
+        deadline = time.monotonic() + VERDICT
+        while not self.look() and time.monotonic() < deadline and not stop.wait(0.002):
+            pass

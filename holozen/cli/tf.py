@@ -1,0 +1,168 @@
+"""`holozen tf`: transforms between the frames that `tf` and `tf_static` connect."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import time
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from holozen.bus import Bus
+from holozen.cli.verb import Noun, Verb, by_name, listed, no_nodes, open_bus
+from holozen.console import printable, report
+from holozen.flags import nearest, number, robot
+from holozen.process import stop_event
+from holozen.rotation import Transform, to_rpy
+from holozen.transport.pubsub import Sample
+
+if TYPE_CHECKING:
+    from holozen.messages import TFMessage
+
+TICK = 0.01  # s between two polls
+ASK = 0.3  # s to wait for replies with static transforms
+WAITING = 1.0  # s without a transform until that is reported
+
+
+class Frames:
+    """The latest transform from each frame to its parent. Metres, radians, seconds."""
+
+    def __init__(self) -> None:
+        self._parents: dict[str, tuple[str, Transform, float]] = {}  # by child; with the stamp, 0 for a static one
+
+    def take(self, message: TFMessage, static: bool) -> None:
+        """Take in a message of `tf` or `tf_static`."""
+        for each in message.transforms:
+            at, turn, stamp = each.transform.translation, each.transform.rotation, each.header.stamp
+            rigid = Transform((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
+            seconds = 0.0 if static else stamp.sec + stamp.nanosec * 1e-9
+            parent, child = (name.removeprefix("/") for name in (each.header.frame_id, each.child_frame_id))
+            self._parents[child] = parent, rigid, seconds
+
+    def names(self) -> list[str]:
+        """All frames, sorted."""
+        return sorted({*self._parents, *(parent for parent, _, _ in self._parents.values())})
+
+    def lookup(self, source: str, target: str) -> tuple[Transform, float]:
+        """The pose of `target` in the frame `source`, and the stamp of the newest transform between them.
+
+        Raises LookupError with the reason.
+        """
+        for name in (source, target):
+            if name not in (names := self.names()):
+                raise LookupError(f"no frame {name!r}{nearest(name, names)}; frames: {listed(names)}")
+        root, to_source, first = self._to_root(source)
+        other, to_target, second = self._to_root(target)
+        if root != other:
+            raise LookupError(f"nothing connects {source!r} and {target!r}: their roots are {root!r} and {other!r}")
+        return to_source.inverse() @ to_target, max(first, second)
+
+    def _to_root(self, frame: str) -> tuple[str, Transform, float]:
+        """The root above a frame, the frame's pose there, and the newest stamp on the way."""
+        pose, newest, seen = Transform(), 0.0, {frame}
+        while frame in self._parents:
+            frame, rigid, stamp = self._parents[frame]
+            if frame in seen:
+                raise LookupError(f"the frames form a loop at {frame!r}")
+            seen.add(frame)
+            pose, newest = rigid @ pose, max(newest, stamp)
+        return frame, pose, newest
+
+
+def echo(args: argparse.Namespace) -> int:
+    """Print the pose of a frame in another one, until interrupted."""
+    stop = stop_event()
+    with open_bus(args, early=True, stop=stop) as bus:
+        from holozen.messages import TFMessage  # while the session opens
+
+        keys = [f"{args.robot}/{key}" if args.robot else key for key in ("tf", "tf_static")]
+        readers = [bus.subscribe(key, TFMessage) for key in keys]
+        frames = Frames()
+        for message in _held(bus, keys[1]):
+            frames.take(message, static=True)
+        begun, due, shown, warned = time.monotonic(), 0.0, False, False
+        while not stop.wait(TICK):
+            for reader, static in zip(readers, (False, True), strict=True):
+                while (received := reader.try_recv()) is not None:
+                    if received.message is not None:
+                        frames.take(received.message, static)
+            now = time.monotonic()
+            if now < due:
+                continue
+            try:
+                pose, stamp = frames.lookup(args.source, args.target)
+            except LookupError as error:
+                passed = now - begun
+                if args.timeout and passed > args.timeout and not shown:
+                    report(f"holozen tf echo: {_why(bus, keys[0], frames, error)}")
+                    return 1
+                if passed > WAITING and not (warned or args.timeout):
+                    report(f"waiting for {args.source} -> {args.target}; {_why(bus, keys[0], frames, error)}")
+                    warned = True
+                continue
+            _print(args, pose, stamp)
+            if args.once:
+                return 0
+            due, shown = now + 1 / args.rate, True
+    return 0
+
+
+def _held(bus: Bus, key: str) -> Iterable[TFMessage]:
+    """The last messages of all publishers of a key, since static transforms are sent only once."""
+    from holozen.messages import TFMessage, codec
+
+    bus.endpoints()  # returns once the running nodes are discovered
+    for answer in bus.ask_all(key, ASK):
+        if isinstance(answer, Sample):
+            try:
+                yield codec.decode(answer.payload, answer.encoding, (TFMessage,), tolerant=True)
+            except codec.CodecError:
+                continue
+
+
+def _why(bus: Bus, key: str, frames: Frames, error: LookupError) -> str:
+    if frames.names():
+        return str(error)
+    return f"no transforms on {key}{'' if bus.connected() else f'; {no_nodes(bus.where)}'}"
+
+
+def _print(args: argparse.Namespace, pose: Transform, stamp: float) -> None:
+    rpy = to_rpy(pose.rotation)
+    if args.json:
+        row = {"time": stamp, "source": args.source, "target": args.target}
+        row |= {"translation": pose.translation, "rotation": pose.rotation, "rpy": rpy}
+        print(json.dumps(row), flush=True)
+        return
+    print(
+        f"At time {stamp:.3f}\n"
+        f"- Translation: {_listed(pose.translation)}\n"
+        f"- Rotation: in Quaternion (xyzw) {_listed(pose.rotation)}\n"
+        f"- Rotation: in RPY (radian) {_listed(rpy)}\n"
+        f"- Rotation: in RPY (degree) {_listed(map(math.degrees, rpy))}",
+        flush=True,
+    )
+
+
+def _listed(values: Iterable[float]) -> str:
+    return f"[{', '.join(f'{round(value, 3) + 0.0:.3f}' for value in values)}]"  # + 0.0: never -0.000
+
+
+def _frame(text: str) -> str:
+    return printable(text.removeprefix("/"))
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("source", type=_frame, metavar="SOURCE", help="the frame in which the pose is given, such as odom")
+    add("target", type=_frame, metavar="TARGET", help="the frame whose pose it is, such as base_link")
+    add("--robot", type=robot, default="", metavar="NAME", help="on the keys of this robot (default: at the root)")
+    add("-r", "--rate", type=number(0.01, 100, "Hz"), default=1.0, metavar="HZ", help="poses a second (default: 1)")
+    add("-1", "--once", action="store_true", help="end after the first one")
+    add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without one")
+
+
+VERBS = by_name(
+    Noun("tf", "Inspect the transforms between frames.", {"echo": "tf"}),
+    Verb("tf echo", "the pose of a frame in another one", "odom base_link", _arguments, echo),
+)

@@ -1,0 +1,173 @@
+"""What verbs of the command line share: their declaration, bus, common flags and messages."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from holozen.bus import Bus
+from holozen.flags import Parser, nearest, package
+from holozen.transport import connection
+from holozen.transport.graph import Endpoint
+
+JSON = "one JSON object a line"
+ROS2_TITLE = "accepted for compatibility with ros2"
+
+# Flags of ros2 without effect here, accepted so that its command lines work unchanged.
+_EVERY = ("--spin-time S", "--no-daemon")
+_QOS = (
+    "--qos-profile NAME", "--qos-depth N", "--qos-history NAME", "--qos-reliability NAME", "--qos-durability NAME",
+    "--qos-liveliness NAME", "--qos-liveliness-lease-duration-seconds S",
+)  # fmt: skip
+_NODES, _TOPICS, _SERVICES = "--include-hidden-nodes", "--include-hidden-topics", "--include-hidden-services"
+_ROS2 = {
+    "topic list": (_TOPICS,), "topic find": (_TOPICS,), "topic type": (_TOPICS,), "topic info": (_TOPICS,),
+    "topic echo": (*_QOS, _TOPICS, "--lost-messages", "--no-lost-messages"), "topic pub": (*_QOS, "--keep-alive S"),
+    "service list": (_SERVICES,), "service find": (_SERVICES,),
+    "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
+    "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
+}  # fmt: skip
+
+
+PUB_PATIENCE = 3.0  # s for a subscriber of `topic pub` to appear
+PUB_EXAMPLE = """cmd_vel '{"linear": {"x": 0.3}}'"""
+
+
+class Verb:
+    """A verb, such as `topic list` or `plot`.
+
+    `about` is its line of help, `arguments` adds its flags to a parser, `run` does the work and returns the exit code.
+    `json` is the help of its flag `--json`. The parsed flags have its name as `verb`.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        about: str,
+        example: str,
+        arguments: Callable[[argparse.ArgumentParser], object],
+        run: Callable[[Any], int],
+        json: str = JSON,
+    ) -> None:
+        self.name, self.about, self._example = name, about, example
+        self._arguments, self._run, self._json = arguments, run, json
+
+    def main(self, argv: list[str]) -> int:
+        """Run it with the words of a command line; returns the exit code."""
+        return self._run(self.parser().parse_args(argv))
+
+    def parser(self) -> Parser:
+        """Its parser alone."""
+        parser = Parser(**self.options())
+        self.fill(parser)
+        return parser
+
+    def options(self) -> dict[str, Any]:
+        """The arguments of its parser."""
+        prog = f"holozen {self.name}"
+        return {"prog": prog, "description": self.about, "epilog": f"example: {prog} {self._example}".rstrip()}
+
+    def fill(self, parser: argparse.ArgumentParser) -> None:
+        """Add all its flags to a parser."""
+        parser.set_defaults(verb=self.name)
+        self._arguments(parser)
+        parser.add_argument("--json", action="store_true", help=self._json)
+        connection.add_arguments(parser)
+        if self.name.partition(" ")[0] in ("topic", "service", "node", "param"):
+            _add_ros2_flags(parser, self.name)
+
+
+class Noun:
+    """A noun, such as `topic`. `modules`: by verb, the module of holozen.cli that defines it in VERBS."""
+
+    def __init__(self, name: str, about: str, modules: dict[str, str]) -> None:
+        self.name, self.about, self.modules = name, about, modules
+
+    def main(self, argv: list[str]) -> int:
+        """Run the verb that `argv` starts with."""
+        if argv and argv[0] in self.modules:
+            return self.verb(argv[0]).main(argv[1:])
+        self.parser().parse_args(argv)
+        return 2
+
+    def parser(self) -> Parser:
+        """The parser of all its verbs."""
+        parser = Parser(prog=f"holozen {self.name}", description=self.about)
+        verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
+        for name in self.modules:
+            verb = self.verb(name)
+            verb.fill(verbs.add_parser(name, help=verb.about, **verb.options()))
+        return parser
+
+    def verb(self, name: str) -> Verb:
+        """One of its verbs."""
+        module = importlib.import_module(f"holozen.cli.{self.modules[name]}")
+        found: Verb = module.VERBS[f"{self.name} {name}"]
+        return found
+
+
+def by_name(*verbs: Noun | Verb) -> dict[str, Any]:
+    """The table VERBS of a module."""
+    return {verb.name: verb for verb in verbs}
+
+
+def _add_ros2_flags(parser: argparse.ArgumentParser, name: str) -> None:
+    group = parser.add_argument_group(ROS2_TITLE, "They change nothing here.")
+    for flag in (*_EVERY, *_ROS2.get(name, ())):
+        option, _, value = flag.partition(" ")
+        if value:
+            group.add_argument(option, metavar=value)
+        else:
+            group.add_argument(option, action="store_true")
+
+
+def add_packages(parser: argparse.ArgumentParser) -> None:
+    """Add the flag `--package`, for verbs that look up types."""
+    parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR",
+        help="the folder of package NAME, whose msg and srv files define its types")  # fmt: skip
+
+
+def open_bus(args: argparse.Namespace, **options: Any) -> Bus:
+    """The bus of a verb, connected according to its flags. `options` are those of Bus."""
+    return Bus(args.verb.replace(" ", "_"), connection.from_arguments(args), **options)
+
+
+def no_nodes(where: str) -> str:
+    """The message that no node was found, and how to start some."""
+    return f"no nodes found at {where}; `holozen up` starts a robot"
+
+
+def none_found(what: str, ends: list[Endpoint], where: str) -> str:
+    """The message that the nodes at `where`, with the endpoints `ends`, have no `what`, or that there are none."""
+    return f"no {what}: {f'the nodes at {where} have none' if ends else no_nodes(where)}"
+
+
+def unknown(word: str, known: list[str], where: str) -> str:
+    """The message that no node has a key; `known` are the keys at `where`."""
+    if not known:
+        return f"unknown key {word!r}: {no_nodes(where)}"
+    return f"unknown key {word!r}{nearest(word, known)}; known: {listed(known)}"
+
+
+def suggest_key(bus: Bus, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
+    """`; did you mean 'odom'?` with the live key nearest to the first of `keys` that no node has, or `; no nodes found
+    at ...`; empty where neither applies.
+    """
+    ends = [end for end in bus.endpoints() if end.session != bus.id]
+    if not ends and not bus.connected():
+        return f"; {no_nodes(bus.where)}"
+    live = {end.key for end in ends if end.kind in kinds and not is_any(end) and "*" not in end.key}
+    lost = [key for key in keys if key not in live and "*" not in key]
+    return nearest(lost[0], sorted(live)) if lost else ""
+
+
+def is_any(end: Endpoint) -> bool:
+    """Whether an endpoint accepts any type, as those of echo do."""
+    return end.type.startswith("any/")
+
+
+def listed(words: Iterable[str]) -> str:
+    """The words separated by commas; `none` if there are none."""
+    return ", ".join(words) or "none"

@@ -1,0 +1,190 @@
+"""Output for people: lines, and pictures redrawn in a terminal.
+
+Writing a line never blocks: an unread pipe, or a terminal that Ctrl-S holds, loses lines. Lost lines are counted, and
+reported when the reader continues.
+"""
+
+import _thread
+import atexit
+import contextlib
+import os
+import select
+import sys
+import threading
+import time
+from collections import deque
+from typing import Self
+
+KEPT = 256  # lines that wait for a slow reader
+SHORT_WAIT = 0.005  # s; usually enough to write the line, which keeps the order of a process's output
+LAST_WAIT = 0.2  # s at the end of the process, for a reader that does not read
+BUSY = 5.0  # s at most then, on a busy machine
+EVERY = {True: 0.1, False: 1.0}  # s between two pictures, in a terminal and elsewhere
+SIZE = (80, 24)
+_BEGIN, _END = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"  # a screen of its own without a cursor, and back
+
+
+def printable(text: str) -> str:
+    """`text` with `?` for control characters: parts of it come over the wire."""
+    return text if text.isprintable() else "".join(c if c.isprintable() else "?" for c in text)
+
+
+def report(text: str) -> None:
+    """Write one line on standard error."""
+    _ERRORS.write(printable(text))
+
+
+def output(text: str) -> None:
+    """Write one line on standard output, for processes that must go on even if it is not read."""
+    _OUTPUT.write(printable(text))
+
+
+def drain(seconds: float = LAST_WAIT) -> None:
+    """Wait until all lines are written, or none has been read for `seconds`."""
+    for lines in (_OUTPUT, _ERRORS):
+        lines.drain(seconds)
+
+
+def give_up_readers() -> None:
+    """Discard further output that is not being read. For signal handlers: a `write` of the main thread that waits there
+    ends too, since the signal interrupts it, and it is tried again.
+    """
+    for lines in (_OUTPUT, _ERRORS):
+        lines.give_up()
+
+
+class _Lines:
+    """Lines on their way to a file descriptor. A thread writes them, since `write` waits for the reader."""
+
+    def __init__(self, number: int) -> None:
+        self._number = number
+        self._waiting: deque[bytes] = deque()
+        self._dropped = 0
+        self._is_given_up = False
+        self._lock = threading.Lock()
+        self._idle = threading.Event()
+        self._idle.set()
+
+    def write(self, line: str) -> None:
+        """Write a line, now or later."""
+        stream, usual = (sys.stdout, sys.__stdout__) if self._number == 1 else (sys.stderr, sys.__stderr__)
+        if stream is not usual:  # replaced by a test or a script
+            with contextlib.suppress(OSError):  # a terminal that is gone is not an error
+                print(line, file=stream, flush=True)
+            return
+        if stream is None:  # closed by the parent process; the descriptor may be another file's now
+            return
+        with self._lock:
+            if len(self._waiting) >= KEPT:
+                self._dropped += 1
+                return
+            self._waiting.append(line.encode(errors="replace") + b"\n")
+            if was_idle := self._idle.is_set():
+                self._idle.clear()
+                _thread.start_new_thread(self._run, ())
+        if was_idle:
+            self.wait(SHORT_WAIT)
+
+    def wait(self, seconds: float) -> None:
+        """Wait until all is written, at most `seconds`."""
+        self._idle.wait(max(seconds, 0.0))
+
+    def give_up(self) -> None:
+        """Discard further output if it is not being read. Takes no lock: a signal may come while it is held."""
+        poll = select.poll()
+        poll.register(self._number, select.POLLOUT)
+        if (sys.__stdout__ if self._number == 1 else sys.__stderr__) is None or poll.poll(0):
+            return
+        self._is_given_up = True
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, self._number)
+        os.close(null)
+
+    def drain(self, seconds: float) -> None:
+        """Wait until all is written, or the reader has read nothing for `seconds`."""
+        poll = select.poll()
+        poll.register(self._number, select.POLLOUT)
+        now = time.monotonic()
+        end, given_up = now + BUSY, now + seconds
+        while not self._is_given_up and not self._idle.wait(0.01) and (now := time.monotonic()) < min(end, given_up):
+            if poll.poll(0):  # there is room: the writing thread has not run yet, on a busy machine
+                given_up = now + seconds
+
+    def _run(self) -> None:
+        while data := self._next():
+            try:
+                while data:
+                    data = data[os.write(self._number, data) :]
+            except OSError:  # the reader is gone
+                os.dup2(os.open(os.devnull, os.O_WRONLY), self._number)
+
+    def _next(self) -> bytes:
+        """The next data to write; empty when this thread may end."""
+        with self._lock:
+            if self._waiting:
+                return self._waiting.popleft()
+            dropped, self._dropped = self._dropped, 0
+            if dropped:
+                return f"... and {dropped} more lines were dropped, as the output was not read\n".encode()
+            self._idle.set()
+            return b""
+
+
+_OUTPUT, _ERRORS = _Lines(1), _Lines(2)
+atexit.register(drain)
+
+
+class Line:
+    """A status line on standard error that is overwritten. Without a terminal it is not shown."""
+
+    def __init__(self, hidden: bool = False) -> None:
+        self.shown = sys.stderr.isatty() and not hidden
+
+    def show(self, text: str) -> None:
+        """Overwrite the line."""
+        if self.shown:
+            with contextlib.suppress(OSError):  # the terminal is gone, and SIGHUP follows
+                sys.stderr.write(f"\r{printable(text)}\x1b[K")
+                sys.stderr.flush()
+
+
+class Screen:
+    """Redraws pictures in a terminal; elsewhere prints them in sequence. Use it in `with`: it restores the terminal."""
+
+    def __init__(self, once: bool, ascii: bool = False) -> None:
+        self.terminal = sys.stdout.isatty() and not once
+        self.every = EVERY[self.terminal]
+        encoding = (sys.stdout.encoding or "").lower().replace("-", "")
+        self.ascii = ascii or encoding != "utf8"
+
+    def __enter__(self) -> Self:
+        self._write(_BEGIN)
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._write(_END)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows of the terminal; 80 x 24 where there is none."""
+        if not self.terminal:
+            return SIZE
+        columns, rows = os.get_terminal_size(sys.stdout.fileno())
+        return max(columns, 20), max(rows, 4)
+
+    def show(self, lines: list[str]) -> None:
+        """Draw a picture."""
+        if self.terminal:
+            # Overwritten line by line: clearing the screen would flicker.
+            self._write("\x1b[H" + "\x1b[K\r\n".join(lines[: self.size[1]]) + "\x1b[K\x1b[J")
+        else:
+            print("\n".join(line.rstrip() for line in lines), flush=True)
+
+    def _write(self, text: str) -> None:
+        if not self.terminal:
+            return
+        try:
+            sys.stdout.write(text)
+            sys.stdout.flush()
+        except OSError:  # the terminal is gone: end quietly, as with a closed pipe
+            raise BrokenPipeError from None

@@ -1,0 +1,321 @@
+"""Finds what people get wrong: on this machine, at the meeting point, and among the running nodes.
+
+A check yields findings; `diagnose` runs all of them in their order.
+"""
+
+import contextlib
+import json
+import os
+import sys
+import time
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import metadata
+from typing import TYPE_CHECKING, NamedTuple
+
+from holozen.transport import graph
+from holozen.transport.connection import LOOPBACK, RENDEZVOUS, Connection
+from holozen.transport.errors import BusError
+from holozen.transport.graph import Endpoint, version
+from holozen.transport.listeners import HERE, Holder, address, exposure, holders, reached
+
+if TYPE_CHECKING:
+    from holozen.bus import Bus
+    from holozen.messages import CommandSource, CommandStatus
+    from holozen.transport.pubsub import Latest
+
+OK, WARNING, ERROR = "ok", "warning", "error"
+OPEN, FIND, LISTEN = 0.8, 0.6, 1.0  # s to reach a router, to find other nodes, and to listen to robots
+ANSWER = 0.4  # s for nodes to answer
+ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
+CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
+EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
+MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
+DRIVES = 2.0  # Hz; a slower source is not taken to drive a robot
+
+
+class Finding(NamedTuple):
+    """One line: what was checked, the result, and how to fix it (empty if nothing is wrong)."""
+
+    check: str
+    level: str
+    text: str
+    fix: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.level:<8} {self.check}: {self.text}" + (f" -> {self.fix}" if self.fix else "")
+
+
+def diagnose(connection: Connection) -> Iterator[Finding]:
+    """All findings about this machine and the nodes at `connection`. Changes nothing."""
+    yield from packages()
+    yield from terminal()
+    try:
+        yield from nodes(connection)
+    except BusError as error:
+        yield from meeting_points(connection, connected=False)
+        yield Finding("zenoh", ERROR, str(error), "check --mode, --connect, --config and --cfg")
+    except ModuleNotFoundError as error:
+        yield from meeting_points(connection, connected=False)
+        yield Finding("zenoh", ERROR, f"nodes cannot be checked without {error.name}", "run scripts/venv")
+
+
+def packages() -> Iterator[Finding]:
+    """Whether the Python packages of every command are installed, and the sim can run here."""
+    running = f"Python {sys.version.split()[0]} on {os.uname().sysname} {os.uname().machine}"
+    runs_sim = sys.version_info[:2] == (3, 11) and os.uname().machine == "x86_64"
+    fix = "" if runs_sim else "use Python 3.11 on x86-64 for `holozen sim`; all other commands run here"
+    yield Finding("python", OK if runs_sim else WARNING, running, fix)
+    try:
+        requirements = [text for text in metadata.requires("holozen") or () if 'extra == "test"' not in text]
+    except metadata.PackageNotFoundError:
+        yield Finding(
+            "packages", WARNING, "holozen is not installed; it runs from its source folder", "run scripts/venv"
+        )
+        return
+    missing: dict[str, list[str]] = {}
+    for text in requirements:
+        if not version(name := text.replace("<", ">").partition(">")[0].partition(";")[0].strip()):
+            missing.setdefault(name, []).extend(text.partition('extra == "')[2].strip('"').split())
+    for name, extras in missing.items():
+        users = ", ".join(f"`holozen {extra}`" for extra in extras) or "every command"
+        fix = f"run scripts/venv, or: {sys.executable} -m pip install {name}"
+        yield Finding("packages", WARNING if extras else ERROR, f"{name} is missing, which {users} needs", fix)
+    if not missing:
+        yield Finding("packages", OK, f"all packages of holozen {version('holozen')} are installed")
+
+
+def terminal(environ: Mapping[str, str] = os.environ) -> Iterator[Finding]:
+    """Whether the terminal suits the teleop and the pictures."""
+    from holozen.terminal import reports_releases
+
+    if (getattr(sys.stdout, "encoding", None) or "ascii").lower().replace("-", "") != "utf8":
+        text = f"the encoding is {sys.stdout.encoding}, so pictures are drawn in ASCII"
+        yield Finding("terminal", WARNING, text, "export LANG=C.UTF-8 (or PYTHONUTF8=1)")
+    inside = "tmux" if environ.get("TMUX") else "screen" if environ.get("STY") else "this terminal"
+    try:
+        releases = reports_releases(sys.stdin.fileno(), sys.stdout.fileno()) if sys.stdout.isatty() else None
+    except (OSError, ValueError, AttributeError):
+        return
+    if releases:
+        yield Finding("terminal", OK, f"{inside} reports key releases (Kitty protocol)")
+    elif releases is False:
+        text = f"{inside} does not report key releases; the teleop relies on key repeat"
+        yield Finding("terminal", OK, text)
+    elif sys.stdout.isatty():
+        yield Finding("terminal", WARNING, f"{inside} does not answer; the teleop cannot see a lost connection to it",
+            "use a terminal such as kitty, foot, WezTerm or Ghostty")  # fmt: skip
+
+
+def nodes(connection: Connection) -> Iterator[Finding]:
+    """The findings about the meeting point and all nodes there. Raises BusError."""
+    from holozen.bus import Bus
+
+    if connection.mode == "peer" and not connection.config:
+        connection = connection.replace(listen=(LOOPBACK,))  # hold no port that another process may want
+    with Bus("doctor", connection, patience=OPEN) as bus:
+        endpoints = bus.graph().settled(bus.connected, patience=FIND)
+        began = time.monotonic()
+        robots = Robots(bus, endpoints)
+        yield from meeting_points(connection, bus.connected())
+        peers = ask_peers(bus) if bus.connected() else {}
+        yield from versions(endpoints, peers, version("holozen"))
+        yield from clocks(peers.values())
+        yield from exposures(peers.values())
+        yield from duplicates(endpoints, peers)
+        if robots.count:
+            time.sleep(max(0.0, began + LISTEN - time.monotonic()))
+        yield from robots.findings(time.monotonic() - began)
+
+
+# The meeting point.
+
+
+def meeting_points(connection: Connection, connected: bool) -> Iterator[Finding]:
+    """Who holds the endpoints to connect to. `connected`: whether any node was reached."""
+    listed = json.loads(connection.settings().get("connect/endpoints", "[]"))
+    endpoints = [one for one in listed if isinstance(one, str)] if isinstance(listed, list) else []
+    asked_for = connection.connect is not None
+    for endpoint, reason in reached(endpoints).items():
+        host, port = address(endpoint) or ("", 0)
+        here = holders(port) if host in HERE else []
+        if endpoint in RENDEZVOUS[1:] and not asked_for and not (here and not reason and not connected):
+            continue  # they matter where the first does not answer
+        yield _meeting_point(endpoint, port, reason, here, connected, asked_for)
+
+
+def _meeting_point(
+    endpoint: str, port: int, reason: str, here: list[Holder], connected: bool, asked_for: bool
+) -> Finding:
+    if reason and not here:
+        if not asked_for:
+            return Finding("port", OK, f"{endpoint} is free: no node runs here yet")
+        fix = f"start a node there, such as: holozen router --listen tcp/0.0.0.0:{port}"
+        return Finding("port", ERROR, f"{endpoint} cannot be reached: {reason}", fix)
+    held = " and ".join(map(str, here)) or "a process on another machine or in a container"
+    if any(one.stopped for one in here):
+        return Finding("port", ERROR, f"{endpoint} is held by {held}, which does not answer", here[0].fix)
+    if connected and not reason:
+        return Finding("port", OK, f"{endpoint} is held by {held}, and speaks Zenoh")
+    fix = here[0].fix if here else "find out what runs there, or choose another meeting point with --connect"
+    return Finding("port", ERROR, f"{endpoint} is held by {held}, which does not answer as Zenoh does", fix)
+
+
+# The nodes.
+
+
+class Peer(NamedTuple):
+    """What a node reports about itself. Its clock is `offset` seconds ahead of ours, give or take `error`."""
+
+    session: str
+    node: str
+    version: str
+    host: str
+    pid: int
+    offset: float
+    error: float
+    exposed: tuple[str, ...] = ()  # endpoints that other machines can reach
+
+    def __str__(self) -> str:
+        return f"{self.node} (pid {self.pid} on {self.host})"
+
+
+def ask_peers(bus: "Bus") -> dict[str, Peer]:
+    """Session -> its node, of all that answer. A clock is measured by half of the round trip, as NTP does."""
+    found: dict[str, Peer] = {}
+    for _ in range(ROUNDS):
+        before, began = time.time(), time.monotonic()
+        for reply in bus.ask_all(graph.ALL_NODE_INFO, ANSWER):
+            now = time.time()
+            if not isinstance(reply, bytes) and (peer := read_peer(reply.key, reply.payload, before, now)):
+                known = found.get(peer.session)
+                found[peer.session] = peer if known is None or peer.error < known.error else known
+        if time.monotonic() - began > ANSWER / 2:
+            break  # a node does not answer, and would not the next time
+    return found
+
+
+def read_peer(key: str, payload: bytes, before: float, now: float) -> Peer | None:
+    """The node in a reply that arrived at `now` to a question of `before` (s); None if it is malformed."""
+    with contextlib.suppress(ValueError, TypeError, KeyError, RecursionError):
+        row = json.loads(payload)
+        node, number, host = (str(row[name])[:80] for name in ("node", "version", "host"))
+        error = (now - before) / 2
+        session = key.removeprefix("@holozen/").removesuffix("/about")
+        offset = float(row["time"]) - before - error
+        exposed = tuple(str(endpoint)[:80] for endpoint in row.get("exposed", ())[:MOST_KEYS])
+        return Peer(session, node, number, host, int(row["pid"]), offset, error, exposed)
+    return None
+
+
+def versions(endpoints: Iterable[Endpoint], peers: Mapping[str, Peer], ours: str) -> Iterator[Finding]:
+    """Nodes of another version, and nodes that do not answer."""
+    same = []
+    for end in (end for end in endpoints if end.kind == "node"):
+        peer = peers.get(end.session)
+        if peer is None:
+            text = f"{end.node} ({end.session[:6]}) does not answer: it hangs, is stopped, or is older than this"
+            yield Finding("nodes", WARNING, text, "look at its terminal; fg or kill -CONT continues it after Ctrl-Z")
+        elif peer.version != ours:
+            text = f"{peer} has holozen {peer.version or 'of no version'}, this is {ours or 'of no version'}"
+            yield Finding("nodes", WARNING, text, "install the same version on both")
+        else:
+            same.append(str(peer))
+    if same:
+        yield Finding("nodes", OK, f"{len(same)} of this version: {', '.join(sorted(same))}")
+
+
+def clocks(peers: Iterable[Peer], here: str = os.uname().nodename) -> Iterator[Finding]:
+    """The offsets of the clocks of other machines."""
+    best: dict[str, Peer] = {}
+    for peer in peers:
+        if peer.host != here and (peer.host not in best or peer.error < best[peer.host].error):
+            best[peer.host] = peer
+    for host, peer in sorted(best.items()):
+        text = f"the clock of {host} is {peer.offset:+.3f} s from ours (give or take {peer.error:.3f} s)"
+        offset = abs(peer.offset) - peer.error
+        level = ERROR if offset > CLOCK_ERROR else WARNING if offset > CLOCK_WARNING else OK
+        fix = "" if level == OK else "set both by NTP: sudo timedatectl set-ntp true"
+        yield Finding("clock", level, text + ("; stamped commands are refused" if level == ERROR else ""), fix)
+
+
+def exposures(peers: Iterable[Peer]) -> Iterator[Finding]:
+    """Nodes that other machines can reach without a password, a certificate or a permission."""
+    for peer in peers:
+        if peer.exposed:
+            text = f"{peer} {exposure(peer.exposed)}"
+            fix = "listen on loopback, or let Zenoh ask for passwords or certificates (--config FILE)"
+            yield Finding("network", WARNING, text, fix)
+
+
+def duplicates(endpoints: Iterable[Endpoint], peers: Mapping[str, Peer]) -> Iterator[Finding]:
+    """Nodes that share a service or a key that only one should publish, such as two sims with the same robot."""
+    holders: dict[tuple[str, str], dict[str, str]] = {}
+    for end in endpoints:
+        if end.kind == "srv" or (end.kind == "pub" and end.type in EXCLUSIVE):
+            holders.setdefault((end.kind, end.key), {})[end.session] = end.node
+    groups: dict[tuple[tuple[str, str], ...], list[str]] = {}
+    for (_, key), sessions in sorted(holders.items()):
+        if len(sessions) > 1:
+            groups.setdefault(tuple(sorted(sessions.items())), []).append(key)
+    for group, keys in groups.items():
+        names = [str(peers[s]) if s in peers else f"{node} ({s[:6]})" for s, node in group]
+        more = f" and {len(keys) - MOST_KEYS} more keys" if len(keys) > MOST_KEYS else ""
+        text = f"{' and '.join(names)} share {', '.join(keys[:MOST_KEYS])}{more}; only one node should have each"
+        yield Finding("duplicates", ERROR, text, "end one, or give its robot another name: --robot FILE=NAME")
+
+
+# The robots.
+
+
+class Robots:
+    """Listens to the robots among `endpoints` from its creation on."""
+
+    def __init__(self, bus: "Bus", endpoints: Iterable[Endpoint]) -> None:
+        published = [end for end in endpoints if end.kind == "pub"]
+        self._nodes = {end.key: end.node for end in published if end.type == EXCLUSIVE[0]}
+        self.count = len(self._nodes)
+        # Samples are not decoded: it is enough that they arrive.
+        self._odoms = {key: bus.subscribe_raw(key, depth=1) for key in sorted(self._nodes)[:MOST_ROBOTS]}
+        self._statuses: dict[str, Latest[CommandStatus]] = {}
+        if statuses := sorted({end.key for end in published if end.type == EXCLUSIVE[2]})[:MOST_ROBOTS]:
+            from holozen import messages
+
+            self._statuses = {key: bus.latest(key, messages.CommandStatus) for key in statuses}
+
+    def findings(self, seconds: float) -> Iterator[Finding]:
+        """The findings after listening for `seconds`."""
+        if not self.count:
+            yield Finding("odom", OK, "there is no robot; `holozen up` starts one")
+            return
+        stale = [key for key, samples in self._odoms.items() if samples.try_recv() is None]
+        for key in stale:
+            text = f"{key} is stale: nothing from {self._nodes[key]} for {seconds:.1f} s"
+            yield Finding("odom", ERROR, text, "continue or restart that node (fg, kill -CONT), or raise its --rtf")
+        if not stale:
+            yield Finding("odom", OK, f"fresh on {', '.join(list(self._odoms)[:MOST_KEYS])} ({self.count} robots)")
+        for key, latest in self._statuses.items():
+            if status := latest.read()[0]:
+                yield from commands(key.removesuffix("_status"), status)
+
+
+def commands(key: str, status: "CommandStatus") -> Iterator[Finding]:
+    """The findings about the sources that command the robot of `key`."""
+    if status.stopped:
+        text = f"the robot is stopped by {status.stopped}, and ignores all commands"
+        yield Finding(key, WARNING, text, f"holozen release {key.rpartition('/')[0]}".strip())
+    driving = sorted((source for source in status.sources if source.rate >= DRIVES), key=_rank)
+    if not driving:
+        yield Finding(key, OK, "nothing commands the robot; `holozen teleop` or `holozen controller` does")
+    if len(driving) > 1:
+        level = ERROR if _rank(driving[0]) == _rank(driving[1]) else WARNING  # among equals it is chance who drives
+        names = [
+            f"{one.source} ({one.priority}, {one.rate:.0f} Hz, {'' if one.obeyed else 'not '}obeyed)" for one in driving
+        ]
+        fix = "end all but one; the teleop takes precedence over scripts, and those over the controller"
+        yield Finding(key, level, f"{len(driving)} sources command the robot at once: {', '.join(names)}", fix)
+
+
+def _rank(source: "CommandSource") -> int:
+    from holozen.transport.pubsub import PRIORITIES
+
+    return PRIORITIES.index(source.priority) if source.priority in PRIORITIES else len(PRIORITIES)

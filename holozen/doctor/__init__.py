@@ -1,1 +1,0 @@
-"""What may be wrong with this machine, its software and the robots that run; each finding with its mend."""

@@ -1,0 +1,62 @@
+"""Kinematics of a planar base, as pure functions. Metres, radians, seconds; x forward, y left, z up."""
+
+import math
+from dataclasses import dataclass
+
+from holozen.limits import Planar
+
+
+@dataclass(frozen=True, slots=True)
+class Wheel:
+    """A wheel that rolls on the ground: centre (x, y) and axle direction (ax, ay) in the body frame, radius in m."""
+
+    joint: str
+    x: float
+    y: float
+    ax: float
+    ay: float
+    radius: float
+
+
+def to_world(velocity: Planar, yaw: float, dt: float) -> tuple[float, float]:
+    """The world-frame velocity (m/s) that moves a body at `yaw` for one step of `dt` seconds.
+
+    The heading at mid-step is used, so that a turning body follows its arc and not a polygon outside it.
+    """
+    x, y, turn = velocity
+    heading = yaw + turn * dt / 2
+    cosine, sine = math.cos(heading), math.sin(heading)
+    return x * cosine - y * sine, x * sine + y * cosine
+
+
+def to_body(vx: float, vy: float, yaw: float) -> tuple[float, float]:
+    """A world-frame velocity (m/s) in the frame of a body at `yaw`."""
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return vx * cosine + vy * sine, vy * cosine - vx * sine
+
+
+def wheel_rate(velocity: Planar, wheel: Wheel) -> float:
+    """The rate (rad/s) about its axle of a wheel that rolls without slipping.
+
+    The rolling direction is axle x up; the speed of the wheel's centre along it, over the radius. The rollers of an
+    omni wheel take the motion along the axle. Source: Siegwart, Introduction to Autonomous Mobile Robots, 3.2.3.
+    """
+    x, y, turn = velocity
+    vx, vy = x - turn * wheel.y, y + turn * wheel.x
+    return (vx * wheel.ay - vy * wheel.ax) / wheel.radius
+
+
+def mecanum_rates(velocity: Planar, arm: float, radius: float) -> tuple[float, float, float, float]:
+    """The rates (rad/s) of mecanum wheels, front left, front right, back left, back right, rollers at 45 degrees.
+
+    `arm` is half the sum of wheelbase and track, in m. Source: Taheri, Qiao and Ghaeminezhad, "Kinematic model of a
+    four mecanum wheeled mobile robot", International Journal of Computer Applications 113, 2015, equation 20.
+    """
+    x, y, turn = velocity
+    around = arm * turn
+    return (
+        (x - y - around) / radius,
+        (x + y + around) / radius,
+        (x + y - around) / radius,
+        (x - y + around) / radius,
+    )

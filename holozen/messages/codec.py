@@ -1,0 +1,193 @@
+"""Encodes and decodes messages: JSON, msgpack or CDR, by the Zenoh Encoding that travels with the bytes."""
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from types import ModuleType
+from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+
+import msgspec
+
+from holozen.console import printable
+from holozen.messages import CodecError
+from holozen.messages.message import Message, listed, not_finite
+
+__all__ = ["WIRES", "CodecError", "convert", "decode", "encode", "encoding", "written"]
+
+M = TypeVar("M", bound=Message)
+Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
+
+WIRES = {"json": "application/json", "msgpack": "application/msgpack", "cdr": "application/cdr"}
+"""The names that `--wire` takes, and the Encoding of each."""
+
+# Encodings that do not describe the content, or mean JSON, which is what people write by hand.
+_JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
+
+LONGEST = 200  # characters of a reason
+
+_encode_json = msgspec.json.Encoder(enc_hook=listed).encode
+_encode_msgpack = msgspec.msgpack.Encoder(enc_hook=listed).encode
+
+
+def encode(message: Message, wire: str = "json") -> bytes:
+    """The bytes of `message`. A NaN or an infinity raises CodecError, as JSON has none.
+
+    CDR has them, and writes them for types with ANY_NUMBER.
+    """
+    payload, finite = _write(message, wire)
+    if not finite and not (wire == "cdr" and message.ANY_NUMBER) and (bad := not_finite(message)):
+        raise CodecError(f"{type(message).__name__}.{bad} is not a finite number")
+    return payload
+
+
+def written(message: Message, wire: str) -> tuple[bytes, str]:
+    """The bytes of `message`, and their wire: CDR for one with ANY_NUMBER that holds a NaN or an infinity."""
+    if not message.ANY_NUMBER or wire == "cdr":
+        return encode(message, wire), wire
+    payload, finite = _write(message, wire)
+    if finite:
+        return payload, wire
+    try:
+        cdr, finite = _structs().write(message)  # faster than `not_finite`
+    except CodecError as error:
+        if bad := not_finite(message):
+            reason = f"{type(message).__name__}.{bad} is not a finite number, which needs CDR"
+            raise CodecError(f"{reason}, and that cannot hold the rest: {error}") from None
+        return payload, wire
+    return (payload, wire) if finite else (cdr, "cdr")
+
+
+def _write(message: Message, wire: str) -> tuple[bytes, bool]:
+    """The bytes, and whether all numbers are certainly finite."""
+    try:
+        if message.SETTLE:
+            message.SETTLE()
+        return _WRITERS[wire](message)
+    except UnicodeEncodeError as error:
+        raise CodecError(f"{type(message).__name__}: a text is not Unicode: {error.reason}") from None
+
+
+def encoding(wire: str, kind: type[Message]) -> str:
+    """The Encoding of a message. CDR does not describe itself, so its type is appended, as Zenoh's schema."""
+    return f"{WIRES[wire]};{_structs().ros_name(kind)}" if wire == "cdr" else WIRES[wire]
+
+
+def decode(payload: bytes, encoding: str, types: tuple[type[M], ...], tolerant: bool = False) -> M:
+    """The message in `payload`, of the first of `types` that fits. Raises CodecError with the reason.
+
+    Unknown fields are refused, or ignored if `tolerant` (`wire.is_command` has the rule).
+    """
+    form = _format(encoding, _is_cdr(payload))
+    makers: Makers[M] = _decoders(types, encoding, form)
+    try:
+        return _first(makers, payload)
+    except CodecError:
+        if not tolerant or form == "cdr":
+            raise
+    plain = (msgspec.json if form == "json" else msgspec.msgpack).decode
+    return _first(tuple((kind, partial(_without_unknown, kind, plain)) for kind in types), payload)
+
+
+def _without_unknown(kind: type[M], plain: Callable[[bytes], Any], payload: bytes) -> M:
+    value = plain(payload)
+    known = _known(kind, value)
+    return msgspec.convert(known or value, kind)  # an object with unknown fields alone is another message
+
+
+def _known(hint: Any, value: Any) -> Any:
+    """`value` without the fields that its type, a message or a list of messages, does not have."""
+    if isinstance(value, list) and get_origin(hint) is list:
+        return [_known(get_args(hint)[0], inner) for inner in value]
+    if isinstance(value, dict) and isinstance(hint, type) and issubclass(hint, Message):
+        fields = _fields(hint)
+        return {name: _known(fields[name], inner) for name, inner in value.items() if name in fields}
+    return value
+
+
+@lru_cache(maxsize=256)
+def _fields(kind: type[Message]) -> dict[str, Any]:
+    return {name: hint for name, hint in get_type_hints(kind).items() if name in kind.__struct_fields__}
+
+
+def convert(value: Any, types: tuple[type[M], ...]) -> M:
+    """`decode` for the dicts, lists and numbers of parsed JSON or YAML. Unknown fields are refused."""
+    makers = tuple((kind, partial(msgspec.convert, type=kind, strict=False)) for kind in types)
+    made: M = _first(makers, value)
+    return made
+
+
+def _first(makers: Makers[M], value: Any) -> M:
+    reasons = []
+    for kind, make in makers:
+        try:
+            return make(value)
+        except CodecError as error:
+            reasons.append(_short(str(error)))
+        except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+            reasons.append(_short(f"not a {kind.__name__}: {error}"))
+    # A message with a header was meant as the stamped type.
+    raise CodecError(next((reason for reason in reasons if "field `header`" not in reason), reasons[0]))
+
+
+def _short(text: str) -> str:
+    """One line: a field's name in it came over the wire and may be anything."""
+    text = printable(text)
+    return text if len(text) <= LONGEST else text[:LONGEST] + " ..."
+
+
+def _write_json(message: Message) -> tuple[bytes, bool]:
+    payload = _encode_json(message)
+    return payload, b"null" not in payload  # msgspec writes NaN and infinities as null, which no message has otherwise
+
+
+_WRITERS: dict[str, Callable[[Message], tuple[bytes, bool]]] = {
+    "json": _write_json,
+    "msgpack": lambda message: (_encode_msgpack(message), False),
+    "cdr": lambda message: _structs().write(message),
+}
+
+
+@lru_cache(maxsize=64)
+def _decoders(types: tuple[type[M], ...], encoding: str, form: str) -> Makers[M]:
+    if form == "cdr":
+        kinds = _named(types, encoding.partition(";")[2])
+        return tuple((kind, _structs().codec(kind).read) for kind in kinds)
+    module = msgspec.json if form == "json" else msgspec.msgpack
+    return tuple((kind, module.Decoder(kind).decode) for kind in types)
+
+
+def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
+    """Those of `types` that an Encoding's schema names; all if it names none."""
+    from holozen.messages.definitions import InterfaceError
+    from holozen.messages.registry import full_name
+
+    try:
+        name = full_name(schema)
+    except InterfaceError:
+        return types
+    found = tuple(kind for kind in types if _structs().ros_name(kind) == name)
+    if not found:
+        raise CodecError(_short(f"not a {types[0].__name__}: its encoding names {name}"))
+    return found
+
+
+def _format(encoding: str, is_cdr: bool) -> str:
+    """The wire of an Encoding, which may carry a schema after a semicolon."""
+    name = encoding.partition(";")[0]
+    if name in _JSON:
+        # Bridges to ROS 2 write CDR without an Encoding; no text begins with a NUL.
+        return "cdr" if is_cdr else "json"
+    found = next((wire for wire, written in WIRES.items() if written == name), None)
+    if found is None:
+        raise CodecError(f"unknown encoding {name[:80]!r}; known: {', '.join(WIRES.values())}")
+    return found
+
+
+def _is_cdr(payload: bytes) -> bool:
+    return payload[:1] == b"\0"
+
+
+def _structs() -> ModuleType:
+    """CDR of our messages, loaded on first use: it takes 18 ms."""
+    from holozen.messages import struct_cdr
+
+    return struct_cdr

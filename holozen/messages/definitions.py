@@ -1,0 +1,378 @@
+"""Types as .msg and .srv files define them: parsed from their text, and their values as plain dicts, lists and numbers.
+
+Written by hand, for the grammar is one line per field: libraries that read it (rosbags, rosidl) bring numpy or ROS
+along, and an echo has to start at once. The spellings of ROS 1 are read too: Header, time and duration.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+LARGEST = 16_000_000  # bytes of the smallest message of a type; nested fixed arrays multiply
+MOST_FIELDS = 10_000  # of a type, nested ones included; each level can double them
+
+INTEGERS = {
+    "byte": (0, 2**8 - 1),
+    "char": (0, 2**8 - 1),
+    **{f"int{bits}": (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) for bits in (8, 16, 32, 64)},
+    **{f"uint{bits}": (0, 2**bits - 1) for bits in (8, 16, 32, 64)},
+}
+"""The least and the largest value of each integer type. As in ROS 2, byte and char are unsigned."""
+FLOATS = ("float32", "float64")
+TEXTS = ("string", "wstring")
+PRIMITIVES = ("bool", *INTEGERS, *FLOATS, *TEXTS)
+
+LARGEST_FILE = 1_000_000  # characters
+LARGEST_ARRAY = 2**32 - 1  # elements, as many as CDR can count
+OLD = {"time": "builtin_interfaces/Time", "duration": "builtin_interfaces/Duration"}
+FLOAT32 = 3.4028235677973366e38  # from here up a number rounds to infinity as a float32 (IEEE 754)
+TYPECODES = {
+    "char": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I", "int64": "q",
+    "uint64": "Q", "float32": "f", "float64": "d",
+}  # fmt: skip
+"""The typecodes (of `array` and `struct`) of those numbers that have one."""
+
+_WORD = r"[A-Za-z][A-Za-z0-9_]*"
+_LINE = re.compile(
+    rf"(?P<type>{_WORD}(?:/{_WORD}){{0,2}})(?:<=(?P<longest>\d{{1,10}}))?(?P<array>\[(?:<=)?\d{{0,10}}\])?"
+    rf"\s+(?P<name>{_WORD})(?:\s*=\s*(?P<constant>\S.*)|\s+(?P<default>\S.*))?"
+)
+_ITEM = re.compile(r"""\s*("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|[^,"']+?)\s*(?:,|$)""")
+_BOOLS = {"true": True, "1": True, "false": False, "0": False}
+_SIZES = {"bool": 1, "byte": 1, "char": 1, "string": 4, "wstring": 4}
+
+
+class InterfaceError(ValueError):
+    """An unknown type, a malformed definition, or a value that does not fit its field. The text is one line."""
+
+
+class Field(NamedTuple):
+    """One field. `type` is a primitive of ROS, or the full name of a message, which is then in `nested`.
+
+    `array` is empty for a single value, else "fixed" (`bound` elements), "bounded" (at most `bound`) or "sequence".
+    `longest` is N of a `string<=N`, 0 without. `default` is None where the definition gives none.
+    """
+
+    name: str
+    type: str
+    array: str = ""
+    bound: int = 0
+    default: Any = None
+    longest: int = 0
+    nested: "Interface | None" = None
+
+    def spelled(self, package: str = "") -> str:
+        """The type as a .msg file of `package` writes it, such as `float64[36]`."""
+        home, _, rest = self.type.partition("/msg/")
+        name = self.type if not rest else rest if home == package else f"{home}/{rest}"
+        ends = {"": "", "fixed": f"[{self.bound}]", "bounded": f"[<={self.bound}]", "sequence": "[]"}
+        return name + (f"<={self.longest}" if self.longest else "") + ends[self.array]
+
+
+class Constant(NamedTuple):
+    """A named value."""
+
+    name: str
+    type: str
+    value: Any
+
+
+class Interface:
+    """A message type; or a service type, which has a `request` and a `response` and no fields of its own.
+
+    `kind` is "msg" or "srv". The messages of a service are messages: `std_srvs/srv/Trigger_Request`.
+    """
+
+    __slots__ = ("constants", "fields", "kind", "least", "name", "request", "response", "width")
+
+    def __init__(
+        self,
+        name: str,
+        kind: str,
+        fields: tuple[Field, ...] = (),
+        constants: tuple[Constant, ...] = (),
+        parts: "tuple[Interface, Interface] | None" = None,
+    ) -> None:
+        self.name, self.kind, self.fields, self.constants = name, kind, fields, constants
+        self.request = parts[0] if parts else None
+        self.response = parts[1] if parts else None
+        self.least: int = max(1, sum(map(_least, fields)))  # bytes; an empty message has one
+        self.width: int = 1 + sum(field.nested.width if field.nested else 1 for field in fields)
+        if self.least > LARGEST or self.width > MOST_FIELDS:
+            raise InterfaceError(f"{name} is too large: at least {self.least} bytes and {self.width} fields")
+
+    @property
+    def package(self) -> str:
+        """The first part of the name."""
+        return self.name.partition("/")[0]
+
+    def __repr__(self) -> str:
+        return f"<Interface {self.name}>"
+
+
+def least(field: Field) -> int:
+    """The least number of bytes of one element of a field, without padding."""
+    return field.nested.least if field.nested else size(field.type)
+
+
+def size(primitive: str) -> int:
+    """The bytes of a primitive; for a text, those of its length."""
+    return _SIZES.get(primitive) or int(primitive.lstrip("uintfloa")) // 8
+
+
+def _least(field: Field) -> int:
+    return 4 if field.array in ("sequence", "bounded") else least(field) * (field.bound if field.array else 1)
+
+
+class PlacedError(InterfaceError):
+    """An error that already names its file and line."""
+
+
+class Section(NamedTuple):
+    """The fields and constants of a message, or of one half of a service."""
+
+    fields: tuple[Field, ...]
+    constants: tuple[Constant, ...]
+
+
+Resolve = Callable[[str], Interface]
+
+
+def parse(text: str, where: str, resolve: Resolve, first: int = 1) -> list[Section]:
+    """The sections of a file, separated by `---`. `resolve` returns the message for a name such as `Pose`.
+
+    Raises InterfaceError with `where` and the line, counted from `first`.
+    """
+    if len(text) > LARGEST_FILE:
+        raise InterfaceError(f"{where}: {len(text)} characters; at most {LARGEST_FILE} are read")
+    sections: list[list[Field | Constant]] = [[]]
+    for number, line in enumerate(text.splitlines(), first):
+        bare = _bare(line)
+        if bare == "---":
+            sections.append([])
+        elif bare:
+            try:
+                sections[-1].append(_member(bare, resolve, sections[-1]))
+            except PlacedError:
+                raise  # it names the file of the nested type
+            except InterfaceError as error:
+                raise PlacedError(f"{where}:{number}: {error}") from None
+    return [_section(members) for members in sections]
+
+
+def _section(members: list[Field | Constant]) -> Section:
+    fields = tuple(member for member in members if isinstance(member, Field))
+    return Section(fields, tuple(member for member in members if isinstance(member, Constant)))
+
+
+def _bare(line: str) -> str:
+    """The line without its comment. A `#` in quotes does not start one, unless the quotes are unbalanced."""
+    quote = ""
+    for at, letter in enumerate(line):
+        if quote:
+            quote = "" if letter == quote and line[at - 1] != "\\" else quote
+        elif letter == "#":
+            return line[:at].strip()
+        elif letter in "\"'":
+            quote = letter
+    return (line.partition("#")[0] if quote else line).strip()
+
+
+def _member(line: str, resolve: Resolve, before: list[Field | Constant]) -> Field | Constant:
+    found = _LINE.fullmatch(line)
+    if not found:
+        raise InterfaceError(f"{line[:80]!r} is not a field; write TYPE NAME, TYPE NAME DEFAULT or TYPE NAME=VALUE")
+    name = found["name"]
+    if any(member.name == name for member in before):
+        raise InterfaceError(f"{name!r} is defined twice")
+    field = _field(found, resolve)
+    if found["constant"] is None:
+        return field
+    if field.array or field.nested:
+        raise InterfaceError(f"{name!r}: a constant is one number, bool or string")
+    return Constant(name, field.type, value_of(field, found["constant"]))
+
+
+def _field(found: re.Match[str], resolve: Resolve) -> Field:
+    kind, nested, longest = found["type"], None, int(found["longest"] or 0)
+    if kind not in PRIMITIVES:
+        nested = resolve(OLD.get(kind, kind))
+        kind = nested.name
+    if found["longest"] and (kind not in TEXTS or not longest):
+        raise InterfaceError(f"{found['type']}<={found['longest']}: only a string has a bound, from 1 up")
+    array, bound = _array(found["array"])
+    field = Field(found["name"], kind, array, bound, None, longest, nested)
+    return field if found["default"] is None else field._replace(default=_parsed_default(field, found["default"]))
+
+
+def _array(text: str | None) -> tuple[str, int]:
+    if text is None or text == "[]":
+        return ("sequence" if text else ""), 0
+    bound = int(text.strip("[<=]") or 0)
+    if not 0 < bound <= LARGEST_ARRAY:
+        raise InterfaceError(f"{text}: an array has from 1 to {LARGEST_ARRAY} elements")
+    return ("bounded" if "<" in text else "fixed"), bound
+
+
+def _parsed_default(field: Field, text: str) -> Any:
+    if field.nested:
+        raise InterfaceError(f"{field.name!r}: a message has no default")
+    if not field.array:
+        return value_of(field, text)
+    if not (text.startswith("[") and text.endswith("]")):
+        raise InterfaceError(f"{field.name!r}: {text[:80]!r} is not a list; write [1, 2]")
+    values = [value_of(field, item) for item in _items(field, text[1:-1])]
+    wrong = len(values) != field.bound if field.array == "fixed" else 0 < field.bound < len(values)
+    if wrong:
+        raise InterfaceError(f"{field.name!r}: {len(values)} values for {field.spelled()}")
+    return values
+
+
+def _items(field: Field, text: str) -> list[str]:
+    items, at = [], 0
+    while at < len(text.rstrip()):
+        found = _ITEM.match(text, at)
+        if not found:
+            raise InterfaceError(f"{field.name!r}: {text[at : at + 80]!r} is not a list of values")
+        items.append(found[1])
+        at = found.end()
+    return items
+
+
+def value_of(field: Field, text: str) -> Any:
+    """The value that `text` writes for one element of a field. Raises InterfaceError."""
+    try:
+        if field.type in TEXTS:
+            return _text(field, text)
+        if field.type == "bool":
+            return _BOOLS[text.lower()]
+        if field.type in FLOATS:
+            return float(text)
+        low, high = INTEGERS[field.type]
+        value = int(text, 0)
+        if low <= value <= high:
+            return value
+    except (ValueError, KeyError):
+        pass
+    raise InterfaceError(f"{field.name!r}: {text[:80]!r} is not a valid {field.type}")
+
+
+def _text(field: Field, text: str) -> str:
+    if len(text) > 1 and text[0] in "\"'" and text[0] == text[-1]:
+        text = re.sub(r"\\([\\\"'])", r"\1", text[1:-1])
+    if field.longest and len(text) > field.longest:
+        raise ValueError
+    return text
+
+
+def prototype(interface: Interface) -> dict[str, Any]:
+    """A message with each field at its default: the one in the definition, else zero, empty or false."""
+    return {field.name: _default(field) for field in interface.fields}
+
+
+def completed(interface: Interface, value: Any, path: str = "") -> dict[str, Any]:
+    """`value` with missing fields at their defaults.
+
+    Raises InterfaceError with the path of the first field that does not exist (and the most similar one that does) or
+    whose value has the wrong type, range or length. NaN and infinities are numbers. A mapping stands for a list of
+    pairs.
+    """
+    if not isinstance(value, dict):
+        raise InterfaceError(f"{path or interface.name}: {_shown(value)} is not a mapping of fields")
+    names = [field.name for field in interface.fields]
+    for name in value:
+        if name not in names:
+            where = f"{path}.{name}" if path else f"{name}"
+            raise InterfaceError(
+                f"{interface.name} has no field {where[:80]!r}{closest(str(name), names) or _listed(names)}"
+            )
+    return {
+        field.name: _checked(field, value[field.name], f"{path}.{field.name}".lstrip("."))
+        if field.name in value
+        else _default(field)
+        for field in interface.fields
+    }
+
+
+def _listed(names: list[str]) -> str:
+    return f"; it has {', '.join(names)}" if names else "; it has none"
+
+
+def _default(field: Field) -> Any:
+    if field.default is not None:
+        return list(field.default) if isinstance(field.default, list) else field.default
+    if field.array:
+        return [_zero(field) for _ in range(field.bound if field.array == "fixed" else 0)]
+    return _zero(field)
+
+
+def _zero(field: Field) -> Any:
+    if field.nested:
+        return prototype(field.nested)
+    if field.type in TEXTS:
+        return ""
+    return False if field.type == "bool" else 0.0 if field.type in FLOATS else 0
+
+
+def _checked(field: Field, value: Any, path: str) -> Any:
+    if not field.array:
+        return _element(field, value, path)
+    if isinstance(value, dict) and (names := _pair(field)):
+        value = [dict(zip(names, item, strict=True)) for item in value.items()]
+    if not isinstance(value, list | tuple):
+        raise InterfaceError(f"{path}: {_shown(value)} is not a list")
+    wrong = len(value) != field.bound if field.array == "fixed" else 0 < field.bound < len(value)
+    if wrong:
+        raise InterfaceError(f"{path}: {len(value)} values for {field.spelled()}")
+    return [_element(field, inner, f"{path}[{index}]") for index, inner in enumerate(value)]
+
+
+def _pair(field: Field) -> list[str]:
+    names = [inner.name for inner in field.nested.fields] if field.nested else []
+    return names if len(names) == 2 else []
+
+
+def _element(field: Field, value: Any, path: str) -> Any:
+    if field.nested:
+        return completed(field.nested, value, path)
+    if _fits(field, value):
+        return float(value) if field.type in FLOATS else value
+    raise InterfaceError(f"{path}: {_shown(value)} is not a valid {field._replace(array='').spelled()}")
+
+
+def _fits(field: Field, value: Any) -> bool:
+    if field.type == "bool" or isinstance(value, bool):
+        return field.type == "bool" and isinstance(value, bool)
+    if field.type in TEXTS:
+        return isinstance(value, str) and _is_unicode(value) and not 0 < field.longest < len(value.encode())
+    if field.type in FLOATS:
+        return isinstance(value, float | int) and _is_number(field.type, value)
+    low, high = INTEGERS[field.type]
+    return isinstance(value, int) and low <= value <= high
+
+
+def _is_number(kind: str, value: float) -> bool:
+    try:
+        number = float(value)
+    except OverflowError:  # a whole number beyond all floats
+        return False
+    return kind == "float64" or not math.isfinite(number) or abs(number) < FLOAT32
+
+
+def _is_unicode(text: str) -> bool:
+    return not any("\ud800" <= letter <= "\udfff" for letter in text)
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:80]}..."
+
+
+def closest(name: str, known: Iterable[str]) -> str:
+    """`; did you mean X?` with the most similar name in `known`; empty if none is similar."""
+    import difflib
+
+    folded = {each.lower().rpartition("/")[2]: each for each in known}  # the package is no sign of similarity
+    found = difflib.get_close_matches(name.lower().rpartition("/")[2], folded, 1)
+    return f"; did you mean {folded[found[0]]}?" if found else ""

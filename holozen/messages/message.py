@@ -1,0 +1,72 @@
+"""The base of all messages, the integer types of ROS, and the numbers and arrays within a message."""
+
+import math
+import struct
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from typing import Annotated, Any, ClassVar
+
+import msgspec
+from msgspec import Meta, Struct
+
+# `ros` is the type in the definition; a plain int is an int64, a float a float64.
+Byte = Annotated[int, Meta(ge=0, lt=2**8, extra={"ros": "byte"})]
+UInt8 = Annotated[int, Meta(ge=0, lt=2**8, extra={"ros": "uint8"})]
+Int32 = Annotated[int, Meta(ge=-(2**31), lt=2**31, extra={"ros": "int32"})]
+UInt64 = Annotated[int, Meta(ge=0, extra={"ros": "uint64"})]
+
+
+class Message(Struct, forbid_unknown_fields=True):
+    """A message of ROS, field for field. A field left out is zero.
+
+    The name in ROS follows from the module and the class, with the ending Request or Reply for the two halves of a
+    service.
+    """
+
+    ROS: ClassVar[str] = ""
+    SETTLE: ClassVar[Callable[[Any], None] | None] = None  # checks the fields before the message is written
+    ANY_NUMBER: ClassVar[bool] = False  # whether a NaN or an infinity is sent (as CDR) instead of refused
+
+    def __init_subclass__(cls) -> None:
+        package, name = cls.__module__.rpartition(".")[2], cls.__name__
+        service = name.removesuffix("Request").removesuffix("Reply")
+        cls.ROS = f"{package}/msg/{name}" if service == name else f"{package}/srv/{service}"
+
+
+def packed(code: str, values: Sequence[Any]) -> "array[Any]":
+    """A list of numbers as an array. Raises OverflowError for one beyond a float32, struct.error for an integer."""
+    if code == "B":
+        return array(code, bytes(values))
+    made: array[Any] = array(code)
+    made.frombytes(struct.pack(f"={len(values)}{code}", *values))
+    return made
+
+
+def listed(value: Any) -> list[Any]:
+    """An array as a list, which is what stands on the wire. Raises TypeError for anything else."""
+    if isinstance(value, array):
+        return value.tolist()
+    raise TypeError(f"a message cannot hold a {type(value).__name__}")
+
+
+def not_finite(message: Message) -> str:
+    """The path of the first number in `message` that is NaN or infinite, such as `linear.x`; else empty."""
+    return next(_bad_numbers(msgspec.to_builtins(message, enc_hook=_suspects), ""), "")
+
+
+def _suspects(value: Any) -> list[Any]:
+    """An array as a list if some of its numbers may not be finite, else an empty list. Raises TypeError."""
+    if isinstance(value, array) and (value.typecode not in "fd" or math.isfinite(sum(value))):
+        return []
+    return listed(value)
+
+
+def _bad_numbers(value: Any, path: str) -> Iterator[str]:
+    if isinstance(value, float) and not math.isfinite(value):
+        yield path
+    elif isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _bad_numbers(inner, f"{path}.{name}" if path else name)
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from _bad_numbers(inner, f"{path}[{index}]")

@@ -1,0 +1,16 @@
+"""Odometry."""
+
+from msgspec import field
+
+from holozen.messages.geometry_msgs import PoseWithCovariance, TwistWithCovariance
+from holozen.messages.message import Message
+from holozen.messages.std_msgs import Header
+
+
+class Odometry(Message):
+    """The pose of a robot in `header.frame_id`, and its twist in `child_frame_id`."""
+
+    header: Header = field(default_factory=Header)
+    child_frame_id: str = ""
+    pose: PoseWithCovariance = field(default_factory=PoseWithCovariance)
+    twist: TwistWithCovariance = field(default_factory=TwistWithCovariance)

@@ -1,0 +1,279 @@
+"""Looks up types by name, in the tables of interfaces/ and in the msg and srv folders of packages."""
+
+import functools
+import os
+import re
+import stat
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+from holozen.messages.definitions import LARGEST_FILE, Interface, InterfaceError, closest, parse
+
+TABLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "interfaces")
+KINDS = ("msg", "srv")
+_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/(?:(msg|srv)/)?([A-Za-z][A-Za-z0-9_]*)")
+DEEPEST = 50  # levels of nesting
+MOST_LOST = 100  # unknown names that are remembered
+MOST = 20  # names in an error
+_HALVES = ("_Request", "_Response")
+
+Folders = Mapping[str, "str | os.PathLike[str]"]
+Paths = Sequence["str | os.PathLike[str]"]
+
+
+class Source(NamedTuple):
+    """The text of a definition, its file, and its first line."""
+
+    text: str
+    where: str
+    line: int = 1
+
+
+def table(package: str) -> dict[str, Source]:
+    """The definitions of a package that comes with holozen, by `msg/Name`; empty for any other."""
+    structs = {name: source for name, source in _sections("structs").items() if name.startswith(f"{package}/")}
+    return {name.partition("/")[2]: source for name, source in structs.items()} | _sections(package)
+
+
+def tables() -> list[str]:
+    """The packages that come with holozen."""
+    files = {name.removesuffix(".txt") for name in os.listdir(TABLES) if name.endswith(".txt")}
+    return sorted({name.partition("/")[0] for name in _sections("structs")} | files - {"structs"})
+
+
+@functools.cache
+def _sections(name: str) -> dict[str, Source]:
+    """The definitions in a file of interfaces/, by their headings; empty if there is no such file."""
+    path = os.path.join(TABLES, f"{name}.txt")
+    if not os.path.isfile(path):
+        return {}
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    found = list(re.finditer(r"^\[([\w/]+)\]\n", text, re.MULTILINE))
+    ends = [*(heading.start() for heading in found[1:]), len(text)]
+    return {
+        heading[1]: Source(text[heading.end() : end], path, text.count("\n", 0, heading.end()) + 1)
+        for heading, end in zip(found, ends, strict=True)
+    }
+
+
+class Places:
+    """Finds the definitions of packages.
+
+    `given` are the folders of some of them. The others are looked up once, around the files or folders `near` and
+    around the working folder.
+    """
+
+    def __init__(self, given: Folders, near: Paths = ()) -> None:
+        self._given = {name: os.fspath(folder) for name, folder in given.items()}
+        self._near = near
+        self._found: dict[str, str | None] = {}
+
+    def source(self, package: str, name: str) -> Source | None:
+        """The definition of `name` (such as `msg/Twist`) in a package; None if there is none. Raises InterfaceError."""
+        if package not in self._given and (ours := table(package)):
+            return ours.get(name)
+        path = self.folder(package)
+        kind, _, last = name.partition("/")
+        return None if path is None else _read(os.path.join(path, kind, f"{last}.{kind}"))
+
+    def names(self, package: str) -> list[str]:
+        """The definitions of a package, such as `msg/Twist`. Raises InterfaceError."""
+        if package not in self._given and (ours := table(package)):
+            return sorted(ours)
+        path = self.folder(package)
+        found = sorted(_names_in(path)) if path else []
+        if package in self._given and not found:
+            raise InterfaceError(f"--package {package}={path}: no .msg or .srv files in its folders msg and srv")
+        return found
+
+    def packages(self) -> list[str]:
+        """Our own, the given ones, and those in the environment that hold definitions."""
+        shared = [os.path.join(prefix, "share") for prefix in _environment("AMENT_PREFIX_PATH")]
+        for place in (*shared, *_environment("ROS_PACKAGE_PATH")):
+            for name in _listing(place):
+                path = os.path.join(place, name)
+                if re.fullmatch(r"\w+", name) and any(_names_in(path)):
+                    self._found.setdefault(name, path)
+        return sorted({*tables(), *self._given, *(name for name, path in self._found.items() if path)})
+
+    def folder(self, package: str) -> str | None:
+        """The folder of a package that is not ours; None if it is not found. Raises InterfaceError."""
+        if package not in self._given:
+            if package not in self._found:
+                self._found[package] = _look_up(package, self._near)
+            return self._found[package]
+        path = self._given[package]
+        if not os.path.isdir(path):
+            raise InterfaceError(f"--package {package}={path}: there is no such folder")
+        return path
+
+
+def _look_up(package: str, near: Paths) -> str | None:
+    """The folder of a package that is not ours, found as those of robot files are. Raises InterfaceError."""
+    from pathlib import Path
+
+    from holozen.robot.packages import find_named, folders_above, folders_below, packages_in
+
+    try:
+        starts = [*map(Path, near), Path.cwd()]
+        found = next(filter(None, (find_named(package, start) for start in starts)), None)
+        below = (each for start in starts if folders_above(start) for each in folders_below(start))
+        found = found or packages_in(list(below)).get(package)
+    except OSError as error:  # the working folder is gone
+        raise InterfaceError(f"package {package}: {error.strerror}") from None
+    return str(found) if found else None
+
+
+def _environment(variable: str) -> list[str]:
+    return [part for part in os.environ.get(variable, "").split(os.pathsep) if part]
+
+
+def _names_in(path: str) -> Iterator[str]:
+    for kind in KINDS:
+        for name in _listing(os.path.join(path, kind)):
+            if re.fullmatch(rf"\w+\.{kind}", name):
+                yield f"{kind}/{name.removesuffix('.' + kind)}"
+
+
+def _listing(path: str) -> list[str]:
+    try:
+        return os.listdir(path)
+    except OSError:
+        return []
+
+
+def _read(path: str) -> Source | None:
+    try:
+        state = os.stat(path)
+        if not stat.S_ISREG(state.st_mode):
+            raise InterfaceError(f"{path} is not a file")
+        with open(path, encoding="utf-8-sig") as file:
+            return Source(file.read(LARGEST_FILE + 1), path)
+    except FileNotFoundError:
+        return None
+    except UnicodeDecodeError:
+        raise InterfaceError(f"{path}: the text is not UTF-8") from None
+    except OSError as error:
+        raise InterfaceError(f"cannot read {path}: {error.strerror}") from None
+
+
+class Registry:
+    """Finds types, each parsed once.
+
+    A package is looked up among `packages` (name -> folder, as `--package NAME=DIR` gives), in our own tables, then in
+    AMENT_PREFIX_PATH, ROS_PACKAGE_PATH, around the files or folders `near` and around the working folder.
+    """
+
+    def __init__(self, packages: Folders = {}, near: Paths = ()) -> None:
+        self.places = Places(packages, near)
+        self._found: dict[str, Interface] = {}
+        self._lost: dict[str, InterfaceError] = {}  # any sample may name one
+        self._open: list[str] = []  # types being parsed, to detect one that contains itself
+
+    def find(self, name: str) -> Interface:
+        """The type called `name`: `geometry_msgs/msg/Twist`, `std_srvs/srv/Trigger`, or a service's half
+        `std_srvs/srv/Trigger_Request`. Raises InterfaceError, with the closest name there is.
+        """
+        if name in self._found:
+            return self._found[name]
+        if name in self._lost:
+            raise self._lost[name].with_traceback(None)
+        try:
+            found = self._found[name] = self._find(name)
+        except InterfaceError as error:
+            if not self._open and len(self._lost) < MOST_LOST:
+                self._lost[name] = error
+            raise
+        return found
+
+    def names(self) -> list[str]:
+        """All types that can be listed, sorted."""
+        known = self.places.packages()
+        return [f"{package}/{name}" for package in known for name in self.places.names(package)]
+
+    def _find(self, name: str) -> Interface:
+        if re.fullmatch(r"\w+", name):
+            raise InterfaceError(self._bare(name))
+        package, kind, last = _parts(name)
+        for each in (kind,) if kind else KINDS:
+            if found := self._get(package, f"{each}/{last}"):
+                return found
+        raise InterfaceError(self._unknown(name, package))
+
+    def _get(self, package: str, name: str) -> Interface | None:
+        full = f"{package}/{name}"
+        if full not in self._found:
+            stem = next((name.removesuffix(half) for half in _HALVES if name.endswith(half)), name)
+            whole = name if name.startswith("msg/") else stem
+            source = self.places.source(package, whole)
+            if source is None:
+                return None
+            self._keep(package, whole, source)
+        return self._found.get(full)
+
+    def _keep(self, package: str, name: str, source: Source) -> None:
+        full, kind = f"{package}/{name}", name[:3]
+        if full in self._open:
+            raise InterfaceError(f"{full} contains itself: {' > '.join([*self._open, full])}")
+        if len(self._open) == DEEPEST:
+            raise InterfaceError(f"{self._open[0]} is nested more than {DEEPEST} deep")
+        self._open.append(full)
+        try:
+            sections = parse(source.text, source.where, lambda other: self._nested(package, other), source.line)
+            wanted = 2 if kind == "srv" else 1
+            if len(sections) != wanted:
+                raise InterfaceError(f"{source.where}: {len(sections) - 1} lines of '---'; a .{kind} has {wanted - 1}")
+            ends = _HALVES if kind == "srv" else ("",)
+            made = [Interface(full + end, "msg", *section) for end, section in zip(ends, sections, strict=True)]
+        finally:
+            self._open.pop()
+        if kind == "srv":
+            made.append(Interface(full, "srv", parts=(made[0], made[1])))
+        self._found.update({interface.name: interface for interface in made})
+
+    def _nested(self, package: str, name: str) -> Interface:
+        """The message that a file of `package` calls `name`."""
+        if "/" in name:
+            home, kind, last = _parts(name)
+            if kind == "srv":
+                raise InterfaceError(f"{name}: a field is a message, not a service")
+            return self.find(f"{home}/msg/{last}")
+        if name == "Header" and not self.places.source(package, "msg/Header"):
+            package = "std_msgs"  # as ROS 1 wrote it
+        return self.find(f"{package}/msg/{name}")
+
+    def _bare(self, name: str) -> str:
+        same = [full for full in self.names() if full.rpartition("/")[2].lower() == name.lower()]
+        hint = f"did you mean {' or '.join(same)}?" if same else "`holozen interface list` lists all"
+        return f"{name[:80]!r} is not a type: the package is missing; {hint}"
+
+    def _unknown(self, name: str, package: str) -> str:
+        known = [f"{package}/{each}" for each in self.places.names(package)]
+        if not known:
+            there = self.places.packages()
+            hint = closest(package, there) or f"; known: {listed(there)}"
+            return f"no package {package!r} with interfaces{hint}; give its folder: --package {package}=DIR"
+        return f"no type {name!r}{closest(name, known) or '; known: ' + listed(known)}"
+
+
+def listed(names: list[str]) -> str:
+    """The first names, and how many more there are."""
+    return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "")
+
+
+def full_name(name: str) -> str:
+    """A full type name as ROS 2 writes it. Raises InterfaceError if package, kind or name are missing."""
+    package, kind, last = _parts(name)
+    if not kind:
+        raise InterfaceError(f"{name!r} does not specify msg or srv")
+    return f"{package}/{kind}/{last}"
+
+
+def _parts(name: str) -> tuple[str, str, str]:
+    """Package, kind (empty if none) and name. DDS spelling is read too: geometry_msgs::msg::dds_::Twist_."""
+    plain = name.replace("::dds_::", "::").removesuffix("_").replace("::", "/") if "::" in name else name
+    found = _NAME.fullmatch(plain)
+    if not found:
+        raise InterfaceError(f"{name[:80]!r} is not a type; write PACKAGE/msg/NAME, such as geometry_msgs/msg/Twist")
+    return found[1], found[2] or "", found[3]

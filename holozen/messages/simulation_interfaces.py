@@ -1,0 +1,141 @@
+"""The part of ROS's simulation_interfaces (1.0) that the sim serves.
+
+An entity is a robot or another object in the world. Reply codes are those of `Result`, and above 100 those of
+SpawnEntity. A request that fails is answered with an error reply, which carries the same `result`.
+"""
+
+from typing import ClassVar
+
+from msgspec import field
+
+from holozen.messages.geometry_msgs import Accel, Pose, PoseStamped, Twist, Vector3
+from holozen.messages.message import Message, UInt8
+from holozen.messages.std_msgs import Header
+
+
+class Result(Message):
+    """How a request ended: `OK`, or another code with a line that gives the reason.
+
+    When a robot was spawned although something in its text was replaced or left out, the result is `OK` and
+    `error_message` holds the warnings, one per line.
+    """
+
+    FEATURE_UNSUPPORTED: ClassVar[UInt8] = 0
+    OK: ClassVar[UInt8] = 1
+    NOT_FOUND: ClassVar[UInt8] = 2
+    INCORRECT_STATE: ClassVar[UInt8] = 3
+    OPERATION_FAILED: ClassVar[UInt8] = 4
+
+    result: UInt8 = 0
+    error_message: str = ""
+
+
+class EntityState(Message):
+    """The pose and the motion of an entity, in the world frame."""
+
+    header: Header = field(default_factory=Header)
+    pose: Pose = field(default_factory=Pose)
+    twist: Twist = field(default_factory=Twist)
+    acceleration: Accel = field(default_factory=Accel)
+
+
+class TagsFilter(Message):
+    FILTER_MODE_ANY: ClassVar[UInt8] = 0
+    FILTER_MODE_ALL: ClassVar[UInt8] = 1
+
+    tags: list[str] = field(default_factory=list)
+    filter_mode: UInt8 = 0
+
+
+class Bounds(Message):
+    TYPE_BOX: ClassVar[UInt8] = 0
+    TYPE_CONVEX_HULL: ClassVar[UInt8] = 1
+    TYPE_SPHERE: ClassVar[UInt8] = 2
+
+    type: UInt8 = 0
+    points: list[Vector3] = field(default_factory=list)
+
+
+class EntityCategory(Message):
+    CATEGORY_UNKNOWN: ClassVar[UInt8] = 0
+    CATEGORY_OBJECT: ClassVar[UInt8] = 1
+    CATEGORY_ROBOT: ClassVar[UInt8] = 2
+    CATEGORY_HUMAN: ClassVar[UInt8] = 3
+    CATEGORY_DYNAMIC_OBJECT: ClassVar[UInt8] = 4
+    CATEGORY_STATIC_OBJECT: ClassVar[UInt8] = 5
+
+    category: UInt8 = 0
+
+
+class EntityFilters(Message):
+    """Selects entities. `filter` is a regular expression on their names; an empty one selects all."""
+
+    filter: str = ""
+    categories: list[EntityCategory] = field(default_factory=list)
+    tags: TagsFilter = field(default_factory=TagsFilter)
+    bounds: Bounds = field(default_factory=Bounds)
+
+
+class SpawnEntityRequest(Message):
+    """A robot or object from `resource_string`, URDF or SDF text (clients expand xacro).
+
+    Its keys are below `entity_namespace`, by default below `name`; a slash is the root. With `allow_renaming`, or
+    without a name, an unused name is chosen.
+    """
+
+    name: str = ""
+    allow_renaming: bool = False
+    uri: str = ""
+    resource_string: str = ""
+    entity_namespace: str = ""
+    initial_pose: PoseStamped = field(default_factory=PoseStamped)
+
+
+class SpawnEntityReply(Message):
+    NAME_NOT_UNIQUE: ClassVar[UInt8] = 101
+    NAME_INVALID: ClassVar[UInt8] = 102
+    UNSUPPORTED_FORMAT: ClassVar[UInt8] = 103
+    NO_RESOURCE: ClassVar[UInt8] = 104
+    NAMESPACE_INVALID: ClassVar[UInt8] = 105
+    RESOURCE_PARSE_ERROR: ClassVar[UInt8] = 106
+    MISSING_ASSETS: ClassVar[UInt8] = 107
+    UNSUPPORTED_ASSETS: ClassVar[UInt8] = 108
+    INVALID_POSE: ClassVar[UInt8] = 109
+
+    result: Result = field(default_factory=Result)
+    entity_name: str = ""
+
+
+class DeleteEntityRequest(Message):
+    entity: str = ""
+
+
+class DeleteEntityReply(Message):
+    result: Result = field(default_factory=Result)
+
+
+class GetEntitiesRequest(Message):
+    filters: EntityFilters = field(default_factory=EntityFilters)
+
+
+class GetEntitiesReply(Message):
+    result: Result = field(default_factory=Result)
+    entities: list[str] = field(default_factory=list)
+
+
+class GetEntityStateRequest(Message):
+    entity: str = ""
+
+
+class GetEntityStateReply(Message):
+    result: Result = field(default_factory=Result)
+    state: EntityState = field(default_factory=EntityState)
+
+
+class SetEntityStateRequest(Message):
+    entity: str = ""
+    state: EntityState = field(default_factory=EntityState)
+
+
+class SetEntityStateReply(Message):
+    result: Result = field(default_factory=Result)

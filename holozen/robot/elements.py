@@ -1,0 +1,302 @@
+"""XML elements with their line numbers, and the source of a robot file, which collects warnings about it."""
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from xml.parsers import expat
+
+from holozen.robot.errors import RobotError, cut
+
+Vector = tuple[float, float, float]
+
+LARGEST = 1e6  # m, kg, kg m^2; larger numbers are mistakes, and 1e308 makes the engine compute NaN
+
+MOST_TEXT = 4_000_000  # characters, or bytes of a file; these three keep malicious files from stalling the reader
+MOST_ELEMENTS = 50_000
+DEEPEST = 200
+
+
+@dataclass(eq=False, slots=True)
+class Tag:
+    """`place` is the file and line for messages; `text` is the element's own text."""
+
+    name: str
+    attributes: dict[str, str]
+    place: str
+    parent: "Tag | None" = None
+    text: str = ""
+    children: "list[Tag]" = field(default_factory=list)
+
+    def all(self, name: str) -> "list[Tag]":
+        """The children called `name`."""
+        return [child for child in self.children if child.name == name]
+
+    def first(self, name: str) -> "Tag | None":
+        """The first child called `name`; as in URDF, further ones are ignored."""
+        for child in self.children:
+            if child.name == name:
+                return child
+        return None
+
+    def below(self, name: str) -> "Iterator[Tag]":
+        """The elements called `name` at any depth, in file order."""
+        waiting = self.children[::-1]
+        while waiting:
+            tag = waiting.pop()
+            if tag.name == name:
+                yield tag
+            waiting += tag.children[::-1]
+
+    def wrong(self, problem: str) -> RobotError:
+        """An error with the location of this element and `problem`."""
+        return RobotError(f"{self.place}: {self} {problem}")
+
+    def value(self) -> str:
+        """The value of a Gazebo element: its `value="..."`, else its text."""
+        return (self.attributes.get("value") or self.text).strip()
+
+    def word(self, attribute: str) -> str:
+        """A required attribute, which must not be empty."""
+        value = self.attributes.get(attribute, "")
+        if not value.strip():
+            raise self.wrong(f'has no {attribute}="..."')
+        return value
+
+    def numbers(
+        self, attribute: str, count: int, default: tuple[float, ...] | None = None, most: float = LARGEST
+    ) -> tuple[float, ...]:
+        """`count` numbers separated by white space, from -`most` to `most`; else `default`."""
+        if attribute not in self.attributes and default is not None:
+            return default
+        text = self.word(attribute)
+        values = tuple(self._number(attribute, word, most) for word in text.split())
+        if len(values) != count:
+            raise self.wrong(f"{attribute}={cut(text)} has {len(values)} numbers instead of {count}")
+        return values
+
+    def number(self, attribute: str, default: float | None = None, most: float = LARGEST) -> float:
+        """One number, from -`most` to `most`."""
+        return self.numbers(attribute, 1, None if default is None else (default,), most)[0]
+
+    def vector(self, attribute: str, default: Vector | None = None) -> Vector:
+        """Three numbers."""
+        x, y, z = self.numbers(attribute, 3, default)
+        return x, y, z
+
+    def _number(self, attribute: str, word: str, most: float) -> float:
+        value = number(word)
+        if value is None:
+            raise self.wrong(f"{attribute}: {cut(word)} is not a finite number; write 0.25, and spaces between several")
+        if abs(value) > most:
+            raise self.wrong(f"{attribute}: {cut(word)} is beyond {most:g}; use metres and kilograms")
+        return value
+
+    def __str__(self) -> str:
+        owner: Tag | None = self
+        while owner is not None and "name" not in owner.attributes:
+            owner = owner.parent
+        if owner is None:
+            return f"<{self.name[:80]}>"
+        named = f"<{owner.name[:80]} name={cut(owner.attributes['name'])}>"
+        return named if owner is self else f"<{self.name[:80]}> of {named}"
+
+
+def number(word: str) -> float | None:
+    """The finite number in `word`, or None. Python's `1_000` is None, since no XML reader accepts it."""
+    try:
+        value = float(word)
+    except ValueError:
+        return None
+    return value if math.isfinite(value) and "_" not in word else None
+
+
+def read_xml(text: str, place: str, most: int = MOST_TEXT) -> Tag:
+    """The root element of an XML text of at most `most` characters; `place` names the text in messages.
+
+    Raises RobotError with the line for broken XML and for entity declarations: robots need none, and they
+    can make a short file expand without bound or read other files. Too much text is rejected before parsing,
+    too many or too deeply nested elements as soon as they are encountered.
+    """
+    check_size(len(text), place, most)
+    if not text.strip():
+        raise RobotError(f"{place}: the file is empty; it must contain a <robot>")
+    reader = _Reader(place)
+    try:
+        reader.parser.Parse(text.encode("utf-8", "replace"), True)
+    except expat.ExpatError as error:
+        raise reader.broken(error) from None
+    return reader.root.children[0]
+
+
+def repair_xml(text: str) -> tuple[str, list[tuple[int, str]]]:
+    """The text without what Gazebo's parser (TinyXML) accepts and XML forbids, blanked out so that lines stay in place;
+    and for each such mistake its line number and a description.
+    """
+    if _is_well_formed(text):
+        return text, []
+    pieces: list[str] = []
+    mistakes: list[tuple[int, str]] = []
+    done, line, has_root = 0, 1, False
+    while (start := text.find("<", done)) >= 0:
+        line += text.count("\n", done, start)
+        end, problem, blanks = _markup(text, start, is_first=start == 0)
+        if end < 0:
+            break  # never closed: the rest cannot be parsed either
+        piece = text[start:end]
+        if not has_root and blanks and problem == HEADER and not text[:start].strip():
+            problem = "white space before <?xml ...?>, which XML does not allow; it is ignored, as in Gazebo"
+        if problem:
+            mistakes.append((line, problem))
+        for first, last in blanks:
+            piece = piece[:first] + re.sub(r"[^\n]", " ", piece[first:last]) + piece[last:]
+        has_root = has_root or piece[1:2].isalpha()
+        pieces += [text[done:start], piece]
+        line += piece.count("\n")
+        done = end
+    return "".join([*pieces, text[done:]]), mistakes
+
+
+HEADER = "a second <?xml ...?> header, which XML allows only at the start; it is ignored, as in Gazebo"
+_TAG = re.compile(r"""<[\w:.-]++(?:[^"'<>]|"[^"]*"|'[^']*')*+>""")
+_ATTRIBUTE = re.compile(r"""\s([\w:.-]+)\s*=\s*(?:"[^"]*"|'[^']*')""")
+
+
+def _markup(text: str, start: int, is_first: bool) -> tuple[int, str, list[tuple[int, int]]]:
+    """The end of the markup that starts with a `<`, or -1; what is wrong with it; and its parts to be blanked."""
+    for opening, closing in (("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")):
+        if not text.startswith(opening, start):
+            continue
+        found = text.find(closing, start + len(opening))
+        end = found + len(closing) if found >= 0 else -1
+        inside = text[start + 4 : found]
+        if opening == "<!--" and ("--" in inside or inside.endswith("-")):
+            return end, "a comment with -- in it, which XML does not allow", [(4, len(inside) + 4)]
+        if opening == "<?" and text[start + 2 : start + 6].lower() == "xml " and not is_first:
+            return end, HEADER, [(0, end - start)]
+        return end, "", []
+    tag = _TAG.match(text, start)
+    if tag is None:
+        return text.find(">", start) + 1 or -1, "", []
+    attributes = list(_ATTRIBUTE.finditer(tag[0]))
+    first = {match[1]: match for match in reversed(attributes)}
+    twice = [match for match in attributes if match is not first[match[1]]]
+    if not twice:
+        return tag.end(), "", []
+    name = re.match(r"<[\w:.-]+", tag[0])
+    problem = f"{name[0][:80] if name else '<'}> has the attribute {cut(twice[0][1])} twice; the first is used"
+    return tag.end(), problem, [match.span() for match in twice]
+
+
+def _is_well_formed(text: str) -> bool:
+    def refuse(*_declaration: object) -> None:
+        raise expat.ExpatError
+
+    parser = expat.ParserCreate("utf-8")
+    parser.EntityDeclHandler = refuse  # entities may expand without bound
+    try:
+        parser.Parse(text.encode("utf-8", "replace"), True)
+    except expat.ExpatError:
+        return False
+    return True
+
+
+def check_size(size: int, place: str, most: int = MOST_TEXT) -> None:
+    """Raise RobotError for an XML text of more than `most` characters, or a file of more bytes."""
+    if size > most:
+        content = f"{size / 1e6:.1f} MB of XML; a robot or world has at most {most / 1e6:g} MB"
+        raise RobotError(f"{place}: the file contains {content}: move its meshes to separate files")
+
+
+class _Reader:
+    def __init__(self, place: str) -> None:
+        self.place = place
+        self.root = self.open = Tag("", {}, place)
+        self.count = 0
+        self.texts: list[list[str]] = [[]]  # of the open elements; joined once, since comments split a text
+        self.parser = expat.ParserCreate("utf-8")
+        self.parser.buffer_text = True
+        self.parser.StartElementHandler = self.start
+        self.parser.EndElementHandler = self.end
+        self.parser.CharacterDataHandler = self.characters
+        self.parser.EntityDeclHandler = self.entity
+
+    def start(self, name: str, attributes: dict[str, str]) -> None:
+        tag = Tag(name, attributes, f"{self.place}, line {self.parser.CurrentLineNumber}", self.open)
+        self.count += 1
+        if self.count > MOST_ELEMENTS:
+            raise tag.wrong(f"is element number {self.count}; a file may have at most {MOST_ELEMENTS}")
+        if len(self.texts) > DEEPEST:
+            raise tag.wrong(f"lies inside {DEEPEST} others; elements may be nested at most {DEEPEST} deep")
+        self.open.children.append(tag)
+        self.open = tag
+        self.texts.append([])
+
+    def end(self, name: str) -> None:
+        assert self.open.parent is not None, "expat closes what it opened"
+        self.open.text = "".join(self.texts.pop())
+        self.open = self.open.parent
+
+    def characters(self, text: str) -> None:
+        self.texts[-1].append(text)
+
+    def entity(self, name: str, *rest: object) -> None:
+        line = self.parser.CurrentLineNumber
+        raise RobotError(f"{self.place}, line {line}: the entity {cut(name)} is declared; write out its text instead")
+
+    def broken(self, error: expat.ExpatError) -> RobotError:
+        unclosed = f"; {self.open} of {self.open.place} is still open" if self.open.name else ""
+        return RobotError(f"{self.place}, line {error.lineno}: broken XML: {expat.ErrorString(error.code)}{unclosed}")
+
+
+MOST_WARNINGS = 200
+MOST_GUESSES = 20  # each scans every name; a file full of mistakes has to finish soon too
+
+
+@dataclass(slots=True)
+class Source:
+    """The file of a robot, the packages given with it, and the warnings about it.
+
+    `strict`: a missing or invalid mesh is an error. `confined`: the text was received over the network, and may only
+    open files of known packages.
+    """
+
+    origin: Path
+    packages: Mapping[str, Path]
+    warnings: list[str] = field(default_factory=list)
+    guesses: int = 0
+    strict: bool = False
+    confined: bool = False
+    meshes: int = 0
+
+    def warn(self, tag: Tag, problem: str) -> None:
+        """Record a mistake that does not make the robot unusable."""
+        if len(self.warnings) < MOST_WARNINGS:
+            self.warnings.append(str(tag.wrong(problem)))
+        elif len(self.warnings) == MOST_WARNINGS:
+            self.warnings.append(f"{tag.place}: there are more than {MOST_WARNINGS} warnings; the rest are not listed")
+
+    def read(self, text: str, place: str = "") -> Tag:
+        """The root element of a text, parsed as by Gazebo, with a warning for what only its parser accepts.
+
+        `place` (default: the file) names the text in messages. Raises RobotError as `read_xml` does.
+        """
+        place = place or str(self.origin)
+        check_size(len(text), place)
+        text, mistakes = repair_xml(text)
+        self.warnings += [f"{place}, line {line}: {problem}" for line, problem in mistakes[:MOST_WARNINGS]]
+        return read_xml(text, place)
+
+    def nearest(self, name: str, known: Iterable[str], common: str = "", alike: float = 0.6) -> str:
+        """The closest match for `name` in `known`, as the phrase "; did you mean ...?", else nothing.
+
+        `alike` is the similarity required, from 0 to 1; the prefix `common` is ignored.
+        """
+        self.guesses += 1
+        if self.guesses > MOST_GUESSES:
+            return ""
+        same = {other.removeprefix(common).casefold()[:60]: other for other in known}
+        found = get_close_matches(name.removeprefix(common).casefold()[:60], same, 1, alike)
+        return f"; did you mean {cut(same[found[0]])}?" if found else ""

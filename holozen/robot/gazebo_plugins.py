@@ -1,0 +1,782 @@
+"""Gazebo plugins and sensors: the drive of a robot, and what is parsed but not simulated.
+
+A plugin is identified by its file name, or for gz-sim by its class.
+"""
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+
+from holozen.robot.elements import LARGEST, Source, Tag, Vector, number
+from holozen.robot.errors import RobotError, cut, listed
+from holozen.robot.model import (
+    Balancing,
+    Differential,
+    Drive,
+    Joint,
+    Link,
+    Mecanum,
+    Mechanism,
+    Planar,
+    RobotModel,
+    Sensor,
+    Shape,
+)
+from holozen.robot.rigid import link_frames
+from holozen.robot.rotation import Array, matrix_of
+from holozen.robot.shapes import solid
+from holozen.wire import COMMAND_SILENCE
+
+_GZ_FILE = re.compile(r"(?:gz-sim|ignition-gazebo)\d*-(.+)-system")
+_GZ_CLASS = re.compile(r"(?:gz::sim|ignition::gazebo)::(?:v\d+::)?systems::(\w+)")
+_HUMP = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+
+
+def kind_of(plugin: Tag) -> str:
+    """`gazebo_ros_diff_drive` for libgazebo_ros_diff_drive.so, `gz:diff-drive` for gz-sim's and ignition's DiffDrive,
+    identified by its file or by its class; empty for a plugin without a file name.
+    """
+    stem = file_of(plugin).rpartition("/")[2].removeprefix("lib").removesuffix(".so")
+    system, name = _GZ_FILE.fullmatch(stem), _GZ_CLASS.fullmatch(plugin.attributes.get("name", "").strip())
+    if system:
+        return f"gz:{system[1]}"
+    return f"gz:{_HUMP.sub('-', name[1]).lower()}" if name else stem.removesuffix("-system")
+
+
+def file_name(kind: str) -> str:
+    """The `filename` to write for a plugin, by its kind."""
+    return f"gz-sim-{kind[3:]}-system" if kind.startswith("gz:") else f"lib{kind}.so"
+
+
+def file_of(plugin: Tag) -> str:
+    """The plugin's `filename` as written."""
+    return plugin.attributes.get("filename", "").strip()
+
+
+# Settings: the elements inside a plugin or `<gazebo reference>`, in the spelling of ROS 1, ROS 2, or a mix of both.
+
+
+SMALLEST = 1e-3  # m; smallest wheel radius, and distance between wheels
+
+_KEY = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]*(/[A-Za-z0-9_][A-Za-z0-9_-]*)*")
+
+
+class Settings:
+    """The child elements of `owner` by their ROS 2 spelling; the first of duplicates counts."""
+
+    def __init__(self, owner: Tag) -> None:
+        self.owner = owner
+        self._tags = {_snake_case(tag.name): tag for tag in reversed(owner.children)}
+
+    def tag(self, *names: str) -> Tag:
+        """The first of `names` that is present and not empty, else an empty tag."""
+        found = self._found(names)
+        return Tag(names[0], {}, self.owner.place, self.owner) if found is None else found
+
+    def each(self, *names: str) -> list[Tag]:
+        """Every non-empty child called one of `names`, in file order."""
+        return [tag for tag in self.owner.children if _snake_case(tag.name) in names and tag.value()]
+
+    def word(self, *names: str) -> str:
+        """The text of the first of `names` that is present, else an empty string."""
+        found = self._found(names)
+        return "" if found is None else found.value()
+
+    def number(self, default: float, *names: str, zero: bool = True, most: float = LARGEST) -> float:
+        """A positive number, or zero where allowed, up to `most`. Raises RobotError."""
+        word = self.word(*names)
+        value = number(word) if word else default
+        if value is None or value < 0 or (value == 0 and not zero):
+            problem = f"is {cut(word)}; it must be a number {'not below' if zero else 'above'} 0"
+            raise self.tag(*names).wrong(problem)
+        if value > most and word:
+            raise self.tag(*names).wrong(f"is {cut(word)}; it must be at most {most:g}")
+        return value
+
+    def maybe(self, *names: str, most: float = LARGEST) -> float | None:
+        """A non-negative number, or None if none of `names` is present. Raises RobotError."""
+        return self.number(0.0, *names, most=most) if self.word(*names) else None
+
+    def maybe_measure(self, *names: str, least: float = SMALLEST) -> float:
+        """Metres, at least `least`, or 0 if none of `names` is present. Raises RobotError."""
+        value = self.number(0.0, *names, zero=False) if self.word(*names) else 0.0
+        if 0 < value < least:
+            raise self.tag(*names).wrong(f"is {cut(self.word(*names))}; it must be at least {least:g} m")
+        return value
+
+    def timeout(self, *names: str) -> float:
+        """Seconds, or -1 for a disabled watchdog. Raises RobotError."""
+        value = number(self.word(*names) or "")
+        return -1.0 if value is not None and value < 0 else self.number(COMMAND_SILENCE, *names, zero=False)
+
+    def flag(self, *names: str, default: bool = True) -> bool:
+        """True, false, 1 or 0; `default` if not set. Raises RobotError."""
+        word = self.word(*names).lower() or str(default).lower()
+        if word not in ("true", "1", "false", "0"):
+            raise self.tag(*names).wrong(f"is {cut(word)}; it must be true or false")
+        return word in ("true", "1")
+
+    def frame(self, *names: str) -> str:
+        """A frame's name without the leading slashes of ROS 1."""
+        return self.word(*names).strip("/")
+
+    def topic(self, default: str, *names: str) -> str:
+        """The key of a topic: its name after remapping, prefixed with the namespace unless it starts with a slash.
+
+        Raises RobotError for an invalid key.
+        """
+        remapped = dict(self._remappings())
+        topic = self.word(*names) or default
+        topic = remapped.get(topic.strip("/"), remapped.get(default, topic))
+        key = topic if topic.startswith("/") else f"{self._namespace()}/{topic}"
+        key = re.sub("/+", "/", key).strip("/")
+        if not _KEY.fullmatch(key):
+            problem = f"makes the topic {cut(key)}; a topic has letters, digits, '_', '-' and single '/'"
+            raise self.tag(*names).wrong(problem)
+        return key
+
+    def _found(self, names: tuple[str, ...]) -> Tag | None:
+        return next((self._tags[name] for name in names if name in self._tags and self._tags[name].value()), None)
+
+    def _namespace(self) -> str:
+        ros = self._tags.get("ros")
+        namespace = ros.first("namespace") if ros else None
+        return namespace.value() if namespace else self.word("robot_namespace")
+
+    def _remappings(self) -> Iterator[tuple[str, str]]:
+        ros = self._tags.get("ros")
+        for tag in (*(ros.all("remapping") if ros else ()), *self.owner.all("remapping")):
+            old, _, new = tag.value().partition(":=")
+            if new.strip():
+                yield old.strip().removeprefix("~").strip("/"), new.strip()
+
+
+def _snake_case(name: str) -> str:
+    return _HUMP.sub("_", name).lower()
+
+
+# Wheels: the joints that a plugin names, and dimensions it omits, measured on the robot's links.
+
+
+Joints = Mapping[str, Joint]
+
+TURNING = ("continuous", "revolute")
+
+
+def wheel_joint(settings: Settings, joints: Joints, source: Source, default: str, *names: str) -> str:
+    """The joint named by the first of the tags `names`, else `default`. Raises RobotError as `turning` does."""
+    tag = settings.tag(*names)
+    if not tag.value() and default not in joints:
+        raise settings.owner.wrong(f"has no <{names[0]}>; joints: {listed(list(joints))}")
+    return turning(tag, tag.value() or default, joints, source)
+
+
+def wheel_joints(settings: Settings, joints: Joints, source: Source, default: str, *names: str) -> tuple[str, ...]:
+    """All joints named by tags called one of `names`, each holding one or several separated by spaces; else `default`.
+
+    Raises RobotError as `turning` does.
+    """
+    named = [(tag, name) for tag in settings.each(*names) for name in _split(tag.value(), joints)]
+    if not named:
+        return (wheel_joint(settings, joints, source, default, *names),)
+    return tuple(turning(tag, name, joints, source) for tag, name in named)
+
+
+def turning(tag: Tag, name: str, joints: Joints, source: Source) -> str:
+    """`name`. Raises RobotError, listing the joints, unless it is a joint that turns."""
+    if name not in joints:
+        near = source.nearest(name, joints)
+        problem = f"names the joint {cut(name)}, which does not exist{near}"
+        raise tag.wrong(f"{problem}; joints: {listed(list(joints))}")
+    if joints[name].kind not in TURNING:
+        raise tag.wrong(f"names the joint {cut(name)}, which is {joints[name].kind}; a wheel's joint is continuous")
+    return name
+
+
+def _split(words: str, joints: Joints) -> list[str]:
+    return [words] if words in joints else words.split()
+
+
+SIMPLE = ("box", "cylinder", "sphere")  # visual meshes are not read
+
+
+def radius_across(link: Link, axle: Vector) -> float:
+    """Half of the link's larger extent across its axle, a unit vector in the link's frame, in metres; 0 without shapes.
+
+    Measured on the collision shapes, else on visual shapes other than meshes.
+    """
+    shapes = link.collisions or [shape for shape in link.visuals if shape.kind in SIMPLE]
+    corners = [part for shape in shapes if len(part := _corners(solid(shape)))]
+    if not corners:
+        return 0.0
+    along = np.array(axle)
+    aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+    aside /= np.linalg.norm(aside)
+    across = np.stack([aside, np.cross(along, aside)], axis=1)
+    return float(np.ptp(np.vstack(corners) @ across, axis=0).max() / 2)
+
+
+def _corners(shape: Shape) -> Array:
+    """Points (n, 3) in the link's frame with the shape's bounding box, if its axes are parallel to the link's."""
+    match shape.kind:
+        case "hull":
+            points = np.array(shape.points)
+        case "box":
+            points = _box(shape.size)
+        case "cylinder":
+            points = _box((2 * shape.size[0], 2 * shape.size[0], shape.size[1]))
+        case "sphere":
+            points = _box((2 * shape.size[0],) * 3)
+        case _:
+            return np.zeros((0, 3))
+    return np.array(shape.pose.xyz) + points @ matrix_of(shape.pose.rpy).T
+
+
+def _box(size: tuple[float, ...]) -> Array:
+    return np.array(list(product((-0.5, 0.5), repeat=3))) * size
+
+
+ROUND = ("cylinder", "sphere")
+
+
+def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
+    """The drive, with the radius of wheels without a round collision shape measured on their other shapes. That of
+    round ones stays 0: it is read from the links.
+
+    Raises RobotError at `plugin` for a joint used for two wheels, and for wheels whose radius or separation is
+    neither given nor measurable.
+    """
+    wheels = drive.mechanism
+    if isinstance(wheels, Planar):
+        return drive
+    left, right = _sides(wheels)
+    _check_once(left, right, plugin)
+    if any(robot.joints[name].child not in robot.links for name in (*left, *right)):
+        return drive  # such a wheel has no mass, which `check_drive` reports
+    if isinstance(wheels, Balancing):
+        _check_round((*left, *right), plugin, robot)
+        return drive
+    _check_apart(wheels, plugin, robot)
+    if wheels.radius:
+        return drive
+    link, radius = _first_radius(left[0], plugin, robot)
+    return drive if _round(link) else replace(drive, mechanism=replace(wheels, radius=radius))
+
+
+def _sides(wheels: Differential | Mecanum | Balancing) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    match wheels:
+        case Differential():
+            return wheels.left, wheels.right
+        case Mecanum():
+            return (wheels.front_left, wheels.back_left), (wheels.front_right, wheels.back_right)
+        case Balancing():
+            return (wheels.left,), (wheels.right,)
+
+
+def _check_once(left: tuple[str, ...], right: tuple[str, ...], plugin: Tag) -> None:
+    for name in left:
+        if name in right:
+            problem = f"has the joint {cut(name)} on the left and on the right"
+            raise plugin.wrong(f"{problem}; each wheel turns on a joint of its own")
+    for side, names in (("left", left), ("right", right)):
+        for name in names:
+            if names.count(name) > 1:
+                raise plugin.wrong(f"has the joint {cut(name)} twice on the {side}; each wheel turns on its own")
+
+
+def _check_round(names: tuple[str, ...], plugin: Tag, robot: RobotModel) -> None:
+    for name in names:
+        link = robot.links[robot.joints[name].child]
+        if _round(link) < SMALLEST:
+            problem = f"balances on the wheel {cut(link.name)}, whose collision shapes are not round"
+            raise plugin.wrong(f"{problem}; give it a <cylinder> with a radius of {SMALLEST:g} m or more")
+
+
+def _check_apart(wheels: Differential | Mecanum, plugin: Tag, robot: RobotModel) -> None:
+    left, right = _sides(wheels)
+    if not wheels.separation and _apart(left, right, 1, robot) < SMALLEST:
+        raise _missing_tag(plugin, "wheel_separation", "its left and right wheels are at the same y")
+    if isinstance(wheels, Mecanum) and not wheels.wheelbase:
+        front, back = (wheels.front_left, wheels.front_right), (wheels.back_left, wheels.back_right)
+        if _apart(front, back, 0, robot) < SMALLEST:
+            raise _missing_tag(plugin, "wheelbase", "its front and back wheels are at the same x")
+
+
+def _apart(some: tuple[str, ...], others: tuple[str, ...], axis: int, robot: RobotModel) -> float:
+    """Metres between the mean positions of two groups of wheels, along an axis of the root frame."""
+    frames = link_frames(robot)
+    places = [[frames[robot.joints[name].child].xyz[axis] for name in names] for names in (some, others)]
+    one, other = (sum(values) / len(values) for values in places)
+    return abs(one - other)
+
+
+def _first_radius(name: str, plugin: Tag, robot: RobotModel) -> tuple[Link, float]:
+    """The wheel on joint `name`, and its radius in metres."""
+
+    joint = robot.joints[name]
+    link = robot.links[joint.child]
+    radius = _round(link) or radius_across(link, joint.axis)
+    if radius < SMALLEST:
+        problem = f"its wheel {cut(link.name)} has no shape with a radius of {SMALLEST:g} m or more"
+        raise _missing_tag(plugin, "wheel_radius" if kind_of(plugin).startswith("gz:") else "wheel_diameter", problem)
+    return link, radius
+
+
+def _round(link: Link) -> float:
+    """The radius of the first round collision shape in metres; 0 without one."""
+    return next((shape.size[0] for shape in link.collisions if shape.kind in ROUND), 0.0)
+
+
+def _missing_tag(plugin: Tag, tag: str, reason: str) -> RobotError:
+    """`tag` as gz-sim and ROS 2 spell it."""
+    head, *rest = tag.split("_")
+    either = "" if kind_of(plugin).startswith("gz:") else f", or <{head}{''.join(map(str.title, rest))}> in ROS 1"
+    return plugin.wrong(f"has no <{tag}>, and {reason}; give <{tag}>{either}, in metres")
+
+
+# The drive plugins of ROS and of its tutorials. Tags and defaults are those of gazebo_ros_planar_move.cpp,
+# gazebo_ros_diff_drive.cpp and gazebo_ros_skid_steer_drive.cpp in ros-simulation/gazebo_ros_pkgs, in ROS 1 (noetic)
+# and ROS 2 (galactic), and of hector_gazebo's diffdrive_plugin_multi_wheel.cpp. Three things differ here: odometry
+# and its tf are published unless the file disables them; a stale command stops the robot; and wheel dimensions that
+# the file omits are measured.
+
+
+TORQUE = 5.0  # N m
+FAST = 100.0  # Hz; odometry rate of all but planar_move
+SKID_COVARIANCE = (1e-4, 1e-4, 1e-2)
+SOURCES = {"encoder": True, "0": True, "world": False, "1": False}
+
+
+def planar_move(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """gazebo_ros_planar_move.cpp. Raises RobotError, like all of these."""
+    plain = Drive()
+    rate = settings.number(plain.odometry_rate, "odometry_rate", "publish_rate", zero=False)
+    return _ros_drive(settings, Planar(), rate, plain.covariance)
+
+
+def diff_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """gazebo_ros_diff_drive.cpp: one pair of wheels, possibly several in ROS 2."""
+    left = wheel_joints(settings, joints, source, "left_joint", "left_joint")
+    right = wheel_joints(settings, joints, source, "right_joint", "right_joint")
+    if len(left) != len(right):
+        problem = f"has {len(left)} left and {len(right)} right joints; wheels come in pairs"
+        raise settings.owner.wrong(problem)
+    if settings.flag("legacy_mode", default=False):  # noetic: left and right are swapped
+        left, right = right, left
+    _check_pairs(settings, len(left), source)
+    # Both versions publish the true pose unless set to use the encoders.
+    wheels = _differential(settings, left, right, encoder=_encoder(settings))
+    return _ros_drive(settings, wheels, _ros_rate(settings), Drive().covariance)
+
+
+def skid_steer(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """gazebo_ros_skid_steer_drive.cpp: four wheels; odometry is the true pose."""
+    names = [f"{side}_{place}_joint" for side in ("left", "right") for place in ("front", "rear")]
+    front_left, rear_left, front_right, rear_right = (
+        wheel_joint(settings, joints, source, name, name) for name in names
+    )
+    wheels = _differential(settings, (front_left, rear_left), (front_right, rear_right), encoder=False)
+    return _ros_drive(settings, wheels, _ros_rate(settings), SKID_COVARIANCE)
+
+
+def multi_wheel(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """diffdrive_plugin_multi_wheel.cpp: any number of wheels per side, in one tag per side."""
+    left, right = (wheel_joints(settings, joints, source, f"{side}_joint", f"{side}_joints", f"{side}_joint")
+                   for side in ("left", "right"))  # fmt: skip
+    return _ros_drive(
+        settings, _differential(settings, left, right, encoder=False), _ros_rate(settings), Drive().covariance
+    )
+
+
+def balancing(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """The wheely_boi lesson's libwb_plugin.so, which has fixed joint names and no tags."""
+    left, right = (turning(settings.owner, name, joints, source) for name in ("jointL", "jointR"))
+    return _ros_drive(settings, Balancing(left, right), _ros_rate(settings), Drive().covariance)
+
+
+def _ros_drive(
+    settings: Settings,
+    mechanism: Planar | Differential | Balancing,
+    rate: float,
+    variances: tuple[float, float, float],
+) -> Drive:
+    named = zip(("covariance_x", "covariance_y", "covariance_yaw"), variances, strict=True)
+    x, y, yaw = (settings.number(variance, name) for name, variance in named)
+    publish = settings.flag("publish_odom", "publish_odometry", "publish_tf")
+    return Drive(
+        command_topic=settings.topic("cmd_vel", "command_topic"),
+        odometry_topic=settings.topic("odom", "odometry_topic"),
+        odometry_frame=settings.frame("odometry_frame") or "odom",
+        odometry_rate=rate,
+        robot_base_frame=settings.frame("robot_base_frame"),
+        command_timeout=settings.timeout("cmd_timeout", "command_timeout"),
+        publish_odom=publish,
+        publish_odom_tf=settings.flag("publish_odom_tf", "publish_odometry_tf", "broadcast_transform", "broadcast_tf"),
+        covariance=(x, y, yaw),
+        mechanism=mechanism,
+    )
+
+
+def _differential(settings: Settings, left: tuple[str, ...], right: tuple[str, ...], encoder: bool) -> Differential:
+    acceleration = settings.number(0.0, "wheel_acceleration", "max_wheel_acceleration")
+    return Differential(
+        left,
+        right,
+        separation=settings.maybe_measure("wheel_separation"),
+        radius=settings.maybe_measure("wheel_diameter", least=2 * SMALLEST) / 2,
+        torque=settings.number(TORQUE, "wheel_torque", "max_wheel_torque", "torque"),
+        encoder=encoder,
+        acceleration=acceleration or math.inf,
+    )
+
+
+def _ros_rate(settings: Settings) -> float:
+    return settings.number(FAST, "update_rate", "odometry_rate", "publish_rate", zero=False)
+
+
+def _encoder(settings: Settings) -> bool:
+    word = settings.word("odometry_source").lower() or "world"
+    if word not in SOURCES:
+        problem = f"is {cut(word)}; it must be encoder (0) or world (1)"
+        raise settings.tag("odometry_source").wrong(problem)
+    return SOURCES[word]
+
+
+def _check_pairs(settings: Settings, pairs: int, source: Source) -> None:
+    tag = settings.tag("num_wheel_pairs")
+    if tag.value() and settings.number(1, "num_wheel_pairs") != pairs:
+        raise tag.wrong(f"is {cut(tag.value())}, but there are {pairs} left and {pairs} right joints")
+    for name in ("wheel_separation", "wheel_diameter"):
+        values = settings.each(name)
+        if len({tag.value() for tag in values}) > 1:
+            source.warn(values[1], "differs from the first; one measure is kept for all pairs, the first")
+
+
+# The drive systems of gz-sim and Ignition Gazebo. Parameters and defaults are those of
+# src/systems/*/{DiffDrive,MecanumDrive,OdometryPublisher,VelocityControl}.hh in gazebosim/gz-sim. Two things differ
+# here: a topic under /model/NAME/ gets its ROS name, and wheel dimensions that the file omits are measured.
+
+
+RATE = 50.0  # Hz
+UNKEPT = ("min_jerk", "max_jerk", "min_linear_jerk", "max_linear_jerk", "min_angular_jerk", "max_angular_jerk")
+
+
+def velocity_control(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """VelocityControl: the whole model moves as commanded. Raises RobotError, like all of these."""
+    for name in ("initial_linear", "initial_angular"):
+        tag = settings.tag(name)
+        if any(number(word) != 0 for word in tag.value().split()):
+            source.warn(tag, "is not used; a robot stands still until it is commanded")
+    return _gz_drive(settings, Planar(), source)
+
+
+def gz_diff_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """DiffDrive: any number of wheels per side; odometry integrates their rotation."""
+    left = wheel_joints(settings, joints, source, "", "left_joint")
+    right = wheel_joints(settings, joints, source, "", "right_joint")
+    separation, radius = settings.maybe_measure("wheel_separation"), settings.maybe_measure("wheel_radius")
+    return _gz_drive(settings, Differential(left, right, separation, radius), source)
+
+
+def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """MecanumDrive: one wheel per corner."""
+    corners = []
+    for corner in ("front_left", "front_right", "back_left", "back_right"):
+        name = f"{corner}_joint"
+        named = wheel_joints(settings, joints, source, "", name)
+        if len(named) > 1:
+            source.warn(settings.each(name)[-1], f"is a second wheel at one corner; only {cut(named[0])} drives")
+        corners.append(named[0])
+    front_left, front_right, back_left, back_right = corners
+    wheels = Mecanum(
+        front_left,
+        front_right,
+        back_left,
+        back_right,
+        separation=settings.maybe_measure("wheel_separation"),
+        wheelbase=settings.maybe_measure("wheelbase"),
+        radius=settings.maybe_measure("wheel_radius"),
+    )
+    return _gz_drive(settings, wheels, source)
+
+
+def with_publisher(drive: Drive, settings: Settings, source: Source) -> Drive:
+    """The drive with the odometry of an OdometryPublisher, which is the true pose."""
+    wheels = drive.mechanism
+    if isinstance(wheels, Differential | Mecanum):
+        wheels = replace(wheels, encoder=False)
+    return replace(
+        drive,
+        odometry_topic=_gz_topic(settings, "odometry", "odom", "odom_topic"),
+        odometry_frame=_frame(settings, "odom_frame") or "odom",
+        odometry_rate=settings.number(RATE, "odom_publish_frequency", zero=False),
+        robot_base_frame=_frame(settings, "robot_base_frame") or drive.robot_base_frame,
+        mechanism=wheels,
+    )
+
+
+def _gz_drive(settings: Settings, mechanism: Mechanism, source: Source) -> Drive:
+    for name in UNKEPT:
+        if settings.word(name):
+            source.warn(settings.tag(name), "is ignored; velocity and acceleration are limited, jerk is not")
+    return Drive(
+        command_topic=_gz_topic(settings, "cmd_vel", "cmd_vel", "topic"),
+        odometry_topic=_gz_topic(settings, "odometry", "odom", "odom_topic"),
+        odometry_frame=_frame(settings, "frame_id") or "odom",
+        odometry_rate=settings.number(RATE, "odom_publish_frequency", zero=False),
+        robot_base_frame=_frame(settings, "child_frame_id"),
+        mechanism=mechanism,
+        max_linear=_limit(settings, "linear_velocity", source),
+        max_angular=_limit(settings, "angular_velocity", source),
+        max_linear_acceleration=_limit(settings, "linear_acceleration", source),
+        max_angular_acceleration=_limit(settings, "angular_acceleration", source),
+    )
+
+
+def _model(settings: Settings) -> str:
+    """The name of the robot or model that contains the plugin."""
+    owner = settings.owner.parent
+    while owner is not None and owner.name not in ("robot", "model"):
+        owner = owner.parent
+    return owner.attributes.get("name", "") if owner else ""
+
+
+def _gz_topic(settings: Settings, own: str, key: str, name: str) -> str:
+    """`key` if the topic is gz-sim's own /model/NAME/`own`, explicit or by default; else the configured topic."""
+    topic = settings.word(name).strip("/")
+    return key if topic in ("", f"model/{_model(settings)}/{own}") else settings.topic(key, name)
+
+
+def _frame(settings: Settings, name: str) -> str:
+    return settings.frame(name).removeprefix(f"{_model(settings)}/")
+
+
+def _limit(settings: Settings, what: str, source: Source) -> float:
+    """The limit of `what` in both directions; the smaller where forwards and backwards differ."""
+    tags = [settings.tag(f"{end}_{what}", f"{end}_{what.partition('_')[2]}") for end in ("max", "min")]
+    values = [number(tag.value()) for tag in tags if tag.value()]
+    for tag, sign in zip(tags, (1, -1), strict=True):
+        value = number(tag.value()) if tag.value() else sign * math.inf
+        if value is None or value * sign <= 0:
+            raise tag.wrong(f"is {cut(tag.value())}; it must be a number {'above' if sign > 0 else 'below'} 0")
+    sizes = sorted(abs(value) for value in values if value is not None)
+    if sizes and sizes[0] != sizes[-1]:
+        source.warn(tags[1], f"differs from {tags[0].name}; {sizes[0]:g} holds both ways")
+    return sizes[0] if sizes else math.inf
+
+
+# Sensors, and plugins that sense without one. They are parsed but not simulated yet.
+
+
+SENSING = {
+    "gazebo_ros_imu": "imu",
+    "gazebo_ros_imu_sensor": "imu",
+    "hector_gazebo_ros_imu": "imu",
+    "hector_gazebo_ros_gps": "gps",
+    "gazebo_ros_gps_sensor": "gps",
+    "hector_gazebo_ros_magnetic": "magnetometer",
+    "hector_gazebo_ros_sonar": "sonar",
+    "gazebo_ros_f3d": "force_torque",
+    "gazebo_ros_ft_sensor": "force_torque",
+    "gazebo_ros_bumper": "contact",
+    "gazebo_ros_laser": "ray",
+    "gazebo_ros_gpu_laser": "gpu_ray",
+    "gazebo_ros_block_laser": "ray",
+    "gazebo_ros_ray_sensor": "ray",
+    "gazebo_ros_range": "ray",
+    "gazebo_ros_camera": "camera",
+    "gazebo_ros_multicamera": "multicamera",
+    "gazebo_ros_triggered_camera": "camera",
+    "gazebo_ros_prosilica": "camera",
+    "gazebo_ros_depth_camera": "depth",
+    "gazebo_ros_openni_kinect": "depth",
+    "gazebo_ros_velodyne_laser": "ray",
+}
+"""Plugin -> the kind of sensor that it is outside a `<sensor>`."""
+
+
+def read_sensors(robot: Tag, links: Mapping[str, object], root: str, source: Source) -> tuple[Sensor, ...]:
+    """The sensors of a `<robot>`, with a warning for each `<sensor>`; `read_plugins` warns of the sensing plugins."""
+    found = []
+    for gazebo in robot.all("gazebo"):
+        link = gazebo.attributes.get("reference", "").strip() or root
+        if link not in links:
+            continue  # already reported as a reference that names no link
+        found += [read_sensor(tag, link, source) for tag in gazebo.all("sensor")]
+        found += [_of_plugin(tag, link, links, source) for tag in gazebo.all("plugin") if kind_of(tag) in SENSING]
+    return tuple(found)
+
+
+def read_sensor(tag: Tag, link: str, source: Source) -> Sensor:
+    """A `<sensor>` on `link`, of URDF or SDF."""
+    kind = tag.attributes.get("type", "").strip() or "unknown"
+    plugin = tag.first("plugin") or Tag("plugin", {}, tag.place, tag)
+    rate = _sensor_rate(tag, source) or _sensor_rate(plugin, source)
+    source.warn(tag, f"({kind[:80]}) is not simulated yet")
+    return Sensor(tag.attributes.get("name", kind), kind, link, rate, _sensor_topic(tag) or _sensor_topic(plugin))
+
+
+def _of_plugin(tag: Tag, link: str, links: Mapping[str, object], source: Source) -> Sensor:
+    settings, kind = Settings(tag), SENSING[kind_of(tag)]
+    body = settings.frame("body_name", "frame_id", "frame_name")
+    on = body if body in links else link
+    return Sensor(tag.attributes.get("name", kind), kind, on, _sensor_rate(tag, source), _sensor_topic(tag))
+
+
+def _sensor_rate(owner: Tag, source: Source) -> float:
+    """Hz; 0 if the file gives no valid rate."""
+    tag = Settings(owner).tag("update_rate")
+    word = tag.value()
+    value = number(word) if word else 0.0
+    if value is None or value < 0:
+        source.warn(tag, f"is {cut(word)}; every step is used")
+    return max(0.0, value or 0.0)
+
+
+def _sensor_topic(owner: Tag) -> str:
+    """As written: a sensor's `<topic>`, or the tags of ROS's sensor plugins."""
+    settings = Settings(owner)
+    ros = owner.first("ros")
+    for remapping in ros.all("remapping") if ros else ():
+        old, _, new = remapping.value().partition(":=")
+        if old.strip().rpartition("/")[2] in ("out", "image_raw"):
+            return new.strip().strip("/")
+    topic = settings.word("topic", "topic_name", "image_topic_name")
+    camera = settings.word("camera_name")
+    return "/".join(part.strip("/") for part in (camera, topic) if part) if camera else topic.strip("/")
+
+
+# The plugins of a robot.
+
+
+Reader = Callable[[Settings, Mapping[str, Joint], Source], Drive]
+
+DRIVES: dict[str, Reader] = {
+    "gazebo_ros_planar_move": planar_move,
+    "gazebo_ros_diff_drive": diff_drive,
+    "gazebo_ros_skid_steer_drive": skid_steer,
+    "gazebo_ros_diff_drive_multi_wheel": multi_wheel,
+    "diffdrive_plugin_multi_wheel": multi_wheel,
+    "hector_gazebo_ros_diff_drive_multi_wheel": multi_wheel,
+    "wb_plugin": balancing,
+    "gz:velocity-control": velocity_control,
+    "gz:diff-drive": gz_diff_drive,
+    "gz:mecanum-drive": mecanum_drive,
+}
+PUBLISHER = "gz:odometry-publisher"
+
+JOINTS = "joint_states is published anyway, and joints follow joint_command"
+STATES = "joint_states is published anyway"
+POSES = "odom and tf are published anyway"
+SERVER = "the sim does this itself"
+WHOLE = "--drive planar_move moves the robot as a whole"
+SLIP = "friction is that of <mu1> and <mu2>"
+INSTEAD = {
+    "gazebo_ros_control": JOINTS,
+    "gazebo_ros2_control": JOINTS,
+    "gz_ros2_control": JOINTS,
+    "ign_ros2_control": JOINTS,
+    "gz:joint-position-controller": JOINTS,
+    "gz:joint-trajectory-controller": JOINTS,
+    "gz:joint-controller": JOINTS,
+    "gazebo_ros_joint_pose_trajectory": JOINTS,
+    "gazebo_ros_joint_state_publisher": STATES,
+    "gz:joint-state-publisher": STATES,
+    "gazebo_ros_p3d": POSES,
+    "gz:pose-publisher": POSES,
+    "gz:physics": SERVER,
+    "gz:user-commands": SERVER,
+    "gz:scene-broadcaster": SERVER,
+    "gz:sensors": "sensors are not simulated yet",
+    "gz:imu": "sensors are not simulated yet",
+    "gz:contact": "sensors are not simulated yet",
+    "roboticsgroup_gazebo_mimic_joint_plugin": "a URDF <mimic> does the same",
+    "gazebo_ros_state": SERVER,
+    "gazebo_ros_init": SERVER,
+    "gazebo_ros_factory": SERVER,
+    "gazebo_ros_force": "nothing else applies a force",
+    "gazebo_ros_tricycle_drive": WHOLE,
+    "gazebo_ros_ackermann_drive": WHOLE,
+    "gz:ackermann-steering": WHOLE,
+    "gz:tracked-vehicle": WHOLE,
+    "gazebo_ros_harness": "nothing holds the robot up",
+    "gazebo_ros_vacuum_gripper": "nothing is held",
+    "gazebo_ros_wheel_slip": SLIP,
+    "gz:wheel-slip": SLIP,
+    "gazebo_ros_projector": "images are not rendered",
+    "gazebo_ros_video": "images are not rendered",
+}
+"""Plugin that drives nothing -> what replaces it."""
+KNOWN = (*DRIVES, *INSTEAD, *SENSING, PUBLISHER)
+MOVING_ELSEWHERE = frozenset(
+    {name for name, reason in INSTEAD.items() if reason in (JOINTS, WHOLE)} | {"gazebo_ros_force"}
+)
+"""Plugins that move a robot in Gazebo, but not here."""
+
+
+def read_plugins(
+    robot: Tag, links: Mapping[str, Link], joints: Mapping[str, Joint], root: str, source: Source
+) -> Drive | None:
+    """The drive of a `<robot>` or `<model>`: its first drive plugin; others cause warnings.
+
+    `links` and `joints` are by name. Plugins inside a `<sensor>` belong to the sensor. Raises RobotError for a drive
+    plugin that cannot work as written.
+    """
+    drive, publishers = None, []
+    for plugin in _plugins(robot):
+        kind = kind_of(plugin)
+        if kind == PUBLISHER:
+            publishers.append(plugin)
+        elif kind not in DRIVES:
+            _warn_not_run(plugin, kind, source)
+        elif drive is not None:
+            source.warn(plugin, "is a second drive; only the first one drives")
+        else:
+            found = DRIVES[kind](Settings(plugin), joints, source)
+            drive, driver = measured(found, plugin, RobotModel("", root, links, joints, None)), plugin
+    if drive is None:
+        for plugin in publishers:
+            source.warn(plugin, "publishes the odometry of a drive, but there is no drive")
+        return None
+    for plugin in publishers:
+        drive, driver = with_publisher(drive, Settings(plugin), source), plugin
+    return _with_known_frame(drive, driver, links, root, source)
+
+
+def _plugins(robot: Tag) -> Iterator[Tag]:
+    """Plugins outside sensors, at any depth below a `<gazebo>`, or directly below a `<model>`."""
+    waiting = [tag for tag in reversed(robot.children) if tag.name in ("gazebo", "plugin")]
+    while waiting:
+        tag = waiting.pop()
+        if tag.name == "plugin":
+            yield tag
+        elif tag.name != "sensor":
+            waiting += reversed(tag.children)
+
+
+def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
+    if kind in INSTEAD:
+        source.warn(plugin, f"({_file(plugin)}) is not supported; {INSTEAD[kind]}")
+    elif kind in SENSING:
+        source.warn(plugin, f"({SENSING[kind]}) is not simulated yet")
+    else:
+        near = source.nearest(kind, KNOWN, "gazebo_ros_", alike=0.8) if kind else ""
+        source.warn(plugin, f"({_file(plugin) or 'no filename'}) is unknown and is ignored{near}")
+
+
+def _file(plugin: Tag) -> str:
+    name = file_of(plugin)
+    return name if len(name) <= 80 else f"{name[:77]}..."
+
+
+def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, Link], root: str, source: Source) -> Drive:
+    frame = drive.robot_base_frame
+    if frame in links:
+        return drive
+    if frame:
+        source.warn(plugin, f"names the base frame {cut(frame)}, which is not a link; {cut(root)} is used")
+    return replace(drive, robot_base_frame=root)

@@ -1,0 +1,220 @@
+"""Mass and inertia: moments that a file omits or gets wrong, and links without mass."""
+
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from holozen.robot.elements import Source, Tag
+from holozen.robot.errors import cut, listed
+from holozen.robot.model import Drive, Joint, Link, Planar, Pose, Shape, descend, joints_of
+from holozen.robot.rotation import Array, matrix_of, symmetric
+from holozen.robot.shapes import solid
+
+# Moments of inertia of solid shapes, per mass: kg m^2 per kg.
+
+
+LEAST = 64.0  # times smaller than a solid body's: an eighth of its radius of gyration, for a cube 1/20 of its edge
+
+Placed = tuple[Shape, Array, Array]
+"""A shape; its frame's position (3,) in metres, and rotation (3, 3) whose columns are the frame's axes."""
+
+
+def moments(placed: Iterable[Placed]) -> Array | None:
+    """The tensor (3, 3) in m^2 about the centre of all shapes, solid and of equal density; None without any.
+
+    A mesh or a hull counts as its bounding box. Planes and missing meshes are ignored.
+    """
+    found = [part for shape, position, rotation in placed if (part := _part(solid(shape), position, rotation))]
+    whole = sum(volume for volume, _, _ in found)
+    if not found:
+        return None
+    centre = sum((volume * middle for volume, middle, _ in found), np.zeros(3)) / whole
+    total = np.zeros((3, 3))
+    for volume, middle, tensor in found:
+        away = middle - centre
+        total += volume / whole * (tensor + away @ away * np.eye(3) - np.outer(away, away))
+    return total
+
+
+def is_absurd(tensor: Array, mass: float, least: Array) -> bool:
+    """Whether a tensor in kg m^2 is far below that of a solid body, `least` in m^2, about any of its axes."""
+    given, own = np.linalg.eigvalsh(tensor), np.linalg.eigvalsh(least)
+    return bool((given * LEAST < mass * own).any())
+
+
+def _part(shape: Shape, position: Array, rotation: Array) -> tuple[float, Array, Array] | None:
+    """Volume, centre and tensor of one shape."""
+    middle, (x, y, z), volume = np.zeros(3), (0.0, 0.0, 0.0), 0.0
+    if shape.kind == "box":
+        x, y, z = (edge * edge / 12 for edge in shape.size)
+        volume = float(np.prod(shape.size))
+    elif shape.kind == "hull":
+        low, high = np.min(shape.points, axis=0), np.max(shape.points, axis=0)
+        middle, (x, y, z), volume = (low + high) / 2, (high - low) ** 2 / 12, float(np.prod(high - low))
+    elif shape.kind == "cylinder":
+        radius, length = shape.size
+        x, y, z = radius * radius / 4, radius * radius / 4, length * length / 12
+        volume = float(np.pi) * radius * radius * length
+    elif shape.kind == "sphere":
+        x = y = z = shape.size[0] ** 2 / 5
+        volume = 4 / 3 * float(np.pi) * shape.size[0] ** 3
+    if not volume:
+        return None
+    tensor = rotation @ np.diag([y + z, x + z, x + y]) @ rotation.T
+    return volume, position + rotation @ middle, tensor
+
+
+def positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> bool:
+    """Sylvester's criterion: the leading minors are above zero."""
+    minor = xx * yy - xy * xy
+    determinant = xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)
+    return xx > 0 and minor > 0 and determinant > 0
+
+
+# Moments that a file omits, or that no body of the link's shapes can have.
+
+
+NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool = False) -> Link:
+    """The link, with the moments of inertia of its solid collision shapes if its own are NO_INERTIA or far smaller, and
+    a warning unless `silent`. A link without shapes is unchanged: a point mass, if it has no inertia.
+    """
+    part = link.inertial
+    if inertial is None or part is None or not part.mass or not (link.collisions or part.inertia == NO_INERTIA):
+        return link
+    least = _of_shapes(link)
+    if part.inertia != NO_INERTIA and (least is None or not _is_absurd(link, least)):
+        return link
+    if not silent:
+        _warn(link, inertial, least is not None, source)
+    if least is None:
+        return link
+    xx, xy, xz, yy, yz, zz = (part.mass * value for value in least)
+    return replace(link, inertial=replace(part, pose=Pose(part.pose.xyz), inertia=(xx, xy, xz, yy, yz, zz)))
+
+
+def _warn(link: Link, inertial: Tag, shaped: bool, source: Source) -> None:
+    given, part = inertial.first("inertia"), link.inertial
+    wrong = "is zero or not positive definite, which is impossible"
+    if part and part.inertia != NO_INERTIA:
+        wrong = "is absurdly small for the size of the link's collision shapes"
+    elif given is None:
+        wrong = "has no <inertia>"
+    taken = "the inertia of its solid collision shapes is used" if shaped else "the link is treated as a point mass"
+    source.warn(given or inertial, f"{wrong}; {taken}")
+
+
+def _of_shapes(link: Link) -> tuple[float, float, float, float, float, float] | None:
+    """m^2, in the link's axes."""
+    if not link.collisions:
+        return None
+    placed = ((shape, np.array(shape.pose.xyz), matrix_of(shape.pose.rpy)) for shape in link.collisions)
+    found = moments(placed)
+    if found is None:
+        return None
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = found.tolist()
+    return xx, xy, xz, yy, yz, zz
+
+
+def _is_absurd(link: Link, least: tuple[float, float, float, float, float, float]) -> bool:
+    assert link.inertial is not None, "checked by the caller"
+    return is_absurd(symmetric(link.inertial.inertia), link.inertial.mass, symmetric(least))
+
+
+# Links without mass. Gazebo Classic drops them, and so do we, by the rule of sdformat's src/parser_urdf.cc
+# (CreateSDF): links connected by fixed joints are one body; a body without mass is dropped, with its joint and
+# everything attached to it.
+
+
+LIGHTEST = 1e-6  # kg; treated as zero by ignition::math::equal
+
+
+def massless(links: Mapping[str, Link], joints: Mapping[str, Joint], root: str) -> dict[str, str]:
+    """Link to drop -> the link that starts its dropped branch: itself, or one above it.
+
+    A robot without any mass keeps all its links: it can be displayed but not driven.
+    """
+    above = {joint.child: joint for joint in joints.values()}
+    order = list(descend(root, joints))
+    masses = _lumped(links, above, order)
+    if all(mass <= LIGHTEST for mass in masses.values()):
+        return {}
+    lost: dict[str, str] = {}
+    for name in order[1:]:
+        joint = above[name]
+        if joint.parent in lost:
+            lost[name] = lost[joint.parent]
+        elif joint.kind != "fixed" and masses[name] <= LIGHTEST:
+            lost[name] = name
+    return lost
+
+
+def _lumped(links: Mapping[str, Link], above: Mapping[str, Joint], order: list[str]) -> dict[str, float]:
+    """Link -> its mass plus that of everything fixed to it."""
+    masses = {name: inertial.mass if (inertial := links[name].inertial) else 0.0 for name in order}
+    for name in reversed(order[1:]):
+        if above[name].kind == "fixed":
+            masses[above[name].parent] += masses[name]
+    return masses
+
+
+def warn_massless(
+    robot: Tag, links: Mapping[str, Link], joints: Mapping[str, Joint], lost: Mapping[str, str], source: Source
+) -> None:
+    """Warn about each branch that is left out, and each link whose <inertial> has no mass."""
+    above = {joint.child: joint.name for joint in joints.values()}
+    branches: dict[str, list[str]] = {}
+    for name, top in lost.items():
+        branches.setdefault(top, []).append(name)
+    for tag in robot.all("link"):
+        name = tag.word("name")
+        inertial = links[name].inertial
+        if name in branches:
+            below = [other for other in branches[name] if other != name]
+            also = f" and the links below it: {listed(below)}" if below else ""
+            problem = f"has no mass, so it is left out, as in Gazebo, with the joint {cut(above[name])}{also}"
+            source.warn(tag, f"{problem}; give it an <inertial>")
+        elif name not in lost and inertial is not None and inertial.mass == 0:
+            source.warn(tag.first("inertial") or tag, "has no mass; the link is treated as massless, with no inertia")
+
+
+def check_drive(
+    robot: Tag,
+    drive: Drive | None,
+    links: Mapping[str, Link],
+    joints: Mapping[str, Joint],
+    root: str,
+    lost: Mapping[str, str],
+    source: Source,
+) -> None:
+    """Raise RobotError if a drive needs a joint that is left out, or wheels have to push a root without mass.
+
+    A root without mass that no wheels push only causes a warning.
+    """
+    tags = {tag.word("name"): tag for tag in robot.all("link")}
+    for name in joints_of(drive.mechanism) if drive else ():
+        child = joints[name].child
+        if child in lost:
+            problem = f"has no mass, so the joint {cut(name)} is left out, as in Gazebo, but the drive needs it"
+            raise tags[lost[child]].wrong(f"{problem}; give it an <inertial>")
+    masses = _lumped(links, {joint.child: joint for joint in joints.values()}, list(descend(root, joints)))
+    if masses[root] <= LIGHTEST and any(mass > LIGHTEST for mass in masses.values()):
+        problem = "is the root and has no mass, nor have the links fixed to it; Gazebo drops such a robot"
+        if drive is not None and not isinstance(drive.mechanism, Planar):
+            raise tags[root].wrong(f"{problem}: give it an <inertial>")
+        source.warn(tags[root], f"{problem}, but it is kept here: give it an <inertial>")
+
+
+def without(
+    links: Mapping[str, Link], joints: Mapping[str, Joint], lost: Mapping[str, str]
+) -> tuple[dict[str, Link], dict[str, Joint]]:
+    """The remaining links and joints; mimics of removed joints are cleared."""
+    kept = {name: joint for name, joint in joints.items() if joint.child not in lost}
+    free = {
+        name: replace(joint, mimic=None) if joint.mimic and joint.mimic.joint not in kept else joint
+        for name, joint in kept.items()
+    }
+    return {name: link for name, link in links.items() if name not in lost}, free

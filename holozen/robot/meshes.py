@@ -1,0 +1,522 @@
+"""Mesh files (.dae, .stl, .obj) -> the points of a convex hull, in metres in the link's frame."""
+
+import base64
+import binascii
+import io
+import os
+import re
+import stat
+import warnings
+from array import array
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import BinaryIO, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from holozen.robot.elements import Tag, Vector, read_xml
+from holozen.robot.errors import RobotError, cut
+from holozen.robot.rotation import Array, triple
+
+# Approximate the convex hull of many points by the farthest one along each of 256 fixed directions. The bounding box
+# is exact, and no kept point lies outside the true hull. The hull has the true extent along the 256 directions, one of
+# which is within 10 degrees of any direction: a ball of radius r loses at most 1.6 % of r, a wheel about x, y or z at
+# most 0.5 % between two corners of its rim, and a polyhedron nothing if each of its corners is the farthest one along
+# some direction, as a box's are.
+
+
+COUNT = 250  # directions besides the six along the axes
+POINTS_AT_ONCE = (
+    340  # points; with more the linear algebra library starts threads, which slow each other down on a busy machine
+)
+FARTHEST = 1e9  # of a coordinate; larger values are mistakes
+THIN = 1e-4  # m; a hull thinner than this is not a solid ...
+THICK = 1e-3  # m; ... and is made this thick
+
+
+def _directions() -> Array:
+    """Points evenly spread over the sphere on a spiral (a Fibonacci lattice): (COUNT, 3)."""
+    index = np.arange(COUNT) + 0.5
+    z, turn = 1 - 2 * index / COUNT, index * np.pi * (3 - np.sqrt(5))
+    across = np.sqrt(1 - z * z)
+    return np.stack([across * np.cos(turn), across * np.sin(turn), z], axis=1)
+
+
+DIRECTIONS = _directions().astype(np.float32)  # only selects points; their coordinates keep full precision
+ALL = np.arange(COUNT)
+
+
+def extremes(parts: Iterable[Array], place: str) -> Array:
+    """The farthest points (k, 3) of all parts (n, 3), k <= 256; empty for empty input. Raises RobotError for NaN."""
+    farthest: _Farthest | None = None
+    with np.errstate(all="ignore"):  # numpy would warn about the NaN that is checked for here
+        for part in parts:
+            _check(part, place)
+            if len(part):
+                farthest = farthest or _Farthest(part[0])
+                farthest.take(part)
+    return np.zeros((0, 3)) if farthest is None else np.unique(np.vstack([farthest.points, farthest.corners]), axis=0)
+
+
+class _Farthest:
+    """The farthest of the points seen so far along each direction, and for the bounding box."""
+
+    def __init__(self, first: Array) -> None:
+        self.first = first
+        self.points = np.tile(first, (COUNT, 1))
+        self.corners = np.tile(first, (6, 1))
+        self._heights = np.zeros(COUNT, np.float32)
+
+    def take(self, part: Array) -> None:
+        ends = np.vstack([self.corners, part])
+        self.corners = ends[np.concatenate([ends.argmin(axis=0), ends.argmax(axis=0)])]
+        # Relative to one of the points, those far from the origin lose no digits.
+        near = (part - self.first).astype(np.float32)
+        for start in range(0, len(part), POINTS_AT_ONCE):
+            heights = DIRECTIONS @ near[start : start + POINTS_AT_ONCE].T
+            best = heights.argmax(axis=1)
+            height = heights[ALL, best]
+            higher = height > self._heights
+            self._heights[higher] = height[higher]
+            self.points[higher] = part[start + best[higher]]
+
+
+def solid(points: Array, place: str) -> Array:
+    """The points (n, 3) in metres, doubled to both sides if they lie in a plane. Raises RobotError for a line."""
+    away = points - points.mean(axis=0)
+    axes = np.linalg.svd(away, full_matrices=False)[2]
+    spans = np.ptp(away @ axes.T, axis=0)
+    if len(spans) < 3 or spans[1] < THIN:
+        size = " x ".join(f"{length:g}" for length in np.ptp(points, axis=0))
+        raise RobotError(f"{place}: is {size} m, which has no volume; check its scale")
+    if spans[2] >= THIN:
+        return points
+    aside = axes[2] * THICK / 2
+    return np.vstack([points - aside, points + aside])
+
+
+def _check(part: Array, place: str) -> None:
+    if not np.isfinite(part).all():
+        raise RobotError(f"{place}: has a vertex that is NaN or infinite; export it again")
+    if len(part) and np.abs(part).max() > FARTHEST:
+        raise RobotError(f"{place}: has a vertex beyond {FARTHEST:g}; export it again, in metres")
+
+
+# STL, binary and ASCII -> the corners of the triangles.
+
+
+HEAD = 84  # bytes: 80 of any text, then the number of triangles
+TRIANGLE = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
+TRIANGLES_AT_ONCE = 50_000  # triangles; a huge file is never in memory as a whole
+BLOCK = 4_000_000  # bytes of text at once
+
+_VERTEX = re.compile(rb"vertex\s+(\S+\s+\S+\s+\S+)")
+
+
+def read_stl(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
+    """Corners (n, 3), one part of the file at a time. `size` is the file's in bytes. Raises RobotError."""
+    head = file.read(HEAD)
+    count = int.from_bytes(head[80:HEAD], "little")
+    whole = HEAD + count * TRIANGLE.itemsize
+    # A binary file may also start with "solid", so its size decides.
+    if size != whole and head.lstrip().lower().startswith(b"solid"):
+        yield from _ascii(file, head, place)
+    elif len(head) < HEAD or size < whole:
+        expected = f"{count} triangles take {whole}" if len(head) == HEAD else f"the head alone takes {HEAD}"
+        raise RobotError(f"{place}: is cut off: it has {size} bytes, and {expected}; export it again as STL")
+    else:
+        yield from _binary(file, count)
+
+
+def write_stl(points: Array) -> bytes:
+    """A binary STL with these points (n, 3) as corners, the last one repeated. Its triangles do not form a surface."""
+    missing = -len(points) % 3
+    triangles = np.zeros((len(points) + missing) // 3, TRIANGLE)
+    triangles["corners"] = np.vstack([points, points[-1:].repeat(missing, axis=0)]).reshape(-1, 3, 3)
+    return bytes(HEAD - 4) + len(triangles).to_bytes(4, "little") + triangles.tobytes()
+
+
+def _binary(file: BinaryIO, count: int) -> Iterator[Array]:
+    for start in range(0, count, TRIANGLES_AT_ONCE):
+        part = np.frombuffer(file.read(min(TRIANGLES_AT_ONCE, count - start) * TRIANGLE.itemsize), TRIANGLE)
+        yield part["corners"].reshape(-1, 3).astype(np.float64)
+
+
+def _ascii(file: BinaryIO, head: bytes, place: str) -> Iterator[Array]:
+    count, rest = 0, head.lower()
+    while block := file.read(BLOCK).lower():
+        done, facet, rest = (rest + block).rpartition(b"endfacet")
+        if not facet and len(rest) > 2 * BLOCK:
+            break  # not STL, so stop collecting
+        part = _ascii_corners(done, place)
+        count += len(part)
+        if len(part):
+            yield part
+    if count % 3 or b"endsolid" not in rest:
+        raise RobotError(f"{place}: is cut off: it does not end with 'endsolid'; export it again as STL")
+
+
+def _ascii_corners(text: bytes, place: str) -> Array:
+    words = b" ".join(_VERTEX.findall(text)).split()
+    try:
+        return np.fromiter(map(float, words), np.float64, len(words)).reshape(-1, 3)
+    except ValueError as error:
+        raise RobotError(f"{place}: a vertex is not a number: {str(error)[:200]}") from None
+
+
+# Wavefront OBJ -> the corners of the faces.
+
+
+VERTEX = (b"v ", b"v\t")
+FACE = (b"f ", b"f\t")
+
+
+def read_obj(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
+    """The vertices (n, 3) that faces use. Raises RobotError with the line."""
+    vertices, used = array("d"), array("q")
+    for number, line in enumerate(file, 1):
+        try:
+            if line.startswith(VERTEX):
+                vertices.extend(_vertex(line.split()[1:4]))
+            elif line.startswith(FACE):
+                used.extend(_face_corners(line.split()[1:], len(vertices) // 3))
+        except OverflowError:
+            raise RobotError(f"{place}, line {number}: a face refers to a vertex that does not exist") from None
+        except ValueError as error:
+            raise RobotError(f"{place}, line {number}: {str(error)[:200]}") from None
+    if used:
+        yield _chosen(np.array(vertices).reshape(-1, 3), np.array(used), place)
+
+
+def _vertex(words: list[bytes]) -> tuple[float, ...]:
+    values = tuple(map(float, words))
+    if len(values) != 3:
+        raise ValueError(f"a vertex with {len(values)} numbers instead of 3")
+    return values
+
+
+def _face_corners(words: list[bytes], count: int) -> list[int]:
+    """Indexes from 0. The file counts from 1, or back from the newest vertex: -1."""
+    numbers = [int(word.partition(b"/")[0]) for word in words]
+    return [number - 1 if number > 0 else count + number for number in numbers]
+
+
+def _chosen(vertices: Array, used: npt.NDArray[np.int64], place: str) -> Array:
+    low, high = int(used.min()), int(used.max())
+    if low < 0 or high >= len(vertices):
+        raise RobotError(f"{place}: a face refers to vertex {(low if low < 0 else high) + 1} of {len(vertices)}")
+    chosen = np.zeros(len(vertices), bool)
+    chosen[used] = True
+    return vertices[chosen]
+
+
+# COLLADA -> the corners of the faces in metres, z up. Following the COLLADA 1.4 specification, `<unit>` is the file's
+# unit of length in metres, `<up_axis>` (Y_UP by default) is rotated to z, and each geometry is placed by the nodes of
+# the scene.
+
+
+FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
+UP = {
+    "Z_UP": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "Y_UP": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
+    "X_UP": ((0, -1, 0), (0, 0, -1), (1, 0, 0)),
+}
+"""The rotation that takes each up axis to z."""
+MOST_NODES = 20_000  # nodes that instantiate nodes can make a short file expand without bound
+MOST_POINTS = 20_000_000  # and one geometry may be instantiated by many nodes
+
+
+def read_dae(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
+    """Corners (n, 3) of each geometry of the scene. Raises RobotError."""
+    root = read_xml(file.read(size).decode("utf-8-sig", "replace"), place, most=size)
+    if root.name != "COLLADA":
+        raise root.wrong("is not a <COLLADA>; a .dae file starts with one")
+    scene, turned, total = _Scene.of(root), _unit(root) * np.array(UP[_up(root)], float), 0
+    for geometry, frame in scene.placed(root):
+        points = scene.corners(geometry)
+        total += len(points)
+        if total > MOST_POINTS:
+            raise RobotError(f"{place}: has more than {MOST_POINTS} corners in its scene; simplify it")
+        if len(points):
+            yield (points @ frame[:3, :3].T + frame[:3, 3]) @ turned.T
+
+
+def _unit(root: Tag) -> float:
+    unit = next(root.below("unit"), Tag("unit", {}, root.place, root))
+    meter = unit.number("meter", 1.0)
+    if meter <= 0:
+        raise unit.wrong(f"meter is {meter:g}; a length must be positive")
+    return meter
+
+
+def _up(root: Tag) -> str:
+    tag = next(root.below("up_axis"), Tag("up_axis", {}, root.place, root))
+    up = tag.text.strip() or "Y_UP"
+    if up not in UP:
+        raise tag.wrong(f"is {cut(up)}; there are {', '.join(UP)}")
+    return up
+
+
+@dataclass(slots=True)
+class _Scene:
+    """The elements of a file by kind and id, and the corners of geometries that were read."""
+
+    elements: dict[tuple[str, str], Tag]
+    read: dict[int, Array] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, root: Tag) -> "_Scene":
+        elements: dict[tuple[str, str], Tag] = {}
+        waiting = [root]
+        while waiting:
+            tag = waiting.pop()
+            elements[tag.name, tag.attributes.get("id", "")] = tag
+            waiting += tag.children
+        return cls(elements)
+
+    def named(self, kind: str, tag: Tag, attribute: str = "url") -> Tag:
+        """The element that an attribute such as url="#deck" refers to."""
+        name = tag.word(attribute).strip().removeprefix("#")
+        found = self.elements.get((kind, name))
+        if found is None:
+            raise tag.wrong(f"{attribute}={cut(name)} names no <{kind}> of this file")
+        return found
+
+    def placed(self, root: Tag) -> Iterator[tuple[Tag, Array]]:
+        """Each `<geometry>` of the scene, and its 4 x 4 frame."""
+        scene = root.first("scene") or Tag("scene", {}, root.place, root)
+        waiting = [(self.named("visual_scene", tag), np.eye(4)) for tag in scene.all("instance_visual_scene")]
+        for _ in range(MOST_NODES):
+            if not waiting:
+                return
+            node, above = waiting.pop()
+            frame = above @ _transform(node)
+            yield from ((self.named("geometry", tag), frame) for tag in node.all("instance_geometry"))
+            yield from (self._skin(tag, frame) for tag in node.all("instance_controller"))
+            waiting += [(tag, frame) for tag in node.all("node")]
+            waiting += [(self.named("node", tag), frame) for tag in node.all("instance_node")]
+        raise root.wrong(f"has more than {MOST_NODES} nodes in its scene, or one that contains itself")
+
+    def _skin(self, tag: Tag, frame: Array) -> tuple[Tag, Array]:
+        controller = self.named("controller", tag)
+        skin = controller.first("skin")
+        if skin is None:
+            raise controller.wrong("has no <skin>; other controllers are not supported")
+        bind = skin.first("bind_shape_matrix")
+        return self.named("geometry", skin, "source"), frame if bind is None else frame @ _matrix(bind)
+
+    def corners(self, geometry: Tag) -> Array:
+        """The vertices (n, 3) that the faces of a geometry use, in its own frame."""
+        if id(geometry) not in self.read:
+            mesh = geometry.first("mesh") or geometry
+            parts = [self._used(tag) for tag in mesh.children if tag.name in FACES]
+            self.read[id(geometry)] = np.vstack([np.zeros((0, 3)), *parts])
+        return self.read[id(geometry)]
+
+    def _used(self, faces: Tag) -> Array:
+        inputs = {tag.attributes.get("semantic"): tag for tag in faces.all("input")}
+        if "VERTEX" not in inputs:
+            raise faces.wrong("has no <input semantic='VERTEX'>")
+        offsets = [int(tag.number("offset", 0.0)) for tag in inputs.values()]
+        offset, stride = int(inputs["VERTEX"].number("offset", 0.0)), max(offsets) + 1
+        texts = [p.text for p in faces.below("p")]
+        used = np.unique(np.concatenate([np.zeros(0, np.int64), *(_numbers(faces, t)[offset::stride] for t in texts)]))
+        points = self._positions(self.named("vertices", inputs["VERTEX"], "source"))
+        indexes = used.astype(np.int64)
+        if len(indexes) and not 0 <= indexes[0] <= indexes[-1] < len(points):
+            raise faces.wrong(f"names vertex {indexes[0] if indexes[0] < 0 else indexes[-1]} of {len(points)}")
+        return points[indexes]
+
+    def _positions(self, vertices: Tag) -> Array:
+        inputs = [tag for tag in vertices.all("input") if tag.attributes.get("semantic") == "POSITION"]
+        if not inputs:
+            raise vertices.wrong("has no <input semantic='POSITION'>")
+        source = self.named("source", inputs[0], "source")
+        values = source.first("float_array")
+        if values is None:
+            raise source.wrong("has no <float_array>")
+        accessor = next(source.below("accessor"), Tag("accessor", {}, source.place, source))
+        start, stride = int(accessor.number("offset", 0.0)), int(accessor.number("stride", 3.0))
+        if start < 0 or stride < 3:
+            raise accessor.wrong(f"has offset {start} and stride {stride}; a position takes 3 numbers")
+        numbers = _numbers(values, values.text)[start:]
+        return numbers[: len(numbers) // stride * stride].reshape(-1, stride)[:, :3]
+
+
+def _transform(node: Tag) -> Array:
+    """The 4 x 4 product of a node's transforms; the first one is outermost."""
+    frame = np.eye(4)
+    for tag in node.children:
+        if tag.name in ("lookat", "skew"):
+            raise tag.wrong("is not supported; apply the transforms in the modelling tool and export again")
+        if tag.name in _TRANSFORMS:
+            frame = frame @ _TRANSFORMS[tag.name](tag)
+    return frame
+
+
+def _matrix(tag: Tag) -> Array:
+    return _values(tag, 16).reshape(4, 4)
+
+
+def _translate(tag: Tag) -> Array:
+    frame = np.eye(4)
+    frame[:3, 3] = _values(tag, 3)
+    return frame
+
+
+def _scale(tag: Tag) -> Array:
+    return np.diag([*_values(tag, 3), 1.0])
+
+
+def _rotate(tag: Tag) -> Array:
+    """Rodrigues' formula: cos I + sin [u] + (1 - cos) u u^T."""
+    x, y, z, degrees = _values(tag, 4)
+    length = float(np.hypot(np.hypot(x, y), z))
+    frame = np.eye(4)
+    if length > 0:
+        u, angle = np.array([x, y, z]) / length, np.radians(degrees)
+        across = np.cross(np.eye(3), u)
+        frame[:3, :3] = np.cos(angle) * np.eye(3) + np.sin(angle) * across + (1 - np.cos(angle)) * np.outer(u, u)
+    return frame
+
+
+_TRANSFORMS = {"matrix": _matrix, "translate": _translate, "scale": _scale, "rotate": _rotate}
+
+
+def _values(tag: Tag, count: int) -> Array:
+    values = _numbers(tag, tag.text)
+    if len(values) != count:
+        raise tag.wrong(f"has {len(values)} numbers instead of {count}")
+    return values
+
+
+def _numbers(tag: Tag, text: str) -> npt.NDArray[np.float64]:
+    """Numbers separated by white space; a double represents every index exactly."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # older numpy only warns, and stops reading
+            return np.fromstring(text, np.float64, sep=" ")
+    except (ValueError, DeprecationWarning):
+        raise tag.wrong("contains something that is not a number") from None
+
+
+# Mesh files. Each is read once per process.
+
+
+T = TypeVar("T")
+UNSCALED = (1.0, 1.0, 1.0)
+MOST_DATA = 1_000_000  # characters of a data: URI; the hull of any mesh takes 6000
+POINTER = b"version https://git-lfs.github.com/spec/v1"  # the content of a placeholder for a file that was not fetched
+
+Reader = Callable[[BinaryIO, int, str], Iterator[Array]]
+READERS: dict[str, tuple[Reader, int]] = {
+    ".dae": (read_dae, 100_000_000),
+    ".obj": (read_obj, 80_000_000),
+    ".stl": (read_stl, 300_000_000),
+}
+"""File name extension -> its reader, and the maximum size in bytes: what a slow machine reads in 10 s."""
+
+_DATA = re.compile(r"data:(model|application)/[a-z.+-]*stl[a-z.+-]*;base64,", re.IGNORECASE)
+
+
+def hull(path: Path, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
+    """The points, at most 512, whose convex hull approximates a mesh; for the accuracy see `extremes`.
+
+    `scale` is the URDF's, applied to the file's coordinates in metres. Raises RobotError naming the file.
+    """
+    return _checked(_scaled(*_identity(path), scale))
+
+
+def bounds(path: Path, scale: Vector = UNSCALED) -> tuple[Vector, Vector]:
+    """The lowest and the highest x, y, z of a mesh in metres. Raises RobotError."""
+    coordinates = list(zip(*hull(path, scale), strict=True))
+    return triple(map(min, coordinates)), triple(map(max, coordinates))
+
+
+def data_uri(path: Path) -> str:
+    """The unscaled hull of a mesh as text, in place of the file's name. Raises RobotError."""
+    found = _checked(_extremes(*_identity(path)))
+    return "data:model/stl;base64," + base64.b64encode(write_stl(found)).decode()
+
+
+def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
+    """The hull of the STL that a `data:` URI holds, as `hull`. Raises RobotError."""
+    if len(uri) > MOST_DATA:
+        raise RobotError(f"a data: URI of {len(uri)} characters; at most {MOST_DATA} are read")
+    head = _DATA.match(uri.lstrip())
+    if head is None:
+        raise RobotError(f"{cut(uri)} is not supported; write data:model/stl;base64,...")
+    try:
+        data = base64.b64decode("".join(uri.lstrip()[head.end() :].split()), validate=True)
+    except (binascii.Error, ValueError):
+        raise RobotError(f"{cut(uri)} is not valid base64") from None
+    return _solid(_farthest(read_stl(io.BytesIO(data), len(data), "data: URI"), "data: URI"), scale, "data: URI")
+
+
+def _identity(path: Path) -> tuple[str, int, int]:
+    """Path, time and size, which identify a version of a file. Only regular files are opened: a FIFO would block."""
+    try:
+        state = os.stat(path)
+    except (OSError, ValueError) as error:
+        raise RobotError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    if not stat.S_ISREG(state.st_mode):
+        raise RobotError(f"{path}: is not a file that could contain a mesh")
+    return str(path), state.st_mtime_ns, state.st_size
+
+
+def _checked(found: T | str) -> T:
+    if isinstance(found, str):
+        raise RobotError(found)
+    return found
+
+
+# An error is cached as text, so that an invalid file is read only once as well.
+
+
+@lru_cache(maxsize=1024)
+def _scaled(path: str, mtime: int, size: int, scale: Vector) -> tuple[Vector, ...] | str:
+    try:
+        return _solid(_checked(_extremes(path, mtime, size)), scale, path)
+    except RobotError as error:
+        return str(error)
+
+
+@lru_cache(maxsize=1024)
+def _extremes(path: str, _mtime: int, size: int) -> Array | str:
+    try:
+        return _read(path, size)
+    except RobotError as error:
+        return str(error)
+
+
+def _read(path: str, size: int) -> Array:
+    suffix = os.path.splitext(path)[1].lower()
+    if suffix not in READERS:
+        raise RobotError(f"{path}: is not a supported mesh; use a {', '.join(READERS)} file")
+    reader, most = READERS[suffix]
+    if size == 0:
+        raise RobotError(f"{path}: is empty (0 bytes)")
+    if size > most:
+        raise RobotError(f"{path}: has {size / 1e6:.0f} MB, at most {most / 1e6:.0f} MB are read; simplify the mesh")
+    try:
+        with open(path, "rb") as file:
+            if file.read(len(POINTER)) == POINTER:
+                raise RobotError(f"{path}: is a Git LFS pointer, not a mesh; run: git lfs pull")
+            file.seek(0)
+            return _farthest(reader(file, size, path), path)
+    except OSError as error:
+        raise RobotError(f"{path}: {error.strerror}") from None
+
+
+def _farthest(parts: Iterator[Array], place: str) -> Array:
+    found = extremes(parts, place)
+    if not len(found):
+        raise RobotError(f"{place}: has no faces")
+    return found
+
+
+def _solid(points: Array, scale: Vector, place: str) -> tuple[Vector, ...]:
+    return tuple(triple(point) for point in solid(points * scale, place))

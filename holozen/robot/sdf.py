@@ -1,0 +1,744 @@
+"""SDF elements -> values, shapes, links and joints, and `<include>` -> the model that its URI names."""
+
+import math
+import os
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+
+from holozen.robot.elements import LARGEST, Source, Tag, Vector, check_size, number, read_xml
+from holozen.robot.errors import RobotError, cut
+from holozen.robot.inertia import NO_INERTIA, positive_definite, with_moments
+from holozen.robot.model import Color, Inertial, Joint, Limits, Link, Mimic, Pose, Shape, Surface
+from holozen.robot.packages import MODEL_PATHS, find_named, folders_above, local_packages
+from holozen.robot.rigid import Frame
+from holozen.robot.rotation import triple
+from holozen.robot.shapes import material_color, mesh_shape, needed
+from holozen.robot.xacro import read_text
+from holozen.rotation import to_rpy
+
+# Text of elements: numbers, vectors, flags, names and poses.
+
+
+ENDLESS = 1e16  # SDF's own number for a joint without a limit
+SHORTEST = 1e-6  # of a direction
+
+
+@dataclass(frozen=True, slots=True)
+class Placed:
+    """A pose, and the name of the frame it is relative to; empty for the default frame of its element."""
+
+    pose: Pose
+    within: str
+
+
+def word(tag: Tag, name: str, default: str = "") -> str:
+    """The text of the child called `name`."""
+    child = tag.first(name)
+    return default if child is None else child.text.strip()
+
+
+def empty(tag: Tag) -> Tag:
+    """An empty element; its messages refer to `tag`."""
+    return Tag(tag.name, tag.attributes, tag.place, tag.parent)
+
+
+def numbers(tag: Tag, count: int, most: float = LARGEST) -> tuple[float, ...]:
+    """The `count` numbers that are the text of `tag`, from -`most` to `most`. Raises RobotError."""
+    words = tag.text.split()
+    values = tuple(_number(tag, word, most) for word in words)
+    if len(values) != count:
+        raise tag.wrong(f"has {len(values)} numbers instead of {count}: {cut(tag.text.strip())}")
+    return values
+
+
+def value(tag: Tag, name: str, default: float, most: float = LARGEST) -> float:
+    """The one number in the child called `name`. Raises RobotError."""
+    child = tag.first(name)
+    return default if child is None else numbers(child, 1, most)[0]
+
+
+def vector(tag: Tag, name: str, default: Vector) -> Vector:
+    """The three numbers in the child called `name`. Raises RobotError."""
+    child = tag.first(name)
+    if child is None:
+        return default
+    x, y, z = numbers(child, 3)
+    return x, y, z
+
+
+def direction(tag: Tag, name: str) -> Vector:
+    """The unit vector in the child called `name`; z by default, as in all of SDF. Raises RobotError."""
+    x, y, z = vector(tag, name, (0.0, 0.0, 1.0))
+    length = math.hypot(x, y, z)
+    if length < SHORTEST:
+        raise (tag.first(name) or tag).wrong("has no direction; write 0 0 1 for straight up")
+    return x / length, y / length, z / length
+
+
+def flag(tag: Tag, name: str, default: bool) -> bool:
+    """True or false in the child called `name`. Raises RobotError."""
+    child = tag.first(name)
+    if child is None:
+        return default
+    text = child.text.strip().lower()
+    if text not in ("true", "1", "false", "0"):
+        raise child.wrong(f"is {cut(text)}; it must be true or false")
+    return text in ("true", "1")
+
+
+def read_pose(tag: Tag) -> Placed:
+    """The `<pose>` of an element, zero without one. Raises RobotError."""
+    pose = tag.first("pose")
+    if pose is None:
+        return Placed(Pose(), "")
+    # SDF 1.5 and 1.6 called it frame.
+    within = pose.attributes.get("relative_to", pose.attributes.get("frame", "")).strip()
+    return Placed(_pose(pose), within)
+
+
+def compose(outer: Pose, inner: Pose) -> Pose:
+    """The composition: `inner`, a pose relative to `outer`, relative to the frame that `outer` is relative to."""
+    if outer == Pose():
+        return inner
+    return outer if inner == Pose() else (Frame.of(outer) @ Frame.of(inner)).pose
+
+
+def _pose(tag: Tag) -> Pose:
+    if not tag.text.strip():
+        return Pose()
+    if tag.attributes.get("rotation_format", "euler_rpy") == "quat_xyzw":
+        return _with_quaternion(tag)
+    x, y, z, *turns = numbers(tag, 6)
+    if tag.attributes.get("degrees", "false").strip().lower() in ("true", "1"):
+        turns = [math.radians(turn) for turn in turns]
+    roll, pitch, yaw = turns
+    return Pose((x, y, z), (roll, pitch, yaw))
+
+
+def _with_quaternion(tag: Tag) -> Pose:
+    x, y, z, *turn = numbers(tag, 7)
+    length = math.hypot(*turn)
+    if length < SHORTEST:
+        raise tag.wrong("has a quaternion of length 0; write 0 0 0 1 for no rotation")
+    a, b, c, w = (part / length for part in turn)
+    return Pose((x, y, z), to_rpy((a, b, c, w)))
+
+
+def _number(tag: Tag, word: str, most: float) -> float:
+    value = number(word)
+    if value is None:
+        raise tag.wrong(f"has {cut(word)}, which is not a finite number")
+    if abs(value) > most:
+        raise tag.wrong(f"has {cut(word)}, which is beyond {most:g}; use metres, kilograms and radians")
+    return value
+
+
+# The elements of SDF: others, such as misspelt ones, cause a warning.
+
+
+_PHYSICAL = "pose frame plugin sensor"
+
+KNOWN = {
+    "model": f"{_PHYSICAL} static self_collide allow_auto_disable enable_wind link joint model include gripper"
+    " placement_frame",
+    "link": f"{_PHYSICAL} inertial collision visual self_collide gravity kinematic enable_wind must_be_base_link"
+    " velocity_decay light projector battery particle_emitter audio_source audio_sink",
+    "inertial": "pose frame mass inertia density fluid_added_mass",
+    "inertia": "ixx ixy ixz iyy iyz izz",
+    "visual": f"{_PHYSICAL} geometry material transparency cast_shadows laser_retro visibility_flags meta",
+    "collision": f"{_PHYSICAL} geometry surface max_contacts laser_retro density auto_inertia_params",
+    "material": "ambient diffuse specular emissive shininess script shader lighting pbr double_sided render_order",
+    "joint": f"{_PHYSICAL} parent child axis axis2 physics thread_pitch screw_thread_pitch gearbox_ratio"
+    " gearbox_reference_body",
+    "axis": "xyz limit dynamics mimic initial_position use_parent_model_frame",
+    "limit": "lower upper effort velocity stiffness dissipation",
+    "dynamics": "damping friction spring_reference spring_stiffness",
+    "surface": "friction contact bounce soft_contact",
+}
+"""Element -> its allowed children; elements not listed here may contain anything."""
+
+IN_WORLD = (
+    "model include light physics gravity frame gui scene state plugin audio wind magnetic_field atmosphere"
+    " spherical_coordinates"
+)
+NOT_SIMULATED = "actor population road joint"
+
+
+def check_known(tag: Tag, source: Source, warned: set[str]) -> None:
+    """Warn about elements that SDF does not define, inside `tag` and below; once for each, recorded in `warned`.
+
+    Elements with a namespace prefix, as `a:b`, are custom and not checked.
+    """
+    known = KNOWN[tag.name].split()
+    for child in tag.children:
+        if child.name not in known:
+            _warn_unknown(tag, child, known, source, warned)
+        elif child.name in KNOWN and child.name != "model":  # nested models are checked separately
+            check_known(child, source, warned)
+
+
+def check_world(tag: Tag, source: Source, warned: set[str]) -> None:
+    """As `check_known`, for the elements directly in a world, and for those that are known but not simulated."""
+    for child in tag.children:
+        if child.name in NOT_SIMULATED.split():
+            source.warn(child, "is not simulated and is left out")
+        elif child.name not in IN_WORLD.split():
+            _warn_unknown(tag, child, IN_WORLD.split(), source, warned)
+
+
+def _warn_unknown(outer: Tag, child: Tag, known: list[str], source: Source, warned: set[str]) -> None:
+    key = f"{outer.name} {child.name}"
+    if ":" not in child.name and key not in warned:
+        warned.add(key)
+        near = source.nearest(child.name, known)
+        source.warn(child, f"is not an SDF child of <{outer.name}> and is ignored{near}")
+
+
+# Shapes.
+
+
+SMALLEST = 1e-6  # of a size in metres, and of a mesh's scale
+AROUND, UPWARDS = 16, 9  # points of a round hull: per circle, and circles from pole to pole
+
+SIZES = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "cone": {"radius": 1, "length": 1},
+    "ellipsoid": {"radii": 3},
+}
+"""The elements that give a shape's size, and how many numbers each contains."""
+
+LEFT_OUT = ("heightmap", "polyline", "image")
+
+
+def read_shape(tag: Tag, frame: Pose, source: Source) -> Shape | None:
+    """A `<visual>` or `<collision>` in the link whose own frame is `frame` in the model's link; None for one that is
+    empty or left out with a warning. Raises RobotError.
+
+    A capsule, a cone and an ellipsoid become the hull of points on their surface, at most 2 % smaller in cross-section.
+    """
+    pose = compose(frame, read_pose(tag).pose)
+    geometry = needed(tag, "geometry")
+    known = [child for child in geometry.children if child.name in (*SIZES, *LEFT_OUT, "plane", "mesh", "empty")]
+    if not known:
+        found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
+        raise geometry.wrong(f"contains {found}; it must contain {_listed()}, <plane> or <mesh>")
+    color = _color(tag, source) if tag.name == "visual" else None
+    return _shape(known[0], tag.name, pose, color, source)
+
+
+def _shape(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) -> Shape | None:
+    if tag.name == "empty":
+        return None
+    if tag.name in LEFT_OUT:
+        source.warn(tag, f"({use}) is left out; use {_listed()}, <plane> or <mesh>")
+        return None
+    if tag.name == "mesh":
+        return _mesh(tag, use, pose, color, source)
+    if tag.name == "plane":
+        return Shape("plane", _plane_size(tag), compose(pose, _upon(direction(tag, "normal"))), color=color)
+    size = _size(tag)
+    if tag.name in ("box", "sphere", "cylinder"):
+        return Shape(tag.name, size, pose, color=color)
+    return Shape("hull", (), pose, color=color, points=tuple(_HULLS[tag.name](size)))
+
+
+def _listed() -> str:
+    return ", ".join(f"<{name}>" for name in SIZES)
+
+
+def _size(tag: Tag) -> tuple[float, ...]:
+    size = tuple(value for name, count in SIZES[tag.name].items() for value in numbers(needed(tag, name), count))
+    if min(size) < SMALLEST:
+        raise tag.wrong(f"has the size {size} m; each number must be {SMALLEST:g} or more")
+    return size
+
+
+def _plane_size(tag: Tag) -> tuple[float, ...]:
+    size = tag.first("size")
+    sides = (1.0, 1.0) if size is None else numbers(size, 2)
+    if min(sides) < SMALLEST:
+        raise tag.wrong(f"has the size {sides} m; each number must be {SMALLEST:g} or more")
+    return sides
+
+
+def _upon(normal: Vector) -> Pose:
+    """The rotation that takes z to `normal`."""
+    x, y, z = normal
+    return Pose(rpy=(0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x)))
+
+
+def _mesh(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) -> Shape | None:
+    scale = vector(tag, "scale", (1.0, 1.0, 1.0))
+    if min(abs(factor) for factor in scale) < SMALLEST:
+        raise tag.wrong(f"has the scale {scale}; a zero flattens the mesh (a negative scale mirrors it)")
+    if tag.first("submesh") is not None:
+        source.warn(tag, f"({use}) names a <submesh>; the whole file is used")
+    uri = word(tag, "uri")
+    if not uri:
+        raise tag.wrong("has no <uri>")
+    return mesh_shape(tag, uri, scale, pose, use, source, color)
+
+
+def _color(tag: Tag, source: Source) -> Color | None:
+    """A visual's colour, with alpha from its `<transparency>`."""
+    material = tag.first("material")
+    color = None if material is None else material_color(material, source)
+    if color is None:
+        return None
+    red, green, blue, alpha = color
+    return red, green, blue, alpha * (1 - min(max(value(tag, "transparency", 0.0), 0.0), 1.0))
+
+
+def _capsule(size: tuple[float, ...]) -> list[Vector]:
+    radius, length = size
+    ball = [(x * radius, y * radius, z * radius) for x, y, z in _ball()]
+    return [(x, y, z + math.copysign(length / 2, end)) for end in (1, -1) for x, y, z in ball if z * end > -SMALLEST]
+
+
+def _cone(size: tuple[float, ...]) -> list[Vector]:
+    radius, length = size
+    return [(0.0, 0.0, length / 2), *((x * radius, y * radius, -length / 2) for x, y in _circle())]
+
+
+def _ellipsoid(size: tuple[float, ...]) -> list[Vector]:
+    a, b, c = size
+    return [(a * x, b * y, c * z) for x, y, z in _ball()]
+
+
+def _circle() -> list[tuple[float, float]]:
+    turns = [2 * math.pi * step / AROUND for step in range(AROUND)]
+    return [(math.cos(turn), math.sin(turn)) for turn in turns]
+
+
+@lru_cache(1)
+def _ball() -> list[Vector]:
+    """Points on the unit sphere, including the poles and the equator."""
+    rings = [math.pi * step / (UPWARDS - 1) for step in range(1, UPWARDS - 1)]
+    body = [(math.sin(up) * x, math.sin(up) * y, math.cos(up)) for up, (x, y) in product(rings, _circle())]
+    return [(0.0, 0.0, 1.0), *body, (0.0, 0.0, -1.0)]
+
+
+_HULLS = {"capsule": _capsule, "cone": _cone, "ellipsoid": _ellipsoid}
+
+# Links.
+
+
+GAZEBOS_INERTIAL = Inertial(Pose(), 1.0, (1.0, 0.0, 0.0, 1.0, 0.0, 1.0))
+
+
+@dataclass(frozen=True, slots=True)
+class ModelFlags:
+    """A model's settings for all its links."""
+
+    static: bool
+    self_collide: bool
+
+
+def read_link(tag: Tag, name: str, frame: Pose, flags: ModelFlags, source: Source) -> Link:
+    """A `<link>` whose own frame is `frame` in the frame of the robot's link. Raises RobotError."""
+    if flag(tag, "kinematic", False) and not flags.static:
+        source.warn(tag, "is kinematic, which is not simulated; gravity and contacts act on it as on any link")
+    visuals = [read_shape(visual, frame, source) for visual in tag.all("visual")]
+    collisions = [read_shape(collision, frame, source) for collision in tag.all("collision")]
+    link = Link(
+        name=name,
+        inertial=_inertial(tag, frame, flags.static, source),
+        visuals=tuple(shape for shape in visuals if shape is not None),
+        collisions=tuple(shape for shape in collisions if shape is not None),
+        surface=_surface(tag, flag(tag, "self_collide", flags.self_collide), source),
+        gravity=flag(tag, "gravity", True),
+    )
+    return with_moments(link, tag.first("inertial"), source, silent=flags.static)
+
+
+def _inertial(tag: Tag, frame: Pose, static: bool, source: Source) -> Inertial | None:
+    inertial = tag.first("inertial")
+    if inertial is None:
+        if not static:
+            source.warn(tag, "has no <inertial>; as in Gazebo it is treated as 1 kg with 1 kg m^2 about each axis")
+        return None if static else GAZEBOS_INERTIAL
+    if inertial.attributes.get("auto", "false").strip().lower() in ("true", "1") and not static:
+        source.warn(inertial, "is automatic, which is not supported; write <mass> and <inertia>")
+    mass = value(inertial, "mass", 1.0)
+    if mass < 0:
+        raise needed(inertial, "mass").wrong(f"is {mass} kg, which is negative")
+    if mass == 0 and not static:
+        source.warn(inertial, "has no mass; the link is treated as massless, with no inertia")
+    pose = compose(frame, read_pose(inertial).pose)
+    return Inertial(pose, mass, _inertia(inertial) if mass else NO_INERTIA)
+
+
+def _inertia(tag: Tag) -> tuple[float, float, float, float, float, float]:
+    given = tag.first("inertia") or empty(tag)
+    xx, yy, zz = (value(given, name, 1.0) for name in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (value(given, name, 0.0) for name in ("ixy", "ixz", "iyz"))
+    if min(xx, yy, zz) < 0:
+        raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never negative")
+    return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
+
+
+def _surface(tag: Tag, self_collide: bool, source: Source) -> Surface:
+    """The surface of a link's first collision that has one; it holds for all collisions of the link."""
+    found = [surface for collision in tag.all("collision") if (surface := collision.first("surface"))]
+    values = [tuple(_first(surface, paths) for paths in SURFACE.values()) for surface in found]
+    if any(other != values[0] for other in values):
+        source.warn(tag, "has collisions with different surfaces; the first is used for all")
+    mu1, mu2, kp, kd = values[0] if values else (None, None, None, None)
+    return Surface(mu1, mu2, kp, kd, self_collide)
+
+
+SURFACE = {
+    "mu1": ("friction/ode/mu", "friction/bullet/friction"),
+    "mu2": ("friction/ode/mu2", "friction/bullet/friction2"),
+    "kp": ("contact/ode/kp", "contact/bullet/kp"),
+    "kd": ("contact/ode/kd", "contact/bullet/kd"),
+}
+"""Surface parameter -> its possible paths; the first one present counts."""
+
+
+def _first(surface: Tag, paths: tuple[str, ...]) -> float | None:
+    for path in paths:
+        tag: Tag | None = surface
+        for name in path.split("/"):
+            tag = tag.first(name) if tag else None
+        if tag is not None:
+            (number,) = numbers(tag, 1, most=math.inf)
+            if number < 0:
+                raise tag.wrong(f"is {number}, which is negative")
+            return number
+    return None
+
+
+# Joints.
+
+
+KINDS = ("continuous", "revolute", "prismatic", "fixed")
+AS_FIXED = ("ball", "universal", "screw", "revolute2")
+ROLLING = ("ball", "universal")  # of those; a caster on one rolls in every direction
+GEARBOX = "gearbox"  # couples two other joints; connects no links
+
+NOISE = 1e-12  # rounding error of a rotated unit vector
+
+
+def read_joint(tag: Tag, name: str, ends: tuple[str, str], frames: tuple[Frame, Frame], axis: Vector) -> Joint:
+    """A `<joint>` from a parent to a child link whose frames in the world are `frames`; `axis` is a unit vector there.
+
+    Raises RobotError.
+    """
+    (parent, child), (outer, inner) = ends, frames
+    kind, pose = kind_of(tag), (outer.inverse @ inner).pose
+    if kind == "fixed":
+        return Joint(name, kind, parent, child, pose, (1.0, 0.0, 0.0), Limits())
+    limits = _limits(tag)
+    if kind == "revolute" and (limits.lower, limits.upper) == (-math.inf, math.inf):
+        kind = "continuous"
+    if kind == "continuous":
+        limits = Limits(limits.effort, limits.velocity)
+    turned = _clean(triple(inner.inverse.rotation @ axis))
+    return Joint(name, kind, parent, child, pose, turned, limits, *_dynamics(tag), _mimic(tag))
+
+
+def has_spring(tag: Tag) -> bool:
+    """Whether a joint has a spring. Raises RobotError."""
+    dynamics = _axis(tag).first("dynamics")
+    return dynamics is not None and value(dynamics, "spring_stiffness", 0.0, most=math.inf) != 0
+
+
+def kind_of(tag: Tag) -> str:
+    """One of KINDS; those in AS_FIXED become "fixed". Raises RobotError."""
+    kind = tag.word("type").strip()
+    if kind not in (*KINDS, *AS_FIXED, GEARBOX):
+        known = ", ".join((*KINDS, *AS_FIXED, GEARBOX))
+        raise tag.wrong(f"has unknown type {cut(kind)}; known types: {known}")
+    return "fixed" if kind in AS_FIXED else kind
+
+
+def rolls(tag: Tag) -> bool:
+    """Whether a joint lets its link roll in every direction, though it is treated as fixed."""
+    return tag.attributes.get("type", "").strip() in ROLLING
+
+
+def axis_of(tag: Tag, version: tuple[int, ...]) -> tuple[Vector, str]:
+    """The unit vector a joint turns about or slides along, and the name of the frame it is expressed in; empty for
+    the joint's own. Raises RobotError.
+    """
+    axis = _axis(tag)
+    xyz = axis.first("xyz")
+    within = "" if xyz is None else xyz.attributes.get("expressed_in", "").strip()
+    # Up to SDF 1.4 axes are in the model's frame, in 1.5 and 1.6 only if the flag is set.
+    if flag(axis, "use_parent_model_frame", version < (1, 5)):
+        within = within or "__model__"
+    return direction(axis, "xyz"), within
+
+
+def _axis(tag: Tag) -> Tag:
+    return tag.first("axis") or empty(tag)
+
+
+def _limits(tag: Tag) -> Limits:
+    limit = _axis(tag).first("limit") or empty(tag)
+    effort, velocity = (value(limit, name, -1.0, most=math.inf) for name in ("effort", "velocity"))
+    lower = value(limit, "lower", -ENDLESS, most=math.inf)
+    upper = value(limit, "upper", ENDLESS, most=math.inf)
+    if lower > upper:
+        raise limit.wrong(f"has lower {lower} above upper {upper}")
+    return Limits(
+        effort=math.inf if effort < 0 else effort,
+        velocity=math.inf if velocity < 0 else velocity,
+        lower=-math.inf if lower <= -ENDLESS else lower,
+        upper=math.inf if upper >= ENDLESS else upper,
+    )
+
+
+def _dynamics(tag: Tag) -> tuple[float, float]:
+    """Friction and damping."""
+    dynamics = _axis(tag).first("dynamics") or empty(tag)
+    friction, damping = (value(dynamics, name, 0.0) for name in ("friction", "damping"))
+    if min(friction, damping) < 0:
+        raise dynamics.wrong(f"has friction {friction} and damping {damping}; neither may be negative")
+    return friction, damping
+
+
+def _mimic(tag: Tag) -> Mimic | None:
+    mimic = _axis(tag).first("mimic")
+    if mimic is None:
+        return None
+    multiplier = value(mimic, "multiplier", 1.0)
+    offset = value(mimic, "offset", 0.0) - multiplier * value(mimic, "reference", 0.0)
+    return Mimic(mimic.word("joint"), multiplier, offset)
+
+
+def _clean(axis: Vector) -> Vector:
+    x, y, z = (0.0 if abs(part) < NOISE else part for part in axis)
+    return x, y, z
+
+
+# Includes.
+
+
+DEEPEST = 20  # nesting of includes
+MOST_PARTS = 5000  # models and links of one world; a few short files can expand to a million
+
+SUN = "sun"  # a light, not a model
+PLANE = """
+<model name="ground_plane">
+  <static>true</static>
+  <link name="link">
+    <collision name="collision"><geometry><plane><size>100 100</size></plane></geometry></collision>
+    <visual name="visual">
+      <geometry><plane><size>100 100</size></plane></geometry>
+      <material><diffuse>0.7 0.7 0.7 1</diffuse></material>
+    </visual>
+  </link>
+</model>
+"""
+BUILT_IN = {"ground_plane": PLANE, "asphalt_plane": PLANE}
+"""Models of Gazebo's library that worlds rely on."""
+
+_MODEL_NAME = re.compile(r"[\w .-]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A `<model>` element with its SDF version, and the file that its URIs are relative to.
+
+    `chain` is the chain of including files.
+    """
+
+    tag: Tag
+    source: Source
+    version: tuple[int, ...]
+    chain: tuple[Path, ...] = ()
+
+
+@dataclass(slots=True)
+class Includes:
+    """Models by URI, each file read once; a text received over the network may use those of known folders only.
+
+    `warned` holds what has been warned about already.
+    """
+
+    count: int = 0
+    warned: set[str] = field(default_factory=set)
+    _files: dict[Path, Tag] = field(default_factory=dict)
+    _paths: dict[tuple[str, Path], Path] = field(default_factory=dict)
+
+    def within(self, outer: Piece) -> Iterator[Piece]:
+        """The models directly inside a model or a world, in file order. Raises RobotError.
+
+        An `<include>`'s own name, pose and static override the model's. A model that is not found causes a warning.
+        """
+        for tag in outer.tag.children:
+            if tag.name not in ("model", "include"):
+                continue
+            piece: Piece | None = replace(outer, tag=tag)
+            if tag.name == "include":
+                piece = self.included(replace(outer, tag=tag))
+            self._count(piece.tag if piece else tag)
+            if piece is not None:
+                yield piece
+
+    def included(self, outer: Piece) -> Piece | None:
+        """The model of an `<include>`. Raises RobotError for a broken file and for circular includes."""
+        tag, uri = outer.tag, word(outer.tag, "uri")
+        if not uri:
+            raise tag.wrong("has no <uri>; write <uri>model://NAME</uri>")
+        name = uri.removeprefix("model://").strip("/")
+        if name == SUN:
+            return None
+        if name in BUILT_IN:
+            model = read_xml(BUILT_IN[name], tag.place)
+            return replace(outer, tag=_overridden(model, tag, tag.place))
+        path = self._path(outer, uri)
+        if path is None:
+            return None
+        if path in outer.chain or len(outer.chain) == DEEPEST:
+            names = " -> ".join(str(file) for file in (*outer.chain, path)[-4:])
+            raise tag.wrong(f"has circular or too deeply nested includes: {names}")
+        root = self._read(path, outer.source)
+        model = _model_of(root, tag, path)
+        source = replace(outer.source, origin=path, packages={**outer.source.packages, **_own_name(uri, path)})
+        return Piece(_overridden(model, tag, model.place), source, version_of(root), (*outer.chain, path))
+
+    def _count(self, tag: Tag) -> None:
+        self.count += 1 + len(tag.all("link"))
+        if self.count > MOST_PARTS:
+            raise tag.wrong(f"brings the number of models and links above {MOST_PARTS}; remove some models")
+
+    def _read(self, path: Path, source: Source) -> Tag:
+        if path not in self._files:
+            self._files[path] = read_file(path, source)
+        return self._files[path]
+
+    def _path(self, outer: Piece, uri: str) -> Path | None:
+        key = uri, outer.source.origin
+        found = self._paths.get(key) or _found(outer, uri)
+        if found is not None:
+            self._paths[key] = found
+        return found
+
+
+def _model_of(root: Tag, include: Tag, path: Path) -> Tag:
+    model = root.first("model") if root.name == "sdf" else None
+    if model is None:
+        raise include.wrong(f"includes {path}, which contains no <sdf><model>")
+    return model
+
+
+def read_file(path: Path, source: Source) -> Tag:
+    """The root of an SDF file; warnings go to `source`. Raises RobotError."""
+    if path.is_file():
+        check_size(path.stat().st_size, str(path))
+    return source.read(read_text(path), str(path))
+
+
+def version_of(root: Tag) -> tuple[int, ...]:
+    """The version of an `<sdf>`, as numbers; the newest if not given."""
+    return tuple(int(part) for part in re.findall(r"\d+", root.attributes.get("version", ""))[:2]) or (1, 11)
+
+
+def _found(outer: Piece, uri: str) -> Path | None:
+    places = list(dict.fromkeys(_places(outer.source, uri)))
+    if not places:
+        outer.source.warn(outer.tag, f"({cut(uri)}) is not fetched and is left out; write model://NAME")
+        return None
+    files = (file for place in places if (file := _model_file(place)))
+    found = next((file for file in files if not outer.source.confined or _is_known(file, outer.source)), None)
+    if found is None:
+        shown = ", ".join(cut(str(place.parent), 200)[1:-1] for place in places[:6])
+        more = f" and {len(places) - 6} more" if len(places) > 6 else ""
+        hint = "add its folder to GZ_SIM_RESOURCE_PATH or give --package NAME=DIR"
+        outer.source.warn(outer.tag, f"({cut(uri)}) is not found and is left out; looked in {shown}{more}; {hint}")
+    return found
+
+
+def _places(source: Source, uri: str) -> Iterator[Path]:
+    """Candidate folders and files of the model, in order of preference."""
+    scheme, _, rest = uri.rpartition("://")
+    if scheme in ("", "file") and not source.confined:
+        yield _folder(source.origin) / rest
+    if scheme in ("", "model", "package"):
+        yield from _model_places(rest, source)
+
+
+def _model_places(rest: str, source: Source) -> Iterator[Path]:
+    name, _, inside = rest.strip("/").partition("/")
+    if not _MODEL_NAME.fullmatch(name) or ".." in (name, *inside.split("/")):
+        return
+    if name in source.packages:
+        yield source.packages[name] / inside
+    for folder in _shared() if source.confined else (*_shared(), *_near(source.origin)):
+        yield folder / name / inside
+    package = None if source.confined else _package(name, source)
+    if package is not None:
+        yield package / inside
+
+
+def _shared() -> list[Path]:
+    parts = [part for key in MODEL_PATHS for part in os.environ.get(key, "").split(os.pathsep)]
+    return [Path(part) for part in parts if os.path.isabs(part)]
+
+
+def _is_known(file: Path, source: Source) -> bool:
+    """Whether a file, symbolic links resolved, is in a folder that untrusted text may refer to."""
+    roots = [os.path.realpath(folder) for folder in (*source.packages.values(), *_shared())]
+    return any(str(file).startswith(root + os.sep) for root in roots)
+
+
+def _near(origin: Path) -> Iterator[Path]:
+    """Folders of models around a file: above it, in packages there, and the user's ~/.gazebo/models."""
+    for folder in folders_above(origin):
+        yield from (folder / "models", folder)
+    yield from (folder / "models" for folder in local_packages(origin).values())
+    yield Path.home() / ".gazebo" / "models"
+
+
+def _package(name: str, source: Source) -> Path | None:
+    try:
+        return find_named(name, source.origin, source.packages)
+    except RobotError:  # not every model name is a valid package name
+        return None
+
+
+def _model_file(place: Path) -> Path | None:
+    """The SDF file that `place` is, or the one that the folder `place` names in its model.config."""
+    if os.path.isfile(place):
+        return Path(os.path.realpath(place))
+    config = place / "model.config"
+    names = [*_configured(config), "model.sdf"] if os.path.isfile(config) else ["model.sdf"]
+    found = (place / name for name in names if os.path.isfile(place / name))
+    return next((Path(os.path.realpath(file)) for file in found), None)
+
+
+def _configured(config: Path) -> list[str]:
+    """The files that a model.config names, newest SDF version first; none outside its folder."""
+    tags = read_file(config, Source(config, {})).all("sdf")
+    names = [tag.text.strip() for tag in sorted(tags, key=version_of, reverse=True)]
+    return [name for name in names if "/" not in name and "\\" not in name]
+
+
+def _own_name(uri: str, path: Path) -> dict[str, Path]:
+    """The name by which an included model's mesh URIs may refer to its own folder."""
+    name = uri.rpartition("://")[2].strip("/").partition("/")[0]
+    return {name: path.parent} if path.parent.name == name else {}
+
+
+def _folder(origin: Path) -> Path:
+    return Path(os.path.abspath(origin if os.path.isdir(origin) else origin.parent))
+
+
+def _overridden(model: Tag, include: Tag, place: str) -> Tag:
+    """The model with its `<include>`'s name, pose and static applied; messages locate it at `place`."""
+    given = {tag.name for tag in include.children if tag.name in ("pose", "static")}
+    name = word(include, "name")
+    attributes = {**model.attributes, **({"name": name} if name else {})}
+    kept = [tag for tag in model.children if tag.name not in given]
+    added = [tag for tag in include.children if tag.name in (*given, "plugin", "placement_frame")]
+    return Tag("model", attributes, place, None, "", [*kept, *added])

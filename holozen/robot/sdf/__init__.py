@@ -1,1 +1,0 @@
-"""SDF models and worlds -> robots, bodies and what the world is like."""

@@ -1,0 +1,503 @@
+"""SDF models -> robots and other bodies: named frames, the joint graph, and one robot per tree of joints."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+from holozen.robot.elements import Source, Tag, Vector, read_xml
+from holozen.robot.errors import RobotError, cut, listed
+from holozen.robot.gazebo_plugins import read_plugins, read_sensor
+from holozen.robot.model import MOST_PARTS, Joint, Limits, Link, Pose, RobotModel, Sensor, descend
+from holozen.robot.rigid import Frame
+from holozen.robot.rotation import triple
+from holozen.robot.sdf import (
+    AS_FIXED,
+    GEARBOX,
+    Includes,
+    ModelFlags,
+    Piece,
+    axis_of,
+    check_known,
+    flag,
+    has_spring,
+    kind_of,
+    read_joint,
+    read_link,
+    read_pose,
+    rolls,
+    version_of,
+    word,
+)
+from holozen.robot.urdf import check_mimics
+
+# Named frames. A full name starts at the outermost model: `table::drawer::knob`. The empty name is the world.
+
+
+WORLD = ""
+INSIDE = "::"
+
+
+@dataclass(frozen=True, slots=True)
+class _Node:
+    """A frame as written: `pose` relative to the frame called `within` in `scope`."""
+
+    tag: Tag
+    scope: str
+    within: str
+    pose: Pose
+    attached: str  # the name, in `scope`, of what it is attached to; empty for a link and a model
+    is_link: bool
+
+
+def whole(scope: str, name: str) -> str:
+    """The full name of `name` in `scope`."""
+    if name in ("__model__", ""):
+        return scope
+    return f"{scope}{INSIDE}{name}" if scope else name
+
+
+class Frames:
+    """Frames by full name. They are added in any order, and looked up once all of them are known."""
+
+    def __init__(self) -> None:
+        self._nodes: dict[str, _Node] = {}
+        self._found = {WORLD: Frame.of(Pose())}
+        self._roots: dict[str, str] = {}  # model -> its canonical link, by its local name
+
+    def add_model(self, tag: Tag, scope: str, name: str, within: str, pose: Pose, canonical: str) -> None:
+        """Add a model; `canonical` is empty if it has no canonical link. Raises RobotError for a duplicate name."""
+        self._add(whole(scope, name), _Node(tag, scope, within, pose, "", False))
+        self._roots[whole(scope, name)] = canonical
+
+    def add_link(self, tag: Tag, scope: str, within: str, pose: Pose) -> None:
+        """Add a link; `pose` is relative to `within`, by default the model. Raises RobotError for a duplicate name."""
+        self._add(whole(scope, tag.word("name")), _Node(tag, scope, within, pose, "", True))
+
+    def add_frame(self, tag: Tag, scope: str, within: str, pose: Pose, attached: str) -> None:
+        """Add a frame attached to `attached`, by default the model. Raises RobotError for a duplicate name."""
+        node = _Node(tag, scope, within or attached, pose, attached or "__model__", False)
+        self._add(whole(scope, tag.word("name")), node)
+
+    def add_joint(self, tag: Tag, scope: str, within: str, pose: Pose, child: str) -> str:
+        """Add a joint's own frame, relative to its child unless `within` is given; returns its full name."""
+        name = whole(scope, tag.word("name"))
+        taken = self._nodes.get(name)
+        if taken and taken.is_link:  # SDF 1.6 and older let a joint and a link share a name
+            name = f"{name} "
+        self._add(name, _Node(tag, scope, within or child, pose, child, False))
+        return name
+
+    def of(self, name: str) -> Frame:
+        """The frame with a full name, in the outermost one. Raises RobotError for circular references."""
+        chain: dict[str, None] = {}
+        while name not in self._found:
+            if name in chain:
+                circle = [*chain][[*chain].index(name) :]
+                raise self._nodes[name].tag.wrong(f"has a circular pose reference: {listed(circle)}")
+            chain[name] = None
+            name = self._base(self._nodes[name])
+        frame = self._found[name]
+        for inner in reversed(chain):
+            frame = self._found[inner] = frame @ Frame.of(self._nodes[inner].pose)
+        return frame
+
+    def resolve(self, tag: Tag, scope: str, name: str) -> Frame:
+        """The frame called `name` in `scope`, in the outermost one. Raises RobotError if there is none."""
+        return self.of(self._known(tag, scope, name))
+
+    def link(self, tag: Tag, scope: str, name: str) -> str:
+        """The full name of the link that `name` in `scope` is attached to; WORLD for the world itself.
+
+        Raises RobotError for an unknown name, a circular reference, and a model without a link.
+        """
+        if name == "world":
+            return WORLD
+        seen: set[str] = set()
+        found = self._known(tag, scope, name)
+        while not (node := self._nodes.get(found)) or not node.is_link:
+            if found in seen:
+                raise tag.wrong(f"names {cut(name)}, which is attached to itself in a loop")
+            seen.add(found)
+            found = self._next(tag, found, node)
+        return found
+
+    def _next(self, tag: Tag, name: str, node: _Node | None) -> str:
+        if node is not None and node.attached:
+            return self._known(node.tag, node.scope, node.attached)
+        if not self._roots.get(name):
+            raise tag.wrong(f"names {cut(name.rpartition(INSIDE)[2])}, which has no link")
+        return self._known(tag, name, self._roots[name])
+
+    def _base(self, node: _Node) -> str:
+        return self._known(node.tag, node.scope, node.within)
+
+    def _known(self, tag: Tag, scope: str, name: str) -> str:
+        found = WORLD if name in ("world", "__root__") and not scope else whole(scope, name)
+        if found and found not in self._nodes:
+            raise self._unknown(tag, scope, name)
+        return found
+
+    def _unknown(self, tag: Tag, scope: str, name: str) -> RobotError:
+        start = f"{scope}{INSIDE}" if scope else ""
+        inside = [key[len(start) :].strip() for key in self._nodes if key.startswith(start)]
+        return tag.wrong(f"names the unknown frame {cut(name)}; frames: {listed(inside)}")
+
+    def _add(self, name: str, node: _Node) -> None:
+        if name in self._nodes:
+            place = self._nodes[name].tag.place
+            raise node.tag.wrong(f"has a duplicate name (first at {place}); give each a unique name")
+        self._nodes[name] = node
+
+
+# A model and the models nested in it.
+
+
+@dataclass(frozen=True, slots=True)
+class Member:
+    """A model, or one nested in it, by full name; `joints` are its joint elements and their frames' full names."""
+
+    name: str
+    piece: Piece
+    joints: tuple[tuple[Tag, str], ...]
+
+
+def register(piece: Piece, scope: str, frames: Frames, includes: Includes) -> list[Member]:
+    """A model and those nested in it, the outer one first; their frames are added to `frames`. Raises RobotError."""
+    tag, placed = piece.tag, read_pose(piece.tag)
+    check_known(tag, piece.source, includes.warned)
+    name = _name(piece)
+    nested = list(includes.within(piece))
+    names = [link.word("name") for link in tag.all("link")] + [inner.tag.word("name") for inner in nested]
+    canonical = tag.attributes.get("canonical_link", "").strip() or next(iter(names), "")
+    frames.add_model(tag, scope, name, placed.within, placed.pose, canonical)
+    inside = whole(scope, name)
+    for link in tag.all("link"):
+        at = read_pose(link)
+        frames.add_link(link, inside, at.within, at.pose)
+    members = [member for inner in nested for member in register(inner, inside, frames, includes)]
+    add_frames(tag, inside, frames)
+    return [Member(inside, piece, tuple(_joints(tag, inside, frames))), *members]
+
+
+def add_frames(tag: Tag, scope: str, frames: Frames) -> None:
+    """Add the `<frame>` elements of a model or a world. Raises RobotError."""
+    for frame in tag.all("frame"):
+        at = read_pose(frame)
+        frames.add_frame(frame, scope, at.within, at.pose, frame.attributes.get("attached_to", "").strip())
+
+
+def joint_end(tag: Tag, end: str) -> str:
+    """What the `<parent>` or `<child>` of a joint names. Raises RobotError."""
+    name = word(tag, end)
+    if not name:
+        raise tag.wrong(f"has no <{end}>; write the name of a link there")
+    return name
+
+
+def _name(piece: Piece) -> str:
+    tag = piece.tag
+    name = tag.word("name")
+    if INSIDE in name:
+        raise tag.wrong(f"has {INSIDE!r} in its name, which is reserved for nested names")
+    if tag.first("placement_frame") or tag.attributes.get("placement_frame"):
+        piece.source.warn(tag, "has an unknown placement_frame; its own frame is used")
+    return name
+
+
+def _joints(tag: Tag, scope: str, frames: Frames) -> list[tuple[Tag, str]]:
+    joints = []
+    for joint in tag.all("joint"):
+        at = read_pose(joint)
+        joints.append((joint, frames.add_joint(joint, scope, at.within, at.pose, joint_end(joint, "child"))))
+    return joints
+
+
+# The joint graph.
+
+
+OFF_AXIS = 1e-9  # m
+
+
+@dataclass(frozen=True, slots=True)
+class JointEdge:
+    """A joint element between two links, by full names; `name` is its local name in the model.
+
+    `frame` is the joint's, and `axis` a unit vector, both in the world.
+    """
+
+    tag: Tag
+    name: str
+    parent: str
+    child: str
+    frame: Frame
+    axis: Vector
+
+    @property
+    def turns(self) -> bool:
+        """Whether it is a rotary joint."""
+        return kind_of(self.tag) in ("revolute", "continuous")
+
+    def misses(self, frame: Frame) -> bool:
+        """Whether the axis misses the origin of `frame`."""
+        x, y, z = (there - here for there, here in zip(self.frame.xyz, frame.xyz, strict=True))
+        a, b, c = self.axis
+        cross = (y * c - z * b, z * a - x * c, x * b - y * a)
+        return max(map(abs, cross)) > OFF_AXIS
+
+
+@dataclass(slots=True)
+class JointGraph:
+    """The links of a model and its nested models, the parent joint of each, and the links fixed to the world."""
+
+    top: str
+    frames: Frames
+    links: dict[str, tuple[Member, Tag]] = field(default_factory=dict)
+    holders: dict[str, JointEdge] = field(default_factory=dict)
+    grounded: set[str] = field(default_factory=set)
+
+    @classmethod
+    def of(cls, members: list[Member], frames: Frames) -> "JointGraph":
+        """The graph of a model and its nested models. Raises RobotError unless its joints form trees."""
+        graph = cls(members[0].name, frames)
+        for member in members:
+            for tag in member.piece.tag.all("link"):
+                graph.links[whole(member.name, tag.word("name"))] = member, tag
+        graph._check_size(members)
+        for member in members:
+            for tag, frame in member.joints:
+                graph._add_edge(member, tag, frame)
+        graph._check_circles(members[0].piece.tag)
+        return graph
+
+    def local(self, name: str) -> str:
+        """The local name of a link or a joint in the model."""
+        return name.removeprefix(f"{self.top}{INSIDE}")
+
+    def root_above(self, link: str) -> str:
+        """The root of the tree that contains `link`."""
+        while link in self.holders:
+            link = self.holders[link].parent
+        return link
+
+    def roots(self) -> list[str]:
+        """The links without a parent joint, in file order."""
+        return [name for name in self.links if name not in self.holders]
+
+    def joint(self, edge: JointEdge, placed: Mapping[str, Frame]) -> Joint:
+        """The robot's joint, for links whose frames in the world are `placed`. Raises RobotError."""
+        ends = self.local(edge.parent), self.local(edge.child)
+        joint = read_joint(edge.tag, edge.name, ends, (placed[edge.parent], placed[edge.child]), edge.axis)
+        if joint.mimic is None:
+            return joint
+        scope = edge.name.removesuffix(edge.tag.word("name"))
+        return replace(joint, mimic=replace(joint.mimic, joint=scope + joint.mimic.joint))
+
+    def check_mimics(self, joints: list[Joint], tag: Tag, source: Source) -> None:
+        """Raise RobotError for a joint that mimics a missing joint, or itself."""
+        named = [replace(edge.tag, attributes={"name": edge.name}) for edge in self.holders.values()]
+        check_mimics(replace(tag, children=named), {joint.name: joint for joint in joints}, source)
+
+    def _check_size(self, members: list[Member]) -> None:
+        links, joints = len(self.links), sum(len(member.joints) for member in members)
+        if max(links, joints) > MOST_PARTS:
+            problem = f"has {links} links and {joints} joints; a model has at most {MOST_PARTS} of each"
+            raise members[0].piece.tag.wrong(problem)
+
+    def _add_edge(self, member: Member, tag: Tag, frame: str) -> None:
+        """Add a joint element to the graph."""
+        source, kind = member.piece.source, kind_of(tag)
+        if kind == GEARBOX:
+            source.warn(tag, "is a gearbox, which is not simulated, and is left out")
+            return
+        if tag.word("type").strip() in AS_FIXED:
+            slides = f", and its link {cut(joint_end(tag, 'child'))} slides without friction" if rolls(tag) else ""
+            problem = (
+                f"is of the type {tag.word('type').strip()}, which is not simulated; it is treated as fixed{slides}"
+            )
+            source.warn(tag, problem)
+        if kind != "fixed" and has_spring(tag):
+            source.warn(tag, "has a spring, which is not simulated")
+        parent, child = (self.frames.link(tag, member.name, joint_end(tag, end)) for end in ("parent", "child"))
+        self._check_ends(tag, parent, child)
+        if parent != WORLD:
+            self.holders[child] = self._edge(member, tag, frame, (parent, child))
+            return
+        if kind != "fixed":
+            source.warn(
+                tag, f"is a {kind} joint to the world, which is not simulated; what is attached to it is static"
+            )
+        self.grounded.add(child)
+
+    def _edge(self, member: Member, tag: Tag, frame: str, ends: tuple[str, str]) -> JointEdge:
+        direction, within = axis_of(tag, member.piece.version)
+        own = self.frames.of(frame)
+        seen_in = self.frames.resolve(tag, member.name, within) if within else own
+        name = self.local(whole(member.name, tag.word("name")))
+        return JointEdge(tag, name, *ends, own, triple(seen_in.rotation @ direction))
+
+    def _check_ends(self, tag: Tag, parent: str, child: str) -> None:
+        for name in (parent, child):
+            if name not in self.links and (name != WORLD or name == child):
+                raise tag.wrong(f"connects {cut(self.local(name) or 'the world')}, which is not a link of this model")
+        if parent == child:
+            raise tag.wrong(f"connects the link {cut(self.local(child))} to itself")
+        if child in self.holders or child in self.grounded:
+            holder = repr(self.holders[child].name) if child in self.holders else "to the world"
+            problem = f"has the child link {cut(self.local(child))}, which is already the child of the joint {holder}"
+            raise tag.wrong(f"{problem}; remove one, or swap the parent and the child of one")
+
+    def _check_circles(self, tag: Tag) -> None:
+        joints = {
+            name: Joint(name, "fixed", edge.parent, edge.child, Pose(), edge.axis, Limits())
+            for name, edge in self.holders.items()
+        }
+        reached = {name for root in self.roots() for name in descend(root, joints)}
+        lost = [self.local(name) for name in self.links if name not in reached]
+        if lost:
+            raise tag.wrong(f"has joints that form a loop through the links {listed(lost)}; remove one joint")
+
+
+# One robot per tree of joints.
+
+
+def build(members: list[Member], frames: Frames) -> list[RobotModel]:
+    """The robots of a model: the one with its canonical link, then one for each other tree of links; a static model
+    is always one.
+
+    The first one's root link is in the model's own frame, which is its `pose`. A link whose frame is off its joint's
+    axis is expressed in a frame on the axis. Raises RobotError.
+    """
+    piece = members[0].piece
+    graph = JointGraph.of(members, frames)
+    if not graph.links:
+        piece.source.warn(piece.tag, "has no <link> and is left out")
+        return []
+    static = _static(members)
+    first = graph.root_above(frames.link(piece.tag, WORLD, graph.top))
+    placed = _placed(graph, first)
+    flags = ModelFlags(static, flag(piece.tag, "self_collide", False))
+    links = {name: _link(name, graph, placed, flags) for name in graph.links}
+    joints = [graph.joint(edge, placed) for edge in graph.holders.values()]
+    graph.check_mimics(joints, piece.tag, piece.source)
+    loose = [root for root in graph.roots() if root != first]
+    if static:
+        joints += [_standing(graph, first, root, placed) for root in loose]
+        loose = []
+    robots = [_robot(root, graph, links, joints, placed[root], static) for root in (first, *loose)]
+    return [_driven(members[0], robots[0]), *robots[1:]]
+
+
+def _static(members: list[Member]) -> bool:
+    piece = members[0].piece
+    plane = next((plane for member in members for plane in _planes(member.piece.tag)), None)
+    static = flag(piece.tag, "static", False)
+    if plane is not None and not static:
+        piece.source.warn(plane, "is not a shape of a moving body; the model is treated as static")
+    return static or plane is not None
+
+
+def _planes(tag: Tag) -> list[Tag]:
+    collisions = [collision for link in tag.all("link") for collision in link.all("collision")]
+    return [plane for collision in collisions for plane in collision.below("plane")]
+
+
+def _placed(graph: JointGraph, first: str) -> dict[str, Frame]:
+    """Link -> the frame in the world in which it is expressed."""
+    placed = {name: graph.frames.of(name) for name in graph.links}
+    for name, edge in graph.holders.items():
+        if edge.turns and edge.misses(placed[name]):
+            placed[name] = Frame(edge.frame.position, placed[name].rotation)
+    return placed | {first: graph.frames.of(graph.top)}
+
+
+def _link(name: str, graph: JointGraph, placed: Mapping[str, Frame], flags: ModelFlags) -> Link:
+    member, tag = graph.links[name]
+    frame = (placed[name].inverse @ graph.frames.of(name)).pose
+    link = read_link(tag, graph.local(name), frame, flags, member.piece.source)
+    if name not in graph.holders or not rolls(graph.holders[name].tag):
+        return link
+    # A caster that should roll slides instead: one that drags keeps the robot from turning.
+    return replace(link, surface=replace(link.surface, mu1=0.0, mu2=0.0))
+
+
+def _standing(graph: JointGraph, first: str, root: str, placed: Mapping[str, Frame]) -> Joint:
+    """The joint that fixes a loose link of a static model."""
+    ends = graph.local(first), graph.local(root)
+    pose = (placed[first].inverse @ placed[root]).pose
+    return Joint(f"{ends[0]} holds {ends[1]}", "fixed", *ends, pose, (1.0, 0.0, 0.0), Limits())
+
+
+def _robot(
+    root: str, graph: JointGraph, links: Mapping[str, Link], joints: list[Joint], at: Frame, static: bool
+) -> RobotModel:
+    own = graph.local(root)
+    names = set(descend(own, {joint.name: joint for joint in joints}))
+    return RobotModel(
+        name=f"{graph.top}_{own.replace(INSIDE, '_')}",
+        root=own,
+        links={link.name: link for link in links.values() if link.name in names},
+        joints={joint.name: joint for joint in joints if joint.child in names},
+        drive=None,
+        sensors=tuple(sensor for name in graph.links if graph.local(name) in names for sensor in _sensors(graph, name)),
+        static=static or root in graph.grounded,
+        pose=at.pose,
+    )
+
+
+def _sensors(graph: JointGraph, name: str) -> list[Sensor]:
+    """The sensors of a link and of its parent joint."""
+    member, link = graph.links[name]
+    tags = link.all("sensor") + (graph.holders[name].tag.all("sensor") if name in graph.holders else [])
+    return [read_sensor(tag, graph.local(name), member.piece.source) for tag in tags]
+
+
+def _driven(top: Member, robot: RobotModel) -> RobotModel:
+    """The body with the canonical link, which has the model's name and its plugins."""
+    piece = top.piece
+    drive = read_plugins(piece.tag, robot.links, robot.joints, robot.root, piece.source)
+    return replace(robot, name=top.name, drive=drive)
+
+
+def parse_sdf(root: Tag, source: Source) -> RobotModel:
+    """The only robot in an `<sdf>`. Raises RobotError, also for a world, for several models, and for parts that no
+    joint connects to the robot.
+    """
+    models = read_models(root, source)
+    if len(models) > 1:
+        names = listed([model.name for model in models])
+        raise root.wrong(f"holds {len(models)} bodies that no joint connects ({names}); a robot has to be one body")
+    return models[0]
+
+
+def read_models(root: Tag | str, source: Source) -> list[RobotModel]:
+    """The bodies in the `<sdf>` of an object or a robot, each with its `pose`; at least one.
+
+    A model whose links no joint connects becomes several bodies, which move freely; the one with the canonical link
+    comes first and has the model's name. Raises RobotError.
+    """
+    if isinstance(root, str):
+        root = read_xml(root, str(source.origin))
+    if root.name != "sdf":
+        raise root.wrong("is not an <sdf>; an SDF file starts with <sdf version=...>")
+    if root.first("world"):
+        raise root.wrong("contains a <world>, not a robot or an object; pass it to the simulator as --world")
+    models = list(models_in(Piece(root, source, version_of(root)), Frames(), Includes()))
+    if not models:
+        raise root.wrong("has no <model> with a <link>")
+    return [replace(models[0], warnings=tuple(source.warnings)), *models[1:]]
+
+
+def models_in(outer: Piece, frames: Frames, includes: Includes) -> Iterator[RobotModel]:
+    """The bodies directly inside an `<sdf>` or a `<world>`, in file order. Raises RobotError."""
+    families = [register(piece, WORLD, frames, includes) for piece in includes.within(outer)]
+    names: dict[str, Tag] = {}
+    for family in families:
+        for model in build(family, frames):
+            tag = family[0].piece.tag
+            if model.name in names:
+                raise _taken(tag, model.name)
+            names[model.name] = tag
+            yield model
+
+
+def _taken(tag: Tag, name: str) -> RobotError:
+    return tag.wrong(f"makes a second body called {cut(name)}; give each a unique name")

@@ -1,0 +1,103 @@
+"""SDF worlds -> physics step, gravity, real-time factor, ground and models."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from holozen.robot.elements import Source, Tag, Vector
+from holozen.robot.model import GRAVITY, STEP, RobotModel, WorldSpec
+from holozen.robot.rigid import Frame, link_frames
+from holozen.robot.sdf import (
+    Includes,
+    Piece,
+    check_world,
+    read_file,
+    value,
+    vector,
+    version_of,
+)
+from holozen.robot.sdf_models import WORLD, Frames, add_frames, models_in
+
+STRONGEST = 100.0  # m/s^2; ten times Earth's
+SHORTEST, LONGEST = 1e-4, 0.02  # s; outside this range the physics engine is far too slow or unstable
+FASTEST = 1000.0  # real-time factor
+LEVEL = 1e-9  # m, and of a unit vector; tolerance for a plane to count as the ground
+
+
+def load_world(path: Path, packages: Mapping[str, Path] = {}) -> WorldSpec:
+    """The world in an SDF file. Raises RobotError naming file and line."""
+    source = Source(path, packages)
+    return read_world(read_file(path, source), source)
+
+
+def read_world(root: Tag, source: Source) -> WorldSpec:
+    """The world in an `<sdf>`. Raises RobotError."""
+    world = _world_of(root)
+    includes = Includes()
+    check_world(world, source, includes.warned)
+    frames = Frames()
+    add_frames(world, WORLD, frames)
+    models = list(models_in(Piece(world, source, version_of(root)), frames, includes))
+    step, rtf = _physics(world)
+    return WorldSpec(
+        name=world.attributes.get("name", "default"),
+        step=step,
+        gravity=_gravity(world),
+        rtf=rtf,
+        ground=any(is_ground(model) for model in models),
+        models=tuple(model for model in models if not is_ground(model)),
+        warnings=tuple(source.warnings),
+    )
+
+
+def is_ground(model: RobotModel) -> bool:
+    """Whether a model's only collision shape is a level plane at z = 0."""
+    shapes = [(link.name, shape) for link in model.links.values() for shape in link.collisions]
+    if not shapes or any(shape.kind != "plane" for _, shape in shapes):
+        return False
+    links, at = link_frames(model), Frame.of(model.pose)
+    planes = [at @ links[name] @ Frame.of(shape.pose) for name, shape in shapes]
+    return all(_is_level(plane) for plane in planes)
+
+
+def _is_level(plane: Frame) -> bool:
+    up = (plane.rotation @ (0.0, 0.0, 1.0)).tolist()
+    return abs(plane.xyz[2]) < LEVEL and max(abs(up[0]), abs(up[1]), abs(up[2] - 1)) < LEVEL
+
+
+def _world_of(root: Tag) -> Tag:
+    if root.name == "robot":
+        raise root.wrong("is a robot (URDF), not a world; pass it to the simulator as --robot")
+    if root.name != "sdf":
+        raise root.wrong("is not a world; a world file starts with <sdf version=...><world name=...>")
+    world = root.first("world")
+    if world is None and root.first("model"):
+        raise root.wrong("contains a model but no <world>; add it to a running world with: holozen spawn FILE")
+    if world is None:
+        raise root.wrong("holds no <world>")
+    return world
+
+
+def _physics(world: Tag) -> tuple[float, float]:
+    """The step in s and the real-time factor."""
+    given = world.all("physics")
+    chosen = [tag for tag in given if tag.attributes.get("default", "").lower() in ("1", "true")] or given
+    physics = chosen[0] if chosen else Tag("physics", {}, world.place, world)
+    step, rtf = value(physics, "max_step_size", STEP), value(physics, "real_time_factor", 1.0)
+    if not SHORTEST <= step <= LONGEST:
+        raise (physics.first("max_step_size") or physics).wrong(f"is {step:g} s; use {SHORTEST} to {LONGEST}")
+    if not 0 <= rtf <= FASTEST:
+        problem = f"is {rtf:g}; use 0 (as fast as possible) to {FASTEST:g}"
+        raise (physics.first("real_time_factor") or physics).wrong(problem)
+    return step, rtf
+
+
+def _gravity(world: Tag) -> Vector:
+    old = [physics for physics in world.all("physics") if physics.first("gravity")]
+    owner = next((tag for tag in (world, *old) if tag.first("gravity")), None)
+    if owner is None:
+        return GRAVITY
+    gravity = vector(owner, "gravity", GRAVITY)
+    if max(map(abs, gravity)) > STRONGEST:
+        problem = f"is {' '.join(f'{part:g}' for part in gravity)}; use at most {STRONGEST:g} m/s^2 along each axis"
+        raise (owner.first("gravity") or owner).wrong(problem)
+    return gravity

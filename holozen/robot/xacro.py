@@ -1,0 +1,349 @@
+"""Xacro without ROS: the xacro library in a process of its own, with results cached while no input changes."""
+
+import contextlib
+import glob
+import hashlib
+import json
+import os
+import re
+import signal
+import stat
+import subprocess
+import sys
+from collections.abc import Collection, Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import IO, Any
+
+from holozen.console import report
+from holozen.robot.elements import MOST_TEXT, check_size
+from holozen.robot.errors import RobotError, cut
+from holozen.robot.packages import find_package
+
+# The result of an expansion, and its inputs: files, wildcards, environment variables and packages.
+
+
+Answer = str | list[str] | None
+Inputs = dict[str, dict[str, Answer]]
+"""Kind ("file", "glob", "env", "find") -> input -> its value at the time."""
+
+SAVED = ("file", "glob")  # the kinds that change when files are saved
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The result of an expansion: a text, or a one-line error.
+
+    `inputs` are those read up to then. `pure` means that the text depends on nothing else.
+    """
+
+    text: str = ""
+    error: str = ""
+    inputs: Inputs = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    pure: bool = False
+
+
+def answer(kind: str, asked: str, start: Path, packages: Mapping[str, Path]) -> Answer:
+    """The current value of `asked`; None for a missing file, variable or package."""
+    if kind == "file":
+        return digest(asked)
+    if kind == "glob":
+        return sorted(glob.glob(asked))
+    if kind == "env":
+        return os.environ.get(asked)
+    return _folder(asked, start, packages)
+
+
+def digest(path: str) -> str | None:
+    """A file is identified by its content: two saves within a clock tick may leave size and times unchanged."""
+    try:
+        state = os.stat(path)
+        if not stat.S_ISREG(state.st_mode) or state.st_size > MOST_TEXT:
+            return f"{state.st_mode} {state.st_size} {state.st_mtime_ns}"  # nothing that is expanded
+        with open(path, "rb") as file:
+            return hashlib.sha256(file.read()).hexdigest()
+    except (OSError, ValueError):
+        return None
+
+
+def now(inputs: Inputs, start: Path, packages: Mapping[str, Path]) -> Inputs:
+    """The same inputs with their current values."""
+    return {
+        kind: {asked: answer(kind, asked, start, packages) for asked in answers} for kind, answers in inputs.items()
+    }
+
+
+def unchanged(
+    inputs: Inputs, start: Path, packages: Mapping[str, Path], kinds: tuple[str, ...] = (*SAVED, "env", "find")
+) -> bool:
+    """Whether each input of `kinds` still has the recorded value."""
+    return all(
+        answer(kind, asked, start, packages) == then for kind in kinds for asked, then in inputs.get(kind, {}).items()
+    )
+
+
+def _folder(name: str, start: Path, packages: Mapping[str, Path]) -> str | None:
+    try:
+        return str(find_package(name, start, packages))
+    except RobotError:
+        return None
+
+
+# Expanded texts in the user's cache folder, each with its inputs. Damaged or foreign entries are ignored, and so
+# is a folder that cannot be written.
+
+
+MOST_ENTRIES = 64
+MOST_BYTES = 1_000_000  # per entry
+
+
+def cache_folder() -> Path | None:
+    """`holozen/xacro` in $XDG_CACHE_HOME or ~/.cache; None if neither is an absolute path."""
+    given = os.environ.get("XDG_CACHE_HOME", "")
+    home = given if os.path.isabs(given) else os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(home, "holozen", "xacro") if os.path.isabs(home) else None
+
+
+def load_cached(key: str) -> dict[str, Any] | None:
+    """The entry stored under `key`, if it is complete and ours."""
+    try:
+        path = _cache_path(key)
+        with open(path, "rb") as file:
+            mine = os.fstat(file.fileno()).st_uid == os.getuid()
+            head, _, body = file.read(2 * MOST_BYTES).partition(b"\n")
+        if not mine or head != _checksum(body):
+            return None
+        entry = json.loads(body)
+        return entry if entry["key"] == key else None
+    except (OSError, ValueError):
+        return None
+
+
+def store_cached(key: str, entry: dict[str, Any]) -> None:
+    """Store an entry atomically; then delete the oldest beyond MOST_ENTRIES."""
+    body = json.dumps(entry | {"key": key}).encode()
+    if len(body) > MOST_BYTES:
+        return
+    with contextlib.suppress(OSError, ValueError):
+        path = _cache_path(key)
+        path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        part = path.with_suffix(f".{os.getpid()}.part")
+        try:
+            part.write_bytes(_checksum(body) + b"\n" + body)
+            part.replace(path)
+        finally:
+            part.unlink(missing_ok=True)
+        _forget(path.parent)
+
+
+def _cache_path(key: str) -> Path:
+    place = cache_folder()
+    if place is None:
+        raise OSError("no cache folder")
+    return place / f"{hashlib.sha256(key.encode('utf-8', 'surrogateescape')).hexdigest()[:32]}.json"
+
+
+def _checksum(body: bytes) -> bytes:
+    return hashlib.sha256(body).hexdigest().encode()
+
+
+def _forget(place: Path) -> None:
+    # These include temporary files of killed processes.
+    kept = sorted(place.iterdir(), key=lambda path: path.stat().st_mtime_ns)
+    for path in kept[:-MOST_ENTRIES]:
+        path.unlink(missing_ok=True)
+
+
+# The process.
+
+
+PROCESSOR_TIME = 6  # s for a whole expansion; the largest robots take 2
+STEP_TIME = 1.2  # s of CPU time for one expression or element, after which the kernel ends the process
+PATIENCE = 60.0  # s; the child's own CPU time limits end it long before, unless it sleeps
+_ROOT = str(Path(__file__).resolve().parents[2])
+# Without `site`, whose search path is passed in, startup takes half as long.
+_BOOT = """
+import json, sys
+asked = json.load(sys.stdin)
+sys.path[:] = asked["modules"]
+from holozen.robot.xacro_child import main
+main(asked)
+"""
+
+
+def expand_in_child(
+    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str] = ()
+) -> Outcome:
+    """Expand `path` in a process of its own. Takes 0.1 s, and terminates for any input file."""
+    with os.fdopen(os.memfd_create("note"), "w+b") as note:  # there may be no writable folder
+        asked = {
+            "path": str(path),
+            "args": dict(args),
+            "packages": {name: str(folder) for name, folder in packages.items()},
+            "allow_env": [*allow_env],
+            "modules": [*map(str, sys.path), _ROOT],
+            "note": note.fileno(),
+        }
+        code, reply, words = _ask(json.dumps(asked).encode(), note.fileno())
+        with contextlib.suppress(ValueError):
+            answer = json.loads(reply)
+            answer["warnings"] = tuple(answer["warnings"])
+            return Outcome(**answer)
+        return Outcome(error=_ended(path, code, note, words))
+
+
+def _ask(question: bytes, note: int) -> tuple[int, bytes, bytes]:
+    """Exit code, standard output and standard error of the child."""
+    words = [sys.executable, "-I", "-S", "-X", "utf8", "-c", _BOOT]
+    pipe = subprocess.PIPE
+    try:
+        # A session of its own: only this process gets Ctrl-C, and it always ends the child.
+        child = subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=(note,), start_new_session=True)
+    except OSError as error:
+        raise RobotError(f"cannot start {sys.executable} to expand xacro: {error.strerror}") from None
+    try:
+        out, err = child.communicate(question, PATIENCE)
+    except subprocess.TimeoutExpired:
+        out, err = b"", b""
+    finally:
+        child.kill()
+        child.wait()
+        _close(child)
+    return child.returncode, out, err
+
+
+def _close(child: "subprocess.Popen[bytes]") -> None:
+    for stream in (child.stdin, child.stdout, child.stderr):
+        with contextlib.suppress(OSError):
+            if stream:
+                stream.close()
+
+
+def _ended(path: Path, code: int, note: IO[bytes], words: bytes) -> str:
+    where, what = _noted(path, note)
+    if code == -signal.SIGPROF:
+        return f"{where}: {what} takes longer than the limit of {STEP_TIME:g} s"
+    if code == -signal.SIGXCPU:
+        return f"{where}: the file takes longer than the limit of {PROCESSOR_TIME} s"
+    if code == -signal.SIGKILL:
+        return f"{where}: {what} was ended after waiting more than {PATIENCE:g} s or out of memory"
+    last = words.decode("utf-8", "replace").strip().splitlines()[-1:] or [f"exit code {code}"]
+    return f"{where}: xacro failed at {what}: {last[0]}"
+
+
+def _noted(path: Path, note: IO[bytes]) -> tuple[str, str]:
+    try:
+        file, line, expression = json.loads(os.pread(note.fileno(), 10_000, 0).split(b"\n")[0])
+    except ValueError:
+        return str(path), "the file"
+    where = f"{file}, line {line}" if file else str(path)
+    return where, f"the expression {cut(expression, 200)}" if expression else "this element"
+
+
+# Expansion.
+
+
+_XACRO_ELEMENT = re.compile(r"<xacro:\w")
+_FORMAT = 1  # of a cache entry
+
+
+def expand(
+    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
+) -> str:
+    """The URDF text of a robot file; a file without xacro is not changed. Otherwise as `expand_xacro`."""
+    text = read_text(path)
+    return expand_xacro(path, args, packages, allow_env) if is_xacro(path, text) else text
+
+
+def expand_xacro(
+    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
+) -> str:
+    """The text that the xacro library generates from a file: the output of its command line, and of
+    `process_file(path).toprettyxml(indent="  ")`, byte for byte.
+
+    `args` are the values of `xacro:arg`, `packages` the folders of `--package NAME=DIR`. The text is sent to any
+    node that serves `spawn_entity`, so it must not leak local data: `load_yaml` reads inside known packages only, and
+    environment variables are read only if `allow_env` names them. Xacro still evaluates Python expressions: never
+    expand text received over the network. The library's warnings are printed. Raises RobotError with file, line and
+    the chain of macros and includes.
+    """
+    outcome = process(path, args, packages, allow_env)
+    if outcome.error:
+        raise RobotError(outcome.error)
+    for warning in outcome.warnings:
+        report(warning)
+    return outcome.text
+
+
+def process(
+    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
+) -> Outcome:
+    """As `expand_xacro`, with the inputs of the text. A cached text is reused while none of them changed.
+
+    Raises RobotError only for errors before the library is called.
+    """
+    read_text(path)
+    key = _key(path, args, packages, allow_env)
+    entry = load_cached(key)
+    if entry and unchanged(entry["inputs"], path, packages):
+        return Outcome(entry["text"], "", entry["inputs"], tuple(entry["warnings"]), True)
+    outcome = expand_in_child(path, args, packages, allow_env)
+    if outcome.pure and not outcome.error:
+        store_cached(key, asdict(outcome))
+    return outcome
+
+
+def read_text(path: Path) -> str:
+    """The text of a file, line endings kept. Raises RobotError if it cannot be read, is too large or is not UTF-8."""
+    try:
+        if path.is_file():
+            check_size(path.stat().st_size, str(path))
+        elif path.exists() and not path.is_dir():
+            raise RobotError(f"{path}: not a regular file; give one that can be read more than once")
+        text = path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise RobotError(f"{path}: byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
+    except OSError as error:
+        raise RobotError(f"{path}: {error.strerror or error}") from None
+    except RobotError:
+        raise
+    except ValueError as error:
+        raise RobotError(f"{path}: {error}") from None
+    return text
+
+
+def is_xacro(path: Path, text: str) -> bool:
+    """Whether a robot file has to be expanded: by its name, or because it contains xacro elements."""
+    return path.name.endswith(".xacro") or _XACRO_ELEMENT.search(text) is not None
+
+
+def _key(path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]) -> str:
+    """Everything besides its inputs that determines a text, as text. Relative names start at the working folder."""
+    given = {name: str(folder) for name, folder in packages.items()}
+    asked = [str(path), _here(), dict(args), given, sorted(allow_env), os.path.expanduser("~")]
+    return json.dumps([_FORMAT, *asked, sys.version, _code()], sort_keys=True)
+
+
+def _here() -> str:
+    try:
+        return os.getcwd()
+    except OSError:
+        return ""
+
+
+def _code() -> list[tuple[str, int, int]]:
+    """The files of the library and our own module for it; installing another version changes them."""
+    here = Path(__file__).parent
+    files = [*_library().glob("*.py"), here / "xacro.py", here / "xacro_child.py", here / "packages.py"]
+    stats = [(str(file), file.stat()) for file in files]
+    return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stats)
+
+
+def _library() -> Path:
+    from importlib.util import find_spec
+
+    found = find_spec("xacro")
+    if found is None or found.origin is None:
+        raise RobotError("the xacro library is missing; install it with: pip install xacro")
+    return Path(found.origin).parent

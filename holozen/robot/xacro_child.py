@@ -1,0 +1,524 @@
+"""Expands one file with the xacro library, in a process of its own, and replies with JSON on standard output.
+
+The library keeps its state in module globals and evaluates Python that may never end, so each expansion has a process
+that the kernel can end. `holozen.robot.xacro` starts it.
+"""
+
+import io
+import json
+import os
+import re
+import resource
+import signal
+import sys
+from collections.abc import Callable, Collection, Mapping
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from itertools import groupby
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+from xml.dom import expatbuilder, minidom
+from xml.parsers.expat import ErrorString, ExpatError
+
+from holozen.robot.elements import MOST_ELEMENTS, check_size
+from holozen.robot.errors import RobotError, cut, suggest
+from holozen.robot.packages import (
+    find_by_name,
+    find_named,
+    find_package,
+    known_folders,
+    lies_in,
+    portable_name,
+    without_home,
+)
+from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, unchanged
+
+# Elements annotated with file and line, in the documents that the library reads and copies.
+
+
+class Place(NamedTuple):
+    """File and line of an element."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}, line {self.line}"
+
+
+def place_of(node: Any) -> Place | None:
+    """Where `node` was written, also if it is a copy."""
+    return getattr(node, "place", None)
+
+
+def keep_places(file: Callable[[], str]) -> None:
+    """Make minidom record the place of each element it parses from now on; `file` gives the current file.
+
+    It patches minidom for the whole process. Entity declarations are refused, as in `tag.read_xml`.
+    """
+    builder: Any = expatbuilder.ExpatBuilderNS
+    dom: Any = minidom
+    start, copy = builder.start_element_handler, dom._clone_node
+
+    def started(self: Any, name: str, attributes: Any) -> None:
+        start(self, name, attributes)
+        self.curNode.place = Place(file(), self.getParser().CurrentLineNumber)
+
+    def entity(self: Any, name: str, *_rest: object) -> None:
+        place = Place(file(), self.getParser().CurrentLineNumber)
+        raise RobotError(f"{place}: the entity {cut(name)} is declared; write out its text instead")
+
+    def copied(node: Any, deep: bool, owner: Any) -> Any:
+        clone = copy(node, deep, owner)
+        if place := place_of(node):
+            clone.place = place
+        return clone
+
+    builder.start_element_handler, builder.entity_decl_handler, dom._clone_node = started, entity, copied
+
+
+# The current position in the files, the call chain, and limits on both.
+
+
+MOST_CALLS = 5_000  # of macros, blocks and includes; the library takes 1 s for this many, and superlinear time for more
+# These differ between processes: string hashes, set order, and generated names.
+_IMPURE = re.compile(r"\b(hash|set|frozenset|anon)\b")
+
+
+class Trace:
+    """Wraps the library's functions. `note` is a file from which the parent reads where a killed child was."""
+
+    def __init__(self, library: Any, note: int) -> None:
+        self.library, self.note = library, note
+        self.calls: list[str] = []  # active macros and includes, outermost first
+        self.place: Place | None = None
+        self.pure = True
+        self._element: Any = None
+        self._elements = self._calls = 0
+        self._wrap()
+
+    def quiet(self) -> None:
+        """No step is in progress: the time limit of a step does not apply."""
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        self._note("")
+
+    def _wrap(self) -> None:
+        library = self.library
+        for name in ("check_attrs", "reqd_attrs"):
+            setattr(library, name, self._entering(getattr(library, name)))
+        library.handle_macro_call = self._calling(library.handle_macro_call)
+        library.process_include = self._including(library.process_include)
+        for name in ("safe_eval", "eval_extension"):
+            setattr(library, name, self._evaluating(getattr(library, name)))
+        library.warning, library.print_location = self._warn, lambda: None
+
+    def _warn(self, *words: object, **_options: object) -> None:
+        text = " ".join(" ".join(map(str, words)).split())
+        print(f"{self._here()}{text}")
+
+    def _enter(self, node: Any) -> None:
+        if node is self._element:
+            return
+        self._element, self.place = node, place_of(node) or self.place
+        self._elements += 1
+        if self._elements > MOST_ELEMENTS:
+            raise RobotError(f"{self._here()}it expands without end; at most {MOST_ELEMENTS} elements are expanded")
+        if node.nodeName == "xacro:insert_block":
+            self._count_call()
+        self._step("")
+
+    def _step(self, expression: str) -> None:
+        self._note(expression)
+        signal.setitimer(signal.ITIMER_PROF, STEP_TIME)
+
+    def _note(self, expression: str) -> None:
+        file, line = self.place or ("", 0)
+        os.pwrite(self.note, json.dumps([file, line, expression[:200]]).encode() + b"\n", 0)
+
+    def _here(self) -> str:
+        return f"{self.place}: " if self.place else ""
+
+    def _call(self, node: Any, step: str) -> None:
+        self._enter(node)
+        self.calls.append(f"{step} {self.place}" if self.place else step)
+        self._count_call()
+
+    def _count_call(self) -> None:
+        self._calls += 1
+        if self._calls > MOST_CALLS:
+            raise RobotError(
+                f"{self._here()}macros, blocks and includes call each other without end;"
+                f" at most {MOST_CALLS} calls are made"
+            )
+
+    def _entering(self, function: Any) -> Any:
+        def wrapped(node: Any, *rest: Any) -> Any:
+            self._enter(node)
+            return function(node, *rest)
+
+        return wrapped
+
+    def _calling(self, function: Any) -> Any:
+        def wrapped(node: Any, macros: Any, symbols: Any) -> Any:
+            name = node.tagName
+            if not name.startswith("xacro:") or name == "xacro:call":
+                self._enter(node)
+                return function(node, macros, symbols)
+            depth, place = len(self.calls), place_of(node)
+            self._call(node, f"in macro {name[6:]!r} called at")
+            try:
+                done = function(node, macros, symbols)
+            except self.library.XacroException as error:
+                self._mend_call(error, node, macros, depth)
+                raise
+            del self.calls[depth:]
+            self._element, self.place = node, place or self.place
+            return done
+
+        return wrapped
+
+    def _mend_call(self, error: Any, node: Any, macros: Any, depth: int) -> None:
+        """A call that failed before the macro's body is itself at fault, not the macro."""
+        words = str(error)
+        unknown = words.startswith("unknown macro name:")
+        if self._element is not node or not (unknown or error.macros):
+            return
+        del self.calls[depth:]
+        if unknown:
+            error.hint = suggest(node.tagName[6:], names(macros))
+            return
+        params = [param.lstrip("*") for param in error.macros[0].params]
+        wrong = words.split('"')[1] if words.startswith("Invalid parameter ") else ""
+        error.hint = suggest(wrong, params) or f"; {node.tagName} takes {', '.join(params) or 'no parameter'}"
+
+    def _including(self, function: Any) -> Any:
+        def wrapped(node: Any, *rest: Any) -> None:
+            depth, place = len(self.calls), place_of(node)
+            self._call(node, "included at")
+            try:
+                function(node, *rest)
+            except self.library.XacroException as error:
+                if self._element is node and isinstance(error.exc, OSError):
+                    del self.calls[depth:]  # a missing file was not included
+                raise
+            del self.calls[depth:]
+            self._element, self.place = node, place or self.place
+
+        return wrapped
+
+    def _evaluating(self, function: Any) -> Any:
+        def wrapped(text: str, *tables: Any) -> Any:
+            self._step(text)
+            self.pure = self.pure and not _IMPURE.search(text)
+            try:
+                return function(text, *tables)
+            except NameError as error:
+                if error.name and tables and not hasattr(error, "hint"):
+                    error.hint = suggest(error.name, names(tables[0]))  # type: ignore[attr-defined]
+                raise
+
+        return wrapped
+
+
+def names(table: Any) -> list[str]:
+    """The names in one of the library's tables and in its enclosing ones."""
+    found: list[str] = []
+    while isinstance(table, dict):
+        found += [str(name).lstrip("*") for name in list(table) if not str(name).startswith("__")]
+        table = getattr(table, "parent", None)
+    return found
+
+
+# The library's errors as one line.
+
+
+MOST_MEMORY = 512 << 20  # bytes of address space of the child
+
+
+def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[str, Path]) -> str:
+    """File, line, reason, hint, and the chain of macros and includes. `guesses` are packages found by location only."""
+    cause, suffix = _cause(error)
+    chain = _chain(trace.calls)
+    if isinstance(cause, RobotError):
+        return f"{_placed(str(cause), path, trace)}{chain}"
+    args = trace.library.substitution_args_context.get("arg", {})
+    hint = getattr(cause, "hint", "") or (_guessed(guesses) if isinstance(cause, OSError) else "")
+    if type(cause).__name__ == "ArgException":
+        hint = suggest(str(cause), list(args))
+    return f"{_where(cause, trace)}: {_reason(cause, suffix)}{hint}{chain}"
+
+
+def _placed(message: str, path: Path, trace: Trace) -> str:
+    """The message with the place of the element that requested the package or file."""
+    if trace.place is None or str(trace.place) in message:
+        return message
+    if message.startswith(f"{path}: "):
+        return f"{trace.place}{message.removeprefix(str(path))}"
+    return message if trace.calls else f"{message} (asked for at {trace.place})"
+
+
+def _where(cause: BaseException, trace: Trace) -> str:
+    file = next((str(file) for file in reversed(trace.library.filestack or [""])), "")
+    if isinstance(cause, ExpatError):
+        return str(Place(file, cause.lineno))
+    if isinstance(cause, UnicodeDecodeError):
+        return file
+    return str(trace.place or file)
+
+
+def _reason(cause: BaseException, suffix: str) -> str:
+    kind = type(cause).__name__
+    if isinstance(cause, ExpatError):
+        return f"broken XML: {ErrorString(cause.code)}"
+    if isinstance(cause, OSError):
+        return f"{cause.strerror}: {cause.filename}"
+    if isinstance(cause, UnicodeDecodeError):
+        return "it is not UTF-8 text; save the file as UTF-8"
+    if isinstance(cause, RecursionError):
+        return "a macro, a property or an include calls itself without end, or elements are nested too deep"
+    if isinstance(cause, MemoryError):
+        return f"it needs too much memory; an expansion has {MOST_MEMORY >> 20} MB {suffix}".rstrip()
+    if kind == "ArgException":
+        return f"$(arg {cause}) has no value; give one with {cause}:=VALUE or a default in <xacro:arg>"
+    words = str(cause) if not isinstance(cause, KeyError) else f"there is no {cause}"
+    return one_line(f"{words or kind} {suffix}")
+
+
+def one_line(text: str, most: int = 400) -> str:
+    """`text` as one line of at most `most` characters."""
+    text = " ".join(text.split())
+    return text if len(text) <= most else f"{text[: most - 3]}..."
+
+
+def _cause(error: Any) -> tuple[BaseException, str]:
+    """The innermost of the library's wrapped errors, and the innermost "when evaluating ..." on the way."""
+    suffix = ""
+    while isinstance(getattr(error, "exc", None), Exception):
+        suffix = getattr(error, "suffix", None) or suffix
+        error = error.exc
+    return error, one_line(suffix, 200)
+
+
+def _chain(calls: list[str], most: int = 6) -> str:
+    runs = ((call, len(list(same))) for call, same in groupby(reversed(calls)))
+    chain = [call if times == 1 else f"{call}, {times} times" for call, times in runs]
+    cut = [f"and {len(chain) - most} more"] if len(chain) > most else []
+    return f" ({', '.join([*chain[:most], *cut])})" if chain else ""
+
+
+def _guessed(guesses: Mapping[str, Path]) -> str:
+    """A hint for each package that was identified only by the location of the robot file."""
+    return "".join(
+        f"; no package.xml says {name!r}, so {folder} was taken for it: if wrong, give --package {name}=DIR"
+        for name, folder in guesses.items()
+    )
+
+
+# The expansion.
+
+
+ROBOTS = ("robot", "sdf")  # root elements of files meant to be included
+DEEPEST_CALLS = 4000  # Python frames; the library's own 1000 and what the trace adds
+MOST_WORDS = 10_000  # characters of warnings
+
+
+def main(asked: dict[str, Any]) -> None:
+    out = os.dup(1)
+    os.dup2(2, 1)
+    _limit()
+    words = io.StringIO()
+    with redirect_stdout(words), redirect_stderr(words):
+        packages = {name: Path(folder) for name, folder in asked["packages"].items()}
+        reply = Expansion(Path(asked["path"]), packages, asked["allow_env"]).run(asked)
+    reply["warnings"] = words.getvalue()[:MOST_WORDS].splitlines()
+    with os.fdopen(out, "wb") as file:
+        file.write(json.dumps(reply).encode())
+    os._exit(0)  # freeing a large document takes as long as building it
+
+
+def _limit() -> None:
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    for number in (signal.SIGPROF, signal.SIGXCPU):
+        signal.signal(number, signal.SIG_DFL)
+    for kind, most in (
+        (resource.RLIMIT_AS, MOST_MEMORY),
+        (resource.RLIMIT_CPU, PROCESSOR_TIME),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        with suppress(OSError, ValueError):  # the system lacks this limit
+            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+    sys.setrecursionlimit(DEEPEST_CALLS)
+
+
+class Expansion:
+    """One run of the library, with the inputs it used."""
+
+    def __init__(self, path: Path, packages: Mapping[str, Path], allow_env: Collection[str]) -> None:
+        self.path, self.packages, self.allow_env = path, packages, frozenset(allow_env)
+        self.inputs: Inputs = {"file": {}, "glob": {}, "env": {}, "find": {}}
+        self.guesses: dict[str, Path] = {}
+        self._recording = self._parsing = False
+
+    def run(self, asked: Mapping[str, Any]) -> dict[str, Any]:
+        """The reply: "text" or "error", "inputs", and whether the text depends on them alone ("pure")."""
+        library, trace = self._library(asked["note"])
+        try:
+            text = self._expanded(library, trace, asked["args"])
+            reply: dict[str, Any] = {"text": text}
+        except Exception as error:  # an expression in the file may raise anything
+            trace.quiet()
+            reply = {"error": describe(error, trace, self.path, self.guesses)}
+        self._recording = False
+        text = reply.get("text", "")
+        pure = trace.pure and " at 0x" not in text and unchanged(self.inputs, self.path, self.packages)
+        return reply | {"inputs": self.inputs, "pure": pure}
+
+    def _library(self, note: int) -> tuple[Any, Trace]:
+        import xacro
+        import xacro.substitution_args  # the library would import it late, and its files would look like inputs
+
+        xacro.init_stacks(str(self.path))
+        keep_places(lambda: str(xacro.filestack[-1]))
+        trace = Trace(xacro, note)
+        xacro.parse = self._parse(xacro, trace)
+        setattr(xacro, "open", self._open)  # noqa: B010
+        self._answer_find()
+        setattr(os, "environ", Asked(os.environ, self))  # noqa: B010
+        sys.addaudithook(self._audit)
+        return xacro, trace
+
+    def _expanded(self, library: Any, trace: Trace, args: dict[str, str]) -> str:
+        self._recording = True
+        document = library.process_file(str(self.path), mappings=args)
+        trace.quiet()
+        text = str(document.toprettyxml(indent="  "))
+        check_size(len(text), f"{self.path} (expanded)")
+        return text
+
+    def _parse(self, library: Any, trace: Trace) -> Any:
+        parse = library.parse
+
+        def parsed(source: Any, filename: str) -> Any:
+            trace.quiet()
+            if source is None and os.path.isabs(filename) and not os.path.exists(filename):
+                filename = self._elsewhere(filename, library)
+            self._parsing = True
+            try:
+                document = parse(source, filename)
+            finally:
+                self._parsing = False
+            self._check_include(filename, document.documentElement.tagName)
+            return document
+
+        return parsed
+
+    def _elsewhere(self, path: str, library: Any) -> str:
+        """The file to include instead of one from another machine: a file of the robot with the same name, if any."""
+        self.record("file", path)  # used as soon as it exists
+        self._recording = False
+        found = find_by_name(path, self.path, self.packages)
+        instead = portable_name(found, self.path, self.packages) if found else ""
+        self._recording = True
+        if found is None:
+            return path
+        library.warning(
+            f"there is no file {cut(path, 200)}; {found}, which has the same name, is included; write {instead}"
+        )
+        library.filestack[-1] = str(found)  # base of relative names in it
+        return str(found)
+
+    def _open(self, path: str) -> Any:
+        """The library's `open`: for files parsed as XML, and for `load_yaml`, whose data goes into the text."""
+        if not (self._parsing or self._is_known(path)):
+            raise RobotError(
+                f"{self.path}: load_yaml reads inside known packages only, and {path} is in none of them (or hidden);"
+                " give the package that holds it: --package NAME=DIR"
+            )
+        return open(path)
+
+    def _check_include(self, path: str, root: str) -> None:
+        """A robot may be included from anywhere; other XML may be private data."""
+        if root not in ROBOTS and not self._is_known(path, self.path.absolute().parent):
+            raise RobotError(
+                f"{self.path}: {path} is outside the robot's folder and all known packages, and is not a robot file: it"
+                " is not included; give the package that holds it: --package NAME=DIR"
+            )
+
+    def _is_known(self, path: str, *more: Path) -> bool:
+        recording, self._recording = self._recording, False  # the package.xml files read on the way are not inputs
+        try:
+            return lies_in(path, [*known_folders(self.path, self.packages), *without_home(more)])
+        finally:
+            self._recording = recording
+
+    def record_variable(self, name: str, is_set: bool) -> None:
+        """Record the value of an environment variable. Raises RobotError for one that is set and not allowed."""
+        if not self._recording:
+            return
+        self.record("env", name)
+        if is_set and name not in self.allow_env:
+            raise RobotError(
+                f"{self.path}: reads the environment variable {cut(name)}, whose value would be sent on with the robot;"
+                f" allow that with --allow-env {cut(name, 60)[1:-1]}"
+            )
+
+    def _answer_find(self) -> None:
+        """`$(find NAME)` asks ROS's package index, which is replaced by ours."""
+        package, module = ModuleType("ament_index_python"), ModuleType("ament_index_python.packages")
+        module.get_package_share_directory = self.find  # type: ignore[attr-defined]
+        sys.modules |= {"ament_index_python": package, "ament_index_python.packages": module}
+
+    def find(self, name: str) -> str:
+        """The folder of a package."""
+        self._recording = False  # the package.xml files read on the way are not inputs: the answer is
+        try:
+            folder = find_package(name, self.path, self.packages)
+            if find_named(name, self.path, self.packages) is None:
+                self.guesses[name] = folder
+        finally:
+            self._recording = True
+        self.inputs["find"][name] = str(folder)
+        return str(folder)
+
+    def record(self, kind: str, asked: str) -> Answer:
+        """Record the current value of `asked` at its first use."""
+        if asked not in self.inputs[kind]:
+            recording, self._recording = self._recording, False
+            self.inputs[kind][asked] = answer(kind, asked, self.path, self.packages)
+            self._recording = recording
+        return self.inputs[kind][asked]
+
+    def _audit(self, event: str, args: tuple[Any, ...]) -> None:
+        if not self._recording or event not in ("open", "glob.glob"):
+            return
+        if event == "glob.glob":
+            self.record("glob", args[0])
+        elif isinstance(args[0], (str, os.PathLike)):
+            path = str(Path(args[0]))  # the library passes ./robot.xacro
+            check_file(path)
+            self.record("file", path)
+
+
+class Asked(dict[str, str]):
+    """The environment, which reports to the expansion what is read."""
+
+    def __init__(self, values: Mapping[str, str], expansion: Expansion) -> None:
+        super().__init__(values)
+        self._expansion = expansion
+
+    def __getitem__(self, name: str) -> str:
+        self._expansion.record_variable(name, super().__contains__(name))
+        return super().__getitem__(name)
+
+    def __contains__(self, name: object) -> bool:
+        self._expansion.record_variable(str(name), super().__contains__(name))
+        return super().__contains__(name)
+
+
+def check_file(path: str) -> None:
+    """Raise RobotError for an existing path that is not a regular file of reasonable size."""
+    if os.path.isfile(path):
+        check_size(os.path.getsize(path), path)
+    elif os.path.exists(path) and not os.path.isdir(path):
+        raise RobotError(f"{path}: not a regular file; give one that can be read more than once")

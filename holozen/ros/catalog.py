@@ -1,0 +1,181 @@
+"""Which of ROS's modules and names exist here, and the hints for those that do not.
+
+What a module of ours lists in `__all__` is what scripts find there; the documentation is generated from it.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+from holozen.messages.definitions import closest
+
+PAGE = "docs/coming-from-ros.md"
+
+SAME = (
+    "rclpy", "rclpy.callback_groups", "rclpy.client", "rclpy.clock", "rclpy.context", "rclpy.exceptions",
+    "rclpy.executors", "rclpy.logging", "rclpy.node", "rclpy.parameter", "rclpy.publisher", "rclpy.qos",
+    "rclpy.service", "rclpy.subscription", "rclpy.task", "rclpy.time", "rclpy.timer", "tf2_ros",
+    "tf2_geometry_msgs", "tf_transformations", "ament_index_python", "launch",
+    "launch.actions", "launch.conditions", "launch.event_handlers", "launch.launch_description_sources",
+    "launch.substitutions", "launch_ros",
+)  # fmt: skip
+"""ROS's modules whose counterpart has the same name below `holozen.ros`."""
+
+ALIASES = {
+    "rclpy.clock_type": "rclpy.time",
+    "rclpy.constants": "rclpy.time",
+    "rclpy.duration": "rclpy.time",
+    "rclpy.guard_condition": "rclpy.waitable",
+    "rclpy.impl": "rclpy.logging",
+    "rclpy.impl.logging_severity": "rclpy.logging",
+    "rclpy.impl.rcutils_logger": "rclpy.logging",
+    "rclpy.signals": "rclpy.context",
+    "rclpy.time_source": "rclpy.clock",
+    "rclpy.topic_endpoint_info": "rclpy.node",
+    "rclpy.utilities": "rclpy",
+    "rclpy.wait_for_message": "rclpy.subscription",
+    "tf2_ros.buffer": "tf2_ros",
+    "tf2_ros.static_transform_broadcaster": "tf2_ros",
+    "tf2_ros.transform_broadcaster": "tf2_ros",
+    "tf2_ros.transform_listener": "tf2_ros",
+    "tf2_geometry_msgs.tf2_geometry_msgs": "tf2_geometry_msgs",
+    "ament_index_python.packages": "ament_index_python",
+    "launch.events": "launch.event_handlers",
+    "launch.launch_context": "launch",
+    "launch.launch_description": "launch",
+    "launch.some_substitutions_type": "launch",
+    "launch.utilities": "launch",
+    "launch_ros.actions": "launch_ros",
+    "launch_ros.descriptions": "launch_ros",
+    "launch_ros.parameter_descriptions": "launch_ros",
+    "launch_ros.substitutions": "launch.substitutions",
+}
+"""ROS's modules whose names are in another one here."""
+
+MODULES = {name: f"holozen.ros.{ALIASES.get(name, name)}" for name in sorted((*SAME, *ALIASES))}
+"""ROS's module -> ours. A module that another one's name begins with, up to a dot, is a package."""
+
+_TF2_ROS = (
+    "DurabilityPolicy", "Duration", "HistoryPolicy", "Node", "QoSProfile", "Future", "Time", "TFMessage",
+    "TransformStamped",
+)  # fmt: skip
+
+REEXPORTS: dict[str, tuple[str, ...]] = {
+    "rclpy.client": ("CallbackGroup", "Context", "Future", "QoSProfile"),
+    "rclpy.clock": ("ClockType", "Context", "Duration", "Time", "get_default_context"),
+    "rclpy.executors": (
+        "Client", "Clock", "ClockType", "Context", "ExternalShutdownException", "Future", "GuardCondition",
+        "InvalidHandle", "Node", "Service", "Subscription", "Task", "Timer", "get_default_context",
+    ),
+    "rclpy.node": (
+        "CallbackGroup", "Client", "Clock", "Context", "Executor", "FloatingPointRange", "Future", "GuardCondition",
+        "IntegerRange", "InvalidHandle", "InvalidParameterException", "InvalidParameterTypeException",
+        "InvalidParameterValueException", "InvalidTopicNameException", "ListParametersResult",
+        "MutuallyExclusiveCallbackGroup", "NodeNameNonExistentError", "NotInitializedException",
+        "PARAMETER_SEPARATOR_STRING", "Parameter", "ParameterAlreadyDeclaredException", "ParameterDescriptor",
+        "ParameterEvent", "ParameterImmutableException", "ParameterNotDeclaredException", "ParameterType",
+        "ParameterUninitializedException", "ParameterValue", "Publisher", "QoSProfile", "ROSClock", "Rate",
+        "ReentrantCallbackGroup", "S_TO_NS", "Service", "SetParametersResult", "Subscription", "TimeSource", "Timer",
+        "get_default_context", "get_logger", "qos_profile_parameter_events", "qos_profile_services_default",
+    ),
+    "rclpy.parameter": ("ParameterType", "ParameterValue"),
+    "rclpy.publisher": ("CallbackGroup", "QoSProfile"),
+    "rclpy.qos": ("Duration",),
+    "rclpy.service": ("CallbackGroup", "QoSProfile"),
+    "rclpy.subscription": ("CallbackGroup", "QoSProfile"),
+    "rclpy.timer": ("CallbackGroup", "Clock", "Context"),
+    "tf2_geometry_msgs": (
+        "PointStamped", "PoseStamped", "PoseWithCovarianceStamped", "TransformStamped", "Vector3Stamped",
+    ),
+    "tf2_ros": _TF2_ROS,
+    "tf2_ros.buffer": _TF2_ROS,
+    "tf2_ros.transform_listener": _TF2_ROS,
+}  # fmt: skip
+"""ROS's module -> names that it imports from others, and that scripts therefore find in it as well."""
+
+MESSAGES = {
+    "rcl_interfaces.msg": (
+        "FloatingPointRange", "IntegerRange", "ListParametersResult", "ParameterDescriptor", "ParameterEvent",
+        "ParameterType", "ParameterValue", "SetParametersResult",
+    ),
+    "geometry_msgs.msg": REEXPORTS["tf2_geometry_msgs"],
+    "tf2_msgs.msg": ("TFMessage",),
+}  # fmt: skip
+"""The messages among the re-exported names, by module; all others are rclpy's."""
+
+ACTIONS = "there are no actions here; use a service, or a topic for the goal and one for the progress"
+COMPONENTS = "there are no components here, which are C++; start each as a Node of its own: Python scripts run"
+ROS_1 = "this belongs to ROS 1; here is ROS 2's rclpy"
+
+HINTS = {
+    "actionlib": ACTIONS,
+    "ament_index_python.resources": "ament_index_python.packages finds the folders of packages",
+    "cv_bridge": "numpy.frombuffer(image.data, 'uint8').reshape(image.height, image.width, -1) is a colour image",
+    "interactive_markers": "there are no interactive markers here; a topic or a service can set what a marker would",
+    "launch_ros.actions.ComposableNodeContainer": COMPONENTS,
+    "launch_ros.actions.LifecycleNode": "there are no lifecycle nodes here; use Node",
+    "launch_ros.actions.LoadComposableNodes": COMPONENTS,
+    "launch_ros.descriptions.ComposableNode": COMPONENTS,
+    "launch_xml": "launch files are in Python here",
+    "launch_yaml": "launch files are in Python here",
+    "message_filters": "keep the last message of each topic in its callback, and compare their stamps",
+    "rclpy.action": ACTIONS,
+    "rclpy.lifecycle": "there are no lifecycle nodes here; use rclpy.node.Node",
+    "rclpy.serialization": "holozen.messages.codec.encode and decode do this",
+    "rosbag2_py": "`holozen record` and `holozen replay` do this",
+    "rosidl_runtime_py": "holozen.ros.generated.find gives the class of a name such as 'geometry_msgs/msg/Twist'",
+    "rospkg": "ament_index_python.packages finds the folders of packages",
+    "rospy": ROS_1,
+    "roslib": ROS_1,
+    "tf": f"{ROS_1}, tf2_ros and tf_transformations",
+    "tf2_py": "its exceptions and Buffer are in tf2_ros",
+}
+"""A module of ROS that does not exist here -> what to use instead."""
+
+WAITABLES = "create_guard_condition(callback).trigger() wakes the executor for anything but topics, services and timers"
+CLIENTS = "clients are not in the graph, only services: count_services, get_service_names_and_types"
+
+NODE_HINTS = {
+    "add_waitable": WAITABLES,
+    "count_clients": CLIENTS,
+    "get_client_names_and_types_by_node": CLIENTS,
+    "get_clients_info_by_service": CLIENTS,
+    "get_node_names_and_namespaces_with_enclaves": "there are no enclaves; use get_node_names_and_namespaces",
+    "get_servers_info_by_service": "get_service_names_and_types_by_node lists the services of a node",
+    "handle": "there is no C library below it",
+    "remove_waitable": WAITABLES,
+    "waitables": WAITABLES,
+}
+"""An attribute of ROS's Node that does not exist here -> what to use instead."""
+
+INTERNAL = {
+    "arm", "beginning_execution", "changed", "check_running", "check_can_publish", "check_signal", "close_all",
+    "closed", "detach", "ending_execution", "entities", "interrupt", "is_passed", "opened", "sleep_nanoseconds",
+    "take", "threads", "unwatch", "watch",
+}  # fmt: skip
+"""Public methods that our classes have for one another, and that are not part of rclpy."""
+
+
+class HelpfulAttributes:
+    """A class of ROS whose AttributeErrors name the nearest attribute, or what to use instead."""
+
+    __slots__ = ()
+
+    if not TYPE_CHECKING:  # a type checker would take any attribute as valid
+
+        def __getattr__(self, name: str) -> Any:
+            # An empty name keeps Python from adding a guess of its own.
+            raise AttributeError(_missing_attribute(type(self), name), name="")
+
+
+def _missing_attribute(kind: type, name: str) -> str:
+    """The error line for an attribute that a class of ours, or a script's subclass of it, lacks."""
+    if name == "_holozen":
+        call = "call super().__init__('name_of_the_node') in the __init__"
+        return f"{call} of {kind.__name__} before anything of Node is used"
+    ours = next(base for base in kind.__mro__ if base.__module__.startswith("holozen."))
+    lacks = f"{kind.__name__!r} object has no attribute {name!r}"
+    if name.startswith("_"):
+        return lacks
+    if name in NODE_HINTS and ours.__name__ == "Node":
+        return f"{lacks}; {NODE_HINTS[name]}; see {PAGE}"
+    known = (each for each in dir(kind) if each[0] != "_" and each not in INTERNAL)
+    return f"{lacks}{closest(name, known)}; what {ours.__name__} has here: {PAGE}"

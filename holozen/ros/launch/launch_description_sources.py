@@ -1,0 +1,66 @@
+"""launch.launch_description_sources: launch files, and how they are read."""
+
+from pathlib import Path
+from types import ModuleType
+
+from holozen.flags import nearest
+from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Text, describe, here, text
+from holozen.ros.launch.launch_description import LaunchDescription
+from holozen.ros.launch.stand_ins import gazebo_launch_file
+
+__all__ = ["AnyLaunchDescriptionSource", "FrontendLaunchDescriptionSource", "PythonLaunchDescriptionSource"]
+
+
+class PythonLaunchDescriptionSource:
+    """A launch file in Python, read when it is included."""
+
+    def __init__(self, launch_file_path: Text) -> None:
+        self.path, self.place = launch_file_path, here()
+
+    @property
+    def location(self) -> str:
+        """The path, as far as it is known."""
+        return describe(self.path)
+
+    def load(self, context: LaunchContext) -> tuple[Path, LaunchDescription]:
+        """The path and the description. Raises LaunchError, and what the file raises."""
+        path = Path(text(context, self.path))
+        try:
+            return path, gazebo_launch_file(path) or read(path)
+        except LaunchError as error:
+            raise error.at(self.place) from None
+
+
+class AnyLaunchDescriptionSource(PythonLaunchDescriptionSource):
+    """A launch file; only those in Python are supported here."""
+
+
+class FrontendLaunchDescriptionSource(PythonLaunchDescriptionSource):
+    """A launch file; only those in Python are supported here."""
+
+
+def read(path: Path) -> LaunchDescription:
+    """The description that a launch file generates. Raises LaunchError, and what the file raises."""
+    if not path.is_file():
+        folder = path.parent
+        files = sorted(each.name for each in folder.iterdir() if each.is_file()) if folder.is_dir() else []
+        hint = nearest(path.name, files) or (f"; files there: {', '.join(files[:20])}" if files else "")
+        raise LaunchError(f"no launch file {str(path)!r}{hint}")
+    if path.suffix in (".xml", ".yaml", ".yml"):
+        raise LaunchError(f"{path}: launch files in XML and YAML are not supported; Python only")
+    if path.suffix != ".py":
+        raise LaunchError(f"{path}: only launch files in Python are supported, whose names end with .py")
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise LaunchError(f"cannot read {path}: {error.strerror}") from None
+    module = ModuleType("launch_file")
+    module.__file__ = str(path)
+    exec(compile(source, str(path), "exec", dont_inherit=True), module.__dict__)
+    generate = getattr(module, "generate_launch_description", None)
+    if not callable(generate):
+        raise LaunchError(f"{path} has no function generate_launch_description()")
+    found = generate()
+    if not isinstance(found, LaunchDescription):
+        raise LaunchError(f"{path}: generate_launch_description() returned {found!r:.80}, not a LaunchDescription")
+    return found

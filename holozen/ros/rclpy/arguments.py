@@ -1,0 +1,141 @@
+"""ROS arguments of a command line: `--ros-args -r from:=to -p name:=value --params-file FILE --log-level LEVEL --`."""
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from holozen.console import printable
+from holozen.flags import nearest
+from holozen.ros import parameter_yaml
+from holozen.ros.parameter_yaml import Section, Value
+from holozen.ros.rclpy import names
+from holozen.ros.rclpy.exceptions import NameValidationException, RCLInvalidROSArgsError, UnknownROSArgsError
+from holozen.ros.rclpy.logging import LoggingSeverity
+
+START, END = "--ros-args", "--"
+REMAP, PARAM, FILE, LEVEL = "--remap", "--param", "--params-file", "--log-level"
+SHORT = {"-r": REMAP, "-p": PARAM, "-e": "--enclave"}
+WITH_VALUE = (REMAP, PARAM, FILE, LEVEL, "--enclave", "--log-config-file", "--log-file-name")
+SWITCHES = ("rosout-logs", "stdout-logs", "external-lib-logs")
+WITHOUT_VALUE = tuple(f"--{verb}-{name}" for verb in ("enable", "disable") for name in SWITCHES)
+QUIET = "--disable-stdout-logs"
+
+
+@dataclass(frozen=True, slots=True)
+class Arguments:
+    """The ROS arguments of a command line, for all nodes of a process, or of `cli_args`, for one node."""
+
+    remaps: tuple[names.Remap, ...] = ()
+    sections: tuple[Section, ...] = ()
+    levels: tuple[tuple[str, LoggingSeverity], ...] = ()
+    """Loggers and their levels; "" is the default of all others."""
+    quiet: bool = False
+    """Whether loggers print nothing."""
+    unparsed: list[str] = field(default_factory=list)
+    """The words that are not ROS arguments."""
+
+    def node_name(self, given: str) -> str:
+        """The name of a node that is called `given` in its script."""
+        return next((r.replacement for r in self.remaps if r.match == "__node" and r.applies_to(given)), given)
+
+    def namespace(self, given: str, node: str) -> str:
+        """The namespace of a node that is created in `given`."""
+        return next((r.replacement for r in self.remaps if r.match == "__ns" and r.applies_to(node)), given)
+
+    def remap(self, full_name: str, node: str, namespace: str, *, kind: str = "topic") -> str:
+        """An absolute name after the first remap rule that matches it in a node."""
+        for rule in self.remaps:
+            if rule.renames(full_name, node, namespace, kind):
+                return names.expand(rule.replacement, node, namespace, kind=kind)
+        return full_name
+
+    def parameters_for(self, full_name: str) -> dict[str, Value]:
+        """The parameter values for a node. Of two values for one name the later wins."""
+        found: dict[str, Value] = {}
+        for section in self.sections:
+            if section.is_for(full_name):
+                found |= section.values
+        return found
+
+    def merged(self, first: "Arguments") -> "Arguments":
+        """These, with those of one node taking precedence."""
+        return replace(
+            self, remaps=first.remaps + self.remaps, sections=self.sections + first.sections,
+            levels=self.levels + first.levels, quiet=self.quiet or first.quiet,
+        )  # fmt: skip
+
+
+def parse(args: Sequence[str] | None = None) -> Arguments:
+    """The ROS arguments in `args`, by default the process's own.
+
+    Raises RCLInvalidROSArgsError for a value that cannot be parsed, UnknownROSArgsError for an unknown flag.
+    """
+    found = _Parsed()
+    words = iter(sys.argv if args is None else args)
+    for text in words:
+        if not isinstance(text, str):
+            raise TypeError(f"arguments must be a list of str; {text!r} is a {type(text).__name__}")
+        if text != START:
+            found.unparsed.append(text)
+            continue
+        for flag in words:
+            if flag == END:
+                break
+            found.take(flag, words)
+    return Arguments(
+        tuple(found.remaps), tuple(found.sections), tuple(found.levels), found.quiet, unparsed=found.unparsed
+    )
+
+
+def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
+    """The words that are not ROS arguments, with the program's name."""
+    return parse(args).unparsed
+
+
+class _Parsed:
+    """What was parsed so far."""
+
+    def __init__(self) -> None:
+        self.remaps: list[names.Remap] = []
+        self.sections: list[Section] = []
+        self.levels: list[tuple[str, LoggingSeverity]] = []
+        self.quiet = False
+        self.unparsed: list[str] = []
+
+    def take(self, flag: str, words: Iterator[str]) -> None:
+        """Parse one flag, with its value from the words after it."""
+        if flag == START or flag in WITHOUT_VALUE:
+            self.quiet = self.quiet or flag == QUIET
+            return
+        full = SHORT.get(flag, flag)
+        if full not in WITH_VALUE:
+            known = (*WITH_VALUE, *SHORT, *WITHOUT_VALUE)
+            hint = nearest(flag, known) or "; end the ROS arguments with -- before your own"
+            raise UnknownROSArgsError(f"unknown ROS argument {flag!r}{hint}")
+        text = next(words, None)
+        if text is None or text == END:
+            raise RCLInvalidROSArgsError(f"{flag} needs a value")
+        try:
+            self._read(full, text)
+        except (ValueError, NameValidationException) as error:
+            raise RCLInvalidROSArgsError(printable(f"{flag} {text}: {error}")) from None
+
+    def _read(self, flag: str, text: str) -> None:
+        readers: dict[str, Callable[[str], Any]] = {
+            REMAP: lambda text: self.remaps.append(names.remap(text)),
+            PARAM: lambda text: self.sections.append(parameter_yaml.assigned(text)),
+            FILE: lambda text: self.sections.extend(parameter_yaml.read(text)),
+            LEVEL: lambda text: self.levels.append(_level(text)),
+        }
+        readers.get(flag, str)(text)  # the other flags are accepted and have no effect
+
+
+def _level(text: str) -> tuple[str, LoggingSeverity]:
+    name, _, level = text.rpartition(":=")
+    try:
+        return name, LoggingSeverity[level.upper()]
+    except KeyError:
+        raise ValueError(
+            f"no level {level!r}; use one of {', '.join(s.name.lower() for s in LoggingSeverity)}"
+        ) from None

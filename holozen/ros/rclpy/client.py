@@ -1,0 +1,147 @@
+"""Client: calls a service."""
+
+import threading
+import time
+import weakref
+from typing import Any
+
+from holozen.messages.codec import CodecError
+from holozen.ros.catalog import HelpfulAttributes
+from holozen.ros.rclpy.callback_groups import CallbackGroup
+from holozen.ros.rclpy.exceptions import InvalidHandle
+from holozen.ros.rclpy.handle import NodeHandle
+from holozen.ros.rclpy.names import key
+from holozen.ros.rclpy.qos import QoSProfile
+from holozen.ros.rclpy.task import Future, TaskQueue
+from holozen.transport.errors import BusError, NoReply, ServiceError
+
+__all__ = ["Client"]
+
+POLL = 0.01  # s between two looks for the service
+LONGEST = 86_400.0  # s for a service to answer
+
+
+class Client(HelpfulAttributes):
+    """Created by `Node.create_client`. Each call waits for the service, and for its reply, in a thread of its own.
+
+    So `call` works without a spinning executor. If the service refuses, the future raises ServiceError with the reason.
+    """
+
+    def __init__(
+        self,
+        handle: NodeHandle,
+        srv_type: Any,
+        srv_name: str,
+        callback_group: CallbackGroup | None,
+        qos_profile: QoSProfile,
+    ) -> None:
+        self.srv_type, self.srv_name, self.qos_profile = srv_type, srv_name, qos_profile
+        self.callback_group = callback_group
+        self.tasks = TaskQueue(callback_group)  # the done callbacks of its futures
+        self._handle, self._closed = handle, threading.Event()
+        self._is_served = handle.bus.served(key(srv_name))
+        self._threads: weakref.WeakSet[threading.Thread] = weakref.WeakSet()
+        self._pending: weakref.WeakSet[Future] = weakref.WeakSet()
+
+    @property
+    def service_name(self) -> str:
+        """Its name, absolute and remapped."""
+        return self.srv_name
+
+    @property
+    def logger_name(self) -> str:
+        """The name of its node's logger."""
+        return self._handle.logger.name
+
+    def service_is_ready(self) -> bool:
+        """Whether the service is available. Raises RCLError after `rclpy.shutdown()`, InvalidHandle if destroyed."""
+        self._handle.context.check_can_publish(f"look for {self.srv_name}")
+        self._check_open()
+        return self._is_served()
+
+    def wait_for_service(self, timeout_sec: float | None = None) -> bool:
+        """Wait until the service is available, at most so many seconds; whether it is.
+
+        Raises as `service_is_ready`, and ExternalShutdownException when a signal shuts down rclpy while it waits.
+        """
+        deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
+        while not self.service_is_ready():
+            self._handle.context.check_running(f"wait for {self.srv_name}")
+            left = POLL if deadline is None else min(POLL, deadline - time.monotonic())
+            if left <= 0:
+                return False
+            self._closed.wait(left)
+        return True
+
+    def call(self, request: Any, timeout_sec: float | None = None) -> Any:
+        """Call the service and wait for the reply.
+
+        Raises TimeoutError, ServiceError with the service's reason, or InvalidHandle if it is destroyed while it waits.
+        """
+        future, done = self.call_async(request), threading.Event()
+        future.watch(done.set)
+        deadline = None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
+        while not done.is_set():
+            left = 0.1 if deadline is None else min(0.1, deadline - time.monotonic())
+            if left <= 0:
+                future.cancel()
+                raise TimeoutError(f"no reply from {self.srv_name} within {timeout_sec:g} s")
+            self._handle.context.check_can_publish(f"call {self.srv_name}")
+            done.wait(left)
+        if future.cancelled():
+            raise InvalidHandle(f"the client of {self.srv_name} was destroyed while it waited for the reply")
+        return future.result()
+
+    def call_async(self, request: Any) -> Future:
+        """Call the service; the future of the reply, at once."""
+        if not isinstance(request, self.srv_type.Request):
+            given = request.__name__ if isinstance(request, type) else type(request).__name__
+            raise TypeError(f"{self.srv_name}: expected a {self.srv_type.__name__}.Request, and got a {given}")
+        self._handle.context.check_can_publish(f"call {self.srv_name}")
+        self._check_open()
+        future = Future(executor=self.tasks)
+        self._pending.add(future)
+        thread = threading.Thread(target=self._call, args=(request, future), daemon=True)
+        self._threads.add(thread)
+        thread.start()
+        return future
+
+    def remove_pending_request(self, future: Future) -> None:
+        """Stop waiting for that reply."""
+        future.cancel()
+
+    def detach(self) -> None:
+        """Stop calling; the bus is about to close."""
+        self._closed.set()
+
+    def destroy(self) -> None:
+        """Stop calling, and cancel all pending requests."""
+        self.detach()
+        for future in list(self._pending):
+            future.cancel()
+
+    def threads(self) -> list[threading.Thread]:
+        """Those that wait for replies, which end with the bus."""
+        return list(self._threads)
+
+    def _check_open(self) -> None:
+        if self._closed.is_set():
+            raise InvalidHandle(f"the client of {self.srv_name} was destroyed")
+
+    def _call(self, request: Any, future: Future) -> None:
+        while not (future.done() or self._closed.is_set()):
+            try:
+                if not self._is_served():
+                    self._closed.wait(POLL)
+                    continue
+                reply = self._handle.bus.call(key(self.srv_name), request, self.srv_type.Response, LONGEST)
+                return future.set_result(reply)
+            except NoReply:
+                continue
+            except (ServiceError, CodecError) as error:
+                return future.set_exception(error)
+            except Exception as error:
+                if not self._closed.is_set() and not isinstance(error, BusError):
+                    return future.set_exception(error)
+                break
+        future.cancel()

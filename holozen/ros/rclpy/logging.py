@@ -1,0 +1,287 @@
+"""Loggers: lines with a level, a time and a name on standard error.
+
+ROS's environment variables apply: RCUTILS_CONSOLE_OUTPUT_FORMAT, RCUTILS_COLORIZED_OUTPUT (0 or 1) and
+RCUTILS_LOGGING_USE_STDOUT (1).
+"""
+
+import contextlib
+import os
+import re
+import sys
+import threading
+import time
+from enum import IntEnum
+from pathlib import Path
+from typing import Any, NamedTuple, TextIO
+
+from holozen.ros.catalog import HelpfulAttributes
+
+__all__ = [
+    "LoggingSeverity", "RcutilsLogger", "clear_config", "get_logger", "get_logger_effective_level", "get_logger_level",
+    "get_logging_directory", "get_logging_severity_from_string", "initialize", "set_logger_level", "shutdown",
+]  # fmt: skip
+
+
+class LoggingSeverity(IntEnum):
+    """ROS's levels, with its numbers."""
+
+    UNSET = 0
+    DEBUG = 10
+    INFO = 20
+    WARN = 30
+    ERROR = 40
+    FATAL = 50
+
+
+FORMAT = "[{severity}] [{time}] [{name}]: {message}"
+COLORS = {LoggingSeverity.DEBUG: 32, LoggingSeverity.WARN: 33, LoggingSeverity.ERROR: 31, LoggingSeverity.FATAL: 31}
+"""The terminal's colour codes: green, yellow, red."""
+ESCAPE = {r"\n": "\n", r"\t": "\t", r"\r": "\r", r"\a": "\a", r"\\": "\\"}
+
+
+class Place(NamedTuple):
+    """A call in a script that logs."""
+
+    file: str
+    function: str
+    line: int
+    offset: int = 0  # in the bytecode: a line may hold two calls
+
+
+def _write(severity: LoggingSeverity, name: str, message: str, place: Place) -> None:
+    """Print a line to standard error. A closed terminal is not an error."""
+    stream = sys.stdout if os.environ.get("RCUTILS_LOGGING_USE_STDOUT") == "1" else sys.stderr
+    line = formatted(severity, name, message, place, time.time_ns())
+    if severity in COLORS and _colored(stream):
+        line = f"\033[{COLORS[severity]}m{line}\033[0m"
+    with contextlib.suppress(OSError, ValueError):
+        stream.write(line + "\n")  # in one call: lines of two threads must not mix
+        stream.flush()
+
+
+def formatted(severity: LoggingSeverity, name: str, message: str, place: Place, now: int) -> str:
+    """The line, at `now` nanoseconds since 1970."""
+    seconds, rest = divmod(now, 1_000_000_000)
+    words = {
+        "severity": severity.name, "name": name, "message": message, "time": f"{seconds}.{rest:09}",
+        "time_as_nanoseconds": str(now), "function_name": place.function, "file_name": place.file,
+        "line_number": str(place.line),
+        "date_time_with_ms": time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(seconds)) + f".{rest // 1_000_000:03}",
+    }  # fmt: skip
+    form = os.environ.get("RCUTILS_CONSOLE_OUTPUT_FORMAT") or FORMAT
+    form = re.sub(r"\\.", lambda found: ESCAPE.get(found[0], found[0]), form)
+    return re.sub(r"\{(\w+)\}", lambda found: words.get(found[1], found[0]), form)
+
+
+def _colored(stream: TextIO) -> bool:
+    setting = os.environ.get("RCUTILS_COLORIZED_OUTPUT", "")
+    return setting == "1" if setting in ("0", "1") else stream.isatty()
+
+
+MOST_CALLS = 10_000  # that are remembered: generated code must not fill the memory
+
+Call = tuple[str, Place]  # the name of a logger, and where it is called
+
+
+class _Filters:
+    """Drops repeated lines of calls with `once`, `skip_first` or `throttle_duration_sec`."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._levels: dict[Call, LoggingSeverity] = {}
+        self._last: dict[Call, int] = {}
+
+    def passes(
+        self,
+        name: str,
+        place: Place,
+        severity: LoggingSeverity,
+        *,
+        once: bool,
+        skip_first: bool,
+        seconds: float | None,
+        clock: Any,
+    ) -> bool:
+        """Whether a line is printed. Raises ValueError if a call logs at two levels, TypeError for invalid seconds."""
+        if seconds is not None and (isinstance(seconds, bool) or not isinstance(seconds, int | float)):
+            raise TypeError(f"throttle_duration_sec is a {type(seconds).__name__}; use seconds, as a number")
+        call = (name, place)
+        with self._lock:
+            if len(self._levels) >= MOST_CALLS:
+                return True
+            is_first = call not in self._levels
+            if self._levels.setdefault(call, severity) != severity:
+                raise ValueError(
+                    f"{place.file}:{place.line} logs at {severity.name}, and before at {self._levels[call].name}; "
+                    "a call with once, skip_first or throttle_duration_sec must keep its level"
+                )
+            if (once and not is_first) or (skip_first and is_first):
+                return False
+            return seconds is None or self._is_due(call, seconds, clock)
+
+    def _is_due(self, call: Call, seconds: float, clock: Any) -> bool:
+        now = clock.now().nanoseconds if hasattr(clock, "now") else time.monotonic_ns()
+        last = self._last.get(call)
+        if last is not None and last <= now < last + seconds * 1e9:  # a clock that was set back starts again
+            return False
+        self._last[call] = now
+        return True
+
+
+DEFAULT = LoggingSeverity.INFO
+
+_levels: dict[str, LoggingSeverity] = {}
+_quiet = False
+_filters = _Filters()
+
+
+class RcutilsLogger(HelpfulAttributes):
+    """A logger. Its parents are the names before each dot of its own."""
+
+    def __init__(self, name: str = "") -> None:
+        self.name = name
+
+    def get_child(self, name: str) -> "RcutilsLogger":
+        """The logger of a name below this one. Raises ValueError for an empty name."""
+        if not isinstance(name, str) or not name:
+            raise ValueError(f"the name of a logger must be a str that is not empty, not {name!r}")
+        return RcutilsLogger(f"{self.name}.{name}" if self.name else name)
+
+    def set_level(self, level: int) -> None:
+        """Print lines of this level and above. Raises ValueError for an unknown level."""
+        set_logger_level(self.name, level)
+
+    def get_effective_level(self) -> LoggingSeverity:
+        """Its level, else its nearest parent's, else INFO."""
+        return get_logger_effective_level(self.name)
+
+    def is_enabled_for(self, severity: int) -> bool:
+        """Whether a line of that level is printed."""
+        return not _quiet and severity >= self.get_effective_level()
+
+    def log(
+        self,
+        message: object,
+        severity: int,
+        *,
+        once: bool = False,
+        skip_first: bool = False,
+        throttle_duration_sec: float | None = None,
+        throttle_time_source_type: Any = None,
+    ) -> bool:
+        """Print a line; whether it was printed.
+
+        `once`, `skip_first` and `throttle_duration_sec` count for each call in the script, and each logger; seconds are
+        measured on the steady clock, or on the Clock given.
+        """
+        level = _severity(severity)
+        if not self.is_enabled_for(level):
+            return False
+        place = _caller()
+        if (once or skip_first or throttle_duration_sec is not None) and not _filters.passes(
+            self.name, place, level, once=once, skip_first=skip_first, seconds=throttle_duration_sec,
+            clock=throttle_time_source_type,
+        ):  # fmt: skip
+            return False
+        _write(level, self.name, str(message), place)
+        return True
+
+    def debug(self, message: object, **options: Any) -> bool:
+        """Print a line that helps to find a bug. Options are those of `log`."""
+        return self.log(message, LoggingSeverity.DEBUG, **options)
+
+    def info(self, message: object, **options: Any) -> bool:
+        """Print a line about normal operation. Options are those of `log`."""
+        return self.log(message, LoggingSeverity.INFO, **options)
+
+    def warning(self, message: object, **options: Any) -> bool:
+        """Print a line about what may be wrong. Options are those of `log`."""
+        return self.log(message, LoggingSeverity.WARN, **options)
+
+    def warn(self, message: object, **options: Any) -> bool:
+        """`warning`, by its older name."""
+        return self.log(message, LoggingSeverity.WARN, **options)
+
+    def error(self, message: object, **options: Any) -> bool:
+        """Print a line about what failed. Options are those of `log`."""
+        return self.log(message, LoggingSeverity.ERROR, **options)
+
+    def fatal(self, message: object, **options: Any) -> bool:
+        """Print a line about what ends the program. Options are those of `log`."""
+        return self.log(message, LoggingSeverity.FATAL, **options)
+
+
+def get_logger(name: str) -> RcutilsLogger:
+    """The logger of a name. Raises ValueError for an empty one."""
+    return RcutilsLogger().get_child(name)
+
+
+def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
+    """The level of a name such as "warn". Raises RuntimeError for an unknown one."""
+    try:
+        return LoggingSeverity[log_severity.upper()]
+    except KeyError:
+        raise RuntimeError(f"no level {log_severity!r}; use one of {_level_names()}") from None
+
+
+def get_logger_effective_level(name: str) -> LoggingSeverity:
+    """The level of a logger, else of its nearest parent, else INFO."""
+    while name:
+        if level := _levels.get(name):
+            return level
+        name = name.rpartition(".")[0]
+    return _levels.get("") or DEFAULT
+
+
+def get_logger_level(name: str) -> LoggingSeverity:
+    """The logger's own level; UNSET if it has none."""
+    return _levels.get(name, LoggingSeverity.UNSET)
+
+
+def set_logger_level(name: str, level: int, detailed_error: bool = False) -> None:
+    """Print lines of this level and above. Raises ValueError for an unknown level."""
+    _levels[name] = _severity(level)
+
+
+def silence(quiet: bool = True) -> None:
+    """Silence all loggers."""
+    global _quiet
+    _quiet = quiet
+
+
+def initialize() -> None:
+    """Does nothing."""
+
+
+def shutdown() -> None:
+    """Does nothing."""
+
+
+def clear_config() -> None:
+    """Forget all levels."""
+    _levels.clear()
+    silence(False)
+
+
+def get_logging_directory() -> Path:
+    """Where ROS would keep its log files. There are none: all lines go to standard error."""
+    return Path.home() / ".ros" / "log"
+
+
+def _severity(level: int) -> LoggingSeverity:
+    try:
+        return LoggingSeverity(level)
+    except ValueError:
+        raise ValueError(f"no level {level!r}; use LoggingSeverity: {_level_names()}") from None
+
+
+def _level_names() -> str:
+    return ", ".join(each.name for each in LoggingSeverity)
+
+
+def _caller() -> Place:
+    """The innermost call from outside this file."""
+    frame = sys._getframe(1)
+    while frame.f_code.co_filename == __file__ and frame.f_back:
+        frame = frame.f_back
+    return Place(frame.f_code.co_filename, frame.f_code.co_name, frame.f_lineno, frame.f_lasti)

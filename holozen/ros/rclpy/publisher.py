@@ -1,0 +1,80 @@
+"""Publisher: sends messages on a topic."""
+
+from typing import Any
+
+from holozen.ros.catalog import HelpfulAttributes
+from holozen.ros.rclpy.callback_groups import CallbackGroup
+from holozen.ros.rclpy.exceptions import InvalidHandle
+from holozen.ros.rclpy.handle import NodeHandle
+from holozen.ros.rclpy.names import key
+from holozen.ros.rclpy.qos import HistoryPolicy, QoSProfile
+
+__all__ = ["Publisher"]
+
+
+class Publisher(HelpfulAttributes):
+    """Created by `Node.create_publisher`. Sends with Zenoh's priority DATA; late subscribers can get the last message.
+
+    Messages are dropped where a link is full; with a history of KEEP_ALL the publisher waits instead.
+    """
+
+    def __init__(self, handle: NodeHandle, msg_type: Any, topic: str, qos_profile: QoSProfile) -> None:
+        self.msg_type, self.topic, self.qos_profile = msg_type, topic, qos_profile
+        self._handle = handle
+        block = qos_profile.history == HistoryPolicy.KEEP_ALL
+        self._writer: Any = handle.bus.publisher(key(topic), msg_type, block=block)
+        self.callback_group: CallbackGroup | None = None
+
+    @property
+    def topic_name(self) -> str:
+        """Its topic, absolute and remapped."""
+        return self.topic
+
+    @property
+    def logger_name(self) -> str:
+        """The name of its node's logger."""
+        return self._handle.logger.name
+
+    def publish(self, msg: Any) -> None:
+        """Send a message, or the bytes of one. Raises TypeError for another type.
+
+        A message with a NaN or an infinity is sent as CDR whatever the wire format: the others cannot express them.
+        """
+        self._handle.context.check_can_publish()
+        writer = self._writer
+        if writer is None:
+            raise InvalidHandle(f"the publisher of {self.topic} was destroyed")
+        if not isinstance(msg, self.msg_type | bytes):
+            given = msg.__name__ if isinstance(msg, type) else type(msg).__name__
+            hint = f"; write {given}()" if isinstance(msg, type) else ""
+            raise TypeError(f"{self.topic}: expected a {self.msg_type.__name__}, and got a {given}{hint}")
+        try:
+            (writer.put_bytes if isinstance(msg, bytes) else writer.put)(msg)
+        except Exception:
+            if self._writer is None:  # another thread has destroyed it
+                raise InvalidHandle(f"the publisher of {self.topic} was destroyed") from None
+            raise
+
+    def get_subscription_count(self) -> int:
+        """How many subscriptions receive what is sent now; 1 if only programs that are not holozen nodes do."""
+        self._handle.context.check_can_publish(f"count the subscriptions of {self.topic}")
+        if self._writer is None or not self._writer.matched:
+            return 0  # a subscription may be in the graph before the route to it is established
+        return max(1, len(self._handle.endpoints_on(self.topic, "sub")))
+
+    def assert_liveliness(self) -> None:
+        """Does nothing: Zenoh tracks liveliness."""
+
+    def wait_for_all_acked(self, timeout: Any = None) -> bool:
+        """Always true: Zenoh has accepted everything that `publish` was given."""
+        return True
+
+    def detach(self) -> None:
+        """Stop sending; the bus is about to close."""
+        self._writer = None
+
+    def destroy(self) -> None:
+        """Stop sending, and leave the topic."""
+        writer, self._writer = self._writer, None
+        if writer is not None:
+            writer.close()

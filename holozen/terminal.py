@@ -1,0 +1,45 @@
+"""Queries to the terminal about its capabilities."""
+
+import contextlib
+import os
+import re
+import select
+import time
+
+ASK_KEYBOARD, ASK_TERMINAL = "\x1b[?u", "\x1b[c"  # the Kitty protocol's query, and DA1, which every terminal answers
+PATIENCE = 0.3  # s for an answer
+_KEYBOARD, _TERMINAL = re.compile(rb"\x1b\[\?\d+u"), re.compile(rb"\x1b\[\?[\d;]*c")
+
+
+def reports_releases(stdin: int, stdout: int) -> bool | None:
+    """Whether the terminal reports key releases (Kitty protocol); None if it does not answer.
+
+    Raises OSError without a terminal, or in a background process.
+    """
+    import termios
+    import tty
+
+    try:
+        if os.tcgetpgrp(stdin) != os.getpgrp():
+            raise OSError("this runs in the background")
+        before = termios.tcgetattr(stdin)
+    except termios.error as error:
+        raise OSError(str(error)) from None
+    try:
+        tty.setcbreak(stdin, termios.TCSADRAIN)  # Ctrl-C still works
+        os.write(stdout, (ASK_KEYBOARD + ASK_TERMINAL).encode())
+        answer = _answer(stdin)
+    finally:
+        with contextlib.suppress(termios.error):
+            termios.tcsetattr(stdin, termios.TCSADRAIN, before)
+    return bool(_KEYBOARD.search(answer)) if answer else None
+
+
+def _answer(stdin: int) -> bytes:
+    answer, deadline = b"", time.monotonic() + PATIENCE
+    while not _TERMINAL.search(answer) and (left := deadline - time.monotonic()) > 0:
+        if select.select([stdin], [], [], left)[0]:
+            if not (more := os.read(stdin, 1000)):
+                break
+            answer += more
+    return answer

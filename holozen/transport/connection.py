@@ -1,0 +1,193 @@
+"""How a process connects to others: Zenoh's own flags, and the default without any.
+
+By default nothing leaves this machine: peers meet on loopback at the rendezvous points; no router, no multicast.
+"""
+
+from holozen.flags import nearest, refused
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:
+    import argparse
+
+RENDEZVOUS = tuple(f"tcp/127.0.0.1:{port}" for port in (7447, 7448, 7449))
+"""Where the processes of one machine meet: Zenoh's own port, and two more in case its holder does not answer."""
+
+LOOPBACK = "tcp/127.0.0.1:0"  # any free port, on loopback only
+LEASE = 1500  # ms; a silent link is closed after this (Zenoh: 10 s), and a new one with a longer round trip too
+FORBIDDEN = " (where an access control list is in force, it has to allow @holozen/**)"  # a reason to see no nodes
+CLIENT_TRY = 10.0  # s, for one attempt of a client to reach its router; a link with a delay of 0.5 s takes 3 s
+_RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
+
+
+class Connection:
+    """Zenoh's flags, and how messages are encoded.
+
+    `listen` and `connect`: None means the loopback default, an empty tuple means no endpoint.
+    """
+
+    def __init__(
+        self,
+        mode: str = "peer",
+        connect: tuple[str, ...] | None = None,
+        listen: tuple[str, ...] | None = None,
+        config: str | None = None,
+        cfg: tuple[tuple[str, str], ...] = (),
+        wire: str = "json",
+    ) -> None:
+        self.mode, self.connect, self.listen = mode, connect, listen
+        self.config, self.cfg, self.wire = config, cfg, wire
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Connection) and vars(self) == vars(other)
+
+    def __hash__(self) -> int:
+        return hash(tuple(vars(self).values()))
+
+    def replace(self, **changes: object) -> "Connection":
+        """A copy with some values changed."""
+        return Connection(**{**vars(self), **changes})
+
+    @property
+    def where(self) -> str:
+        """Where it looks for others, as text for messages."""
+        if self.config and self.connect is None:
+            return f"the endpoints of {self.config}"
+        return ", ".join(self._connect_endpoints()) or ", ".join(self._listen_endpoints())
+
+    @property
+    def rendezvous(self) -> tuple[str, ...]:
+        """The endpoints where others look for this process, best first. It holds the first one that it can get.
+
+        These are the ones given to both --listen and --connect, or else the first of --listen.
+        """
+        if self.config or self.mode != "peer":
+            return ()
+        if self.listen is None:
+            return RENDEZVOUS
+        return tuple(one for one in self.listen if one in self._connect_endpoints()) or self.listen[:1]
+
+    def settings(self) -> dict[str, str]:
+        """Zenoh configuration paths and their values as JSON5, in the order to apply them."""
+        values: dict[str, object] = {"mode": self.mode, **_ALWAYS}
+        if not self.config or self.connect is not None:
+            values["connect/endpoints"] = self._connect_endpoints()
+        if not self.config or self.listen is not None:
+            values["listen/endpoints"] = self._listen_endpoints()
+        if self.config:
+            # The file decides; a mode of "peer" cannot be distinguished from the default.
+            values = {k: v for k, v in values.items() if k.endswith("/endpoints") or (k == "mode" and v != "peer")}
+        if self.mode == "client":
+            # Attempts time out, so that none outlives its bus by much. After a success Zenoh reconnects for ever.
+            values |= {"connect/timeout_ms": round(CLIENT_TRY * 1000), "connect/exit_on_failure": True}
+        return {path: _json(value) for path, value in values.items()} | dict(self.cfg)
+
+    def arguments(self) -> list[str]:
+        """The flags that give another process the same connection."""
+        flags = [] if self.mode == "peer" else ["--mode", self.mode]
+        for name, endpoints in (("--connect", self.connect), ("--listen", self.listen)):
+            for endpoint in endpoints or ():
+                flags += [name, endpoint]
+        flags += ["--config", self.config] if self.config else []
+        flags += ["--wire", self.wire] if self.wire != "json" else []
+        for path, value in self.cfg:
+            flags += ["--cfg", f"{path}:{value}"]
+        return flags
+
+    def _connect_endpoints(self) -> list[str]:
+        if self.connect is None:
+            return {"router": [], "client": [RENDEZVOUS[0]]}.get(self.mode, [*RENDEZVOUS])
+        return list(self.connect)
+
+    def _listen_endpoints(self) -> list[str]:
+        if self.mode == "client":
+            return []
+        if self.mode == "router":
+            return [RENDEZVOUS[0]] if self.listen is None else list(self.listen)
+        # A peer whose endpoint is taken still needs a port where the others can reach it.
+        others = [one for one in self.listen or () if one not in self.rendezvous]
+        return [*self.rendezvous[:1], *others, LOOPBACK]
+
+
+_ALWAYS: dict[str, object] = {
+    "scouting/multicast/enabled": False,
+    "scouting/delay": 0,
+    "connect/timeout_ms": -1,
+    "connect/exit_on_failure": False,
+    "connect/retry": _RETRY,
+    # One attempt: a listener that waits for a taken port delays `close` by 10 s.
+    "listen/timeout_ms": 0,
+    "listen/exit_on_failure": True,
+    "transport/link/tx/lease": LEASE,
+}
+
+
+def add_arguments(parser: "argparse.ArgumentParser") -> None:
+    """Add Zenoh's own flags, with the names that its other tools use."""
+    group = parser.add_argument_group("zenoh", f"how to connect; by default peers meet on loopback at {RENDEZVOUS[0]}")
+    group.add_argument("--mode", choices=("peer", "client", "router"), default="peer", help="Zenoh session mode")
+    for name, example in (("connect", "tcp/10.0.0.2:7447"), ("listen", "tcp/0.0.0.0:7447")):
+        text = f"{name} there, such as {example}"
+        group.add_argument(f"--{name}", action="append", type=endpoint, metavar="ENDPOINT", help=text)
+    group.add_argument("--config", metavar="FILE", help="a Zenoh configuration file (JSON5 or YAML)")
+    group.add_argument("--wire", choices=("json", "msgpack", "cdr"), default="json", help="encoding of messages")
+    group.add_argument("--cfg", action="append", type=_pair, default=[], metavar="PATH:VALUE",
+        help="a single Zenoh setting")  # fmt: skip
+
+
+def from_arguments(args: "argparse.Namespace") -> Connection:
+    """The Connection that the flags of `add_arguments` describe."""
+    return Connection(
+        mode=args.mode,
+        connect=None if args.connect is None else tuple(args.connect),
+        listen=None if args.listen is None else tuple(args.listen),
+        config=args.config,
+        cfg=tuple(args.cfg),
+        wire=args.wire,
+    )
+
+
+def endpoint(text: str) -> str:
+    """Parses an endpoint."""
+    if wrong := fault(text):
+        raise refused(wrong)
+    return text
+
+
+def _json(value: object) -> str:
+    """JSON without the module `json`, which takes 2 ms to load."""
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_json(name)}: {_json(inner)}" for name, inner in value.items()) + "}"
+    if isinstance(value, list):
+        return "[" + ", ".join(map(_json, value)) + "]"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return str(value).lower()
+
+
+def _pair(text: str) -> tuple[str, str]:
+    path, colon, value = text.partition(":")
+    if not colon or not path:
+        raise refused(f"{text!r}: write PATH:VALUE, such as transport/link/tx/lease:2000")
+    return path, value
+
+
+PROTOCOLS = ("tcp", "udp", "tls", "quic", "ws", "unixsock-stream", "unixpipe", "serial", "vsock")
+"""Zenoh's protocols. Zenoh itself reports those that it was built without."""
+
+_WITH_PORT = ("tcp", "udp", "tls", "quic", "ws")
+HOW = "write PROTOCOL/HOST:PORT, such as tcp/10.0.0.2:7447"
+
+
+def fault(text: str) -> str:
+    """What is wrong with an endpoint, with the right format, in one line; empty for a valid one."""
+    protocol, slash, address = text.partition("/")
+    if not slash or not address or not text.isprintable() or " " in text:
+        return f"{text!r} is not an endpoint: {HOW}"
+    if protocol not in PROTOCOLS:
+        return f"{text!r}: no protocol {protocol!r}{nearest(protocol, PROTOCOLS)}; there are {', '.join(PROTOCOLS)}"
+    if protocol not in _WITH_PORT:
+        return ""
+    host, colon, port = address.partition("#")[0].partition("?")[0].rpartition(":")
+    if not host or not colon or not port.isdecimal() or int(port) > 65535:
+        return f"{text!r} has no port from 0 to 65535: {HOW}"
+    return ""

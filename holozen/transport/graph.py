@@ -1,0 +1,239 @@
+"""The graph: the nodes and what they read, write and serve, announced by Zenoh liveliness tokens.
+
+A token's key is `@holozen/<session>/<node>/<kind>/<package>/<msg or srv>/<Type>/<key>`; a `node` token ends after its
+kind. A slash in a node's name is written as `%2F`. The `@` excludes them from a plain `**`.
+"""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import threading
+import time
+from collections import Counter, deque, namedtuple
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from holozen.transport.pubsub import source
+
+ALL = "@holozen/**"
+ALL_NODE_INFO = "@holozen/*/about"
+SILENT_FACTOR = 5  # how much longer to wait for nodes without tokens
+MAX_GONE = 1000  # tokens kept until `left` is called; the oldest are dropped
+KINDS = ("node", "pub", "sub", "srv")
+
+
+class Endpoint(namedtuple("Endpoint", "key kind type node session")):  # all str; `typing` would take 3 ms to load
+    """One node, or one of its publishers ("pub"), subscribers ("sub") or services ("srv")."""
+
+    key: str
+    kind: str
+    type: str
+    node: str
+    session: str
+
+    @property
+    def source(self) -> str:
+        """The source of its samples."""
+        return source(self.node, self.session)
+
+
+def quoted(key: str) -> str:
+    """A key as written in a token, which may have no wildcards even where an endpoint's key does."""
+    return key.replace("%", "%25").replace("*", "%2A").replace("$", "%24")
+
+
+def token(endpoint: Endpoint) -> str:
+    """The token's key for an endpoint."""
+    node = quoted(endpoint.node).replace("/", "%2F")
+    start = f"@holozen/{endpoint.session}/{node}/{endpoint.kind}"
+    return start if endpoint.kind == "node" else f"{start}/{endpoint.type}/{quoted(endpoint.key)}"
+
+
+@functools.lru_cache(maxsize=4096)  # displays of the graph parse the same tokens again and again
+def parse(text: str) -> Endpoint | None:
+    """The endpoint a token names; None if the key is no such token."""
+    parts = text.split("/", 7)
+    if len(parts) == 4 and parts[0] == "@holozen" and parts[3] == "node":
+        return Endpoint("", "node", "", _unquoted(parts[2]), parts[1])
+    if len(parts) == 8 and parts[0] == "@holozen" and parts[3] in KINDS:
+        return Endpoint(_unquoted(parts[7]), parts[3], "/".join(parts[4:7]), _unquoted(parts[2]), parts[1])
+    return None
+
+
+def _unquoted(text: str) -> str:
+    return text.replace("%2F", "/").replace("%24", "$").replace("%2A", "*").replace("%25", "%")
+
+
+def on_key(endpoints: Iterable[Endpoint], key: str, kind: str) -> list[Endpoint]:
+    """The endpoints of a kind on a key, also those with a key expression such as `**/odom`."""
+    return [endpoint for endpoint in endpoints if endpoint.kind == kind and includes(endpoint.key, key)]
+
+
+def includes(expression: str, key: str) -> bool:
+    """Whether a key expression with whole-chunk wildcards (`*`, `**`) includes a key."""
+    return _includes(expression.split("/"), key.split("/"))
+
+
+def _includes(pattern: list[str], chunks: list[str]) -> bool:
+    if not pattern:
+        return not chunks
+    first, *rest = pattern
+    if first == "**":
+        return any(_includes(rest, chunks[i:]) for i in range(len(chunks) + 1))
+    return bool(chunks) and first in ("*", chunks[0]) and _includes(rest, chunks[1:])
+
+
+class Graph:
+    """The endpoints of all nodes as their tokens come and go.
+
+    `change` returns the next token's key and whether it exists now, or None without news. `roll_call` returns when all
+    nodes that are connected by now have sent their tokens; `met` returns their sessions. `undeclare` ends the
+    subscription. Use it in `with`, or keep it until the bus is closed.
+    """
+
+    def __init__(
+        self,
+        change: Callable[[], tuple[str, bool] | None],
+        roll_call: Callable[[], object] = lambda: None,
+        met: Callable[[], Iterable[str]] = tuple,
+        undeclare: Callable[[], object] = lambda: None,
+    ) -> None:
+        self._change, self._roll_call, self._met, self._undeclare = change, roll_call, met, undeclare
+        self._tokens: set[str] = set()
+        self._sessions: dict[str, set[str]] = {}  # the tokens of each
+        self._publishers: dict[str, Counter[str]] = {}  # key -> sessions with a publisher there
+        self.changes = 0  # how often a token came or went
+        self._gone: deque[Endpoint] = deque(maxlen=MAX_GONE)
+
+    def __enter__(self) -> Graph:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Receive no more tokens. Later calls raise BusError."""
+        self._undeclare()
+
+    def endpoints(self) -> list[Endpoint]:
+        """The known endpoints, sorted by key."""
+        self._update()
+        found = (parse(key) for key in self._tokens)
+        return sorted(endpoint for endpoint in found if endpoint)
+
+    def has(self, session: str) -> bool:
+        """Whether a session had any token at the last update."""
+        return session in self._sessions
+
+    def left(self) -> list[Endpoint]:
+        """The nodes that left since the last call. Cheap when there are none."""
+        self._update()
+        return [self._gone.popleft() for _ in range(len(self._gone))]
+
+    def publishers(self, key: str) -> Iterable[str]:
+        """The sessions that have a publisher on a key, at the last update."""
+        return self._publishers.get(key, ())
+
+    def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.015) -> list[Endpoint]:
+        """The endpoints once there is a link and nothing has changed for a while; at most twice `patience` seconds.
+
+        Peers introduce further peers, which takes a moment: `quiet` seconds, or twice the time that the last change
+        took, since a slow network or machine needs longer. A peer without tokens may be foreign, or about to send some.
+        """
+        start = time.monotonic()
+        while not connected():
+            if time.monotonic() - start > patience:
+                return self.endpoints()
+            time.sleep(0.001)
+        deadline = time.monotonic() + patience
+        self._roll_call()  # on a new link there may be nothing yet that answers
+        known, since = self.endpoints(), time.monotonic()
+        while (now := time.monotonic()) < deadline:
+            passed, enough = now - since, max(quiet, 2 * (since - start))
+            if known and (passed > SILENT_FACTOR * enough or (passed > enough and self._all_announced())):
+                break
+            time.sleep(0.001)
+            if (newer := self.endpoints()) != known:
+                known, since = newer, time.monotonic()
+        return known
+
+    def _all_announced(self) -> bool:
+        return set(self._met()) <= self._sessions.keys()
+
+    def _update(self) -> None:
+        while (change := self._change()) is not None:
+            key, there = change
+            if key.count("/") < 3:  # foreign: any node can declare any token
+                continue
+            self.changes += 1
+            if there and key not in self._tokens:
+                self._add(key)
+            elif not there:
+                endpoint = parse(key)
+                if endpoint and endpoint.kind == "node":
+                    self._gone.append(endpoint)
+                if key in self._tokens:
+                    self._remove(key, endpoint)
+
+    def _add(self, key: str) -> None:
+        self._tokens.add(key)
+        self._sessions.setdefault(key.split("/", 2)[1], set()).add(key)
+        endpoint = parse(key)
+        if endpoint and endpoint.kind == "pub":
+            self._publishers.setdefault(endpoint.key, Counter())[endpoint.session] += 1
+
+    def _remove(self, key: str, endpoint: Endpoint | None) -> None:
+        self._tokens.remove(key)
+        session = key.split("/", 2)[1]
+        self._sessions[session].remove(key)
+        if endpoint and endpoint.kind == "pub":
+            sessions = self._publishers[endpoint.key]
+            sessions[session] -= 1
+            if not sessions[session]:
+                del sessions[session]
+            if not sessions:
+                del self._publishers[endpoint.key]
+        if not self._sessions[session]:
+            del self._sessions[session]
+
+
+def node_info_key(session: str) -> str:
+    """The key of a session's node info."""
+    return ALL_NODE_INFO.replace("*", session)
+
+
+def version(package: str) -> str:
+    """The installed version of a package; empty if it is not installed."""
+    from importlib import metadata
+
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+class NodeInfo:
+    """Answers queries about this node from a thread of its own, until the bus is closed."""
+
+    def __init__(self, session: Any, channel: Any, node: str, exposed: list[str]) -> None:
+        self._key = node_info_key(str(session.zid()))
+        self._queryable = session.declare_queryable(self._key, channel)
+        self._queries = self._queryable.handler
+        self._fixed = {"node": node, "host": os.uname().nodename, "pid": os.getpid(), "exposed": exposed}
+        self.thread = threading.Thread(target=self._serve, daemon=True)
+        self.thread.start()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                query = self._queries.recv()
+            except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+                return
+            with query:
+                # Looked up on the first query: it takes longer than the rest of the start.
+                if "version" not in self._fixed:
+                    self._fixed |= {"version": version("holozen"), "zenoh": version("eclipse-zenoh")}
+                info = self._fixed | {"time": time.time()}
+                query.reply(self._key, json.dumps(info), encoding="application/json")

@@ -1,0 +1,160 @@
+"""How old a command is, by its sender's clock: a round trip bounds how far two monotonic clocks are apart.
+
+The offset is the sender's clock minus ours. A round trip that began at t0, that the sender answered at s, and whose
+answer we read at t1 gives: s - t1 <= offset <= s - t0. A sample with stamp s that was read at a gives: s - a <= offset,
+since it cannot arrive before it is sent. The tightest bounds are kept, and loosened by DRIFT as they age.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable
+from typing import Any
+
+from holozen.transport.errors import BusError
+from holozen.transport.pubsub import Sample
+
+DRIFT = 1e-3  # s a second; a quartz is good to 1e-4, and NTP slews a clock by up to 5e-4
+CONTRADICTION = 0.002  # s; bounds that contradict each other by more: a clock jumped, or a computer was suspended
+AGAIN = 1.0  # s between two round trips with one peer
+FIRST = 5  # round trips back to back, for a tight bound from the start
+GIVE_UP = 10.0  # s without an answer
+MAX_PEERS = 256  # since any node can announce tokens
+SLOW = 1.0  # s without an answer, after which others are asked besides
+MAX_ASKED = 32  # round trips under way
+
+
+def clock_key(session: str) -> str:
+    """The key where a session answers with its monotonic clock, in nanoseconds."""
+    return f"@holozen/{session}/clock"
+
+
+class _Peer:
+    """The bounds of one session's clock. `confirmed` is when its last completed round trip began."""
+
+    __slots__ = ("asked", "commands", "confirmed", "due", "highest", "left", "lowest", "replies")
+
+    def __init__(self, now: float) -> None:
+        self.lowest: tuple[float, float] | None = None  # a bound of the offset, and when it was found
+        self.highest: tuple[float, float] | None = None
+        self.confirmed = -1.0
+        self.commands = False  # whether a command of it has been seen
+        self.replies: Any = None
+        self.asked, self.due, self.left = 0.0, now, FIRST
+
+    def at_least(self, now: float) -> float:
+        """The lower bound of the offset at `now`."""
+        return self.lowest[0] - DRIFT * (now - self.lowest[1]) if self.lowest else float("-inf")
+
+    def at_most(self, now: float) -> float:
+        """The upper bound of the offset at `now`."""
+        return self.highest[0] + DRIFT * (now - self.highest[1]) if self.highest else float("inf")
+
+    def narrow(self, low: float, high: float, now: float) -> None:
+        """Apply the bounds of a round trip, and start over if they contradict the known ones."""
+        if low > self.at_most(now) + CONTRADICTION or high < self.at_least(now) - CONTRADICTION:
+            self.lowest = self.highest = None
+        if low >= self.at_least(now):
+            self.lowest = (low, now)
+        if high <= self.at_most(now):
+            self.highest = (high, now)
+
+
+class PeerClocks:
+    """The clocks of the sessions that command. `ask` requests a session's clock and returns its replies, `has`
+    returns whether a session is alive.
+
+    No thread: `poll` is called in a loop, and never waits. All times are in seconds of this process's monotonic clock.
+    """
+
+    def __init__(
+        self, ask: Callable[[str, float], Any], has: Callable[[str], bool], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._ask, self.has, self._clock = ask, has, clock
+        self._peers: dict[str, _Peer] = {}
+
+    def track(self, sessions: Iterable[str], now: float) -> None:
+        """Measure the clocks of these sessions from now on; forget sessions that left."""
+        for session in [session for session in self._peers if not self.has(session)]:
+            del self._peers[session]
+        for session in sessions:
+            if session not in self._peers and len(self._peers) < MAX_PEERS:
+                self._peers[session] = _Peer(now)
+
+    def track_first(self, session: str, now: float) -> None:
+        """Measure the clock of a session that commands, ahead of those that only might.
+
+        Where there are MAX_PEERS, one that has never answered is forgotten for it.
+        """
+        if session not in self._peers and len(self._peers) >= MAX_PEERS:
+            silent = (other for other, peer in self._peers.items() if peer.confirmed < 0 and not peer.commands)
+            if (other := next(silent, None)) is None:
+                return
+            del self._peers[other]
+        self._peers.setdefault(session, _Peer(now)).commands = True
+
+    def ages(self, session: str, sent: float, now: float) -> tuple[float, float] | None:
+        """Bounds of the age in seconds of a sample that a session sent at `sent` by its own clock.
+
+        None while that clock is unbounded. The sample refines the lower bound, within those of round trips.
+        """
+        peer = self._peers.get(session)
+        if peer is None or peer.highest is None:
+            return None
+        if sent - now > peer.at_most(now) + CONTRADICTION:  # from the future: measure again
+            peer.due = min(peer.due, now)
+            return None
+        if sent - now > peer.at_least(now):
+            peer.lowest = (sent - now, now)
+        elapsed = now - sent
+        return max(0.0, elapsed + peer.at_least(now)), max(0.0, elapsed + peer.at_most(now))
+
+    def answered(self, session: str) -> float:
+        """When the last round trip that this session answered began; below zero before the first."""
+        peer = self._peers.get(session)
+        return peer.confirmed if peer else -1.0
+
+    def ask_now(self, session: str, now: float) -> None:
+        """Start another round trip with this session now, or when the current one has ended."""
+        if peer := self._peers.get(session):
+            peer.due = min(peer.due, now)
+
+    def poll(self, now: float) -> None:
+        """Read replies, and send the requests that are due."""
+        due: list[tuple[bool, float, str]] = []
+        room = MAX_ASKED
+        for session, peer in self._peers.items():
+            if peer.replies is not None:
+                self._read(peer, now)
+            if peer.replies is not None:
+                room -= now - peer.asked < SLOW  # whoever never answers keeps no place
+            elif now >= peer.due:
+                due.append((not peer.commands, peer.due, session))
+        for _, _, session in sorted(due)[: max(room, 0)]:
+            peer = self._peers[session]
+            peer.asked = self._clock()
+            peer.replies = self._ask(session, GIVE_UP)
+            peer.left = max(0, peer.left - 1)
+            peer.due = now if peer.left else now + AGAIN
+
+    def _read(self, peer: _Peer, now: float) -> None:
+        try:
+            reply = peer.replies.try_recv()
+        except BusError:  # it timed out, or the session is gone
+            peer.replies = None
+            return
+        if reply is None:
+            return
+        peer.replies = None
+        answered = _seconds(reply)
+        if answered is not None:
+            peer.confirmed = peer.asked
+            read = self._clock()
+            peer.narrow(answered - read, answered - peer.asked, max(now, read))
+
+
+def _seconds(reply: Sample | bytes) -> float | None:
+    """The clock in a reply, in seconds; None for an error or a malformed one."""
+    if not isinstance(reply, Sample) or not reply.payload.isdigit() or len(reply.payload) > 20:
+        return None
+    return int(reply.payload) * 1e-9

@@ -1,0 +1,327 @@
+"""Topics: publishers and subscribers, as bytes or as messages. The codec is loaded with the first typed one."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import threading
+import time
+from collections.abc import Callable
+from itertools import count
+from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+
+from holozen.transport.errors import BusError
+
+if TYPE_CHECKING:
+    from holozen.messages import Message
+
+M = TypeVar("M", bound="Message")
+
+MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
+LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
+TRIM_AFTER = 1.0  # s
+SLOWEST = 5.0  # s; after this long any stream is stale
+PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
+"""Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
+
+
+def source(node: str, session: str) -> str:
+    """The name of a sender, for messages and status."""
+    return f"{node}@{session[:6]}"
+
+
+class Stamp(NamedTuple):
+    """How a sample was sent: the session, an increasing sequence number, and the sender's clock in s (monotonic)."""
+
+    session: str
+    number: int
+    sent: float
+
+
+def stamps(node: str, session: str) -> Callable[[], bytes]:
+    """A function that makes attachments with sender and stamp: `node@session;number;nanoseconds`."""
+    start, numbers = f"{node}@{session};", count()
+    return lambda: f"{start}{next(numbers)};{time.monotonic_ns()}".encode()
+
+
+def source_in(attachment: Any) -> str:
+    """The sender in the attachment of a sample or a request; empty if there is none."""
+    if not attachment or len(attachment) > MAX_ATTACHMENT_BYTES:
+        return ""
+    name, _, session = bytes(attachment).decode(errors="replace").partition(";")[0].rpartition("@")
+    return source(name, session)[:80] if name else session[:80]
+
+
+def _stamp_in(attachment: Any) -> Stamp | None:
+    """The stamp in an attachment; None if it is missing or malformed."""
+    parts = bytes(attachment).split(b";") if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else []
+    if len(parts) != 3 or not all(part.isdigit() and len(part) < 20 for part in parts[1:]):
+        return None
+    session = parts[0].rpartition(b"@")[2]
+    if not 0 < len(session) <= 32 or not session.isalnum():
+        return None
+    return Stamp(session.decode(), int(parts[1]), int(parts[2]) * 1e-9)
+
+
+def release_memory() -> None:
+    """Return the memory of a refused payload to the system, in a second: the C library would keep it.
+
+    It came in fragments, some of which lie between memory in use.
+    """
+    global _trimmer
+    if _trimmer is None or not _trimmer.is_alive():
+        _trimmer = threading.Timer(TRIM_AFTER, _trim)
+        _trimmer.daemon = True
+        _trimmer.start()
+
+
+_trimmer: threading.Timer | None = None
+
+
+def _trim() -> None:
+    import ctypes
+
+    with contextlib.suppress(OSError, AttributeError):  # not in every C library
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+class Sample:
+    """A received sample. It is `oversized`, and has no payload, if its `size` in bytes is over the reader's limit, or
+    its attachment is too long. A limit of 0 means no limit.
+
+    Most readers need only the payload, so the rest is read from Zenoh's sample on demand.
+    """
+
+    __slots__ = ("_sample", "encoding", "oversized", "payload", "size")
+
+    def __init__(self, sample: Any, limit: int = 0) -> None:
+        payload = sample.payload
+        self._sample, self.encoding, self.size = sample, str(sample.encoding), len(payload)
+        if limit and (named := len(sample.attachment or b"")) > MAX_ATTACHMENT_BYTES:
+            self.size += max(named, limit)
+        self.oversized = 0 < limit < self.size
+        self.payload = b"" if self.oversized else bytes(payload)
+        if self.oversized and self.size > LARGE:
+            release_memory()
+
+    @property
+    def key(self) -> str:
+        """Its key."""
+        return str(self._sample.key_expr)
+
+    @property
+    def priority(self) -> str:
+        """The name of its Zenoh priority."""
+        return PRIORITIES[int(self._sample.priority) - 1]
+
+    @property
+    def source(self) -> str:
+        """Its sender; empty if it names none."""
+        return source_in(self._sample.attachment)
+
+    @property
+    def stamp(self) -> Stamp | None:
+        """Its stamp as claimed by the sender; None without one."""
+        return _stamp_in(self._sample.attachment)
+
+    @property
+    def number(self) -> tuple[str, int] | None:
+        """The publisher's id and its sequence number; None without them."""
+        info = self._sample.source_info
+        return info and (f"{info.source_id.zid}:{info.source_id.eid}", info.source_sn)
+
+    @property
+    def delivery(self) -> tuple[str, bool]:
+        """Congestion control ("DROP" or "BLOCK"), and whether it is express (not batched)."""
+        return str(self._sample.congestion_control).rpartition(".")[2], bool(self._sample.express)
+
+
+class RawSubscriber:
+    """Raw samples; if too many wait, the oldest are dropped."""
+
+    def __init__(self, subscriber: Any, limit: int = 0) -> None:
+        # Reading from the handler leaves the subscriber free to be undeclared at the same time.
+        self.ends = [subscriber]  # the declarations of this reader
+        self._samples, self._limit = subscriber.handler, limit
+        self.thread: threading.Thread | None = None  # the one that waits in `recv`
+
+    def try_recv(self) -> Sample | None:
+        """The next waiting sample, or None."""
+        sample = self._samples.try_recv()
+        return sample and Sample(sample, self._limit)
+
+    def recv(self) -> Sample:
+        """The next sample; waits for it. Raises BusError once the bus or this subscriber is closed."""
+        self.thread = threading.current_thread()
+        try:
+            sample = self._samples.recv()
+        except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+            raise BusError("closed") from None
+        return Sample(sample, self._limit)
+
+    def close(self) -> None:
+        """Stop listening."""
+        for end in self.ends:
+            end.undeclare()
+
+
+class Publisher(Generic[M]):
+    """Writes messages, and answers a `get` on its key with the last one. Made by `Bus.publisher`.
+
+    Each carries the attachment that `stamp` makes, with the sender and the time of sending, and a sequence number, by
+    which readers count lost samples. `number` converts it to Zenoh's SourceInfo.
+    """
+
+    def __init__(self, publisher: Any, wire: str, stamp: Callable[[], bytes], number: Callable[[int], Any]) -> None:
+        from holozen.messages import codec
+
+        self.ends = [publisher]  # the declarations of this publisher
+        self._publisher, self._wire, self._stamp = publisher, wire, stamp
+        self._written, self._named, self._encoding = codec.written, codec.encoding, publisher.encoding
+        self._last: tuple[bytes, Any] | None = None  # with its Encoding
+        self.numbers = map(number, count())
+
+    @property
+    def matched(self) -> bool:
+        """Whether anyone subscribes to this key."""
+        return bool(self._publisher.matching_status.matching)
+
+    def put(self, message: M) -> None:
+        """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
+        on its type.
+        """
+        payload, wire = self._written(message, self._wire)
+        self.put_bytes(payload, None if wire == self._wire else self._named(wire, type(message)))
+
+    def put_bytes(self, payload: bytes, encoding: str | None = None) -> None:
+        """Send an encoded payload, by default in the encoding of this publisher."""
+        self._last = payload, encoding or self._encoding
+        self._publisher.put(payload, encoding=encoding, attachment=self._stamp(), source_info=next(self.numbers))
+
+    def answer(self, gets: Any) -> None:
+        """Reply to each get with the last message, until this publisher is closed. Needs a thread of its own."""
+        while True:
+            try:
+                query = gets.recv()
+            except Exception:  # as in RawSubscriber.recv
+                return
+            with query:
+                if self._last is not None:
+                    payload, encoding = self._last
+                    query.reply(self._publisher.key_expr, payload, encoding=encoding)
+
+    def close(self) -> None:
+        """Stop publishing and answering; all declarations are removed."""
+        for end in self.ends:
+            end.undeclare()
+
+
+class Received(NamedTuple, Generic[M]):
+    """A sample with its message, or with the reason in one line why it has none."""
+
+    sample: Sample
+    message: M | None
+    error: str = ""
+
+
+class Subscription(Generic[M]):
+    """Messages in order of arrival; if too many wait, the oldest are dropped."""
+
+    def __init__(self, samples: RawSubscriber, kinds: tuple[type[M], ...], tolerant: bool = False) -> None:
+        from holozen.messages import codec
+
+        self.raw, self._kinds, self._tolerant = samples, kinds, tolerant
+        self._decode, self._error = codec.decode, codec.CodecError
+
+    def try_recv(self) -> Received[M] | None:
+        """The next waiting message, or None."""
+        sample = self.raw.try_recv()
+        return None if sample is None else self._received(sample)
+
+    def recv(self) -> Received[M]:
+        """The next message; waits for it. Raises BusError once the bus is closed."""
+        return self._received(self.raw.recv())
+
+    def close(self) -> None:
+        """Stop listening."""
+        self.raw.close()
+
+    def _received(self, sample: Sample) -> Received[M]:
+        if sample.oversized:
+            return Received(sample, None, f"oversized: {sample.size} bytes")
+        try:
+            return Received(sample, self._decode(sample.payload, sample.encoding, self._kinds, self._tolerant))
+        except self._error as error:
+            return Received(sample, None, str(error))
+
+
+class Arrivals(Generic[M]):
+    """The newest message of a stream, its time of arrival, and the period. Times in seconds."""
+
+    def __init__(self) -> None:
+        self.newest: M | None = None
+        self.count = 0
+        self._at = -math.inf
+        self._gaps = (0.0, 0.0)  # the last two, to ignore a single hiccup
+
+    def record(self, message: M, now: float) -> None:
+        """Record a message."""
+        self._gaps = (self._gaps[1], now - self._at if self.count else 0.0)
+        self.newest, self._at = message, now
+        self.count += 1
+
+    def age(self, now: float) -> float:
+        """Seconds since the newest arrived; infinite before the first."""
+        return now - self._at
+
+    def patience(self, silence: float) -> float:
+        """The age from which the newest is stale: `silence`, or three periods of a stream that is slower than that."""
+        return max(silence, min(3 * min(self._gaps), SLOWEST))
+
+
+class Latest(Generic[M]):
+    """The newest message of a key and when it arrived, kept by a dedicated thread."""
+
+    def __init__(self, subscription: Subscription[M]) -> None:
+        self._subscription, self.raw = subscription, subscription.raw
+        self._newer = threading.Condition()
+        self._arrivals: Arrivals[M] = Arrivals()
+        self.bad = 0  # samples that could not be decoded
+        threading.Thread(target=self._keep, daemon=True).start()
+
+    @property
+    def count(self) -> int:
+        """The number of messages so far."""
+        return self._arrivals.count
+
+    def read(self) -> tuple[M | None, float]:
+        """The newest message (None before the first) and its age in seconds since it arrived."""
+        with self._newer:
+            return self._arrivals.newest, self._arrivals.age(time.monotonic())
+
+    def patience(self, silence: float) -> float:
+        """The age from which the newest is stale, see Arrivals."""
+        with self._newer:
+            return self._arrivals.patience(silence)
+
+    def wait(self, after: int, timeout: float) -> bool:
+        """Wait until more than `after` messages have arrived, at most `timeout` seconds; returns whether they have."""
+        with self._newer:
+            return self._newer.wait_for(lambda: self.count > after, timeout)
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._subscription.close()
+
+    def _keep(self) -> None:
+        while True:
+            try:
+                received: Received[Any] = self._subscription.recv()
+            except BusError:
+                return
+            with self._newer:
+                if received.message is None:
+                    self.bad += 1
+                    continue
+                self._arrivals.record(received.message, time.monotonic())
+                self._newer.notify_all()

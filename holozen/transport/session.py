@@ -1,0 +1,268 @@
+"""Opens and closes Zenoh sessions; reports Zenoh's errors in one line."""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import json
+import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any
+
+import zenoh
+
+from holozen.console import report
+from holozen.transport import rendezvous
+from holozen.transport.connection import CLIENT_TRY, Connection
+from holozen.transport.errors import BusError
+from holozen.transport.listeners import covers, reached, unanswered
+
+LAST = 1.0  # s to wait for threads at the end of the process
+CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
+
+
+class Opened:
+    """An open session. `took`: s until its first link, a measure of the network's delay."""
+
+    def __init__(self, session: Any, took: float = 0.0) -> None:
+        self.session, self.took = session, took
+        self.keeper: threading.Thread | None = None
+        self.listens: list[str] = []  # the endpoints of this session itself
+        self.is_guarded = False  # whether connections need a password, a certificate or a permission
+        self.point = ""  # the rendezvous point that this session itself holds
+
+    def close(self) -> None:
+        """Close it, even if it is closed already."""
+        rendezvous.held.discard(self.point)
+        close(self.session)
+
+
+def open_session(
+    connection: Connection, *, lasting: bool, patience: float | None, stop: threading.Event, closing: threading.Event
+) -> Opened:
+    """Open a session; if `lasting` it holds a free rendezvous point until `closing` is set.
+
+    A client waits for its router, at most `patience` s (None: for ever), a peer for a process that is there to answer.
+    Exits with code 0 when `stop` is set. Raises BusError.
+    """
+    begin = time.monotonic()
+    config = configuration(connection)
+    mode = _value(config, "mode") or "peer"
+    if mode == "client":
+        return Opened(_open_client(connection, config, patience, stop), min(time.monotonic() - begin, CLIENT_TRY))
+    opened = _open_listening(connection, config, mode)
+    points = connection.rendezvous
+    if lasting and points and not opened.point:
+        opened.keeper = rendezvous.hold(points, closing, open_point)
+    if mode == "peer":
+        mine, connect = opened.listens, endpoints(config, "connect", mode)
+        others = [one for one in connect if not any(covers(listening, one) for listening in mine)]
+        try:
+            limit = rendezvous.PATIENCE if patience is None else patience
+            rendezvous.wait_for_link(lambda: linked(opened.session), others, lasting, limit, stop)
+        except BaseException:
+            closing.set()
+            closer = threading.Thread(target=opened.close, daemon=True)
+            closer.start()
+            wait_for_threads((closer, opened.keeper), CLOSE_LIMIT)
+            raise
+    opened.took = time.monotonic() - begin
+    return opened
+
+
+def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> Opened:
+    """The session of a peer or a router. A peer skips the endpoints that are in use."""
+    listen = endpoints(config, "listen", mode)
+    while True:
+        if mode == "peer" and not connection.config:
+            listen = [one for one in listen if rendezvous.listen_error(one) != rendezvous.IN_USE]
+            config.insert_json5("listen/endpoints", json.dumps(listen))
+        try:
+            opened = Opened(zenoh.open(config))
+        except zenoh.ZError as error:
+            taken = next((one for one in listen if one in str(error) and "in use" in str(error)), None)
+            if mode != "peer" or not taken:
+                raise BusError(opening(error, mode, connection.where, None)) from None
+            listen.remove(taken)  # another process was faster
+            continue
+        opened.listens, opened.is_guarded = listen, _is_guarded(config)
+        opened.point = next((one for one in connection.rendezvous if one in listen), "")
+        if opened.point:
+            rendezvous.held.add(opened.point)
+        return opened
+
+
+def _open_client(
+    connection: Connection, config: zenoh.Config, patience: float | None, stop: threading.Event
+) -> zenoh.Session:
+    """The session of a client, opened in a thread so that signals are handled while it waits for its router."""
+    begin = time.monotonic()
+    reported = False
+    while True:
+        attempt = _Attempt(config)
+        try:
+            while not attempt.done.wait(0.02):
+                passed = time.monotonic() - begin
+                if stop.is_set():
+                    raise SystemExit(0)
+                if patience is not None and passed > patience:
+                    raise BusError(_unreached(connection, config, patience))
+                if passed > rendezvous.NOTICE and not reported:
+                    report(f"waiting for a Zenoh router at {connection.where}")
+                    reported = True
+        except BaseException:
+            attempt.abandon()
+            raise
+        if attempt.session:
+            return attempt.session
+        if not _may_recover(attempt.error) or (patience is not None and time.monotonic() - begin > patience):
+            raise BusError(opening(attempt.error, "client", connection.where, patience))
+        if stop.wait(0.05):
+            raise SystemExit(0)
+
+
+class _Attempt:
+    """One attempt to open a session, in a thread of its own. `done` is set when there is a session or an error."""
+
+    def __init__(self, config: zenoh.Config) -> None:
+        self.session: zenoh.Session | None = None
+        self.error = Exception()
+        self.done = threading.Event()
+        self._abandoned = False
+        threading.Thread(target=self._open, args=(config,), daemon=True).start()
+
+    def abandon(self) -> None:
+        """Close the session, also one that opens later."""
+        self._abandoned = True
+        if self.session:
+            close(self.session)
+
+    def _open(self, config: zenoh.Config) -> None:
+        try:
+            self.session = zenoh.open(config)
+        except zenoh.ZError as error:
+            self.error = error
+        self.done.set()
+        if self._abandoned and self.session:
+            close(self.session)
+
+
+def _may_recover(error: Exception) -> bool:
+    """Whether a client may succeed later after this error."""
+    return str(error).startswith(("Unable to connect", "No peer"))
+
+
+def _unreached(connection: Connection, config: zenoh.Config, patience: float) -> str:
+    reasons = reached(endpoints(config, "connect", "client"))
+    silent = [endpoint for endpoint, reason in reasons.items() if not reason]
+    if silent:
+        return unanswered(silent, patience)
+    return opening(Exception("Unable to connect"), "client", connection.where, patience)
+
+
+def linked(session: Any) -> bool:
+    """Whether a session has a link to any other."""
+    return bool(session.info.peers_zid() or session.info.routers_zid())
+
+
+def configuration(connection: Connection) -> zenoh.Config:
+    """Zenoh's configuration for a connection. Raises BusError."""
+    with one_line(f"Zenoh configuration {connection.config}"):
+        config = zenoh.Config.from_file(connection.config) if connection.config else zenoh.Config()
+    for path, value in connection.settings().items():
+        with one_line(f"Zenoh setting {path}:{value}"):
+            config.insert_json5(path, value)
+    return config
+
+
+def endpoints(config: zenoh.Config, way: str, mode: str) -> list[str]:
+    """The endpoints of a configuration for a `way`, "listen" or "connect", in that mode."""
+    found = _value(config, f"{way}/endpoints")
+    found = found.get(mode) if isinstance(found, dict) else found
+    groups = [one.get("locators") if isinstance(one, dict) else one for one in found or ()]
+    return [one for group in groups for one in ([group] if isinstance(group, str) else group or ())]
+
+
+def _is_guarded(config: zenoh.Config) -> bool:
+    guards = ("access_control/enabled", "transport/auth/usrpwd/dictionary_file", "transport/link/tls/enable_mtls")
+    return any(_value(config, path) for path in guards)
+
+
+def _value(config: zenoh.Config, path: str) -> Any:
+    return json.loads(config.get_json(path))
+
+
+def open_point(endpoint: str) -> Callable[[], None] | None:
+    """Open a session that only listens at `endpoint`. Returns a function that closes it, or None if it is taken."""
+    cfg = (("listen/endpoints", f'["{endpoint}"]'), ("listen/exit_on_failure", "true"))
+    try:
+        session = zenoh.open(configuration(Connection(connect=(), listen=(), cfg=cfg)))
+    except zenoh.ZError:
+        return None
+    # It marks a session of ours that is not a node.
+    token = session.liveliness().declare_token(f"@holozen/{session.zid()}/rendezvous/rendezvous")
+    return partial(close, session, token)
+
+
+def close(session: Any, *_kept: Any) -> None:
+    """Close a session, even if it is closed already."""
+    with contextlib.suppress(zenoh.ZError):
+        session.close()
+
+
+@contextlib.contextmanager
+def one_line(what: str) -> Iterator[None]:
+    """Convert Zenoh's errors to a BusError that begins with `what`."""
+    try:
+        yield
+    except zenoh.ZError as error:
+        raise BusError(f"{what}: {reason(error)}") from None
+
+
+def opening(error: Exception, mode: str, where: str, patience: float | None) -> str:
+    """Why a session could not be opened; `where` it looks for others."""
+    text = reason(error)
+    if mode == "client" and text.startswith(("Unable to connect", "No peer")):
+        if not where:
+            return "cannot open Zenoh: a client needs --connect ENDPOINT, such as tcp/10.0.0.2:7447"
+        within = f" within {patience:g} s" if patience else ""
+        return f"cannot open Zenoh: no router answers at {where}{within}; `holozen router` runs one"
+    if text.startswith("Can not create a new TCP listener bound to "):
+        endpoint, _, why = text.removeprefix("Can not create a new TCP listener bound to ").partition(": ")
+        return f"cannot open Zenoh: cannot listen at {endpoint}: {_system(why)}"
+    return f"cannot open Zenoh: {text}"
+
+
+def reason(error: Exception) -> str:
+    """Zenoh's reason in one line, without source locations."""
+    text = " ".join(str(error).partition(" at /")[0].replace("\\n", " ").split()).rstrip(".")
+    if text == 'Str("unknown key")':
+        return "there is no such setting"
+    if text.startswith("Json5Err(Message { msg: "):
+        text = text.removeprefix("Json5Err(Message { msg: ").partition(", location: ")[0].strip('" ')
+    return text.strip()
+
+
+def _system(why: str) -> str:
+    """The system's reason within Zenoh's text: `[10.0.0.1:7: Cannot assign requested address (os error 99)`."""
+    return why.strip("[]").rpartition(": ")[2].partition(" (os error")[0] or why
+
+
+def wait_for_threads(threads: Iterable[threading.Thread | None], seconds: float) -> None:
+    """Join threads, for at most `seconds`; the rest gets LAST seconds more when the process ends.
+
+    The interpreter aborts if a thread returns from Zenoh during its finalization.
+    """
+    others = [thread for thread in threads if thread and thread is not threading.current_thread()]
+    if late := _join(others, seconds):
+        atexit.register(_join, late, LAST)
+
+
+def _join(threads: list[threading.Thread], seconds: float) -> list[threading.Thread]:
+    """Join threads; returns those that still run."""
+    deadline = time.monotonic() + seconds
+    for thread in threads:
+        thread.join(max(0.0, deadline - time.monotonic()))
+    return [thread for thread in threads if thread.is_alive()]

@@ -1,0 +1,67 @@
+"""`scripts/cli-table`: writes the table of the command line, read off the parsers, to the end of docs/cli.md."""
+
+import argparse
+from collections.abc import Iterator
+from pathlib import Path
+
+from holozen import cli
+from holozen.cli.verb import ROS2_TITLE
+
+PAGE = Path(__file__).parents[1] / "docs" / "cli.md"
+MARK = "<!-- table -->\n"
+LEFT_OUT = ("zenoh", ROS2_TITLE)  # groups of flags that many verbs have
+
+
+def table() -> str:
+    """A row for each verb: how it is called, what it does, its flags, an example."""
+    rows = [_row(parser) for verb in cli.VERBS for parser in _verbs(cli.command(verb).parser())]
+    return "\n".join(["| command | does | flags |", "|---|---|---|", *rows]) + "\n"
+
+
+def _verbs(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """The parsers of the verbs of a noun; a verb's own."""
+    inner = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
+    if not inner:
+        yield parser
+    for action in inner:
+        for child in action.choices.values():
+            yield from _verbs(child)
+
+
+def _row(parser: argparse.ArgumentParser) -> str:
+    groups = [group for group in parser._action_groups if group.title in LEFT_OUT]
+    left_out = {id(action) for group in groups for action in group._group_actions}
+    actions = [action for action in parser._actions if id(action) not in left_out and action.dest != "help"]
+    places = [_place(action) for action in actions if not action.option_strings]
+    flags = [f"`{_flag(action)}`" for action in actions if action.option_strings]
+    does = " ".join((parser.description or "").split())
+    example = (parser.epilog or "").partition("example: ")[2]
+    told = f"{does}<br>`{example}`" if example else does
+    return (
+        " | ".join((f"| `{_cell(' '.join([parser.prog, *places]))}`", _cell(told), " ".join(map(_cell, flags)))) + " |"
+    )
+
+
+def _place(action: argparse.Action) -> str:
+    name = action.dest.upper() if action.metavar is None else str(action.metavar)
+    if name.startswith("["):
+        return name  # it says itself how often
+    return {"?": f"[{name}]", "*": f"[{name} ...]", "+": f"{name} ..."}.get(str(action.nargs), name)
+
+
+def _flag(action: argparse.Action) -> str:
+    names = ", ".join(action.option_strings)
+    if action.nargs == 0:
+        return names
+    choices = "/".join(map(str, action.choices)) if action.choices else ""
+    return f"{names} {action.metavar or choices or action.dest.upper()}"
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|")
+
+
+if __name__ == "__main__":
+    head, mark, _ = PAGE.read_text().partition(MARK)
+    assert mark, f"{PAGE} lost its {MARK.strip()} mark"
+    PAGE.write_text(f"{head}{mark}{table()}")

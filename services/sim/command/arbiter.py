@@ -1,0 +1,181 @@
+"""Who drives: the highest Zenoh priority among the fresh commands. No clock, no socket."""
+
+from dataclasses import dataclass, replace
+
+from holozen.limits import STOP
+from holozen.transport.pubsub import PRIORITIES
+from holozen.wire import COMMAND_SILENCE
+
+from .motion import JointMotion, Motion, is_stop
+from .software_stop import STOPPED, SoftwareStop
+
+PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # no source ranks above a person: stronger priorities count as this one
+AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here down, a source waits for `resume` once a higher one has driven
+MAX_HELD = 100  # names of each rank, since they come over the wire; beyond, the whole rank is held but its driver
+LATE = "late: it waited up to {age:.1f} s for the sim"
+OVERRULED = "overruled: {driver} drives"
+HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
+
+
+@dataclass(slots=True)
+class Driver:
+    """The source that drives, its motion, and the earliest time of its last command in s. Rank 0 is highest."""
+
+    source: str
+    rank: int
+    motion: Motion
+    sent: float
+
+
+class Held:
+    """The sources of one rank that are held. A full table holds every source of its rank, except the one that drives at
+    that time: a flood of names frees no source, and holds none of another rank.
+    """
+
+    def __init__(self) -> None:
+        self._names: set[str] = set()
+        self._all, self._free = False, ""
+
+    def add(self, source: str, driver: str) -> None:
+        """Hold a source; `driver` is the source of this rank that drives, or empty."""
+        if len(self._names) < MAX_HELD:
+            self._names.add(source)
+        elif source not in self._names:
+            self._all = True
+        if driver or source == self._free:
+            self._free = driver
+
+    def __contains__(self, source: str) -> bool:
+        return source in self._names or (self._all and source != self._free)
+
+    def copy(self) -> "Held":
+        """An independent copy."""
+        other = Held()
+        other._names, other._all, other._free = set(self._names), self._all, self._free
+        return other
+
+
+class Arbiter:
+    """Chooses among the sources of one robot.
+
+    Among equals the current driver keeps driving, but each of them may stop the robot. A source that a higher one
+    overruled, or that another one stopped, is held: it moves the robot again only after `resume`. So is every
+    autopilot once a source above it drove. A source is a name with a rank, since senders choose their names freely.
+    After `timeout` seconds of silence a source no longer drives; below zero it drives until another one commands. The
+    `software_stop` overrides all of them.
+    """
+
+    def __init__(self, timeout: float) -> None:
+        self.timeout, self.software_stop = timeout, SoftwareStop(timeout)
+        self.resumed = 0  # how often `resume` succeeded
+        self._driver: Driver | None = None
+        self._held: dict[int, Held] = {}  # by rank
+        self._highest = AUTOPILOT + 1  # the best rank that drove since the last resume
+
+    def offer(self, source: str, rank: int, motion: Motion, now: float, sent: float | None = None) -> str:
+        """Consider a command at time `now`, sent at `sent` at the earliest. Returns why it is refused, or ""."""
+        sent = now if sent is None else sent
+        if reason := self.software_stop.refusal(source, max(rank, PERSON), is_stop(motion), now):
+            return reason
+        if now - sent > COMMAND_SILENCE and not is_stop(motion):
+            return LATE.format(age=now - sent)
+        return self._choose(Driver(source, max(rank, PERSON), motion, sent), now)
+
+    def note_refused(self, source: str, rank: int, now: float) -> None:
+        """Note a command that was refused before it got here: its source has not let go of a stopped robot."""
+        self.software_stop.refusal(source, max(rank, PERSON), False, now)
+
+    def _choose(self, new: Driver, now: float) -> str:
+        source, rank, motion = new.source, new.rank, new.motion
+        driver = self.driver(now)
+        other = driver if driver and (driver.source, driver.rank) != (source, rank) else None
+        stops = is_stop(motion) and driver is not None and rank <= driver.rank
+        if other and rank >= other.rank and not stops and now - other.sent <= COMMAND_SILENCE:
+            if rank > other.rank:
+                self._hold(source, rank, new)
+            return OVERRULED.format(driver=other.source)
+        if not stops and self._is_held(source, rank):
+            return HELD
+        if other and (stops or rank < other.rank):
+            self._hold(other.source, other.rank, new)
+        self._driver = new
+        self._highest = min(self._highest, rank)
+        return ""
+
+    def set_timeout(self, timeout: float, now: float) -> None:
+        """Set `timeout` from `now` on. A longer one does not revive a source that has fallen silent."""
+        self._driver = self.driver(now)
+        self.timeout = timeout
+        self.software_stop.set_timeout(timeout)
+
+    def driver(self, now: float) -> Driver | None:
+        """The source that drives at `now`; None when all are silent."""
+        driver = self._driver
+        if driver is None:
+            return None
+        timeout = COMMAND_SILENCE if isinstance(driver.motion, JointMotion) else self.timeout
+        return None if 0 <= timeout < now - driver.sent else driver
+
+    def moves(self, source: str, now: float) -> bool:
+        """Whether a source moves the robot at `now`."""
+        driver = self.driver(now)
+        return driver is not None and driver.source == source and not is_stop(driver.motion)
+
+    def motion(self, now: float) -> Motion:
+        """The commanded motion at `now`."""
+        driver = self.driver(now)
+        return driver.motion if driver else STOP
+
+    def stop(self, by: str, now: float) -> None:
+        """Set the software stop: no source drives until it is released, and no autopilot before `resume`."""
+        driver = self.driver(now)
+        moving = (driver.source, driver.rank) if driver and not is_stop(driver.motion) else None
+        self.software_stop.set(by, moving, now)
+        self._driver, self._highest = None, PERSON
+
+    def forget(self, source: str) -> None:
+        """Stop the robot if this source drove: its process is gone.
+
+        It counts as a stop sent with its last command, so that no other source takes over any sooner.
+        """
+        if self._driver and self._driver.source == source:
+            self._driver = replace(self._driver, motion=STOP)
+
+    def holds(self, source: str, rank: int, now: float) -> bool:
+        """Whether a source has to wait for `resume`, or has to let go, before it may drive."""
+        rank = max(rank, PERSON)
+        return self._is_held(source, rank) or self.software_stop.must_let_go(source, rank, now)
+
+    @property
+    def held(self) -> bool:
+        """Whether every autopilot waits for `resume`: a source above them drove."""
+        return self._highest < AUTOPILOT
+
+    def resume(self, now: float) -> str:
+        """Let every source drive again. Returns why not, if a source above the autopilots moves the robot at `now`, or
+        the robot is stopped.
+        """
+        if self.software_stop.setter:
+            return STOPPED.format(by=self.software_stop.setter)
+        driver = self.driver(now)
+        if driver and driver.rank < AUTOPILOT and not is_stop(driver.motion):
+            return f"{driver.source} drives; stop first"
+        self._driver = driver if driver and driver.rank >= AUTOPILOT else None
+        self._held.clear()
+        self._highest = AUTOPILOT + 1
+        self.resumed += 1
+        return ""
+
+    def inherit(self, other: "Arbiter") -> None:
+        """Take over the held sources and the software stop of a robot that was replaced."""
+        self._held = {rank: held.copy() for rank, held in other._held.items()}
+        self._highest = other._highest
+        self.software_stop.inherit(other.software_stop)
+
+    def _is_held(self, source: str, rank: int) -> bool:
+        autopilot = rank >= AUTOPILOT and rank > self._highest
+        return autopilot or (rank in self._held and source in self._held[rank])
+
+    def _hold(self, source: str, rank: int, new: Driver) -> None:
+        free = new.source if new.rank == rank and new.source != source else ""
+        self._held.setdefault(rank, Held()).add(source, free)

@@ -1,0 +1,1 @@
+"""The keys of robots and of the world: topics out, services in."""

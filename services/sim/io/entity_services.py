@@ -1,0 +1,179 @@
+"""The services of simulation_interfaces that add, list, move and delete entities."""
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+
+from holozen.bus import Bus
+from holozen.console import report
+from holozen.messages import Header, Point, Pose, Quaternion, Time, Twist, Vector3
+from holozen.messages import simulation_interfaces as si
+from holozen.messages.message import not_finite
+from holozen.robot.elements import read_xml, repair_xml
+from holozen.robot.errors import RobotError
+from holozen.robot.loading import parse
+from holozen.robot.model import RobotModel
+from holozen.transport.graph import on_key
+from holozen.transport.services import answer_in_turn
+
+from ..entities import Entities, EntityError, Place, checked_place
+from ..physics.engine import Rotation, Vector
+
+MAX_SPEED = 100.0  # m/s and rad/s, of a state to set
+MAX_SPAWNS = 64  # waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
+PEER_CHECK = 50  # polls, about a second, after which all other nodes are known
+MAX_WARNINGS = 20  # about a robot's text in a reply
+MAX_TAGS = 20_000  # "<" in a text; parsing more of them would stall the steps
+WORLD = ("", "world", "odom", "map")  # frames that mean the world
+_OK = si.Result(si.Result.OK)
+# The namespace alone may remain after an expansion.
+_XACRO = re.compile(r"<xacro:|\$\{|\$\((?:find|arg|env|optenv|eval|cwd|dirname|anon)\b")
+
+
+class EntityServices:
+    """Answers requests about entities. `packages` are those of `--package`: the only folders whose meshes are read."""
+
+    def __init__(self, bus: Bus, entities: Entities, packages: Mapping[str, Path]) -> None:
+        self._entities, self._packages = entities, packages
+        self._bus, self._graph, self._polls = bus, bus.graph(), 0
+        serve = bus.serve
+        self._servers = [
+            serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self.spawn, MAX_SPAWNS),
+            serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
+            serve("get_entities", si.GetEntitiesRequest, si.GetEntitiesReply, self.names),
+            serve("get_entity_state", si.GetEntityStateRequest, si.GetEntityStateReply, self.state),
+            serve("set_entity_state", si.SetEntityStateRequest, si.SetEntityStateReply, self.put),
+        ]
+
+    def answer(self) -> None:
+        """Answer waiting requests for a short time: many at once must not stall the steps."""
+        answer_in_turn(self._servers)
+        self._polls += 1
+        if self._polls == PEER_CHECK:
+            self._report_other_sims()
+
+    def _report_other_sims(self) -> None:
+        others = on_key(self._graph.endpoints(), "spawn_entity", "srv")
+        if any(other.session != self._bus.id for other in others):
+            report("sim: another sim answers spawn_entity too; robots are spawned in either of them: end one")
+
+    def spawn(self, request: si.SpawnEntityRequest) -> si.SpawnEntityReply:
+        """Add a robot or object to the world."""
+        model = self._read(request)
+        name = request.name or model.name
+        if request.allow_renaming or not request.name:
+            name = self._entities.free_name(name)
+        place = _place(request.initial_pose.header, request.initial_pose.pose)
+        namespace = request.entity_namespace  # a slash alone is the root
+        entity = self._entities.add(name, model, place, namespace.strip("/") if namespace else None)
+        for warning in model.warnings:
+            report(f"sim: {name}: {warning}")
+        report(f"sim: {name} was added to the world")
+        return si.SpawnEntityReply(si.Result(si.Result.OK, _warned(model.warnings)), entity.name)
+
+    def _read(self, request: si.SpawnEntityRequest) -> RobotModel:
+        """The robot of a request. No expression in it is evaluated, and only files of known packages are opened."""
+        text = request.resource_string
+        if not text:
+            problem = "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn FILE` sends it"
+            raise EntityError(
+                si.SpawnEntityReply.UNSUPPORTED_ASSETS if request.uri else si.SpawnEntityReply.NO_RESOURCE, problem
+            )
+        if text.count("<") > MAX_TAGS:
+            problem = f"resource_string has more than {MAX_TAGS // 2} elements; a robot may have no more"
+            raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, problem)
+        if _XACRO.search(text) and _is_xacro(text):
+            raise EntityError(
+                si.SpawnEntityReply.UNSUPPORTED_FORMAT,
+                "resource_string is xacro; expand it first: `holozen xacro FILE`",
+            )
+        try:
+            return parse(text, Path("resource_string"), self._packages, confined=True)
+        except RobotError as error:
+            raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
+
+    def delete(self, request: si.DeleteEntityRequest) -> si.DeleteEntityReply:
+        """Remove an entity."""
+        self._entities.remove(request.entity)
+        report(f"sim: {request.entity} was removed from the world")
+        return si.DeleteEntityReply(_OK)
+
+    def names(self, request: si.GetEntitiesRequest) -> si.GetEntitiesReply:
+        """The names that match the filter."""
+        filters = request.filters
+        if filters.categories or filters.tags.tags or filters.bounds.type:
+            raise EntityError(si.Result.FEATURE_UNSUPPORTED, "entities are filtered by name only: filters.filter")
+        if len(filters.filter) > 100:
+            raise EntityError(si.Result.OPERATION_FAILED, "filters.filter is longer than 100 characters")
+        names = [entity.name for entity in self._entities]
+        return si.GetEntitiesReply(_OK, entities=_matching(names, filters.filter))
+
+    def state(self, request: si.GetEntityStateRequest) -> si.GetEntityStateReply:
+        """The pose and velocity of an entity in the world."""
+        body = self._entities.named(request.entity).body
+        position, rotation = body.pose()
+        linear, angular = body.twist()
+        header = Header(Time.of(self._entities.time), "world")
+        state = si.EntityState(
+            header, Pose(Point(*position), Quaternion(*rotation)), Twist(Vector3(*linear), Vector3(*angular))
+        )
+        return si.GetEntityStateReply(_OK, state=state)
+
+    def put(self, request: si.SetEntityStateRequest) -> si.SetEntityStateReply:
+        """Set the pose and velocity of an entity."""
+        entity, state = self._entities.named(request.entity), request.state
+        position, rotation = _place(state.header, state.pose)
+        linear, angular = _vector(state.twist.linear), _vector(state.twist.angular)
+        if not_finite(state.twist) or max(map(abs, (*linear, *angular))) > MAX_SPEED:
+            raise EntityError(
+                si.Result.OPERATION_FAILED, f"twist {linear}, {angular}: use at most {MAX_SPEED:g} m/s and rad/s"
+            )
+        if entity.model.static and any((*linear, *angular)):
+            raise EntityError(si.Result.OPERATION_FAILED, f"{request.entity!r} is static; its velocity cannot be set")
+        entity.body.put(position, rotation, linear, angular)
+        return si.SetEntityStateReply(_OK)
+
+
+def _is_xacro(text: str) -> bool:
+    """Whether any element uses xacro; comments do not count, and broken XML is another error."""
+    try:
+        root = read_xml(repair_xml(text)[0], "resource_string")
+    except RobotError:
+        return False
+    tags = [root]
+    for tag in tags:
+        tags += tag.children
+    words = (f"<{tag.name} {' '.join(tag.attributes.values())} {tag.text}" for tag in tags)
+    return any(_XACRO.search(word) for word in words)
+
+
+def _warned(warnings: tuple[str, ...]) -> str:
+    more = [f"and {len(warnings) - MAX_WARNINGS} more warnings"] if len(warnings) > MAX_WARNINGS else []
+    return "\n".join(" ".join(warning.split()) for warning in [*warnings[:MAX_WARNINGS], *more])
+
+
+def _matching(names: list[str], wanted: str) -> list[str]:
+    """The names that a pattern matches. Only `*`, `.`, `|`, `^`, `$` are special: others can take for ever."""
+    if not re.fullmatch(r"[\w.*|^$-]*", wanted) or "**" in wanted or wanted.count("*") > 3:
+        raise EntityError(
+            si.Result.FEATURE_UNSUPPORTED, f"filter {wanted!r}: use letters, digits, '_', '-', '.', '*', '|', '^', '$'"
+        )
+    try:
+        pattern = re.compile(wanted)
+    except re.error as error:
+        raise EntityError(si.Result.OPERATION_FAILED, f"filter {wanted!r}: {error}") from None
+    return [name for name in names if pattern.search(name)]
+
+
+def _place(header: Header, pose: Pose) -> Place:
+    if header.frame_id not in WORLD:
+        raise EntityError(
+            si.SpawnEntityReply.INVALID_POSE, f"frame {header.frame_id[:80]!r}: give the pose in the frame 'world'"
+        )
+    q = pose.orientation
+    rotation: Rotation = (q.x, q.y, q.z, q.w)
+    return checked_place((pose.position.x, pose.position.y, pose.position.z), rotation)
+
+
+def _vector(v: Vector3) -> Vector:
+    return v.x, v.y, v.z

@@ -1,0 +1,83 @@
+"""The services of one robot: stop, release, resume."""
+
+from collections.abc import Callable
+
+from holozen.bus import Bus
+from holozen.console import report
+from holozen.messages import TriggerReply, TriggerRequest
+from holozen.transport.errors import ServiceError
+from holozen.transport.services import RING
+from holozen.wire import key_for
+
+from ..command.arbiter import Arbiter
+
+MAX_REQUESTS = 16  # of one service answered per poll; a flood of them must not stall the steps
+RELEASED = (
+    "sources that commanded during the stop have to let go first;"
+    " an autopilot also waits for `holozen controller --resume`"
+)
+
+
+class RobotServices:
+    """Serves them in the namespace of the key `command`, for all `arbiters` alike. `changed` is called before a stop or
+    a release is confirmed.
+    """
+
+    VERBS = ("release", "resume", "stop")
+
+    def __init__(self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[], None]) -> None:
+        self._bus, self._arbiters, self._changed = bus, arbiters, changed
+        answers = (self._on_release, self._on_resume, self._on_stop)
+        self._namespace = namespace = command.rpartition("/")[0]
+        self._release, self._resume, self._stop = self._servers = tuple(
+            bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer)
+            for verb, answer in zip(self.VERBS, answers, strict=True)
+        )
+        self._now = 0.0
+
+    def answer(self, now: float) -> None:
+        """Answer the requests that wait at `now` (s)."""
+        self._now = now
+        if self._stop.take_in():  # a stop wins over requests that wait with it
+            for server in (self._release, self._resume):
+                server.take_in(RING)  # now: a release that is sent once the stop is confirmed counts
+            self._stop.answer_pending(MAX_REQUESTS)
+            for server in (self._release, self._resume):
+                server.refuse_waiting(f"a stop came at the same time; {self._namespace or 'the robot'} is stopped")
+        for server in (self._release, self._resume):
+            server.answer_pending(MAX_REQUESTS)
+
+    def close(self) -> None:
+        """Close the services."""
+        for server in self._servers:
+            self._bus.drop(server)
+
+    @property
+    def _setter(self) -> str:
+        return self._arbiters[0].software_stop.setter
+
+    def _on_stop(self, _request: TriggerRequest) -> TriggerReply:
+        before = self._setter
+        for arbiter in self._arbiters:
+            arbiter.stop(self._stop.caller, self._now)
+        if not before:
+            self._report_change(f"is stopped by {self._setter}")
+        return TriggerReply(True, f"stopped by {self._setter}")
+
+    def _on_release(self, _request: TriggerRequest) -> TriggerReply:
+        if not self._setter:
+            return TriggerReply(True, "the robot was not stopped")
+        for arbiter in self._arbiters:
+            arbiter.software_stop.release()
+        self._report_change(f"was released by {self._release.caller or 'an unknown caller'}")
+        return TriggerReply(True, RELEASED)
+
+    def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
+        for arbiter in self._arbiters:
+            if reason := arbiter.resume(self._now):
+                raise ServiceError(reason)
+        return TriggerReply(True, "every source may drive")
+
+    def _report_change(self, what: str) -> None:
+        report(f"sim: {self._namespace or 'the robot'} {what}")
+        self._changed()

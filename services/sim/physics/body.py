@@ -1,0 +1,125 @@
+"""A body in the engine: its pose and velocity, and how it is placed or removed."""
+
+from collections.abc import Iterable, Mapping
+
+from holozen.kinematics import to_body
+from holozen.limits import Planar
+from holozen.rotation import rotate, yaw
+
+from .engine import NOTHING, Rotation, Vector, bullet
+
+
+class Body:
+    """A multibody of the engine, by its root frame; the engine itself uses the centre of mass.
+
+    `weightless` is the mass in kg, by the engine's number of a link (-1: the base), that gravity does not pull.
+    """
+
+    def __init__(
+        self, world: int, number: int, centre: Vector, axes: Rotation, weightless: Mapping[int, float] = {}
+    ) -> None:
+        self._world, self._body = world, number
+        self.weightless = {link: mass for link, mass in weightless.items() if mass > 0}
+        self.is_removed = False
+        self._centre = centre
+        self._axes = axes
+        self._tilted = max(map(abs, axes[:3])) > 1e-9  # principal axes that are not the root's
+        self._axes_back: Rotation = bullet.invertTransform((0, 0, 0), axes)[1]
+
+    def pose(self) -> tuple[Vector, Rotation]:
+        """Position and rotation of the root frame in the world."""
+        position, rotation, centre = self._root()
+        return (position[0] - centre[0], position[1] - centre[1], position[2] - centre[2]), rotation
+
+    def twist(self) -> tuple[Vector, Vector]:
+        """The root frame's velocity and rotation rate in the world."""
+        _, _, centre = self._root()
+        linear, angular = bullet.getBaseVelocity(self._body, self._world)
+        return _at(linear, angular, (-centre[0], -centre[1], -centre[2])), angular
+
+    def planar(self) -> Planar:
+        """The planar velocity of the root frame, in the body frame."""
+        (vx, vy, _), (_, _, turn) = self.twist()
+        x, y = to_body(vx, vy, yaw(self.pose()[1]))
+        return x, y, turn
+
+    def put(self, position: Vector, rotation: Rotation, linear: Vector, angular: Vector) -> None:
+        """Place the root frame in the world, with its velocity and rotation rate there."""
+        centre = rotate(rotation, self._centre)
+        at = tuple(p + c for p, c in zip(position, centre, strict=True))
+        _, axes = bullet.multiplyTransforms((0, 0, 0), rotation, (0, 0, 0), self._axes)
+        bullet.resetBasePositionAndOrientation(self._body, at, axes, self._world)
+        bullet.resetBaseVelocity(self._body, _at(linear, angular, centre), angular, self._world)
+
+    def cancel_gravity(self, gravity: Vector) -> None:
+        """Cancel the world's `gravity` on weightless links for the next step: the engine has no such flag."""
+        for link, mass in self.weightless.items():
+            if link < 0:
+                centre = bullet.getBasePositionAndOrientation(self._body, self._world)[0]
+            else:
+                centre = bullet.getLinkState(self._body, link, physicsClientId=self._world)[0]
+            force = [-mass * part for part in gravity]
+            bullet.applyExternalForce(self._body, link, force, centre, bullet.WORLD_FRAME, self._world)
+
+    def remove(self) -> None:
+        """Remove it from the world."""
+        self.is_removed = True
+        bullet.removeBody(self._body, self._world)
+
+    def _root(self) -> tuple[Vector, Rotation, Vector]:
+        """The centre of mass, the root frame's rotation, and the offset from the root to the centre, in the world."""
+        position, rotation = bullet.getBasePositionAndOrientation(self._body, self._world)
+        if self._tilted:
+            rotation = bullet.multiplyTransforms((0, 0, 0), rotation, (0, 0, 0), self._axes_back)[1]
+        return position, rotation, rotate(rotation, self._centre)
+
+
+class Links:
+    """The arguments of `createMultiBody` for links below the base, all with the shape `visual`. Those without a joint
+    only carry shapes.
+    """
+
+    def __init__(self, visual: int) -> None:
+        self._visual = visual
+        self.arguments: dict[str, list[object]] = {name: [] for name in _NAMES}
+
+    def __len__(self) -> int:
+        return len(self.arguments["linkMasses"])
+
+    def add(
+        self,
+        parent: int,
+        shape: int = NOTHING,
+        joint: int = bullet.JOINT_FIXED,
+        axis: Vector = (0.0, 0.0, 1.0),
+        at: tuple[Vector, Rotation] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+        mass: float = 0.0,
+        inertial: tuple[Vector, Rotation] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+    ) -> int:
+        """One link on link `parent` (-1: the base) with its frame `at` in the parent's. Returns its index."""
+        values = (mass, shape, self._visual, *at, *inertial, parent + 1, joint, axis)
+        for name, value in zip(_NAMES, values, strict=True):
+            self.arguments[name].append(value)
+        return len(self) - 1
+
+    def carry(self, parent: int, shapes: Iterable[int]) -> list[int]:
+        """Attach more shapes to a link that has one. Returns the indices of the links that carry them."""
+        return [self.add(parent, shape) for shape in shapes]
+
+    def numbers(self, body: int, world: int) -> dict[int, int]:
+        """Our index -> the engine's, which counts depth first; -1, the base, is the same in both."""
+        infos = (bullet.getJointInfo(body, number, world) for number in range(len(self)))
+        return {-1: -1} | {int(info[12].removeprefix(b"link")) - 1: info[0] for info in infos}
+
+
+_NAMES = (
+    "linkMasses", "linkCollisionShapeIndices", "linkVisualShapeIndices", "linkPositions", "linkOrientations",
+    "linkInertialFramePositions", "linkInertialFrameOrientations", "linkParentIndices", "linkJointTypes",
+    "linkJointAxis",
+)  # fmt: skip
+
+
+def _at(linear: Vector, angular: Vector, away: Vector) -> Vector:
+    """The velocity of a point `away` from one that moves and turns: v + w x r."""
+    (vx, vy, vz), (wx, wy, wz), (x, y, z) = linear, angular, away
+    return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x

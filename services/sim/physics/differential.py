@@ -1,0 +1,94 @@
+"""Wheels on two sides, driven by motors; contacts with the ground move the robot."""
+
+import math
+
+from holozen.limits import Planar, clamp
+from holozen.robot.model import Differential, RobotModel
+from holozen.robot.rigid import joint_axes
+
+from .engine import Rotation, Vector
+from .jointed import JointedBody
+from .wheels import forward_sign, radius_of
+
+SLACK = 0.1  # m/s by which a rim may lag behind its command
+
+
+class WheelMover:
+    """A differential or skid-steered base. Forward is along x, whatever the direction of a wheel's axis."""
+
+    def __init__(self, body: JointedBody, model: RobotModel, mechanism: Differential) -> None:
+        self.body, self._mechanism = body, mechanism
+        self.names = body.names
+        self.wheels, self.kept = frozenset((*mechanism.left, *mechanism.right)), frozenset[str]()
+        self._signs = {name: forward_sign(model, name) for name in self.wheels}
+        self._separation = mechanism.separation or separation_of(model, mechanism)
+        self._radius = mechanism.radius or radius_of(model, model.joints[mechanism.left[0]].child)
+        self._odometer = Odometer()
+        self._rims = (0.0, 0.0)  # m/s commanded to the left and right wheels
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Drive the wheels. It cannot move sideways."""
+        x, _, turn = velocity
+        half = turn * self._separation / 2
+        self._rims = self._ramped((x - half, x + half), self._mechanism.acceleration * dt)
+        for names, speed in zip((self._mechanism.left, self._mechanism.right), self._rims, strict=True):
+            for name in names:
+                self.body.roll(name, self._signs[name] * speed / self._radius, self._mechanism.torque)
+
+    def _ramped(self, wanted: tuple[float, float], most: float) -> tuple[float, float]:
+        """The speeds of both sides' rims for the next step, in which they change by no more than `most`, in m/s. A stop
+        is immediate, whatever the file says.
+        """
+        if math.isinf(most) or not any(wanted):
+            return wanted
+        now = self._sides(dict(zip(self.names, self.body.states()[1], strict=True)))
+        # Resistance also holds the ramp back; but small differences would turn the robot.
+        left, right = (n + clamp(rim - n, SLACK) for n, rim in zip(now, self._rims, strict=True))
+        return left + clamp(wanted[0] - left, most), right + clamp(wanted[1] - right, most)
+
+    def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
+        """The true pose, or the one from wheel encoders if the file asks for that."""
+        if not self._mechanism.encoder:
+            return *self.body.pose(), self.body.planar()
+        positions, rates = self.body.states()
+        angles, speeds = dict(zip(self.names, positions, strict=True)), dict(zip(self.names, rates, strict=True))
+        position, rotation = self._odometer.update(*self._sides(angles), self._separation)
+        left, right = self._sides(speeds)
+        return position, rotation, ((left + right) / 2, 0.0, (right - left) / self._separation)
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Positions and rates of the joints."""
+        return self.body.states()
+
+    def _sides(self, values: dict[str, float]) -> tuple[float, float]:
+        """The mean distance (m) or speed (m/s) of the left and of the right wheels."""
+        sides = (self._mechanism.left, self._mechanism.right)
+        left, right = (sum(self._signs[name] * values[name] for name in names) / len(names) for names in sides)
+        return left * self._radius, right * self._radius
+
+
+class Odometer:
+    """Planar odometry from the distances of two sides, on exact arcs. It starts at zero."""
+
+    def __init__(self) -> None:
+        self._x = self._y = self._yaw = 0.0
+        self._seen = (0.0, 0.0)
+
+    def update(self, left: float, right: float, separation: float) -> tuple[Vector, Rotation]:
+        """The pose after the sides have rolled `left` and `right` metres in total."""
+        dl, dr = left - self._seen[0], right - self._seen[1]
+        self._seen = (left, right)
+        turn, way = (dr - dl) / separation, (dl + dr) / 2
+        # The chord of an arc of length `way`: rotated by half the turn, and shorter.
+        chord = way * (math.sin(turn / 2) / (turn / 2) if turn else 1.0)
+        self._x += chord * math.cos(self._yaw + turn / 2)
+        self._y += chord * math.sin(self._yaw + turn / 2)
+        self._yaw += turn
+        return (self._x, self._y, 0.0), (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
+
+
+def separation_of(model: RobotModel, mechanism: Differential) -> float:
+    """The distance in metres between the two sides' wheels, by their links."""
+    axes = joint_axes(model)
+    left, right = (sum(axes[n].xyz[1] for n in names) / len(names) for names in (mechanism.left, mechanism.right))
+    return abs(left - right)

@@ -1,0 +1,217 @@
+"""A robot of parts with joints between them, moved by motors in the joints; or an object that nothing moves."""
+
+import math
+
+from holozen.limits import clamp
+from holozen.robot.model import Joint
+from holozen.robot.rigid import Part
+
+from ..command.motion import JointMotion
+from .body import Body, Links
+from .dynamics import damping_of, load_on, set_joint, set_surface
+from .engine import NOTHING, UPRIGHT, Rotation, Shapes, Vector, bullet
+
+JOINTS = {"continuous": bullet.JOINT_REVOLUTE, "revolute": bullet.JOINT_REVOLUTE, "prismatic": bullet.JOINT_PRISMATIC}
+MAX_EFFORT = 1e3  # N m or N, of a joint without an effort limit
+MAX_RATE = 1e3  # rad/s or m/s
+CLOSING = 0.1  # s; time constant of a joint that moves to a position
+FOLLOWING = 0.02  # s; the same for a joint that mimics another
+MAX_JOINTS = 120  # pybullet silently stops at 127
+
+
+class JointedBody(Body):
+    """The parts of `assemble`, the root's first. Joints are called by their names; rad, rad/s, N m or m, m/s, N.
+
+    `wheels` names the joints of the wheels that drive it. More than two have to slide along their axles, and other
+    parts slide on the ground too, unless the file sets their friction.
+    """
+
+    def __init__(
+        self,
+        world: int,
+        shapes: Shapes,
+        parts: list[Part],
+        at: Vector,
+        rotation: Rotation = UPRIGHT,
+        wheels: frozenset[str] = frozenset(),
+        static: bool = False,
+    ) -> None:
+        root, links = parts[0].body, Links(shapes.unseen)
+        first, carrying = _link(links, shapes, parts)
+        number: int = bullet.createMultiBody(
+            0.0 if static else root.mass,
+            first,
+            shapes.unseen,
+            basePosition=at,
+            baseOrientation=rotation,
+            baseInertialFramePosition=root.centre,
+            baseInertialFrameOrientation=root.axes,
+            flags=bullet.URDF_GLOBAL_VELOCITIES_MB,  # without it a tumbling body turns ever faster
+            physicsClientId=world,
+            **links.arguments,
+        )
+        numbers = links.numbers(number, world)
+        floating = {numbers[own]: part.body.weightless for part, (own, *_) in zip(parts, carrying, strict=True)}
+        super().__init__(world, number, root.centre, root.axes, {} if static else floating)
+        self._dt: float = bullet.getPhysicsEngineParameters(world)["fixedTimeStep"]
+        self._joints: dict[str, tuple[int, Joint]] = {}
+        load = load_on(parts, len(wheels)) if len(wheels) > 2 else 0.0
+        for index, (part, (own, *more)) in enumerate(zip(parts, carrying, strict=True)):
+            drives = part.joint is not None and part.joint.name in wheels
+            touching = [numbers[link] for link in (own, *more)]
+            set_surface(world, number, touching, part, self._dt, load if drives else 0.0, bool(wheels) and not drives)
+            if part.joint or not static:
+                set_joint(world, number, numbers[own], part, damping_of(parts, index, self._dt))
+            if part.joint:
+                self._joints[part.joint.name] = (numbers[own], part.joint)
+        self._begin()
+
+    def _begin(self) -> None:
+        joints = [joint for _, joint in self._joints.values()]
+        self.names = [joint.name for joint in joints]
+        self._numbers = [number for number, _ in self._joints.values()]
+        self._mimics = {
+            joint.name: joint.mimic for joint in joints if joint.mimic and joint.mimic.joint in self._joints
+        }
+        for name in self.names:
+            self.release(name)
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Positions and rates of the joints, in the order of `names`."""
+        states = bullet.getJointStates(self._body, self._numbers, self._world) if self._numbers else ()
+        return [state[0] for state in states], [state[1] for state in states]
+
+    def release(self, name: str, friction: float | None = None) -> None:
+        """Let a joint turn freely, against its friction (default: the file's)."""
+        number, joint = self._joints[name]
+        self._motor(
+            number, bullet.VELOCITY_CONTROL, targetVelocity=0, force=joint.friction if friction is None else friction
+        )
+
+    def roll(self, name: str, rate: float, effort: float) -> None:
+        """Turn a wheel at a rate. The drive's limits apply, not the joint's: exporters write 0 for unknown limits."""
+        number, _ = self._joints[name]
+        self._motor(number, bullet.VELOCITY_CONTROL, targetVelocity=rate, force=min(effort, MAX_EFFORT))
+
+    def turn(self, name: str, rate: float, effort: float = math.inf) -> None:
+        """Turn a joint at a rate, within its limits. Call it before each step for a joint with position limits."""
+        number, joint = self._joints[name]
+        self._motor(
+            number,
+            bullet.VELOCITY_CONTROL,
+            targetVelocity=self._kept(number, joint, rate),
+            force=_effort(joint, effort),
+        )
+
+    def go(self, name: str, position: float, closing: float = CLOSING) -> None:
+        """Move a joint to a position, within its limits, with a time constant of `closing` seconds."""
+        number, joint = self._joints[name]
+        self._motor(
+            number,
+            bullet.POSITION_CONTROL,
+            targetPosition=max(joint.limits.lower, min(joint.limits.upper, position)),
+            positionGain=min(1.0, self._dt / closing),
+            force=_effort(joint),
+            maxVelocity=min(joint.limits.velocity, MAX_RATE),
+        )
+
+    def push(self, name: str, effort: float, most: float = math.inf) -> None:
+        """Apply a torque or force to a joint for the next step, within its limits. `release` it first."""
+        number, joint = self._joints[name]
+        effort = clamp(effort, _effort(joint, most))
+        if math.isfinite(joint.limits.velocity):
+            rate = bullet.getJointState(self._body, number, self._world)[1]
+            if abs(rate) >= joint.limits.velocity and rate * effort > 0:
+                effort = 0.0
+        self._motor(number, bullet.TORQUE_CONTROL, force=effort)
+
+    def mimic(self) -> None:
+        """Move mimic joints to the positions of the joints that they follow. Call it before each step."""
+        if not self._mimics:
+            return
+        positions = dict(zip(self.names, self.states()[0], strict=True))
+        for name, mimic in self._mimics.items():
+            self.go(name, mimic.multiplier * positions[mimic.joint] + mimic.offset, FOLLOWING)
+
+    def _kept(self, number: int, joint: Joint, rate: float) -> float:
+        """`rate` within the joint's limits, for the next step: a strong motor would overcome the engine's own. A joint
+        that is beyond its limits already may only move back.
+        """
+        limits = joint.limits
+        rate = clamp(rate, limits.velocity)
+        if not rate or not (math.isfinite(limits.lower) and math.isfinite(limits.upper)):
+            return rate
+        position: float = bullet.getJointState(self._body, number, self._world)[0]
+        if rate < 0:
+            return max(rate, min(0.0, (limits.lower - position) / self._dt))
+        return min(rate, max(0.0, (limits.upper - position) / self._dt))
+
+    def _motor(self, number: int, mode: int, **values: float) -> None:
+        bullet.setJointMotorControl2(self._body, number, mode, physicsClientId=self._world, **values)
+
+
+def _link(links: Links, shapes: Shapes, parts: list[Part]) -> tuple[int, list[list[int]]]:
+    """The base's shape, and the links of each part: its own, then those that only carry more shapes."""
+    own = [shapes.of(part.body.collisions) or [NOTHING] for part in parts]
+    indices = [-1]
+    for part, (first, *_) in zip(parts[1:], own[1:], strict=True):
+        indices.append(_add(links, part, indices[part.parent], first))
+    others = [links.carry(index, more) for index, (_, *more) in zip(indices, own, strict=True)]
+    return own[0][0], [[index, *more] for index, more in zip(indices, others, strict=True)]
+
+
+def _add(links: Links, part: Part, parent: int, shape: int) -> int:
+    joint = part.joint
+    assert joint is not None, "only the root's part has none"
+    return links.add(
+        parent,
+        shape,
+        JOINTS[joint.kind],
+        joint.axis,
+        (part.xyz, part.rotation),
+        part.body.mass,
+        (part.body.centre, part.body.axes),
+    )
+
+
+def _effort(joint: Joint, effort: float = math.inf) -> float:
+    return min(effort, joint.limits.effort, MAX_EFFORT)
+
+
+class Motors:
+    """The motors of some joints of a body, with at most `effort` in N m or N each. A joint that is no longer commanded
+    holds still; with `together`, all of them do while one is commanded, as the wheels of one base.
+    """
+
+    def __init__(
+        self, body: JointedBody, names: frozenset[str], effort: float = math.inf, together: bool = False
+    ) -> None:
+        self._body, self.names, self._effort, self._together = body, names, effort, together
+        self._held: frozenset[str] = frozenset()
+        self._last: JointMotion | None = None
+
+    def do(self, motion: JointMotion | None) -> None:
+        """Apply the motion of the next step; None: hold the joints that were moved before."""
+        commanded = frozenset(name for name, _ in motion.values) if motion else frozenset[str]()
+        if motion and motion != self._last:
+            for name in commanded:
+                self._body.release(name)
+        self._last = motion
+        self._held |= self.names if motion and self._together else commanded
+        for name in self._held - commanded:
+            self._body.turn(name, 0.0, self._effort)
+        if motion:
+            self._move(motion)
+
+    def forget(self) -> None:
+        """Release them: something else moves them from now on."""
+        self._held, self._last = frozenset(), None
+
+    def _move(self, motion: JointMotion) -> None:
+        for name, value in motion.values:
+            if motion.kind == "position":
+                self._body.go(name, value)
+            elif motion.kind == "velocity":
+                self._body.turn(name, value, self._effort)
+            else:
+                self._body.push(name, value, self._effort)

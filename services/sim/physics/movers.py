@@ -1,0 +1,135 @@
+"""The mechanisms of drives: from the commanded velocity to the engine, and back to odometry."""
+
+import math
+from typing import Protocol
+
+from holozen.limits import Planar, clamp_speed, ramp
+from holozen.robot import model as drives
+from holozen.robot.model import Balancing, Differential, Drive, Mecanum, RobotModel
+from holozen.robot.rigid import lump
+
+from .balance import BalanceMover
+from .body import Body
+from .differential import WheelMover
+from .engine import UPRIGHT, Rotation, Vector
+from .jointed import JointedBody
+from .planar import PlanarBody
+from .wheels import MecanumWheels, Wheels
+from .world import World
+
+Moved = tuple[Vector, Rotation, Planar]
+"""Position (m), rotation and body-frame velocity (m/s, rad/s) for odometry."""
+
+
+class Mover(Protocol):
+    """A robot's body with its drive. `names` are its joints, `wheels` those that both the drive and joint commands may
+    turn, `kept` those that joint commands may not.
+    """
+
+    @property
+    def body(self) -> Body:
+        """The body."""
+        ...
+
+    names: list[str]
+    wheels: frozenset[str]
+    kept: frozenset[str]
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Drive the body at `velocity` for the next step of `dt` seconds."""
+        ...
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """The state for odometry, at sim time `time`, after a step of `dt` seconds."""
+        ...
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Positions and rates of the joints."""
+        ...
+
+
+class PlanarMover:
+    """The whole body moves over the plane; its wheels turn only visually."""
+
+    def __init__(self, body: PlanarBody, wheels: Wheels | MecanumWheels) -> None:
+        self.body = body
+        self._wheels = wheels
+        self.names = wheels.names
+        self.wheels, self.kept = frozenset[str](), frozenset(wheels.names)
+        self._rolled = 0.0  # sim time up to which the wheels have turned
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Set the body's velocity."""
+        self.body.drive(velocity, dt)
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """The true pose."""
+        velocity = self.body.velocity(dt)
+        self._wheels.roll(velocity, time - self._rolled)
+        self._rolled = time
+        return *self.body.pose(), velocity
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Angles and rates of the wheels, as rolling without slip would turn them."""
+        return self._wheels.angles, self._wheels.rates
+
+
+class FreeMover:
+    """A robot or an object that nothing drives; joint commands may move its joints."""
+
+    def __init__(self, body: JointedBody) -> None:
+        self.body, self.names = body, body.names
+        self.wheels = self.kept = frozenset[str]()
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Nothing: it has no drive."""
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """The true pose."""
+        return *self.body.pose(), self.body.planar()
+
+    def states(self) -> tuple[list[float], list[float]]:
+        """Positions and rates of the joints."""
+        return self.body.states()
+
+
+class Limited:
+    """The limits of a drive from the robot's file. A stop is immediate, whatever they are."""
+
+    def __init__(self, drive: Drive) -> None:
+        self._drive = drive
+        limits = (drive.max_linear, drive.max_angular, drive.max_linear_acceleration, drive.max_angular_acceleration)
+        self._unlimited = all(math.isinf(limit) for limit in limits)
+        self._now: Planar = (0.0, 0.0, 0.0)
+
+    def __call__(self, wanted: Planar, dt: float) -> Planar:
+        """The velocity of the next step of `dt` seconds."""
+        drive = self._drive
+        if self._unlimited:
+            return wanted
+        wanted = clamp_speed(wanted, drive.max_linear, drive.max_angular)
+        slower = all(abs(w) <= abs(n) and w * n >= 0 for w, n in zip(wanted, self._now, strict=True))
+        limits = (drive.max_linear_acceleration, drive.max_angular_acceleration)
+        self._now = wanted if slower else ramp(self._now, wanted, *limits, dt)
+        return self._now
+
+
+def mover_for(world: World, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT) -> Mover:
+    """The robot in the world, its root frame at `at`; nothing drives a static one. Raises RobotError if the engine
+    cannot simulate it, and then leaves nothing behind.
+    """
+    mechanism = model.drive.mechanism if model.drive and not model.static else None
+    if isinstance(mechanism, drives.Planar | Mecanum):
+        rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
+        return PlanarMover(world.add(lump(model), at, rotation), rolling)
+    wheels = (*mechanism.left, *mechanism.right) if isinstance(mechanism, Differential) else ()
+    body = world.add_jointed(model, at, rotation, frozenset(wheels))
+    try:
+        if isinstance(mechanism, Differential):
+            return WheelMover(body, model, mechanism)
+        if isinstance(mechanism, Balancing):
+            return BalanceMover(body, model, mechanism, world.spec.step)
+        return FreeMover(body)
+    except Exception:
+        body.remove()
+        raise

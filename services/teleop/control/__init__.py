@@ -1,0 +1,1 @@
+"""Keys -> held keys -> commands. Pure."""

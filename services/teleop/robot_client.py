@@ -1,0 +1,77 @@
+"""One robot's keys on the bus: commands out, odometry and status in."""
+
+import math
+import time
+
+from holozen.bus import Bus
+from holozen.messages import CommandStatus, Header, Odometry, Time, Twist, TwistStamped
+from holozen.transport.pubsub import Publisher
+from holozen.wire import PRIORITY_OF, key_for, topic
+
+RESTS = 0.01  # m/s and rad/s; slower counts as at rest
+LOST = 0.4  # s without odom once there was some, so as not to drive blind. Less than the sim's command timeout
+JUMP = 0.5  # m between two polls beyond what motion explains
+
+
+class RobotClient:
+    """A robot to drive. `command` is its command key, its other keys are siblings of that; `stamped` as for Session."""
+
+    def __init__(self, bus: Bus, robot: str, command: str, stamped: str | None) -> None:
+        row = topic("odom")
+        assert row is not None
+        self.robot, self.key = robot, command or key_for("cmd_vel", robot)
+        self._bus, self._stamped, self._silence = bus, stamped, row.silence
+        kind: type[Twist] | type[TwistStamped] = Twist if stamped is None else TwistStamped
+        self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self.key, kind, PRIORITY_OF["teleop"])
+        self.odom = bus.latest(self.beside("odom"), Odometry)
+        self.status_key = f"{self.key}_status"
+        self._seen: tuple[float, float, float] | None = None  # stamp and position of the last odom seen
+        self._status = bus.latest(self.status_key, CommandStatus)
+
+    def beside(self, name: str) -> str:
+        """The robot's key of this name."""
+        return key_for(name, self.key.rpartition("/")[0])
+
+    def put(self, twist: Twist) -> None:
+        """Publish a command."""
+        if self._stamped is None:
+            self._commands.put(twist)
+        else:
+            self._commands.put(TwistStamped(Header(Time.of(time.time()), self._stamped), twist))
+
+    def status(self) -> CommandStatus:
+        """The sim's last command status; empty if it is outdated."""
+        status, age = self._status.read()
+        return status if status and age < 3 * LOST else CommandStatus()
+
+    def stale(self) -> bool:
+        """Whether odom is too old to show as current."""
+        return self.odom.read()[1] > self.odom.patience(self._silence)
+
+    def lost(self) -> bool:
+        """Whether odom has stopped arriving."""
+        _, age = self.odom.read()
+        return self.odom.count > 0 and age > max(LOST, self.odom.patience(self._silence))
+
+    def was_reset(self) -> bool:
+        """Whether the robot was reset since the last call: its clock went back, or its position jumped."""
+        odom, _ = self.odom.read()
+        if odom is None:
+            return False
+        place, twist, stamp = odom.pose.pose.position, odom.twist.twist.linear, odom.header.stamp.seconds()
+        before, self._seen = self._seen, (stamp, place.x, place.y)
+        if before is None:
+            return False
+        driven = 2 * math.hypot(twist.x, twist.y) * (stamp - before[0])  # at most
+        return stamp < before[0] or math.dist(before[1:], self._seen[1:]) > JUMP + driven
+
+    def rests(self, since: float) -> bool:
+        """Whether odom received after `since` (s, monotonic) shows a robot at rest."""
+        odom, age = self.odom.read()
+        return odom is not None and time.monotonic() - age > since and odom.twist.twist.is_slow(RESTS)
+
+    def close(self) -> None:
+        """Close its publishers and subscriptions."""
+        self._commands.close()
+        self._bus.drop(self.odom)
+        self._bus.drop(self._status)

@@ -1,0 +1,177 @@
+"""Joins mapper and robots: publishes the commands of the keys, hands over, switches between robots."""
+
+import time
+from collections.abc import Sequence
+
+from holozen.bus import Bus
+from holozen.messages import TriggerReply, TriggerRequest, Twist
+from holozen.transport.errors import ServiceError
+from holozen.transport.graph import Graph, on_key
+from holozen.wire import robot_name
+
+from .control.layouts import FIXED
+from .control.twist_mapper import TwistMapper
+from .input.kitty import Event, Focus, Key, Unknown
+from .robot_client import RobotClient
+
+FASTER = {"faster": 1.1, "slower": 0.9}  # a gamepad's buttons
+RESUME_TIMEOUT = 0.2  # s; the keys wait while the sim is asked
+UNSEEN = "the window lost focus: stopped"
+BLIND = "odom was lost: stopped; press a key again to drive"
+RESET = "the robot was reset: stopped; press a key again to drive"
+SWITCHING = "switching to the next robot: press the key again"
+
+
+class Session:
+    """The teleop without its terminal. `stamped`: publish TwistStamped with this frame_id, else None. `command`: the
+    command key of the first robot, if it is not its own cmd_vel.
+    """
+
+    def __init__(
+        self, bus: Bus, robots: Sequence[str], mapper: TwistMapper, stamped: str | None, command: str = ""
+    ) -> None:
+        self.mapper, self.bus, self._stamped = mapper, bus, stamped
+        self._robots = list(robots)
+        self._first, self._command = self._robots[0] if robots else command.rpartition("/")[0], command
+        self.client = self._client(self._first)
+        mapper.switch(self.client.robot)
+        self.graph: Graph = bus.graph()
+        self.sent: Twist | None = None
+        self.warning = ""
+        self.help = False
+        self._sees = False  # whether there was odom at the last tick
+        self.due = 0.0  # when a command is to be repeated
+        self._wanted = ""  # pending until the robot is at rest: "resume" or "next_robot"
+
+    def take(self, event: Event, now: float) -> str:
+        """Take a key event, and publish any change at once. Returns "quit" or "suspend" if it requests that."""
+        if isinstance(event, Focus):
+            return self.let_go(UNSEEN) if not event.gained and self.mapper.key_state.keys else ""
+        if not isinstance(event, Key | Unknown):
+            return ""
+        key = event if isinstance(event, Key) else Key("unknown")
+        if key.kind == "press" or key.kind == "typed":
+            if self._is_switching() and FIXED.get(key.name) not in ("quit", "suspend"):
+                return self.let_go(SWITCHING)
+            self.warning, self._wanted = "", ""
+        return self.act(self.mapper.take(key, now), now)
+
+    def disregard(self, key: Key, now: float) -> None:
+        """Take a key that may have been pressed long ago: it moves nothing, and stops a moving robot."""
+        self.mapper.disregard(key, now)
+        if key.kind in ("press", "typed"):
+            self.let_go()
+
+    def act(self, action: str, now: float) -> str:
+        """Do the action of a key or button. Returns "quit" or "suspend" if the caller has to do that."""
+        if action in ("resume", "next_robot"):
+            self.let_go()
+            self._wanted = action
+        elif action == "help":
+            self.help = not self.help
+        elif action in FASTER:
+            self.mapper.scale(FASTER[action])
+        self.publish(now)
+        return action if action in ("quit", "suspend") else ""
+
+    def steer(self, stick: tuple[float, float, float], now: float) -> None:
+        """Take the joystick's position (forward, left, counter-clockwise; -1 to 1), and publish any change."""
+        if stick != self.mapper.stick:
+            self.mapper.steer(stick, now)
+            self.publish(now)
+
+    def tick(self, now: float) -> None:
+        """Publish what is due: a stop once a key is no longer held, else the repeated command."""
+        if self._wanted and not self.mapper.engaged:
+            self._do_wanted()
+        lost = self.client.lost()
+        if lost and self._sees and self._drives:
+            self.let_go(BLIND)
+        self._sees = not lost
+        if self.client.was_reset() and self._drives:
+            self.let_go(RESET)
+        repeats = self.mapper.settings.repeat_rate > 0 or self.mapper.stopping_since() is not None
+        if self.mapper.expire(now) or (repeats and now >= self.due):
+            self.publish(now)
+
+    def let_go(self, why: str = "") -> str:
+        """Release all keys, and publish a stop at once if this teleop moves the robot. `why` is shown."""
+        if self._drives:
+            now = time.monotonic()
+            self.mapper.stop(now)
+            self.publish(now)
+        else:  # held keys may cancel out, and a stop in progress continues
+            self.mapper.let_go()
+        self.warning = why or self.warning
+        return ""
+
+    def halt(self) -> None:
+        """Stop the robot if this teleop moves it: zeros until odom shows rest, at most a second."""
+        self.let_go()
+        while self.mapper.engaged:
+            time.sleep(0.01)
+            self.publish(time.monotonic())
+
+    def publish(self, now: float) -> None:
+        """Publish the mapper's command at `now`, if any."""
+        since = self.mapper.stopping_since()
+        self.sent = self.mapper.command(now, since is not None and self.client.rests(since))
+        self.due = now + 1 / (self.mapper.settings.repeat_rate or 20.0)
+        if self.sent is not None:
+            self.client.put(self.sent)
+
+    def ring(self) -> list[str]:
+        """The robots that Tab cycles through: those named, else all with a command subscriber."""
+        if len(self._robots) > 1:
+            return self._robots
+        keys = {end.key for end in self.graph.endpoints() if end.kind == "sub"}
+        places = {
+            key.removesuffix("cmd_vel").rstrip("/") for key in keys if key == "cmd_vel" or key.endswith("/cmd_vel")
+        }
+        places = {place for place in places if not place or _is_robot_name(place)}  # anyone may declare any token
+        return sorted({*places, self.client.robot, *([self._first] if self._command else [])})
+
+    def listeners(self) -> list[str]:
+        """The nodes that subscribe to the commands."""
+        return [end.node for end in on_key(self.graph.endpoints(), self.client.key, "sub")]
+
+    @property
+    def _drives(self) -> bool:
+        return self.mapper.engaged and self.mapper.stopping_since() is None
+
+    def _is_switching(self) -> bool:
+        """Whether the switch waits for this robot to come to rest; a key meant for the next one would move this one."""
+        if self._wanted == "next_robot" and not self.mapper.engaged:
+            self._do_wanted()
+        return self._wanted == "next_robot"
+
+    def _do_wanted(self) -> None:
+        wanted, self._wanted = self._wanted, ""
+        if wanted == "resume":
+            return self._hand_over()
+        ring = self.ring()
+        robot = ring[(ring.index(self.client.robot) + 1) % len(ring)]
+        if robot == self.client.robot:
+            self.warning = "there is no other robot"
+        else:
+            before, self.client, self.sent = self.client, self._client(robot), None
+            before.close()
+            self.mapper.switch(robot)
+
+    def _client(self, robot: str) -> RobotClient:
+        return RobotClient(self.bus, robot, self._command if robot == self._first else "", self._stamped)
+
+    def _hand_over(self) -> None:
+        """Allow held sources to drive again."""
+        try:
+            key = self.client.beside("resume")
+            self.warning = self.bus.call(key, TriggerRequest(), TriggerReply, RESUME_TIMEOUT).message
+        except ServiceError as error:
+            self.warning = f"not handed over: {error}"
+
+
+def _is_robot_name(text: str) -> bool:
+    try:
+        return bool(robot_name(text))
+    except ValueError:
+        return False

@@ -1,0 +1,149 @@
+"""What the screen shows of a robot: its position, the link to the sim, the active command source."""
+
+import math
+import threading
+import time
+from collections import deque
+
+from holozen.bus import Bus
+from holozen.limits import STOP, Planar
+from holozen.messages import CommandStatus, Odometry, TriggerRequest, Twist
+from holozen.transport.errors import BusError
+
+from .control.twist_mapper import DEAD_MAN, TwistMapper
+from .session import Session
+from .view import Source, State
+
+ASK_EVERY, ASK_LIMIT = 1.0, 1.0  # s
+CLOSE_LIMIT = 0.4  # s
+TRAIL_STEP, TRAIL_LENGTH = 0.05, 400  # m, points
+PACE_OVER = 1.0  # s of odom over which the real-time factor is measured
+FARTHEST = 1e6  # m; positions beyond are ignored
+
+
+class RoundTrip:
+    """Measures the sim's response time once a second. `close` it before the bus."""
+
+    def __init__(self, bus: Bus, key: str) -> None:
+        self.key = key  # the key to query
+        self.seconds: float | None = None
+        self._bus = bus
+        self._closing = threading.Event()
+        self._thread = threading.Thread(target=self._measure, daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Measure no more."""
+        self._closing.set()
+        self._thread.join(CLOSE_LIMIT)
+
+    def _measure(self) -> None:
+        while not self._closing.wait(ASK_EVERY):
+            began = time.monotonic()
+            try:
+                self._bus.call(self.key, TriggerRequest(), CommandStatus, ASK_LIMIT)
+                self.seconds = time.monotonic() - began
+            except BusError:
+                self.seconds = None
+
+
+class Track:
+    """A robot's trail and the pace of its clock, from its odom."""
+
+    def __init__(self) -> None:
+        self.pose: tuple[float, float, float] | None = None  # x, y, yaw
+        self.trail: deque[tuple[float, float]] = deque(maxlen=TRAIL_LENGTH)
+        self._times: deque[tuple[float, float]] = deque()  # of the odom's clock and of ours
+
+    def see(self, odom: Odometry, now: float) -> None:
+        """Take the latest odom, read at `now`."""
+        position, stamp = odom.pose.pose.position, odom.header.stamp.seconds()
+        yaw = odom.pose.pose.orientation.yaw()
+        if not all(abs(value) < FARTHEST for value in (position.x, position.y, yaw)):
+            return
+        self.pose = position.x, position.y, yaw
+        if not self.trail or math.dist(self.trail[-1], self.pose[:2]) > TRAIL_STEP:
+            self.trail.append(self.pose[:2])
+        if self._times and stamp < self._times[-1][0]:
+            self._times.clear()
+            self.trail.clear()
+        if not self._times or stamp > self._times[-1][0]:
+            self._times.append((stamp, now))
+        while now - self._times[0][1] > PACE_OVER and len(self._times) > 2:
+            self._times.popleft()
+
+    def real_time_factor(self) -> float | None:
+        """Seconds of the odom's clock per second of ours; None if not known yet."""
+        if len(self._times) < 2:
+            return None
+        (began, ours), (ended, now) = self._times[0], self._times[-1]
+        return (ended - began) / (now - ours) if now - ours > PACE_OVER / 2 else None
+
+
+class Telemetry:
+    """Collects the state to show."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+        self._track, self._of = Track(), session.client
+        self._round_trip = RoundTrip(session.bus, session.client.status_key)
+
+    def close(self) -> None:
+        """Measure no more."""
+        self._round_trip.close()
+
+    def state(self, why: str, now: float, ascii: bool) -> State:
+        """The state to show. `why` is the reason for the mode."""
+        session, client = self._session, self._session.client
+        if client is not self._of:
+            self._track, self._of = Track(), client
+        self._round_trip.key = client.status_key
+        odom, age = client.odom.read()
+        if odom is not None:
+            self._track.see(odom, now)
+        status = client.status()
+        state = State(
+            robot=client.robot,
+            others=[robot for robot in session.ring() if robot != client.robot],
+            command=_planar(session.sent) if session.sent else None,
+            measured=_planar(odom.twist.twist) if odom else STOP,
+            odom_age=age,
+            stale=client.stale(),
+            round_trip=self._round_trip.seconds,
+            link_delay=self._round_trip.seconds,
+            real_time_factor=self._track.real_time_factor(),
+            pose=self._track.pose,
+            trail=self._track.trail,
+            listeners=session.listeners(),
+            source=session.bus.source,
+            key=client.key,
+            keys=session.mapper.layout.table if session.help else session.mapper.layout.help,
+            help=session.help,
+            warning=session.warning or session.mapper.note or _refusal(status, session.bus.source),
+            why=why,
+            ascii=ascii,
+        )
+        _show_mapper(state, session.mapper)
+        _show_status(state, status)
+        return state
+
+
+def _show_mapper(state: State, mapper: TwistMapper) -> None:
+    settings = mapper.settings
+    state.mode, state.deadman, state.deadman_held = settings.mode, settings.deadman, DEAD_MAN in mapper.key_state.keys
+    state.speed, state.speed_limit = settings.speed, settings.speed_limit
+    state.turn, state.turn_limit = settings.turn, settings.turn_limit
+
+
+def _show_status(state: State, status: CommandStatus) -> None:
+    state.obeyed, state.held, state.stopped = status.obeyed, status.held, status.stopped
+    state.sources = [Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources]
+
+
+def _planar(twist: Twist) -> Planar:
+    return twist.linear.x, twist.linear.y, twist.angular.z
+
+
+def _refusal(status: CommandStatus, source: str) -> str:
+    """Why the last of our commands was refused, if it was."""
+    return status.last_refusal.partition(": ")[2] if status.last_refusal.startswith(f"{source}: ") else ""

@@ -1,0 +1,61 @@
+"""A file says what it is, and what is public says what it does."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+REPO = Path(__file__).parents[2]
+FOLDERS = ("holozen", "services", "benchmarks", "examples", "meshes", "tests")
+FILES = sorted(path for folder in FOLDERS for path in REPO.glob(f"{folder}/**/*.py"))
+CODE = [path for path in FILES if path.relative_to(REPO).parts[0] in ("holozen", "services")]
+Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
+
+WITHOUT_DOCSTRING = {"main", "parser"}  # the file's first line says it
+
+
+def name(path: Path) -> str:
+    return path.relative_to(REPO).as_posix()
+
+
+def definitions(tree: ast.Module) -> Iterator[tuple[str, Definition]]:
+    """(path, node) of each class and function that is not inside a function."""
+    waiting: list[tuple[str, ast.Module | ast.ClassDef]] = [("", tree)]
+    while waiting:
+        prefix, parent = waiting.pop()
+        for node in parent.body:
+            if isinstance(node, Definition):
+                yield f"{prefix}{node.name}", node
+            if isinstance(node, ast.ClassDef):
+                waiting.append((f"{prefix}{node.name}.", node))
+
+
+def is_public(path: str, node: Definition) -> bool:
+    return not any(part.startswith("_") for part in path.split(".")) and node.name not in WITHOUT_DOCSTRING
+
+
+def is_a_message(node: Definition) -> bool:
+    """ROS documents it."""
+    bases = node.bases if isinstance(node, ast.ClassDef) else []
+    return any(isinstance(base, ast.Name) and base.id == "Message" for base in bases)
+
+
+def is_of_a_protocol(node: Definition) -> bool:
+    """A body of `...`: who implements it says what it does."""
+    last = node.body[-1]
+    return isinstance(last, ast.Expr) and isinstance(last.value, ast.Constant) and last.value.value is ...
+
+
+def test_a_file_says_what_it_is() -> None:
+    texts = {name(path): path.read_text() for path in FILES}
+    assert [where for where, text in texts.items() if text and not ast.get_docstring(ast.parse(text))] == []
+
+
+def test_what_is_public_has_a_docstring() -> None:
+    bare = [
+        f"{name(path)}: {place}"
+        for path in CODE
+        for place, node in definitions(ast.parse(path.read_text()))
+        if is_public(place, node) and not ast.get_docstring(node)
+        if not is_a_message(node) and not is_of_a_protocol(node)
+    ]
+    assert bare == []

@@ -1,0 +1,30 @@
+"""A program that drives a robot at 20 Hz until it is told to end, and prints when it sends each command (s, monotonic).
+
+python driver.py ENDPOINT
+
+It is no lasting node, as `holozen topic pub` is none: when it dies the robot stands by the silence alone.
+"""
+
+import sys
+import time
+
+from holozen.bus import Bus, Connection
+from holozen.messages import Twist
+from holozen.process import stop_event
+
+RATE = 20.0  # Hz
+
+
+def main(endpoint: str) -> None:
+    stop = stop_event()
+    with Bus("driver", Connection(mode="client", connect=(endpoint,)), stop=stop) as bus:
+        commands = bus.publisher("cmd_vel", Twist)
+        while not stop.wait(1 / RATE):
+            print(time.monotonic(), flush=True)
+            commands.put(Twist.planar(0.3))
+        print("stop", flush=True)
+        commands.put(Twist())
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

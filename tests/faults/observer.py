@@ -1,0 +1,30 @@
+"""A program that prints each odom of a robot: when it came (s, monotonic), its stamp (s of sim time), its speed (m/s).
+
+python observer.py ENDPOINT
+"""
+
+import sys
+import time
+
+from holozen.bus import Bus, BusError, Connection
+from holozen.messages import Odometry
+from holozen.process import stop_event
+
+
+def main(endpoint: str) -> None:
+    stop = stop_event()
+    with Bus("observer", Connection(mode="client", connect=(endpoint,)), stop=stop) as bus:
+        odometry = bus.subscribe("odom", Odometry, depth=1000)
+        while not stop.wait(0.01):
+            try:
+                while (received := odometry.try_recv()) is not None:
+                    if received.message:
+                        linear = received.message.twist.twist.linear
+                        speed = (linear.x**2 + linear.y**2) ** 0.5
+                        print(time.monotonic(), received.message.header.stamp.seconds(), f"{speed:.4f}", flush=True)
+            except BusError:
+                return
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

@@ -1,0 +1,77 @@
+"""Whoever opens a port to the network is told so, and so is whoever looks with the doctor."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from holozen.testing import wait_for
+from holozen.testing.wire import command
+
+from .namespaces import NEEDS, Host, Lab
+
+pytestmark = NEEDS
+
+RISK = "open to the network: anyone who can reach it can drive, stop and delete robots, and set parameters"
+LOOPBACK = ("--listen", "tcp/127.0.0.1:7447", "--connect", "tcp/127.0.0.1:7447")
+
+
+@pytest.fixture
+def host(lab: Lab) -> Host:
+    return lab.host("robot")
+
+
+@pytest.mark.parametrize("listen", ["tcp/0.0.0.0:7447", "tcp/[::]:7447", "tcp/10.99.1.1:7447", "udp/0.0.0.0:7447"])
+def test_a_sim_that_listens_beyond_loopback_says_so(lab: Lab, host: Host, listen: str) -> None:
+    lab.cable(host, lab.host("desk"))
+    sim = host.start(*command("sim", "--listen", listen))
+    assert sim.wait_for_line("open to the network") == f"sim: listens at {listen}, {RISK}"
+    sim.wait_for_line("listens on cmd_vel")
+
+
+def test_a_hostname_is_looked_up(host: Host) -> None:
+    host.start(*command("sim", "--listen", "tcp/localhost:7447")).wait_for_line("listens on cmd_vel")
+    done = host.run(*command("doctor", "--json"))
+    assert not [row for row in map(json.loads, done.stdout.splitlines()) if row["check"] == "network"]
+
+
+def test_a_sim_on_loopback_says_nothing_of_the_network(host: Host) -> None:
+    for flags in ((), LOOPBACK):
+        sim = host.start(*command("sim", *flags))
+        sim.wait_for_line("listens on cmd_vel")
+        assert "network" not in sim.err
+        assert sim.terminate() == 0
+
+
+@pytest.mark.parametrize("way", ["config", "cfg"])
+def test_a_router_says_where_a_configuration_has_it_listen(host: Host, tmp_path: Path, way: str) -> None:
+    path = tmp_path / "router.json5"
+    path.write_text('{mode: "router", listen: {endpoints: ["tcp/127.0.0.1:7450", "tcp/0.0.0.0:7451"]}}')
+    flags = ["--config", str(path)] if way == "config" else ["--cfg", 'listen/endpoints:["tcp/0.0.0.0:7451"]']
+    router = host.start(*command("router", *flags))
+    assert router.wait_for_line("open to the network") == f"router: listens at tcp/0.0.0.0:7451, {RISK}"
+    both = {"config": "tcp/127.0.0.1:7450, tcp/0.0.0.0:7451", "cfg": "tcp/0.0.0.0:7451"}[way]
+    wait_for(lambda: f"router: listens at {both}\n" in router.err)
+
+
+def test_zenohs_own_default_is_open(host: Host, tmp_path: Path) -> None:
+    path = tmp_path / "empty.json5"
+    path.write_text("{}")
+    router = host.start(*command("router", "--config", str(path)))
+    assert router.wait_for_line("open to the network") == f"router: listens at tcp/[::]:7447, {RISK}"
+
+
+def test_who_asks_for_a_password_is_not_told(host: Host, tmp_path: Path) -> None:
+    (tmp_path / "users").write_text("student:secret\n")
+    dictionary = f'transport/auth/usrpwd/dictionary_file:"{tmp_path / "users"}"'
+    router = host.start(*command("router", "--listen", "tcp/0.0.0.0:7447", "--cfg", dictionary))
+    router.wait_for_line("router: listens at tcp/0.0.0.0:7447")
+    assert "open to the network" not in router.err
+
+
+def test_the_doctor_finds_it(host: Host) -> None:
+    host.start(*command("sim", "--listen", "tcp/0.0.0.0:7447")).wait_for_line("listens on cmd_vel")
+    done = host.run(*command("doctor", "--json"))
+    (row,) = [row for row in map(json.loads, done.stdout.splitlines()) if row["check"] == "network"]
+    assert row["level"] == "warning"
+    assert f"listens at tcp/0.0.0.0:7447, {RISK}" in row["text"]

@@ -1,0 +1,98 @@
+"""Commands of strangers who name themselves as they like, or mean nothing: the person who drives goes on driving."""
+
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+import zenoh
+
+from holozen.bus import Bus
+from holozen.messages import CommandStatus, Twist
+from holozen.testing import Wire, wait_for
+
+NAMES = 1200
+
+
+class Person:
+    """Drives at 20 Hz from a thread, as a held key does."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.source = bus.source
+        self._commands = bus.publisher("cmd_vel", Twist, "INTERACTIVE_HIGH")
+        self._let_go = threading.Event()
+        self._thread = threading.Thread(target=self._drive)
+        self._thread.start()
+
+    def _drive(self) -> None:
+        while not self._let_go.wait(0.05):
+            self._commands.put(Twist.planar(0.2))
+        self._commands.put(Twist())
+
+    def let_go(self) -> None:
+        self._let_go.set()
+        self._thread.join()
+
+
+@pytest.fixture
+def statuses(wire: Wire) -> Iterator["Statuses"]:
+    wire.start("sim").wait_for_line("listens on cmd_vel")
+    yield Statuses(wire.bus())
+
+
+class Statuses:
+    """What the sim says of who drives."""
+
+    def __init__(self, bus: Bus) -> None:
+        self.bus = bus
+        self._subscription = bus.subscribe("cmd_vel_status", CommandStatus, depth=1)
+
+    def next(self) -> CommandStatus:
+        def newer() -> CommandStatus | None:
+            received = self._subscription.try_recv()
+            return received and received.message
+
+        self._subscription.try_recv()
+        return wait_for(newer) or CommandStatus()
+
+    def wait_for(self, source: str) -> None:
+        wait_for(lambda: self.next().obeyed == source, what=lambda: f"{source} to drive; {self.next()}")
+
+
+def forge(bus: Bus, payload: str, names: int, priority: zenoh.Priority) -> None:
+    """Fast, but not so fast that the sim overlooks most of it: it reads the newest 64 between two steps."""
+    for number in range(names):
+        time.sleep(0.02 * (number % 30 == 29))
+        bus.session.put("cmd_vel", payload, attachment=f"forged{number}@{number:06x}", priority=priority)
+
+
+@pytest.mark.parametrize("payload", ['{"linear": {"x": -1}}', "{}"], ids=["go back", "stop"])
+def test_a_flood_of_names_at_the_lowest_priority_holds_no_person(wire: Wire, statuses: Statuses, payload: str) -> None:
+    person = Person(wire.bus("teleop", lasting=True))
+    try:
+        statuses.wait_for(person.source)
+        forge(statuses.bus, payload, NAMES, zenoh.Priority.BACKGROUND)
+        wait_for(lambda: sum(statuses.next().refused.values()) >= 0.5 * NAMES)
+        status = statuses.next()
+        assert status.obeyed == person.source
+        assert [each.held for each in status.sources if each.source == person.source] == [False]
+    finally:
+        person.let_go()
+    another = Person(wire.bus("teleop", lasting=True))
+    try:
+        statuses.wait_for(another.source)
+    finally:
+        another.let_go()
+
+
+@pytest.mark.parametrize("twist", ['{"linear": {"x": 1.5e308, "y": 1.5e308}}', '{"linear": {"x": 1e308}}'])
+def test_what_no_robot_can_mean_neither_stops_nor_moves_it(wire: Wire, statuses: Statuses, twist: str) -> None:
+    person = Person(wire.bus("teleop", lasting=True))
+    try:
+        statuses.wait_for(person.source)
+        statuses.bus.session.put("cmd_vel", twist, priority=zenoh.Priority.REAL_TIME)
+        wait_for(lambda: statuses.next().refused.get("implausible"))
+        status = statuses.next()
+        assert (status.obeyed, "linear.x is 1" in status.last_refusal) == (person.source, True)
+    finally:
+        person.let_go()

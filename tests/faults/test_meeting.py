@@ -1,0 +1,223 @@
+"""Processes meet though links are slow, and though whoever holds the rendezvous point sleeps or is no Zenoh at all."""
+
+import json
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.testing import Process, Wire, wait_for
+from holozen.testing.wire import command, free_port
+from holozen.transport.connection import Connection
+
+from .proxy import Proxy
+
+DELAY = 0.5  # s one way
+WITHIN = 5.0  # s to get in
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+def test_a_process_gets_in_over_a_slow_link(wire: Wire, proxy: Proxy, mode: str) -> None:
+    router = wire.start("router")
+    router.wait_for_line("listens")
+    proxy.set(delay=DELAY)
+    begin = time.monotonic()
+    with Bus("late", Connection(mode, connect=(proxy.endpoint,), listen=()), patience=WITHIN) as bus:
+        wait_for(bus.connected)
+        print(f"{mode}: {time.monotonic() - begin:.2f} s")
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+def test_a_verb_sees_the_nodes_over_a_slow_link_and_says_what_it_waits_for(wire: Wire, proxy: Proxy, mode: str) -> None:
+    wire.start("pose-service").wait_for_line("goals")
+    proxy.set(delay=DELAY)
+    with Process(command("node", "list", "--mode", mode, "--connect", proxy.endpoint)) as listing:
+        assert listing.wait(20) == 0
+        assert listing.out == "pose_service\n"
+        waited = {"client": f"waiting for a Zenoh router at {proxy.endpoint}\n"}
+        assert listing.err == waited.get(mode, f"waiting for an answer from {proxy.endpoint}\n")
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+def test_a_stop_reaches_the_robot_over_a_slow_link(wire: Wire, proxy: Proxy, mode: str) -> None:
+    wire.start("sim").wait_for_line("listens on")
+    proxy.set(delay=DELAY)
+    with Process(command("stop", "--mode", mode, "--connect", proxy.endpoint)) as stop:
+        assert stop.wait(20) == 0
+        assert stop.out == "the robot at the root is stopped\n"
+
+
+@pytest.mark.parametrize("mode", ["client", "peer"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_what_waits_for_an_answer_ends_at_once_on_a_signal(
+    wire: Wire, proxy: Proxy, mode: str, number: signal.Signals
+) -> None:
+    wire.start("router").wait_for_line("listens")
+    proxy.set(delay=3600)
+    with Process(command("sim", "--mode", mode, "--connect", proxy.endpoint, "--listen", "tcp/127.0.0.1:0")) as sim:
+        sim.wait_for_line("waiting for a")
+        sim.signal(number)
+        assert sim.wait(5) == 0
+        assert "Traceback" not in sim.err
+
+
+DEAF = """
+import socket, sys, time
+server = socket.create_server(("127.0.0.1", int(sys.argv[1])))
+print("up", flush=True)
+time.sleep(999)
+"""
+
+
+class Town:
+    """Processes that meet at any of three rendezvous points, as they do by default at ports 7447 to 7449."""
+
+    def __init__(self) -> None:
+        self.ports = sorted(free_port() for _ in range(3))
+        self.points = tuple(f"tcp/127.0.0.1:{port}" for port in self.ports)
+        self.connection = Connection(connect=self.points, listen=self.points)
+        self._ends = ExitStack()
+
+    def __enter__(self) -> "Town":
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self._ends.close()
+
+    def start(self, verb: str, *words: str) -> Process:
+        """Start a verb here."""
+        process = self._ends.enter_context(Process(command(verb, *words, *self.connection.arguments())))
+        self._ends.callback(lambda: print(f"--- {process}\n{process.out}{process.err}"))
+        return process
+
+    def run(self, verb: str, *words: str) -> Process:
+        """Run a verb here to its end."""
+        process = self.start(verb, *words)
+        process.wait(20)
+        return process
+
+    def asleep(self, verb: str, *words: str) -> Process:
+        """A process that has met others here, and sleeps as after Ctrl-Z."""
+        process = self.start(verb, *words)
+        process.wait_for_line("goal")
+        process.signal(signal.SIGSTOP)
+        return process
+
+    def deaf(self, port: int) -> Process:
+        """A process that listens at a port and never answers."""
+        process = self._ends.enter_context(Process([sys.executable, "-c", DEAF, str(port)]))
+        process.wait_for_line("up")
+        return process
+
+
+@pytest.fixture
+def town() -> Iterator[Town]:
+    with Town() as town:
+        yield town
+
+
+@pytest.mark.parametrize("holder", ["asleep", "foreign"])
+def test_processes_meet_though_the_holder_of_the_first_point_does_not_answer(town: Town, holder: str) -> None:
+    if holder == "asleep":
+        town.asleep("pose-service")
+    else:
+        town.deaf(town.ports[0])
+    town.start("sim").wait_for_line("listens on")
+    topics = town.run("topic", "list")
+    assert (topics.returncode, topics.err) == (0, "")
+    assert "odom" in topics.out.split()
+    stop = town.run("stop")
+    assert (stop.returncode, stop.out) == (0, "the robot at the root is stopped\n")
+    echo = town.run("topic", "echo", "odom", "--once", "--timeout", "5")
+    assert echo.returncode == 0
+
+
+def test_two_that_sleep_keep_nobody_from_meeting(town: Town) -> None:
+    town.asleep("pose-service")
+    town.asleep("pose-service")
+    town.start("sim").wait_for_line("listens on")
+    assert town.run("stop").out == "the robot at the root is stopped\n"
+
+
+def test_who_wakes_up_meets_those_who_met_meanwhile(town: Town) -> None:
+    sleeper = town.asleep("pose-service")
+    town.start("sim").wait_for_line("listens on")
+    sleeper.signal(signal.SIGCONT)
+    wait_for(lambda: town.run("node", "list").out.split() == ["pose_service", "sim"], 20)
+
+
+VERBS = [
+    ["topic", "list"], ["topic", "echo", "odom"], ["topic", "pub", "cmd_vel", "{}"], ["node", "list"],
+    ["service", "call", "resume"], ["param", "list"], ["list"], ["stop"], ["release"], ["graph"],
+    ["sim"], ["pose-service"], ["controller"],
+]  # fmt: skip
+
+
+def test_a_client_that_opens_while_the_port_changes_hands_tries_again(wire: Wire) -> None:
+    """Its first handshake meets a process that ends in the middle of it."""
+    with socket.create_server(("127.0.0.1", wire.port)) as dying:
+        words = command("topic", "echo", "odom", "--once", "--mode", "client", "--connect", wire.endpoint)
+        with Process(words) as echo:
+            dying.accept()[0].close()
+            dying.close()
+            wire.start("sim")
+            assert echo.wait(20) == 0
+            assert "pose:" in echo.out
+
+
+def test_where_no_point_answers_every_verb_names_the_holder_and_fails(wire: Wire) -> None:
+    with socket.create_server(("127.0.0.1", wire.port)):
+        processes = [wire.start(*verb) for verb in VERBS]
+        for process in processes:
+            assert process.wait(30) == 1
+            waiting, why = process.err.splitlines()
+            assert waiting == f"waiting for an answer from {wire.endpoint}"
+            assert f"{wire.endpoint} is held by " in why and "which does not answer; end it: kill" in why
+            assert process.out == ""
+
+
+MESSAGES = (
+    "put", "delete", "declare_subscriber", "declare_queryable", "query", "reply",
+    "liveliness_token", "liveliness_query", "declare_liveliness_subscriber",
+)  # fmt: skip
+
+
+@pytest.mark.parametrize("allowed", [["**"], ["**", "@holozen/**"]], ids=" ".join)
+def test_an_access_control_list_has_to_allow_the_tokens_of_nodes(
+    wire: Wire, tmp_path: Path, allowed: list[str]
+) -> None:
+    rule = {
+        "id": "all",
+        "permission": "allow",
+        "flows": ["ingress", "egress"],
+        "messages": MESSAGES,
+        "key_exprs": allowed,
+    }
+    acl = {"enabled": True, "default_permission": "deny", "rules": [rule], "subjects": [{"id": "anyone"}],
+           "policies": [{"rules": ["all"], "subjects": ["anyone"]}]}  # fmt: skip
+    path = tmp_path / "router.json5"
+    listen = {"endpoints": [wire.endpoint]}
+    path.write_text(json.dumps({"mode": "router", "listen": listen, "access_control": acl}))
+    client = ("--mode", "client", "--connect", wire.endpoint)
+    with Process(command("router", "--config", str(path), "--cfg", "scouting/multicast/enabled:false")) as router:
+        router.wait_for_line("listens at")
+        with Process(command("sim", *client)) as sim:
+            sim.wait_for_line("listens on")
+            listed = subprocess.run(command("topic", "list", *client), capture_output=True, text=True, timeout=30)
+            stop = subprocess.run(command("stop", *client), capture_output=True, text=True, timeout=30)
+    assert stop.stdout == "the robot at the root is stopped\n"  # which is asked without its token
+    if len(allowed) > 1:
+        assert "odom" in listed.stdout.split()
+        assert (stop.stderr, stop.returncode) == ("", 0)
+    else:
+        assert "it has to allow @holozen/**" in listed.stderr
+        assert "other robots may not have been discovered" in stop.stderr
+        assert "it has to allow @holozen/**" in stop.stderr
+        assert (listed.stdout, stop.returncode) == ("", 1)

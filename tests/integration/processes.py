@@ -1,0 +1,41 @@
+"""What processes of a test print, leave in bags, and which of them run."""
+
+import os
+import subprocess
+from pathlib import Path
+
+from holozen.bag.reader import Bag, Message
+from holozen.testing import Wire
+
+
+def assert_one_line(done: subprocess.CompletedProcess[str], code: int, *parts: str) -> None:
+    """It failed with this code and one line that holds these parts."""
+    assert done.returncode == code, done.stderr
+    assert done.stdout == ""
+    said = done.stderr.splitlines()
+    assert len(said) == 1, done.stderr
+    assert all(part in said[0] for part in parts), said[0]
+
+
+def read(path: Path) -> list[Message]:
+    """All messages of a bag."""
+    with Bag(path) as bag:
+        return list(bag.messages())
+
+
+def words_of(pid: int) -> list[str]:
+    """A running process's words; none if it is gone."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    except OSError:
+        return []
+
+
+def parts_at(wire: Wire) -> dict[str, int]:
+    """The verbs that run on this wire, with their process ids; `up` itself too."""
+    found = {}
+    for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))):
+        words = words_of(pid)
+        if wire.endpoint in words and "holozen" in words and "-c" not in words:
+            found[words[words.index("holozen") + 1]] = pid
+    return found

@@ -1,0 +1,74 @@
+"""A payload that is far too large is refused and counted, and takes neither memory nor the link from anybody."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import zenoh
+
+from holozen.bus import Bus
+from holozen.messages import CommandStatus, Odometry, Twist
+from holozen.testing import Process, Wire, wait_for
+from holozen.transport.connection import Connection
+from holozen.transport.pubsub import Sample
+from holozen.transport.services import MAX_REQUEST_BYTES, refusal
+
+from .conftest import start_sim
+from .robots import URDF, record
+
+LARGE = 100_000_000  # bytes
+NEAR = 30_000_000  # bytes
+
+
+@pytest.fixture(scope="module")
+def sim(town: Wire) -> Process:
+    return start_sim(town, "--robot", f"{URDF / 'rover.urdf.xacro'}=Rover")
+
+
+@pytest.fixture
+def stranger(town: Wire, sim: Process) -> Iterator[Bus]:
+    with Bus("stranger", Connection(mode="client", connect=(town.endpoint,))) as bus:
+        yield bus
+
+
+@pytest.fixture
+def driver(town: Wire) -> Bus:
+    return town.bus("driver")
+
+
+def memory(process: Process) -> int:
+    """Resident memory in bytes."""
+    return int(Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * 4096
+
+
+@pytest.mark.parametrize("key", ["Rover/cmd_vel", "Rover/joint_command"])
+def test_a_sim_that_got_payloads_of_100_mb_counts_them_and_is_as_small_as_before(
+    sim: Process, driver: Bus, stranger: Bus, key: str
+) -> None:
+    odom, status = record(driver, "Rover/odom", Odometry), record(driver, "Rover/cmd_vel_status", CommandStatus)
+    commands = driver.publisher("Rover/cmd_vel", Twist)
+    wait_for(stranger.served("spawn_entity"))
+    before, counted, links = memory(sim), status.next().refused.get("oversized", 0), driver.session.info.peers_zid()
+    sender = stranger.session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
+    payload = zenoh.ZBytes(bytes(LARGE))
+    for number in range(1, 4):
+        sender.put(payload)
+
+        def is_counted(wanted: int = counted + number) -> bool:
+            commands.put(Twist.planar(0.1))
+            return any(each.refused.get("oversized", 0) >= wanted for each in status.messages())
+
+        wait_for(is_counted, 30)
+    wait_for(lambda: memory(sim) < before + NEAR, 10, lambda: f"{before} bytes; it has {memory(sim)}")
+    assert driver.session.info.peers_zid() == links
+    commands.put(Twist.planar(0.1))
+    odom.next(lambda odom: odom.twist.twist.linear.x > 0.05)
+
+
+def test_a_request_of_100_mb_is_refused_and_takes_no_memory(sim: Process, stranger: Bus) -> None:
+    wait_for(stranger.served("spawn_entity"))
+    before = memory(sim)
+    (reply,) = stranger.ask("spawn_entity", 30.0, payload=zenoh.ZBytes(bytes(LARGE)))
+    assert not isinstance(reply, Sample)
+    assert str(refusal(reply)) == f"request of {LARGE} bytes; at most {MAX_REQUEST_BYTES} are read"
+    wait_for(lambda: memory(sim) < before + NEAR, 10, lambda: f"{before} bytes; it has {memory(sim)}")

@@ -1,0 +1,137 @@
+"""What a process writes for people holds it up nowhere, whoever does not read it."""
+
+import fcntl
+import math
+import os
+import pty
+import select
+import termios
+from collections.abc import Callable, Iterator
+from functools import partial
+from itertools import count
+from pathlib import Path
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.messages import Odometry
+from holozen.messages import rcl_interfaces as r
+from holozen.testing import Wire, wait_for
+
+from .conftest import start_sim
+from .robots import Robot
+
+SMALL = 4096  # bytes that a pipe takes; the kernel's least
+SOON = 2.0  # s
+
+
+@pytest.fixture
+def unread() -> Iterator[int]:
+    """A pipe that nobody reads, as small as it can be."""
+    reader, writer = os.pipe()
+    fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, SMALL)
+    yield writer
+    os.close(reader)
+    os.close(writer)
+
+
+@pytest.fixture
+def held() -> Iterator[int]:
+    """A terminal after Ctrl-S."""
+    keyboard, screen = pty.openpty()
+    termios.tcflow(screen, termios.TCOOFF)
+    yield screen
+    os.close(screen)
+    os.close(keyboard)
+
+
+def is_full(output: int) -> bool:
+    return not select.select([], [output], [], 0)[1]
+
+
+def chatter(bus: Bus, node: str, name: str, low: float) -> Callable[[], None]:
+    """Each call sets a parameter to another value, of which `node` writes a line."""
+    values = count()
+
+    def speak() -> None:
+        value = r.Parameter(name, r.ParameterValue.of(low + next(values) % 2))
+        assert bus.call(f"{node}/set_parameters", r.SetParametersRequest([value]), r.SetParametersReply)
+
+    return speak
+
+
+def fill(speak: Callable[[], None], output: int) -> None:
+    """Have a process write until there is no room, and many lines more."""
+
+    def full() -> bool:
+        speak()
+        return is_full(output)
+
+    wait_for(full, 60, "the output to be full")
+    for _ in range(120):
+        speak()
+
+
+def test_a_sim_goes_on_and_ends_when_nobody_reads_its_errors(wire: Wire, unread: int) -> None:
+    sim = wire.start("sim", stderr=unread)
+    robot = Robot(wire.bus())
+    fill(chatter(robot.bus, "sim", "max_linear", 3.0), unread)
+    robot.newest()
+    assert sim.terminate(SOON) == 0
+
+
+def test_a_sim_goes_on_and_ends_where_ctrl_s_holds_its_terminal(wire: Wire, held: int) -> None:
+    sim = wire.start("sim", stderr=held, stdout=held)
+    robot = Robot(wire.bus())
+    speak = chatter(robot.bus, "sim", "max_linear", 3.0)
+    for _ in range(10):
+        speak()
+    robot.newest()
+    assert sim.terminate(SOON) == 0
+
+
+def test_a_controller_drives_on_and_ends_when_nobody_reads_its_errors(wire: Wire, unread: int) -> None:
+    start_sim(wire)
+    wire.start("pose-service")
+    controller = wire.start("controller", "--laps", "0", stderr=unread)
+    robot = Robot(wire.bus())
+    fill(chatter(robot.bus, "controller", "max_speed", 0.4), unread)
+    robot.commands.next()
+    assert controller.terminate(SOON) == 0
+
+
+def looks(yaw: float, odom: Odometry) -> bool:
+    return abs(odom.pose.pose.orientation.yaw() - yaw) < 0.1
+
+
+def test_a_controller_drives_lap_after_lap_when_nobody_reads_its_times(wire: Wire, unread: int) -> None:
+    os.write(unread, bytes(SMALL))
+    start_sim(wire, "--rtf", "8")
+    wire.start("pose-service", "--size", "0.02")
+    controller = wire.start("controller", "--laps", "0", stdout=unread)
+    robot = Robot(wire.bus())
+    for goal in 3 * [math.pi / 2, 0.0]:
+        robot.odom.next(partial(looks, goal), within=20)
+    assert controller.terminate(SOON) == 0
+
+
+def test_a_pose_service_answers_and_ends_when_nobody_reads_it(wire: Wire, unread: int) -> None:
+    service = wire.start("pose-service", stderr=unread)
+    fill(chatter(wire.bus(), "pose_service", "size", 1.0), unread)
+    assert service.terminate(SOON) == 0
+
+
+def test_all_of_up_goes_on_and_ends_when_nobody_reads_it(wire: Wire, unread: int) -> None:
+    up = wire.start("up", stdout=unread, stderr=unread)
+    robot = Robot(wire.bus())
+    fill(chatter(robot.bus, "sim", "max_linear", 3.0), unread)
+    robot.newest()
+    assert up.terminate(2 * SOON) == 0
+
+
+def test_a_line_that_waits_for_its_reader_ends_with_a_signal(wire: Wire, unread: int) -> None:
+    wire.start("sim")
+    os.write(unread, bytes(SMALL))
+    hz = wire.start("topic", "hz", "odom", "--json", stdout=unread)
+    wait_for(lambda: "pipe" in Path(f"/proc/{hz.pid}/wchan").read_text(), 30)
+    assert hz.terminate(SOON) == 0

@@ -1,0 +1,183 @@
+"""Findings name the source line, and suggest the word that was meant."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen.check.engine import closest, distance, nearest
+from holozen.check.report import check
+from holozen.check.rules_xml import PLUGIN, URDF
+from tests.unit.check.conftest import Findings
+
+HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+WHEELS = (
+    '<xacro:property name="mass" value="0.1"/>\n'
+    '<xacro:macro name="part" params="name *where">\n'
+    '  <link name="${name}">\n'
+    '    <inertial><mass value="${mass}"/>\n'
+    '      <inertia ixx="1" iyy="1" izz="1" ivz="0"/></inertial></link>\n'
+    '  <joint name="${name}_joint" type="fixed"><parent link="base"/><child link="${name}"/>\n'
+    '    <xacro:insert_block name="where"/></joint>\n'
+    "</xacro:macro>\n"
+)
+USE = (
+    '<link name="base"/>\n'
+    '<xacro:part name="a"><origin xyz="0 0 1" ryp="0 0 0"/></xacro:part>\n'
+    '<xacro:part name="b"><origin xyz="0 0 2"/></xacro:part>\n'
+    "</robot>"
+)
+
+
+def places(path: Path) -> list[tuple[str, str, int]]:
+    return [(finding.rule, Path(finding.place.file).name, finding.place.line) for finding in check(path)]
+
+
+def test_a_line_in_a_macro_and_one_in_its_call(findings: Findings, tmp_path: Path) -> None:
+    findings(HEAD + WHEELS + USE, "r.xacro")
+    assert [(rule, line) for rule, _, line in places(tmp_path / "r.xacro")] == [("attribute", 6), ("attribute", 11)]
+
+
+def test_a_line_in_an_included_file(findings: Findings, tmp_path: Path) -> None:
+    (tmp_path / "package.xml").write_text("<package><name>mine</name></package>")
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts" / "wheels.xacro").write_text(HEAD + WHEELS + "</robot>")
+    for include in ("$(find mine)/parts/wheels.xacro", "parts/wheels.xacro"):
+        findings(HEAD + f'<xacro:include filename="{include}"/>\n' + USE, "r.xacro")
+        assert places(tmp_path / "r.xacro") == [("attribute", "r.xacro", 4), ("attribute", "wheels.xacro", 6)]
+
+
+def test_a_line_that_cannot_be_traced_is_one_of_the_expanded_text(findings: Findings, tmp_path: Path) -> None:
+    (tmp_path / "wheels.xacro").write_text(HEAD + WHEELS + "</robot>")
+    computed = '<xacro:arg name="f" default="wheels"/><xacro:include filename="$(arg f).xacro"/>\n'
+    findings(HEAD + computed + USE, "r.xacro")
+    found = check(tmp_path / "r.xacro")
+    assert [finding.place.expanded for finding in found] == [False, True, True]
+    assert "line of `holozen xacro`'s output" in str(found[1])
+
+
+def test_properties_and_macros_that_nothing_uses(findings: Findings) -> None:
+    text = (
+        HEAD + WHEELS.replace(' ivz="0"', "") + '<xacro:property name="spare" value="1"/>\n<link name="base"/></robot>'
+    )
+    found = findings(text, "r.xacro")
+    told = [finding.problem for finding in found if finding.rule == "unused"]
+    assert told == ["macro 'part' is not used", "property 'spare' is not used"]
+
+
+def test_what_xacro_warns_of_is_a_finding(findings: Findings) -> None:
+    text = HEAD + '<xacro:property name="z" valeu="2" value="1"/><link name="a${z}"><inertial><mass value="1"/>'
+    found = findings(text + '<inertia ixx="1" iyy="1" izz="1"/></inertial></link></robot>', "r.xacro")
+    assert [finding.rule for finding in found] == ["load-note"]
+    assert "valeu" in found[0].problem
+
+
+def test_a_macro_that_is_defined_twice(rules: Callable[..., list[str]]) -> None:
+    good = HEAD + WHEELS.replace(' ivz="0"', "") + USE.replace(' ryp="0 0 0"', "")
+    assert "macro-twice" not in rules(good, "r.xacro")
+    twice = '<xacro:macro name="part" params="name *where"/>\n'
+    assert "macro-twice" in rules(good.replace("<xacro:property", twice + "<xacro:property", 1), "r.xacro")
+
+
+def test_an_include_of_another_machine_is_a_finding_and_its_lines_are_known(findings: Findings, tmp_path: Path) -> None:
+    (tmp_path / "wheels.xacro").write_text(HEAD + WHEELS + "</robot>")
+    include = '<xacro:include filename="/home/asha/ws/wheels.xacro"/>\n'
+    found = findings(HEAD + include + USE, "r.xacro")
+    note = next(finding for finding in found if finding.rule == "load-note")
+    assert "; write wheels.xacro" in note.problem and note.place.line == 2
+    assert ("attribute", "wheels.xacro", 6) in places(tmp_path / "r.xacro")
+
+
+def test_a_file_for_others_to_include_is_no_robot_and_no_mistake(rules: Callable[..., list[str]]) -> None:
+    assert rules(HEAD + WHEELS + "</robot>", "parts.xacro") == []
+
+
+def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
+    for name in ["r.urdf", "r.xacro"]:
+        for text, line, mend in [
+            ('<robot name="r">\n<lin k name="a"/>\n</robot>', 2, "the word k has no value"),
+            ('<robot name="r">\n<link name=a/>\n</robot>', 2, "in quotes"),
+            ('<robot name="r">\n<link name="a>\n</link></robot>', 3, "close the quotes"),
+            ('<robot name="r">\n<link name="a">\n</robot>', 3, "close each element"),
+            ('<robot name="r"/>\n<link name="a"/>', 2, "a single <robot> around everything"),
+            ('<robot name="r">\n<link name="a & b"/></robot>', 2, "&amp;"),
+            ('<robot name="r">\n<link name=\u201ca\u201d/></robot>', 2, "straight"),
+            ('<robot name="r">\n<!-- a -- b -->\n</robot>', 2, "a comment"),
+            ('<robot name="r">\n<link name="a"type="b"/></robot>', 2, "a space"),
+            ('\n<?xml version="1.0"?>\n<robot name="r"/>', 2, "before <?xml"),
+        ]:
+            if name == "r.urdf" and ("--" in text or "<?xml" in text):
+                continue  # Gazebo's reader forgives these, that of xacro does not
+            (finding,) = findings(text, name)
+            assert (finding.rule, finding.severity) == ("file", "error")
+            assert finding.place.line == line
+            assert mend in str(finding)
+            assert len(str(finding).splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["", "<world/>", '<robot name="r" xmlns:xacro="x"><link name="${1/0}"/></robot>', "<sdf><world/></sdf>", "<sdf/>"],
+)
+def test_a_file_that_is_no_robot_is_one_finding(text: str, findings: Findings) -> None:
+    (finding,) = findings(text, "r.xacro")
+    assert finding.rule == "file"
+
+
+def test_a_file_that_is_not_there_is_one_finding(tmp_path: Path) -> None:
+    for path in (tmp_path / "nowhere.urdf", tmp_path, Path("a\0b")):
+        (finding,) = check(path)
+        assert finding.rule == "file"
+
+
+def test_letters_are_counted() -> None:
+    rows = [("", "", 0), ("limit", "dimit", 1), ("length", "lenght", 1), ("a", "abcd", 3),
+     ("ab", "cd", 2)]  # fmt: skip
+    for one, other, far in rows:
+        assert distance(one, other) == distance(other, one) == far
+
+
+@pytest.mark.parametrize(
+    ("word", "element", "meant"),
+    [("ivz", "inertia", True), ("raduis", "cylinder", "radius"), ("height", "cylinder", "length"),
+     ("foo", "origin", None)],
+)  # fmt: skip
+def test_a_known_word_is_found(word: str, element: str, meant: object) -> None:
+    found = nearest(word, sorted(URDF[element].attributes))
+    assert found == meant if meant is not True else found in ("ixz", "iyz", "izz")
+
+
+def test_of_two_spellings_the_one_in_the_same_style_is_meant() -> None:
+    assert nearest("comandTopic", PLUGIN, 6) == "commandTopic"
+    assert nearest("comand_topic", PLUGIN, 6) == "command_topic"
+
+
+def test_short_and_far_words_are_not_guessed_at() -> None:
+    assert nearest("kp", ["kd"], 4) is None
+    assert nearest("x" * 50, ["x" * 49]) is None
+
+
+def test_a_hint_names_what_is_there() -> None:
+    assert closest("whel", ["wheel", "arm"]) == " (did you mean 'wheel'?)"
+    assert closest("arm", ["left_arm_link"]) == " (did you mean 'left_arm_link'?)"
+    assert closest("zzz", ["wheel"]) == ""
+
+
+LONG = "x" * 300_000
+MASS = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
+
+
+def test_a_long_word_of_the_file_does_not_make_a_long_finding(tmp_path: Path) -> None:
+    for parts in [
+        f'<gazebo><plugin name="p" filename="{LONG}"/></gazebo>',
+        f'<gazebo reference="{LONG}"/>',
+        f'<gazebo reference="{"x " * 10_000}"/>',
+        f'<link name="{LONG}"/>',
+        f'<joint name="j" type="{LONG}"><parent link="a"/><child link="a"/></joint>',
+        f'<joint name="j" type="fixed"><parent link="{LONG}"/><child link="a"/></joint>',
+    ]:
+        file = tmp_path / "robot.urdf"
+        file.write_text(f'<robot name="r"><link name="a">{MASS}</link>{parts}</robot>')
+        findings = check(file)
+        assert findings
+        assert all(len(str(finding)) < 5000 for finding in findings)

@@ -1,0 +1,233 @@
+"""Bytes and messages: both wires carry every message, and what is none is refused in one line."""
+
+import math
+import subprocess
+import sys
+import typing
+from typing import Any
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holozen import messages as m
+from holozen.messages.codec import WIRES, CodecError, convert, decode, encode
+from holozen.messages.message import not_finite
+from holozen.wire import SERVICES, TOPICS
+
+TYPES = {kind for row in TOPICS for kind in row.types} | {kind for row in SERVICES for kind in (row.request, row.reply)}
+KINDS = sorted(TYPES, key=lambda kind: kind.__name__)
+finite = st.floats(allow_nan=False, allow_infinity=False)
+plain = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**63), 2**63) | finite | st.text(),
+    lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
+    max_leaves=10,
+)
+
+
+def values(kind: Any) -> st.SearchStrategy[Any]:
+    """Every value that a field of this type may have."""
+    if isinstance(kind, type) and issubclass(kind, m.Message):
+        hints = typing.get_type_hints(kind, include_extras=True)
+        return st.builds(kind, **{name: values(hints[name]) for name in kind.__struct_fields__})
+    if typing.get_origin(kind) is typing.Annotated:
+        return bounded(*typing.get_args(kind))
+    if typing.get_origin(kind) is list:
+        return st.lists(values(typing.get_args(kind)[0]), max_size=3)
+    if typing.get_origin(kind) is dict:
+        return st.dictionaries(st.text(), st.integers(0, 2**63), max_size=3)
+    return {float: finite, int: st.integers(0, 999_999_999), str: st.text(), bool: st.booleans()}[kind]
+
+
+def bounded(kind: Any, meta: msgspec.Meta) -> st.SearchStrategy[Any]:
+    """Whole numbers within the field's bounds; of anything else the plain type."""
+    if kind is not int:
+        return values(kind)
+    least = int(meta.ge or 0)
+    return st.integers(least, int(meta.le) if meta.le is not None else int(meta.lt or 1) - 1)
+
+
+def covered(message: Any) -> Any:
+    """With all 36 numbers in each covariance, which the plain type of the field does not tell."""
+    if isinstance(message, m.Odometry):
+        for part in (message.pose, message.twist):
+            part.covariance = (part.covariance * 36 + [0.5] * 36)[:36]
+    if isinstance(message, m.GetPoseReply):
+        covered(message.odom)
+    return message
+
+
+def refusal(payload: bytes, encoding: str = WIRES["json"], *kinds: type[m.Message]) -> str:
+    with pytest.raises(CodecError) as error:
+        decode(payload, encoding, kinds or (m.Twist,))
+    told = str(error.value)
+    assert told.isprintable()
+    assert len(told) < 300
+    return told
+
+
+def test_every_message_survives_every_wire() -> None:
+    def survive(message: m.Message) -> None:
+        message, kind = covered(message), type(message)
+        for wire in WIRES:
+            assert decode(encode(message, wire), WIRES[wire], (kind,)) == message, wire
+
+    for kind in KINDS:
+        given(values(kind))(survive)()
+
+
+def test_json_is_what_people_write_by_hand() -> None:
+    assert decode(b'{"linear": {"x": 0.3}}', "application/json", (m.Twist,)) == m.Twist.planar(0.3)
+    assert msgspec.json.decode(encode(m.Twist.planar(0.3)))["linear"] == {"x": 0.3, "y": 0.0, "z": 0.0}
+
+
+@pytest.mark.parametrize("wire", WIRES)
+def test_an_encoding_may_carry_a_schema(wire: str) -> None:
+    payload = encode(m.Twist.planar(1), wire)
+    assert decode(payload, f"{WIRES[wire]};geometry_msgs/msg/Twist", (m.Twist,)) == m.Twist.planar(1)
+
+
+def test_encodings_that_say_nothing_are_taken_for_json() -> None:
+    for encoding in ["", "zenoh/bytes", "zenoh/string", "text/plain", "text/json"]:
+        assert decode(encode(m.Twist.planar(1)), encoding, (m.Twist,)) == m.Twist.planar(1)
+
+
+def test_another_encoding_is_refused_with_those_known() -> None:
+    for encoding in ["image/png", "application/x-cdr", "application/jsonx", "x" * 5000, "a\nb"]:
+        told = refusal(b"{}", encoding)
+        assert repr(encoding[:80]) in told
+        assert all(name in told for name in WIRES.values())
+
+
+def test_numbers_that_are_not_finite_are_not_written() -> None:
+    for bad in [math.nan, math.inf, -math.inf]:
+        for wire in WIRES:
+            odom = m.Odometry(header=m.Header(frame_id="null"))
+            encode(odom, wire)  # a text of "null" is none
+            odom.twist.covariance[35] = bad
+            with pytest.raises(CodecError, match=r"^Odometry\.twist\.covariance\[35\] is not a finite number$"):
+                encode(odom, wire)
+
+
+def test_a_nan_in_msgpack_reaches_the_reader_who_has_to_look() -> None:
+    payload = msgspec.msgpack.encode(m.Twist.planar(math.nan))
+    assert not_finite(decode(payload, WIRES["msgpack"], (m.Twist,))) == "linear.x"
+
+
+def test_a_text_that_is_no_unicode_is_not_written() -> None:
+    for wire in WIRES:
+        with pytest.raises(CodecError, match=r"^Header: a text is not Unicode"):
+            encode(m.Header(frame_id="\udcff"), wire)
+
+
+def test_the_first_type_that_fits_is_taken() -> None:
+    kinds = (m.Twist, m.TwistStamped)
+    stamped = m.TwistStamped(twist=m.Twist.planar(1))
+    for wire in WIRES:
+        assert decode(encode(stamped, wire), WIRES[wire], kinds) == stamped
+        assert decode(encode(stamped.twist, wire), WIRES[wire], kinds) == stamped.twist
+    assert isinstance(decode(b"{}", "", kinds), m.Twist)
+    assert refusal(b'{"linaer": {}}', "", *kinds) == "not a Twist: Object contains unknown field `linaer`"
+    assert (
+        refusal(b'{"header": {}, "twsit": {}}', "", *kinds)
+        == "not a TwistStamped: Object contains unknown field `twsit`"
+    )
+    assert refusal(b'{"header": {"x": 1}}', "", m.Twist) == "not a Twist: Object contains unknown field `header`"
+
+
+def test_a_tolerant_reader_ignores_the_fields_of_a_newer_sender() -> None:
+    odom = msgspec.to_builtins(m.Odometry(child_frame_id="base"))
+    odom["quality"] = {"x": 1}
+    odom["pose"]["pose"]["position"]["w"] = 2.0
+    status = msgspec.to_builtins(m.CommandStatus(refused={"late": 1}, sources=[m.CommandSource("a", rate=2)]))
+    status["sources"][0]["battery"] = [1]
+    for module, encoding in ((msgspec.json, WIRES["json"]), (msgspec.msgpack, WIRES["msgpack"])):
+        for value in (odom, status):
+            kind = m.Odometry if value is odom else m.CommandStatus
+            payload = module.encode(value)
+            expected: m.Message = m.Odometry(child_frame_id="base")
+            if value is status:
+                expected = m.CommandStatus(refused={"late": 1}, sources=[m.CommandSource("a", rate=2)])
+            assert decode(payload, encoding, (kind,), tolerant=True) == expected
+            assert "unknown field" in refusal(payload, encoding, kind)
+
+
+def test_a_tolerant_reader_still_refuses_a_wrong_value_and_another_message() -> None:
+    with pytest.raises(CodecError, match=r"^not a Vector3: Object contains unknown field `success`$"):
+        decode(b'{"success": true}', "", (m.Vector3,), tolerant=True)
+    with pytest.raises(CodecError, match=r"^not a Vector3: Expected `float`, got `str` - at `\$\.x`$"):
+        decode(b'{"x": "1", "w": 2}', "", (m.Vector3,), tolerant=True)
+
+
+def test_bad_json_is_refused_with_its_reason() -> None:
+    for payload, reason in [
+        (b"", "truncated"),
+        (b"null", "got `null`"),
+        (b"[]", "got `array`"),
+        (b'{"linear": {"x": NaN}}', "malformed"),
+        (b'{"linear": {"x": 1e999}}', "out of range"),
+        (b'{"linear": {"x": ' + b"9" * 5000 + b"}}", "out of range"),
+        (b'{"linear": {"x": "0.3"}}', "got `str` - at `$.linear.x`"),
+        (b'{"linear": {"x": true}}', "got `bool`"),
+        (b'{"linear": {"x": null}}', "got `null`"),
+        (b'{"linear": {}} {}', "trailing"),
+        (b"[" * 100_000, "got `array`"),
+        (b'{"linear":' * 100_000, "unknown field `linear` - at `$.linear`"),
+        (b"\xff\xfe{}", "malformed"),
+        (b'{"a\\nb\\u001b[2J": 1}', "unknown field `a?b?[2J`"),
+        (b'{"' + b"x" * 60_000 + b'": 1}', "unknown field `xxx"),
+    ]:
+        assert reason in refusal(payload)
+
+
+def test_text_that_is_no_utf8_is_refused() -> None:
+    assert "not a Header" in refusal(b'{"frame_id": "\xff\xfe"}', "", m.Header)
+    assert "not a Header" in refusal(b"\x81\xa8frame_id\xa2\xff\xfe", WIRES["msgpack"], m.Header)
+
+
+def test_bad_msgpack_is_refused() -> None:
+    for payload in [b"", b"\xc1", b"{}", b"\x91" * 100_000, b"\x81\xa6linear" * 1000, b"\xdf\xff\xff\xff\xff"]:
+        refusal(payload, WIRES["msgpack"])
+
+
+@pytest.mark.parametrize("wire", WIRES)
+@given(data=st.data())
+def test_a_message_that_was_cut_off_is_refused(wire: str, data: st.DataObject) -> None:
+    payload = encode(m.Odometry(child_frame_id="base"), wire)
+    refusal(payload[: data.draw(st.integers(0, len(payload) - 1))], WIRES[wire], m.Odometry)
+
+
+@given(st.binary(), st.sampled_from(sorted(WIRES.values())))
+def test_any_bytes_are_a_message_or_a_codec_error(payload: bytes, encoding: str) -> None:
+    try:
+        assert isinstance(decode(payload, encoding, (m.Twist, m.TwistStamped)), m.Message)
+    except CodecError as error:
+        assert str(error).isprintable()
+
+
+@given(plain, st.sampled_from(KINDS))
+def test_any_value_is_a_message_or_a_codec_error(value: Any, kind: type[m.Message]) -> None:
+    for module, encoding in ((msgspec.json, WIRES["json"]), (msgspec.msgpack, WIRES["msgpack"])):
+        try:
+            assert isinstance(decode(module.encode(value), encoding, (kind,)), kind)
+        except CodecError as error:
+            assert str(error).isprintable()
+    try:
+        assert isinstance(convert(value, (kind,)), kind)
+    except CodecError as error:
+        assert str(error).isprintable()
+
+
+def test_plain_values_become_messages() -> None:
+    assert convert({"linear": {"x": 1}}, (m.Twist,)) == m.Twist.planar(1)
+    assert convert({"request_goal": "2"}, (m.NextGoalRequest,)) == m.NextGoalRequest(2)  # from a selector's parameters
+    for kind in (m.Twist, m.Odometry, m.CommandStatus):  # a typo on the command line, in telemetry as well
+        with pytest.raises(CodecError, match=rf"not a {kind.__name__}: .*`linaer`"):
+            convert({"linaer": {}}, (kind,))
+
+
+def test_cdr_is_loaded_only_where_it_is_used() -> None:
+    code = "import sys, holozen.messages.codec as c; c.encode(c.Message()); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert not {"holozen.messages.cdr", "holozen.messages.definitions"} & set(done.stdout.split())

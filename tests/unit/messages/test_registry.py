@@ -1,0 +1,186 @@
+"""Types are found by name, in our tables and in packages; a wrong name is told with the closest right one."""
+
+from pathlib import Path
+
+import pytest
+
+from holozen.messages.definitions import Field, InterfaceError
+from holozen.messages.registry import Registry
+
+
+@pytest.fixture
+def lesson(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A student's package, with the interface of the lesson."""
+    for name, text in {
+        "srv/NextGoal.srv": "int64 request_goal\n---\nfloat64 x_goal\nint64 end_of_list\n",
+        "msg/Where.msg": "Header header\ngeometry_msgs/Pose2D at\nSpot[] spots\n",
+        "msg/Spot.msg": "string<=8 name\n",
+        "msg/README.md": "no definition",
+        "package.xml": "<package><name>lesson</name></package>",
+    }.items():
+        path = tmp_path / "ws" / "src" / "lesson" / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+    for variable in ("AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH"):
+        monkeypatch.delenv(variable, raising=False)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path / "ws" / "src" / "lesson"
+
+
+def refusal(registry: Registry, name: str) -> str:
+    with pytest.raises(InterfaceError) as error:
+        registry.find(name)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_a_message_has_its_fields_and_those_of_its_fields() -> None:
+    twist = Registry().find("geometry_msgs/msg/Twist")
+    assert (twist.name, twist.kind, twist.package) == ("geometry_msgs/msg/Twist", "msg", "geometry_msgs")
+    linear, angular = twist.fields
+    assert (linear.name, angular.name, linear.type) == ("linear", "angular", "geometry_msgs/msg/Vector3")
+    assert linear.nested
+    assert linear.nested.fields == (Field("x", "float64"), Field("y", "float64"), Field("z", "float64"))
+
+
+def test_a_service_has_a_request_and_a_response_that_are_messages_too() -> None:
+    registry = Registry()
+    half = registry.find("std_srvs/srv/SetBool_Request")
+    service = registry.find("std_srvs/srv/SetBool")
+    assert (service.kind, service.fields) == ("srv", ())
+    assert service.request is half
+    assert service.response is registry.find("std_srvs/srv/SetBool_Response")
+    assert (half.kind, [field.name for field in half.fields]) == ("msg", ["data"])
+
+
+@pytest.mark.parametrize(
+    "name", ["geometry_msgs/Twist", "geometry_msgs::msg::dds_::Twist_", "geometry_msgs::msg::Twist"]
+)
+def test_other_spellings_of_a_name_are_understood(name: str) -> None:
+    registry = Registry()
+    assert registry.find(name) is registry.find("geometry_msgs/msg/Twist")
+
+
+def test_a_short_name_may_be_a_service() -> None:
+    assert Registry().find("std_srvs/Trigger").kind == "srv"
+
+
+def test_a_package_that_is_given_is_read(lesson: Path) -> None:
+    registry = Registry({"lesson": lesson})
+    service = registry.find("lesson/srv/NextGoal")
+    assert service.request
+    assert service.request.fields == (Field("request_goal", "int64"),)
+    where = registry.find("lesson/msg/Where")
+    assert [field.type for field in where.fields] == [
+        "std_msgs/msg/Header",
+        "geometry_msgs/msg/Pose2D",
+        "lesson/msg/Spot",
+    ]
+    assert {"lesson/msg/Spot", "lesson/msg/Where", "lesson/srv/NextGoal", "std_msgs/msg/Header"} <= set(
+        registry.names()
+    )
+    assert not any("README" in name for name in registry.names())
+
+
+@pytest.mark.parametrize("variable", ["AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH"])
+def test_a_package_of_the_environment_is_read(variable: str, lesson: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    prefix = lesson.parents[2] / "install"
+    (prefix / "share").mkdir(parents=True)
+    (prefix / "share" / "lesson").symlink_to(lesson)
+    monkeypatch.setenv(variable, f"/no/such/place:{prefix if variable.startswith('A') else lesson.parent}")
+    monkeypatch.chdir("/")
+    registry = Registry()
+    assert registry.find("lesson/srv/NextGoal").kind == "srv"
+    assert "lesson/srv/NextGoal" in registry.names()
+
+
+def test_a_package_around_the_working_folder_is_read(lesson: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for folder in (lesson, lesson.parent, lesson.parents[1]):
+        monkeypatch.chdir(folder)
+        assert Registry().find("lesson/srv/NextGoal").kind == "srv"
+
+
+def test_a_package_that_is_given_comes_before_ours(lesson: Path) -> None:
+    (lesson / "msg" / "Twist.msg").write_text("bool mine\n")
+    assert Registry({"geometry_msgs": lesson}).find("geometry_msgs/msg/Twist").fields == (Field("mine", "bool"),)
+
+
+def test_a_wrong_name_is_told_with_the_closest(lesson: Path) -> None:
+    for name, reason in [
+        ("geometry_msgs/msg/Twsit", "no type 'geometry_msgs/msg/Twsit'; did you mean geometry_msgs/msg/Twist?"),
+        ("geometry_msgs/msg/TWIST", "; did you mean geometry_msgs/msg/Twist?"),
+        ("rosgraph_msgs/msg/Zzzzz", "; known: rosgraph_msgs/msg/Clock"),
+        ("geometry_msg/msg/Twist", "no package 'geometry_msg' with interfaces; did you mean geometry_msgs?"),
+        ("lesson/srv/NextGoal", "; give its folder: --package lesson=DIR"),
+        ("Twist", "'Twist' is not a type: the package is missing; did you mean geometry_msgs/msg/Twist?"),
+        ("Zwist", "the package is missing; `holozen interface list` lists all"),
+        ("a/msg/../B", "'a/msg/../B' is not a type; write PACKAGE/msg/NAME"),
+        ("../a/b", "is not a type"),
+        ("a/action/B", "is not a type"),
+        ("", "'' is not a type"),
+        ("std_srvs/srv/Trigger_Requst", "did you mean std_srvs/srv/Trigger?"),
+    ]:
+        assert reason in refusal(Registry(), name)
+
+
+def test_a_wrong_name_is_looked_up_once(lesson: Path) -> None:
+    registry = Registry({"lesson": lesson})
+    told = refusal(registry, "lesson/msg/New")
+    (lesson / "msg" / "New.msg").write_text("bool a\n")
+    assert refusal(registry, "lesson/msg/New") == told
+    assert Registry({"lesson": lesson}).find("lesson/msg/New").fields == (Field("a", "bool"),)
+
+
+def test_an_error_names_some_of_many_types(lesson: Path) -> None:
+    for number in range(30):
+        (lesson / "msg" / f"Many{number:02}.msg").touch()
+    told = refusal(Registry({"lesson": lesson}), "lesson/msg/Zzz")
+    assert "; known: lesson/msg/Many00, " in told
+    assert told.endswith("lesson/msg/Many19 and 13 more")
+
+
+def test_a_wrong_line_of_a_nested_type_is_told_where_it_is(lesson: Path) -> None:
+    (lesson / "msg" / "Spot.msg").write_text("# a spot\nflot64 x\n")
+    told = refusal(Registry({"lesson": lesson}), "lesson/msg/Where")
+    assert told.startswith(f"{lesson}/msg/Spot.msg:2: no type 'lesson/msg/flot64'")
+
+
+def test_what_is_no_definition_is_told_with_its_file(lesson: Path) -> None:
+    for file, text, reason in [
+        ("msg/Spot.msg", "Spot other", "lesson/msg/Spot contains itself: lesson/msg/Spot > lesson/msg/Spot"),
+        ("msg/Spot.msg", "Where other", "contains itself"),
+        ("msg/Spot.msg", "bool a\n---\nbool b", "1 lines of '---'; a .msg has 0"),
+        ("msg/Spot.msg", "std_srvs/srv/Trigger a", "a field is a message, not a service"),
+        ("msg/Spot.msg", "uint8[1000000000] a", "is too large: at least 1000000000 bytes"),
+        ("srv/Spot.srv", "bool a", "0 lines of '---'; a .srv has 1"),
+    ]:
+        (lesson / file).write_text(text)
+        assert reason in refusal(Registry({"lesson": lesson}), f"lesson/{file.partition('.')[0]}")
+
+
+def test_types_that_double_at_each_level_are_refused(lesson: Path) -> None:
+    (lesson / "msg" / "T0.msg").write_text("bool a\n")
+    for level in range(1, 16):
+        (lesson / "msg" / f"T{level}.msg").write_text(f"T{level - 1} a\nT{level - 1} b\n")
+    assert "is too large" in refusal(Registry({"lesson": lesson}), "lesson/msg/T15")
+
+
+def test_types_that_are_nested_too_deeply_are_refused(lesson: Path) -> None:
+    (lesson / "msg" / "T0.msg").write_text("bool a\n")
+    for level in range(1, 300):
+        (lesson / "msg" / f"T{level}.msg").write_text(f"T{level - 1} a\n")
+    assert "nested more than 50 deep" in refusal(Registry({"lesson": lesson}), "lesson/msg/T299")
+
+
+def test_files_that_cannot_be_read_are_told(lesson: Path) -> None:
+    import os
+
+    (lesson / "msg" / "Latin.msg").write_bytes(b"string a \xff\n")
+    (lesson / "msg" / "Folder.msg").mkdir()
+    os.mkfifo(lesson / "msg" / "Pipe.msg")
+    registry = Registry({"lesson": lesson, "gone": lesson / "gone", "empty": lesson / "srv"})
+    assert refusal(registry, "lesson/msg/Latin").endswith("Latin.msg: the text is not UTF-8")
+    assert refusal(registry, "lesson/msg/Folder").endswith("Folder.msg is not a file")
+    assert refusal(registry, "lesson/msg/Pipe").endswith("Pipe.msg is not a file")
+    assert refusal(registry, "gone/msg/A") == f"--package gone={lesson}/gone: there is no such folder"
+    assert "no .msg or .srv files" in refusal(registry, "empty/msg/A")

@@ -1,0 +1,182 @@
+"""The planar_move plugin is read in the spelling of ROS 1, of ROS 2, and mixed."""
+
+from pathlib import Path
+
+import pytest
+
+from holozen.robot.errors import RobotError
+from holozen.robot.loading import parse
+from holozen.robot.model import Drive, RobotModel
+
+ORIGIN = Path("somewhere/robot.urdf")
+
+
+def robot(*gazebo: str) -> RobotModel:
+    body = "".join(f"<gazebo>{text}</gazebo>\n" for text in gazebo)
+    return parse(f'<robot name="r">\n<link name="base"/>\n{body}</robot>', ORIGIN)
+
+
+def plugin(tags: str, filename: str = "libgazebo_ros_planar_move.so") -> str:
+    return f'<plugin name="drive" filename="{filename}">{tags}</plugin>'
+
+
+def drive(tags: str) -> Drive:
+    model = robot(plugin(tags))
+    assert model.drive is not None and model.warnings == ()
+    return model.drive
+
+
+def test_a_robot_without_plugin_has_no_drive() -> None:
+    model = robot("<material>Gazebo/Black</material>")
+    assert model.drive is None and model.warnings == ()
+
+
+def test_without_tags_gazebos_defaults_hold_with_the_watchdog_on() -> None:
+    assert drive("") == Drive("cmd_vel", "odom", "odom", 20.0, "base", 0.5, True, True, (1e-5, 1e-5, 1e-3))
+
+
+def test_ros_1_tags_are_read() -> None:
+    tags = (
+        "<robotNamespace>/</robotNamespace><commandTopic>/drive</commandTopic><odometryTopic>where</odometryTopic>"
+        "<odometryFrame>/map</odometryFrame><odometryRate>50.0</odometryRate><robotBaseFrame>base</robotBaseFrame>"
+        "<cmdTimeout>0.25</cmdTimeout><broadcastTransform>false</broadcastTransform>"
+    )
+    assert drive(tags) == Drive("drive", "where", "map", 50.0, "base", 0.25, True, False)
+
+
+def test_ros_2_tags_are_read() -> None:
+    tags = (
+        "<ros><namespace>/demo</namespace><remapping>cmd_vel:=drive</remapping>"
+        "<remapping>odom:=/where</remapping></ros><update_rate>100</update_rate><publish_rate>10</publish_rate>"
+        "<publish_odom>true</publish_odom><publish_odom_tf>0</publish_odom_tf>"
+        "<odometry_frame>map</odometry_frame><robot_base_frame>base</robot_base_frame>"
+        "<covariance_x>0.1</covariance_x><covariance_y>0.2</covariance_y><covariance_yaw>0.3</covariance_yaw>"
+    )
+    expected = Drive("demo/drive", "where", "map", 10.0, "base", 0.5, True, False, (0.1, 0.2, 0.3))
+    assert drive(tags) == expected
+
+
+def test_both_spellings_may_be_mixed_and_spaced() -> None:
+    tags = (
+        "<ros><remapping> cmd_vel := /drive </remapping></ros><command_topic>cmd_vel</command_topic>"
+        "<odometryFrame> map\n</odometryFrame><odometry_rate>30</odometry_rate><publishRate>10</publishRate>"
+    )
+    assert drive(tags) == Drive("drive", "odom", "map", 30.0, "base")
+
+
+def test_a_namespace_stands_before_relative_topics_only() -> None:
+    tags = "<robotNamespace>a/b/</robotNamespace><commandTopic>//cmd_vel</commandTopic>"
+    assert (drive(tags).command_topic, drive(tags).odometry_topic) == ("cmd_vel", "a/b/odom")
+
+
+def test_a_topic_is_remapped_by_its_default_name_and_by_its_own() -> None:
+    assert drive("<ros><remapping>/cmd_vel:=go/</remapping></ros>").command_topic == "go"
+    own = "<commandTopic>/drive</commandTopic><ros><remapping>drive:=go</remapping><remapping>x:=y</remapping></ros>"
+    assert drive(own).command_topic == "go"
+    assert drive("<ros><remapping>cmd_vel:=</remapping></ros>").command_topic == "cmd_vel"
+
+
+def test_spellings_that_people_use_are_understood() -> None:
+    for tags, expected in [
+        ("<command_timeout>2</command_timeout>", Drive(robot_base_frame="base", command_timeout=2)),
+        ("<publishOdometry>FALSE</publishOdometry>", Drive(robot_base_frame="base", publish_odom=False)),
+        ("<publish_odometry_tf>0</publish_odometry_tf>", Drive(robot_base_frame="base", publish_odom_tf=False)),
+        ("<publish_odom>1</publish_odom>", Drive(robot_base_frame="base")),
+        ("<odometryFrame>/</odometryFrame>", Drive(robot_base_frame="base")),
+        ("<robotBaseFrame>/base</robotBaseFrame>", Drive(robot_base_frame="base")),
+        ("<covariance_y>0</covariance_y>", Drive(robot_base_frame="base", covariance=(1e-5, 0, 1e-3))),
+    ]:
+        assert drive(tags) == expected
+
+
+def test_of_two_equal_tags_the_first_counts_and_an_empty_one_says_nothing() -> None:
+    tags = "<odometryRate>30</odometryRate><odometryRate>40</odometryRate><odometryFrame> </odometryFrame>"
+    assert (drive(tags).odometry_rate, drive(tags).odometry_frame) == (30, "odom")
+
+
+def test_a_negative_timeout_switches_the_watchdog_off() -> None:
+    assert drive("<cmdTimeout>-1</cmdTimeout>").command_timeout == -1
+    assert drive("<cmd_timeout>-0.2</cmd_timeout>").command_timeout == -1
+
+
+def test_a_base_frame_that_is_no_link_is_told_and_the_root_is_taken() -> None:
+    model = robot(plugin("<robotBaseFrame>chasis</robotBaseFrame>"))
+    assert model.drive is not None and model.drive.robot_base_frame == "base"
+    told = "<plugin name='drive'> names the base frame 'chasis', which is not a link; 'base' is used"
+    assert model.warnings == (f"{ORIGIN}, line 3: {told}",)
+
+
+def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it() -> None:
+    for filename, told in [
+        (
+            "libgazebo_ros_control.so",
+            "is not supported; joint_states is published anyway, and joints follow joint_command",
+        ),
+        ("libgazebo_ros_joint_state_publisher.so", "is not supported; joint_states is published anyway"),
+        ("libgazebo_ros_p3d.so", "is not supported; odom and tf are published anyway"),
+        ("gz-sim-sensors-system", "is not supported; sensors are not simulated yet"),
+        (
+            "libgz_ros2_control-system.so",
+            "is not supported; joint_states is published anyway, and joints follow joint_command",
+        ),
+        ("libgazebo_ros_force.so", "is not supported; nothing else applies a force"),
+        ("libgazebo_ros_planarmove.so", "is unknown and is ignored; did you mean 'gazebo_ros_planar_move'?"),
+        ("libsomething_else.so", "is unknown and is ignored"),
+        ("libgazebo_ros_magic_wand.so", "is unknown and is ignored"),
+        ("libmecanum.so", "is unknown and is ignored"),
+    ]:
+        model = robot(plugin("<x/>", filename), plugin(""))
+        assert model.drive is not None
+        assert model.warnings == (f"{ORIGIN}, line 3: <plugin name='drive'> ({filename}) {told}",)
+
+
+def test_a_plugin_without_file_name_is_told() -> None:
+    (warning,) = robot("<plugin/>").warnings
+    assert warning.endswith("<plugin> of <robot name='r'> (no filename) is unknown and is ignored")
+
+
+def test_a_plugin_directly_in_an_sdf_model_drives_it() -> None:
+    link = "<link name='base'><inertial><mass>1</mass></inertial></link>"
+    text = f"<sdf version='1.6'><model name='m'>{link}{plugin('<commandTopic>go</commandTopic>')}</model></sdf>"
+    model = parse(text, ORIGIN)
+    assert model.drive == Drive("go", robot_base_frame="base")
+
+
+@pytest.mark.parametrize("filename", ["gazebo_ros_planar_move", "/opt/ros/lib/libgazebo_ros_planar_move.so"])
+def test_the_plugin_is_known_by_its_file_name(filename: str) -> None:
+    assert robot(plugin("", filename)).drive is not None
+
+
+def test_a_second_planar_move_is_told_and_the_first_drives() -> None:
+    first, second = (plugin(f"<odometryRate>{rate}</odometryRate>") for rate in (1, 2))
+    for gazebo in ((first, second), (first + second,), (f"<a>{first}</a>{second}",), (f"<a>{first}{second}</a>",)):
+        model = robot(*gazebo)
+        assert model.drive is not None and model.drive.odometry_rate == 1
+        (warning,) = model.warnings
+        assert warning.endswith("<plugin name='drive'> is a second drive; only the first one drives")
+
+
+def test_a_value_that_cannot_be_is_refused_with_its_tag() -> None:
+    for tags, told in [
+        (
+            "<odometryRate>0</odometryRate>",
+            "<odometryRate> of <plugin name='drive'> is '0'; it must be a number above 0",
+        ),
+        ("<odometryRate>-5</odometryRate>", "is '-5'; it must be a number above 0"),
+        ("<publish_rate>nan</publish_rate>", "<publish_rate> of <plugin name='drive'> is 'nan'"),
+        ("<odometryRate>fast</odometryRate>", "is 'fast'"),
+        (
+            "<cmdTimeout>0</cmdTimeout>",
+            "<cmdTimeout> of <plugin name='drive'> is '0'; it must be a number above 0",
+        ),
+        ("<cmdTimeout>inf</cmdTimeout>", "is 'inf'"),
+        ("<covariance_x>-1</covariance_x>", "is '-1'; it must be a number not below 0"),
+        ("<publish_odom>perhaps</publish_odom>", "is 'perhaps'; it must be true or false"),
+        ("<commandTopic>*</commandTopic>", "<commandTopic> of <plugin name='drive'> makes the topic '*'"),
+        ("<commandTopic>@holozen/x</commandTopic>", "makes the topic '@holozen/x'"),
+        ("<robotNamespace>a b</robotNamespace>", "makes the topic 'a b/cmd_vel'"),
+        ("<ros><remapping>odom:=**</remapping></ros>", "makes the topic '**'"),
+    ]:
+        with pytest.raises(RobotError) as error:
+            robot(plugin(tags))
+        assert str(error.value).startswith(f"{ORIGIN}, line 3: ") and told in str(error.value)

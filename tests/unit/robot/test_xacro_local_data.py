@@ -1,0 +1,150 @@
+"""What a robot file makes xacro read stays on this machine, unless it belongs to the robot or was allowed."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen.check.report import check
+from holozen.cli import main
+from holozen.robot.errors import RobotError
+from holozen.robot.loading import load, portable
+from holozen.robot.xacro import expand
+
+HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+SECRET = "correct-horse"
+
+
+@pytest.fixture
+def robot(home: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A robot's file in a package of a home folder that holds secrets."""
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("TOKEN", SECRET)
+    (home / ".config").mkdir()
+    (home / ".config" / "hosts.yml").write_text(f"token: {SECRET}\n")
+    (home / "secret.yaml").write_text(f"token: {SECRET}\n")
+    (home / "secret.xml").write_text(f"<settings><password>{SECRET}</password></settings>")
+    (home / "notes.txt").write_text(SECRET)
+    package = home / "bot"
+    (package / "urdf").mkdir(parents=True)
+    (package / "config").mkdir()
+    (package / "package.xml").write_text("<package><name>bot</name></package>")
+    (package / "config" / "sizes.yaml").write_text("length: 0.25\n")
+    (package / "config" / ".env").write_text(SECRET)
+    (package / "config" / "link.yaml").symlink_to(home / "secret.yaml")
+    (package / "urdf" / "link.xml").symlink_to(home / "secret.xml")
+    return package / "urdf" / "robot.urdf.xacro"
+
+
+def write(path: Path, body: str) -> Path:
+    path.write_text(f"{HEAD}\n<link name='base'/>{body}</robot>")
+    return path
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(RobotError) as error:
+        expand(path)
+    told = str(error.value)
+    assert "\n" not in told and SECRET not in told
+    return told
+
+
+def test_load_yaml_reads_inside_known_packages_only(robot: Path, home: Path) -> None:
+    for function in ["xacro.load_yaml", "load_yaml"]:
+        for name in [
+            "{home}/secret.yaml",
+            "../../secret.yaml",
+            "$(find bot)/../secret.yaml",
+            "$(find bot)/config/link.yaml",
+            "{home}/.config/hosts.yml",
+            "$(find bot)/config/.env",
+            "/etc/hostname",
+        ]:
+            name = name.format(home=home)
+            body = f'<xacro:property name="f" value="{name}"/><l t="${{{function}(f)}}"/>'
+            told = refusal(write(robot, body))
+            assert told.startswith(f"{robot}, line 2: load_yaml reads inside known packages only, and ")
+            assert told.endswith("--package NAME=DIR")
+
+
+def test_load_yaml_reads_what_a_package_holds(robot: Path, home: Path) -> None:
+    read = "<l n=\"${xacro.load_yaml('%s')['length']}\"/>"
+    for name in ("../config/sizes.yaml", f"{robot.parents[1]}/config/sizes.yaml"):
+        assert 'n="0.25"' in expand(write(robot, read % name))
+    (home / "data").mkdir()
+    (home / "data" / "sizes.yaml").write_text("length: 7")
+    write(robot, read % f"{home}/data/sizes.yaml")
+    assert "--package NAME=DIR" in refusal(robot)
+    assert 'n="7"' in expand(robot, packages={"data": home / "data"})
+
+
+def test_a_home_folder_is_no_package_even_if_it_looks_like_one(robot: Path, home: Path) -> None:
+    (home / "urdf").mkdir()
+    (home / "package.xml").write_text("<package><name>mine</name></package>")
+    alone = write(home / "urdf" / "robot.xacro", f"<l t=\"${{xacro.load_yaml('{home}/secret.yaml')}}\"/>")
+    assert "load_yaml reads inside known packages only" in refusal(alone)
+
+
+@pytest.mark.parametrize("use", ["$(env TOKEN)", "$(optenv TOKEN none)"])
+def test_an_environment_variable_is_read_only_if_it_is_allowed(robot: Path, use: str) -> None:
+    write(robot, f'<l t="{use}"/>')
+    told = refusal(robot)
+    assert told == (
+        f"{robot}, line 2: reads the environment variable 'TOKEN', whose value would be sent on with the robot;"
+        " allow that with --allow-env TOKEN"
+    )
+    assert f't="{SECRET}"' in expand(robot, allow_env=["TOKEN"])
+    assert told == refusal(robot), "the text that was allowed is not used again"
+
+
+def test_a_variable_that_is_not_set_has_its_default(robot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("TOKEN")
+    write(robot, '<l t="$(optenv TOKEN none)"/>')
+    assert 't="none"' in expand(robot)
+    monkeypatch.setenv("TOKEN", SECRET)
+    assert "--allow-env TOKEN" in refusal(robot), "nor is the text from when it was not set"
+
+
+@pytest.mark.parametrize("name", ["{home}/secret.xml", "../../secret.xml", "link.xml", "{home}/secret*.xml"])
+def test_xml_that_is_no_robot_is_not_included_from_elsewhere(robot: Path, home: Path, name: str) -> None:
+    told = refusal(write(robot, f'<xacro:include filename="{name.format(home=home)}"/>'))
+    assert told.startswith(f"{robot}, line 2: ") and "is outside the robot's folder and all known packages" in told
+
+
+def test_an_included_file_that_is_no_xml_is_not_quoted(robot: Path, home: Path) -> None:
+    told = refusal(write(robot, f'<xacro:include filename="{home}/notes.txt"/>'))
+    assert told.startswith(f"{home}/notes.txt, line 1: broken XML: ")
+
+
+def test_robot_files_are_included_from_anywhere_and_other_xml_from_the_package(robot: Path, home: Path) -> None:
+    (robot.parent / "part.xml").write_text("<part><a/></part>")
+    (home / "arm.xacro").write_text(f"{HEAD}<b/></robot>")
+    names = ("part.xml", f"{home}/arm.xacro")
+    text = expand(write(robot, "".join(f'<xacro:include filename="{name}"/>' for name in names)))
+    assert "<a/>" in text and "<b/>" in text
+
+
+@pytest.mark.parametrize("use", [load, portable])
+def test_whatever_expands_a_file_refuses_alike(robot: Path, use: Callable[..., object]) -> None:
+    write(robot, '<l t="$(env TOKEN)"/>')
+    with pytest.raises(RobotError, match="--allow-env TOKEN"):
+        use(robot)
+    assert use(robot, allow_env=["TOKEN"])
+
+
+def test_check_reports_a_variable_and_takes_the_flag(robot: Path) -> None:
+    write(robot, '<gazebo t="$(env TOKEN)"/>')
+    (finding,) = check(robot)
+    assert (finding.rule, finding.place.line) == ("file", 2)
+    assert "--allow-env TOKEN" in finding.problem
+    assert "file" not in {finding.rule for finding in check(robot, allow_env=["TOKEN"])}
+
+
+def test_the_flag_of_the_command_line_allows_one_variable(robot: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    write(robot, '<l t="$(env TOKEN)" u="$(env HOME)"/>')
+    assert main(["xacro", str(robot), "--allow-env", "TOKEN"]) == 1
+    assert capsys.readouterr().err.endswith("allow that with --allow-env HOME\n")
+    assert main(["xacro", str(robot), "--allow-env", "TOKEN", "--allow-env", "HOME"]) == 0
+    assert SECRET in capsys.readouterr().out
+    assert main(["spawn", str(robot)]) == 1
+    assert "--allow-env TOKEN" in capsys.readouterr().err

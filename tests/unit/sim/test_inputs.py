@@ -1,0 +1,281 @@
+"""Commands are checked, limited, counted, and reported at most once a second."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holozen.limits import STOP
+from holozen.messages import CommandSource, Header, Time, Twist, TwistStamped, Vector3
+from holozen.wire import MAX_STAMP_AGE
+from services.sim.command.arbiter import Arbiter
+from services.sim.command.inputs import REPORT_EVERY, TwistInput
+from services.sim.command.motion import Motion
+from tests.unit.sim.fakes import FakeSenders, received
+
+CLOCKS = (1000.0, 5.0)  # the day's and the sim's
+
+
+class Judge:
+    """The TwistInput of one robot, and its reports."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+        self.twist_input = TwistInput(
+            "Fred/cmd_vel", Arbiter(0.5), FakeSenders(), linear=2.0, angular=3.0, report=self.told.append
+        )
+
+    def take(
+        self, message: Twist | TwistStamped | None, now: float = 10.0, error: str = "", priority: str = "DATA",
+        source: str = "me@1", key: str = "Fred/cmd_vel", waited: float = 0.0,
+    ) -> None:  # fmt: skip
+        self.twist_input.take([received(message, source, priority, key, error)], now, CLOCKS, now - waited)
+
+    def motion(self, now: float = 10.0) -> Motion:
+        return self.twist_input.arbiter.motion(now)
+
+
+@pytest.fixture
+def judge() -> Judge:
+    return Judge()
+
+
+def stamped(seconds: float, x: float = 1.0) -> TwistStamped:
+    return TwistStamped(Header(Time.of(seconds)), Twist.planar(x))
+
+
+def test_a_good_command_drives_and_is_counted(judge: Judge) -> None:
+    judge.take(Twist.planar(1, -0.5, 2), priority="INTERACTIVE_HIGH", source="teleop@9")
+    assert judge.motion() == (1, -0.5, 2)
+    status = judge.twist_input.status(10.0)
+    assert (status.obeyed, status.priority, status.accepted) == ("teleop@9", "INTERACTIVE_HIGH", 1)
+    assert (status.refused, status.last_refusal, judge.told) == ({}, "", [])
+
+
+def test_the_status_of_a_silent_robot_names_no_driver(judge: Judge) -> None:
+    judge.take(Twist.planar(1))
+    status = judge.twist_input.status(10.6)
+    assert (status.obeyed, status.priority, status.held) == ("", "", True)
+    assert judge.twist_input.arbiter.resume(10.6) == ""
+    status = judge.twist_input.status(10.6)
+    assert (status.held, status.resumed) == (False, 1)
+
+
+def test_what_a_planar_base_cannot_do_is_left_out(judge: Judge) -> None:
+    judge.take(Twist(Vector3(1, 0, 5), Vector3(5, 5, 1)))
+    assert judge.motion() == (1, 0, 1)
+
+
+def test_a_faster_command_is_clamped_in_its_direction_and_reported(judge: Judge) -> None:
+    judge.take(Twist.planar(30, 40, -50))
+    assert judge.motion() == pytest.approx((1.2, 1.6, -3))
+    status = judge.twist_input.status(10.0)
+    assert (status.accepted, status.refused) == (1, {"clamped": 1})
+    assert judge.told == [
+        "Fred/cmd_vel: from me@1: over the limits of 2 m/s and 3 rad/s, clamped: (30, 40, -50)"
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", [Twist, TwistStamped])
+@pytest.mark.parametrize("part", ["linear", "angular"])
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_number_that_is_not_finite_never_drives(
+    judge: Judge, kind: type[Twist | TwistStamped], part: str, axis: str, bad: float
+) -> None:
+    twist = Twist()
+    setattr(getattr(twist, part), axis, bad)
+    judge.take(twist if kind is Twist else TwistStamped(twist=twist))
+    assert judge.motion() == STOP
+    assert judge.twist_input.status(10.0).refused == {"not finite": 1}
+    path = f"{part}.{axis}" if kind is Twist else f"twist.{part}.{axis}"
+    assert judge.told == [f"Fred/cmd_vel: from me@1: {path} is not a finite number"]
+
+
+@pytest.mark.parametrize(
+    ("error", "kind"),
+    [("not a Twist: Input data was truncated", "malformed"), ("oversized: 70000 bytes", "oversized")],
+)
+def test_what_is_no_message_is_counted_by_its_kind(judge: Judge, error: str, kind: str) -> None:
+    judge.take(None, error=error)
+    status = judge.twist_input.status(10.0)
+    assert status.refused == {kind: 1}
+    assert status.last_refusal == f"me@1: {error}"
+    assert status.accepted == 0
+
+
+@pytest.mark.parametrize(
+    ("stamp", "age"),
+    [(1000.0, 0.0), (999.6, 0.0), (1000.4, 0.0), (5.0, 0.0), (5.4, 0.0), (999.4, 0.6), (1000.6, -0.6), (7.0, -2.0)],
+)
+def test_a_stamp_may_be_off_by_half_a_second_by_the_clock_it_is_nearest_to(
+    judge: Judge, stamp: float, age: float
+) -> None:
+    judge.take(stamped(stamp))
+    if age:
+        assert judge.motion() == STOP
+        assert judge.told == [f"Fred/cmd_vel: from me@1: stamp is {age} s old; at most {MAX_STAMP_AGE} s"]
+        assert judge.twist_input.status(10.0).refused == {"stale": 1}
+    else:
+        assert judge.motion() == (1, 0, 0)
+        assert judge.told == []
+
+
+def test_a_stamp_makes_a_command_older_but_never_younger(judge: Judge) -> None:
+    judge.take(stamped(999.7))
+    assert judge.motion(10.1) == (1, 0, 0)
+    assert judge.motion(10.3) == STOP  # half a second after its stamp
+    judge.take(stamped(1000.3), now=20.0)
+    assert judge.motion(20.4) == (1, 0, 0)
+    assert judge.motion(20.6) == STOP
+
+
+def test_a_command_that_may_have_waited_too_long_is_refused_but_a_stop_is_not(judge: Judge) -> None:
+    judge.take(Twist.planar(1), waited=0.4)
+    assert judge.motion() == (1, 0, 0)
+    judge.take(Twist.planar(2), waited=0.6)
+    assert judge.motion() == (1, 0, 0)
+    assert judge.told == ["Fred/cmd_vel: from me@1: late: it waited up to 0.6 s for the sim"]
+    judge.take(Twist(), waited=math.inf)
+    assert judge.motion() == STOP
+    assert judge.twist_input.status(10.0).refused == {"late": 1}
+
+
+@pytest.mark.parametrize("key", ["*/cmd_vel", "**", "Ann/cmd_vel"])
+def test_a_command_for_every_robot_is_for_none(judge: Judge, key: str) -> None:
+    judge.take(Twist.planar(1), key=key)
+    assert judge.motion() == STOP
+    assert judge.twist_input.status(10.0).refused == {"wildcard": 1}
+    assert judge.told == [f"Fred/cmd_vel: from me@1: a command for {key!r}; name one robot"]
+
+
+def test_no_stamp_is_a_fresh_one(judge: Judge) -> None:
+    judge.take(stamped(0.0))
+    assert judge.motion() == (1, 0, 0)
+
+
+def test_an_overruled_and_a_held_source_are_counted_apart(judge: Judge) -> None:
+    judge.take(Twist.planar(1), now=1.0, priority="INTERACTIVE_HIGH", source="teleop@9")
+    judge.take(Twist.planar(2), now=1.1)
+    judge.take(Twist.planar(2), now=9.0)
+    assert judge.twist_input.status(9.0).refused == {"overruled": 1, "held": 1}
+    assert judge.motion(9.0) == STOP
+
+
+def test_a_source_without_a_name_is_called_by_its_priority(judge: Judge) -> None:
+    judge.take(Twist.planar(1), source="")
+    assert judge.twist_input.status(10.0).obeyed == "anonymous (DATA)"
+
+
+def test_the_status_names_the_sources_their_rates_and_the_driver(judge: Judge) -> None:
+    for count in range(21):
+        judge.take(Twist.planar(0.1), now=1.0 + count * 0.05, priority="INTERACTIVE_HIGH", source="teleop@9")
+        if count % 2 == 0:
+            judge.take(Twist.planar(0.2), now=1.0 + count * 0.05, priority="DATA_LOW", source="controller@8")
+        judge.twist_input.status(1.0 + count * 0.05)
+    teleop, controller = judge.twist_input.status(2.0).sources
+    assert (teleop.rate, controller.rate) == pytest.approx((20, 10), abs=1)
+    assert teleop == CommandSource("teleop@9", "INTERACTIVE_HIGH", teleop.rate, obeyed=True, held=False)
+    assert controller == CommandSource("controller@8", "DATA_LOW", controller.rate, obeyed=False, held=True)
+    assert judge.twist_input.status(9.0).sources == []
+
+
+def test_while_it_is_stopped_every_command_is_refused_and_counted(judge: Judge) -> None:
+    judge.twist_input.arbiter.stop("ann@1", 10.0)
+    judge.take(Twist.planar(1), priority="INTERACTIVE_HIGH")
+    judge.take(Twist())
+    judge.take(stamped(1000.0))
+    status = judge.twist_input.status(10.0)
+    assert (status.stopped, status.obeyed, status.held) == ("ann@1", "", True)
+    assert status.refused == {"stopped": 3}
+    assert judge.told == ["Fred/cmd_vel: from me@1: stopped: by ann@1; `holozen release` lets it drive again"]
+    assert judge.motion() == STOP
+
+
+@pytest.mark.parametrize("seconds", [900.0, 1100.0])
+def test_a_stop_is_obeyed_whatever_its_stamp(judge: Judge, seconds: float) -> None:
+    judge.take(Twist.planar(1), priority="INTERACTIVE_HIGH")
+    judge.take(stamped(seconds, 0.0), priority="INTERACTIVE_HIGH", source="ann@1")
+    assert judge.motion() == STOP
+    judge.take(Twist.planar(1), now=10.1, priority="INTERACTIVE_HIGH")
+    assert judge.motion(10.1) == STOP, "who was stopped waits"
+
+
+@pytest.mark.parametrize("kind", ["late", "stale"])
+def test_a_source_on_a_bad_link_that_commands_has_not_let_go(judge: Judge, kind: str) -> None:
+    """What comes too late to be obeyed still shows that its sender has not let go."""
+    judge.twist_input.arbiter.stop("ann@1", 10.0)
+    judge.twist_input.arbiter.software_stop.release()
+    for now in (10.4, 10.8):
+        judge.take(Twist.planar(1) if kind == "late" else stamped(990.0), now, waited=0.6)
+    judge.take(Twist.planar(1), now=11.2)
+    assert judge.motion(11.2) == STOP
+    judge.take(Twist.planar(1), now=11.8)
+    assert judge.motion(11.8) == (1, 0, 0)
+
+
+def test_refusals_are_reported_once_a_second_with_the_number_of_the_others(judge: Judge) -> None:
+    for now in (1.0, 1.2, 1.4, 1.0 + REPORT_EVERY, 2.1):
+        judge.take(None, now, error="not a Twist")
+    assert judge.told == [
+        "Fred/cmd_vel: from me@1: not a Twist",
+        "Fred/cmd_vel: from me@1: not a Twist (and 2 more)",
+    ]
+    judge.take(None, now=3.5, error="not a Twist")
+    assert judge.told[2] == "Fred/cmd_vel: from me@1: not a Twist (and 1 more)"
+    assert judge.twist_input.status(3.5).refused == {"malformed": 6}
+
+
+def test_a_long_reason_is_cut(judge: Judge) -> None:
+    judge.take(None, error="x" * 5000)
+    assert len(judge.twist_input.status(10.0).last_refusal) == 300
+
+
+numbers = st.floats() | st.sampled_from([1e308, -1e308])
+twists = st.builds(Twist, st.builds(Vector3, numbers, numbers, numbers), st.builds(Vector3, numbers, numbers, numbers))
+commands: st.SearchStrategy[Twist | TwistStamped] = twists | st.builds(
+    TwistStamped, st.builds(Header, st.builds(Time, st.integers(-(2**63), 2**63), st.integers(0, 999_999_999))), twists
+)
+
+
+@given(st.lists(commands, max_size=5))
+def test_whatever_comes_the_engine_gets_finite_velocities_within_the_limits(given: list[Twist | TwistStamped]) -> None:
+    judge = Judge()
+    for message in given:
+        judge.take(message)
+    motion = judge.motion()
+    assert isinstance(motion, tuple)
+    x, y, turn = motion
+    assert math.hypot(x, y) <= 2 * (1 + 1e-9)
+    assert abs(turn) <= 3
+    status = judge.twist_input.status(10.0)
+    refused = sum(status.refused.values()) - status.refused.get("clamped", 0)
+    assert status.accepted + refused == len(given)
+
+
+def test_by_default_refusals_are_reported_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+    judge = Judge()
+    judge.twist_input = TwistInput("cmd_vel", Arbiter(0.5), FakeSenders(), 1, 1)
+    judge.take(Twist(), key="*")
+    assert capsys.readouterr().err == "cmd_vel: from me@1: a command for '*'; name one robot\n"
+
+
+@pytest.mark.parametrize(
+    ("twist", "reason"),
+    [
+        (Twist(Vector3(1.5e308, 1.5e308)), "linear.x is 1.5e+308 m/s; at most 100"),
+        (Twist(Vector3(0, -101)), "linear.y is -101 m/s; at most 100"),
+        (Twist(Vector3(0, 0, 1e308)), "linear.z is 1e+308 m/s; at most 100"),
+        (Twist(Vector3(), Vector3(1e308)), "angular.x is 1e+308 rad/s; at most 1000"),
+        (Twist(Vector3(), Vector3(0, 0, 1001)), "angular.z is 1001 rad/s; at most 1000"),
+    ],
+)
+def test_what_no_robot_can_mean_is_refused_by_name_and_is_no_stop_either(
+    judge: Judge, twist: Twist, reason: str
+) -> None:
+    judge.take(Twist.planar(1), source="me@1", priority="INTERACTIVE_HIGH")
+    judge.take(twist, source="forged@2", priority="INTERACTIVE_HIGH")
+    status = judge.twist_input.status(10.0)
+    assert (status.obeyed, status.refused, status.last_refusal) == ("me@1", {"implausible": 1}, f"forged@2: {reason}")
+    assert judge.motion() == (1, 0, 0)

@@ -1,0 +1,56 @@
+"""What is told to people is one line that their terminal survives."""
+
+import subprocess
+import sys
+from subprocess import PIPE
+
+import pytest
+
+from holozen.console import KEPT, printable, report
+
+
+def test_a_line_is_told_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+    report("sim: ready")
+    assert capsys.readouterr() == ("", "sim: ready\n")
+
+
+def test_what_came_over_the_wire_cannot_move_the_cursor_or_start_a_line() -> None:
+    assert printable("cmd_vel: from \x1b[2Jme\nand\ryou") == "cmd_vel: from ?[2Jme?and?you"
+    assert printable("grün ▶ 10 °") == "grün ▶ 10 °"
+
+
+def test_say_tells_only_what_is_printable(capsys: pytest.CaptureFixture[str]) -> None:
+    report("one\ntwo")
+    assert capsys.readouterr().err == "one?two\n"
+
+
+def test_a_terminal_that_is_gone_is_no_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Gone:
+        def write(self, _text: str) -> int:
+            raise OSError("gone")
+
+    monkeypatch.setattr(sys, "stderr", Gone())
+    report("anybody?")
+
+
+def test_what_nobody_reads_is_dropped_and_counted_when_the_reader_goes_on() -> None:
+    code = (
+        "import sys\nfrom holozen.console import KEPT, drain, report\n"
+        "for number in range(2000):\n report(f'{number:099}')\n"
+        "print('wrote all', flush=True)\nsys.stdin.readline()\ndrain(20)"
+    )
+    with subprocess.Popen([sys.executable, "-c", code], stdin=PIPE, stdout=PIPE, stderr=PIPE, text=True) as process:
+        assert process.stdin and process.stdout and process.stderr
+        assert process.stdout.readline() == "wrote all\n"
+        process.stdin.write("\n")
+        process.stdin.close()
+        *lines, last = process.stderr.read().splitlines()
+    assert [int(line) for line in lines] == list(range(len(lines)))
+    assert len(lines) >= KEPT
+    assert last == f"... and {2000 - len(lines)} more lines were dropped, as the output was not read"
+
+
+def test_the_last_line_is_written_before_a_process_ends() -> None:
+    code = "import os, threading\nfrom holozen.console import report\nfor n in range(100):\n report('a line')"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
+    assert (done.returncode, done.stderr) == (0, "a line\n" * 100)

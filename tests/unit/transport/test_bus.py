@@ -1,0 +1,434 @@
+"""Real sessions on loopback: what is said arrives, what is wrong is one line, and everything ends."""
+
+import os
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import partial
+from itertools import count
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.cli.output import CDR, Reader
+from holozen.messages import (
+    JointState,
+    NextGoalReply,
+    NextGoalRequest,
+    Odometry,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+    TwistStamped,
+)
+from holozen.testing import Wire, wait_for
+from holozen.transport import services as module
+from holozen.transport.connection import Connection
+from holozen.transport.errors import BusError, NoReply, ServiceError
+from holozen.transport.graph import ALL, Endpoint, Graph
+from holozen.transport.pubsub import Publisher
+from holozen.transport.rendezvous import is_free
+
+
+@pytest.fixture
+def pair(wire: Wire) -> tuple[Bus, Bus]:
+    """Two buses that have found each other."""
+    first, second = wire.bus("first"), wire.bus("second")
+    wait_for(lambda: first.connected() and second.connected())
+    return first, second
+
+
+def refusal(use: Callable[[], object]) -> str:
+    with pytest.raises(BusError) as error:
+        use()
+    told = str(error.value)
+    assert told.isprintable()
+    assert ".rs" not in told
+    return told
+
+
+def after_all(writer: Bus, reader: Bus) -> Callable[[], object]:
+    """A function that waits until all that `writer` has put so far is with `reader`."""
+    end, numbers = reader.subscribe_raw("end"), count()
+
+    def arrived(mark: bytes) -> bool:
+        writer.session.put("end", mark)
+        return mark in [sample.payload for sample in iter(end.try_recv, None)]
+
+    return lambda: wait_for(partial(arrived, b"%d" % next(numbers)))
+
+
+def test_alone_nobody_is_connected(wire: Wire) -> None:
+    assert not wire.bus().connected()
+
+
+def test_a_plain_put_of_any_zenoh_tool_is_read(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    commands = reader.subscribe("cmd_vel", Twist, TwistStamped)
+    after_all(writer, reader)()
+    writer.session.put("cmd_vel", b'{"linear": {"x": 0.3}}')
+    received = commands.recv()
+    assert received.message == Twist.planar(0.3)
+    assert (received.sample.priority, received.sample.source) == ("DATA", "")
+
+
+def test_a_source_of_any_bytes_is_read_as_a_short_text(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    tap = reader.subscribe_raw("cmd_vel")
+    after_all(writer, reader)()
+    writer.session.put("cmd_vel", b"{}", attachment=b"\xff" * 1000)
+    assert tap.recv().source == "�" * 80
+
+
+def test_the_newest_are_kept_when_too_many_came(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    commands = reader.subscribe("cmd_vel", Twist, depth=3)
+    wait = after_all(writer, reader)
+    wait()
+    publisher: Publisher[Twist] = writer.publisher("cmd_vel", Twist)
+    for x in range(10):
+        publisher.put(Twist.planar(float(x)))
+        wait()  # on a busy machine Zenoh would drop some
+    found = iter(commands.try_recv, None)
+    assert [received.message for received in found] == [Twist.planar(float(x)) for x in (7, 8, 9)]
+
+
+def test_a_payload_over_the_limit_is_not_even_copied(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    commands = reader.subscribe("cmd_vel", Twist, limit=100)
+    after_all(writer, reader)()
+    for size in (100, 101):
+        writer.session.put("cmd_vel", b"{}" + b" " * (size - 2))
+    full, over = commands.recv(), commands.recv()
+    assert full.message == Twist()
+    assert (over.error, over.sample.payload, over.sample.size) == ("oversized: 101 bytes", b"", 101)
+
+
+def test_the_latest_message_of_a_key_is_kept(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    odom = reader.latest("odom", Odometry)
+    assert odom.read()[0] is None
+    publisher: Publisher[Odometry] = writer.publisher("odom", Odometry)
+    wait_for(lambda: publisher.matched)
+    for name in ("first", "second"):
+        publisher.put(Odometry(child_frame_id=name))
+    wait_for(lambda: odom.read()[0] == Odometry(child_frame_id="second"))
+    assert odom.wait(after=0, timeout=0)
+
+
+@pytest.mark.parametrize("read", ["tap", "subscribe"])
+def test_a_reader_that_waits_can_be_closed(wire: Wire, read: str) -> None:
+    bus = wire.bus()
+    reader: Any = bus.subscribe_raw("odom") if read == "tap" else bus.subscribe("odom", Odometry)
+    with ThreadPoolExecutor() as pool:
+        waiting = pool.submit(reader.recv)
+        wait_for(waiting.running)
+        reader.close()
+        with pytest.raises(BusError):
+            waiting.result(10)
+
+
+def test_a_latest_can_be_closed_and_its_thread_ends(wire: Wire) -> None:
+    bus, before = wire.bus(), set(threading.enumerate())
+    odom = bus.latest("odom", Odometry)
+    (thread,) = set(threading.enumerate()) - before
+    odom.close()
+    thread.join(10)
+    assert not thread.is_alive()
+
+
+def test_a_closed_bus_ends_its_readers_and_may_be_closed_again(wire: Wire) -> None:
+    bus = wire.bus()
+    tap = bus.subscribe_raw("odom")
+    bus.close()
+    bus.close()
+    with pytest.raises(BusError):
+        tap.recv()
+    assert "session closed" in refusal(lambda: bus.subscribe_raw("odom"))
+
+
+WRONG_KEYS = ["", "/odom", "odom/", "a//b", "a?b", "a#b", "a$b", "**/**"]
+
+
+@pytest.mark.parametrize("key", WRONG_KEYS)
+def test_a_wrong_key_is_named_whatever_it_was_for(wire: Wire, key: str) -> None:
+    bus = wire.bus()
+    uses: list[Callable[[], object]] = [
+        lambda: bus.subscribe_raw(key),
+        lambda: bus.subscribe(key, Twist),
+        lambda: bus.latest(key, Twist),
+        lambda: bus.publisher(key, Twist),
+        lambda: bus.serve(key, TriggerRequest, TriggerReply, lambda _: TriggerReply()),
+        lambda: bus.call(key, TriggerRequest(), TriggerReply),
+    ]
+    for use in uses if "?" not in key else uses[:-1]:  # one may call with parameters
+        assert f" {key!r}: Invalid Key Expr `{key}`" in refusal(use)
+
+
+def test_a_wrong_key_leaves_nothing_in_the_graph(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    refusal(lambda: writer.publisher("a$b", Twist))
+    writer.publisher("odom", Odometry)
+    graph = reader.graph()
+    wait_for(graph.endpoints)
+    assert [endpoint.key for endpoint in graph.endpoints()] == ["odom"]
+
+
+def test_a_service_that_is_not_there_yet_is_waited_for(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    server, caller = wire.bus("server"), wire.bus("caller")
+    pauses: list[float] = []
+
+    def sleep(seconds: float) -> None:
+        if not pauses:  # it was asked for once, in vain
+            server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply()).start()
+        pauses.append(seconds)
+        time.sleep(seconds)
+
+    monkeypatch.setattr(module, "time", SimpleNamespace(monotonic=time.monotonic, sleep=sleep))
+    assert caller.call("resume", TriggerRequest(), TriggerReply, 10) == TriggerReply()
+    assert pauses
+
+
+def test_a_service_that_is_not_there_is_named_with_the_time_it_had(wire: Wire) -> None:
+    with pytest.raises(
+        NoReply, match=r"^no reply from 'resume' within 0\.05 s at tcp/127.*; `holozen service list` lists the servers$"
+    ):
+        wire.bus().call("resume", TriggerRequest(), TriggerReply, timeout=0.05)
+
+
+def test_a_service_that_is_there_but_silent_is_no_refusal(pair: tuple[Bus, Bus]) -> None:
+    """The controller asks a service again that did not answer, and gives up at one that refused."""
+    server, caller = pair
+    server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())  # and nobody looks
+    with pytest.raises(NoReply, match=r"within 0\.1 s"):
+        caller.call("resume", TriggerRequest(), TriggerReply, timeout=0.1)
+
+
+def test_a_reply_that_is_none_is_an_error_of_the_service(wire: Wire) -> None:
+    bus = wire.bus()
+    bus.serve("next_goal", NextGoalRequest, TriggerReply, lambda _: TriggerReply()).start()
+    with pytest.raises(ServiceError, match=r"^the reply of 'next_goal' is not a NextGoalReply: .*`success`"):
+        bus.call("next_goal", NextGoalRequest(), NextGoalReply)
+
+
+def test_the_graph_shows_who_reads_writes_and_serves(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    writer.publisher("Fred/odom", Odometry)
+    writer.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())
+    reader.subscribe("**/odom", Odometry)
+    expected = {
+        Endpoint("Fred/odom", "pub", "nav_msgs/msg/Odometry", "first", writer.id),
+        Endpoint("resume", "srv", "std_srvs/srv/Trigger", "first", writer.id),
+        Endpoint("**/odom", "sub", "nav_msgs/msg/Odometry", "second", reader.id),
+    }
+    graph = reader.graph()
+    wait_for(lambda: set(graph.endpoints()) == expected)
+    writer.close()
+    wait_for(lambda: {endpoint.node for endpoint in graph.endpoints()} == {"second"})
+
+
+class Watched(Bus):
+    """A bus that keeps the graphs it gave."""
+
+    def __init__(self, wire: Wire) -> None:
+        super().__init__("watched", wire.connection)
+        self.graphs: list[Graph] = []
+
+    def graph(self, keys: str = ALL) -> Graph:
+        self.graphs.append(super().graph(keys))
+        return self.graphs[-1]
+
+
+def test_one_look_at_the_graph_leaves_nothing_declared(wire: Wire) -> None:
+    wire.bus("sim", lasting=True)
+    with Watched(wire) as bus:
+        kept = bus.graph()
+        assert [endpoint.node for endpoint in bus.endpoints()] == ["sim"]
+        assert [endpoint.node for endpoint in kept.endpoints()] == ["sim"]
+        with pytest.raises(BusError, match="closed"):
+            bus.graphs[-1].endpoints()
+
+
+def test_an_echo_that_looks_types_up_leaves_nothing_declared(wire: Wire) -> None:
+    """It looked once for each key of which nobody told the type, and every look stayed declared."""
+    with Watched(wire) as bus:
+        tap, reader = bus.subscribe_raw("**"), Reader()
+        for number in range(2):
+            bus.session.put(f"key/{number}", b"\0\1\0\0", encoding=CDR)
+            reader.read(tap.recv(), bus)
+        assert len(bus.graphs) == 2
+        for graph in bus.graphs:
+            with pytest.raises(BusError, match="closed"):
+                graph.endpoints()
+
+
+def test_only_what_runs_long_is_a_node(wire: Wire) -> None:
+    lasting = wire.bus("sim", lasting=True)
+    wire.bus("topic_echo")
+    graph = wire.bus("me").graph()
+    wait_for(graph.endpoints)
+    assert graph.endpoints() == [Endpoint("", "node", "", "sim", lasting.id)]
+
+
+def test_when_the_holder_of_the_point_goes_another_opens_it_and_late_joiners_get_in(wire: Wire) -> None:
+    holder, heir = wire.bus("holder", lasting=True), wire.bus("heir", lasting=True)
+    wait_for(heir.connected)
+    holder.close()
+    wait_for(lambda: not heir.connected())
+    wait_for(lambda: not is_free(wire.endpoint))
+    late = wire.bus("late")
+    wait_for(late.connected)
+    heir.close()
+    wait_for(lambda: is_free(wire.endpoint))  # whoever has left holds no point
+
+
+def test_what_does_not_run_long_leaves_the_point_shut(wire: Wire) -> None:
+    holder, visitor = wire.bus("holder"), wire.bus("visitor")
+    wait_for(visitor.connected)
+    before = set(threading.enumerate())
+    holder.close()
+    assert is_free(wire.endpoint)
+    assert set(threading.enumerate()) <= before
+
+
+def sockets() -> set[tuple[str, str]]:
+    """(protocol, local address) of this process's sockets that wait for anybody."""
+    mine = set()
+    for entry in os.scandir("/proc/self/fd"):
+        try:
+            mine.add(os.readlink(entry.path))
+        except FileNotFoundError:  # the one of the listing itself
+            continue
+    found = set()
+    for protocol in ("tcp", "tcp6", "udp", "udp6"):
+        for line in Path("/proc/self/net", protocol).read_text().splitlines()[1:]:
+            _, local, _, state, *_, inode = line.split()[:10]
+            waits = state == "0A" or protocol.startswith("udp")
+            if waits and f"socket:[{inode}]" in mine:
+                found.add((protocol, local.partition(":")[0]))
+    return found
+
+
+def test_a_bus_listens_on_loopback_only(wire: Wire) -> None:
+    wire.bus(lasting=True)
+    assert sockets() == {("tcp", "0100007F")}  # 127.0.0.1, as the kernel writes it
+
+
+@pytest.mark.parametrize(
+    ("connection", "told"),
+    [
+        (Connection(config="no/such.json5"), "Zenoh configuration no/such.json5: No such file or directory"),
+        (Connection(connect=("nonsense",)), 'Zenoh setting connect/endpoints:["nonsense"]: '),
+        (Connection(connect=("pigeon/127.0.0.1:1",)), "cannot open Zenoh: Unicast not supported for pigeon"),
+        (Connection(cfg=(("no/such", "1"),)), "Zenoh setting no/such:1: "),
+        (Connection(cfg=(("mode", "["),)), "Zenoh setting mode:[: "),
+        (Connection("router", listen=("tcp/192.0.2.1:7447",)), "cannot open Zenoh: cannot listen at tcp/192.0.2.1"),
+        (Connection("client", connect=()), "cannot open Zenoh: a client needs --connect ENDPOINT"),
+    ],
+)
+def test_a_wrong_connection_is_one_line(wire: Wire, connection: Connection, told: str) -> None:
+    listening = connection.replace(listen=connection.listen or (wire.endpoint,))
+    assert refusal(lambda: Bus("test", listening, patience=0)).startswith(told)
+
+
+@pytest.mark.parametrize("text", ["{mode: ", "{nosuch: 1}", "{mode: 'king'}"])
+def test_a_wrong_configuration_file_is_one_line_that_names_it(tmp_path: Path, text: str) -> None:
+    path = tmp_path / "zenoh.json5"
+    path.write_text(text)
+    assert refusal(lambda: Bus("test", Connection(config=str(path)))).startswith(f"Zenoh configuration {path}: ")
+
+
+def test_a_configuration_file_is_read(wire: Wire, tmp_path: Path) -> None:
+    path = tmp_path / "zenoh.json5"
+    path.write_text(f'{{scouting: {{multicast: {{enabled: false}}}}, connect: {{endpoints: ["{wire.endpoint}"]}}}}')
+    wire.bus("point")
+    with Bus("test", Connection(config=str(path), listen=("tcp/127.0.0.1:0",))) as bus:
+        wait_for(bus.connected)
+
+
+def test_a_client_without_its_router_gives_up_after_its_patience(wire: Wire) -> None:
+    told = refusal(lambda: Bus("test", Connection("client", connect=(wire.endpoint,)), patience=0))
+    assert told == f"cannot open Zenoh: no router answers at {wire.endpoint}; `holozen router` runs one"
+
+
+def test_a_client_that_waits_ends_in_peace_when_it_is_told_to(wire: Wire) -> None:
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(SystemExit) as end:
+        Bus("test", Connection("client", connect=(wire.endpoint,)), stop=stop)
+    assert end.value.code == 0
+
+
+def test_a_client_waits_for_its_router_and_says_so(wire: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+    with ThreadPoolExecutor() as pool:
+        client = pool.submit(Bus, "client", Connection("client", connect=(wire.endpoint,)))
+        wait_for(lambda: wire.endpoint in capsys.readouterr().err)
+        with Bus("router", Connection("router", listen=(wire.endpoint,))), client.result(10) as bus:
+            wait_for(bus.connected)
+
+
+def test_an_early_bus_opens_meanwhile_and_its_first_use_waits(wire: Wire) -> None:
+    with wire.bus("early", early=True) as early, wire.bus("other") as other:
+        odom = early.subscribe("odom", Odometry)
+        publisher = other.publisher("odom", Odometry)
+        wait_for(lambda: publisher.matched)
+        publisher.put(Odometry())
+        assert odom.recv().message == Odometry()
+        assert early.source.startswith("early@")
+
+
+def test_an_early_bus_that_cannot_open_says_so_at_its_first_use_and_closes(wire: Wire) -> None:
+    nowhere = Connection("client", connect=(wire.endpoint,))
+    with Bus("early", nowhere, patience=0.1, early=True) as bus:
+        for _ in range(2):
+            with pytest.raises(BusError, match="no router answers"):
+                bus.subscribe_raw("odom")
+
+
+def test_an_early_bus_may_be_closed_before_it_is_open(wire: Wire) -> None:
+    with Bus("early", Connection("client", connect=(wire.endpoint,)), early=True):
+        pass
+
+
+def test_a_closed_bus_has_no_link_to_ask_for(wire: Wire) -> None:
+    with wire.bus("one") as bus:
+        bus.connected()
+    with pytest.raises(BusError, match="closed"):
+        bus.connected()
+
+
+def test_a_newer_sim_does_not_blind_an_older_reader_but_a_typo_in_a_command_is_refused(pair: tuple[Bus, Bus]) -> None:
+    writer, reader = pair
+    odoms, commands = reader.subscribe("odom", Odometry), reader.subscribe("Fred/cmd_vel", Twist, TwistStamped)
+    for key in ("odom", "Fred/cmd_vel"):
+        wait_for(lambda key=key: writer.session.declare_publisher(key).matching_status.matching)  # type: ignore[misc]
+        writer.session.put(key, b'{"child_frame_id": "base", "linear": {}, "speed": 1}', encoding="application/json")
+    assert odoms.recv().message == Odometry(child_frame_id="base")
+    assert "unknown field" in commands.recv().error
+
+
+def test_a_request_with_an_unknown_field_is_refused_and_one_in_a_reply_ignored(pair: tuple[Bus, Bus]) -> None:
+    server, caller = pair
+    server.serve("next_goal", NextGoalRequest, NextGoalReply, lambda _: NextGoalReply(1.0)).start()
+    with pytest.raises(ServiceError, match="unknown field `gaol`"):
+        module.call_bytes(caller, "next_goal", b'{"gaol": 1}', "application/json", 5.0)
+    answer = b'{"success": true, "by": "a"}'
+    newer = server.session.declare_queryable("release", lambda query: query.reply("release", answer))
+    assert caller.call("release", TriggerRequest(), TriggerReply, 5.0) == TriggerReply(True)
+    newer.undeclare()
+
+
+def test_commands_go_out_at_once_and_telemetry_in_batches(pair: tuple[Bus, Bus]) -> None:
+    """Sent one by one, the five messages of one step of the sim fill the queue of a link, and some are dropped."""
+    writer, reader = pair
+    samples = reader.subscribe_raw("**")
+    for key, kind in (("cmd_vel", Twist), ("odom", Odometry), ("Fred/joint_states", JointState)):
+        publisher = writer.publisher(key, kind)
+        wait_for(lambda publisher=publisher: publisher.matched)  # type: ignore[misc]
+        publisher.put(kind())
+    express = {sample.key: sample.delivery[1] for sample in (samples.recv(), samples.recv(), samples.recv())}
+    assert express == {"cmd_vel": True, "odom": False, "Fred/joint_states": False}

@@ -1,0 +1,130 @@
+"""Zenoh's flags become settings; without any, nothing leaves the machine."""
+
+import argparse
+import json
+
+import pytest
+import zenoh
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holozen.transport.connection import LEASE, LOOPBACK, RENDEZVOUS, Connection, add_arguments, from_arguments
+
+endpoints = st.none() | st.lists(
+    st.sampled_from(["tcp/127.0.0.1:7447", "tcp/10.0.0.2:1", "udp/[::1]:9", "unixsock-stream//tmp/x"]), min_size=1
+).map(tuple)
+connections = st.builds(
+    Connection,
+    mode=st.sampled_from(["peer", "client", "router"]),
+    connect=endpoints,
+    listen=endpoints,
+    config=st.none() | st.just("zenoh.json5"),
+    cfg=st.lists(st.tuples(st.sampled_from(["transport/link/tx/lease", "mode"]), st.text())).map(tuple),
+    wire=st.sampled_from(["json", "msgpack"]),
+)
+
+
+def parsed(*words: str) -> Connection:
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    return from_arguments(parser.parse_args(words))
+
+
+def value(connection: Connection, path: str) -> object:
+    return json.loads(connection.settings()[path])
+
+
+def test_no_flags_are_the_default_connection() -> None:
+    assert parsed() == Connection()
+    assert Connection().arguments() == []
+
+
+@given(connections)
+def test_the_arguments_of_a_connection_make_the_same_connection(connection: Connection) -> None:
+    assert parsed(*connection.arguments()) == connection
+
+
+@pytest.mark.parametrize("mode", ["peer", "client", "router"])
+def test_by_default_every_endpoint_is_on_loopback_and_nobody_shouts(mode: str) -> None:
+    connection = Connection(mode)
+    listen, connect = value(connection, "listen/endpoints"), value(connection, "connect/endpoints")
+    assert isinstance(listen, list)
+    assert isinstance(connect, list)
+    assert listen + connect
+    assert all(endpoint.startswith("tcp/127.0.0.1:") for endpoint in listen + connect)
+    assert value(connection, "scouting/multicast/enabled") is False
+
+
+def test_a_peer_listens_at_the_first_rendezvous_point_and_at_a_port_of_its_own() -> None:
+    assert value(Connection(), "listen/endpoints") == [RENDEZVOUS[0], LOOPBACK]
+    assert value(Connection(), "connect/endpoints") == [*RENDEZVOUS]
+    given = Connection(listen=("tcp/10.0.0.1:7",), connect=("tcp/10.0.0.2:8",))
+    assert value(given, "listen/endpoints") == ["tcp/10.0.0.1:7", LOOPBACK]
+    assert value(given, "connect/endpoints") == ["tcp/10.0.0.2:8"]
+
+
+def test_a_client_listens_nowhere() -> None:
+    assert value(Connection("client"), "listen/endpoints") == []
+    assert value(Connection("client"), "connect/endpoints") == [RENDEZVOUS[0]]
+
+
+def test_a_router_only_listens() -> None:
+    assert value(Connection("router"), "listen/endpoints") == [RENDEZVOUS[0]]
+    assert value(Connection("router"), "connect/endpoints") == []
+
+
+def test_links_are_retried_for_ever_and_given_up_after_a_while_of_silence() -> None:
+    assert value(Connection(), "connect/timeout_ms") == -1
+    assert value(Connection(), "connect/exit_on_failure") is False
+    assert value(Connection(), "scouting/delay") == 0
+    assert value(Connection(), "transport/link/tx/lease") == LEASE == 1500
+
+
+def test_a_setting_by_hand_comes_last_and_wins() -> None:
+    settings = parsed("--cfg", "transport/link/tx/lease:2000", "--cfg", "mode:'client'").settings()
+    assert settings["transport/link/tx/lease"] == "2000"
+    assert settings["mode"] == "'client'"
+
+
+def test_a_value_may_hold_colons() -> None:
+    assert parsed("--cfg", "a/b:tcp/h:1").cfg == (("a/b", "tcp/h:1"),)
+
+
+@pytest.mark.parametrize("text", ["", "lease", ":2000"])
+def test_a_setting_that_is_no_pair_is_wrong_usage(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        parsed("--cfg", text)
+    assert end.value.code == 2
+    assert f"{text!r}: write PATH:VALUE" in capsys.readouterr().err
+
+
+TRIES = {"connect/timeout_ms": "10000", "connect/exit_on_failure": "true"}  # of a client
+
+
+def test_a_configuration_file_decides_what_no_flag_names() -> None:
+    assert Connection(config="zenoh.json5").settings() == {}
+    given = Connection("client", config="zenoh.json5", connect=("tcp/h:1",), cfg=(("a", "1"),))
+    assert given.settings() == {"mode": '"client"', "connect/endpoints": '["tcp/h:1"]', "a": "1", **TRIES}
+
+
+def test_where_a_process_both_listens_and_connects_is_a_rendezvous_point() -> None:
+    one, two, three = (f"tcp/127.0.0.1:{port}" for port in (9, 10, 11))
+    for connection, points in [
+        (Connection(), RENDEZVOUS),
+        (Connection(listen=(one, two)), (one,)),
+        (Connection(listen=(one, two, three), connect=(three, two)), (two, three)),
+        (Connection(listen=(), connect=(one,)), ()),
+        (Connection("client"), ()),
+        (Connection("router"), ()),
+        (Connection(config="zenoh.json5"), ()),
+    ]:
+        assert connection.rendezvous == points
+    given = Connection(listen=(one, two, three), connect=(three, two))
+    assert value(given, "listen/endpoints") == [two, one, LOOPBACK]
+
+
+@pytest.mark.parametrize("mode", ["peer", "client", "router"])
+def test_zenoh_takes_every_setting(mode: str) -> None:
+    config = zenoh.Config()
+    for path, text in Connection(mode).settings().items():
+        config.insert_json5(path, text)

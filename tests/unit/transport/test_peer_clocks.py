@@ -1,0 +1,170 @@
+"""Round trips bound how far apart two clocks are; what arrives fast refines that, and nothing else does."""
+
+import time
+from collections.abc import Iterator
+from types import SimpleNamespace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from holozen.messages import Twist
+from holozen.testing import Wire, wait_for
+from holozen.transport.errors import BusError
+from holozen.transport.peer_clocks import AGAIN, MAX_PEERS, PeerClocks
+from holozen.transport.pubsub import Sample, Stamp
+
+OFFSET = 7200.0  # s that the peer's clock is ahead of ours
+
+
+class Link:
+    """A peer behind a link with delays in seconds there and back, and this side's clock."""
+
+    def __init__(self, there: float = 0.0, back: float = 0.0) -> None:
+        self.now, self.there, self.back = 100.0, there, back
+        self.alive, self.asked, self.offset = True, 0, OFFSET
+        self.silent = False  # requests from now on are never answered
+        self.clocks = PeerClocks(self.ask, lambda session: self.alive or session != "aa", lambda: self.now)
+        self.clocks.track(["aa"], self.now)
+
+    def ask(self, _session: str, _timeout: float) -> "Reply":
+        self.asked += 1
+        return Reply(self, self.now)
+
+    def run(self, seconds: float) -> None:
+        """Look every 4 ms, as a sim does."""
+        for _ in range(round(seconds / 0.004)):
+            self.clocks.poll(self.now)
+            self.now += 0.004
+
+    def ages(self, age: float) -> tuple[float, float] | None:
+        """What is known of the age of a sample that was sent `age` seconds ago."""
+        return self.clocks.ages("aa", self.now - age + self.offset, self.now)
+
+
+class Reply:
+    """The answer of the peer, which is on its way for as long as the link takes."""
+
+    def __init__(self, link: Link, asked: float) -> None:
+        self.link, self.comes = link, asked + link.there + link.back + 1e9 * link.silent
+        self.clock = round((asked + link.there + link.offset) * 1e9)
+
+    def try_recv(self) -> Sample | bytes | None:
+        if not self.link.alive:
+            raise BusError("no more replies")
+        if self.link.now < self.comes:
+            return None
+        return Sample(SimpleNamespace(payload=str(self.clock).encode(), encoding=""))
+
+
+def test_without_an_answer_nothing_is_known() -> None:
+    link = Link(1.0, 1.0)
+    link.run(1.5)
+    assert link.ages(0.0) is None
+    assert link.clocks.answered("aa") < 0
+    link.run(1.0)
+    assert link.ages(0.0) is not None
+    assert link.clocks.answered("aa") == pytest.approx(100.0)
+
+
+@given(there=st.floats(0, 2), back=st.floats(0, 2), age=st.floats(0, 5), runs=st.floats(0.1, 3))
+def test_the_true_age_lies_within_the_bounds_and_their_width_is_that_of_the_round_trip(
+    there: float, back: float, age: float, runs: float
+) -> None:
+    link = Link(there, back)
+    link.run(there + back + runs)
+    known = link.ages(age)
+    assert known is not None
+    youngest, oldest = known
+    assert youngest - 1e-6 <= age <= oldest + 1e-6
+    assert oldest - age <= there + 0.02  # the way there, and what a clock may drift between two round trips
+
+
+def test_a_fast_sample_refines_the_lower_bound_and_no_sample_the_upper_one() -> None:
+    link = Link(0.3, 0.3)
+    link.run(0.7)
+    first = link.ages(0.3)
+    assert first == pytest.approx((0.0, 0.6), abs=0.01)
+    assert link.ages(0.001) == pytest.approx((0.0, 0.301), abs=0.01)
+    assert link.ages(0.3) == pytest.approx((0.299, 0.6), abs=0.01)
+
+
+def test_a_sample_from_the_future_says_nothing_and_asks_for_another_round_trip() -> None:
+    link = Link()
+    link.run(2.0)
+    before, asked = link.ages(0.1), link.asked
+    assert link.ages(-5.0) is None
+    assert link.ages(0.1) == before
+    link.run(0.01)
+    assert link.asked > asked
+
+
+def test_a_clock_that_jumped_is_measured_anew() -> None:
+    link = Link(0.01, 0.01)
+    link.run(2.0)
+    link.offset -= 600  # the peer's computer slept
+    link.run(2 * AGAIN)
+    assert link.ages(0.2) == pytest.approx((0.2, 0.2), abs=0.03)
+
+
+def test_a_sender_that_is_asked_to_hurry_is_asked_at_once() -> None:
+    link = Link()
+    link.run(1.5)
+    before = link.now
+    link.clocks.ask_now("aa", link.now)
+    link.run(0.01)
+    assert link.clocks.answered("aa") >= before
+
+
+def test_who_left_is_forgotten_and_a_flood_is_bounded() -> None:
+    link = Link()
+    link.run(0.1)
+    link.clocks.track((f"forged{number}" for number in range(1000)), link.now)
+    before = link.asked
+    link.run(0.004)
+    assert link.asked - before <= MAX_PEERS
+    link.alive = False
+    link.clocks.track([], link.now)
+    assert link.ages(0.0) is None
+
+
+def test_a_session_that_commands_is_measured_among_many_that_never_answer() -> None:
+    link = Link()
+    link.silent = True
+    link.clocks.track((f"forged{number}" for number in range(1000)), link.now)
+    link.run(0.1)
+    link.silent = False
+    link.clocks.track_first("bb", link.now)
+    link.run(1.1)  # those that do not answer keep their places for a second at most
+    assert link.clocks.ages("bb", link.now + OFFSET, link.now) is not None
+
+
+@pytest.fixture
+def wire() -> Iterator[Wire]:
+    with Wire() as wire:
+        yield wire
+
+
+def test_over_zenoh_a_publisher_stamps_and_its_session_answers(wire: Wire) -> None:
+    robot, driver = wire.bus("robot"), wire.bus("driver")
+    commands, graph = robot.subscribe("cmd_vel", Twist), robot.graph()
+    publisher = driver.publisher("cmd_vel", Twist)
+    wait_for(lambda: publisher.matched)
+    publisher.put(Twist())
+    received = wait_for(commands.try_recv)
+    assert received is not None
+    stamp = received.sample.stamp
+    assert isinstance(stamp, Stamp)
+    assert (stamp.session, stamp.number, received.sample.source) == (driver.id, 0, driver.source)
+    clocks = robot.peer_clocks(graph.has)
+    wait_for(lambda: graph.endpoints() and graph.has(driver.id))
+
+    def known() -> tuple[float, float] | None:
+        now = time.monotonic()
+        clocks.track([driver.id], now)
+        clocks.poll(now)
+        return clocks.ages(driver.id, stamp.sent, now)
+
+    youngest, oldest = wait_for(known) or (0.0, 0.0)
+    assert 0 <= youngest <= time.monotonic() - stamp.sent <= oldest + 0.01 < 10
+    assert driver.clock_asked.is_set()

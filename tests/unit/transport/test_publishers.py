@@ -1,0 +1,124 @@
+"""A publisher writes messages, and gives the last one to whoever asks."""
+
+import math
+import sys
+
+import pytest
+import zenoh
+
+from holozen.bus import Bus
+from holozen.messages import Odometry, Twist, Vector3
+from holozen.messages.codec import WIRES, CodecError, encoding
+from holozen.testing import Process, Wire, wait_for
+from holozen.transport.connection import Connection
+from holozen.transport.pubsub import Publisher
+
+
+def last(bus: Bus, key: str) -> list[tuple[bytes, str]]:
+    replies = bus.session.get(key, timeout=10)
+    return [(bytes(reply.ok.payload), str(reply.ok.encoding)) for reply in replies if reply.ok]
+
+
+@pytest.mark.parametrize("name", WIRES)
+def test_what_is_put_arrives_with_encoding_priority_and_source(wire: Wire, name: str) -> None:
+    writer, reader = wire.bus("writer", wire=name), wire.bus("reader")
+    subscription = reader.subscribe("cmd_vel", Twist)
+    publisher: Publisher[Twist] = writer.publisher("cmd_vel", Twist, "DATA_LOW")
+    wait_for(lambda: publisher.matched)
+    publisher.put(Twist.planar(0.5))
+    received = subscription.recv()
+    assert received.message == Twist.planar(0.5)
+    sample = received.sample
+    assert (sample.key, sample.encoding) == ("cmd_vel", encoding(name, Twist))
+    assert (sample.priority, sample.source) == ("DATA_LOW", writer.source)
+    assert writer.source.startswith("writer@")
+
+
+def test_nobody_matches_until_somebody_subscribes(wire: Wire) -> None:
+    publisher: Publisher[Twist] = wire.bus("writer").publisher("cmd_vel", Twist)
+    assert not publisher.matched
+    reader = wire.bus("reader").subscribe("cmd_vel", Twist)
+    wait_for(lambda: publisher.matched)
+    reader.close()
+    wait_for(lambda: not publisher.matched)
+
+
+def test_a_get_is_answered_with_the_last_message(wire: Wire, capfd: pytest.CaptureFixture[str]) -> None:
+    writer, reader = wire.bus("writer"), wire.bus("reader")
+    publisher: Publisher[Odometry] = writer.publisher("odom", Odometry)
+    assert last(writer, "odom") == []
+    publisher.put(Odometry(child_frame_id="first"))
+    publisher.put(Odometry(child_frame_id="second"))
+    ((payload, encoding),) = wait_for(lambda: last(reader, "odom"))
+    assert b'"second"' in payload
+    assert encoding == "application/json"
+    assert capfd.readouterr().err == ""  # Zenoh's own thread tells there what went wrong
+
+
+def test_a_number_that_is_not_finite_is_neither_sent_nor_remembered(wire: Wire) -> None:
+    bus = wire.bus()
+    subscription = bus.subscribe("cmd_vel", Twist)
+    publisher: Publisher[Twist] = bus.publisher("cmd_vel", Twist)
+    publisher.put(Twist.planar(1))
+    with pytest.raises(CodecError, match=r"^Twist\.linear\.y is not a finite number$"):
+        publisher.put(Twist(Vector3(y=math.nan)))
+    publisher.put(Twist.planar(2))
+    assert [subscription.recv().message for _ in range(2)] == [Twist.planar(1), Twist.planar(2)]
+    with pytest.raises(CodecError):
+        publisher.put(Twist(Vector3(y=math.inf)))
+    assert b'"x":2' in last(bus, "cmd_vel")[0][0]
+
+
+def test_a_closed_publisher_leaves_nothing_of_its_key(wire: Wire) -> None:
+    writer, reader = wire.bus("writer"), wire.bus("reader")
+    graph = reader.graph()
+    publisher: Publisher[Twist] = writer.publisher("cmd_vel", Twist)
+    publisher.put(Twist())
+    wait_for(graph.endpoints)
+    publisher.close()
+    wait_for(lambda: not graph.endpoints())
+    assert last(writer, "cmd_vel") == []
+
+
+def test_samples_are_numbered_by_their_publisher(wire: Wire) -> None:
+    bus, reader = wire.bus(), wire.bus()
+    tap = reader.subscribe_raw("*")
+    first: Publisher[Twist] = bus.publisher("cmd_vel", Twist)
+    second: Publisher[Twist] = bus.publisher("cmd_vel", Twist)
+    wait_for(lambda: first.matched and second.matched)
+    for publisher in (first, first, second, first):
+        publisher.put(Twist())
+    bus.session.put("plain", b"{}")
+    numbers = [tap.recv().number for _ in range(5)]
+    told = [number for number in numbers if number]
+    assert [number for _, number in told] == [0, 1, 0, 2]
+    assert told[0][0] == told[1][0] == told[3][0] != told[2][0]
+    assert numbers[4] is None
+
+
+HOLDER = """
+import ctypes, signal, sys
+from holozen.bus import Bus
+from holozen.messages import Odometry, Twist
+from holozen.transport.connection import Connection
+with Bus("holder", Connection(connect=(sys.argv[1],), listen=(sys.argv[1],))) as bus:
+    odom, commands = bus.publisher("odom", Odometry), bus.subscribe_raw("cmd_vel", 10)
+    print("ready", flush=True)
+    ctypes.PyDLL(None).sleep(5)  # no other thread of Python runs meanwhile
+    print("awake", flush=True)
+    signal.pause()
+"""
+
+
+def test_many_gets_of_the_last_value_do_not_hold_up_the_link(wire: Wire) -> None:
+    with Process([sys.executable, "-c", HOLDER, wire.endpoint]) as holder:
+        holder.wait_for_line("ready")
+        asking = Bus("asking", Connection(mode="client", connect=(wire.endpoint,)))
+        with asking:
+            wait_for(asking.served("odom"))
+            commands = asking.session.declare_publisher("cmd_vel", congestion_control=zenoh.CongestionControl.BLOCK)
+            kept = [asking.ask("odom", 20.0) for _ in range(1000)]
+            for _ in range(200):
+                commands.put(bytes(200_000))  # more than buffers on the way take
+            assert "awake" not in holder.out
+            assert len(kept) == 1000

@@ -1,0 +1,273 @@
+"""Requests are typed, and every failure is a reply that says why."""
+
+from collections import Counter
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.messages import NextGoalReply, NextGoalRequest, TriggerReply, TriggerRequest
+from holozen.messages.codec import WIRES, encoding
+from holozen.testing import Wire, wait_for
+from holozen.transport.errors import NoReply, ServiceError
+from holozen.transport.pubsub import Sample
+from holozen.transport.services import MAX_REQUEST_BYTES, Replies, Server, answer_in_turn, call_bytes, refusal
+
+R = TypeVar("R")
+
+
+def goal(request: NextGoalRequest) -> NextGoalReply:
+    if request.request_goal < 0:
+        raise ServiceError("goal -1: there is none\nat all")
+    return NextGoalReply(x_goal=10 / request.request_goal)
+
+
+@pytest.fixture
+def caller(wire: Wire) -> Bus:
+    """A bus beside one that serves next_goal."""
+    server, caller = wire.bus("server"), wire.bus("caller")
+    server.serve("next_goal", NextGoalRequest, NextGoalReply, goal).start()
+    return caller
+
+
+def failure(caller: Bus, payload: bytes, encoding: str = "application/json") -> str:
+    with pytest.raises(ServiceError) as error:
+        call_bytes(caller, "next_goal", payload, encoding, 10)
+    assert not isinstance(error.value, NoReply)
+    return str(error.value)
+
+
+def test_a_request_gets_its_reply(caller: Bus) -> None:
+    assert caller.call("next_goal", NextGoalRequest(4), NextGoalReply) == NextGoalReply(2.5)
+    assert caller.call("next_goal", NextGoalRequest(5), NextGoalReply) == NextGoalReply(2.0)
+
+
+@pytest.mark.parametrize("name", WIRES)
+def test_a_server_speaks_its_wire_and_understands_the_others(wire: Wire, name: str) -> None:
+    wire.bus("server", wire=name).serve("next_goal", NextGoalRequest, NextGoalReply, goal).start()
+    for other in WIRES:
+        caller = wire.bus("caller", wire=other)
+        assert caller.call("next_goal", NextGoalRequest(4), NextGoalReply) == NextGoalReply(2.5)
+    assert call_bytes(caller, "next_goal", b'{"request_goal": 1}', "", 10).encoding == encoding(name, NextGoalReply)
+
+
+def test_a_refusal_arrives_in_the_words_of_the_service(caller: Bus) -> None:
+    with pytest.raises(ServiceError, match=r"^goal -1: there is none\nat all$"):
+        caller.call("next_goal", NextGoalRequest(-1), NextGoalReply)
+
+
+def test_a_handler_that_breaks_tells_its_own_log_and_not_the_caller(
+    caller: Bus, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(ServiceError, match=r"^next_goal: internal error, see the server's log$"):
+        caller.call("next_goal", NextGoalRequest(0), NextGoalReply)
+    assert capsys.readouterr().err == "next_goal: ZeroDivisionError: division by zero\n"
+    assert caller.call("next_goal", NextGoalRequest(1), NextGoalReply) == NextGoalReply(10)
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding", "told"),
+    [
+        (b'{"request_gaol": 1}', "application/json", "contains unknown field `request_gaol`"),
+        (b"[]", "application/json", "not a NextGoalRequest: Expected `object`, got `array`"),
+        (b"{}", "image/png", "unknown encoding 'image/png'"),
+    ],
+)
+def test_a_request_that_is_none_is_refused_with_the_reason(
+    caller: Bus, payload: bytes, encoding: str, told: str
+) -> None:
+    assert told in failure(caller, payload, encoding)
+
+
+def test_a_request_that_is_too_large_is_not_read(caller: Bus) -> None:
+    size = MAX_REQUEST_BYTES + 1
+    assert failure(caller, b"x" * size) == f"request of {size} bytes; at most {MAX_REQUEST_BYTES} are read"
+
+
+def selected(caller: Bus, selector: str) -> str:
+    def ask() -> str:
+        (reply,) = list(caller.session.get(selector, timeout=10)) or (None,)
+        end = reply and (reply.ok or reply.err)
+        return bytes(end.payload).decode() if end else ""
+
+    return str(wait_for(ask))
+
+
+def test_a_get_without_payload_asks_by_its_parameters(caller: Bus) -> None:
+    assert '"x_goal":2.5' in selected(caller, "next_goal?request_goal=4")
+    assert "`int`" in selected(caller, "next_goal?request_goal=four")
+    assert "unknown field `gaol`" in selected(caller, "next_goal?gaol=4")
+
+
+def test_a_look_around_by_a_wildcard_asks_nobody_to_do_anything(wire: Wire) -> None:
+    asked = []
+
+    def resume(request: TriggerRequest) -> TriggerReply:
+        asked.append(request)
+        return TriggerReply(True)
+
+    server, caller = wire.bus("sim"), wire.bus("caller")
+    for key in ("resume", "Fred/resume"):
+        server.serve(key, TriggerRequest, TriggerReply, resume).start()
+    assert caller.call("resume", TriggerRequest(), TriggerReply).success
+    for key in ("**", "*", "*/resume", "Fred/*"):
+        assert list(caller.session.get(key, timeout=10)) == []
+    assert len(asked) == 1
+
+
+def test_requests_wait_until_the_server_looks(wire: Wire) -> None:
+    """The sim answers between two steps."""
+    asked = []
+
+    def resume(request: TriggerRequest) -> TriggerReply:
+        asked.append(request)
+        return TriggerReply(True)
+
+    server_bus, caller = wire.bus("sim"), wire.bus("caller")
+    server = server_bus.serve("resume", TriggerRequest, TriggerReply, resume)
+    server.answer_pending()  # nothing waits
+    with ThreadPoolExecutor() as pool:
+        reply = pool.submit(caller.call, "resume", TriggerRequest(), TriggerReply, 10)
+
+        def answered() -> bool:
+            server.answer_pending()
+            return reply.done()
+
+        wait_for(answered)
+    assert reply.result() == TriggerReply(True)
+    assert asked == [TriggerRequest()]
+
+
+def test_a_closed_server_answers_no_more(wire: Wire) -> None:
+    bus = wire.bus("server")
+    server = bus.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(True))
+    server.start()
+    assert bus.call("resume", TriggerRequest(), TriggerReply).success
+    server.close()
+    with pytest.raises(NoReply):
+        bus.call("resume", TriggerRequest(), TriggerReply, timeout=0.05)
+    assert server.answer_pending() == 0
+
+
+def test_the_reason_of_ours_and_of_strangers_is_shown() -> None:
+    for payload, text in [
+        (b'{"error": "no such goal"}', "no such goal"),
+        (b'{"error": 7}', "7"),
+        (b"plain words", "plain words"),
+        (b'"error"', '"error"'),
+        (b'["error"]', '["error"]'),
+        (b"{}", "{}"),
+        (b"", "the service answered with an error and no reason"),
+        (b"\xff", "�"),
+        (b"[" * 50_000, "[" * 50_000),
+    ]:
+        assert str(refusal(payload)) == text
+
+
+def test_a_server_knows_who_says_to_call(wire: Wire) -> None:
+    callers = list[str]()
+
+    def answer(_request: TriggerRequest) -> TriggerReply:
+        callers.append(server.caller)
+        return TriggerReply(True)
+
+    server = wire.bus("server").serve("stop", TriggerRequest, TriggerReply, answer)
+    server.start()
+    caller = wire.bus("caller")
+    caller.call("stop", TriggerRequest(), TriggerReply)
+    list(caller.session.get("stop"))
+    assert callers == [caller.source, ""]
+
+
+def outcome(replies: Replies) -> str:
+    """The one reply to a request: "answered", or the reason why not."""
+    (reply,) = list(replies)
+    return "answered" if isinstance(reply, Sample) else str(refusal(reply))
+
+
+def answered_while(server: Server, work: Callable[[], R]) -> R:
+    """What `work` gives, done in a thread while the server answers."""
+    with ThreadPoolExecutor() as pool:
+        done = pool.submit(work)
+
+        def over() -> bool:
+            server.answer_pending(most=1)
+            return done.done()
+
+        wait_for(over, 60)
+        return done.result()
+
+
+def test_each_of_a_thousand_requests_at_once_gets_an_answer_or_the_word_busy(wire: Wire) -> None:
+    server = wire.bus("server").serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(), room=100)
+    caller = wire.bus("caller")
+    wait_for(caller.served("resume"))
+    asked = [caller.ask("resume", 60.0) for _ in range(1000)]
+    outcomes = Counter(answered_while(server, lambda: [outcome(replies) for replies in asked]))
+    assert set(outcomes) == {"answered", "resume is busy: 100 requests wait already; ask again"}
+    assert outcomes["answered"] >= 100
+
+
+def test_who_asks_a_lot_keeps_nobody_else_waiting(wire: Wire) -> None:
+    callers = list[str]()
+
+    def answer(_request: TriggerRequest) -> TriggerReply:
+        callers.append(server.caller)
+        return TriggerReply()
+
+    server = wire.bus("server").serve("resume", TriggerRequest, TriggerReply, answer, room=10)
+    greedy, modest = wire.bus("greedy"), wire.bus("modest")
+    for bus in (greedy, modest):
+        wait_for(bus.served("resume"))
+    kept = [greedy.ask("resume", 60.0) for _ in range(20)]
+    wait_for(lambda: server.take_in() == 10)
+    kept.append(modest.ask("resume", 60.0))
+    wait_for(lambda: server.take_in() and server.answer_pending(most=1) and modest.source in callers)
+    assert callers.index(modest.source) <= 10
+
+
+def test_a_call_asks_a_busy_service_again(wire: Wire) -> None:
+    server = wire.bus("server").serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(), room=1)
+    callers = [wire.bus(f"caller{number}") for number in range(8)]
+
+    def ask(caller: Bus) -> TriggerReply:
+        return caller.call("resume", TriggerRequest(), TriggerReply, 60)
+
+    with ThreadPoolExecutor(len(callers)) as pool:
+        assert answered_while(server, lambda: list(pool.map(ask, callers))) == [TriggerReply()] * 8
+
+
+def test_a_service_that_stays_busy_is_an_error_that_says_so(wire: Wire) -> None:
+    server = wire.bus("server").serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(), room=0)
+    caller = wire.bus("caller")
+    with ThreadPoolExecutor() as pool:
+        call = pool.submit(caller.call, "resume", TriggerRequest(), TriggerReply, 1.0)
+        wait_for(lambda: server.take_in() or call.done())
+    with pytest.raises(ServiceError, match=r"^resume is busy: 0 requests wait already; ask again$"):
+        call.result()
+
+
+def test_services_of_one_loop_take_turns(wire: Wire) -> None:
+    order = list[str]()
+
+    def noting(name: str) -> Callable[[TriggerRequest], TriggerReply]:
+        def answer(_request: TriggerRequest) -> TriggerReply:
+            order.append(name)
+            return TriggerReply()
+
+        return answer
+
+    bus, caller = wire.bus("server"), wire.bus("caller")
+    servers = [bus.serve(name, TriggerRequest, TriggerReply, noting(name)) for name in ("spawn", "delete")]
+    kept = list[Replies]()
+    for name, many in (("spawn", 50), ("delete", 2)):
+        wait_for(caller.served(name))
+        kept += [caller.ask(name, 60.0) for _ in range(many)]
+    wait_for(lambda: [server.take_in() for server in servers] == [50, 2])
+    for _ in range(4):
+        answer_in_turn(servers, 0.0)
+    assert order == ["spawn", "delete", "spawn", "delete"]
+    answer_in_turn(servers, 60.0)
+    assert len(order) == 52
