@@ -1,30 +1,23 @@
 """A robot file under check: its sources, its elements with their lines, and the mistakes that rules find in it."""
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
-
-from holozen.robot.elements import Source, Tag
-from holozen.robot.sdf_models import parse_sdf
-
-if TYPE_CHECKING:
-    pass  # dropped
 import os
 import re
 import tempfile
-from collections.abc import Collection, Iterable, Mapping
-from dataclasses import field
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Literal
 from xml.parsers import expat
 
 from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
-from holozen.robot.elements import read_xml, repair_xml
+from holozen.robot.elements import Source, Tag, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.packages import find_by_name, find_package
+from holozen.robot.sdf_models import parse_sdf
 from holozen.robot.xacro import Outcome, expand_in_child, is_xacro, process, read_text
 
 Severity = Literal["error", "warning"]
@@ -63,7 +56,15 @@ class Rule:
     severity: Severity
     finds: str
     why: str
-    find: "Callable[[Subject], Iterator[Mistake]]"
+    find: "Find"
+
+
+Find = Callable[["Subject"], Iterable[Mistake]]
+
+
+def rule(name: str, severity: Severity, finds: str, why: str) -> Callable[[Find], Rule]:
+    """Make a function that inspects a robot file a Rule."""
+    return lambda find: Rule(name, severity, finds, why, find)
 
 
 @dataclass(frozen=True, slots=True)

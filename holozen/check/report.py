@@ -1,7 +1,8 @@
 """A robot file -> everything that is wrong with it: the table of rules, and the findings in order."""
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -79,214 +80,33 @@ def _lines(path: Path) -> list[str]:
 # The rules, in the order in which they are best fixed.
 
 
-def _errors(subject: Subject) -> Iterator[Mistake]:
-    yield from loader_mistakes(subject, "error")
-
-
-def _warnings(subject: Subject) -> Iterator[Mistake]:
-    yield from loader_mistakes(subject, "warning")
-
-
-def _nothing(_: Subject) -> Iterator[Mistake]:
-    return iter(())
-
-
 FATAL = Rule(
     "file",
     "error",
     "a file that is not a robot: broken XML, xacro that cannot be expanded",
     "nothing in it is usable",
-    _nothing,
+    lambda _: (),  # `examine` reports it
 )
 LOAD = Rule(
     "load",
     "error",
     "other mistakes that prevent loading",
     "the robot cannot be spawned",
-    _errors,
+    partial(loader_mistakes, severity="error"),
 )
 NOTE = Rule(
     "load-note",
     "warning",
     "other values that are replaced on loading",
     "the robot differs from the file",
-    _warnings,
+    partial(loader_mistakes, severity="warning"),
 )
 
-RULES = (
-    Rule("xml", "warning", "broken XML that Gazebo tolerates", "ROS and other parsers reject it", rules_xml.forgiven),
-    Rule("tag", "error", "a misspelt element", "it is silently ignored", rules_xml.misspelt_tags),
-    Rule("attribute", "error", "a misspelt attribute", "it is silently ignored", rules_xml.misspelt_attributes),
-    Rule("place", "error", "an element in a place where it is not read", "it is silently ignored", rules_xml.misplaced),
-    Rule("ignored", "warning", "an element that URDF does not have", "URDF parsers ignore it", rules_xml.ignored),
-    Rule(
-        "joint-type", "error", "a joint type that does not exist", "the robot cannot be loaded", rules_xml.joint_kinds
-    ),
-    Rule(
-        "twice",
-        "error",
-        "two links or two joints with one name",
-        "references to it are ambiguous",
-        rules_names.duplicates,
-    ),
-    Rule("no-link", "error", "a joint that names no link", "the joint connects nothing", rules_names.unknown_links),
-    Rule(
-        "gazebo-link",
-        "warning",
-        "a gazebo tag that names no link",
-        "its settings are lost, as in Gazebo",
-        rules_names.unknown_references,
-    ),
-    Rule("tree", "error", "links that are not one tree", "the robot falls apart", rules_names.unconnected),
-    Rule(
-        "colour",
-        "warning",
-        "a material without a colour, or with two",
-        "the colour is undefined",
-        rules_names.colours,
-    ),
-    Rule(
-        "unused-colour", "warning", "a material that nothing uses", "a name may be misspelt", rules_names.unused_colours
-    ),
-    Rule("macro-twice", "warning", "a macro that is defined twice", "the first one is lost", rules_names.macros_twice),
-    Rule(
-        "unused",
-        "warning",
-        "a property or macro that nothing uses",
-        "a name may be misspelt",
-        rules_names.unused_macros,
-    ),
-    Rule(
-        "limit", "error", "a revolute or prismatic joint without limit", "URDF parsers reject it", rules_joints.no_limit
-    ),
-    Rule("limit-range", "error", "a joint limit without range", "the joint cannot move", rules_joints.empty_limit),
-    Rule(
-        "limit-effort",
-        "warning",
-        "a limit without effort or velocity",
-        "motors have no strength",
-        rules_joints.no_effort,
-    ),
-    Rule("mimic", "error", "a joint that mimics nothing", "the joint does not move", rules_joints.mimics),
-    Rule("degrees", "warning", "an angle in degrees", "URDF and SDF use radians", rules_joints.degrees),
-    Rule("no-inertia", "error", "a body without mass", "Gazebo drops it, or it cannot move", rules_inertia.no_inertia),
-    Rule("mass", "error", "a negative or missing mass", "it is physically impossible", rules_inertia.bad_mass),
-    Rule("massless", "warning", "a mass or an inertia of zero", "Gazebo drops such a link", rules_inertia.no_mass),
-    Rule("heavy", "warning", "a mass impossible for its size", "motors and contacts fail", rules_inertia.absurd_mass),
-    Rule(
-        "inertia",
-        "error",
-        "a physically impossible inertia",
-        "the robot shakes or flies off",
-        rules_inertia.impossible_inertia,
-    ),
-    Rule(
-        "inertia-size",
-        "warning",
-        "an inertia 10 times larger or smaller than the shape's",
-        "it turns too hard or too easily",
-        rules_inertia.unlike_shape,
-    ),
-    Rule("floating", "warning", "a body without gravity", "nothing keeps it on the ground", rules_inertia.floating),
-    Rule(
-        "wheel-collision",
-        "error",
-        "a wheel without collision shape",
-        "it sinks into the floor",
-        rules_wheels.wheel_collisions,
-    ),
-    Rule(
-        "wheel-axis",
-        "error",
-        "a wheel that does not turn about its cylinder's axis",
-        "it tumbles instead of rolling",
-        rules_wheels.wheel_axes,
-    ),
-    Rule(
-        "wheel-height",
-        "warning",
-        "a wheel above the ground, or lower than the others",
-        "it does not drive, or the robot leans",
-        rules_wheels.wheel_heights,
-    ),
-    Rule(
-        "overlap",
-        "warning",
-        "a wheel inside another, or more than half of it inside the body",
-        "impossible on a real robot",
-        rules_wheels.overlaps,
-    ),
-    Rule(
-        "wheel-load",
-        "warning",
-        "a part of the body that is as low as the wheels",
-        "it drags on the ground, and the wheels slip",
-        rules_wheels.dragging,
-    ),
-    Rule(
-        "wheel-side",
-        "error",
-        "a left wheel on the right side, or the other way round",
-        "it turns the wrong way: the plugin's tags say which side is which",
-        rules_wheels.sides,
-    ),
-    Rule(
-        "wheel-measure",
-        "warning",
-        "a plugin's wheel separation or diameter that differs by 20 % from the robot's",
-        "it turns or drives faster or slower than commanded",
-        rules_wheels.measures,
-    ),
-    Rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it", rules_plugins.misspelt_plugins),
-    Rule("plugin", "warning", "an unknown plugin", "it is ignored", rules_plugins.unknown_plugins),
-    Rule(
-        "plugin-link",
-        "warning",
-        "a plugin's frame that is not a link",
-        "odometry and sensors refer to a missing frame",
-        rules_plugins.plugin_links,
-    ),
-    Rule(
-        "plugin-joint",
-        "error",
-        "a plugin's joint that does not exist",
-        "the plugin has nothing to turn",
-        rules_plugins.plugin_joints,
-    ),
-    Rule("two-drives", "warning", "two drive plugins", "they work against each other", rules_plugins.two_drives),
-    Rule(
-        "no-drive",
-        "warning",
-        "wheels and plugin tags, but no drive plugin",
-        "cmd_vel moves nothing",
-        rules_plugins.no_drive,
-    ),
-    Rule("mesh", "error", "a mesh that is not found", "the part is invisible or a box", rules_meshes.missing),
-    Rule(
-        "mesh-path",
-        "warning",
-        "a mesh at a path on another machine",
-        "it is not found on other machines",
-        rules_meshes.elsewhere,
-    ),
-    Rule("mesh-empty", "error", "a mesh that is empty or broken", "the part has no shape", rules_meshes.unreadable),
-    Rule("mesh-unit", "warning", "a mesh in the wrong unit", "it is far too large or too small", rules_meshes.units),
-    Rule("fits", "error", "a robot larger than --fits", "the task sets its size", requirements.too_large),
-    Rule(
-        "require-file",
-        "error",
-        "an invalid line of --require",
-        "it checks nothing",
-        requirements.bad_needs,
-    ),
-    Rule(
-        "require",
-        "error",
-        "a missing link or joint of --require",
-        "the task sets its names",
-        requirements.missing_names,
-    ),
-)
+MODULES = (
+    rules_xml, rules_names, rules_joints, rules_inertia, rules_wheels, rules_plugins, rules_meshes, requirements,
+)  # fmt: skip
+RULES = [value for module in MODULES for value in vars(module).values() if isinstance(value, Rule)]
+"""All rules, in the order in which their findings are best fixed."""
 
 
 def table() -> str:

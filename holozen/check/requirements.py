@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from holozen.check.engine import Mistake, Place, Subject, closest
+from holozen.check.engine import Mistake, Place, Subject, closest, rule
 from holozen.check.geometry import box_of, size_of
 from holozen.check.rules_inertia import dimensions
 from holozen.robot.errors import RobotError, listed
@@ -23,6 +23,7 @@ class Need:
     type: str = ""
 
 
+@rule("fits", "error", "a robot larger than --fits", "the task sets its size")
 def too_large(subject: Subject) -> Iterator[Mistake]:
     """A robot larger than --fits: collision shapes, and visual ones except meshes, all joints at zero."""
     fits = subject.requirements.fits
@@ -42,6 +43,7 @@ def too_large(subject: Subject) -> Iterator[Mistake]:
         yield Mistake(subject.root, problem, "make it smaller, or bring its parts together")
 
 
+@rule("require-file", "error", "an invalid line of --require", "it checks nothing")
 def bad_needs(subject: Subject) -> Iterator[Mistake]:
     """Invalid lines of the --require file."""
     for line, need in _needs(subject):
@@ -50,6 +52,7 @@ def bad_needs(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(Place(str(subject.requirements.require), line), need, fix)
 
 
+@rule("require", "error", "a missing link or joint of --require", "the task sets its names")
 def missing_names(subject: Subject) -> Iterator[Mistake]:
     """Links and joints of the --require file that are missing, or joints of another type."""
     for _, need in _needs(subject):

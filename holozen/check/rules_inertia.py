@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from holozen.check.engine import Mistake, Subject
+from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.geometry import MOVING, box_of, fixed_bodies, half_sizes, size_of
 from holozen.robot.elements import Tag, Vector, number
 from holozen.robot.errors import listed
@@ -41,6 +41,7 @@ def read_inertial(link: Tag, sdf: bool) -> Given | None:
     return Given(tag, mass, value, inertia, _tensor(inertia, sdf) if inertia else None)
 
 
+@rule("no-inertia", "error", "a body without mass", "Gazebo drops it, or it cannot move")
 def no_inertia(subject: Subject) -> Iterator[Mistake]:
     """Bodies without mass: a link, with all that is fixed to it, that a joint moves or that others move on."""
     if subject.model is None or subject.model.static or subject.sdf:
@@ -62,6 +63,7 @@ def no_inertia(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, f"link {carrying[0]!r} has a collision and moving parts but no <inertial>", "add one")
 
 
+@rule("mass", "error", "a negative or missing mass", "it is physically impossible")
 def bad_mass(subject: Subject) -> Iterator[Mistake]:
     """Negative or missing masses."""
     for name, tag in subject.links.items():
@@ -78,6 +80,7 @@ def bad_mass(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(given.mass_tag, f"link {name!r} has a mass of {given.mass:g} kg", "give it its mass in kg")
 
 
+@rule("massless", "warning", "a mass or an inertia of zero", "Gazebo drops such a link")
 def no_mass(subject: Subject) -> Iterator[Mistake]:
     """Links with a mass of zero or without moments of inertia, which are loaded nevertheless."""
     for name, tag in subject.links.items():
@@ -89,6 +92,7 @@ def no_mass(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(given.inertia_tag, f"the inertia of link {name!r} is zero", "compute it from the shape")
 
 
+@rule("heavy", "warning", "a mass impossible for its size", "motors and contacts fail")
 def absurd_mass(subject: Subject) -> Iterator[Mistake]:
     """Links denser than any metal, and robots denser than steel."""
     total = 0.0
@@ -107,6 +111,7 @@ def absurd_mass(subject: Subject) -> Iterator[Mistake]:
         yield Mistake(subject.root, problem, "write kilograms, and sizes in metres")
 
 
+@rule("inertia", "error", "a physically impossible inertia", "the robot shakes or flies off")
 def impossible_inertia(subject: Subject) -> Iterator[Mistake]:
     """Impossible inertias: missing, not positive definite, or one moment above the sum of the other two."""
     for name, tag in subject.links.items():
@@ -119,6 +124,12 @@ def impossible_inertia(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(given.inertia_tag, f"the inertia of link {name!r} {problem}", "compute it from the shape")
 
 
+@rule(
+    "inertia-size",
+    "warning",
+    "an inertia 10 times larger or smaller than the shape's",
+    "it turns too hard or too easily",
+)
 def unlike_shape(subject: Subject) -> Iterator[Mistake]:
     """Inertias that differ tenfold from those of the link's shape, solid and of the link's mass."""
     if subject.model is None:
@@ -137,6 +148,7 @@ def unlike_shape(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(given.inertia_tag, problem + shape, "compute it from the shape and the mass")
 
 
+@rule("floating", "warning", "a body without gravity", "nothing keeps it on the ground")
 def floating(subject: Subject) -> Iterator[Mistake]:
     """Bodies that gravity does not pull, or only by less than half of their mass."""
     if subject.model is None or subject.model.static:

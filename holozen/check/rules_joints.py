@@ -3,12 +3,13 @@
 import math
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, Subject, closest
+from holozen.check.engine import Mistake, Subject, closest, rule
 from holozen.robot.elements import Tag, number
 
 LARGE_ANGLE = 20.0  # rad; more than three turns, and written as a round number of degrees
 
 
+@rule("limit", "error", "a revolute or prismatic joint without limit", "URDF parsers reject it")
 def no_limit(subject: Subject) -> Iterator[Mistake]:
     """Revolute and prismatic joints without a <limit>; in SDF they are unlimited."""
     for tag in subject.root.all("joint") if not subject.sdf else ():
@@ -19,6 +20,7 @@ def no_limit(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, f"{tag} is {kind} and has no <limit>", fix)
 
 
+@rule("limit-range", "error", "a joint limit without range", "the joint cannot move")
 def empty_limit(subject: Subject) -> Iterator[Mistake]:
     """Limits without range: lower above upper, or both the same."""
     for tag in subject.root.all("joint"):
@@ -33,6 +35,7 @@ def empty_limit(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(limit, f"{tag} cannot move: lower and upper are both {lower:g}", fix)
 
 
+@rule("limit-effort", "warning", "a limit without effort or velocity", "motors have no strength")
 def no_effort(subject: Subject) -> Iterator[Mistake]:
     """Moving joints whose limit gives no effort or velocity, or 0."""
     for tag in subject.root.all("joint"):
@@ -47,6 +50,7 @@ def no_effort(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(limit, f"the limit of {tag} has {word} 0", f"give it a {word} above 0, in {unit}")
 
 
+@rule("mimic", "error", "a joint that mimics nothing", "the joint does not move")
 def mimics(subject: Subject) -> Iterator[Mistake]:
     """Joints that mimic a missing joint, or themselves, directly or through others."""
     leaders = {name: tag.first("mimic") for name, tag in subject.joints.items()}
@@ -61,6 +65,7 @@ def mimics(subject: Subject) -> Iterator[Mistake]:
             )
 
 
+@rule("degrees", "warning", "an angle in degrees", "URDF and SDF use radians")
 def degrees(subject: Subject) -> Iterator[Mistake]:
     """Angles that can only be degrees."""
     for tag in subject.tags():

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
-from holozen.check.engine import Mistake, Subject
+from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.geometry import Placed, around, box_of, size_of
 from holozen.robot.elements import Tag, Vector, number
 from holozen.robot.errors import RobotError
@@ -22,6 +22,7 @@ UNITS = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 1000.0: ""
 """Factor to metres, and the unit that the file may be in; without one it may have been scaled twice."""
 
 
+@rule("mesh", "error", "a mesh that is not found", "the part is invisible or a box")
 def missing(subject: Subject) -> Iterator[Mistake]:
     """Meshes that are not found. The places searched are reported once."""
     searched = ""
@@ -35,6 +36,7 @@ def missing(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, f"mesh: {problem}", MODEL if uri.lower().startswith("model:") else PACKAGE)
 
 
+@rule("mesh-path", "warning", "a mesh at a path on another machine", "it is not found on other machines")
 def elsewhere(subject: Subject) -> Iterator[Mistake]:
     """Meshes at an absolute path on another machine, found here by their file name."""
     for tag, uri, _ in _meshes(subject):
@@ -47,6 +49,7 @@ def elsewhere(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, f"mesh: {line}", "write package://PACKAGE/PATH")
 
 
+@rule("mesh-empty", "error", "a mesh that is empty or broken", "the part has no shape")
 def unreadable(subject: Subject) -> Iterator[Mistake]:
     """Meshes that are empty or broken."""
     for tag, uri, _ in _meshes(subject):
@@ -59,6 +62,7 @@ def unreadable(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(tag, f"mesh {error}", again)
 
 
+@rule("mesh-unit", "warning", "a mesh in the wrong unit", "it is far too large or too small")
 def units(subject: Subject) -> Iterator[Mistake]:
     """Meshes whose size does not match the rest of the robot."""
     if subject.model is None:

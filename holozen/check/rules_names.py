@@ -4,13 +4,14 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, SourceFile, Subject, closest
+from holozen.check.engine import Mistake, SourceFile, Subject, closest, rule
 from holozen.robot.elements import Tag
 from holozen.robot.errors import listed
 
 PALETTE = 2  # this many unused colours are a palette shared by several robots
 
 
+@rule("twice", "error", "two links or two joints with one name", "references to it are ambiguous")
 def duplicates(subject: Subject) -> Iterator[Mistake]:
     """Two links or two joints with one name."""
     for kind in ("link", "joint"):
@@ -24,6 +25,7 @@ def duplicates(subject: Subject) -> Iterator[Mistake]:
                 )
 
 
+@rule("no-link", "error", "a joint that names no link", "the joint connects nothing")
 def unknown_links(subject: Subject) -> Iterator[Mistake]:
     """Joints that name a missing link."""
     for joint in subject.root.all("joint"):
@@ -34,6 +36,7 @@ def unknown_links(subject: Subject) -> Iterator[Mistake]:
                 yield _unknown(tag, f"{joint} names the {end} link {name!r}, which does not exist", name, subject.links)
 
 
+@rule("gazebo-link", "warning", "a gazebo tag that names no link", "its settings are lost, as in Gazebo")
 def unknown_references(subject: Subject) -> Iterator[Mistake]:
     """<gazebo> tags that name a missing link; a file without links is meant to be included by others."""
     for gazebo in subject.root.all("gazebo") if subject.links else ():
@@ -43,6 +46,7 @@ def unknown_references(subject: Subject) -> Iterator[Mistake]:
             yield _unknown(gazebo, f"reference={name!r} is no link and no joint", name, known)
 
 
+@rule("tree", "error", "links that are not one tree", "the robot falls apart")
 def unconnected(subject: Subject) -> Iterator[Mistake]:
     """Links other than the root without a parent joint, and links with two parents."""
     children = Counter[str]()
@@ -82,6 +86,7 @@ def _circles(subject: Subject, roots: list[str]) -> Iterator[Mistake]:
         yield Mistake(subject.links[lost[0]], problem, "remove one of the joints")
 
 
+@rule("colour", "warning", "a material without a colour, or with two", "the colour is undefined")
 def colours(subject: Subject) -> Iterator[Mistake]:
     """Used materials without a colour, or with two; in URDF only."""
     if subject.sdf:
@@ -100,16 +105,18 @@ def colours(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, f"material {name!r} has no colour anywhere{closest(name, known)}", fix)
 
 
+@rule("unused-colour", "warning", "a material that nothing uses", "a name may be misspelt")
 def unused_colours(subject: Subject) -> Iterator[Mistake]:
     """Materials of the file itself that no visual uses; a palette of several is left alone."""
     used = {tag.attributes.get("name", "") for tag in _materials(subject) if tag.parent is not subject.root}
     own = [tag for tag in subject.root.all("material") if subject.is_source(tag)]
     unused = [tag for tag in own if tag.attributes.get("name", "") not in used]
-    if used and len(unused) < PALETTE and not any(colours(subject)):
+    if used and len(unused) < PALETTE and not any(colours.find(subject)):
         for tag in unused:
             yield Mistake(tag, f"{tag} is used by no visual", "use it or remove it")
 
 
+@rule("macro-twice", "warning", "a macro that is defined twice", "the first one is lost")
 def macros_twice(subject: Subject) -> Iterator[Mistake]:
     """A macro that is defined twice in one file, outside of conditions."""
     for source in subject.sources:
@@ -121,6 +128,7 @@ def macros_twice(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(tag, f"macro {name!r} is defined twice, first at {subject.place(first)}", "rename one")
 
 
+@rule("unused", "warning", "a property or macro that nothing uses", "a name may be misspelt")
 def unused_macros(subject: Subject) -> Iterator[Mistake]:
     """Properties and macros of the robot file that nothing uses."""
     if (

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, Subject, closest, nearest
+from holozen.check.engine import Mistake, Subject, closest, nearest, rule
 from holozen.robot.elements import Tag
 from holozen.robot.errors import listed
 from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
@@ -18,6 +18,7 @@ LINK_TAGS = ("robotbaseframe", "robotbaselink", "bodyname")
 FRAME_TAGS = ("framename", "frameid", "childframeid")
 
 
+@rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it")
 def misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
     """Plugins whose file name is similar to a known one."""
     for plugin in subject.plugins:
@@ -29,6 +30,7 @@ def misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
             )
 
 
+@rule("plugin", "warning", "an unknown plugin", "it is ignored")
 def unknown_plugins(subject: Subject) -> Iterator[Mistake]:
     """Plugins that are neither known nor of a known family."""
     for plugin in subject.plugins:
@@ -40,6 +42,7 @@ def unknown_plugins(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(plugin, f"plugin {plugin.attributes['filename']!r} is unknown and is ignored", fix)
 
 
+@rule("plugin-link", "warning", "a plugin's frame that is not a link", "odometry and sensors refer to a missing frame")
 def plugin_links(subject: Subject) -> Iterator[Mistake]:
     """Plugin frames that do not name a link."""
     for tag in _settings(subject):
@@ -54,6 +57,7 @@ def plugin_links(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, f"<{tag.name}> is {name!r}, which names no link", f"write {suggestion}")
 
 
+@rule("plugin-joint", "error", "a plugin's joint that does not exist", "the plugin has nothing to turn")
 def plugin_joints(subject: Subject) -> Iterator[Mistake]:
     """Plugin joints that do not exist."""
     for tag, name in subject.plugin_joints:
@@ -62,6 +66,7 @@ def plugin_joints(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, problem, f"joints: {listed(list(subject.joints))}")
 
 
+@rule("two-drives", "warning", "two drive plugins", "they work against each other")
 def two_drives(subject: Subject) -> Iterator[Mistake]:
     """A second plugin that drives the robot."""
     driving = [plugin for plugin in subject.plugins if kind_of(plugin) in DRIVES]
@@ -69,6 +74,7 @@ def two_drives(subject: Subject) -> Iterator[Mistake]:
         yield Mistake(plugin, f"{plugin} drives the robot, and so does {driving[0]}", "keep one of them")
 
 
+@rule("no-drive", "warning", "wheels and plugin tags, but no drive plugin", "cmd_vel moves nothing")
 def no_drive(subject: Subject) -> Iterator[Mistake]:
     """A robot on wheels with plugin tags, but no drive plugin. A file without any is a plain description."""
     controls = [tag for tag in subject.plugins if kind_of(tag) in MOVING_ELSEWHERE] + subject.root.all("ros2_control")

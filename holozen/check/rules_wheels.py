@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import combinations
 from statistics import fmean, median_low
 
-from holozen.check.engine import Mistake, Subject
+from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.geometry import (
     ALIGNED,
     LEAST,
@@ -116,6 +116,7 @@ SAME = math.cos(math.radians(0.5))
 ROUGH = 0.2  # friction of a part that drags
 
 
+@rule("wheel-collision", "error", "a wheel without collision shape", "it sinks into the floor")
 def wheel_collisions(subject: Subject) -> Iterator[Mistake]:
     """Wheels without a collision shape, on a robot meant to be simulated."""
     if subject.model is None or not any(link.collisions or link.inertial for link in subject.model.links.values()):
@@ -128,6 +129,7 @@ def wheel_collisions(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(subject.links[joint.child], f"wheel {joint.child!r} has no <collision>", fix)
 
 
+@rule("wheel-axis", "error", "a wheel that does not turn about its cylinder's axis", "it tumbles instead of rolling")
 def wheel_axes(subject: Subject) -> Iterator[Mistake]:
     """Wheels that do not turn about their cylinder's axis."""
     for wheel in subject.wheels:
@@ -138,6 +140,12 @@ def wheel_axes(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(subject.joints[wheel.joint.name], problem, f"{fix} (directions in the root frame)")
 
 
+@rule(
+    "wheel-height",
+    "warning",
+    "a wheel above the ground, or lower than the others",
+    "it does not drive, or the robot leans",
+)
 def wheel_heights(subject: Subject) -> Iterator[Mistake]:
     """Wheels off the ground when the robot rests, or lower than the others."""
     wheels = [wheel for wheel in subject.wheels if wheel.rolls and wheel.sure]
@@ -155,12 +163,18 @@ def wheel_heights(subject: Subject) -> Iterator[Mistake]:
         yield from _off_ground(subject, wheels, ground)
 
 
+@rule(
+    "wheel-load",
+    "warning",
+    "a part of the body that is as low as the wheels",
+    "it drags on the ground, and the wheels slip",
+)
 def dragging(subject: Subject) -> Iterator[Mistake]:
     """Parts of the body that touch the ground next to wheels that would carry it, or instead of wheels."""
     wheels = [wheel for wheel in subject.wheels if wheel.rolls and wheel.sure]
     ground = _ground(subject, wheels)
     centre = _centre(subject)
-    if not (ground and centre) or _slides(subject) or next(wheel_heights(subject), None):
+    if not (ground and centre) or _slides(subject) or any(wheel_heights.find(subject)):
         return
     rough = [shape for shape in _body(subject) if ground.above(shape) < TOUCHING]
     if rough and (_carries(rough, wheels, centre) or not _needs(rough, subject, centre, ground)):
@@ -280,6 +294,12 @@ RINGS = tuple(math.sqrt((ring + 0.5) / 6) for ring in range(6))  # of the radius
 SPOKES = tuple(spoke * math.pi / 6 for spoke in range(12))
 
 
+@rule(
+    "overlap",
+    "warning",
+    "a wheel inside another, or more than half of it inside the body",
+    "impossible on a real robot",
+)
 def overlaps(subject: Subject) -> Iterator[Mistake]:
     """Wheels inside each other, and wheels of which more than half is inside one other link; all in one finding."""
     wheels = [wheel for wheel in subject.wheels if wheel.shape.use == "collision" and not subject.guessed]
@@ -359,6 +379,12 @@ class DriveMeasures:
     radius: float
 
 
+@rule(
+    "wheel-side",
+    "error",
+    "a left wheel on the right side, or the other way round",
+    "it turns the wrong way: the plugin's tags say which side is which",
+)
 def sides(subject: Subject) -> Iterator[Mistake]:
     """Wheels that a plugin names as left but that are on the right, or vice versa."""
     drive = _drive_measures(subject)
@@ -374,6 +400,12 @@ def sides(subject: Subject) -> Iterator[Mistake]:
         yield Mistake(at, f"on the opposite side of its tag: {names}; left is where y is larger", "swap them")
 
 
+@rule(
+    "wheel-measure",
+    "warning",
+    "a plugin's wheel separation or diameter that differs by 20 % from the robot's",
+    "it turns or drives faster or slower than commanded",
+)
 def measures(subject: Subject) -> Iterator[Mistake]:
     """A wheel separation or diameter that differs from the robot's."""
     drive = _drive_measures(subject)

@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from holozen.check.engine import Mistake, Subject, nearest
+from holozen.check.engine import Mistake, Subject, nearest, rule
 from holozen.robot.elements import Tag
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.model import JOINT_KINDS
@@ -148,11 +148,13 @@ FREE = ("gazebo", "transmission")  # may contain non-URDF elements
 SDF_JOINT_KINDS = (*JOINT_KINDS, "revolute2", "universal", "ball", "screw", "gearbox")
 
 
+@rule("xml", "warning", "broken XML that Gazebo tolerates", "ROS and other parsers reject it")
 def forgiven(subject: Subject) -> Iterator[Mistake]:
     """Broken XML that Gazebo tolerates."""
     yield from subject.forgiven
 
 
+@rule("tag", "error", "a misspelt element", "it is silently ignored")
 def misspelt_tags(subject: Subject) -> Iterator[Mistake]:
     """Unknown elements similar to one allowed there."""
     guessed: dict[tuple[str, frozenset[str]], str | None] = {}
@@ -172,6 +174,7 @@ def misspelt_tags(subject: Subject) -> Iterator[Mistake]:
             )
 
 
+@rule("attribute", "error", "a misspelt attribute", "it is silently ignored")
 def misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
     """Unknown attributes of URDF elements similar to a known one."""
     for tag in _urdf_elements(subject):
@@ -184,6 +187,7 @@ def misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(tag, f"{tag} has no attribute {word!r}", f"write {suggestion}=")
 
 
+@rule("place", "error", "an element in a place where it is not read", "it is silently ignored")
 def misplaced(subject: Subject) -> Iterator[Mistake]:
     """Elements of URDF in an element where they are not read."""
     for parent in _urdf_elements(subject):
@@ -193,6 +197,7 @@ def misplaced(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(tag, f"<{tag.name}> does not belong in {parent}", f"move it into {owners}")
 
 
+@rule("ignored", "warning", "an element that URDF does not have", "URDF parsers ignore it")
 def ignored(subject: Subject) -> Iterator[Mistake]:
     """Elements of SDF, or of older URDF, in a URDF."""
     for parent in _urdf_elements(subject):
@@ -201,6 +206,7 @@ def ignored(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(tag, f"<{tag.name}> in {parent} is not read", IGNORED[tag.name])
 
 
+@rule("joint-type", "error", "a joint type that does not exist", "the robot cannot be loaded")
 def joint_kinds(subject: Subject) -> Iterator[Mistake]:
     """Joint types that do not exist."""
     kinds = SDF_JOINT_KINDS if subject.sdf else JOINT_KINDS
