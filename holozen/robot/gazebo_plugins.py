@@ -23,7 +23,6 @@ from holozen.robot.model import (
     Mechanism,
     Planar,
     RobotModel,
-    Sensor,
     Shape,
 )
 from holozen.robot.rigid import link_frames
@@ -569,7 +568,7 @@ def _limit(settings: Settings, what: str, source: Source) -> float:
     return sizes[0] if sizes else math.inf
 
 
-# Sensors, and plugins that sense without one. They are parsed but not simulated yet.
+# Sensors, and plugins that sense without one. They are not simulated yet.
 
 
 SENSING = {
@@ -599,55 +598,17 @@ SENSING = {
 """Plugin -> the kind of sensor that it is outside a `<sensor>`."""
 
 
-def read_sensors(robot: Tag, links: Mapping[str, object], root: str, source: Source) -> tuple[Sensor, ...]:
-    """The sensors of a `<robot>`, with a warning for each `<sensor>`; `read_plugins` warns of the sensing plugins."""
-    found = []
+def warn_sensors(robot: Tag, links: Mapping[str, object], source: Source) -> None:
+    """Warn about each `<sensor>` of a `<robot>`; `read_plugins` warns of the sensing plugins."""
     for gazebo in robot.all("gazebo"):
-        link = gazebo.attributes.get("reference", "").strip() or root
-        if link not in links:
-            continue  # already reported as a reference that names no link
-        found += [read_sensor(tag, link, source) for tag in gazebo.all("sensor")]
-        found += [_of_plugin(tag, link, links, source) for tag in gazebo.all("plugin") if kind_of(tag) in SENSING]
-    return tuple(found)
+        link = gazebo.attributes.get("reference", "").strip()
+        for tag in gazebo.all("sensor") if not link or link in links else ():  # a reference to no link has its warning
+            warn_sensor(tag, source)
 
 
-def read_sensor(tag: Tag, link: str, source: Source) -> Sensor:
-    """A `<sensor>` on `link`, of URDF or SDF."""
-    kind = tag.attributes.get("type", "").strip() or "unknown"
-    plugin = tag.first("plugin") or Tag("plugin", {}, tag.place, tag)
-    rate = _sensor_rate(tag, source) or _sensor_rate(plugin, source)
-    source.warn(tag, f"({kind[:80]}) is not simulated yet")
-    return Sensor(tag.attributes.get("name", kind), kind, link, rate, _sensor_topic(tag) or _sensor_topic(plugin))
-
-
-def _of_plugin(tag: Tag, link: str, links: Mapping[str, object], source: Source) -> Sensor:
-    settings, kind = Settings(tag), SENSING[kind_of(tag)]
-    body = settings.frame("body_name", "frame_id", "frame_name")
-    on = body if body in links else link
-    return Sensor(tag.attributes.get("name", kind), kind, on, _sensor_rate(tag, source), _sensor_topic(tag))
-
-
-def _sensor_rate(owner: Tag, source: Source) -> float:
-    """Hz; 0 if the file gives no valid rate."""
-    tag = Settings(owner).tag("update_rate")
-    word = tag.value()
-    value = number(word) if word else 0.0
-    if value is None or value < 0:
-        source.warn(tag, f"is {cut(word)}; every step is used")
-    return max(0.0, value or 0.0)
-
-
-def _sensor_topic(owner: Tag) -> str:
-    """As written: a sensor's `<topic>`, or the tags of ROS's sensor plugins."""
-    settings = Settings(owner)
-    ros = owner.first("ros")
-    for remapping in ros.all("remapping") if ros else ():
-        old, _, new = remapping.value().partition(":=")
-        if old.strip().rpartition("/")[2] in ("out", "image_raw"):
-            return new.strip().strip("/")
-    topic = settings.word("topic", "topic_name", "image_topic_name")
-    camera = settings.word("camera_name")
-    return "/".join(part.strip("/") for part in (camera, topic) if part) if camera else topic.strip("/")
+def warn_sensor(tag: Tag, source: Source) -> None:
+    """Warn about a `<sensor>` of URDF or SDF."""
+    source.warn(tag, f"({tag.attributes.get('type', '').strip()[:80] or 'unknown'}) is not simulated yet")
 
 
 # The plugins of a robot.

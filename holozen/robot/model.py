@@ -114,28 +114,6 @@ class Joint:
     mimic: Mimic | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Sensor:
-    """A sensor on a link. `kind` as in the file, such as "imu" or "camera"; `rate` in Hz, 0: every step."""
-
-    name: str
-    kind: str
-    link: str
-    rate: float = 0.0
-    topic: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Transmission:
-    """A ros_control transmission: its joints and their hardware interfaces."""
-
-    name: str
-    kind: str
-    joints: tuple[str, ...]
-    interfaces: tuple[str, ...]
-    reduction: float = 1.0
-
-
 JOINT_KINDS = ("continuous", "revolute", "prismatic", "fixed", "floating", "planar")
 
 
@@ -248,8 +226,6 @@ class RobotModel:
     joints: Mapping[str, Joint]
     drive: Drive | None
     warnings: tuple[str, ...] = ()
-    sensors: tuple[Sensor, ...] = ()
-    transmissions: tuple[Transmission, ...] = ()
     static: bool = False
     pose: Pose = HERE
 

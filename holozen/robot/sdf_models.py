@@ -5,8 +5,8 @@ from dataclasses import dataclass, field, replace
 
 from holozen.robot.elements import Source, Tag, Vector, read_xml
 from holozen.robot.errors import RobotError, cut, listed
-from holozen.robot.gazebo_plugins import read_plugins, read_sensor
-from holozen.robot.model import MOST_PARTS, Joint, Limits, Link, Pose, RobotModel, Sensor, descend
+from holozen.robot.gazebo_plugins import read_plugins, warn_sensor
+from holozen.robot.model import MOST_PARTS, Joint, Limits, Link, Pose, RobotModel, descend
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import triple
 from holozen.robot.sdf import (
@@ -382,6 +382,10 @@ def build(members: list[Member], frames: Frames) -> list[RobotModel]:
     if static:
         joints += [_standing(graph, first, root, placed) for root in loose]
         loose = []
+    for member in members:
+        for owner in (*member.piece.tag.all("link"), *member.piece.tag.all("joint")):
+            for sensor in owner.all("sensor"):
+                warn_sensor(sensor, member.piece.source)
     robots = [_robot(root, graph, links, joints, placed[root], static) for root in (first, *loose)]
     return [_driven(members[0], robots[0]), *robots[1:]]
 
@@ -437,17 +441,9 @@ def _robot(
         links={link.name: link for link in links.values() if link.name in names},
         joints={joint.name: joint for joint in joints if joint.child in names},
         drive=None,
-        sensors=tuple(sensor for name in graph.links if graph.local(name) in names for sensor in _sensors(graph, name)),
         static=static or root in graph.grounded,
         pose=at.pose,
     )
-
-
-def _sensors(graph: JointGraph, name: str) -> list[Sensor]:
-    """The sensors of a link and of its parent joint."""
-    member, link = graph.links[name]
-    tags = link.all("sensor") + (graph.holders[name].tag.all("sensor") if name in graph.holders else [])
-    return [read_sensor(tag, graph.local(name), member.piece.source) for tag in tags]
 
 
 def _driven(top: Member, robot: RobotModel) -> RobotModel:

@@ -1,13 +1,13 @@
-"""URDF: a `<robot>` with its links, joints, materials, transmissions and `<gazebo>` elements -> RobotModel."""
+"""URDF: a `<robot>` with its links, joints, materials and `<gazebo>` elements -> RobotModel."""
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import TypeVar
 
-from holozen.robot.elements import Source, Tag, Vector, number
+from holozen.robot.elements import Source, Tag, Vector
 from holozen.robot.errors import RobotError, cut, listed
-from holozen.robot.gazebo_plugins import Settings, read_plugins, read_sensors
+from holozen.robot.gazebo_plugins import Settings, read_plugins, warn_sensors
 from holozen.robot.inertia import (
     NO_INERTIA,
     check_drive,
@@ -28,7 +28,6 @@ from holozen.robot.model import (
     RobotModel,
     Shape,
     Surface,
-    Transmission,
     descend,
 )
 from holozen.robot.shapes import Materials, gazebo_color, needed, read_materials, read_pose, read_shape, urdf_color
@@ -99,51 +98,16 @@ def _wrong(robot: Tag, name: str, problem: str) -> RobotError:
     return (joint.first("mimic") or joint).wrong(problem)
 
 
-# Transmissions, as written for pr2 and for ros_control.
-
-
-def read_transmissions(robot: Tag, joints: Mapping[str, Joint], source: Source) -> tuple[Transmission, ...]:
-    """Those whose joints exist; the others only cause warnings, since nothing is driven by them."""
-    found = []
+def warn_transmissions(robot: Tag, joints: Mapping[str, Joint], source: Source) -> None:
+    """Warn about transmissions of no joint. Joints take commands without one."""
     for tag in robot.all("transmission"):
-        names = tuple(joint.attributes.get("name", "").strip() for joint in tag.all("joint"))
+        names = [joint.attributes.get("name", "").strip() for joint in tag.all("joint")]
         unknown = [name for name in names if name not in joints]
         if unknown:
             near = source.nearest(unknown[0], joints)
             source.warn(tag, f"names the joint {cut(unknown[0])}, which does not exist{near}; it is left out")
         elif not names:
             source.warn(tag, "names no joint; it is left out")
-        else:
-            found.append(Transmission(_name(tag), _kind(tag), names, _interfaces(tag), _reduction(tag, source)))
-    return tuple(found)
-
-
-def _name(tag: Tag) -> str:
-    return tag.attributes.get("name", "").strip()
-
-
-def _kind(tag: Tag) -> str:
-    kind = tag.first("type")
-    return kind.value() if kind else tag.attributes.get("type", "")
-
-
-def _interfaces(tag: Tag) -> tuple[str, ...]:
-    """Hardware interfaces of the joints; older files set them on the actuators."""
-    for parts in (tag.all("joint"), tag.all("actuator")):
-        found = tuple(inside.value() for part in parts for inside in part.all("hardwareInterface"))
-        if found:
-            return found
-    return ()
-
-
-def _reduction(tag: Tag, source: Source) -> float:
-    reduction = next(tag.below("mechanicalReduction"), None)
-    if reduction is None:
-        return 1.0
-    value = number(reduction.value())
-    if not value:
-        source.warn(reduction, f"is {cut(reduction.value())}; 1 is used")
-    return value or 1.0
 
 
 # `<gazebo>` elements.
@@ -229,14 +193,14 @@ def read_robot(robot: Tag, source: Source) -> RobotModel:
     kept, moving = without(dressed, joints, lost)
     drive = read_plugins(robot, kept, joints, root, source)
     check_drive(robot, drive, links, joints, root, lost, source)
+    warn_sensors(robot, links, source)
+    warn_transmissions(robot, joints, source)
     return RobotModel(
         name=robot.word("name"),
         root=root,
         links=kept,
         joints=moving,
         drive=drive,
-        sensors=tuple(sensor for sensor in read_sensors(robot, links, root, source) if sensor.link in kept),
-        transmissions=read_transmissions(robot, joints, source),
         static=static or root == WORLD,
         warnings=tuple(source.warnings),
     )

@@ -7,7 +7,7 @@ import pytest
 
 from holozen.robot.elements import Source, read_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.model import Drive, Inertial, Limits, Link, Mimic, Pose, RobotModel, Sensor, Surface
+from holozen.robot.model import Drive, Inertial, Limits, Link, Mimic, Pose, RobotModel, Surface
 from holozen.robot.sdf_models import parse_sdf, read_models
 
 ORIGIN = Path("/nowhere/a.sdf")
@@ -249,9 +249,9 @@ def test_plugins_directly_in_the_model_drive_it() -> None:
     assert drive == Drive(robot_base_frame="a")
 
 
-def test_sensors_of_a_link_are_read() -> None:
+def test_a_warning_says_that_a_sensor_is_not_simulated() -> None:
     robot = model(f'<link name="a">{MASS}<sensor name="s" type="imu"><update_rate>50</update_rate></sensor></link>')
-    assert robot.sensors == (Sensor("s", "imu", "a", 50.0),)
+    assert robot.warnings == ("a.sdf, line 3: <sensor name='s'> (imu) is not simulated yet",)
 
 
 def test_misspelt_elements_are_told_once_with_the_nearest_name() -> None:
