@@ -1,4 +1,5 @@
-"""A program that drives a robot at 20 Hz until it is told to end, and prints when it sends each command (s, monotonic).
+"""A program that drives a robot at 20 Hz until it is told to end. It prints when it begins to send each command, and
+when it has (s, monotonic).
 
 python driver.py ENDPOINT
 
@@ -20,9 +21,9 @@ def main(endpoint: str) -> None:
     with Bus("driver", Connection(mode="client", connect=(endpoint,)), stop=stop) as bus:
         commands = bus.publisher("cmd_vel", Twist)
         while not stop.wait(1 / RATE):
-            print(time.monotonic(), flush=True)
+            print("begin", time.monotonic(), flush=True)
             commands.put(Twist.planar(0.3))
-        print("stop", flush=True)
+            print("end", time.monotonic(), flush=True)
         commands.put(Twist())
 
 

@@ -1,10 +1,9 @@
-"""A program that prints each odom of a robot: when it came (s, monotonic), its stamp (s of sim time), its speed (m/s).
+"""A program that prints each odom of a robot: when the sim sent it (s, of the sim's monotonic clock), its speed (m/s).
 
 python observer.py ENDPOINT
 """
 
 import sys
-import time
 
 from holozen.bus import Bus, BusError, Connection
 from holozen.messages import Odometry
@@ -18,10 +17,10 @@ def main(endpoint: str) -> None:
         while not stop.wait(0.01):
             try:
                 while (received := odometry.try_recv()) is not None:
-                    if received.message:
+                    stamp = received.sample.stamp
+                    if received.message and stamp:
                         linear = received.message.twist.twist.linear
-                        speed = (linear.x**2 + linear.y**2) ** 0.5
-                        print(time.monotonic(), received.message.header.stamp.seconds(), f"{speed:.4f}", flush=True)
+                        print(stamp.sent, f"{(linear.x**2 + linear.y**2) ** 0.5:.4f}", flush=True)
             except BusError:
                 return
 

@@ -17,7 +17,7 @@ import pytest
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command, free_port
 
-from .history import History, whole_lines
+from .history import STEP, History, whole_lines
 from .namespaces import NEEDS, Cable, Host, Lab
 from .proxy import Proxy
 
@@ -27,14 +27,15 @@ HERE = Path(__file__).parent
 CLOCK = 4000  # s that the drivers' clock is ahead
 TRIALS = 34 if os.environ.get("HOLOZEN_LONG") else 1  # of each cut and fate, so some hundred of each cut
 CUTS = (0.2, 0.6, 0.9, 2.0)  # s
+EACH_STEP = ("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}")  # odom, so that its times are close
 
 
 def script(name: str, endpoint: str) -> list[str]:
     return [sys.executable, str(HERE / f"{name}.py"), endpoint]
 
 
-def came(observer: Process) -> float:
-    """When the newest odom came."""
+def newest(observer: Process) -> float:
+    """When the newest odom was sent."""
     return next((float(line.split()[0]) for line in reversed(whole_lines(observer))), 0.0)
 
 
@@ -50,6 +51,7 @@ class Course:
         self.endpoint, here = at, f"tcp/127.0.0.1:{port}"
         words = command("sim", "--listen", f"tcp/0.0.0.0:{port}", "--connect", here)
         self.robot.start(*words).wait_for_line("listens on cmd_vel")
+        self.robot.check(*command(*EACH_STEP, "--connect", here))
         self.observer = self.robot.start(*script("observer", here))
         self.drivers: list[Process] = []
 
@@ -68,7 +70,7 @@ class Course:
         wait_for(lambda: self.history().moves(since), within, "a robot that moves")
 
     def wait_for_odom(self, at: float) -> None:
-        wait_for(lambda: came(self.observer) > at, 20.0, "odom")
+        wait_for(lambda: newest(self.observer) > at, 20.0, "odom")
 
 
 @pytest.fixture(scope="module")
@@ -123,6 +125,7 @@ class Far:
     def __init__(self, wire: Wire, proxy: Proxy, lab: Lab) -> None:
         self.proxy, self.desk = proxy, lab.host("desk", clock=CLOCK)
         wire.start("sim").wait_for_line("listens on cmd_vel")
+        assert wire.run(*EACH_STEP).returncode == 0
         self.observer = Process(script("observer", wire.endpoint))
         words = [word for word in self.desk.inside(*script("driver", proxy.endpoint)) if word != "-n"]
         self.driver = Process(words)
@@ -131,7 +134,7 @@ class Far:
         return History.of([self.driver], self.observer, CLOCK)
 
     def wait_for_odom(self, at: float) -> None:
-        wait_for(lambda: came(self.observer) > at, 20.0, "odom")
+        wait_for(lambda: newest(self.observer) > at, 20.0, "odom")
 
 
 @pytest.fixture
@@ -151,7 +154,7 @@ def test_a_link_that_becomes_slow_stops_the_robot_and_a_late_stop_is_obeyed(far:
         assert bool(history.moves(begin, begin + 1)) == drives, f"with a delay of {delay} s"
         history.check_silence()
     far.driver.terminate()
-    wait_for(lambda: not far.history().odom[-1][1], 5.0, "a robot that stands")
+    wait_for(lambda: not far.history().odom[-1].moves, 5.0, "a robot that stands")
 
 
 def test_a_link_that_jitters_moves_the_robot_only_by_what_is_fresh(far: Far) -> None:
