@@ -14,6 +14,8 @@ from holozen.messages import simulation_interfaces as s
 COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stops
 MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded
 MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a TwistStamped is refused
+MAX_SPEED, MAX_TURN = 100.0, 1000.0  # m/s, rad/s; a command beyond is a mistake: it is refused, not clamped
+MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N; also of a mistake
 
 PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
 """Zenoh priority of each command source. Others have DATA, as a plain `zenoh put`."""
@@ -135,6 +137,23 @@ def is_command(key: str, types: Iterable[type[m.Message]]) -> bool:
     """
     row = topic(key)
     return row.is_command if row else any(kind.ROS in _COMMAND_TYPES for kind in types)
+
+
+def implausible(command: m.Message) -> str:
+    """Which component of a command is a mistake, whatever the robot's limits, and the bound; empty if none is."""
+    if isinstance(command, m.JointState):
+        for kind, most in MAX_OF_JOINT.items():
+            for index, value in enumerate(getattr(command, kind)):
+                if abs(value) > most:
+                    name = f" of joint {command.name[index][:80]!r}" if index < len(command.name) else ""
+                    return f"{kind}[{index}]{name} is {value:g}; at most {most:g}"
+    twist = command.twist if isinstance(command, m.TwistStamped) else command
+    if isinstance(twist, m.Twist):
+        for part, most, unit in (("linear", MAX_SPEED, "m/s"), ("angular", MAX_TURN, "rad/s")):
+            for axis in "xyz":
+                if abs(value := getattr(getattr(twist, part), axis)) > most:
+                    return f"{part}.{axis} is {value:g} {unit}; at most {most:g}"
+    return ""
 
 
 _COMMAND_TYPES = {kind.ROS for row in TOPICS if row.is_command for kind in row.types} - {

@@ -107,24 +107,24 @@ def _form(args: argparse.Namespace) -> Form | None:
     row = wire.topic(args.key)
     if given:
         try:
-            form = values.form_named(given, args.wire, args.force, args.package)
+            form = values.form_named(given, args.key, args.wire, args.force, args.package)
         except ValueError as error:
             raise Refused(f"{args.key}: {error}") from None
         right = [kind.ROS for kind in row.types] if row else [form.kind.ROS]
         if form.kind.ROS not in right and not args.force:
             raise Refused(f"{args.key}: its type is {' or '.join(right)}, not {given}{values.FORCE}")
         return form
-    return Ours(row.types, args.wire, args.force) if row else None
+    return Ours(row.types, args.key, args.wire, args.force) if row else None
 
 
 def _form_of_listener(found: list[Endpoint], args: argparse.Namespace) -> Form:
     """The form of the type that the key's subscribers expect: a robot's file may give its topics any name."""
     wanted = {end.type for end in on_key(found, args.key, "sub")}
     if kinds := values.kinds_of(wanted):
-        return Ours(kinds, args.wire, args.force)
+        return Ours(kinds, args.key, args.wire, args.force)
     for name in sorted(wanted):
         with contextlib.suppress(ValueError):
-            return values.form_named(name, args.wire, args.force, args.package)
+            return values.form_named(name, args.key, args.wire, args.force, args.package)
     known = ", ".join(topic.key for topic in wire.TOPICS)
     raise Refused(
         f"{args.key!r} has no known type; known keys: {known}, each also as ROBOT/key;"
@@ -220,6 +220,7 @@ def _stop_robot(publisher: Publisher[Message], payload: bytes) -> None:
 
 
 LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
+OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 HELD = "held, since a higher source took over; `holozen service call resume` lets it drive again"
 
 
@@ -237,7 +238,7 @@ def verdict(status: CommandStatus, source: str) -> str | None:
         return own_refusal if own_refusal.startswith(LIMITED) else ""
     if mine and mine.held:
         return HELD
-    if mine and status.obeyed:
+    if mine and status.obeyed and own_refusal.partition(":")[0] in ("", OVERRULED):
         return f"{status.obeyed} drives"
     return own_refusal or None
 

@@ -152,8 +152,9 @@ def _field_hint(reason: str, value: Any, kinds: Kinds) -> str:
 class Ours:
     """Encodes values as one of our types, the first of `kinds` that fits."""
 
-    def __init__(self, kinds: Kinds, wire: str, force: bool) -> None:
-        self.kind, self._kinds, self._wire, self._force = kinds[0], kinds, wire, force
+    def __init__(self, kinds: Kinds, key: str, encoding: str, force: bool) -> None:
+        self.kind, self._kinds, self._wire, self._force = kinds[0], kinds, encoding, force
+        self._is_command = wire.is_command(key, kinds)
 
     def payload(self, text: str) -> bytes:
         """The bytes of a written value; sets `kind` to its type. Raises ValueError with the reason."""
@@ -164,6 +165,8 @@ class Ours:
             return forced(message, self._wire)
         if bad:
             raise ValueError(f"{self.kind.__name__}.{bad} is not a finite number{FORCE}")
+        if self._is_command and not self._force and (bad := wire.implausible(message)):
+            raise ValueError(f"{self.kind.__name__}.{bad}{FORCE}")
         return codec.encode(message, self._wire)
 
     def stop(self) -> bytes | None:
@@ -205,13 +208,13 @@ class Foreign:
 Form = Ours | Foreign
 
 
-def form_named(name: str, wire: str, force: bool, packages: Iterable[tuple[str, Path]] = ()) -> Form:
-    """The form of a type; `packages` are those of `--package`. Raises ValueError for an unknown type, naming the
-    closest known one.
+def form_named(name: str, key: str, wire: str, force: bool, packages: Iterable[tuple[str, Path]] = ()) -> Form:
+    """The form of a type for a `key`; `packages` are those of `--package`. Raises ValueError for an unknown type,
+    naming the closest known one.
     """
     given = dict(packages)
     if name.partition("/")[0] not in given and (kinds := kinds_named(name)):
-        return Ours(kinds, wire, force)
+        return Ours(kinds, key, wire, force)
     from holozen.messages.registry import Registry
 
     return Foreign(Registry(given).find(name), wire, force)

@@ -63,6 +63,22 @@ def test_a_wrong_field_is_refused_with_the_closest_name(town: Wire, value: str, 
     assert_one_line(town.run("topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", told)
 
 
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("cmd_vel", '{"linear": {"x": 1e308}}', "Twist.linear.x is 1e+308 m/s; at most 100"),
+        ("Fred/cmd_vel", "twist: {angular: {y: -1001}}", "TwistStamped.angular.y is -1001 rad/s; at most 1000"),
+        ("joint_command", "{name: [j], velocity: [2e3]}", "JointState.velocity[0] of joint 'j' is 2000; at most 1000"),
+    ],
+)
+def test_what_no_robot_can_mean_is_refused_and_not_sent(wire: Wire, key: str, value: str, told: str) -> None:
+    heard = wire.bus().subscribe_raw(key)
+    for often in (("--once",), ("-r", "20")):
+        words = ("topic", "pub", key, value, *often)
+        assert_one_line(wire.run(*words), 1, f"{key}: refused: {told}; --force sends it all the same")
+    assert heard.try_recv() is None
+
+
 def test_a_type_that_the_key_does_not_carry_is_refused(town: Wire) -> None:
     words = ("topic", "pub", "cmd_vel", "nav_msgs/msg/Odometry", "{}", "--once", "--no-wait")
     told = "cmd_vel: its type is geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped, not nav_msgs/msg/Odometry"
@@ -90,6 +106,16 @@ def test_it_tells_when_another_one_drives_and_when_it_is_obeyed(town: Wire, robo
     robot.odom.next(lambda odom: moves(odom, 0, 0.1, 0))
     second.signal(signal.SIGINT)
     assert (first.wait(), second.wait()) == (0, 0)
+    robot.stands()
+
+
+def test_a_forced_mistake_is_named_also_where_another_one_drives(town: Wire, robot: Robot) -> None:
+    driver = town.start("topic", "pub", "cmd_vel", AHEAD)
+    robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
+    done = town.run("topic", "pub", "cmd_vel", '{"linear": {"x": 1e308}}', "--once", "--force")
+    assert "not obeyed: linear.x is 1e+308 m/s; at most 100" in done.stderr
+    driver.signal(signal.SIGINT)
+    assert driver.wait() == 0
     robot.stands()
 
 

@@ -13,7 +13,7 @@ from holozen.messages import CommandSource, CommandStatus, JointState, Message, 
 from holozen.messages.message import not_finite
 from holozen.robot.errors import listed
 from holozen.transport.pubsub import PRIORITIES, Received
-from holozen.wire import MAX_STAMP_AGE
+from holozen.wire import MAX_STAMP_AGE, implausible
 
 from .arbiter import Arbiter
 from .freshness import Freshness, Judged, Senders, source_of
@@ -27,7 +27,6 @@ RECENT = 3.0  # s
 SPAN = 1.0  # s over which commands are counted
 MARK = 0.1  # s between two samples of a count
 REPORT_EVERY = 1.0  # s
-MAX_PLAUSIBLE_LINEAR, MAX_PLAUSIBLE_ANGULAR = 100.0, 1000.0  # m/s, rad/s; beyond, it is a mistake: refuse, not clamp
 M = TypeVar("M", bound=Message)
 
 
@@ -268,19 +267,6 @@ def _fault(received: Received[M], keys: tuple[str, ...]) -> tuple[str, str]:
         return "oversized" if received.error.startswith("oversized") else "malformed", received.error
     if bad := not_finite(message):
         return "not finite", f"{bad} is not a finite number"
-    if bad := _implausible(message):
+    if bad := implausible(message):
         return "implausible", bad
     return "", ""
-
-
-def _implausible(message: Message) -> str:
-    """Why a speed is a mistake, whatever the limits; empty if it is plausible."""
-    twist = message.twist if isinstance(message, TwistStamped) else message
-    if not isinstance(twist, Twist):
-        return ""
-    for name, most, unit in (("linear", MAX_PLAUSIBLE_LINEAR, "m/s"), ("angular", MAX_PLAUSIBLE_ANGULAR, "rad/s")):
-        vector = getattr(twist, name)
-        for axis in "xyz":
-            if abs(value := getattr(vector, axis)) > most:
-                return f"{name}.{axis} is {value:g} {unit}; at most {most:g}"
-    return ""

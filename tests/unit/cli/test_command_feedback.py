@@ -27,6 +27,8 @@ def test_the_reason_is_what_the_sim_says() -> None:
         (CommandStatus(refused={"malformed": 1}, last_refusal=f"{TELEOP}: not a Twist"), None),
         (CommandStatus(ME, refused={"clamped": 1}, last_refusal=f"{ME}: over the limits of 5"), "over the limits of 5"),
         (CommandStatus(ME, refused={"malformed": 1}, last_refusal=f"{ME}: not a Twist"), ""),
+        (CommandStatus(TELEOP, sources=[CommandSource(ME)], last_refusal=f"{ME}: linear.x is 101"), "linear.x is 101"),
+        (CommandStatus(TELEOP, sources=[CommandSource(ME)], last_refusal=f"{ME}: overruled: x"), f"{TELEOP} drives"),
     ]:
         assert verdict(status, ME) == why
 
