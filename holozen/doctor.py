@@ -13,7 +13,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, NamedTuple
 
 from holozen.transport import graph
-from holozen.transport.connection import LOOPBACK, RENDEZVOUS, Connection
+from holozen.transport.connection import LOOPBACK, RENDEZVOUS, VARIABLES, Connection
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, version
 from holozen.transport.listeners import HERE, Holder, address, exposure, holders, reached
@@ -45,10 +45,13 @@ class Finding(NamedTuple):
         return f"{self.level:<8} {self.check}: {self.text}" + (f" -> {self.fix}" if self.fix else "")
 
 
-def diagnose(connection: Connection) -> Iterator[Finding]:
-    """All findings about this machine and the nodes at `connection`. Changes nothing."""
+def diagnose(connection: Connection, given: Mapping[str, object]) -> Iterator[Finding]:
+    """All findings about this machine and the nodes at `connection`. Changes nothing. `given`: the values of the flags,
+    None for one that is not given.
+    """
     yield from packages()
     yield from terminal()
+    yield from environment(given)
     try:
         yield from nodes(connection)
     except BusError as error:
@@ -104,6 +107,14 @@ def terminal(environ: Mapping[str, str] = os.environ) -> Iterator[Finding]:
     elif sys.stdout.isatty():
         yield Finding("terminal", WARNING, f"{inside} does not answer; the teleop cannot see a lost connection to it",
             "use a terminal such as kitty, foot, WezTerm or Ghostty")  # fmt: skip
+
+
+def environment(given: Mapping[str, object], environ: Mapping[str, str] = os.environ) -> Iterator[Finding]:
+    """The variables that choose the network, and which of them a flag overrules."""
+    for name, variable in VARIABLES.items():
+        if value := environ.get(variable, "").strip():
+            text = f"is in force for every verb without --{name}" if given[name] is None else f"yields to --{name} here"
+            yield Finding("environment", OK, f"{variable}={value} {text}")
 
 
 def nodes(connection: Connection) -> Iterator[Finding]:

@@ -24,7 +24,7 @@ def main(argv: list[str]) -> int:
     from holozen.doctor import ERROR, diagnose
 
     code = 0
-    for finding in diagnose(connection.from_arguments(args)):
+    for finding in diagnose(connection.from_arguments(args), vars(args)):
         code = max(code, int(finding.level == ERROR))
         print(json.dumps(finding._asdict()) if args.json else printable(str(finding)), flush=True)
     return code

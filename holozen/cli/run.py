@@ -84,7 +84,7 @@ _BEHIND: dict[str, Callable[[str], object]] = {
     "--package": flags.package,
     "--connect": connection.endpoint,
     "--listen": connection.endpoint,
-    "--mode": ("peer", "client", "router").__contains__,
+    "--mode": connection.MODES.__contains__,
     "--wire": ("json", "msgpack", "cdr").__contains__,
 }
 """holozen flags that may also follow the script -> a function that accepts their values."""

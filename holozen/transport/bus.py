@@ -20,7 +20,7 @@ from holozen.background import at_once, background
 from holozen.console import report
 from holozen.transport import graph as graphs
 from holozen.transport import listeners, services
-from holozen.transport.connection import Connection
+from holozen.transport.connection import Connection, from_environment
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Graph, NodeInfo
 from holozen.transport.peer_clocks import PeerClocks, clock_key
@@ -60,7 +60,7 @@ class Bus:
         early: bool = False,
         stop: threading.Event | None = None,
     ) -> None:
-        connection = connection or Connection()
+        connection = connection or from_environment()
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
         self._readers: set[RawSubscriber | Server | NodeInfo] = set()  # kept until the bus is closed
         self._answering = weakref.WeakSet[threading.Thread]()

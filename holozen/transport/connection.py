@@ -1,9 +1,12 @@
-"""How a process connects to others: Zenoh's own flags, and the default without any.
+"""How a process connects to others: Zenoh's own flags, environment variables that say the same, and the default.
 
 By default nothing leaves this machine: peers meet on loopback at the rendezvous points; no router, no multicast.
 """
 
+import os
+
 from holozen.flags import nearest, refused
+from holozen.transport.errors import BusError
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:
@@ -82,8 +85,8 @@ class Connection:
         return {path: _json(value) for path, value in values.items()} | dict(self.cfg)
 
     def arguments(self) -> list[str]:
-        """The flags that give another process the same connection."""
-        flags = [] if self.mode == "peer" else ["--mode", self.mode]
+        """The flags that give another process the same connection, whatever its environment says."""
+        flags = ["--mode", self.mode]
         for name, endpoints in (("--connect", self.connect), ("--listen", self.listen)):
             for endpoint in endpoints or ():
                 flags += [name, endpoint]
@@ -108,6 +111,10 @@ class Connection:
         return [*self.rendezvous[:1], *others, LOOPBACK]
 
 
+MODES = ("peer", "client", "router")
+VARIABLES = {name: f"HOLOZEN_{name.upper()}" for name in ("mode", "connect", "listen", "config")}
+"""Flag -> the environment variable that says the same where the flag is not given."""
+
 _ALWAYS: dict[str, object] = {
     "scouting/multicast/enabled": False,
     "scouting/delay": 0,
@@ -123,8 +130,9 @@ _ALWAYS: dict[str, object] = {
 
 def add_arguments(parser: "argparse.ArgumentParser") -> None:
     """Add Zenoh's own flags, with the names that its other tools use."""
-    group = parser.add_argument_group("zenoh", f"how to connect; by default peers meet on loopback at {RENDEZVOUS[0]}")
-    group.add_argument("--mode", choices=("peer", "client", "router"), default="peer", help="Zenoh session mode")
+    text = f"how to connect; by default peers meet on loopback at {RENDEZVOUS[0]}. Where a flag is not given, "
+    group = parser.add_argument_group("zenoh", f"{text}{', '.join(VARIABLES.values())} say the same.")
+    group.add_argument("--mode", choices=MODES, help="Zenoh session mode (default: peer)")
     for name, example in (("connect", "tcp/10.0.0.2:7447"), ("listen", "tcp/0.0.0.0:7447")):
         text = f"{name} there, such as {example}"
         group.add_argument(f"--{name}", action="append", type=endpoint, metavar="ENDPOINT", help=text)
@@ -135,15 +143,46 @@ def add_arguments(parser: "argparse.ArgumentParser") -> None:
 
 
 def from_arguments(args: "argparse.Namespace") -> Connection:
-    """The Connection that the flags of `add_arguments` describe."""
-    return Connection(
-        mode=args.mode,
-        connect=None if args.connect is None else tuple(args.connect),
-        listen=None if args.listen is None else tuple(args.listen),
-        config=args.config,
-        cfg=tuple(args.cfg),
-        wire=args.wire,
-    )
+    """The Connection that the flags of `add_arguments` describe. Exits with code 2 for a wrong environment variable."""
+    given = {name: value for name in VARIABLES if (value := getattr(args, name)) is not None}
+    try:
+        return from_environment(**given, cfg=tuple(args.cfg), wire=args.wire)
+    except BusError as error:
+        from holozen.console import report
+
+        report(f"holozen: {error}")
+        raise SystemExit(2) from None
+
+
+def from_environment(**given: object) -> Connection:
+    """The Connection of the environment variables; `given` are values that win. Raises BusError for a wrong variable."""
+    values = {name: _variable(name) for name in VARIABLES if name not in given} | given
+    values["mode"] = values["mode"] or "peer"
+    for name in ("connect", "listen"):
+        values[name] = None if values[name] is None else tuple(values[name])  # type: ignore[arg-type]
+    return Connection(**values)  # type: ignore[arg-type]
+
+
+def _variable(name: str) -> "str | list[str] | None":
+    """The value of a flag's environment variable; None if it is unset or empty. Raises BusError."""
+    variable = VARIABLES[name]
+    text = os.environ.get(variable, "").strip()
+    wrong = ""
+    if not text:
+        return None
+    if name == "mode" and text not in MODES:
+        wrong = f"{nearest(text, MODES)}; use {', '.join(MODES)}"
+    if name == "config" and not os.path.isfile(text):
+        wrong = ": there is no such file"
+    if wrong:
+        raise BusError(f"{variable}={text!r}{wrong}, or unset it")
+    if name in ("mode", "config"):
+        return text
+    endpoints = [one.strip() for one in text.split(",")]
+    for one in endpoints:
+        if wrong := fault(one):
+            raise BusError(f"{variable}={text!r}: {wrong}; separate several by commas")
+    return endpoints
 
 
 def endpoint(text: str) -> str:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .control.layouts import Layout
     from .session import Session
 
-DRIVE_MODES, ZENOH_MODES = ("hold", "latch"), ("peer", "client", "router")
+DRIVE_MODES = ("hold", "latch")
 WITHOUT = """holozen topic pub {key} '{{"linear": {{"x": 0.3}}}}'"""
 
 
@@ -64,9 +64,9 @@ def parser() -> argparse.ArgumentParser:
         help="where the robot listens (default: [ROBOT/]cmd_vel)")  # fmt: skip
     add("--name", default="teleop", help="of this node (default: teleop)")
     connection.add_arguments(parser)
-    add("--mode", action=Mode, choices=(*DRIVE_MODES, *ZENOH_MODES),
+    add("--mode", action=Mode, choices=(*DRIVE_MODES, *connection.MODES),
         help="hold: drive while a key is held; latch: until another (default: hold); or Zenoh's mode")  # fmt: skip
-    parser.set_defaults(zenoh_mode="peer")
+    parser.set_defaults(zenoh_mode=None)
     return parser
 
 

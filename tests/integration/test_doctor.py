@@ -230,3 +230,28 @@ def test_it_ends_quietly_when_nobody_reads(wire: Wire) -> None:
         ["bash", "-o", "pipefail", "-c", f"{words} | head -1"], capture_output=True, text=True, timeout=60
     )
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_variables_put_every_process_on_a_network_and_the_doctor_shows_them(wire: Wire) -> None:
+    env = {"HOLOZEN_CONNECT": wire.endpoint, "HOLOZEN_LISTEN": wire.endpoint, "HOLOZEN_MODE": "peer"}
+
+    def run(verb: str, *words: str, **more: str) -> subprocess.CompletedProcess[str]:
+        words = (*command(verb, *words),)
+        return subprocess.run(words, env={**os.environ, **env, **more}, capture_output=True, text=True, timeout=60)
+
+    with Process(command("up"), env=env) as up:
+        up.wait_for_line("goals")
+        assert "controller" in wire.run("node", "list").stdout, "up and all that it starts are there"
+        assert run("topic", "echo", "odom", "--once").returncode == 0
+        shown = run("doctor", "--json", "--mode", "peer").stdout
+        found = [row["text"] for row in map(json.loads, shown.splitlines()) if row["check"] == "environment"]
+        assert found == [
+            "HOLOZEN_MODE=peer yields to --mode here",
+            f"HOLOZEN_CONNECT={wire.endpoint} is in force for every verb without --connect",
+            f"HOLOZEN_LISTEN={wire.endpoint} is in force for every verb without --listen",
+        ]
+        for verb in ("sim", "teleop", "controller", "pose-service", "up", "stop", "doctor"):
+            done = run(verb, *["--script", os.devnull][: 2 * (verb == "teleop")], HOLOZEN_MODE="klient")
+            assert (done.returncode, done.stdout) == (2, ""), verb
+            assert done.stderr.startswith("holozen: HOLOZEN_MODE='klient'; did you mean 'client'?"), done.stderr
+            assert done.stderr.count("\n") == 1, done.stderr

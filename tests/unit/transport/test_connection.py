@@ -8,7 +8,7 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.transport.connection import LEASE, LOOPBACK, RENDEZVOUS, Connection, add_arguments, from_arguments
+from holozen.transport.connection import LEASE, LOOPBACK, RENDEZVOUS, Connection, add_arguments, from_arguments, from_environment
 
 endpoints = st.none() | st.lists(
     st.sampled_from(["tcp/127.0.0.1:7447", "tcp/10.0.0.2:1", "udp/[::1]:9", "unixsock-stream//tmp/x"]), min_size=1
@@ -36,7 +36,6 @@ def value(connection: Connection, path: str) -> object:
 
 def test_no_flags_are_the_default_connection() -> None:
     assert parsed() == Connection()
-    assert Connection().arguments() == []
 
 
 @given(connections)
@@ -128,3 +127,36 @@ def test_zenoh_takes_every_setting(mode: str) -> None:
     config = zenoh.Config()
     for path, text in Connection(mode).settings().items():
         config.insert_json5(path, text)
+
+
+def test_variables_say_what_flags_say_and_a_flag_wins(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOLOZEN_MODE", "client")
+    monkeypatch.setenv("HOLOZEN_CONNECT", "tcp/10.0.0.2:7447, tcp/10.0.0.3:7447")
+    monkeypatch.setenv("HOLOZEN_LISTEN", "")  # as compose passes one on that is not set
+    said = Connection("client", ("tcp/10.0.0.2:7447", "tcp/10.0.0.3:7447"))
+    assert parsed() == from_environment() == said
+    assert parsed("--mode", "peer", "--connect", "tcp/h:1") == Connection("peer", ("tcp/h:1",))
+    assert parsed(*Connection().arguments()).mode == "peer", "a child gets its parent's mode"
+
+
+@pytest.mark.parametrize(
+    ("variable", "value", "reason"),
+    [
+        ("HOLOZEN_MODE", "klient", "='klient'; did you mean 'client'?; use peer, client, router, or unset it"),
+        ("HOLOZEN_CONNECT", "10.0.0.2", "'10.0.0.2' is not an endpoint: write PROTOCOL/HOST:PORT"),
+        ("HOLOZEN_LISTEN", "tcp/a:1 tcp/b:2", "is not an endpoint: write PROTOCOL/HOST:PORT"),
+        ("HOLOZEN_CONFIG", "/nowhere.json5", "='/nowhere.json5': there is no such file"),
+    ],
+)
+def test_a_wrong_variable_is_one_line_that_names_it_unless_a_flag_wins(
+    variable: str, value: str, reason: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv(variable, value)
+    with pytest.raises(SystemExit) as end:
+        parsed()
+    said = capsys.readouterr().err
+    assert (end.value.code, said.count("\n")) == (2, 1)
+    assert said.startswith(f"holozen: {variable}=")
+    assert reason in said
+    flag = f"--{variable.removeprefix('HOLOZEN_').lower()}"
+    parsed(flag, {"--mode": "peer", "--config": "there.json5"}.get(flag, "tcp/h:1"))
