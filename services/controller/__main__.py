@@ -61,6 +61,9 @@ def parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("--resume", action="store_true", help="let the controller drive again, and exit")
     parser.add_argument(
+        "--held", action="store_true", help="drive only after `holozen controller --resume` or the teleop's r"
+    )
+    parser.add_argument(
         "--laps", type=flags.count(), default=1, help="laps of the list of goals; 0: for ever (default: 1)"
     )
     for param in PARAMS:
@@ -88,7 +91,7 @@ def follow(args: argparse.Namespace, where: connection.Connection) -> int:
     """Drive `args.laps` laps, and print the results of each."""
     stop, laps = stop_event(), 0
     with Bus("controller", where, lasting=True, stop=stop) as bus:
-        follower = Follower(bus, args.robot, _gains(args), stop, lambda text: report(f"controller: {text}"))
+        follower = Follower(bus, args.robot, _gains(args), stop, lambda text: report(f"controller: {text}"), args.held)
         serve_parameters(bus, args.robot, follower)
         try:
             while not stop.is_set() and (laps < args.laps or not args.laps):

@@ -1,5 +1,6 @@
 """Follows goals: requests one after another and drives there, while no other source drives the robot."""
 
+import math
 import threading
 import time
 from collections.abc import Callable
@@ -24,13 +25,13 @@ RESUMES = "`holozen controller --resume` or the teleop's r resumes"
 class YieldPolicy:
     """Whether the controller may drive: it yields when another source drives, and drives again only after a resume.
 
-    Reads cmd_vel_status, in which `source` is this controller.
+    Reads cmd_vel_status, in which `source` is this controller. It starts as one that yields to `yielded_to`.
     """
 
-    def __init__(self, source: str) -> None:
+    def __init__(self, source: str, yielded_to: str = "") -> None:
         self._source = source
-        self._resumed = 0
-        self.yielded_to = ""  # empty while this controller may drive
+        self._resumed: float = math.inf  # of the last status: a resume before the first is none for this controller
+        self.yielded_to = yielded_to  # empty while this controller may drive
         self.stopped = ""  # who set the software stop, while it is set
 
     @property
@@ -58,8 +59,9 @@ class Follower:
     """Drives one robot from goal to goal until `stop` is set."""
 
     def __init__(
-        self, bus: Bus, robot: str, gains: Gains, stop: threading.Event, report: Callable[[str], None]
-    ) -> None:
+        self, bus: Bus, robot: str, gains: Gains, stop: threading.Event, report: Callable[[str], None],
+        held: bool = False,
+    ) -> None:  # fmt: skip
         row = topic("odom")
         assert row is not None
         self._bus, self._stop, self._report, self._silence = bus, stop, report, row.silence
@@ -67,7 +69,7 @@ class Follower:
         self._odom = bus.latest(key_for("odom", robot), Odometry)
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
-        self._policy = YieldPolicy(bus.source)
+        self._policy = YieldPolicy(bus.source, "--held" if held else "")
         self._now: Planar = STOP
         self._yielded = False
         self._reported = ""

@@ -27,6 +27,7 @@ def parser() -> argparse.ArgumentParser:
     add("--robot", type=flags.robot_file, action="append", metavar="FILE[=NAME]",
         help="a xacro or URDF file, and the robot's name (default: hb_bot, on keys without a name)")  # fmt: skip
     add("--empty", action="store_true", help="start without robots; add them with `holozen spawn`")
+    add("--stopped", action="store_true", help="start with the robots stopped, until `holozen release`")
     add("--drive", choices=["planar_move"], help="a drive for robots whose file has none")
     add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="where $(find NAME) is")  # fmt: skip
@@ -68,6 +69,8 @@ def main(argv: list[str] | None = None) -> int:
             add_models(entities, spec.models)
             if args.robot or not args.empty:
                 spawn_all(entities, args)
+            if args.stopped:
+                entities.stop("the start of this sim")
             for warning in spec.warnings:
                 report(f"sim: {warning}")
             services = EntityServices(bus, entities, dict(args.package))

@@ -1,6 +1,7 @@
 """The entities of the world, robots and objects by name: added, looked up, moved and removed."""
 
 import math
+import time
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
@@ -104,6 +105,12 @@ class Entities:
         self.limits = (linear, angular)
         for robot in self.robots:
             robot.limit(linear, angular)
+
+    def stop(self, by: str) -> None:
+        """Set the software stop of all robots."""
+        for robot in self.robots:
+            for arbiter in robot.memory:
+                arbiter.stop(by, time.monotonic())
 
     def require_age(self, limit: float) -> None:
         """Refuse commands that may be older than `limit` seconds, except stops, from now on."""

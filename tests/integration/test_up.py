@@ -171,7 +171,7 @@ def test_a_robot_with_a_name_is_driven_by_that_name(wire: Wire) -> None:
 
 
 def test_a_killed_sim_is_told_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:
-    up = wire.start("up")
+    up = wire.start("up", "--no-restart")
     robot = Robot(wire.bus())
     driven(robot)
     os.kill(parts_at(wire)["sim"], signal.SIGKILL)
@@ -181,3 +181,39 @@ def test_a_killed_sim_is_told_and_one_started_by_hand_joins_the_others(wire: Wir
     start_sim(wire)
     driven(robot)
     up.wait_for_line("controller: continues")
+
+
+@pytest.mark.parametrize(
+    ("part", "then", "holds"),
+    [
+        ("sim", ", its robots stopped until `holozen release`", "controller: yields: the robot is stopped by"),
+        ("controller", "; it drives after `holozen controller --resume` or", "controller: yields to --held"),
+        ("pose-service", "; the controller drives after `holozen controller --resume`", "controller: yields to --held"),
+    ],
+)
+def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire, part: str, then: str, holds: str) -> None:
+    up = wire.start("up")
+    robot = Robot(wire.bus())
+    driven(robot)
+    os.kill(dead := parts_at(wire)[part], signal.SIGKILL)
+    up.wait_for_line(f"up: {part} was ended by signal 9; starting it again in 0.5 s{then}")
+    up.wait_for_line(holds)
+    assert parts_at(wire)[part] != dead
+    robot.stands()
+    seen = len(robot.odom.messages())
+    robot.pass_time(2.0)
+    assert all(map(rests, robot.odom.messages()[seen:]))
+    if part == "sim":
+        assert wire.run("release").returncode == 0
+    wait_for(lambda: robot.resume())
+    driven(robot)
+    up.signal(signal.SIGINT)
+    assert up.wait(AT_MOST) == 0
+    assert parts_at(wire) == {}
+
+
+def test_a_part_that_keeps_dying_is_started_less_and_less_often(wire: Wire) -> None:
+    up = wire.start("up")
+    for pause in ("0.5", "1", "2"):
+        os.kill(all_run(wire, PARTS)["pose-service"], signal.SIGKILL)
+        up.wait_for_line(f"up: pose-service was ended by signal 9; starting it again in {pause} s")

@@ -8,7 +8,15 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.transport.connection import LEASE, LOOPBACK, RENDEZVOUS, Connection, add_arguments, from_arguments, from_environment
+from holozen.transport.connection import (
+    LEASE,
+    LOOPBACK,
+    RENDEZVOUS,
+    Connection,
+    add_arguments,
+    from_arguments,
+    from_environment,
+)
 
 endpoints = st.none() | st.lists(
     st.sampled_from(["tcp/127.0.0.1:7447", "tcp/10.0.0.2:1", "udp/[::1]:9", "unixsock-stream//tmp/x"]), min_size=1
