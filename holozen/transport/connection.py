@@ -155,7 +155,7 @@ def from_arguments(args: "argparse.Namespace") -> Connection:
 
 
 def from_environment(**given: object) -> Connection:
-    """The Connection of the environment variables; `given` are values that win. Raises BusError for a wrong variable."""
+    """The Connection of the environment variables; `given` values win. Raises BusError for a wrong variable."""
     values = {name: _variable(name) for name in VARIABLES if name not in given} | given
     values["mode"] = values["mode"] or "peer"
     for name in ("connect", "listen"):
