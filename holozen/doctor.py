@@ -30,6 +30,7 @@ ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
 MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
+SHARED = ("delete_entity", "get_entities", "get_entity_state", "set_entity_state")  # served by joined sims too
 DRIVES = 2.0  # Hz; a slower source is not taken to drive a robot
 
 
@@ -262,7 +263,7 @@ def duplicates(endpoints: Iterable[Endpoint], peers: Mapping[str, Peer]) -> Iter
     """Nodes that share a service or a key that only one should publish, such as two sims with the same robot."""
     holders: dict[tuple[str, str], dict[str, str]] = {}
     for end in endpoints:
-        if end.kind == "srv" or (end.kind == "pub" and end.type in EXCLUSIVE):
+        if (end.kind == "srv" and end.key not in SHARED) or (end.kind == "pub" and end.type in EXCLUSIVE):
             holders.setdefault((end.kind, end.key), {})[end.session] = end.node
     groups: dict[tuple[tuple[str, str], ...], list[str]] = {}
     for (_, key), sessions in sorted(holders.items()):

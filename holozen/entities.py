@@ -1,4 +1,7 @@
-"""The client side of the sim's entity services: list, locate, spawn and delete robots and objects."""
+"""The client side of the sims' entity services: list, locate, spawn and delete robots and objects.
+
+Several sims may run on one wire, of which one spawns. Requests about entities go to all of them.
+"""
 
 from typing import TypeVar
 
@@ -16,15 +19,17 @@ R = TypeVar("R", si.SpawnEntityReply, si.DeleteEntityReply, si.GetEntityStateRep
 def names(bus: Bus, notice: float = 0.0) -> list[str]:
     """The names of all entities, sorted. Raises ServiceError, also if no sim answers within `notice` seconds (3)."""
     notice = notice or NOTICE
+    bus.endpoints()  # once they are known, all sims are connected
     try:
-        return sorted(_ask(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice).entities)
+        replies = _ask(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice)
+        return sorted({name for reply in replies for name in reply.entities})
     except NoReply:
         raise ServiceError(f"no sim answered within {notice:g} s; start one in another terminal: holozen sim") from None
 
 
 def pose(bus: Bus, name: str) -> Pose:
     """The pose of an entity in the world. Raises ServiceError."""
-    return _ask(bus, "get_entity_state", si.GetEntityStateRequest(name), si.GetEntityStateReply, PATIENCE).state.pose
+    return _ask(bus, "get_entity_state", si.GetEntityStateRequest(name), si.GetEntityStateReply, PATIENCE)[0].state.pose
 
 
 def delete(bus: Bus, name: str) -> None:
@@ -40,7 +45,7 @@ def spawn(bus: Bus, name: str, text: str, at: Pose, namespace: str = "") -> tupl
     """
     place = PoseStamped(pose=at)
     request = si.SpawnEntityRequest(name, resource_string=text, entity_namespace=namespace, initial_pose=place)
-    reply = _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE)
+    (reply,) = _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE, everyone=False)
     return reply.entity_name or name, reply.result.error_message.splitlines()
 
 
@@ -50,9 +55,10 @@ def is_taken(error: ServiceError) -> bool:
     return isinstance(result, dict) and result.get("result") == si.SpawnEntityReply.NAME_NOT_UNIQUE
 
 
-def _ask(bus: Bus, key: str, request: Message, reply: type[R], timeout: float) -> R:
-    answer = bus.call(key, request, reply, timeout)
-    result: si.Result = answer.result
-    if result.result != si.Result.OK:  # our sim sends an error reply instead; others may not
+def _ask(bus: Bus, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = True) -> list[R]:
+    answers = bus.call_all(key, request, reply, timeout) if everyone else [bus.call(key, request, reply, timeout)]
+    good = [answer for answer in answers if answer.result.result == si.Result.OK]
+    if not good:  # our sim sends an error reply instead; others may not
+        result = answers[0].result
         raise ServiceError(result.error_message or f"{key} failed with result {result.result}")
-    return answer
+    return good

@@ -118,7 +118,7 @@ def _call(bus: Bus, args: argparse.Namespace, payload: bytes, kind: str) -> int:
 
 
 def _ask(bus: Bus, args: argparse.Namespace, payload: bytes, reader: Reader, kind: str) -> None:
-    reply = call_bytes(bus, args.key, payload, "application/json", args.timeout)
+    reply = call_bytes(bus, args.key, payload, "application/json", args.timeout)[0]
     if kind and reply.encoding == CDR:  # whose encoding does not name the type
         reply.encoding = f"{CDR};{kind}_Response"
     value = reader.read(reply, bus)

@@ -214,7 +214,11 @@ class Bus:
 
         Raises ServiceError with the service's own reason, without a reply, or for a malformed one.
         """
-        return services.call(self, key, request, reply, timeout)
+        return services.call(self, key, request, reply, timeout)[0]
+
+    def call_all(self, key: str, request: Message, reply: type[R], timeout: float = 5.0) -> list[R]:
+        """As `call`, with the replies of all servers of the key that did not refuse. Raises ServiceError if all did."""
+        return services.call(self, key, request, reply, timeout, everyone=True)
 
     def ask(self, key: str, timeout: float, **request: Any) -> Replies:
         """Send one request, without waiting for the service."""
@@ -237,11 +241,12 @@ class Bus:
         self._readers.add(raw)
         return raw
 
-    def ask_all(self, key: str, timeout: float) -> Replies:
-        """Query all servers of `key` without a payload, ahead of other traffic."""
+    def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
+        """Query all servers of `key`, ahead of other traffic."""
         return self.ask(
             key, timeout, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE,
             priority=zenoh.Priority.REAL_TIME, express=True, congestion_control=zenoh.CongestionControl.BLOCK,
+            **request,
         )  # fmt: skip
 
     def peer_clocks(self, has: Callable[[str], bool]) -> PeerClocks:

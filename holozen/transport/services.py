@@ -211,6 +211,10 @@ class Asks(Protocol):
         """Ask once, without waiting for the service."""
         ...
 
+    def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
+        """Ask all services of a key once."""
+        ...
+
 
 class Replies:
     """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error."""
@@ -235,29 +239,37 @@ def _read(reply: Any) -> Sample | bytes:
     return Sample(reply.ok) if reply.ok else bytes(reply.err.payload)
 
 
-def call(bus: Asks, key: str, request: Message, reply: type[R], timeout: float) -> R:
-    """See Bus.call."""
+def call(bus: Asks, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = False) -> list[R]:
+    """See Bus.call, and Bus.call_all for `everyone`."""
     from holozen.messages import codec
 
     payload, wire = codec.written(request, bus.wire)
-    answer = call_bytes(bus, key, payload, codec.encoding(wire, type(request)), timeout)
+    answers = call_bytes(bus, key, payload, codec.encoding(wire, type(request)), timeout, everyone)
     try:
-        return codec.decode(answer.payload, answer.encoding, (reply,), tolerant=True)
+        return [codec.decode(answer.payload, answer.encoding, (reply,), tolerant=True) for answer in answers]
     except codec.CodecError as error:
         raise ServiceError(f"the reply of {key!r} is {error}") from None
 
 
-def call_bytes(bus: Asks, key: str, payload: bytes, encoding: str, timeout: float) -> Sample:
-    """As `call`, without types: the sample of the reply."""
+def call_bytes(
+    bus: Asks, key: str, payload: bytes, encoding: str, timeout: float, everyone: bool = False
+) -> list[Sample]:
+    """As `call`, without types: the samples of the replies."""
     deadline, pause, busy = time.monotonic() + timeout, FIRST_PAUSE, None
     while (left := deadline - time.monotonic()) > 0:
-        for answer in bus.ask(key, left, payload=payload, encoding=encoding):
+        found = []
+        ask = bus.ask_all if everyone else bus.ask
+        for answer in ask(key, left, payload=payload, encoding=encoding):
             if isinstance(answer, Sample):
-                return answer
-            if answer != TIMEOUT:
+                found.append(answer)
+                if not everyone:
+                    return found
+            elif answer != TIMEOUT:
                 busy = refusal(answer)
-                if not busy.fields.get("busy"):
-                    raise busy
+        if found:
+            return found
+        if busy and not busy.fields.get("busy"):
+            raise busy
         time.sleep(min(pause, max(left, 0)))
         pause = min(2 * pause, LONGEST_PAUSE)
     if busy:

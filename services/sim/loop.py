@@ -21,16 +21,20 @@ DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring
 
 
 class Loop:
-    """Runs one world with its entities at `rtf` times real time (0: as fast as it goes)."""
+    """Runs one world with its entities at `rtf` times real time (0: as fast as it goes).
+
+    `is_clock`: whether it publishes its time.
+    """
 
     def __init__(
-        self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None
-    ) -> None:
+        self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None,
+        is_clock: bool = True,
+    ) -> None:  # fmt: skip
         self._world, self._entities, self._robots = world, entities, entities.robots
         self.pace = Pace(world.spec.step, rtf, time.monotonic())
         self.answers = [services.answer] if services else []  # called between steps
         self._served = self.graph_polled = 0.0
-        self._clock: Publisher[Clock] = bus.publisher("clock", Clock)
+        self._clock: Publisher[Clock] | None = bus.publisher("clock", Clock) if is_clock else None
         self._clock_due = Schedule(CLOCK_RATE)
         self._last_read = self._before_stall = time.monotonic()
         self._trusted_from = 0.0
@@ -75,5 +79,5 @@ class Loop:
                 robot.publish(world.time, dt)
         except (ArithmeticError, ValueError) as error:  # such as a position that became NaN
             self._entities.fail(robot, error)
-        if self._clock_due.due(world.time):
+        if self._clock and self._clock_due.due(world.time):
             self._clock.put(Clock(Time.of(world.time)))

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 
 from holozen.bus import Bus
-from holozen.messages import Odometry, Twist
+from holozen.messages import Clock, Odometry, Twist
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 from holozen.transport import graph
@@ -105,13 +105,17 @@ def test_who_holds_the_port_and_sleeps_is_to_be_woken(wire: Wire) -> None:
 
 
 def test_two_sims_on_one_key_are_told_with_their_processes(wire: Wire) -> None:
-    sims = [wire.start("sim", "--empty") for _ in range(2)]
-    for sim in sims:
-        sim.wait_for_line("no robot yet")
+    sim = wire.start("sim", "--empty")
+    sim.wait_for_line("no robot yet")
+    clock = wire.bus("other", lasting=True).publisher("clock", Clock)  # our own sim would refuse
     code, rows = doctor(wire)
     (text,) = bad(rows, "duplicates")
     assert code == 1
-    assert all(f"sim (pid {sim.pid} on {os.uname().nodename})" in text for sim in sims)
+    assert all(
+        f"{name} (pid {pid} on {os.uname().nodename})" in text
+        for name, pid in [("sim", sim.pid), ("other", os.getpid())]
+    )
+    clock.close()
 
 
 def test_odom_that_does_not_come_is_stale(wire: Wire, door: Bus) -> None:

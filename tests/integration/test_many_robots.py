@@ -1,5 +1,6 @@
 """Robots with names have keys of their own."""
 
+import json
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from holozen.messages import JointState, TFMessage
 from holozen.testing import Wire, wait_for
 
 from .conftest import start_sim
+from .processes import assert_one_line
 from .robots import Robot, distance, moves, place, record
 
 pytestmark = pytest.mark.alone
@@ -141,3 +143,26 @@ def test_a_sim_that_cannot_start_says_why_in_one_line(town: Wire, tmp_path: Path
     said = done.stderr.splitlines()
     assert len(said) == 1, done.stderr
     assert reason.format(**names) in said[0]
+
+
+def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_to_callers(wire: Wire) -> None:
+    first = start_sim(wire, "--robot", f"{BOT}=Fred")
+    for words, why in [
+        ([], "end it, or join it with named robots: holozen sim --join --robot FILE=NAME"),
+        (["--robot", f"{BOT}=Ann"], "end it, or join it with named robots: "),
+        (["--join"], "name the robots: holozen sim --join --robot FILE=NAME"),
+        (["--join", "--robot", f"{BOT}=Ann", "--robot", str(BOT)], "name the robots: "),
+    ]:
+        done = wire.run("sim", *words)
+        assert_one_line(done, 1, "sim: sim@", f" simulates here already; {why}")
+    second = start_sim(wire, "--join", "--robot", f"{BOT}=Ann")
+    assert [line.split()[0] for line in wire.run("list").stdout.splitlines()] == ["Ann", "Fred"]
+    clock = json.loads(wire.run("topic", "info", "clock", "--json").stdout)
+    assert len(clock["publishers"]) == 1
+    assert "duplicates" not in wire.run("doctor").stdout
+    Robot(wire.bus(), "Ann").drive(0.3)
+    assert wire.run("param", "set", "Ann/sim", "max_linear", "0.2").returncode == 0
+    assert wire.run("delete", "Ann", "Fred").returncode == 0
+    assert wire.run("list").stdout == ""
+    assert wire.run("spawn", str(BOT), "--name", "Joe").returncode == 0, "one of them spawns"
+    assert "Traceback" not in first.err + second.err

@@ -31,25 +31,31 @@ _XACRO = re.compile(r"<xacro:|\$\{|\$\((?:find|arg|env|optenv|eval|cwd|dirname|a
 
 
 class EntityServices:
-    """Answers requests about entities. `packages` are those of `--package`: the only folders whose meshes are read."""
+    """Answers requests about entities. `packages` are those of `--package`: the only folders whose meshes are read.
 
-    def __init__(self, bus: Bus, entities: Entities, packages: Mapping[str, Path]) -> None:
+    Of several sims on one wire only the first `spawns`; each answers for its own entities.
+    """
+
+    def __init__(self, bus: Bus, entities: Entities, packages: Mapping[str, Path], spawns: bool = True) -> None:
         self._entities, self._packages = entities, packages
-        self._bus, self._graph, self._polls = bus, bus.graph(), 0
+        self._bus, self._graph, self._polls, self._spawns = bus, bus.graph(), 0, spawns
         serve = bus.serve
         self._servers = [
-            serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self.spawn, MAX_SPAWNS),
             serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
             serve("get_entities", si.GetEntitiesRequest, si.GetEntitiesReply, self.names),
             serve("get_entity_state", si.GetEntityStateRequest, si.GetEntityStateReply, self.state),
             serve("set_entity_state", si.SetEntityStateRequest, si.SetEntityStateReply, self.put),
         ]
+        if spawns:
+            self._servers.append(
+                serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self.spawn, MAX_SPAWNS)
+            )
 
     def answer(self) -> None:
         """Answer waiting requests for a short time: many at once must not stall the steps."""
         answer_in_turn(self._servers)
         self._polls += 1
-        if self._polls == PEER_CHECK:
+        if self._spawns and self._polls == PEER_CHECK:
             self._report_other_sims()
 
     def _report_other_sims(self) -> None:
