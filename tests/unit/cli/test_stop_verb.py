@@ -13,6 +13,8 @@ from holozen.cli import stop as stop_module
 from holozen.messages import TriggerReply, TriggerRequest
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
+from holozen.transport.services import Server
+from holozen.wire import key_for
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -24,12 +26,14 @@ class Robots:
         self.wire, self.refusals = wire, list[str]()
         self.told = set[tuple[str, str]]()  # keys, and the sims whose they are
         self.first_told = threading.Event()
+        self._servers = list[Server]()
 
     def add(self, *keys: str, wire: str = "json", hangs: bool = False) -> Bus:
         """A sim of its own that serves these keys, or holds them and does not answer."""
         bus = self.wire.bus("sim", wire=wire)
         for key in keys:
             server = bus.serve(key, TriggerRequest, TriggerReply, self._answer(key, bus.id))
+            self._servers.append(server)
             if not hangs:
                 server.start()
         return bus
@@ -43,6 +47,11 @@ class Robots:
             return TriggerReply(True, "whatever")
 
         return answer
+
+    def drop_tokens(self) -> None:
+        """Go on serving, but announce nothing."""
+        for server in self._servers:
+            server.ends.pop().undeclare()
 
     def keys(self) -> set[str]:
         return {key for key, _ in self.told}
@@ -80,6 +89,29 @@ def test_one_that_is_met_later_than_others_is_stopped_too(robots: Robots, run: R
         assert robots.keys() == told
     finally:
         late.join()
+
+
+@pytest.mark.parametrize(("names", "place"), [(["Fred"], "Fred"), ([], "")], ids=["named", "at the root"])
+def test_a_robot_whose_token_is_lost_among_forged_ones_is_stopped(
+    robots: Robots, run: Run, names: list[str], place: str
+) -> None:
+    key = key_for("stop", place)
+    robots.add(key)
+    robots.drop_tokens()
+    stranger = robots.wire.bus("stranger")
+    _forged = [stranger.announce("srv", TriggerReply.ROS, f"forged{number}/stop") for number in range(100)]
+    assert f"{place or 'the robot at the root'} is stopped" in run("stop", *names, "--timeout", "2")[1].splitlines()
+    assert robots.keys() == {key}
+
+
+def test_it_looks_for_robots_until_its_timeout(robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Among thousands of tokens, those of robots come late."""
+    monkeypatch.setattr(stop_module, "NOTICE", 0.1)
+    robots.add("next_goal")
+    late = threading.Timer(1.5, robots.add, ["Fred/stop"])
+    late.start()
+    assert run("stop", "--timeout", "20")[:2] == (0, "Fred is stopped\n")
+    late.join()
 
 
 def test_release_says_what_the_sim_says(robots: Robots, run: Run) -> None:

@@ -21,7 +21,7 @@ from holozen.messages import (
     TwistStamped,
 )
 from holozen.testing import Wire, wait_for
-from holozen.transport.errors import ServiceError
+from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.pubsub import Publisher, Subscription
 from services.teleop.control.key_state import LATCH
 from services.teleop.control.layouts import TTK
@@ -413,6 +413,24 @@ def test_a_key_after_tab_never_moves_the_robot_before(wire: Wire, robot: Robot) 
     assert robot.heard() == []
     assert session.mapper.settings.speed == 0.5
     assert {str(command.message) for command in iter(other.try_recv, None)} == {str(Twist())}
+
+
+def test_tab_passes_over_forged_names(wire: Wire, robot: Robot) -> None:
+    forged = ("**/cmd_vel", "a b/cmd_vel", "Fred/arm/cmd_vel", "9/cmd_vel", "Ginger/cmd_vel")
+    _tokens = [robot.bus.announce("sub", Twist.ROS, key) for key in forged]
+    session = session_of(wire, robot)
+    wait_for(lambda: session.ring() == ["Fred", "Ginger"])
+
+
+def test_a_robot_that_cannot_be_driven_leaves_the_one_before(wire: Wire, robot: Robot) -> None:
+    session = Session(wire.bus("teleop"), ["Fred", "no//key"], TwistMapper(Settings(), TTK), None)
+    wait_for(session.listeners)
+    press(session, "tab")
+    with pytest.raises(BusError):
+        tick(session, lambda: False)
+    assert session.client.robot == "Fred"
+    press(session, "i")
+    assert robot.commands.recv().message == Twist.planar(0.5)
 
 
 def test_tab_without_another_robot_says_so(wire: Wire, robot: Robot) -> None:
