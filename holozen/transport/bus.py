@@ -9,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-import weakref
 from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Self, TypeVar
@@ -24,7 +23,7 @@ from holozen.transport.connection import Connection, from_environment
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Graph, NodeInfo
 from holozen.transport.peer_clocks import PeerClocks, clock_key
-from holozen.transport.pubsub import Latest, Publisher, RawSubscriber, Subscription, source, stamps
+from holozen.transport.pubsub import Declared, Latest, Publisher, RawSubscriber, Subscription, source, stamps
 from holozen.transport.rendezvous import PATIENCE
 from holozen.transport.services import RING, ROOM, Replies, Server
 from holozen.transport.session import CLOSE_LIMIT, linked, one_line, open_session, wait_for_threads
@@ -34,6 +33,7 @@ if TYPE_CHECKING:
 
 M = TypeVar("M", bound="Message")
 R = TypeVar("R", bound="Message")
+D = TypeVar("D", bound=Declared)
 
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
 ROLL_CALL = 0.5  # s
@@ -62,8 +62,7 @@ class Bus:
     ) -> None:
         connection = connection or from_environment()
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
-        self._readers: set[RawSubscriber | Server | NodeInfo] = set()  # kept until the bus is closed
-        self._answering = weakref.WeakSet[threading.Thread]()
+        self._declared: set[Declared] = set()
         self._closing = threading.Event()
         self._stamp: Callable[[], bytes] | None = None  # made with the first publisher
         self.clock_asked = threading.Event()  # set once another node has asked for this session's clock
@@ -76,8 +75,8 @@ class Bus:
         if lasting:
             if exposed := self.exposed():
                 report(f"{node}: {listeners.exposure(exposed)}")
-            self._readers.add(NodeInfo(self.session, zenoh.handlers.RingChannel(16), node, exposed))
-        self._token = self.announce("node") if lasting else None
+            info = self._keep(NodeInfo(self.session, zenoh.handlers.RingChannel(16), node, exposed))
+            info.ends.append(self.announce("node"))
 
     @property
     def session(self) -> Any:
@@ -111,7 +110,7 @@ class Bus:
                     query.reply(key, str(time.monotonic_ns()), express=True)
                 self.clock_asked.set()
 
-            self._clock = self.session.declare_queryable(key, answer)
+            self._keep(Declared(self.session.declare_queryable(key, answer)))
         return self._stamp
 
     def __enter__(self) -> Self:
@@ -134,15 +133,25 @@ class Bus:
     def close(self) -> None:
         """Close the session. Returns within 0.2 s, whatever the other side does."""
         self._closing.set()
-        closer = threading.Thread(target=self._leave, daemon=True)
+        declared = list(self._declared)
+        closer = threading.Thread(target=self._leave, args=(declared,), daemon=True)
         closer.start()
-        wait_for_threads(
-            (closer, self._keeper, *self._answering, *(reader.thread for reader in self._readers)), CLOSE_LIMIT
-        )
+        wait_for_threads((closer, self._keeper, *(one.thread for one in declared)), CLOSE_LIMIT)
 
-    def _leave(self) -> None:
+    def _leave(self, declared: list[Declared]) -> None:
+        # A link that another session opens at this moment may survive the session, and Zenoh would go on to show there
+        # all that was declared. So that goes first.
+        for one in declared:
+            with contextlib.suppress(Exception):  # closed, or in use, by another thread
+                one.close()
         with contextlib.suppress(BusError, SystemExit):  # an error of opening was reported already
             self._opened().close()
+
+    def _keep(self, declared: D) -> D:
+        """Keep something until it, or the bus, is closed."""
+        declared.kept = self._declared
+        self._declared.add(declared)
+        return declared
 
     def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
         """List a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
@@ -166,12 +175,11 @@ class Bus:
         writer: Publisher[M] = Publisher(publisher, self.wire, self.stamp, number)
         # A callback's queue would, when full, block Zenoh's thread and with it this link.
         queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(GETS))
-        answering = threading.Thread(target=writer.answer, args=(queryable.handler,), daemon=True)
-        answering.start()
-        self._answering.add(answering)
+        writer.thread = threading.Thread(target=writer.answer, args=(queryable.handler,), daemon=True)
+        writer.thread.start()
         # Last, so that nodes that discover it can query it at once.
         writer.ends += [queryable, self.announce("pub", kind.ROS, key)]
-        return writer
+        return self._keep(writer)
 
     def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> Subscription[M]:
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused."""
@@ -188,14 +196,8 @@ class Bus:
     def subscribe_raw(self, key: str, depth: int = 1024, limit: int = 0) -> RawSubscriber:
         """A reader of bytes on any key expression. Raises BusError if it is not valid."""
         with one_line(f"key {key!r}"):
-            raw = RawSubscriber(self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth)), limit)
-        self._readers.add(raw)
-        return raw
-
-    def drop(self, reader: Subscription[Any] | Latest[Any] | RawSubscriber | Server) -> None:
-        """Close a reader or a server before the bus; its declarations are removed."""
-        reader.close()
-        self._readers.discard(getattr(reader, "raw", reader))
+            subscriber = self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth))
+        return self._keep(RawSubscriber(subscriber, limit))
 
     def serve(self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R], room: int = ROOM) -> Server:
         """Answer requests on `key`. The caller runs it: `answer_pending()` in a loop, or `start()`.
@@ -204,9 +206,8 @@ class Bus:
         """
         token = self.announce("srv", reply.ROS, key)
         queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=True)
-        server = Server(queryable, key, request, answer, self.wire, room)
+        server = self._keep(Server(queryable, key, request, answer, self.wire, room))
         server.ends.append(token)
-        self._readers.add(server)
         return server
 
     def call(self, key: str, request: Message, reply: type[R], timeout: float = 5.0) -> R:
@@ -235,11 +236,8 @@ class Bus:
     def writers(self, key: str) -> RawSubscriber:
         """A reader of a sample for each holozen publisher on `key` that exists, appears or disappears."""
         tokens = f"@holozen/*/*/pub/*/*/*/{graphs.quoted(key)}"
-        raw = RawSubscriber(
-            self.session.liveliness().declare_subscriber(tokens, zenoh.handlers.RingChannel(64), history=True)
-        )
-        self._readers.add(raw)
-        return raw
+        live = self.session.liveliness()
+        return self._keep(RawSubscriber(live.declare_subscriber(tokens, zenoh.handlers.RingChannel(64), history=True)))
 
     def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
         """Query all servers of `key`, ahead of other traffic."""

@@ -15,7 +15,7 @@ from collections import Counter, deque, namedtuple
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from holozen.transport.pubsub import source
+from holozen.transport.pubsub import Declared, source
 
 ALL = "@holozen/**"
 ALL_NODE_INFO = "@holozen/*/about"
@@ -214,13 +214,13 @@ def version(package: str) -> str:
         return ""
 
 
-class NodeInfo:
+class NodeInfo(Declared):
     """Answers queries about this node from a thread of its own, until the bus is closed."""
 
     def __init__(self, session: Any, channel: Any, node: str, exposed: list[str]) -> None:
         self._key = node_info_key(str(session.zid()))
-        self._queryable = session.declare_queryable(self._key, channel)
-        self._queries = self._queryable.handler
+        super().__init__(queryable := session.declare_queryable(self._key, channel))
+        self._queries = queryable.handler
         self._fixed = {"node": node, "host": os.uname().nodename, "pid": os.getpid(), "exposed": exposed}
         self.thread = threading.Thread(target=self._serve, daemon=True)
         self.thread.start()

@@ -136,14 +136,29 @@ class Sample:
         return str(self._sample.congestion_control).rpartition(".")[2], bool(self._sample.express)
 
 
-class RawSubscriber:
+class Declared:
+    """What a bus has declared to all others, in `ends`, until `close`."""
+
+    def __init__(self, *ends: Any) -> None:
+        self.ends = list(ends)
+        self.thread: threading.Thread | None = None  # the one that waits for Zenoh here
+        self.kept: set[Declared] = set()  # by the bus, with all that is declared
+
+    def close(self) -> None:
+        """Remove the declarations: nothing more arrives, and others see it leave. Does nothing the second time."""
+        self.kept.discard(self)
+        ends, self.ends = self.ends, []
+        for end in reversed(ends):
+            end.undeclare()
+
+
+class RawSubscriber(Declared):
     """Raw samples; if too many wait, the oldest are dropped."""
 
     def __init__(self, subscriber: Any, limit: int = 0) -> None:
+        super().__init__(subscriber)
         # Reading from the handler leaves the subscriber free to be undeclared at the same time.
-        self.ends = [subscriber]  # the declarations of this reader
         self._samples, self._limit = subscriber.handler, limit
-        self.thread: threading.Thread | None = None  # the one that waits in `recv`
 
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""
@@ -159,13 +174,8 @@ class RawSubscriber:
             raise BusError("closed") from None
         return Sample(sample, self._limit)
 
-    def close(self) -> None:
-        """Stop listening."""
-        for end in self.ends:
-            end.undeclare()
 
-
-class Publisher(Generic[M]):
+class Publisher(Declared, Generic[M]):
     """Writes messages, and answers a `get` on its key with the last one. Made by `Bus.publisher`.
 
     Each carries the attachment that `stamp` makes, with the sender and the time of sending, and a sequence number, by
@@ -175,8 +185,8 @@ class Publisher(Generic[M]):
     def __init__(self, publisher: Any, wire: str, stamp: Callable[[], bytes], number: Callable[[int], Any]) -> None:
         from holozen.messages import codec
 
-        self.ends = [publisher]  # the declarations of this publisher
-        self._publisher, self._wire, self._stamp = publisher, wire, stamp
+        super().__init__(publisher)
+        self._publisher, self._key, self._wire, self._stamp = publisher, publisher.key_expr, wire, stamp
         self._written, self._named, self._encoding = codec.written, codec.encoding, publisher.encoding
         self._last: tuple[bytes, Any] | None = None  # with its Encoding
         self.numbers = map(number, count())
@@ -208,12 +218,7 @@ class Publisher(Generic[M]):
             with query:
                 if self._last is not None:
                     payload, encoding = self._last
-                    query.reply(self._publisher.key_expr, payload, encoding=encoding)
-
-    def close(self) -> None:
-        """Stop publishing and answering; all declarations are removed."""
-        for end in self.ends:
-            end.undeclare()
+                    query.reply(self._key, payload, encoding=encoding)
 
 
 class Received(NamedTuple, Generic[M]):

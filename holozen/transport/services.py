@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from holozen.console import report
 from holozen.transport.errors import TIMEOUT, BusError, NoReply, ServiceError
-from holozen.transport.pubsub import Sample, release_memory, source_in
+from holozen.transport.pubsub import Declared, Sample, release_memory, source_in
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -69,7 +69,7 @@ class Waiting:
         return query
 
 
-class Server:
+class Server(Declared):
     """A service. Requests wait until `answer_pending` is called, or until the thread of `start` takes them.
 
     At most `room` of them wait; the others are refused as busy, and `Bus.call` retries those.
@@ -80,11 +80,10 @@ class Server:
     ) -> None:
         from holozen.messages import codec
 
-        self.ends = [queryable]  # the declarations of this service
+        super().__init__(queryable)
         # Reading from the handler leaves the queryable free to be undeclared at the same time.
         self._queries = queryable.handler
         self._waiting, self._room = Waiting(room), room
-        self.thread: threading.Thread | None = None  # of `start`
         self.caller = ""  # the claimed sender of the request that is being answered
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
@@ -129,11 +128,6 @@ class Server:
         """Answer from a thread of its own, until the bus is closed."""
         self.thread = threading.Thread(target=self._serve, daemon=True)
         self.thread.start()
-
-    def close(self) -> None:
-        """Stop answering."""
-        for end in self.ends:
-            end.undeclare()
 
     def _serve(self) -> None:
         while True:

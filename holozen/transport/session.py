@@ -206,9 +206,11 @@ def open_point(endpoint: str) -> Callable[[], None] | None:
     return partial(close, session, token)
 
 
-def close(session: Any, *_kept: Any) -> None:
-    """Close a session, even if it is closed already."""
+def close(session: Any, *tokens: Any) -> None:
+    """Close a session, even if it is closed already, and withdraw its tokens before that; see Bus.close."""
     with contextlib.suppress(zenoh.ZError):
+        for token in tokens:
+            token.undeclare()
         session.close()
 
 

@@ -20,7 +20,7 @@ class RobotClient:
         row = topic("odom")
         assert row is not None
         self.robot, self.key = robot, command or key_for("cmd_vel", robot)
-        self._bus, self._stamped, self._silence = bus, stamped, row.silence
+        self._stamped, self._silence = stamped, row.silence
         kind: type[Twist] | type[TwistStamped] = Twist if stamped is None else TwistStamped
         self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self.key, kind, PRIORITY_OF["teleop"])
         self.odom = bus.latest(self.beside("odom"), Odometry)
@@ -73,5 +73,5 @@ class RobotClient:
     def close(self) -> None:
         """Close its publishers and subscriptions."""
         self._commands.close()
-        self._bus.drop(self.odom)
-        self._bus.drop(self._status)
+        self.odom.close()
+        self._status.close()

@@ -328,7 +328,7 @@ class TimeSource:
             if active:
                 self._listen()
             elif self._reader:
-                self._node._holozen.bus.drop(self._reader)
+                self._reader.close()
                 self._reader = None
         for clock in self._clocks:
             clock._set_ros_time_is_active(active)

@@ -86,7 +86,7 @@ class Service(HelpfulAttributes):
         """Stop serving."""
         if not self._closed:
             self._closed = True
-            self._handle.bus.drop(self._server)
+            self._server.close()
             self._inbox.close()
 
     def _answer(self, query: Any, request: Any) -> Any:

@@ -98,7 +98,7 @@ class Subscription(HelpfulAttributes):
         """Stop receiving."""
         if not self._closed:
             self._closed = True
-            self._handle.bus.drop(self._reader)
+            self._reader.close()
             if self.latched:
                 self.latched.close()
             self.inbox.close()
@@ -174,7 +174,7 @@ class _LatchedMessages:
     def close(self) -> None:
         """Stop asking."""
         self.detach()
-        self._bus.drop(self.writers)
+        self.writers.close()
 
     def _keep_asking(self) -> None:
         try:

@@ -26,7 +26,7 @@ class RobotServices:
     VERBS = ("release", "resume", "stop")
 
     def __init__(self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[], None]) -> None:
-        self._bus, self._arbiters, self._changed = bus, arbiters, changed
+        self._arbiters, self._changed = arbiters, changed
         answers = (self._on_release, self._on_resume, self._on_stop)
         self._namespace = namespace = command.rpartition("/")[0]
         self._release, self._resume, self._stop = self._servers = tuple(
@@ -50,7 +50,7 @@ class RobotServices:
     def close(self) -> None:
         """Close the services."""
         for server in self._servers:
-            self._bus.drop(server)
+            server.close()
 
     @property
     def _setter(self) -> str:

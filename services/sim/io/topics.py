@@ -42,7 +42,7 @@ class JointTopics:
         self, bus: Bus, place: str, model: RobotModel, names: list[str], prefix: str, twist_input: JointInput,
         tf: Publisher[TFMessage],
     ) -> None:  # fmt: skip
-        self._bus, self._input, self._tf, self.names = bus, twist_input, tf, names
+        self._input, self._tf, self.names = twist_input, tf, names
         self._frames = JointFrames(model, key_for("", prefix))
         self._commands = bus.subscribe(twist_input.key, JointState, limit=MAX_COMMAND_BYTES)
         self._states: Publisher[JointState] = bus.publisher(key_for("joint_states", place), JointState)
@@ -67,7 +67,7 @@ class JointTopics:
 
     def close(self) -> None:
         """Close the keys."""
-        self._bus.drop(self._commands)
+        self._commands.close()
         self._states.close()
 
 
@@ -141,7 +141,7 @@ class DriveTopics:
     """The keys of a drive. `prefix` is the robot's name or empty."""
 
     def __init__(self, bus: Bus, prefix: str, drive: Drive, twist_input: TwistInput, tf: Publisher[TFMessage]) -> None:
-        self._bus, self._drive, self._input, self._tf = bus, drive, twist_input, tf
+        self._drive, self._input, self._tf = drive, twist_input, tf
         self._frames = key_for("", prefix)
         self._variances = covariance(drive)
         self._limited = Limited(drive)
@@ -187,6 +187,6 @@ class DriveTopics:
     def close(self) -> None:
         """Close the keys."""
         for commands in self._commands:
-            self._bus.drop(commands)
+            commands.close()
         for publisher in (self._odom, self._status):
             publisher.close()

@@ -356,9 +356,9 @@ def test_shutdown_does_not_call_a_close_of_the_script(ros: Wire) -> None:
 
 
 def test_a_node_is_destroyed_at_the_end_of_its_with(ros: Wire) -> None:
-    with rclpy.create_node("tom") as node:
-        assert node.get_node_names() == ["tom"]
     jerry = rclpy.create_node("jerry")
+    with rclpy.create_node("tom"):
+        wait_for(lambda: jerry.get_node_names() == ["jerry", "tom"])
     wait_for(lambda: jerry.get_node_names() == ["jerry"])
 
 

@@ -32,6 +32,7 @@ from holozen.transport.errors import BusError, NoReply, ServiceError
 from holozen.transport.graph import ALL, Endpoint, Graph
 from holozen.transport.pubsub import Publisher
 from holozen.transport.rendezvous import is_free
+from holozen.transport.session import Opened
 
 
 @pytest.fixture
@@ -229,6 +230,22 @@ def test_the_graph_shows_who_reads_writes_and_serves(pair: tuple[Bus, Bus]) -> N
     wait_for(lambda: set(graph.endpoints()) == expected)
     writer.close()
     wait_for(lambda: {endpoint.node for endpoint in graph.endpoints()} == {"second"})
+
+
+def test_who_left_is_gone_even_where_its_link_survives(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As Zenoh lets a link survive that is opened while the session is closed."""
+    leaver, watcher = wire.bus("sim", lasting=True), wire.bus("watcher")
+    leaver.publisher("odom", Odometry)
+    leaver.subscribe("cmd_vel", Twist)
+    leaver.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())
+    graph, served = watcher.graph(), watcher.served("resume")
+    wait_for(lambda: len(graph.endpoints()) == 4 and served())
+    with monkeypatch.context() as patch:
+        patch.setattr(Opened, "close", lambda _: None)
+        leaver.close()
+    wait_for(lambda: not graph.endpoints() and not served())
+    assert watcher.connected()
+    leaver.session.close()
 
 
 class Watched(Bus):
