@@ -221,11 +221,11 @@ class Bus:
         """As `call`, with the replies of all servers of the key that did not refuse. Raises ServiceError if all did."""
         return services.call(self, key, request, reply, timeout, everyone=True)
 
-    def ask(self, key: str, timeout: float, **request: Any) -> Replies:
-        """Send one request, without waiting for the service."""
+    def ask(self, key: str, timeout: float, replier: str = "", **request: Any) -> Replies:
+        """Send one request, without waiting for the service. `replier`: the session whose replies are read."""
         with one_line(f"key {key!r}"):
             replies = self.session.get(key, timeout=timeout, attachment=self.source, **request)
-        return Replies(replies)
+        return Replies(replies, replier)
 
     def served(self, key: str) -> Callable[[], bool]:
         """A function that returns whether any node, also a foreign one, answers on `key` now."""
@@ -251,7 +251,11 @@ class Bus:
         """The clocks of other sessions, to measure the age of their commands. `has`: whether a session is alive."""
 
         def ask(session: str, timeout: float) -> Replies:
-            return self.ask(clock_key(session), timeout, priority=zenoh.Priority.REAL_TIME, express=True)
+            # All servers are asked, since any session may serve this key.
+            return self.ask(
+                clock_key(session), timeout, session, target=zenoh.QueryTarget.ALL,
+                consolidation=zenoh.ConsolidationMode.NONE, priority=zenoh.Priority.REAL_TIME, express=True,
+            )  # fmt: skip
 
         return PeerClocks(ask, has)
 

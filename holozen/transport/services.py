@@ -211,18 +211,22 @@ class Asks(Protocol):
 
 
 class Replies:
-    """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error."""
+    """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error. With a `replier`, `try_recv`
+    skips those of any other session, by Zenoh's own id of who replied.
+    """
 
-    def __init__(self, replies: Any) -> None:
-        self._replies = replies
+    def __init__(self, replies: Any, replier: str = "") -> None:
+        self._replies, self._replier = replies, replier
 
     def try_recv(self) -> Sample | bytes | None:
         """The next reply, or None. Raises BusError when there will be no more."""
         try:
-            reply = self._replies.try_recv()
+            while (reply := self._replies.try_recv()) is not None:
+                if not self._replier or (reply.replier_id and str(reply.replier_id.zid) == self._replier):
+                    return _read(reply)
         except Exception:  # zenoh's own error type, which only bus.py may name: all have replied, or it timed out
             raise BusError("no more replies") from None
-        return reply and _read(reply)
+        return None
 
     def __iter__(self) -> Iterator[Sample | bytes]:
         """All replies; waits for each."""

@@ -5,13 +5,14 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 
 import pytest
+import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.messages import Twist
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import BusError
-from holozen.transport.peer_clocks import AGAIN, MAX_PEERS, PeerClocks
+from holozen.transport.peer_clocks import AGAIN, MAX_PEERS, PeerClocks, clock_key
 from holozen.transport.pubsub import Sample, Stamp
 
 OFFSET = 7200.0  # s that the peer's clock is ahead of ours
@@ -143,6 +144,31 @@ def test_a_session_that_commands_is_measured_among_many_that_never_answer() -> N
 def wire() -> Iterator[Wire]:
     with Wire() as wire:
         yield wire
+
+
+def test_the_answer_of_a_stranger_does_not_count(wire: Wire) -> None:
+    robot, driver, stranger = wire.bus("robot"), wire.bus("driver"), wire.bus("stranger")
+    sent, key = driver.stamp().split(b";")[2], clock_key(driver.id)
+
+    def lie(query: zenoh.Query) -> None:
+        with query:
+            query.reply(key, str(time.monotonic_ns() + 10**12))
+
+    lies = stranger.session.declare_queryable(key, lie, complete=True)
+    querier = robot.session.declare_querier(key)
+    wait_for(lambda: querier.matching_status.matching)
+    wait_for(lambda: any(reply.replier_id.zid == stranger.session.zid() for reply in querier.get()))
+    clocks = robot.peer_clocks(lambda _: True)
+
+    def known() -> tuple[float, float] | None:
+        now = time.monotonic()
+        clocks.track([driver.id], now)
+        clocks.poll(now)
+        return clocks.ages(driver.id, int(sent) * 1e-9, now)
+
+    _, oldest = wait_for(known) or (0.0, 0.0)
+    assert oldest < 100
+    lies.undeclare()
 
 
 def test_over_zenoh_a_publisher_stamps_and_its_session_answers(wire: Wire) -> None:
