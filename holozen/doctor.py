@@ -312,19 +312,20 @@ class Robots:
 
 def commands(key: str, status: "CommandStatus") -> Iterator[Finding]:
     """The findings about the sources that command the robot of `key`."""
+    robot = status.name or "the robot"
     if status.stopped:
-        text = f"the robot is stopped by {status.stopped}, and ignores all commands"
+        text = f"{robot} is stopped by {status.stopped}, and ignores all commands"
         yield Finding(key, WARNING, text, f"holozen release {key.rpartition('/')[0]}".strip())
     driving = sorted((source for source in status.sources if source.rate >= DRIVES), key=_rank)
     if not driving:
-        yield Finding(key, OK, "nothing commands the robot; `holozen teleop` or `holozen controller` does")
+        yield Finding(key, OK, f"nothing commands {robot}; `holozen teleop` or `holozen controller` does")
     if len(driving) > 1:
         level = ERROR if _rank(driving[0]) == _rank(driving[1]) else WARNING  # among equals it is chance who drives
         names = [
             f"{one.source} ({one.priority}, {one.rate:.0f} Hz, {'' if one.obeyed else 'not '}obeyed)" for one in driving
         ]
         fix = "end all but one; the teleop takes precedence over scripts, and those over the controller"
-        yield Finding(key, level, f"{len(driving)} sources command the robot at once: {', '.join(names)}", fix)
+        yield Finding(key, level, f"{len(driving)} sources command {robot} at once: {', '.join(names)}", fix)
 
 
 def _rank(source: "CommandSource") -> int:

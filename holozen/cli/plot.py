@@ -31,7 +31,6 @@ TRAIL = 2000  # points
 STEP = 0.02  # m between two points of a trail
 ASK_EVERY = 2.0  # s between two requests to the sim and the pose service
 MOST_GOALS = 100
-NEAR, FAR = 0.15, 1e9  # m
 PATIENCE = 1.0  # s for a service to answer
 
 
@@ -169,7 +168,7 @@ class Watcher:
     """Follows the odom of all robots, and calls the services periodically in a thread of its own."""
 
     def __init__(self, bus: Bus) -> None:
-        from holozen.messages import Odometry
+        from holozen.messages import CommandStatus, Odometry
 
         self.poses: dict[str, tuple[float, float, float]] = {}  # x, y, yaw by a robot's name
         self.goals: list[Point] = []
@@ -177,7 +176,8 @@ class Watcher:
         self._graph = bus.graph()
         self._bus, self._odom = bus, bus.subscribe("**/odom", Odometry, depth=1024)
         self._trails: dict[str, deque[Point]] = {}
-        self._moved, self._ended = threading.Event(), threading.Event()
+        self._status = bus.latest("cmd_vel_status", CommandStatus)  # knows the name of the robot at the root
+        self._ended = threading.Event()
         self._asking = threading.Thread(target=self._ask, daemon=True)
         self._asking.start()
 
@@ -191,10 +191,13 @@ class Watcher:
 
     def plane(self) -> Plane:
         """The current state to draw."""
+        status = self._status.read()[0]
+        root = status.name if status else ""
         robots = [
-            Robot(name, x, y, yaw, [*self._trails[name], (x, y)]) for name, (x, y, yaw) in sorted(self.poses.items())
+            Robot(name or root, x, y, yaw, [*self._trails[name], (x, y)])
+            for name, (x, y, yaw) in sorted(self.poses.items())
         ]
-        others = {name: at for name, at in self.objects.items() if name not in self.poses}
+        others = {name: at for name, at in self.objects.items() if name not in self.poses and name != root}
         return Plane(robots, self.goals, others, ", ".join(map(_place, robots)))
 
     def join(self) -> None:
@@ -207,10 +210,8 @@ class Watcher:
         if not trail or abs(trail[-1][0] - x) + abs(trail[-1][1] - y) > STEP:
             trail.append((x, y))
         self.poses[name] = x, y, yaw
-        self._moved.set()
 
     def _ask(self) -> None:
-        self._moved.wait(PATIENCE)  # the position of the robot at the root is needed to exclude it from the objects
         while not self._ended.is_set():
             try:
                 self.goals = self._ask_goals()
@@ -242,10 +243,7 @@ class Watcher:
         found = {}
         for name in entities.names(self._bus):
             at = entities.pose(self._bus, name).position
-            # The robot at the root has a name in the sim but not on its keys; its odom identifies it by position.
-            x, y, _ = self.poses.get("", (FAR, FAR, 0.0))
-            if abs(at.x - x) + abs(at.y - y) > NEAR:
-                found[name] = at.x, at.y
+            found[name] = at.x, at.y
         return found
 
 

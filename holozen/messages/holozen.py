@@ -35,7 +35,9 @@ class CommandStatus(Message):
     `obeyed` is the driving source (empty: none), `priority` its Zenoh priority. `held` is true after a source of higher
     priority took over: lower ones wait for a call of `resume`. `resumed` counts these calls; `accepted` and `refused`
     (by reason; pairs in ROS) count commands since the start of the sim. `stopped` names the node that set the software
-    stop (empty: none); `sources` are those with recent commands.
+    stop (empty: none); `sources` are those with recent commands. `name` is the robot's in the sim. Commands beyond
+    `max_linear` (m/s) and `max_angular` (rad/s) are clamped (0: not known); `strafes` is whether its drive can move it
+    sideways.
     """
 
     obeyed: str = ""
@@ -47,6 +49,10 @@ class CommandStatus(Message):
     last_refusal: str = ""
     stopped: str = ""
     sources: list[CommandSource] = field(default_factory=list)
+    name: str = ""
+    max_linear: float = 0.0
+    max_angular: float = 0.0
+    strafes: bool = True
 
 
 class NextGoalRequest(Message):

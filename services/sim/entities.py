@@ -89,7 +89,7 @@ class Entities:
             self._check(name, prefix, model)
             entity = Entity(name, model, mover.body, prefix=prefix)
             if model.drive or mover.names:
-                entity.robot = Robot(self._bus, prefix, model, mover, self.limits, self._clocks)
+                entity.robot = Robot(self._bus, name, prefix, model, mover, self.limits, self._clocks)
                 entity.robot.require_age(self.max_age)
         except Exception:
             mover.body.remove()

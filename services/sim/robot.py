@@ -21,11 +21,15 @@ Memory = tuple[Arbiter, Arbiter]
 
 
 class Robot:
-    """A robot with a drive, with joints, or with both. `prefix` is its name on the wire, empty at the root."""
+    """A robot with a drive, with joints, or with both.
+
+    `name` is its name in the world, `prefix` that on the wire, which is empty at the root.
+    """
 
     def __init__(
-        self, bus: Bus, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float], senders: Senders
-    ) -> None:
+        self, bus: Bus, name: str, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float],
+        senders: Senders,
+    ) -> None:  # fmt: skip
         self.mover, self._bus = mover, bus
         drive = model.drive
         command = command_key(model, prefix)
@@ -36,7 +40,7 @@ class Robot:
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", namespace), TFMessage)
         self.prefix = prefix
         self._input = twist_input = TwistInput(command, self.arbiter, senders, *limits, others=_aliases(model, prefix))
-        self._drive = DriveTopics(bus, prefix, drive, twist_input, self._tf) if drive else None
+        self._drive = DriveTopics(bus, prefix, name, drive, twist_input, self._tf) if drive else None
         pairs = ((self._wheels, self.arbiter), (self._others, self.joint_arbiter))
         groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
         stats = twist_input.stats if drive else CommandStats()

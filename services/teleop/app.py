@@ -231,6 +231,7 @@ class TeleopApp:
             return
         self._draw_at = now + (LINE_EVERY if self._plain else REDRAW)
         state = self._telemetry.state(self._why(), now, self._ascii)
+        state.detached = not self._liveness.is_attached()
         if self._plain:
             self._terminal.write(f"{plain_line(state)}\r\n")
         else:

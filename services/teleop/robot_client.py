@@ -25,6 +25,7 @@ class RobotClient:
         self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self.key, kind, PRIORITY_OF["teleop"])
         self.odom = bus.latest(self.beside("odom"), Odometry)
         self.status_key = f"{self.key}_status"
+        self.name = ""  # in the sim; empty while it is not known
         self._seen: tuple[float, float, float] | None = None  # stamp and position of the last odom seen
         self._status = bus.latest(self.status_key, CommandStatus)
 
@@ -42,6 +43,7 @@ class RobotClient:
     def status(self) -> CommandStatus:
         """The sim's last command status; empty if it is outdated."""
         status, age = self._status.read()
+        self.name = status.name if status else ""
         return status if status and age < 3 * LOST else CommandStatus()
 
     def stale(self) -> bool:

@@ -104,6 +104,7 @@ class Telemetry:
         status = client.status()
         state = State(
             robot=client.robot,
+            name=client.name or client.robot,
             others=[robot for robot in session.ring() if robot != client.robot],
             command=_planar(session.sent) if session.sent else None,
             measured=_planar(odom.twist.twist) if odom else STOP,
@@ -119,13 +120,25 @@ class Telemetry:
             key=client.key,
             keys=session.mapper.layout.table if session.help else session.mapper.layout.help,
             help=session.help,
-            warning=session.warning or session.mapper.note or _refusal(status, session.bus.source),
+            warning=session.warning or _unmoved(session, status) or _refusal(status, session.bus.source),
             why=why,
             ascii=ascii,
         )
         _show_mapper(state, session.mapper)
         _show_status(state, status)
         return state
+
+
+def _unmoved(session: Session, status: CommandStatus) -> str:
+    """Why the robot moves slower than the keys say, or not at all; empty if it obeys them."""
+    settings, (x, y, _, turn) = session.mapper.settings, session.mapper.motion
+    if y and not status.strafes:
+        return "this robot cannot strafe: its drive only goes forward, backward and turns"
+    if status.max_linear and math.hypot(x, y) * settings.speed > status.max_linear:
+        return f"limit: the robot is driven at no more than {status.max_linear:g} m/s"
+    if status.max_angular and abs(turn) * settings.turn > status.max_angular:
+        return f"limit: the robot is turned at no more than {status.max_angular:g} rad/s"
+    return session.mapper.note
 
 
 def _show_mapper(state: State, mapper: TwistMapper) -> None:
@@ -137,6 +150,8 @@ def _show_mapper(state: State, mapper: TwistMapper) -> None:
 
 def _show_status(state: State, status: CommandStatus) -> None:
     state.obeyed, state.held, state.stopped = status.obeyed, status.held, status.stopped
+    state.speed_limit = min(state.speed_limit, status.max_linear or math.inf)
+    state.turn_limit = min(state.turn_limit, status.max_angular or math.inf)
     state.sources = [Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources]
 
 

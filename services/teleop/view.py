@@ -31,9 +31,11 @@ class State:
     """
 
     robot: str = ""  # "" is the robot at the root
+    name: str = ""  # in the sim; empty while it is not known
     others: list[str] = field(default_factory=list)  # robots that Tab switches to
     mode: str = "hold"  # or "latch"
     why: str = ""  # how key releases are detected, or why they are not needed
+    detached: bool = False  # whether no operator can see the terminal
     deadman: bool = False
     deadman_held: bool = False
     speed: float = 0.5
@@ -124,6 +126,8 @@ def alarms(state: State) -> list[list[str]]:
         release = f"`holozen release{' ' * bool(state.robot)}{clean(state.robot, 64)}`"
         by = f"STOPPED by {clean(state.stopped, 40)}: {release}"
         found.append([f"{by} lets it drive again", by, f"STOPPED: {release}", "STOPPED"])
+    if state.detached:
+        found.append(["terminal detached: hands off; attach to it again to drive", "terminal detached: hands off"])
     if not state.listeners:
         found.append([f"NO SUBSCRIBER on {clean(state.key, 100)}", "NO SUBSCRIBER"])
     if not math.isfinite(state.odom_age):
@@ -232,7 +236,7 @@ def bar(part: float, cells: int, style: str, ascii: bool = False) -> Line:
 def plain_line(state: State) -> str:
     """The contents of the screen in one line, alarms first; printable ASCII without a line end."""
     parts = [wordings[0] for wordings in alarms(state)]
-    parts += [clean(state.robot, 64) or "robot at the root", driver(state)[1]]
+    parts += [clean(state.name or state.robot, 64) or "robot at the root", driver(state)[1]]
     parts.append(f"command {planar(state.command)}" if state.command else "command silent")
     parts.append(f"measured {planar(state.measured)}" if state.known else "measured unknown")
     parts += _plain_links(state)
@@ -358,7 +362,7 @@ def _alarms(state: State, columns: int, rows: int) -> list[Line]:
 
 
 def _title(state: State, columns: int) -> Ranked:
-    robot = clean(state.robot, 64) or "the robot at the root"
+    robot = clean(state.name or state.robot, 64) or "the robot at the root"
     others = ", ".join(clean(name, 64) for name in state.others)
     product = "holozen teleop   " if columns >= WIDE else ""
     left = f" {product}{robot}" + (f"   Tab: {others}" if others else "")

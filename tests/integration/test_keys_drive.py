@@ -7,7 +7,7 @@ import pytest
 from holozen.messages import TwistStamped
 from holozen.testing import Terminal, Wire, wait_for
 
-from .robots import Record, Robot, distance, moves, place, planar, rests, time_of
+from .robots import URDF, Record, Robot, distance, moves, place, planar, rests, time_of
 
 pytestmark = pytest.mark.alone
 
@@ -139,3 +139,26 @@ def test_pasted_text_never_drives(town: Wire, robot: Robot, pasted: str) -> None
         terminal.wait_for_text("0.550 m/s")
         robot.newest()
         assert len(robot.commands.messages()) == seen
+
+
+def test_the_teleop_says_what_a_robot_cannot_do_and_the_limits_that_the_sim_has(wire: Wire) -> None:
+    wire.start("sim", "--robot", str(URDF / "differential.urdf.xacro")).wait_for_line("listens on")
+    terminal = start_teleop(wire, "--mode", "latch")
+    terminal.wait_for_text("limit 5")
+    assert "1000" not in terminal.screen()
+    assert wire.run("param", "set", "sim", "max_linear", "0.2").returncode == 0
+    terminal.wait_for_text("limit 0.2")
+    terminal.type("i")
+    terminal.wait_for_text("limit: the robot is driven at no more than 0.2 m/s")
+    terminal.type("J")
+    terminal.wait_for_text("this robot cannot strafe")
+    terminal.type("k")
+    wait_for(lambda: "cannot strafe" not in terminal.screen())
+
+
+def test_a_robot_has_one_name_in_list_map_teleop_and_doctor(town: Wire, robot: Robot) -> None:
+    with start_teleop(town) as terminal:
+        terminal.wait_for_text("holozen teleop   hb_bot")
+    assert town.run("list").stdout.startswith("hb_bot ")
+    assert "hb_bot x " in town.run("map", "--once").stdout
+    assert "nothing commands hb_bot;" in town.run("doctor").stdout

@@ -64,7 +64,7 @@ def test_every_wire_is_drawn(wire: Wire) -> None:
 
 
 def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
-    for verb, words, text in (("plot", (FIELD,), f"{FIELD}: "), ("map", (), "robot x")):
+    for verb, words, text in (("plot", (FIELD,), f"{FIELD}: "), ("map", (), "hb_bot x")):
         terminal = town.terminal(verb, *words)
         terminal.wait_for_text(text)
         terminal.type("\x03")
@@ -116,11 +116,11 @@ def test_the_map_shows_the_robot_and_the_goals(town: Wire, robot: Robot) -> None
     lines = done.stdout.splitlines()
     assert len(lines) == 24
     assert all(len(line) <= 80 for line in lines)
-    assert "robot x" in lines[-1]
+    assert "hb_bot x" in lines[-1]
 
     def goals() -> int:
         told = json.loads(town.run("map", "--json").stdout)
-        assert [one["name"] for one in told["robots"]] == [""]
+        assert [one["name"] for one in told["robots"]] == ["hb_bot"]
         assert told["objects"] == {}
         return len(told["goals"])
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from holozen.testing import Terminal, Wire
+from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command
 from tests.integration.robots import Robot, moves
 
@@ -34,6 +34,10 @@ class Multiplexer:
         """Another window that looks at the same program."""
         return Terminal([*self._tmux, "attach"], env=self.env)
 
+    def shown(self) -> str:
+        """What the program shows now, whoever looks; empty if that cannot be read."""
+        return subprocess.run([*self._tmux, "capture-pane", "-p"], capture_output=True, text=True).stdout
+
     def end(self) -> None:
         """End it and all that runs in it."""
         subprocess.run([*self._tmux, "kill-server"], capture_output=True)
@@ -53,6 +57,9 @@ class Screen(Multiplexer):
 
     def attach(self) -> Terminal:
         return Terminal(["screen", "-c", "/dev/null", "-r", "it"], env=self.env)
+
+    def shown(self) -> str:
+        return ""
 
     def end(self) -> None:
         subprocess.run(["screen", "-S", "it", "-X", "quit"], env=os.environ | self.env, capture_output=True)
@@ -90,6 +97,8 @@ def test_a_latched_robot_stands_when_nobody_is_there_and_waits_for_a_key_of_who_
         first.hang_up()
     robot.told_to_stop()
     robot.stands()
+    if shown := multiplexer.shown():
+        wait_for(lambda: "terminal detached: hands off" in multiplexer.shown(), what=shown)
     second = windows.enter_context(multiplexer.attach())
     second.wait_for_text("listening sim")
     assert_nothing_moves(robot)

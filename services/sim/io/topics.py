@@ -22,7 +22,8 @@ from holozen.messages import (
     TwistWithCovariance,
     Vector3,
 )
-from holozen.robot.model import Drive, RobotModel
+from holozen.robot.model import Drive, Mecanum, RobotModel
+from holozen.robot.model import Planar as PlanarDrive
 from holozen.robot.rigid import Frame
 from holozen.rotation import XYZ, XYZW, from_axis_angle, multiply
 from holozen.transport.pubsub import Publisher, Subscription
@@ -138,9 +139,12 @@ STATUS_RATE = 10.0  # Hz of real time: people read it
 
 
 class DriveTopics:
-    """The keys of a drive. `prefix` is the robot's name or empty."""
+    """The keys of a drive. `prefix` is the robot's name or empty, `name` its name in the world."""
 
-    def __init__(self, bus: Bus, prefix: str, drive: Drive, twist_input: TwistInput, tf: Publisher[TFMessage]) -> None:
+    def __init__(
+        self, bus: Bus, prefix: str, name: str, drive: Drive, twist_input: TwistInput, tf: Publisher[TFMessage]
+    ) -> None:
+        self._name, self._strafes = name, isinstance(drive.mechanism, PlanarDrive | Mecanum)
         self._drive, self._input, self._tf = drive, twist_input, tf
         self._frames = key_for("", prefix)
         self._variances = covariance(drive)
@@ -164,7 +168,11 @@ class DriveTopics:
     def publish_status(self, now: float, at_once: bool = False) -> None:
         """Publish the command status, when it is due or `at_once`."""
         if self._status_due.due(now) or at_once:
-            self._status.put(self._input.status(now))
+            status, drive = self._input.status(now), self._drive
+            status.name, status.strafes = self._name, self._strafes
+            status.max_linear = min(self._input.linear, drive.max_linear)
+            status.max_angular = min(self._input.angular, drive.max_angular)
+            self._status.put(status)
 
     def motion(self, now: float, dt: float) -> Planar | JointMotion:
         """The commanded motion of the next step of `dt` seconds, within the limits of its file."""

@@ -140,7 +140,7 @@ class TerminalLiveness:
 
     def __init__(self, terminal: Terminal, keyboard: Keyboard) -> None:
         self._terminal, self._keyboard, self._heartbeat = terminal, keyboard, Heartbeat()
-        self._attached = attached()
+        self.is_attached = attached()
         self._heartbeat.asked_terminal()  # by `Terminal.enter`
         self._speaks = False  # the Kitty protocol, since the last identity query
         self._known = False  # whether it reports releases
@@ -192,7 +192,7 @@ class TerminalLiveness:
             self._ask_terminal()
         if self._heartbeat.miss(now):
             return UNANSWERED
-        return DETACHED if engaged and not self._attached() else ""
+        return DETACHED if engaged and not self.is_attached() else ""
 
     def lend(self, now: float) -> None:
         """Send plain keys for a while: Docker recognizes its detach keys, Ctrl-P Ctrl-Q, only in that form."""
