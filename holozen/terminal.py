@@ -7,7 +7,7 @@ import select
 import time
 
 ASK_KEYBOARD, ASK_TERMINAL = "\x1b[?u", "\x1b[c"  # the Kitty protocol's query, and DA1, which every terminal answers
-PATIENCE = 0.3  # s for an answer
+PATIENCE = 1.0  # s for an answer; a slow line, or a busy machine, takes its time
 _KEYBOARD, _TERMINAL = re.compile(rb"\x1b\[\?\d+u"), re.compile(rb"\x1b\[\?[\d;]*c")
 
 

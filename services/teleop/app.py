@@ -150,12 +150,16 @@ class TeleopApp:
         now = time.monotonic()
         if isinstance(event, Answer):
             return self._hear(event, now)
-        if isinstance(event, Key) and event.name != "ctrl+c" and (not counts or self._is_old(event, now)):
+        if isinstance(event, Key) and not self._quits(event) and (not counts or self._is_old(event, now)):
             return self._session.disregard(event, now)
         self._do(self._session.take(event, now))
-        if isinstance(event, Key) and (event.name, event.kind) == ("ctrl+p", "press"):
+        if isinstance(event, Key) and "ctrl+p" in (event.name, event.base) and event.kind == "press":
             self._liveness.lend(now)
             self._session.let_go("to detach from a container: Ctrl-P Ctrl-Q within 2 s")
+
+    def _quits(self, event: Event) -> bool:
+        """Whether it is Ctrl-C, on a keyboard of any script. It always counts."""
+        return isinstance(event, Key) and self._session.mapper.key(event) == "ctrl+c"
 
     def _is_old(self, event: Key, now: float) -> bool:
         """Whether a key may have been held before the terminal was identified; only possible for typed keys."""
@@ -266,9 +270,9 @@ class TeleopApp:
         if self._joystick:
             self._joystick.let_go()
         self._session.let_go(why if self._session.mapper.engaged else "")
-        if self._readable():  # outdated, but Ctrl-C always counts
+        if self._readable():  # outdated, but for Ctrl-C
             typed = self._keyboard.feed(self._terminal.read(), time.monotonic())
-            self._ended = self._ended or any(isinstance(event, Key) and event.name == "ctrl+c" for event in typed)
+            self._ended = self._ended or any(map(self._quits, typed))
         self._liveness.meet_again()
         self._forget()
         self._back = False

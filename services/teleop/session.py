@@ -51,7 +51,7 @@ class Session:
             return ""
         key = event if isinstance(event, Key) else Key("unknown")
         if key.kind == "press" or key.kind == "typed":
-            if self._is_switching() and FIXED.get(key.name) not in ("quit", "suspend"):
+            if self._is_switching() and FIXED.get(self.mapper.key(key)) not in ("quit", "suspend"):
                 return self.let_go(SWITCHING)
             self.warning, self._wanted = "", ""
         return self.act(self.mapper.take(key, now), now)

@@ -65,9 +65,13 @@ class TwistMapper:
         """Whether a key drives or a stop is in progress."""
         return self.motion != STILL or self._stopping is not None
 
+    def key(self, key: Key) -> str:
+        """The key of the layout that was pressed."""
+        return self.layout.key_for(key.name, key.base)
+
     def take(self, key: Key, now: float) -> str:
         """Take a key event; returns the action it requests, such as "resume", or "". Unknown keys stop the robot."""
-        name = self.layout.key_for(key.name, key.base)
+        name = self.key(key)
         if key.kind == "release":
             return self._moved(lambda: self.key_state.release(key.code), now)
         action = ""
@@ -82,7 +86,7 @@ class TwistMapper:
     def disregard(self, key: Key, now: float) -> None:
         """Take a key that does not count, nor do its repeats."""
         if key.kind == "typed" and key.name not in PIECES:
-            self.key_state.ignore(self.layout.key_for(key.name, key.base), now)
+            self.key_state.ignore(self.key(key), now)
 
     def let_go(self) -> None:
         """Release all keys and the joystick."""
