@@ -20,7 +20,7 @@ QUICK = {"LIBGL_ALWAYS_SOFTWARE": "1", "KITTY_ENABLE_WAYLAND": "0"}
 
 # What runs in kitty in place of a shell: it starts what it is told to, and says how the terminal was left.
 SHELL = """
-import json, os, socket, subprocess, sys, termios, time, tty
+import json, os, re, socket, subprocess, sys, termios, tty
 told = socket.socket(socket.AF_UNIX)
 told.connect(sys.argv[1])
 lines = told.makefile("rw")
@@ -30,10 +30,10 @@ def ask(question):
     tty.setraw(0)
     os.write(1, question.encode())
     answer = b""
-    while not answer.endswith(b"c"):
+    while not re.search(rb"\\x1b\\[[?][0-9;]*c", answer):
         answer += os.read(0, 1000)
     termios.tcsetattr(0, termios.TCSAFLUSH, before)
-    return answer.decode()
+    return re.search(rb"\\x1b\\[[?]([0-9]*)u", answer)[1].decode()
 
 for line in lines:
     words = json.loads(line)
@@ -44,8 +44,8 @@ for line in lines:
     left = {
         "code": code,
         "modes": termios.tcgetattr(0)[:4] == before[:4],
-        "flags": ask("\\x1b[?u\\x1b[c").partition("u")[0],
-        "flags of the other screen": ask("\\x1b[?1049h\\x1b[?u\\x1b[?1049l\\x1b[c").partition("u")[0],
+        "flags": ask("\\x1b[?u\\x1b[c"),
+        "flags of the other screen": ask("\\x1b[?1049h\\x1b[?u\\x1b[?1049l\\x1b[c"),
     }
     print(json.dumps(left), file=lines, flush=True)
 """
@@ -79,6 +79,11 @@ class Display:
     def keys(self, *words: str) -> None:
         """`keys("keydown", "shift", "keydown", "j")`: xdotool's commands; a number is the code of a key."""
         self.run("xdotool", *words)
+
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._server.pid
 
     def focus(self, window: str) -> None:
         """Give the keyboard to a window."""
@@ -124,19 +129,26 @@ class Kitty:
 
     def run(self, words: Sequence[str]) -> "Program":
         """Start a program in it."""
+        begin = len(self.bytes())
         self._shell.sendall(f"{json.dumps(list(words))}\n".encode())
-        return Program(self, self.told()["pid"], len(self.bytes()))
+        return Program(self, self.told()["pid"], begin)
 
     def told(self) -> dict[str, Any]:
         """What its shell says next."""
         said: dict[str, Any] = json.loads(self._lines.readline())
         return said
 
-    def bytes(self) -> bytes:
-        """All that was written to it."""
-        with contextlib.suppress(FileNotFoundError):
-            return self._dump.read_bytes()
+    def bytes(self, begin: int = 0) -> bytes:
+        """All that was written to it, or what came after the first bytes."""
+        with contextlib.suppress(FileNotFoundError), self._dump.open("rb") as dump:
+            dump.seek(begin)
+            return dump.read()
         return b""
+
+    @property
+    def pid(self) -> int:
+        """Its process."""
+        return self._process.pid
 
     def signal(self, number: int) -> None:
         """Send kitty itself a signal."""
@@ -154,30 +166,26 @@ class Kitty:
 
 
 class Program:
-    """What runs in kitty now. In `with`: it is ended by SIGTERM."""
+    """What runs in kitty now."""
 
     def __init__(self, kitty: Kitty, pid: int, begin: int) -> None:
         self.kitty, self.pid, self._begin = kitty, pid, begin
         self._left: dict[str, Any] | None = None
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_error: object) -> None:
-        if self._left is None:
-            self.signal(15)
-            self.ended()
+        self._shown = begin  # bytes passed to the emulator
+        self._screen = pyte.Screen(COLUMNS, ROWS)
+        self._emulator = pyte.ByteStream(self._screen)
 
     @property
     def raw(self) -> str:
         """All that it wrote, with its control sequences."""
-        return self.kitty.bytes()[self._begin :].decode(errors="replace")
+        return self.kitty.bytes(self._begin).decode(errors="replace")
 
     def screen(self) -> str:
         """What a person sees now, a line a row."""
-        emulator = pyte.Screen(COLUMNS, ROWS)
-        pyte.Stream(emulator).feed(self.raw)
-        return "\n".join(line.rstrip() for line in emulator.display)
+        new = self.kitty.bytes(self._shown)
+        self._shown += len(new)
+        self._emulator.feed(new)
+        return "\n".join(line.rstrip() for line in self._screen.display)
 
     def wait_for_text(self, text: str) -> str:
         """Wait until the screen shows `text`; the screen."""
@@ -192,6 +200,17 @@ class Program:
         """Send it a signal."""
         with contextlib.suppress(ProcessLookupError):
             os.kill(self.pid, number)
+
+    @property
+    def runs(self) -> bool:
+        """Whether it still runs."""
+        return self._left is None and Path(f"/proc/{self.pid}").exists()
+
+    def end(self) -> None:
+        """End it by SIGTERM, unless it has ended."""
+        if self._left is None:
+            self.signal(15)
+            self.ended()
 
     def ended(self) -> dict[str, Any]:
         """Wait for its end: "code", whether the "modes" are as before, and the keyboard's "flags" of both screens."""

@@ -1,11 +1,19 @@
 """What the robot does while somebody is at the keys."""
 
 import os
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
 
-from tests.integration.robots import Robot, moves, planar
+from holozen.testing import wait_for
+from tests.integration.robots import Record, Robot, moves, planar
 
 OFTEN = 100 if os.environ.get("HOLOZEN_LONG") else 1
 """How often a test that looks for a race runs; scripts/test --long asks for the whole hundred."""
+MISSED = ("does not answer", "answers again", "paused:")
+"""What the teleop says after a terminal, or it itself, was held up: a key that came meanwhile does not count."""
+PATIENCE = 2.0  # s until a key that moved nothing may have been one of those; longer than a key is ignored
+HOLD_UP = 0.2  # s that a few processes wait for a processor together, where the machine is too busy to keep time
 
 
 def drives(robot: Robot, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
@@ -17,8 +25,81 @@ def stands(robot: Robot) -> None:
     robot.stands()
 
 
-def assert_nothing_moves(robot: Robot, seconds: float = 0.7) -> None:
+def press_until(
+    shown: Callable[[], object], press: Callable[[], object], let_go: Callable[[], object], screen: Callable[[], str]
+) -> None:
+    """Press a key, and wait for what it does. A busy machine holds a terminal up for longer than the teleop waits for
+    its answer: where the screen says so, the key is pressed anew, as by a person.
+    """
+    for _ in range(5):
+        press()
+        with suppress(AssertionError):
+            wait_for(shown, PATIENCE)
+            return
+        if not any(words in screen() for words in MISSED):
+            break
+        let_go()
+    wait_for(shown, what=lambda: f"what the key does; the screen:\n{screen()}")
+
+
+class Since:
+    """Whether the robot has moved in a certain way since this was made."""
+
+    def __init__(self, odom: Record) -> None:
+        self._odom, self._seen = odom, len(odom.messages())
+
+    def drove(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> bool:
+        """Whether it moved so at any time; what it shows is not looked at again."""
+        new = self._odom.messages()[self._seen :]
+        self._seen += len(new)
+        return any(moves(odom, x, y, turn) for odom in new)
+
+
+def assert_nothing_moves(robot: Robot, seconds: float = 0.3) -> None:
     """Nobody says a word on cmd_vel that moves the robot, for as long by the sim's clock."""
     seen = len(robot.commands.messages())
     robot.pass_time(seconds)
+    assert_nothing_moved(robot, seen)
+
+
+def assert_nothing_moved(robot: Robot, seen: int) -> None:
+    """Nor did anybody after the first `seen` commands."""
     assert not [command for command in robot.commands.messages()[seen:] if any(planar(command))]
+
+
+class HeldUp:
+    """How long the machine keeps processes waiting for a processor, from now on."""
+
+    def __init__(self, *pids: int) -> None:
+        self._before = {pid: _waited(pid) for pid in pids}
+
+    def seconds(self) -> float:
+        """The waits of the processes together; each by that of its threads which waited longest."""
+        return sum(
+            max((at - before.get(thread, 0.0) for thread, at in _waited(pid).items()), default=0.0)
+            for pid, before in self._before.items()
+        )
+
+
+def _waited(pid: int) -> dict[str, float]:
+    """Seconds for which each thread has waited so far."""
+    waited = {}
+    for file in Path(f"/proc/{pid}/task").glob("*/schedstat"):
+        with suppress(OSError):
+            waited[file.parent.name] = int(file.read_text().split()[1]) * 1e-9
+    return waited
+
+
+def assert_drives_on(robot: Robot, motion: tuple[float, ...], again: Callable[[], object], *pids: int) -> None:
+    """It is told this motion and no other for a second. One in which these processes waited for a processor shows
+    nothing: the robot is made to drive `again`.
+    """
+    for _ in range(5):
+        seen, held_up = len(robot.commands.messages()), HeldUp(*pids)
+        robot.pass_time(1.0)
+        told = {planar(command) for command in robot.commands.messages()[seen:]}
+        if told == {motion}:
+            return
+        assert held_up.seconds() > HOLD_UP, f"it was told {told} on a machine that kept time"
+        again()
+    raise AssertionError(f"it was told {told}, five times")

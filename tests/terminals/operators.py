@@ -1,8 +1,10 @@
 """People who drive one robot each, in a terminal each, over a line that can break."""
 
 import contextlib
+import math
 import signal
 import threading
+from bisect import bisect
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Self
@@ -17,6 +19,7 @@ from holozen.wire import key_for
 from tests.faults.proxy import Proxy
 from tests.integration.robots import speeds, time_of
 
+from .motion import press_until
 from .played import KITTY, REPEAT, Played, event
 
 FORWARD, BACKWARD = map(ord, "i,")
@@ -44,6 +47,7 @@ class Witness:
 
     def __init__(self, bus: Bus, robot: str) -> None:
         self.seen: list[tuple[float, float]] = []  # time of the sim in s, the fastest of its speeds
+        self._sent: list[float] = []  # when the sim sent each, s as of time.monotonic
         self._odom = bus.subscribe(key_for("odom", robot), Odometry, depth=1000)
         threading.Thread(target=self._watch, daemon=True).start()
 
@@ -51,35 +55,42 @@ class Witness:
         """The time of the newest odom."""
         return self.seen[-1][0]
 
+    def time_at(self, at: float) -> float:
+        """The time of the last odom that was sent before `at`, as of time.monotonic; waits for the next one."""
+        wait_for(lambda: self._sent and self._sent[-1] > at, what="odom")
+        return self.seen[bisect(self._sent, at) - 1][0]
+
     def moving(self) -> bool:
         """Whether it drives now."""
         return bool(self.seen) and self.seen[-1][1] > 0.9 * SPEED
 
     def rest_after(self, time: float) -> float:
         """When it came to rest after `time`; waits for it."""
-        begin = len(self.seen) - RATE // 4
+        begin = bisect(self.seen, (time, math.inf))
 
         def rest() -> float | None:
-            return next((at for at, speed in self.seen[max(0, begin) :] if at > time and speed < RESTS), None)
+            return next((at for at, speed in self.seen[begin:] if speed < RESTS), None)
 
         return wait_for(rest, what="the robot to rest") or 0.0
 
     def moved_after(self, time: float) -> bool:
         """Whether it moved at any time after `time`."""
-        return any(at > time and speed > RESTS for at, speed in self.seen[-10 * RATE :])
+        return any(speed > RESTS for _, speed in self.seen[bisect(self.seen, (time, math.inf)) :])
 
     def _watch(self) -> None:
         with contextlib.suppress(BusError):
             while True:
-                if odom := self._odom.recv().message:
+                received = self._odom.recv()
+                if (odom := received.message) and (stamp := received.sample.stamp):
                     self.seen.append((time_of(odom), max(map(abs, speeds(odom)))))
+                    self._sent.append(stamp.sent)
 
 
 class Operator:
-    """Somebody who drives one robot. `words` start the teleop where it is not the usual one, without its flags."""
+    """Somebody who drives one robot, of the sim with this process id."""
 
-    def __init__(self, wire: Wire, bus: Bus, robot: str) -> None:
-        self.robot, self.witness = robot, Witness(bus, robot)
+    def __init__(self, wire: Wire, bus: Bus, robot: str, sim: int) -> None:
+        self.robot, self.sim, self.witness = robot, sim, Witness(bus, robot)
         self._wire, self._count = wire, 0
         self.terminal: Played | None = None
         self.line: Proxy | None = None
@@ -116,8 +127,7 @@ class Operator:
         """Hold a key until the robot moves; to and fro, so that it stays where it is."""
         self._count += 1
         self.key = (FORWARD, BACKWARD)[self._count % 2]
-        self.at.press(self.key)
-        wait_for(self.witness.moving, what=f"{self.robot} to move; {self.at.screen()}")
+        press_until(self.witness.moving, lambda: self.at.press(self.key), self.let_go, self.at.screen)
 
     def hold_on(self) -> None:
         """The key is still down: it repeats."""

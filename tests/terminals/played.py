@@ -1,6 +1,6 @@
 """A terminal that is played: it answers questions as a certain one does, or late, or never.
 
-The answers were taken from kitty 0.26.5, tmux 3.3a and GNU screen 4.9; those of the Linux console from its source,
+The answers were taken from kitty 0.26.5 and tmux 3.3a; those of the Linux console from its source,
 drivers/tty/vt/vt.c; those of xterm from its control sequences' documentation.
 """
 
@@ -28,10 +28,8 @@ class Kind(NamedTuple):
 KITTY = Kind(True, "\x1b[?62;c")
 XTERM = Kind(False, "\x1b[?64;1;2;6;9;15;16;17;18;21;22;28c")
 TMUX = Kind(False, "\x1b[?1;2c")
-SCREEN = Kind(False, "\x1b[?1;2c")
 CONSOLE = Kind(False, "\x1b[?6c")
 DUMB = Kind(False, "", "")
-WITHOUT_RELEASES = {"xterm": XTERM, "tmux": TMUX, "screen": SCREEN, "console": CONSOLE, "dumb": DUMB}
 
 
 class Played(Terminal):
@@ -60,6 +58,15 @@ class Played(Terminal):
     def flags_left(self) -> dict[bool, list[int]]:
         """The flags pushed and not popped: of the main screen (False) and of the alternate one (True)."""
         return {screen: flags for screen, flags in self.pushed.items() if flags}
+
+    def down(self, code: int) -> None:
+        """A key goes down, as this kind of terminal tells it."""
+        self.type(event(code) if self.kind.keyboard else chr(code))
+
+    def up(self, code: int) -> None:
+        """It goes up; only some tell it."""
+        if self.kind.keyboard:
+            self.release(code)
 
     def press(self, code: int, modifiers: int = 0, *, shifted: int = 0, base: int = 0) -> None:
         """A key goes down, on a terminal that was asked to tell releases."""

@@ -10,9 +10,9 @@ import pytest
 
 from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command
-from tests.integration.robots import Robot, moves
+from tests.integration.robots import Robot
 
-from .motion import assert_nothing_moves
+from .motion import Since, assert_nothing_moves, press_until, stands
 
 V = 0.4  # m/s
 
@@ -82,53 +82,46 @@ def windows() -> Iterator[contextlib.ExitStack]:
         yield windows
 
 
-@pytest.mark.parametrize("way", ["detached", "closed"])
+def drive(window: Terminal, robot: Robot, key: str, x: float = 0.0, y: float = 0.0) -> None:
+    since = Since(robot.odom)
+    press_until(lambda: since.drove(x, y), lambda: window.type(key), lambda: None, window.screen)
+
+
 def test_a_latched_robot_stands_when_nobody_is_there_and_waits_for_a_key_of_who_comes_back(
-    multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot, way: str
-) -> None:
-    words = command("teleop", "--mode", "latch", "--speed", str(V), *town.flags)
-    first = windows.enter_context(multiplexer.new(words))
-    first.wait_for_text("listening sim")
-    first.type("i")
-    robot.odom.next(lambda odom: moves(odom, V, 0, 0))
-    if way == "detached":
-        first.type(multiplexer.detach)
-    else:
-        first.hang_up()
-    robot.told_to_stop()
-    robot.stands()
-    if shown := multiplexer.shown():
-        wait_for(lambda: "terminal detached: hands off" in multiplexer.shown(), what=shown)
-    second = windows.enter_context(multiplexer.attach())
-    second.wait_for_text("listening sim")
-    assert_nothing_moves(robot)
-    second.type("J")
-    robot.odom.next(lambda odom: moves(odom, 0, V, 0))
-    second.type("k")
-    robot.stands()
-    second.type("\x03")
-    assert second.process.wait() == 0
-    robot.told_to_stop()
-
-
-def test_a_key_drives_while_it_repeats(
     multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot
 ) -> None:
-    window = windows.enter_context(multiplexer.new(command("teleop", "--speed", str(V), *town.flags)))
-    window.wait_for_text("listening sim")
-    window.hold("i", 1.0)
-    robot.odom.next(lambda odom: moves(odom, V, 0, 0))
-    robot.told_to_stop()
-    robot.stands()
+    words = command("teleop", "--mode", "latch", "--speed", str(V), *town.flags)
+    window = windows.enter_context(multiplexer.new(words))
+    for leave in (lambda window: window.type(multiplexer.detach), Terminal.hang_up):
+        window.wait_for_text("listening sim")
+        drive(window, robot, "i", x=V)
+        leave(window)
+        stands(robot)
+        if shown := multiplexer.shown():
+            wait_for(lambda: "terminal detached: hands off" in multiplexer.shown(), what=shown)
+        window = windows.enter_context(multiplexer.attach())
+        window.wait_for_text("listening sim")
+        assert_nothing_moves(robot)
+        drive(window, robot, "J", y=V)
+        window.type("k")
+        stands(robot)
+    window.type("\x03")
+    assert window.process.wait() == 0
 
 
-def test_a_paste_moves_nothing(
+def test_a_key_drives_while_it_repeats_and_a_paste_moves_nothing(
     multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot
 ) -> None:
     window = windows.enter_context(multiplexer.new(command("teleop", "--speed", str(V), *town.flags)))
     window.wait_for_text("listening sim")
     seen = len(robot.commands.messages())
-    window.type("\x1b[200~iiii\x1b[201~w")
-    window.wait_for_text("0.44")
+    window.type("\x1b[200~iiii\x1b[201~")
+    press_until(  # what follows the paste was read
+        lambda: "0.360 m/s" in window.screen(), lambda: window.type("x"), lambda: None, window.screen
+    )
     robot.newest()
     assert [(r.sample.source, r.message) for r in robot.commands.all()[seen:]] == []
+    since = Since(robot.odom)
+    window.hold("i", 0.7)
+    wait_for(lambda: since.drove(x=0.9 * V))
+    stands(robot)

@@ -1,11 +1,13 @@
-"""Every key of teleop_twist_keyboard, typed in a terminal, says on the wire what it says there, at every speed."""
+"""Every key of teleop_twist_keyboard, typed in a terminal, says on the wire what it says there."""
 
-from collections.abc import Iterator
+from collections.abc import Callable
 
 import pytest
 
-from holozen.testing import Terminal, Wire, wait_for
-from tests.integration.robots import Record, Robot, planar
+from holozen.testing import Wire
+from tests.integration.robots import Robot, planar
+
+from .motion import press_until
 
 V, W = 0.4, 0.8  # m/s, rad/s
 LIMITS = 0.9, 1.4  # m/s, rad/s
@@ -24,58 +26,49 @@ TABLE = {
     "\x1b[1;2D": (0, 1, 0, 0), "\x1b[1;2C": (0, -1, 0, 0),
 }  # fmt: skip
 
-# What is typed, and the speed and the turn that follow.
-SPEEDS = {
-    "at the start": ("", V, W),
-    "q": ("q", V * 1.1, W * 1.1),
-    "z": ("z", V * 0.9, W * 0.9),
-    "w": ("w", V * 1.1, W),
-    "x": ("x", V * 0.9, W),
-    "e": ("e", V, W * 1.1),
-    "c": ("c", V, W * 0.9),
-    "qqxe": ("qqxe", V * 1.1**2 * 0.9, W * 1.1**3),
-    "at the limits": ("q" * 12, *LIMITS),
-    "below the limits again": ("q" * 12 + "z", LIMITS[0] * 0.9, LIMITS[1] * 0.9),
-}
+# The keys of the speeds, one after the other, and what each multiplies speed and turn by.
+SPEEDS = {"q": (1.1, 1.1), "z": (0.9, 0.9), "w": (1.1, 1), "x": (0.9, 1), "e": (1, 1.1), "c": (1, 0.9)}
 
 
-@pytest.fixture(params=SPEEDS)
-def speeds(request: pytest.FixtureRequest) -> tuple[str, float, float]:
-    keys: tuple[str, float, float] = SPEEDS[request.param]
-    return keys
-
-
-@pytest.fixture
-def teleop(town: Wire, robot: Robot, speeds: tuple[str, float, float]) -> Iterator[Terminal]:
-    """A teleop, latched, whose speeds were changed by these keys."""
+def test_every_key_says_what_it_says_there(town: Wire, robot: Robot) -> None:
     limits = ("--speed-limit", str(LIMITS[0]), "--turn-limit", str(LIMITS[1]))
     with town.terminal("teleop", "--mode", "latch", "--speed", str(V), "--turn", str(W), *limits) as terminal:
         terminal.wait_for_text("listening sim")
-        terminal.type(speeds[0])
-        yield terminal
 
+        def type_until(keys: str, shown: Callable[[], object]) -> None:
+            press_until(shown, lambda: terminal.type(keys), lambda: None, terminal.screen)
 
-def said(commands: Record, terminal: Terminal, key: str) -> tuple[float, ...]:
-    """The first motion that is commanded after a stop and this key."""
-    begin = len(commands.messages())
-    terminal.type("k")
-    wait_for(lambda: any(not any(planar(m)) for m in commands.messages()[begin:]), what="a stop")
-    begin = len(commands.messages())
-    terminal.type(key)
-    found = wait_for(lambda: [m for m in commands.messages()[begin:] if any(planar(m))], what=f"a command of {key!r}")
-    return planar(found[0])
+        def said(key: str, moves: bool = True) -> tuple[float, ...]:
+            """The first motion, or stop, that is commanded after this key."""
+            begin = len(robot.commands.messages())
 
+            def found() -> list[tuple[float, ...]]:
+                told = map(planar, robot.commands.messages()[begin:])
+                return [command for command in told if any(command) == moves]
 
-def test_every_key_says_what_it_says_there(teleop: Terminal, robot: Robot, speeds: tuple[str, float, float]) -> None:
-    _, speed, turn = speeds
-    heard = {key: said(robot.commands, teleop, key) for key in TABLE}
-    factors = (speed, speed, speed, turn)
-    expected = {key: tuple(d * f for d, f in zip(TABLE[key], factors, strict=True)) for key in TABLE}
-    assert heard == {key: pytest.approx(motion) for key, motion in expected.items()}
+            type_until(key, found)
+            return found()[0]
 
+        def assert_says(key: str, speed: float, turn: float) -> None:
+            x, y, z, counter_clockwise = TABLE[key]
+            said("k", moves=False)
+            assert said(key) == pytest.approx((x * speed, y * speed, z * speed, counter_clockwise * turn)), key
 
-def test_a_speed_over_its_limit_is_brought_down_from_the_start(town: Wire, robot: Robot) -> None:
-    with town.terminal("teleop", "--mode", "latch", "--speed", "3", "--speed-limit", "0.3") as terminal:
-        terminal.wait_for_text("listening sim")
-        terminal.type("i")
-        robot.odom.next(lambda odom: odom.twist.twist.linear.x == pytest.approx(0.3))
+        def change(keys: str, speed: float, turn: float) -> None:
+            """Type the keys of speeds, which lead to these."""
+            type_until(
+                keys, lambda: all(f"{v:.3f} {u}" in terminal.screen() for v, u in ((speed, "m/s"), (turn, "rad/s")))
+            )
+
+        for key in TABLE:
+            assert_says(key, V, W)
+        speed, turn = V, W
+        for key, (faster, more) in SPEEDS.items():
+            speed, turn = speed * faster, turn * more
+            change(key, speed, turn)
+            assert_says("u", speed, turn)  # it drives and turns
+        change("q" * 12, *LIMITS)
+        for key in TABLE:
+            assert_says(key, *LIMITS)
+        change("z", LIMITS[0] * 0.9, LIMITS[1] * 0.9)
+        assert_says("u", LIMITS[0] * 0.9, LIMITS[1] * 0.9)
