@@ -84,13 +84,14 @@ class PeerClocks:
     def track_first(self, session: str, now: float) -> None:
         """Measure the clock of a session that commands, ahead of those that only might.
 
-        Where there are MAX_PEERS, one that has never answered is forgotten for it.
+        Where there are MAX_PEERS, one that has never answered is forgotten for it: first those that never commanded,
+        then the oldest.
         """
         if session not in self._peers and len(self._peers) >= MAX_PEERS:
-            silent = (other for other, peer in self._peers.items() if peer.confirmed < 0 and not peer.commands)
-            if (other := next(silent, None)) is None:
+            silent = [other for other, peer in self._peers.items() if peer.confirmed < 0]
+            if not silent:
                 return
-            del self._peers[other]
+            del self._peers[min(silent, key=lambda other: self._peers[other].commands)]
         self._peers.setdefault(session, _Peer(now)).commands = True
 
     def ages(self, session: str, sent: float, now: float) -> tuple[float, float] | None:
@@ -121,7 +122,7 @@ class PeerClocks:
 
     def poll(self, now: float) -> None:
         """Read replies, and send the requests that are due."""
-        due: list[tuple[bool, float, str]] = []
+        due: list[tuple[bool, bool, float, str]] = []
         room = MAX_ASKED
         for session, peer in self._peers.items():
             if peer.replies is not None:
@@ -129,8 +130,8 @@ class PeerClocks:
             if peer.replies is not None:
                 room -= now - peer.asked < SLOW  # whoever never answers keeps no place
             elif now >= peer.due:
-                due.append((not peer.commands, peer.due, session))
-        for _, _, session in sorted(due)[: max(room, 0)]:
+                due.append((not peer.commands, peer.asked > 0 > peer.confirmed, peer.due, session))
+        for *_, session in sorted(due)[: max(room, 0)]:
             peer = self._peers[session]
             peer.asked = self._clock()
             peer.replies = self._ask(session, GIVE_UP)

@@ -177,11 +177,11 @@ class Freshness(Generic[M]):
         sender, there = _sender(received), self._senders.has(stamp.session)
         if sender in self._waiting:
             came = min(came, self._waiting[sender][1])
+        if there:
+            self._senders.track_first(stamp.session, now)
         if now - came > COMMAND_SILENCE or (sender not in self._waiting and len(self._waiting) >= MAX_WAITING):
             self._waiting.pop(sender, None)
             return Judged(received, -math.inf, 0.0, UNKNOWN if there else GONE)
-        if there:
-            self._senders.track_first(stamp.session, now)
         self._waiting[sender] = (received, came)
         return None
 

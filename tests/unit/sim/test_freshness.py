@@ -152,6 +152,13 @@ def test_a_flood_of_unknown_senders_takes_bounded_memory(robot: Robot) -> None:
     assert robot.hear(10.1, robot.sent(1, 10.1)) == [""]
 
 
+def test_where_many_wait_the_clock_of_one_more_is_measured_too(robot: Robot) -> None:
+    robot.hear(10.0, *(received(GO, f"x@z{number};1;1") for number in range(MAX_WAITING)))
+    robot.senders.known.remove("aa")
+    assert robot.hear(10.1, robot.sent(1, 10.1)) == ["unknown clock"]
+    assert robot.senders.tracked == ["aa"]
+
+
 class TestALinkThatWasHeldUp:
     """Commands that waited arrive at once: the first to arrive may be the last that its sender ever sent."""
 

@@ -140,6 +140,20 @@ def test_a_session_that_commands_is_measured_among_many_that_never_answer() -> N
     assert link.clocks.ages("bb", link.now + OFFSET, link.now) is not None
 
 
+def test_many_that_command_and_never_answer_keep_no_other_out() -> None:
+    link = Link()
+    link.run(0.1)
+    link.silent = True
+    for number in range(2 * MAX_PEERS):
+        link.clocks.track_first(f"forged{number}", link.now)
+    link.run(2.0)
+    link.silent = False
+    link.clocks.track_first("bb", link.now)
+    link.run(1.1)
+    assert link.clocks.ages("bb", link.now + OFFSET, link.now) is not None
+    assert link.ages(0.0), "who has answered is kept"
+
+
 @pytest.fixture
 def wire() -> Iterator[Wire]:
     with Wire() as wire:
