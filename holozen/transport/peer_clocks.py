@@ -102,11 +102,12 @@ class PeerClocks:
         peer = self._peers.get(session)
         if peer is None or peer.highest is None:
             return None
-        if sent - now > peer.at_most(now) + CONTRADICTION:  # from the future: measure again
+        read = self._clock()  # it may have come after `now`
+        if sent - read > peer.at_most(now) + CONTRADICTION:  # from the future: measure again
             peer.due = min(peer.due, now)
             return None
-        if sent - now > peer.at_least(now):
-            peer.lowest = (sent - now, now)
+        if sent - read > peer.at_least(now):
+            peer.lowest = (sent - read, now)
         elapsed = now - sent
         return max(0.0, elapsed + peer.at_least(now)), max(0.0, elapsed + peer.at_most(now))
 

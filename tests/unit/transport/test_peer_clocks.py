@@ -100,6 +100,17 @@ def test_a_sample_from_the_future_says_nothing_and_asks_for_another_round_trip()
     assert link.asked > asked
 
 
+def test_a_sample_that_came_during_a_hang_says_nothing_false() -> None:
+    """The receiver looked at its clock, hung for 40 ms, and then read a sample that had been sent meanwhile."""
+    link = Link(0.05, 0.05)
+    link.run(1.0)
+    ages = link.clocks.ages("aa", link.now + OFFSET, link.now - 0.04)
+    assert ages and ages[0] == 0.0
+    link.now += 0.001
+    youngest, oldest = link.ages(0.0) or (1.0, 0.0)
+    assert youngest <= 0.001 <= oldest
+
+
 def test_a_clock_that_jumped_is_measured_anew() -> None:
     link = Link(0.01, 0.01)
     link.run(2.0)
