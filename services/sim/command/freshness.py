@@ -26,6 +26,7 @@ OLD = "old: it was sent up to {age:.2f} s ago; at most {limit:g} s"
 GONE = "gone: its sender has left"
 OUT_OF_ORDER = "out of order: number {number} came after {last}"
 UNANSWERED = "late: it was under way for {age:.2f} s or more, and its sender has not answered since"
+WAITED = "late: it was sent up to {age:.2f} s ago, before its sender was asked whether it is alive"
 UNKNOWN = "unknown clock: its sender has not answered with its time"
 UNSTAMPED = "unstamped: this sender stamps its commands"
 
@@ -79,8 +80,8 @@ class Freshness(Generic[M]):
     A stamped command (see holozen.transport.pubsub.Stamp) is measured by its sender's clock; it waits until that is
     known, for at most 0.5 s. The greatest possible age counts. A command is refused if it is older than `max_age`, out
     of order, or its sender has left. A slow command that would set the robot moving suggests that a link was held up:
-    its sender has to answer a request first, which no dead process does, and only commands that arrive after the answer
-    move the robot.
+    its sender has to answer a request first, which no dead process does, and only commands that were sent after the
+    request and arrive after the answer move the robot.
 
     The age of a command without a stamp is unknown. Of those that arrive together only the newest counts.
 
@@ -168,6 +169,8 @@ class Freshness(Generic[M]):
         if sender in self._doubted:
             if self._senders.answered(session) < self._doubted[sender]:
                 return Judged(received, sent, oldest, UNANSWERED.format(age=youngest))
+            if sent < self._doubted[sender]:  # the answer overtook it
+                return Judged(received, sent, oldest, WAITED.format(age=oldest))
             del self._doubted[sender]
         if oldest > self.max_age:
             return Judged(received, sent, oldest, OLD.format(age=oldest, limit=self.max_age))
