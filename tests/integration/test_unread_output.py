@@ -135,3 +135,25 @@ def test_a_line_that_waits_for_its_reader_ends_with_a_signal(wire: Wire, unread:
     hz = wire.start("topic", "hz", "odom", "--json", stdout=unread)
     wait_for(lambda: "pipe" in Path(f"/proc/{hz.pid}/wchan").read_text(), 30)
     assert hz.terminate(SOON) == 0
+
+
+LOGS = """
+import rclpy
+from rclpy.executors import ExternalShutdownException
+
+rclpy.init()
+node = rclpy.create_node("talker")
+node.create_timer(0.001, lambda: node.get_logger().info(200 * "x"))
+try:
+    rclpy.spin(node)
+except ExternalShutdownException:
+    pass
+"""
+
+
+def test_a_script_whose_log_nobody_reads_ends_with_a_signal(wire: Wire, unread: int, tmp_path: Path) -> None:
+    script = tmp_path / "talker.py"
+    script.write_text(LOGS)
+    run = wire.start("run", str(script), stderr=unread)
+    wait_for(lambda: "pipe" in Path(f"/proc/{run.pid}/wchan").read_text(), 30)
+    assert run.terminate(2 * SOON) == 0

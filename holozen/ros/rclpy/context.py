@@ -17,6 +17,7 @@ from enum import IntFlag
 from types import FrameType
 from typing import Any, Protocol, Self
 
+from holozen.console import give_up_readers
 from holozen.ros.rclpy import arguments
 from holozen.ros.rclpy.exceptions import RCLError
 from holozen.ros.rclpy.logging import get_logger, set_logger_level, silence
@@ -316,6 +317,7 @@ def _interrupt_all() -> None:
 
 
 def _handle(number: int, frame: FrameType | None) -> None:
+    give_up_readers()
     _interrupt_all()
     previous = _previous.get(number)
     if callable(previous):
