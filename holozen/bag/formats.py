@@ -15,13 +15,12 @@ import msgspec
 
 from holozen import wire
 from holozen.messages import Message, codec
-from holozen.messages.definitions import Interface, InterfaceError
+from holozen.messages.definitions import Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 
 # Encodings that may carry JSON; the first ones do not describe the content.
 _MAYBE_JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
 _MCAP = {"application/msgpack": "msgpack", "application/cdr": "cdr", "application/protobuf": "protobuf"}
-_SEPARATOR = "=" * 80  # between two definitions
 _KEPT = ("type", "items", "properties")
 
 
@@ -125,28 +124,33 @@ def msg_schema(name: str) -> bytes:
         interface = _registry().find(name)
     except InterfaceError:
         return b""
-    parts: dict[str, Interface] = {}
-    _collect(interface, parts)
-    others = [f"{_SEPARATOR}\nMSG: {one.name.replace('/msg/', '/')}\n{_definition(one)}" for one in parts.values()]
-    return "\n".join([_definition(interface), *others]).encode()
+    return whole_text(interface).encode()
+
+
+def learn(name: str, define: Callable[[str], str]) -> None:
+    """Learn a type that is not known here from its definition, which `define` returns (empty: there is none)."""
+    _registry().learn(name, define)
+
+
+@cache
+def interface_schema(name: str) -> bytes:
+    """The JSON schema of a ROS type without a Struct; empty for an unknown type."""
+    try:
+        interface = _registry().find(name)
+    except InterfaceError:
+        return b""
+    return json.dumps({"title": name, **_object(interface)}).encode()
+
+
+def _object(interface: Interface) -> dict[str, Any]:
+    properties = {}
+    for field in interface.fields:
+        kinds = {"bool": "boolean", "string": "string", "wstring": "string", "float32": "number", "float64": "number"}
+        one = _object(field.nested) if field.nested else {"type": kinds.get(field.type, "integer")}
+        properties[field.name] = {"type": "array", "items": one} if field.array else one
+    return {"type": "object", "properties": properties}
 
 
 @cache
 def _registry() -> Registry:
     return Registry()
-
-
-def _collect(interface: Interface, found: dict[str, Interface]) -> None:
-    for field in interface.fields:
-        if field.nested and field.nested.name not in found:
-            found[field.nested.name] = field.nested
-            _collect(field.nested, found)
-
-
-def _definition(interface: Interface) -> str:
-    constants = [f"{one.type} {one.name}={one.value}" for one in interface.constants]
-    fields = []
-    for field in interface.fields:
-        default = "" if field.default is None else f" {json.dumps(field.default)}"
-        fields.append(f"{field.spelled()} {field.name}{default}")
-    return "\n".join(constants + fields)

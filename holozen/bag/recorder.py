@@ -4,12 +4,14 @@ import contextlib
 import threading
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import NamedTuple, Self
 
-from holozen.bag.formats import Format, as_cdr, format_of, types_of
+from holozen.bag.formats import Format, as_cdr, format_of, interface_schema, known, learn, types_of
 from holozen.bag.writer import CHANNELS, BagWriter
 from holozen.messages import Clock, Message
 from holozen.messages.codec import CodecError
+from holozen.messages.definitions import InterfaceError
 from holozen.transport.graph import Graph, on_key
 from holozen.transport.pubsub import RawSubscriber, Sample
 
@@ -178,13 +180,16 @@ class Recorder:
     The types of keys are those of the wire table, or those that their publishers announce.
     With `ros`, messages of known types are written as by ROS 2: in CDR, on topics with a leading slash. All others,
     and all without `ros`, stay as they arrived. With `time`, times are those of the sim, and samples before its
-    first tick are left out.
+    first tick are left out. `define` returns the definition of a type that is not known here, from its publisher.
     """
 
     def __init__(
-        self, intake: Intake, writer: BagWriter, graph: Graph, ros: bool = False, time: SimTime | None = None
-    ) -> None:
+        self, intake: Intake, writer: BagWriter, graph: Graph, ros: bool = False, time: SimTime | None = None,
+        define: Callable[[str], str] = lambda _: "",
+    ) -> None:  # fmt: skip
         self._intake, self._writer, self._graph, self._ros, self._time = intake, writer, graph, ros, time
+        self._define = define
+        self._learned: dict[str, str] = {}  # key -> its type, if it has no Struct
         self._types: dict[str, tuple[type[Message], ...]] = {}
         self.refused = 0  # samples beyond the number of channels that a bag can have
         self.early = 0  # samples from before the sim's clock was known
@@ -217,14 +222,23 @@ class Recorder:
         if self._ros and message is not None and form.encoding != "cdr":
             with contextlib.suppress(CodecError):
                 return *as_cdr(message), message
+        if form.encoding == "json" and not form.schema and (name := self._learned.get(sample.key)):
+            schema = interface_schema(name)
+            form = form._replace(schema=name, schema_encoding="jsonschema" if schema else "", schema_data=schema)
         return form, sample.payload, message
 
     def _types_of(self, key: str) -> tuple[type[Message], ...]:
         if key not in self._types:
             if len(self._types) >= CHANNELS:
                 self._types.clear()  # something publishes on ever new keys
+                self._learned.clear()
             self._types[key] = types_of(key, lambda: self._named(key))
         return self._types[key]
 
     def _named(self, key: str) -> set[str]:
-        return {endpoint.type for endpoint in on_key(self._graph.endpoints(), key, "pub")}
+        names = {endpoint.type for endpoint in on_key(self._graph.endpoints(), key, "pub")}
+        for name in sorted(names - known().keys()):
+            with contextlib.suppress(InterfaceError):
+                learn(name, self._define)
+                self._learned[key] = name
+        return names

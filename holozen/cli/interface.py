@@ -9,6 +9,7 @@ from holozen import flags
 from holozen.console import printable, report
 from holozen.messages.definitions import Interface, InterfaceError, prototype
 from holozen.messages.registry import Registry
+from holozen.transport import connection
 
 
 def parser() -> flags.Parser:
@@ -20,10 +21,14 @@ def parser() -> flags.Parser:
             verb.add_argument("-m", "--only-msgs", action="store_true", help="no services")
             verb.add_argument("-s", "--only-srvs", action="store_true", help="no messages")
         else:
-            verb.add_argument("type", metavar="TYPE", help="such as geometry_msgs/msg/Twist or std_srvs/srv/Trigger")
+            verb.add_argument("type", metavar="TYPE|KEY" if name == "show" else "TYPE",
+                help="such as geometry_msgs/msg/Twist or std_srvs/srv/Trigger"
+                     + "; or a key, such as odom" * (name == "show"))  # fmt: skip
         verb.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
             help="the folder of package NAME, with msg and srv folders in it")  # fmt: skip
         verb.add_argument("--json", action="store_true", help="one JSON object per line")
+        if name == "show":
+            connection.add_arguments(verb)
     return parser
 
 
@@ -61,9 +66,30 @@ def list_types(args: argparse.Namespace) -> int:
 
 def show(args: argparse.Namespace) -> int:
     """Print the definition of a type, with nested fields indented."""
-    interface = Registry(dict(args.package)).find(args.type)
+    interface = _found(args)
     print(json.dumps(described(interface)) if args.json else "\n".join(map(printable_line, definition(interface))))
     return 0
+
+
+def _found(args: argparse.Namespace) -> Interface:
+    """The type that is named, or that of a key; one that is not here comes from the node that publishes it."""
+    registry = Registry(dict(args.package))
+    try:
+        return registry.find(args.type)
+    except InterfaceError:
+        package = args.type.partition("/")[0]
+        if package.isidentifier() and registry.places.names(package):
+            raise  # it is here, without that type
+        from holozen.bus import Bus
+        from holozen.transport.graph import on_key
+
+        with Bus("interface_show", connection.from_arguments(args)) as bus:
+            ends, key = bus.endpoints(), args.type.removeprefix("/")
+            types = {end.type for kind in ("pub", "sub", "srv") for end in on_key(ends, key, kind)}
+            name = min((one for one in types if not one.startswith("any/")), default="")
+            if name or bus.connected():
+                return registry.learn(name or args.type, bus.definition)
+        raise
 
 
 def proto(args: argparse.Namespace) -> int:

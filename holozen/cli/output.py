@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
 from holozen.bus import Bus
@@ -52,24 +52,25 @@ class Reader:
             return value
         try:
             if kind := self._given or schema or self._announced_type(sample.key, bus):
-                return self._cdr(kind, sample.payload)
+                return self._cdr(kind, sample.payload, bus)
             self.why = "for CDR give the type: --type T"
         except ValueError as error:  # bytes of another type, or a type that is not known here
             other = f", its encoding says {schema}" if schema not in ("", self._given) else ""
             self.why = f"{error}; --type is wrong, or the bytes are{other}" if self._given else str(error)
         return hex_dump(sample.payload, sample.encoding)
 
-    def _cdr(self, kind: str, payload: bytes) -> Any:
+    def _cdr(self, kind: str, payload: bytes, bus: Bus) -> Any:
         from holozen.messages import cdr
 
-        return cdr.read(self._interface(kind), payload)
+        return cdr.read(self._interface(kind, bus.definition), payload)
 
-    def _interface(self, name: str) -> Any:
+    def _interface(self, name: str, define: Callable[[str], str] = lambda _: "") -> Any:
+        """A type; one that is not here is learned from its publisher."""
         if name not in self._interfaces:
             from holozen.messages.registry import Registry
 
             self._registry = self._registry or Registry(dict(self._packages))
-            self._interfaces[name] = self._registry.find(name)
+            self._interfaces[name] = self._registry.learn(name, define)
         return self._interfaces[name]
 
     def _announced_type(self, key: str, bus: Bus) -> str:

@@ -80,9 +80,8 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
             report(
                 f"recording {'every key' if args.all else ' '.join(args.keys)} into {writer.files[0]}; Ctrl-C ends it"
             )
-            recorder = Recorder(
-                intake, writer, bus.graph(), args.wire == "cdr", SimTime() if args.use_sim_time else None
-            )
+            sim_time = SimTime() if args.use_sim_time else None
+            recorder = Recorder(intake, writer, bus.graph(), args.wire == "cdr", sim_time, bus.definition)
             progress = Progress(args.json, intake, recorder, writer)
             try:
                 _until(stop, args.max_duration, recorder, writer, progress)

@@ -376,3 +376,45 @@ def closest(name: str, known: Iterable[str]) -> str:
     folded = {each.lower().rpartition("/")[2]: each for each in known}  # the package is no sign of similarity
     found = difflib.get_close_matches(name.lower().rpartition("/")[2], folded, 1)
     return f"; did you mean {folded[found[0]]}?" if found else ""
+
+
+SEPARATOR = "=" * 80  # between two definitions
+
+
+def whole_text(interface: Interface) -> str:
+    """The definitions of a message and of those nested in it, as ROS 2 joins them in bags."""
+    parts: dict[str, Interface] = {}
+    _collect(interface, parts)
+    others = [f"{SEPARATOR}\nMSG: {one.name.replace('/msg/', '/')}\n{_definition(one)}" for one in parts.values()]
+    return "\n".join([_definition(interface), *others])
+
+
+def split_text(name: str, text: str) -> dict[str, str]:
+    """The definition of each message in the `whole_text` of `name`, by full names. Raises InterfaceError."""
+    if len(text) > LARGEST_FILE:
+        raise InterfaceError(f"{name}: a definition of {len(text)} characters; at most {LARGEST_FILE} are read")
+    first, *others = text.split(f"{SEPARATOR}\nMSG: ")
+    found = {name: first}
+    for other in others:
+        package, _, rest = other.partition("/")
+        last, _, lines = rest.partition("\n")
+        found[f"{package}/msg/{last}"] = lines
+    return found
+
+
+def _collect(interface: Interface, found: dict[str, Interface]) -> None:
+    for field in interface.fields:
+        if field.nested and field.nested.name not in found:
+            found[field.nested.name] = field.nested
+            _collect(field.nested, found)
+
+
+def _definition(interface: Interface) -> str:
+    import json
+
+    constants = [f"{one.type} {one.name}={one.value}" for one in interface.constants]
+    fields = []
+    for field in interface.fields:
+        default = "" if field.default is None else f" {json.dumps(field.default)}"
+        fields.append(f"{field.spelled()} {field.name}{default}")
+    return "\n".join(constants + fields)

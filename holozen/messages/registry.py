@@ -4,10 +4,10 @@ import functools
 import os
 import re
 import stat
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from holozen.messages.definitions import LARGEST_FILE, Interface, InterfaceError, closest, parse
+from holozen.messages.definitions import LARGEST_FILE, Interface, InterfaceError, closest, parse, split_text
 
 TABLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "interfaces")
 KINDS = ("msg", "srv")
@@ -68,6 +68,7 @@ class Places:
         self._given = {name: os.fspath(folder) for name, folder in given.items()}
         self._near = near
         self._found: dict[str, str | None] = {}
+        self.learned: dict[str, Source] = {}  # by full names; what is here comes first
 
     def source(self, package: str, name: str) -> Source | None:
         """The definition of `name` (such as `msg/Twist`) in a package; None if there is none. Raises InterfaceError."""
@@ -75,7 +76,8 @@ class Places:
             return ours.get(name)
         path = self.folder(package)
         kind, _, last = name.partition("/")
-        return None if path is None else _read(os.path.join(path, kind, f"{last}.{kind}"))
+        found = None if path is None else _read(os.path.join(path, kind, f"{last}.{kind}"))
+        return found or self.learned.get(f"{package}/{name}")
 
     def names(self, package: str) -> list[str]:
         """The definitions of a package, such as `msg/Twist`. Raises InterfaceError."""
@@ -169,6 +171,7 @@ class Registry:
         self.places = Places(packages, near)
         self._found: dict[str, Interface] = {}
         self._lost: dict[str, InterfaceError] = {}  # any sample may name one
+        self._asked: set[str] = set()  # types whose definition was asked for
         self._open: list[str] = []  # types being parsed, to detect one that contains itself
 
     def find(self, name: str) -> Interface:
@@ -186,6 +189,22 @@ class Registry:
                 self._lost[name] = error
             raise
         return found
+
+    def learn(self, name: str, define: Callable[[str], str]) -> Interface:
+        """As `find`; for a type that is not here `define` is asked once, which returns its `whole_text` or an empty
+        text. Raises InterfaceError.
+        """
+        try:
+            return self.find(name)
+        except InterfaceError:
+            if name in self._asked or len(self._asked) == MOST_LOST or not (text := define(name)):
+                raise
+        self._asked.add(name)
+        learned = split_text(name, text)
+        self.places.learned |= {full: Source(part, f"the definition of {full}") for full, part in learned.items()}
+        for full in learned:
+            self._lost.pop(full, None)
+        return self.find(name)
 
     def names(self) -> list[str]:
         """All types that can be listed, sorted."""

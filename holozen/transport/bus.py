@@ -7,6 +7,7 @@ The codec is loaded with the first typed publisher or subscriber.
 from __future__ import annotations
 
 import contextlib
+import re
 import threading
 import time
 from collections.abc import Callable
@@ -37,6 +38,8 @@ D = TypeVar("D", bound=Declared)
 
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
 ROLL_CALL = 0.5  # s
+DEFINITION_WAIT = 0.5  # s for a node to answer
+_TYPE_NAME = re.compile(r"\w+/(?:msg|srv)/\w+")
 GETS = 256  # waiting queries for a publisher's last value; beyond, the oldest get no reply
 
 
@@ -63,6 +66,7 @@ class Bus:
         connection = connection or from_environment()
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
         self._declared: set[Declared] = set()
+        self._defined: set[str] = set()  # types whose definition this node answers with
         self._closing = threading.Event()
         self._stamp: Callable[[], bytes] | None = None  # made with the first publisher
         self.clock_asked = threading.Event()  # set once another node has asked for this session's clock
@@ -177,9 +181,30 @@ class Bus:
         queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(GETS))
         writer.thread = threading.Thread(target=writer.answer, args=(queryable.handler,), daemon=True)
         writer.thread.start()
+        self._define(kind)
         # Last, so that nodes that discover it can query it at once.
         writer.ends += [queryable, self.announce("pub", kind.ROS, key)]
         return self._keep(writer)
+
+    def _define(self, kind: type[Message]) -> None:
+        """Answer with the definition of a type that other processes may not have: one from the files of a package."""
+        from holozen.messages import definitions, registry
+
+        interface = getattr(kind, "__interface__", None)
+        if interface is None or kind.ROS in self._defined or registry.table(kind.ROS.partition("/")[0]):
+            return
+        self._defined.add(kind.ROS)
+        text = definitions.whole_text(interface)
+        self._keep(graphs.Definition(self.session, zenoh.handlers.RingChannel(16), kind.ROS, text))
+
+    def definition(self, type_name: str) -> str:
+        """The definition of a type and of those nested in it, from a node that publishes it; empty without one."""
+        if not _TYPE_NAME.fullmatch(type_name):
+            return ""
+        for reply in self.ask_all(graphs.definition_key("*", type_name), DEFINITION_WAIT):
+            if not isinstance(reply, bytes):
+                return reply.payload.decode(errors="replace")
+        return ""
 
     def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> Subscription[M]:
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused."""

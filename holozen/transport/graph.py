@@ -204,6 +204,11 @@ def node_info_key(session: str) -> str:
     return ALL_NODE_INFO.replace("*", session)
 
 
+def definition_key(session: str, type_name: str) -> str:
+    """The key on which a session, or all of them (`*`), answer with the definition of a type."""
+    return f"@holozen/{session}/definition/{type_name}"
+
+
 def version(package: str) -> str:
     """The installed version of a package; empty if it is not installed."""
     from importlib import metadata
@@ -212,6 +217,26 @@ def version(package: str) -> str:
         return metadata.version(package)
     except metadata.PackageNotFoundError:
         return ""
+
+
+class Definition(Declared):
+    """Answers queries for the definition of a type from a thread of its own, until the bus is closed."""
+
+    def __init__(self, session: Any, channel: Any, type_name: str, text: str) -> None:
+        self._key, self._text = definition_key(str(session.zid()), type_name), text
+        super().__init__(queryable := session.declare_queryable(self._key, channel))
+        self._queries = queryable.handler
+        self.thread = threading.Thread(target=self._serve, daemon=True)
+        self.thread.start()
+
+    def _serve(self) -> None:
+        while True:
+            try:
+                query = self._queries.recv()
+            except Exception:  # as in NodeInfo
+                return
+            with query:
+                query.reply(self._key, self._text, encoding="text/plain")
 
 
 class NodeInfo(Declared):
