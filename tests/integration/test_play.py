@@ -117,7 +117,7 @@ def test_another_sim_on_the_same_wire_is_told(house: Path, wire: Wire) -> None:
     game = Game(house, wire)
     game.terminal.process.wait(30)
     assert game.terminal.process.returncode == 1
-    assert "another sim runs here" in game.terminal.raw
+    assert "simulates here already" in game.terminal.raw
     assert set(parts_at(wire)) == {"sim"}
     assert game.left()[1] == []
     game.terminal.close()
