@@ -89,7 +89,7 @@ def main() -> int:
     # Without bytecode half of the time would be the compiler's; an installed package always has it.
     for folder in ("holozen", "services"):
         compileall.compile_dir(ROOT / folder, quiet=2)
-    cases = [echo(rate, turns=2 if args.quick else 40) for rate in RATES]
+    cases = [echo(rate, turns=1 if args.quick else 40) for rate in RATES]
     cases.append(Case("up to first odom", "ms", UP_AIM).take_turns(1 if args.quick else 15, holozen=first_odom))
     publish("startup", cases, args.json)
     return 0

@@ -71,13 +71,13 @@ class Ending:
     """
 
     def __init__(self) -> None:
-        self._code = 1  # of an uncaught exception
+        self.code = 1  # of an uncaught exception
         self._before: Callable[[int, FrameType | None], object]
         atexit.register(self._end)
 
     def leave(self, code: "int | str | None") -> "NoReturn":
         """Exit, once all non-daemon threads and the callbacks of atexit are done. Ctrl-C ends that wait."""
-        self._code = code if isinstance(code, int) else int(code is not None)
+        self.code = code if isinstance(code, int) else int(code is not None)
         before = signal.getsignal(signal.SIGINT)
         if callable(before):
             self._before = before
@@ -85,7 +85,7 @@ class Ending:
         sys.exit(code)
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
-        self._code = self._code or INTERRUPTED
+        self.code = self.code or INTERRUPTED
         with contextlib.suppress(KeyboardInterrupt):
             self._before(number, frame)
         self._end()
@@ -97,7 +97,7 @@ class Ending:
         for stream in (sys.stdout, sys.stderr):
             with contextlib.suppress(OSError, ValueError, AttributeError):  # it is gone, closed or never existed
                 stream.flush()
-        os._exit(self._code)
+        os._exit(self.code)
 
 
 def dies_with_parent() -> Callable[[], None]:

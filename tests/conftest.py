@@ -10,19 +10,19 @@ What is tried often, to be sure, is tried more often by `scripts/test --long`, w
         for _ in range(trials(3, 20)):
 """
 
-import atexit
 import fcntl
 import os
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from holozen.process import Ending
 
 PACKAGES = {
     "docker": "docker.io",
@@ -56,25 +56,11 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
 
 
-class Exit:
-    """The exit code of this run, with which the last callback of atexit ends the process. A thread of Zenoh that comes
-    back to Python while the interpreter is being finalized would abort it (see holozen.process.Ending).
-    """
-
-    code = 1
-
-    @classmethod
-    def leave(cls) -> None:
-        for stream in (sys.stdout, sys.stderr):
-            stream.flush()
-        os._exit(cls.code)
-
-
-atexit.register(Exit.leave)
+ending = Ending()  # this process too has opened Zenoh sessions
 
 
 def pytest_sessionfinish(exitstatus: int) -> None:
-    Exit.code = int(exitstatus)
+    ending.code = int(exitstatus)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

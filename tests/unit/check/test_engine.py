@@ -106,6 +106,8 @@ def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
             ('<robot name="r">\n<link name="a"type="b"/></robot>', 2, "a space"),
             ('\n<?xml version="1.0"?>\n<robot name="r"/>', 2, "before <?xml"),
         ]:
+            if name == "r.xacro" and line != 3 and "--" not in text and "<?xml" not in text:
+                continue  # as in a URDF
             if name == "r.urdf" and ("--" in text or "<?xml" in text):
                 continue  # Gazebo's reader forgives these, that of xacro does not
             (finding,) = findings(text, name)

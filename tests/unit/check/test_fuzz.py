@@ -2,7 +2,7 @@
 
 import random
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -10,6 +10,7 @@ import pytest
 from holozen.check.report import check
 from tests.unit.check.conftest import HERE
 
+Trials = Callable[[int, int], int]
 REPO = HERE.parents[2]
 TOKEN = re.compile(r"""<[^<>]*>|[\w:.-]+\s*=\s*"[^"]*"|[\w.${}()-]+""")
 WORDS = [
@@ -51,21 +52,21 @@ def mutated(text: str, chance: random.Random) -> str:
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
-def test_nothing_but_findings_comes_out(path: Path, tmp_path: Path) -> None:
-    text, broken = path.read_text(), 0
-    for number, changed in enumerate(mutations(text, 4, 300)):
+def test_nothing_but_findings_comes_out(path: Path, tmp_path: Path, trials: Trials) -> None:
+    text, broken, count = path.read_text(), 0, trials(60, 1000)
+    for number, changed in enumerate(mutations(text, 4, count)):
         (tmp_path / path.name).write_text(changed)
         found = check(tmp_path / path.name)
         broken += bool(found)
         for finding in found:
             assert len(str(finding).splitlines()) == 2, (number, finding)
             assert finding.place.line <= changed.count("\n") + 1
-    assert broken > 100
+    assert broken > count / 3
 
 
-def test_nothing_but_findings_comes_out_of_xacro(tmp_path: Path) -> None:
+def test_nothing_but_findings_comes_out_of_xacro(tmp_path: Path, trials: Trials) -> None:
     text = (REPO / "urdf" / "hb_bot.urdf.xacro").read_text()
-    for changed in mutations(text, 4, 12):
+    for changed in mutations(text, 4, trials(3, 50)):
         (tmp_path / "r.xacro").write_text(changed)
         for finding in check(tmp_path / "r.xacro", packages={"holo": REPO}):
             assert len(str(finding).splitlines()) == 2, finding

@@ -199,13 +199,12 @@ def test_a_name_that_does_not_exist_names_those_that_do(
     assert run("stop", name, "Fred")[:2] == (1, "Fred is stopped\n")
 
 
-def test_without_a_robot_it_says_so(robots: Robots, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(stop_module, "NOTICE", 0.5)
-    code, out, err = run("stop")
+def test_without_a_robot_it_says_so(robots: Robots, run: Run) -> None:
+    code, out, err = run("stop", "--timeout", "0.1")
     assert (code, out) == (1, "")
     assert err.startswith(f"holozen stop: no nodes found at {robots.wire.endpoint}; ")
     robots.add("next_goal")
-    code, _, err = run("release")
+    code, _, err = run("release", "--timeout", "2")
     assert (code, err.count("\n")) == (1, 1)
     assert err.startswith("holozen release: no robot was found (where an access control list is in force, ")
 

@@ -47,7 +47,7 @@ ODD = odd_types()
 
 
 def test_another_library_writes_and_reads_the_same_bytes(stranger: Stranger) -> None:
-    """Types of every kind with 50 values each; and fields at odd places, which are aligned, with 5."""
+    """Types of every kind with 15 values each; and fields at odd places, which are aligned, with 2."""
 
     def agree(interface: Interface, value: dict[str, Any]) -> None:
         payload = cdr.write(interface, value)
@@ -55,7 +55,7 @@ def test_another_library_writes_and_reads_the_same_bytes(stranger: Stranger) -> 
         assert cdr.read(interface, payload) == value == stranger.read(interface, payload), interface.name
         assert cdr.read(interface, stranger.write(interface, value, little_endian=False)) == value, interface.name
 
-    for interface, count in (*((REGISTRY.find(name), 50) for name in SOME), *((odd, 5) for odd in ODD)):
+    for interface, count in (*((REGISTRY.find(name), 15) for name in SOME), *((odd, 2) for odd in ODD)):
         settings(max_examples=count)(given(st.just(interface), values(interface))(agree))()
 
 
@@ -142,10 +142,9 @@ def test_bounds_hold_when_read_and_when_written() -> None:
             cdr.write(bound, value)
 
 
-@pytest.mark.parametrize("name", SOME)
 @given(data=st.data())
-def test_any_bytes_are_a_message_or_a_codec_error(name: str, data: st.DataObject) -> None:
-    interface = REGISTRY.find(name)
+def test_any_bytes_are_a_message_or_a_codec_error(data: st.DataObject) -> None:
+    interface = REGISTRY.find(data.draw(st.sampled_from(SOME)))
     good = bytearray(cdr.write(interface, data.draw(values(interface))))
     for _ in range(data.draw(st.integers(0, 4))):
         good[data.draw(st.integers(0, len(good) - 1))] = data.draw(st.integers(0, 255))

@@ -12,7 +12,8 @@ from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher
 from holozen.wire import TOPICS
-from services.pose_service.tracker import MAX_NAMES, MAX_ROBOTS, Tracker
+from services.pose_service import tracker
+from services.pose_service.tracker import MAX_NAMES, Tracker
 
 SILENCE = next(row.silence for row in TOPICS if row.key == "odom")
 
@@ -100,14 +101,17 @@ def test_what_is_no_odom_of_a_robot_is_left_out(robots: Robots) -> None:
     assert robots.refusal("Ann") == "no Ann/odom was received; robots with odom: Fred"
 
 
-def test_of_too_many_robots_the_one_that_has_been_silent_for_longest_is_forgotten(robots: Robots) -> None:
+def test_of_too_many_robots_the_one_that_has_been_silent_for_longest_is_forgotten(
+    robots: Robots, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tracker, "MAX_ROBOTS", 60)
     odom = encode(Odometry())
 
     def told(name: str) -> GetPoseReply | None:
         robots.sim.session.put(f"{name}/odom", odom)
         return robots.heard(name, 0.0)
 
-    names = ["Silent", "Steady", *(f"R{number}" for number in range(MAX_ROBOTS - 2)), "Steady", "Last"]
+    names = ["Silent", "Steady", *(f"R{number}" for number in range(58)), "Steady", "Last"]
     for name in names:
         wait_for(partial(told, name))
     assert robots.heard("Steady", 0.0) or "stale" in robots.refusal("Steady")
@@ -118,7 +122,7 @@ def test_of_too_many_robots_the_one_that_has_been_silent_for_longest_is_forgotte
 
 def test_the_thread_ends_with_the_bus(wire: Wire) -> None:
     bus: Bus = wire.bus("pose_service")
-    tracker = Tracker(bus.subscribe("**/odom", Odometry))
+    listening = Tracker(bus.subscribe("**/odom", Odometry))
     bus.close()
     with pytest.raises(ServiceError, match="no odom was received"):
-        tracker.get_pose(GetPoseRequest())
+        listening.get_pose(GetPoseRequest())

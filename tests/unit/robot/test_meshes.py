@@ -129,11 +129,13 @@ def test_a_huge_file_is_refused_unread(tmp_path: Path, name: str, size: int) -> 
     assert f"{path}: has {size / 1e6:.0f} MB, at most {size / 1e6 - 1:.0f} MB are read" in refusal(path)
 
 
-def test_five_million_triangles_are_read_a_part_at_a_time(tmp_path: Path) -> None:
-    path, count = tmp_path / "giant.stl", 5_000_000
-    with path.open("wb") as file:
-        file.write(bytes(80) + struct.pack("<I", count) + STL[84:])
-        file.truncate(84 + count * 50)  # the rest are points in the middle
+def test_many_triangles_are_read_a_part_at_a_time(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(meshes, "TRIANGLES_AT_ONCE", 100)
+    path, count = tmp_path / "giant.stl", 250
+    points = bytes(50 * (count - 12))  # in the middle
+    path.write_bytes(bytes(80) + struct.pack("<I", count) + STL[84:384] + points + STL[384:])
+    with path.open("rb") as file:
+        assert [len(part) for part in meshes.read_stl(file, path.stat().st_size, "")] == [300, 300, 150]
     assert bounds(path) == ((-0.5, -1, -1.5), (0.5, 1, 1.5))
 
 

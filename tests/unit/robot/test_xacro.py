@@ -165,13 +165,7 @@ def test_every_other_failure_is_one_line_with_the_file(folder: Path) -> None:
         ('<link name="${1/0}"/>', "division by zero when evaluating expression '1/0'"),
         ('<link name="$(fnd holo)"/>', "Unknown substitution command [fnd holo]"),
         ('<xacro:if value="maybe"/>', "not a boolean expression"),
-        ('<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/>', "calls itself without end"),
-        ('<xacro:include filename="robot.urdf.xacro"/>', "calls itself without end"),
         ("<xacro:macro/>", "missing attribute 'name'"),
-        (
-            '<xacro:property name="a" value="${b}"/><xacro:property name="b" value="${a}"/><l n="${a}"/>',
-            "circular",
-        ),
         ('<xacro:insert_block name="b"/>', 'Undefined block "b"'),
         ('<link name="$(env HOLOZEN_NOT_SET)"/>', "HOLOZEN_NOT_SET"),
     ]:

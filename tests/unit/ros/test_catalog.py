@@ -102,11 +102,10 @@ def test_a_star_brings_what_the_module_imports(tmp_path: Path) -> None:
 
 
 def test_a_script_that_imports_what_is_not_there_is_told_what_is(tmp_path: Path) -> None:
-    for name in HINTS:
-        script = tmp_path / "one.py"
-        script.write_text(f"import {name}\n")
-        done = subprocess.run(command("run", str(script)), capture_output=True, text=True, timeout=60)
-        assert done.returncode == 1
-        last = done.stderr.splitlines()[-1]
-        assert last.startswith("ModuleNotFoundError: ")
-        assert last.endswith(f"{HINTS[name]}; see docs/coming-from-ros.md")
+    script = tmp_path / "all.py"
+    tries = [f"try:\n    import {name}\nexcept ModuleNotFoundError as error:\n    print(error)\n" for name in HINTS]
+    script.write_text("".join(tries))
+    done = subprocess.run(command("run", str(script)), capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (0, "")
+    for hint, told in zip(HINTS.values(), done.stdout.splitlines(), strict=True):
+        assert told.endswith(f"{hint}; see docs/coming-from-ros.md")

@@ -201,7 +201,6 @@ CASES = {
     "spin, SIGTERM": (SPIN, signal.SIGTERM, 1, EXTERNAL),
     "polite, SIGINT": (POLITE, signal.SIGINT, 0, ""),
     "polite, SIGTERM": (POLITE, signal.SIGTERM, 0, ""),
-    "publish for ever, SIGINT": (LOOP, signal.SIGINT, 130, ""),
     "publish for ever, SIGTERM": (LOOP, signal.SIGTERM, 1, EXTERNAL),
     "while ok, SIGTERM": (OK, signal.SIGTERM, 0, ""),
     "rate, SIGINT": (RATE, signal.SIGINT, 130, ""),
@@ -216,7 +215,6 @@ CASES = {
     "wait for a frame, SIGTERM": (FRAME, signal.SIGTERM, 1, EXTERNAL),
     "wait for a node, SIGTERM": (NODE, signal.SIGTERM, 1, EXTERNAL),
     "many threads, SIGINT": (MANY, signal.SIGINT, 130, ""),
-    "many threads, SIGTERM": (MANY, signal.SIGTERM, 1, EXTERNAL),
     "many nodes, SIGINT": (NODES, signal.SIGINT, 130, ""),
 }
 

@@ -64,13 +64,10 @@ def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Pat
 def test_the_exit_code_is_the_scripts(run: Run, write: Write) -> None:
     for end, code, told in [
         ("", 0, ""),
-        ("sys.exit()", 0, ""),
         ("sys.exit(3)", 3, ""),
         ("sys.exit('no robot')", 1, "no robot\n"),
         ("sys.exit(-1)", 255, ""),
-        ("import rclpy; rclpy.init(); sys.exit(3)", 3, ""),
         ("import rclpy; rclpy.init(); node = rclpy.create_node('a'); sys.exit('no robot')", 1, "no robot\n"),
-        ("raise KeyboardInterrupt", 130, ""),
         ("os.kill(os.getpid(), 2); time.sleep(60)", 130, ""),
     ]:
         write("a.py", f"import os, sys, time\n{end}")
@@ -101,7 +98,7 @@ def test_ours_is_left_out_of_what_an_error_came_from(run: Run, write: Write) -> 
     assert "holozen/" not in told
 
 
-@pytest.mark.parametrize("text", ["def f(:\n  pass", "a = 1\n  b = 2", "x = '\0'"])
+@pytest.mark.parametrize("text", ["def f(:\n  pass", "x = '\0'"])
 def test_what_is_no_python_is_told_as_python_does(run: Run, write: Write, text: str) -> None:
     write("a.py", text)
     done = run("a.py")
@@ -139,7 +136,6 @@ def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> 
         (["my_boot", "a.py"], "no package 'my_boot' around "),
         (["my_bot", "c.py"], "package 'my_bot' has no executable 'c.py'"),
         (["my_bot"], "give an executable; executables in "),
-        (["my_bot", "--ros-args"], "give an executable; executables in "),
     ]:
         write("controller.py")
         done = run(*words)
@@ -178,18 +174,6 @@ def test_under_python_alone_it_fails_as_ever(write: Write) -> None:
 def test_the_connection_is_that_of_the_flags(run: Run, write: Write, wire: Wire) -> None:
     write("a.py", "from holozen.ros.rclpy import context; print(context.connection.connect, context.connection.wire)")
     assert run("a.py", flags=("--wire", "cdr")).stdout == f"('{wire.endpoint}',) cdr\n"
-
-
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_signal_ends_a_script_that_spins(wire: Wire, write: Write, number: int) -> None:
-    path = write("a.py", "import rclpy\nrclpy.init()\nnode = rclpy.create_node('a')\nprint('spins')\nrclpy.spin(node)")
-    line = [sys.executable, "-u", "-m", "holozen", "run", *wire.flags, str(path)]
-    with Process(line, env=environment()) as process:
-        process.wait_for_line("spins")
-        process.signal(number)
-        process.wait(within=10)
-        assert "holozen/" not in process.err
-        assert process.returncode in ((130,) if number == signal.SIGINT else (1, -15, 143))
 
 
 def test_our_flags_behind_the_script_are_ours_unless_the_script_has_them(run: Run, write: Write, home: Path) -> None:
@@ -250,12 +234,11 @@ except KeyboardInterrupt:
 """
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
-def test_a_thread_that_spins_ends_without_a_word(wire: Wire, write: Write, number: int) -> None:
+def test_a_thread_that_spins_ends_without_a_word(wire: Wire, write: Write) -> None:
     line = [sys.executable, "-u", "-m", "holozen", "run", *wire.flags, str(write("a.py", THREAD))]
     with Process(line, env=environment()) as process:
         process.wait_for_line("spins")
-        process.signal(number)
+        process.signal(signal.SIGINT)
         assert (process.wait(within=10), process.err) == (0, "")
 
 
@@ -282,7 +265,6 @@ thread.start()
             "rclpy.get_default_context().interrupt(); rclpy.spin_once(node)",
             "rclpy.executors.ExternalShutdownException: ",
         ),
-        ("rclpy.shutdown(); rclpy.shutdown(); rclpy.create_node('b')", "RuntimeError: "),
         ("rclpy.shutdown(); rclpy.create_node('b')", "rclpy.exceptions.NotInitializedException: "),
         ("import tf2_ros; raise tf2_ros.LookupException('no')", "tf2_ros.LookupException: no"),
         ("from holozen.messages.codec import CodecError; raise CodecError('no')", "CodecError: no"),

@@ -93,7 +93,7 @@ def test_every_type_is_made_and_any_value_of_it_is_the_same_bytes_as_another_lib
             payload = encode(message, wire)
             assert decode(payload, encoding(wire, kind), (kind,)) == message, f"{name} as {wire}"
             assert wire != "cdr" or payload == stranger.write(interface, prototype(interface)), name
-        settings(max_examples=5)(given(st.just(interface), values(interface))(agree))()
+        settings(max_examples=2)(given(st.just(interface), values(interface))(agree))()
 
 
 def filled(interface: Interface, value: dict[str, Any]) -> Any:
@@ -120,7 +120,7 @@ def test_what_a_field_takes_is_written_and_read() -> None:
         most, one = field.bound or 3, elements(field)
         every = st.lists(one, min_size=2 if field.array == "fixed" else 0, max_size=most) if field.array else one
         kind = generated.make(Interface("t/msg/Some", "msg", (field,)))
-        given(st.builds(kind, some=every))(survived)()
+        settings(max_examples=15)(given(st.builds(kind, some=every))(survived))()
 
 
 def test_what_was_put_into_a_list_is_written_as_its_field_says() -> None:

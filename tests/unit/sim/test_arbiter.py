@@ -512,7 +512,7 @@ class Robot(RuleBasedStateMachine):
 
 
 TestAnySequence = Robot.TestCase
-TestAnySequence.settings = settings(deadline=None, max_examples=200, stateful_step_count=30)
+TestAnySequence.settings = settings(stateful_step_count=30)
 
 
 def test_joint_commands_end_with_silence_even_where_the_watchdog_is_off() -> None:

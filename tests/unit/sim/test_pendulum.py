@@ -1,8 +1,8 @@
 """The gains hold the pendulum that they were made for, and one that is somewhat different."""
 
+import math
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from services.sim.physics.balance import GRAVITY, Pendulum, gains
@@ -21,28 +21,24 @@ DT = 1 / 240
 
 def accelerations(p: Pendulum, lean: float, rate: float, torque: float) -> tuple[float, float]:
     """Of the lean and of the way: Lagrange's equations, not linearised, by hand."""
-    sine, cosine = np.sin(lean), np.cos(lean)
-    coupling = p.body_mass * p.height * cosine
-    matrix = np.array(
-        [
-            [p.body_mass + p.wheel_mass + p.wheel_inertia / p.radius**2, coupling],
-            [coupling, p.body_inertia + p.body_mass * p.height**2],
-        ]
+    sine, cosine = math.sin(lean), math.cos(lean)
+    moving, turning = (
+        p.body_mass + p.wheel_mass + p.wheel_inertia / p.radius**2,
+        p.body_inertia + p.body_mass * p.height**2,
     )
-    forces = [
-        torque / p.radius + p.body_mass * p.height * rate**2 * sine,
-        p.body_mass * GRAVITY * p.height * sine - torque,
-    ]
-    way, leaning = np.linalg.solve(matrix, forces)
-    return float(leaning), float(way)
+    coupling = p.body_mass * p.height * cosine
+    pull = torque / p.radius + p.body_mass * p.height * rate**2 * sine
+    fall = p.body_mass * GRAVITY * p.height * sine - torque
+    determinant = moving * turning - coupling**2
+    return (moving * fall - coupling * pull) / determinant, (turning * pull - coupling * fall) / determinant
 
 
-def held(real: Pendulum, known: Pendulum, lean: float, seconds: float, dt: float = DT) -> np.ndarray:
+def held(real: Pendulum, known: Pendulum, lean: float, seconds: float, dt: float = DT) -> list[float]:
     """Lean, its rate, speed and way after being held with the gains for `known`."""
-    found = np.array(gains(known, dt))
-    state = np.array([lean, 0.0, 0.0, 0.0])
+    found = gains(known, dt)
+    state = [lean, 0.0, 0.0, 0.0]
     for _ in range(round(seconds / dt)):
-        torque = -float(found @ state)
+        torque = -sum(gain * value for gain, value in zip(found, state, strict=True))
         for _ in range(4):
             leaning, pulling = accelerations(real, state[0], state[1], torque)
             state[1] += leaning * dt / 4

@@ -19,11 +19,11 @@ HB_BOT = load(REPO / "urdf" / "hb_bot.urdf.xacro")
 angles = st.floats(-3, 3)
 
 
-def test_an_hour_at_240_hz_has_every_message_and_not_one_more() -> None:
-    for rate in [1, 7, 10, 20, 30, 50, 60, 100, 200, 240]:
+def test_ten_minutes_at_240_hz_have_every_message_and_not_one_more() -> None:
+    for rate in [1, 7, 30, 50, 200, 240]:
         schedule = Schedule(rate)
         first = rate < 240  # the one at the first step, before a period has passed
-        assert sum(schedule.due(step / 240) for step in range(1, 3600 * 240 + 1)) == 3600 * rate + first
+        assert sum(schedule.due(step / 240) for step in range(1, 600 * 240 + 1)) == 600 * rate + first
 
 
 @pytest.mark.parametrize("rate", [20, 30, 50, 60])
