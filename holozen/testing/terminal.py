@@ -13,6 +13,7 @@ from typing import Any, Self
 from holozen.testing.process import Process, wait_for
 
 SIZE = 100, 32  # columns and rows
+LAST = 1.0  # s for the last output of a process that has ended, while another one keeps its terminal open
 # Makes the terminal on standard input the controlling one, so that it delivers hang-ups and interrupts.
 _ENTER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
 
@@ -34,6 +35,7 @@ class Terminal:
         self._shown = 0  # bytes passed to the emulator
         self._emulator: Any = None
         self._closing, self._frozen = threading.Event(), threading.Event()
+        self._read_all = threading.Event()  # set once nothing more can come
         try:
             self.process = Process(
                 [sys.executable, "-S", "-c", _ENTER, *words],
@@ -100,6 +102,7 @@ class Terminal:
     @property
     def raw(self) -> str:
         """All output to the terminal, including control sequences."""
+        self._catch_up()
         return self._bytes.decode(errors="replace")
 
     def screen(self) -> str:
@@ -110,6 +113,7 @@ class Terminal:
             raise RuntimeError("Terminal.screen needs pyte; run: pip install pyte") from None
         if self._emulator is None:
             self._emulator = pyte.ByteStream(pyte.Screen(*self._size))
+        self._catch_up()
         new = self._bytes[self._shown :]
         self._shown += len(new)
         self._emulator.feed(new)
@@ -136,12 +140,20 @@ class Terminal:
         if not self._closing.is_set():
             self._closing.set()
             self._reader.join()
+            self._read_all.set()
             os.close(self._master)
 
     def close(self) -> None:
         """End the process and close the terminal."""
         self.process.close()
         self.hang_up()
+
+    def _catch_up(self) -> None:
+        """Once the process has ended, wait until all that it wrote has been read."""
+        if self.process.returncode is None or self._frozen.is_set() or threading.current_thread() is self._reader:
+            return
+        if not self._read_all.wait(LAST):
+            self._read_all.set()  # do not wait again
 
     def _read(self) -> None:
         while not self._closing.is_set():
@@ -153,6 +165,7 @@ class Terminal:
             try:
                 data = os.read(self._master, 65536)
             except OSError:  # the last process has left the terminal
+                self._read_all.set()
                 self._closing.wait()
             else:
                 self._bytes += data

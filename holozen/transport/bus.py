@@ -74,7 +74,11 @@ class Bus:
             open_session, connection, lasting=lasting, stop=stop or self._closing, closing=self._closing,
             patience=None if lasting else PATIENCE if patience is None else patience,
         )  # fmt: skip
-        self._opened = background(opening) if early else at_once(opening)
+        try:
+            self._opened = background(opening) if early else at_once(opening)
+        except BaseException:  # Ctrl-C, and nobody will close this bus: a thread that opens it gives up
+            self._closing.set()
+            raise
         self._keeper = self._opened().keeper if lasting else None
         if lasting:
             if exposed := self.exposed():

@@ -45,6 +45,14 @@ def test_frozen_it_shows_nothing_until_it_is_thawed() -> None:
         wait_for(lambda: terminal.raw.count("two") == 10)
 
 
+def test_all_that_a_process_wrote_is_there_when_it_has_ended() -> None:
+    with python("print('the end')") as terminal:
+        terminal.freeze()
+        assert terminal.process.wait() == 0
+        terminal.thaw()  # read from now on
+        assert terminal.raw == "the end\r\n"
+
+
 def test_a_key_that_is_held_repeats_after_a_delay() -> None:
     with python(ECHOES) as terminal:
         times = terminal.hold("i", 0.33, delay=0.2, interval=0.05)

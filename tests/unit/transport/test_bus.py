@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.output import CDR, Reader
 from holozen.messages import (
@@ -26,6 +27,7 @@ from holozen.messages import (
     TwistStamped,
 )
 from holozen.testing import Wire, wait_for
+from holozen.transport import bus as bus_module
 from holozen.transport import services as module
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, NoReply, ServiceError
@@ -404,6 +406,21 @@ def test_an_early_bus_that_cannot_open_says_so_at_its_first_use_and_closes(wire:
         for _ in range(2):
             with pytest.raises(BusError, match="no router answers"):
                 bus.subscribe_raw("odom")
+
+
+def test_an_early_bus_that_is_interrupted_as_it_starts_leaves_no_thread_that_opens(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(work: Callable[[], object]) -> None:
+        background(work)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(bus_module, "background", interrupted)
+    nowhere = Connection("client", connect=(wire.endpoint,))
+    before = threading.active_count()
+    with pytest.raises(KeyboardInterrupt):
+        Bus("early", nowhere, patience=60, early=True)
+    wait_for(lambda: threading.active_count() <= before, 30)
 
 
 def test_an_early_bus_may_be_closed_before_it_is_open(wire: Wire) -> None:
