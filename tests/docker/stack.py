@@ -109,7 +109,7 @@ def docker(*words: str) -> str:
     return run("docker", *words)
 
 
-def run(*words: str, env: dict[str, str] | None = None, within: float = 300) -> str:
+def run(*words: str, env: dict[str, str] | None = None, within: float = 1500) -> str:
     """Run a command to its end; what it printed, errors too. AssertionError if it fails."""
     done = subprocess.run(
         words, env={**os.environ, **(env or {})}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,

@@ -1,4 +1,4 @@
-"""docker-compose up: who may reach what, a robot that drives its shape, and a person who takes it over."""
+"""docker-compose up, stop and down: who may reach what, a robot that drives its shape, a person who takes it over."""
 
 import json
 import sys
@@ -10,7 +10,7 @@ from holozen.testing import Terminal, wait_for
 
 from .stack import SERVICES, Stack, Watcher, docker, run
 
-pytestmark = [pytest.mark.needs("docker", "docker-compose", "ss"), pytest.mark.timeout(900)]
+pytestmark = [pytest.mark.needs("docker", "docker-compose", "ss"), pytest.mark.timeout(1800)]
 
 LISTENS = "0A"  # a TCP state in /proc/net/tcp
 DOCKERS_DNS = "0B00007F"  # 127.0.0.11
@@ -50,13 +50,16 @@ def test_only_the_router_listens(stack: Stack) -> None:
     assert found == {"router": {("tcp", 7447)}, "sim": set(), "pose_service": set(), "controller": set()}
 
 
-@pytest.mark.parametrize("service", SERVICES)
-def test_a_process_may_nothing_but_its_work(stack: Stack, service: str) -> None:
-    status = dict(line.split(":\t", 1) for line in stack.execute(service, "cat", "/proc/1/status").splitlines())
-    assert int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0
-    assert status["NoNewPrivs"] == "1"
-    assert "0" not in status["Uid"].split()
-    assert "Read-only" in stack.execute(service, "sh", "-c", "touch /tmp/x 2>&1 || true")
+def test_a_process_may_nothing_but_its_work(stack: Stack) -> None:
+    for service in SERVICES:
+        told, wrote = stack.execute(service, "sh", "-c", "cat /proc/1/status; touch /tmp/x 2>&1 || true").split(
+            "touch:"
+        )
+        status = dict(line.split(":\t", 1) for line in told.splitlines())
+        assert int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0, service
+        assert status["NoNewPrivs"] == "1", service
+        assert "0" not in status["Uid"].split(), service
+        assert "Read-only" in wrote, service
 
 
 def test_from_this_machine_one_sees_the_robot_move(stack: Stack, watcher: Watcher) -> None:
@@ -163,5 +166,14 @@ def test_when_the_router_is_started_again_everybody_comes_back(stack: Stack, wat
     wait_for(lambda: set(stack.healths().values()) == {"healthy"}, within=60, what="healthy containers")
 
 
-def test_the_logs_hold_no_errors_after_all_this(stack: Stack) -> None:
+def test_after_all_this_each_process_ends_by_itself_with_code_0_and_clean_logs(stack: Stack) -> None:
+    stack.compose("stop")
+    ends = {service: stack.inspect(service)["State"]["ExitCode"] for service in SERVICES}
+    assert ends == dict.fromkeys(SERVICES, 0)  # 137 would be one that had to be killed
     assert stack.complaints() == []
+
+
+def test_down_leaves_nothing(stack: Stack) -> None:
+    stack.compose("down")
+    assert stack.containers() == []
+    assert docker("network", "ls", "--quiet", "--filter", f"label=com.docker.compose.project={stack.name}") == ""
