@@ -21,7 +21,7 @@ from .history import STEP, History, whole_lines
 from .namespaces import NEEDS, Cable, Host, Lab
 from .proxy import Proxy
 
-pytestmark = NEEDS
+pytestmark = [NEEDS, pytest.mark.alone]
 
 HERE = Path(__file__).parent
 CLOCK = 4000  # s that the drivers' clock is ahead

@@ -9,6 +9,7 @@ import zenoh
 
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, Twist
+from holozen.messages.rcl_interfaces import Parameter, ParameterValue, SetParametersReply, SetParametersRequest
 from holozen.testing import Wire, wait_for
 
 NAMES = 1200
@@ -37,7 +38,11 @@ class Person:
 @pytest.fixture
 def statuses(wire: Wire) -> Iterator["Statuses"]:
     wire.start("sim").wait_for_line("listens on cmd_vel")
-    yield Statuses(wire.bus())
+    bus = wire.bus()
+    longer = Parameter("command_timeout", ParameterValue.of(2.0))  # for a person's thread on a busy machine
+    told = bus.call("sim/set_parameters", SetParametersRequest([longer]), SetParametersReply)
+    assert told.results[0].successful, told
+    yield Statuses(bus)
 
 
 class Statuses:

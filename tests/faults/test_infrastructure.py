@@ -1,5 +1,6 @@
 """The faults happen: what a test sets is what a connection meets."""
 
+import select
 import socket
 import sys
 import time
@@ -60,19 +61,22 @@ def test_a_link_without_faults_carries_both_ways_and_ends_as_its_ends_do(echo: E
 
 
 def test_a_delay_is_one_way(link: Proxy, echo: Echo) -> None:
-    link.upstream.delay = 0.5
-    assert echo.carries() >= 0.5
+    link.upstream.delay = 1.0
     begin = time.monotonic()
-    echo.far.sendall(b"x")
-    echo.near.recv(1)
-    assert time.monotonic() - begin < 0.5
+    echo.near.sendall(b"there")
+    echo.far.sendall(b"back")
+    assert echo.near.recv(4) == b"back"
+    assert select.select([echo.far], [], [], 0)[0] == [], "what was sent before is still under way"
+    assert echo.far.recv(5) == b"there"
+    assert time.monotonic() - begin >= 1.0
 
 
 def test_a_connection_over_a_slow_link_takes_a_round_trip_to_open(link: Proxy, listener: socket.socket) -> None:
     link.set(delay=0.3)
+    begin = time.monotonic()
     echo = Echo(link, listener)
-    assert echo.carries() > 0.8  # three times the delay, less the moment that it took to connect
-    assert echo.carries() < 0.8
+    echo.carries()
+    assert time.monotonic() - begin >= 0.9  # three times the delay
     echo.near.close()
     echo.far.close()
 
@@ -144,14 +148,15 @@ while True:
 PING = """
 import socket, sys
 udp = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-udp.settimeout(0.3)
-back = 0
-for number in range(int(sys.argv[2])):
-    try:
+udp.settimeout(1)
+back, count = 0, int(sys.argv[2])
+try:
+    for number in range(count):
         udp.sendto(b"x", (sys.argv[1], 4000))
+    while back < count:
         back += len(udp.recv(100))
-    except OSError:
-        pass
+except OSError:
+    pass
 print(back)
 """
 
@@ -176,7 +181,7 @@ def test_a_cable_carries_until_it_is_cut_and_again_when_it_is_joined(hosts: tupl
 def test_a_cable_loses_a_share_of_its_packets(hosts: tuple[Host, Host], cable: Cable) -> None:
     hosts[1].start(sys.executable, "-c", ANSWER, cable.address(hosts[1])).wait_for_line("up")
     cable.lose(0.5)
-    assert 0 < pings(hosts, cable, 20) < 20
+    assert 0 < pings(hosts, cable, 200) < 200  # 50 of them; none in one of 10^25 times
     cable.lose(1.0)
     assert pings(hosts, cable) == 0
     cable.lose(0.0)
@@ -193,7 +198,7 @@ def test_each_host_has_a_monotonic_clock_of_its_own_and_the_time_of_day_of_all(h
         map(float, host.check(sys.executable, "-c", CLOCKS).split()) for host in clocks
     )
     passed = other_day - day
-    assert other_mono - mono - passed == pytest.approx(5000, abs=0.1)
+    assert other_mono - mono - passed == pytest.approx(5000, abs=2)
     assert abs(passed) < 10
 
 

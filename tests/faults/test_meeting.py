@@ -23,6 +23,7 @@ DELAY = 0.5  # s one way
 WITHIN = 5.0  # s to get in
 
 
+@pytest.mark.alone
 @pytest.mark.parametrize("mode", ["client", "peer"])
 def test_a_process_gets_in_over_a_slow_link(wire: Wire, proxy: Proxy, mode: str) -> None:
     router = wire.start("router")
@@ -54,8 +55,7 @@ def test_a_stop_reaches_the_robot_over_a_slow_link(wire: Wire, proxy: Proxy, mod
         assert stop.out == "the robot at the root is stopped\n"
 
 
-@pytest.mark.parametrize("mode", ["client", "peer"])
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize(("mode", "number"), [("client", signal.SIGINT), ("peer", signal.SIGTERM)])
 def test_what_waits_for_an_answer_ends_at_once_on_a_signal(
     wire: Wire, proxy: Proxy, mode: str, number: signal.Signals
 ) -> None:
@@ -64,7 +64,7 @@ def test_what_waits_for_an_answer_ends_at_once_on_a_signal(
     with Process(command("sim", "--mode", mode, "--connect", proxy.endpoint, "--listen", "tcp/127.0.0.1:0")) as sim:
         sim.wait_for_line("waiting for a")
         sim.signal(number)
-        assert sim.wait(5) == 0
+        assert sim.wait(20) == 0
         assert "Traceback" not in sim.err
 
 

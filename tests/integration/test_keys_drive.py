@@ -9,8 +9,6 @@ from holozen.testing import Terminal, Wire, wait_for
 
 from .robots import URDF, Record, Robot, distance, moves, place, planar, rests, time_of
 
-pytestmark = pytest.mark.alone
-
 V, W = 0.4, 0.8  # m/s, rad/s
 ESCAPE = "\x1b"
 UP = f"{ESCAPE}[A"
@@ -49,7 +47,7 @@ def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> 
         assert place(end)[1] == pytest.approx(place(start)[1], abs=1e-3)
 
 
-@pytest.mark.parametrize("key", ["k", "K", " ", "y", "5", "\t", "\r", f"{ESCAPE}[15~", "\x04", "ä"])
+@pytest.mark.parametrize("key", ["k", " ", "y", "\t", f"{ESCAPE}[15~", "ä"])
 def test_k_and_every_unknown_key_stop_the_robot(shared_teleop: Terminal, robot: Robot, key: str) -> None:
     after(robot.commands, shared_teleop, "i")
     robot.odom.next(lambda odom: moves(odom, V, 0, 0))
@@ -61,12 +59,12 @@ def test_k_and_every_unknown_key_stop_the_robot(shared_teleop: Terminal, robot: 
 
 
 def test_without_another_key_the_robot_stops_after_the_key_timeout(town: Wire, robot: Robot) -> None:
-    start = robot.newest()
     with start_teleop(town, "--key-timeout", "0.2") as terminal:
+        seen = len(robot.commands.messages())
         after(robot.commands, terminal, "i")
         robot.told_to_stop()
-        # The sim alone would stop it only 0.5 s after the last command.
-        assert distance(start, robot.stands()) < 0.5 * 0.4
+        # At 20 Hz; after the default of 0.5 s it would be ten of them and more.
+        assert sum(any(planar(command)) for command in robot.commands.messages()[seen:]) <= 6
 
 
 def test_a_key_timeout_of_zero_drives_on(shared_teleop: Terminal, robot: Robot) -> None:
@@ -78,15 +76,15 @@ def test_a_key_timeout_of_zero_drives_on(shared_teleop: Terminal, robot: Robot) 
 
 
 def test_a_held_key_drives_on_past_the_timeout(town: Wire, robot: Robot) -> None:
-    with start_teleop(town, "--key-timeout", "0.3") as terminal:
+    with start_teleop(town, "--key-timeout", "1") as terminal:
         after(robot.commands, terminal, "i")
         start = time_of(robot.newest())
 
-        def held_for_a_second(odom: object = None) -> bool:
+        def held_for_two_seconds() -> bool:
             terminal.type("i")
-            return time_of(robot.newest()) > start + 1.0
+            return time_of(robot.newest()) > start + 2.0
 
-        wait_for(held_for_a_second)
+        wait_for(held_for_two_seconds)
         assert not any(rests(odom) for odom in robot.odom.messages() if time_of(odom) > start)
 
 
@@ -96,10 +94,13 @@ def test_a_stop_is_repeated_until_the_robot_rests_and_then_the_teleop_is_silent(
         terminal.type("k")
         terminal.wait_for_text("silent")
         robot.stands()
-        robot.pass_time(0.2)  # the teleop has to see it too
-        seen = len(robot.commands.messages())
-        robot.pass_time(0.5)
-        assert len(robot.commands.messages()) == seen
+
+        def silent() -> bool:
+            seen = len(robot.commands.messages())
+            robot.pass_time(0.5)
+            return len(robot.commands.messages()) == seen
+
+        wait_for(silent, what="half a second without a command")
 
 
 def test_an_idle_teleop_says_nothing(town: Wire, robot: Robot) -> None:
@@ -131,14 +132,20 @@ def test_stamped_commands_carry_time_and_frame_and_drive_too(town: Wire, robot: 
         assert command.header.stamp.sec > 0
 
 
-@pytest.mark.parametrize("pasted", ["i", "iiii", "forward: i\nand I\n", f"{UP}{UP}", "k" * 5000 + "i"])
-def test_pasted_text_never_drives(town: Wire, robot: Robot, pasted: str) -> None:
+def test_pasted_text_never_drives(town: Wire, robot: Robot) -> None:
+    seen = len(robot.commands.messages())
     with start_teleop(town) as terminal:
-        seen = len(robot.commands.messages())
-        terminal.type(f"{ESCAPE}[200~{pasted}{ESCAPE}[201~w")  # the w after it shows when it was read
-        terminal.wait_for_text("0.550 m/s")
-        robot.newest()
-        assert len(robot.commands.messages()) == seen
+        # The w after it shows when it was read.
+        for pasted, told in (
+            ("i", "0.550 m/s"),
+            ("forward: i\nand I\n", "0.605 m/s"),
+            (f"{UP}{UP}", "0.666 m/s"),
+            ("k" * 5000 + "i", "0.732 m/s"),
+        ):
+            terminal.type(f"{ESCAPE}[200~{pasted}{ESCAPE}[201~w")
+            terminal.wait_for_text(told)
+    robot.newest()
+    assert len(robot.commands.messages()) == seen
 
 
 def test_the_teleop_says_what_a_robot_cannot_do_and_the_limits_that_the_sim_has(wire: Wire) -> None:

@@ -31,15 +31,11 @@ def steady(robot: Robot, velocity: Planar, seconds: float) -> list[Odometry]:
     ("velocity", "seconds"),
     [
         ((0.5, 0.0, 0.0), 4.0),
-        ((-0.5, 0.0, 0.0), 4.0),
-        ((0.0, 0.5, 0.0), 4.0),
         ((0.4, -0.3, 0.0), 4.0),
-        ((0.0, 0.0, 1.0), 2 * math.pi),
-        ((0.5, 0.0, 0.5), 4.0),
         ((0.3, 0.4, -0.8), 8.0),
         ((2.0, 1.0, 5.0), 2.0),
     ],
-    ids=["2 m forward", "2 m back", "2 m left", "2 m aslant", "turn round", "arc", "arc aslant", "fast spiral"],
+    ids=["2 m forward", "2 m aslant", "arc aslant", "fast spiral"],
 )
 def test_driving_two_metres_or_turning_ends_where_the_closed_form_says(
     quick: Robot, velocity: Planar, seconds: float

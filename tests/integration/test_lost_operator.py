@@ -16,8 +16,6 @@ from holozen.testing import Process, Wire, wait_for
 from .conftest import start_sim
 from .robots import URDF, Robot, moves, speeds
 
-pytestmark = pytest.mark.alone
-
 TAG = "<commandTopic>"
 WATCHDOGS = {"Slow": "60", "Never": "-1"}  # s
 

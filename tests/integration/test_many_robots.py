@@ -13,8 +13,6 @@ from .conftest import start_sim
 from .processes import assert_one_line
 from .robots import Robot, distance, moves, place, record
 
-pytestmark = pytest.mark.alone
-
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 
 
@@ -109,25 +107,14 @@ def test_a_wildcard_is_no_robots_name(town: Wire) -> None:
 BROKEN_XML = "<robot name='r'><link name='a'>"
 NO_DRIVE = "<robot name='r'><link name='a'/></robot>"
 WRONG = {
-    "no such robot file": (["--robot", "nowhere.urdf"], 1, "nowhere.urdf"),
     "a robot that is broken XML": (["--robot", "{tmp}/broken.urdf"], 1, "broken.urdf"),
     "a robot with nothing to drive it": (["--robot", "{tmp}/still.urdf"], 1, "no plugin drives it"),
-    "a folder for a robot": (["--robot", "{tmp}"], 1, "{tmp}"),
     "a picture for a robot": (["--robot", "{picture}"], 1, "logo.png"),
     "an illegal name": (["--robot", "{bot}=a/b"], 2, "robot name 'a/b'"),
-    "a wildcard for a name": (["--robot", "{bot}=*"], 2, "robot name '*'"),
     "two robots of one name": (["--robot", "{bot}=A", "--robot", "{bot}=A"], 1, "2 robots are called 'A'"),
-    "two robots at the root": (["--robot", "{bot}", "--robot", "{bot}"], 1, "2 robots are called ''"),
     "no such world": (["--world", "nowhere.world"], 1, "nowhere.world"),
-    "a world that is broken XML": (["--world", "{tmp}/broken.urdf"], 1, "broken XML"),
     "a robot for a world": (["--world", "{tmp}/still.urdf"], 1, "is a robot (URDF), not a world"),
-    "a negative factor": (["--rtf", "-1"], 2, "'-1': use a number from 0 to 1000"),
-    "a factor of nan": (["--rtf", "nan"], 2, "'nan'"),
-    "a factor that is no number": (["--rtf", "fast"], 2, "'fast'"),
-    "a limit of zero": (["--max-linear", "0"], 2, "'0'"),
-    "a package without a folder": (["--package", "holo"], 2, "write NAME=DIR"),
-    "an unknown flag": (["--rft", "1"], 2, "--rft"),
-    "an endpoint that is none": (["--connect", "nonsense"], 2, "nonsense"),
+    "a factor of nan": (["--rtf", "nan"], 2, "'nan': use a number from 0 to 1000"),
 }  # fmt: skip
 
 

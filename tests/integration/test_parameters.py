@@ -15,8 +15,6 @@ from holozen.testing import Wire, wait_for
 
 from .robots import Robot, moves, rests, time_of
 
-pytestmark = pytest.mark.alone
-
 DEFAULTS = {
     "max_linear": 5.0, "max_angular": 10.0, "real_time_factor": 1.0, "command_timeout": 0.5, "odometry_rate": 50.0,
 }  # fmt: skip
@@ -64,6 +62,7 @@ def still(robot: Robot, seconds: float) -> bool:
     return all(map(rests, robot.odom.messages()[seen:]))
 
 
+@pytest.mark.alone
 def test_the_watchdog_can_be_shortened_but_not_switched_off(robot: Robot) -> None:
     for value in (0.0, -1.0, 0.04, 3.0):
         told = f"command_timeout: {value:g}: use a number from 0.05 to 2 s"
@@ -113,6 +112,7 @@ def speed(twist: Twist) -> float:
     return math.hypot(twist.linear.x, twist.linear.y)
 
 
+@pytest.mark.alone
 def test_the_controller_slows_down_at_once_and_by_its_own_acceleration(town: Wire, robot: Robot) -> None:
     town.start("pose-service", "--size", "100").wait_for_line("goals")
     with town.start("controller", "--max-speed", "0.6"):

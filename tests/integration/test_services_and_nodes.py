@@ -37,12 +37,6 @@ def test_service_list_names_every_service(town: Wire) -> None:
     assert "resume [std_srvs/srv/Trigger]" in lines
 
 
-def test_service_list_of_nobody_says_so(wire: Wire) -> None:
-    done = wire.run("service", "list")
-    assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == f"no services: no nodes found at {wire.endpoint}; `holozen up` starts a robot\n"
-
-
 def test_service_call_prints_the_reply(town: Wire) -> None:
     done = town.run("service", "call", "next_goal", '{"request_goal": 3}')
     assert done.returncode == 0
@@ -87,16 +81,11 @@ def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
             1,
             "refused: not a NextGoalRequest: Object contains unknown field `goal`",
         ),
-        (["call", "next_goal", "[1]"], 1, "refused: not a NextGoalRequest: "),
-        (["call", "next_goal", "{a: b: c}"], 1, "refused: neither JSON nor YAML: "),
         (["call", "get_pose", '{"name": "Fred"}'], 1, "no Fred/odom was received"),
         (["call", "get_pose", '{"name": "*"}'], 1, "robot name '*': use a letter"),
         (["call", "Fred/resume", "--timeout", "0.3"], 1, "no reply from 'Fred/resume' within 0.3 s"),
         (["call", "make_tea"], 1, "'make_tea' has no known type; known: next_goal, get_pose, "),
-        (["call", "next_goal", "--timeout", "0"], 2, "'0': use a number"),
-        (["call"], 2, "key"),
         (["ring"], 2, "'ring'"),
-        ([], 2, "VERB"),
     ],
 )
 def test_a_call_that_fails_says_why_in_one_line(town: Wire, words: list[str], code: int, reason: str) -> None:
@@ -109,12 +98,6 @@ def test_node_list_names_who_runs(town: Wire) -> None:
         terminal.wait_for_text("listening")
         assert town.run("node", "list").stdout.split() == ["pose_service", "sim", "teleop"]
     wait_for(lambda: town.run("node", "list").stdout.split() == ["pose_service", "sim"])
-
-
-def test_node_list_of_nobody_says_so(wire: Wire) -> None:
-    done = wire.run("node", "list")
-    assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == f"no nodes found at {wire.endpoint}; `holozen up` starts a robot\n"
 
 
 def test_clients_meet_through_a_router(wire: Wire) -> None:
@@ -165,14 +148,11 @@ def test_an_unknown_verb_is_one_line(town: Wire) -> None:
     assert_one_line(town.run("drive"), 2, "holozen: no verb 'drive'; `holozen --help` lists the verbs")
 
 
-def test_help_names_every_verb_and_every_verb_has_help() -> None:
+def test_help_names_every_verb() -> None:
     shown = subprocess.run(command("--help"), capture_output=True, text=True)
     assert shown.returncode == 0
     for verb in VERBS:
         assert f"\n  {verb} " in shown.stdout
-        help_of_it = subprocess.run(command(verb, "--help"), capture_output=True, text=True)
-        assert (help_of_it.returncode, help_of_it.stderr) == (0, "")
-        assert help_of_it.stdout.startswith(f"usage: holozen {verb}")
 
 
 def test_without_a_verb_it_shows_the_help_and_fails() -> None:
@@ -185,19 +165,13 @@ def test_the_version_is_that_of_the_package() -> None:
     assert subprocess.run(command("--version"), capture_output=True, text=True).stdout == f"{version('holozen')}\n"
 
 
-@pytest.mark.parametrize("unbuffered", ["1", ""])
-@pytest.mark.parametrize(
-    "verb", ["--help", "--version", "xacro urdf/hb_bot.urdf.xacro", "topic --help", "service list"]
-)
-def test_output_into_a_reader_that_is_gone_ends_quietly(town: Wire, verb: str, unbuffered: str) -> None:
+@pytest.mark.parametrize(("verb", "unbuffered"), [("--help", ""), ("xacro urdf/hb_bot.urdf.xacro", "1")])
+def test_output_into_a_reader_that_is_gone_ends_quietly(verb: str, unbuffered: str) -> None:
     read, write = os.pipe()
     os.close(read)
-    flags = town.flags if verb == "service list" else []
     env = {**os.environ, "PYTHONUNBUFFERED": unbuffered}
     with os.fdopen(write, "wb") as gone:
-        done = subprocess.run(
-            command(*verb.split(), *flags), stdout=gone, stderr=subprocess.PIPE, text=True, cwd=ROOT, env=env
-        )
+        done = subprocess.run(command(*verb.split()), stdout=gone, stderr=subprocess.PIPE, text=True, cwd=ROOT, env=env)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -209,21 +183,6 @@ def test_service_type_find_and_info(town: Wire) -> None:
     assert lines[2].startswith("  pose_service (")
     told = json.loads(town.run("service", "info", "next_goal", "--json").stdout)
     assert [server["node"] for server in told["servers"]] == ["pose_service"]
-
-
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        ("service type next_gaol", "unknown key 'next_gaol'; did you mean 'next_goal'?; known: delete_entity, "),
-        ("service info next_gaol", "unknown key 'next_gaol'; did you mean 'next_goal'?"),
-        ("service find Triger", "no service of type 'Triger'"),
-        ("node info smi", "unknown node 'smi'; did you mean 'sim'?; known: pose_service, sim"),
-        ("topic type odmo", "unknown key 'odmo'; did you mean 'odom'?"),
-        ("topic find Odmetry", "no topic of type 'Odmetry'"),
-    ],
-)
-def test_what_is_not_there_is_told_with_the_closest(town: Wire, words: str, reason: str) -> None:
-    assert_one_line(town.run(*words.split()), 1, reason)
 
 
 def test_service_call_again_and_again(town: Wire) -> None:

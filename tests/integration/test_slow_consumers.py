@@ -1,11 +1,11 @@
 """A slow consumer cannot delay control."""
 
-import signal
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
-from holozen.testing import Process, Wire
+from holozen.testing import Process, Wire, wait_for
 
 from .conftest import deaf, start_sim
 from .robots import Robot, time_of
@@ -13,7 +13,6 @@ from .robots import Robot, time_of
 pytestmark = pytest.mark.alone
 
 AT_ONCE = 2.0  # s; a publisher that waits for a slow reader waits 5
-ENOUGH = 100  # s of sim time, with 200 samples each: more than Zenoh's queue of 256 and loopback's buffers hold
 
 
 @pytest.fixture
@@ -23,15 +22,25 @@ def fast_robot(wire: Wire) -> Robot:
     return Robot(wire.bus())
 
 
-@pytest.fixture(params=["reads nothing", "is stopped"])
-def slow(request: pytest.FixtureRequest, wire: Wire, fast_robot: Robot) -> Iterator[Process]:
-    """A subscriber of odom, tf and joint_states that has been told more than it can hold."""
+def held_back(wire: Wire) -> int:
+    """Bytes that wait in the sim's sockets for their readers."""
+    rows = [row.split() for row in Path("/proc/net/tcp").read_text().splitlines()[1:]]
+    here = f"0100007F:{wire.port:04X}"
+    return sum(int(waiting.partition(":")[0], 16) for _, local, _, _, waiting, *_ in rows if local == here)
+
+
+@pytest.fixture
+def slow(wire: Wire, fast_robot: Robot) -> Iterator[Process]:
+    """A subscriber of odom, tf and joint_states that has been told more than it and the system's buffers can hold."""
     with deaf(wire, "**") as process:
-        if request.param == "is stopped":
-            process.signal(signal.SIGSTOP)
-        end = time_of(fast_robot.newest()) + ENOUGH
-        while time_of(fast_robot.odom.next(within=AT_ONCE)) < end:
-            pass
+
+        def full() -> bool:
+            before, end = held_back(wire), time_of(fast_robot.newest()) + 2
+            while time_of(fast_robot.odom.next(within=AT_ONCE)) < end:
+                pass
+            return 100_000 < before == held_back(wire)
+
+        wait_for(full, 60, lambda: f"full buffers; {held_back(wire)} bytes wait")
         yield process
 
 

@@ -31,8 +31,6 @@ from holozen.wire import key_for
 from .conftest import start_sim
 from .robots import URDF, Robot, distance, moves, rests, speeds
 
-pytestmark = pytest.mark.alone
-
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
 BOT = URDF / "hb_bot.urdf.xacro"
 TAG = "<commandTopic>"

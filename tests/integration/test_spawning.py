@@ -6,26 +6,40 @@ from pathlib import Path
 
 import pytest
 
+from holozen import entities
 from holozen.bus import Bus
 from holozen.messages import Clock
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.xacro import expand
 from holozen.testing import Process, Wire, wait_for
 
-from .robots import Robot, distance, place, planar
-
-pytestmark = pytest.mark.alone
+from .robots import Robot, distance, place
 
 REPO = Path(__file__).parents[2]
 HB_BOT = str(REPO / "urdf" / "hb_bot.urdf.xacro")
 
 
-@pytest.fixture
-def sim(wire: Wire) -> Process:
-    """A sim without any robot."""
-    sim = wire.start("sim", "--empty")
+@pytest.fixture(scope="module")
+def only_sim(town: Wire) -> Process:
+    sim = town.start("sim", "--empty")
     sim.wait_for_line("no robot yet")
     return sim
+
+
+@pytest.fixture
+def sim(town: Wire, only_sim: Process) -> Process:
+    """The file's sim, without any robot."""
+    bus = town.bus()
+    for name in entities.names(bus, notice=20):
+        entities.delete(bus, name)
+    bus.close()
+    return only_sim
+
+
+@pytest.fixture
+def wire(town: Wire) -> Wire:
+    """The file's wire."""
+    return town
 
 
 def keys(bus: Bus) -> set[str]:
@@ -81,9 +95,8 @@ def test_the_teleop_and_the_controller_work_on_a_robot_that_came_later(wire: Wir
     terminal.type("\x03")
     assert terminal.process.wait() == 0
     fred.resume()
-    wire.start("pose-service", "--shape", "square", "--size", "0.4")
-    controller = wire.start("controller", "Fred")
-    controller.wait_for_line("goal 3", within=60)
+    with wire.start("pose-service", "--size", "0.3"), wire.start("controller", "Fred") as controller:
+        controller.wait_for_line("lap 1 goal 0: ", within=60)
 
 
 def test_a_name_twice_an_unknown_robot_and_a_wrong_file_are_told_with_what_there_is(
@@ -152,16 +165,6 @@ def resident(process: Process) -> int:
     """The memory of a process, in bytes."""
     pages = int(Path(f"/proc/{process.pid}/statm").read_text().split()[1])
     return pages * os.sysconf("SC_PAGE_SIZE")
-
-
-def test_planar_commands_go_nowhere_but_to_their_robot(wire: Wire, sim: Process) -> None:
-    for name, y in (("Fred", 0), ("Ann", 3)):
-        done(wire, "spawn", HB_BOT, "--name", name, "-y", str(y))
-    fred, ann = Robot(wire.bus(), "Fred"), Robot(wire.bus("other"), "Ann")
-    there = ann.stands()
-    fred.drive(0.5)
-    assert distance(there, ann.newest()) < 1e-6
-    assert all(not any(planar(command)) for command in ann.commands.messages())
 
 
 def test_a_topic_that_the_robots_file_names_is_published_to_by_its_readers_type(

@@ -45,16 +45,11 @@ def test_what_a_stranger_puts_is_shown(town: Wire) -> None:
     for words, shown in [
         ("a/json", "speed: 1.5\nname: x\n---\n"),
         ("a/json --json", '{"speed": 1.5, "name": "x"}\n'),
-        ("a/lines --json", '{"name": "\\u00e9\\u009b"}\n'),
         ("a/json --csv", "1.5,x\n"),
         ("a/json --field speed", "1.5\n---\n"),
-        ("a/json --no-str", "speed: 1.5\nname: <1 characters>\n---\n"),
         ("a/text", '"red \\u001b[31malert\\u0007"\n---\n'),
-        ("a/text --csv", "red \\u001b[31malert\\u0007\n"),
         ("a/schema", SHOWN),
         ("a/cdr --type geometry_msgs/msg/Twist", SHOWN),
-        ("a/cdr geometry_msgs/Twist", SHOWN),
-        ("a/plain geometry_msgs/msg/Twist", SHOWN),
         ("a/schema --filter m.linear.x==1.5 --field angular.z --csv", "0.25\n"),
         ("a/json --json --field speed", '{"value": 1.5}\n'),
         ("a/js$* --json", '{"key": "a/json", "value": {"speed": 1.5, "name": "x"}}\n'),
@@ -100,7 +95,7 @@ def test_raw_gives_the_bytes_as_they_came(town: Wire) -> None:
     assert subprocess.run(words, capture_output=True, timeout=30).stdout == PUTS["a/bytes"][0]
 
 
-@pytest.mark.parametrize("words", ["a/text --raw --once", "a/text --once", "a/text --csv --once", "** --filter m=='x'"])
+@pytest.mark.parametrize("words", ["a/text --raw --once", "** --filter m=='x'"])
 def test_a_strangers_control_characters_never_reach_a_terminal(town: Wire, words: str) -> None:
     with town.terminal("topic", "echo", *words.split(), "--timeout", "2") as terminal:
         terminal.process.wait()
@@ -162,12 +157,6 @@ def test_delay_says_that_no_clock_is_heard(town: Wire) -> None:
     assert_one_line(done, 1, " messages have stamps by another clock than this machine's, and nothing comes on clock")
 
 
-@pytest.mark.parametrize("verb", ["hz", "bw", "delay"])
-def test_a_silent_key_ends_with_the_timeout(town: Wire, verb: str) -> None:
-    done = town.run("topic", verb, "nothing", "--timeout", "0.2")
-    assert_one_line(done, 1, "no messages on nothing within 0.2 s")
-
-
 def test_list_hears_strangers_if_it_listens(town: Wire) -> None:
     assert town.run("topic", "list").stdout == ""
     assert town.run("topic", "list", "--heard", "0.3").stdout.split() == sorted(PUTS)
@@ -218,9 +207,7 @@ def test_who_looks_for_a_stranger_calls_no_service(town: Wire) -> None:
     assert asked == []
 
 
-@pytest.mark.parametrize(
-    "words", ["echo **", "echo ** --csv", "echo a/bytes --raw", "hz **", "bw **", "list --heard 0.2"]
-)
+@pytest.mark.parametrize("words", ["echo ** --csv", "echo a/bytes --raw", "list --heard 0.2"])
 def test_a_reader_that_is_gone_ends_it_quietly(town: Wire, words: str) -> None:
     reading, writing = os.pipe()
     os.close(reading)

@@ -31,12 +31,6 @@ def test_list_names_every_topic_once(town: Wire, robot: Robot) -> None:
     assert lines == [f"{key} [{kind}]" for key, kind in sorted(TOPICS.items())]
 
 
-def test_list_of_nobody_says_so(wire: Wire) -> None:
-    done = wire.run("topic", "list")
-    assert (done.returncode, done.stdout) == (0, "")
-    assert done.stderr == f"no topics: no nodes found at {wire.endpoint}; `holozen up` starts a robot\n"
-
-
 def test_info_tells_the_type_and_who_writes_and_reads(town: Wire, robot: Robot) -> None:
     lines = town.run("topic", "info", "cmd_vel").stdout.splitlines()
     assert lines[0] == "Type: geometry_msgs/msg/Twist"
@@ -47,24 +41,14 @@ def test_info_tells_the_type_and_who_writes_and_reads(town: Wire, robot: Robot) 
     assert lines[-1].startswith("Obeyed: ")
 
 
-def test_info_of_an_unknown_key_names_the_known_ones(town: Wire, robot: Robot) -> None:
-    assert_one_line(
-        town.run("topic", "info", "cmd_val"), 1, "unknown key 'cmd_val'; did you mean 'cmd_vel'?; known: clock, "
-    )
-
-
 def test_echo_prints_as_ros_does(town: Wire, robot: Robot) -> None:
-    done = town.run("topic", "echo", "odom", "--once")
+    done = town.run("topic", "echo", "/odom", "--once")
     lines = done.stdout.splitlines()
     assert lines[:3] == ["header:", "  stamp:", lines[2]]
     assert lines[2].startswith("    sec: ")
     assert "child_frame_id: footprint_link" in lines
     assert lines[-1] == "---"
     assert lines.count("---") == 1
-
-
-def test_echo_with_ros_s_slash_is_the_same_key(town: Wire, robot: Robot) -> None:
-    assert "child_frame_id: footprint_link" in town.run("topic", "echo", "/odom", "--once").stdout
 
 
 def test_echo_as_json_is_one_object_a_line(town: Wire, robot: Robot) -> None:
@@ -90,18 +74,11 @@ def test_echo_waits_and_says_so(town: Wire, robot: Robot) -> None:
     echo.wait_for_line("x: 0.1")
 
 
-def test_echo_gives_up_after_its_timeout(town: Wire, robot: Robot) -> None:
-    assert_one_line(town.run("topic", "echo", "nothing", "--timeout", "0.3"), 1, "no messages on nothing within 0.3 s")
-
-
 @pytest.mark.parametrize(
     ("payload", "encoding", "shown"),
     [
-        (b"plain words", "text/plain", "plain words"),
         (b"\xff\xfe\x00\x01", "zenoh/bytes", "4 bytes of zenoh/bytes: ff fe 00 01"),
         (b"\x81\xa1x\x01", "application/msgpack", "x: 1"),
-        (b"", "zenoh/bytes", '""'),
-        (b"3.5", "application/json", "3.5"),
         (b'{"a":[{"b":1},{"c":[1,2]}],"d":{}}', "application/json", "a:\n  - b: 1\n  - c: [1, 2]\nd: {}"),
         (b"\x1b[2Jcleared", "text/plain", '"\\u001b[2Jcleared"'),
     ],
@@ -120,7 +97,7 @@ def test_echo_shows_what_strangers_put(
     assert echo.out == f"{shown}\n---\n"
 
 
-@pytest.mark.parametrize("verb", ["echo odom", "echo odom --json", "hz odom"])
+@pytest.mark.parametrize("verb", ["echo odom", "hz odom"])
 def test_a_reader_that_has_seen_enough_ends_it_quietly(town: Wire, robot: Robot, verb: str) -> None:
     words = command("topic", *verb.split(), *town.flags)
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
@@ -145,12 +122,6 @@ def test_hz_of_a_silent_key_says_so(town: Wire, robot: Robot) -> None:
     hz.wait_for_line("no new messages on nothing")
 
 
-@pytest.mark.parametrize("verb", ["echo", "hz", "info"])
-def test_a_key_that_is_none_is_told_in_one_line(town: Wire, verb: str) -> None:
-    done = town.run("topic", verb, "a//b", within=10)
-    assert_one_line(done, 1, "a//b")
-
-
 def test_pub_drives_until_ctrl_c_and_stops_the_robot_then(town: Wire, robot: Robot) -> None:
     pub = town.start("topic", "pub", "cmd_vel", '{"linear": {"x": 0.3}}')
     robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
@@ -167,9 +138,7 @@ def test_pub_drives_until_ctrl_c_and_stops_the_robot_then(town: Wire, robot: Rob
     [
         (["linear: {x: 0.2}"], (0.2, 0, 0)),
         (["linear:\n  y: 0.2\nangular:\n  z: -0.5"], (0, 0.2, -0.5)),
-        (["{linear: {x: 0.1, y: 0.1}}"], (0.1, 0.1, 0)),
         (['{"twist": {"linear": {"x": 0.2}}}'], (0.2, 0, 0)),
-        (['{"linear": {"x": "0.2"}}'], (0.2, 0, 0)),
         (['{"linear": {"x": 0.2}}', "--wire", "msgpack"], (0.2, 0, 0)),
     ],
 )
@@ -185,9 +154,7 @@ def test_pub_reads_a_value_from_standard_input(town: Wire, robot: Robot) -> None
     robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
 
 
-@pytest.mark.parametrize(
-    ("words", "count"), [(["--once"], 1), (["-1"], 1), (["--times", "5", "--rate", "100"], 5 + STOPS)]
-)
+@pytest.mark.parametrize(("words", "count"), [(["-1"], 1), (["--times", "5", "--rate", "100"], 5 + STOPS)])
 def test_pub_says_it_as_often_as_told_and_stops_after_more_than_one(
     town: Wire, robot: Robot, words: list[str], count: int
 ) -> None:
@@ -202,15 +169,9 @@ def test_pub_says_it_as_often_as_told_and_stops_after_more_than_one(
     ("value", "reason"),
     [
         ('{"linear":{"x":NaN}}', "linear.x is not a finite number"),
-        ('{"linear":{"x":Infinity}}', "linear.x is not a finite number"),
         ('{"linear":{"x":1e999}}', "linear.x is not a finite number"),
-        ("linear: {y: .nan}", "linear.y is not a finite number"),
         ('{"linaer":{}}', "not a Twist: Object contains unknown field `linaer`"),
-        ("[]", "not a Twist: Expected `object`, got `array`"),
-        ("3", "not a Twist: Expected `object`, got `int`"),
         ("", "not a Twist: Expected `object`, got `null`"),
-        ('{"linear":{"x":"fast"}}', "not a Twist: Expected `float`, got `str` - at `$.linear.x`"),
-        ("{a: b: c}", "neither JSON nor YAML: "),
         ("!!python/object/apply:os.system ['true']", "neither JSON nor YAML: "),
         ("[" * 5000, ""),
     ],
@@ -229,43 +190,15 @@ def test_pub_refuses_ten_megabytes(town: Wire, robot: Robot) -> None:
     robot.newest()
 
 
-def test_pub_without_a_subscriber_says_so(wire: Wire) -> None:
-    assert_one_line(wire.run("topic", "pub", "cmd_vel", "{}", "--once"), 1, "no subscribers of cmd_vel")
-
-
 def test_a_wrong_word_is_told_in_one_line(town: Wire) -> None:
     for words, code, reason in [
         (["pub", "*/cmd_vel", "{}"], 1, "'*/cmd_vel': write to one key; a wildcard would move every robot"),
         (["pub", "speed", "{}"], 1, "'speed' has no known type; known keys: cmd_vel, odom, "),
         (["pub", "cmd_vel", "{}", "--rate", "0"], 2, "'0': use a number from 0.01 to 10000 Hz"),
-        (["pub", "cmd_vel", "{}", "--times", "0"], 2, "'0': use a whole number from 1 up"),
-        (["pub", "cmd_vel"], 2, "value"),
         (["echo"], 2, "key"),
-        (["echo", "odom", "--timeout", "-1"], 2, "'-1'"),
         (["shout"], 2, "'shout'"),
-        ([], 2, "VERB"),
-        (["list", "--mode", "king"], 2, "'king'"),
         (["list", "--cfg", "nonsense"], 2, "'nonsense': write PATH:VALUE"),
         (["list", "--cfg", "no/such/path:1"], 1, "no/such/path"),
         (["list", "--config", "nowhere.json5"], 1, "nowhere.json5"),
     ]:
         assert_one_line(town.run("topic", *words), code, reason)
-
-
-def test_a_client_without_a_router_gives_up_with_a_reason() -> None:
-    done = subprocess.run(
-        command("topic", "list", "--mode", "client", "--connect", "tcp/127.0.0.1:9"), capture_output=True, text=True
-    )
-    waits, fails = done.stderr.splitlines()
-    assert (done.returncode, done.stdout, waits) == (1, "", "waiting for a Zenoh router at tcp/127.0.0.1:9")
-    assert fails.startswith("holozen topic list: cannot open Zenoh: ")
-
-
-@pytest.mark.parametrize("verb", ["echo odom", "echo nothing", "hz odom", "pub cmd_vel {}"])
-def test_ctrl_c_in_a_terminal_ends_a_verb_without_a_traceback(town: Wire, robot: Robot, verb: str) -> None:
-    seen = len(robot.commands.all())
-    with town.terminal("topic", *verb.split()) as terminal:
-        wait_for(lambda: terminal.raw or len(robot.commands.all()) > seen)
-        terminal.type("\x03")
-        assert terminal.process.wait() in (0, 130)
-        assert "Traceback" not in terminal.raw

@@ -1,19 +1,18 @@
 """A person beats a script beats the autopilot, and nobody who was overruled takes the robot back by himself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 import pytest
 
 from holozen.messages import CommandStatus, Twist
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
-from holozen.wire import PRIORITY_OF
+from holozen.wire import COMMAND_SILENCE, PRIORITY_OF
 
 from .robots import Robot, moves, rests
 
-pytestmark = pytest.mark.alone
-
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
+SILENCE = 2.0  # s
 
 Hand = Callable[[float], None]
 
@@ -22,6 +21,13 @@ def hand(wire: Wire, node: str, priority: str) -> Hand:
     """A source that commands forward speeds."""
     publisher = wire.bus(node).publisher("cmd_vel", Twist, priority)
     return lambda x: publisher.put(Twist.planar(x))
+
+
+@pytest.fixture
+def patient(robot: Robot) -> Iterator[Robot]:
+    """The robot, for tests in which somebody has to stay fresh on a busy machine: it stops after SILENCE only."""
+    yield robot.wait_longer(SILENCE)
+    robot.wait_longer(COMMAND_SILENCE)
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +87,7 @@ def test_a_person_overrules_a_script_and_a_script_the_autopilot(
     assert status.held
 
 
+@pytest.mark.usefixtures("patient")
 def test_a_lower_one_that_begins_while_a_higher_one_drives_does_not_move_the_robot(
     robot: Robot, person: Hand, script: Hand, autopilot: Hand
 ) -> None:
@@ -126,6 +133,7 @@ def test_a_script_that_a_person_starts_after_driving_may_drive(robot: Robot, per
     drive(robot, script, 0.2)
 
 
+@pytest.mark.usefixtures("patient")
 def test_among_equals_the_one_that_drives_goes_on(robot: Robot, script: Hand, other_script: Hand) -> None:
     drive(robot, script, 0.2)
     begin = len(robot.odom.messages())
@@ -137,12 +145,13 @@ def test_among_equals_the_one_that_drives_goes_on(robot: Robot, script: Hand, ot
     assert robot.status().refused["overruled"] >= 10
 
 
+@pytest.mark.usefixtures("patient")
 def test_an_equal_may_stop_the_robot_and_then_the_other_is_held(robot: Robot, script: Hand, other_script: Hand) -> None:
     drive(robot, script, 0.2)
     other_script(0.0)
     robot.stands()
     refused(robot, script, "overruled")
-    robot.pass_time(0.6)
+    robot.pass_time(SILENCE + 0.2)
     refused(robot, script, "held")
     assert rests(robot.newest())
 
@@ -153,6 +162,7 @@ def test_an_equal_takes_over_once_the_other_is_silent(robot: Robot, script: Hand
     drive(robot, other_script, 0.3)
 
 
+@pytest.mark.usefixtures("patient")
 def test_resume_is_refused_while_a_person_drives(robot: Robot, person: Hand) -> None:
     drive(robot, person, 0.3)
     with pytest.raises(ServiceError, match=r"person@.* drives; stop first"):
@@ -167,6 +177,7 @@ def test_resume_is_granted_as_soon_as_the_person_has_stopped(robot: Robot, perso
     drive(robot, autopilot, 0.1)
 
 
+@pytest.mark.usefixtures("patient")
 def test_a_stop_of_a_person_stops_a_driving_autopilot(robot: Robot, person: Hand, autopilot: Hand) -> None:
     drive(robot, autopilot, 0.2)
     person(0.0)
