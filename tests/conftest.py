@@ -25,6 +25,7 @@ import pytest
 from holozen.process import Ending
 
 PACKAGES = {
+    "debootstrap": "debootstrap",
     "docker": "docker.io",
     "docker-compose": "docker-compose",
     "Xvfb": "xvfb",

@@ -119,12 +119,12 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_sim_that_cannot_start_says_why_in_one_line(town: Wire, tmp_path: Path, name: str) -> None:
+def test_a_sim_that_cannot_start_says_why_in_one_line(wire: Wire, tmp_path: Path, name: str) -> None:
     words, code, reason = WRONG[name]
     (tmp_path / "broken.urdf").write_text(BROKEN_XML)
     (tmp_path / "still.urdf").write_text(NO_DRIVE)
     names = {"tmp": tmp_path, "bot": BOT, "picture": data.find("meshes", "logo.png")}
-    done = town.run("sim", *(word.format(**names) for word in words))
+    done = wire.run("sim", *(word.format(**names) for word in words))
     assert done.returncode == code
     assert done.stdout == ""
     said = done.stderr.splitlines()

@@ -166,7 +166,7 @@ def test_get_pose_tells_the_last_odom_until_it_is_stale(wire: Wire) -> None:
     reply = pose()
     assert place(reply.odom) == pytest.approx(place(before), abs=1e-3)
     assert time_of(reply.odom) >= time_of(before) - 0.1
-    assert 0 <= reply.age < 0.2
+    wait_for(lambda: 0 <= pose().age < 0.2, what="the age of an odom that just came")
     with pytest.raises(ServiceError, match=r"^no Fred/odom was received; robots with odom: '' \(at the root\)$"):
         pose("Fred")
     sim.kill()

@@ -12,7 +12,7 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
 from .processes import assert_one_line
-from .robots import Robot, moves
+from .robots import Robot, moves, planar
 
 TOPICS = {
     "clock": "rosgraph_msgs/msg/Clock",
@@ -150,19 +150,21 @@ def test_pub_takes_json_and_yaml_twist_and_twist_stamped(
 
 
 def test_pub_reads_a_value_from_standard_input(town: Wire, robot: Robot) -> None:
+    seen = len(robot.odom.messages())
     assert town.run("topic", "pub", "cmd_vel", "-", "--once", given='{"linear": {"x": 0.3}}').returncode == 0
-    robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
+    wait_for(lambda: any(moves(odom, 0.3, 0, 0) for odom in robot.odom.messages()[seen:]), what="the robot to move")
 
 
 @pytest.mark.parametrize(("words", "count"), [(["-1"], 1), (["--times", "5", "--rate", "100"], 5 + STOPS)])
 def test_pub_says_it_as_often_as_told_and_stops_after_more_than_one(
     town: Wire, robot: Robot, words: list[str], count: int
 ) -> None:
-    before = robot.status().accepted
+    seen = len(robot.commands.messages())
     assert town.run("topic", "pub", "cmd_vel", '{"linear": {"x": 0.3}}', *words).returncode == 0
-    robot.status_when(lambda status: status.accepted >= before + count)
+    wait_for(lambda: len(robot.commands.messages()) >= seen + count, what="that many commands")
     robot.stands()
-    assert robot.status().accepted == before + count
+    said = [planar(command)[0] for command in robot.commands.messages()[seen:]]
+    assert said == ([0.3] if count == 1 else [0.3] * 5 + [0.0] * STOPS)
 
 
 @pytest.mark.parametrize(
