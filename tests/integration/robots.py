@@ -41,7 +41,7 @@ class Record:
         self.all()
         return self._messages
 
-    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = 10.0) -> Any:
+    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = 20.0) -> Any:
         """The first message from now on that is as wanted; waits for it."""
         seen = len(self.messages())
         return wait_for(lambda: next((m for m in self.messages()[seen:] if wanted(m)), None), within, "such a message")
@@ -60,7 +60,7 @@ class Robot:
         self.commands = record(bus, key_for("cmd_vel", name), Twist, TwistStamped)
         self._status = record(bus, key_for("cmd_vel_status", name), CommandStatus)
         self._publisher = bus.publisher(key_for("cmd_vel", name), Twist, priority)
-        self.newest()
+        self.odom.next(within=60)  # its sim, and what starts that, may only just have begun
 
     def wait_longer(self, seconds: float = 2.0) -> "Robot":
         """Let it stop only after so much silence: a test that measures a drive may be held up. Itself."""
