@@ -157,6 +157,18 @@ def test_a_link_that_becomes_slow_stops_the_robot_and_a_late_stop_is_obeyed(far:
     wait_for(lambda: not far.history().odom[-1].moves, 5.0, "a robot that stands")
 
 
+def test_a_stricter_limit_refuses_what_a_slow_link_brings(far: Far, wire: Wire) -> None:
+    far.proxy.set(delay=0.2)
+    far.wait_for_odom(time.monotonic() + 1.5)
+    assert wire.run("param", "set", "sim", "max_command_age", "0.1").returncode == 0
+    begin = time.monotonic() + 1.0
+    far.wait_for_odom(begin + 1.0)
+    assert not far.history().moves(begin)
+    assert wire.run("param", "set", "sim", "max_command_age", "0.5").returncode == 0
+    since = time.monotonic()
+    wait_for(lambda: far.history().moves(since), 20.0, "a robot that moves")
+
+
 def test_a_link_that_jitters_moves_the_robot_only_by_what_is_fresh(far: Far) -> None:
     far.proxy.set(delay=0.1, jitter=0.4)
     far.wait_for_odom(time.monotonic() + 5)

@@ -188,6 +188,11 @@ def test_who_listens_how_old_odom_is_and_how_far_the_sim_is_away() -> None:
     assert rows(GOOD, (40, 12))[9:11] == [" odom age  12 ms", " round trip 0.61 ms   real time 1.00x"]
 
 
+def test_a_link_of_more_than_a_quarter_of_a_second_is_an_alarm_with_its_delay() -> None:
+    assert loud(replace(GOOD, link_delay=0.25), (80, 24)) == []
+    assert loud(replace(GOOD, link_delay=0.31), (80, 24)) == ["SLOW LINK: the robot answers 310 ms later"]
+
+
 def test_each_publisher_is_named_with_its_priority_its_rate_and_what_becomes_of_it() -> None:
     shown = rows(GOOD)
     ours = next(index for index, line in enumerate(shown) if line.startswith(" sources "))
