@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import pytest
 
+from holozen import cli
 from holozen.bus import Bus
 from holozen.cli import stop as stop_module
 from holozen.messages import TriggerReply, TriggerRequest
@@ -209,8 +210,9 @@ def test_without_a_robot_it_says_so(robots: Robots, run: Run) -> None:
     assert err.startswith("holozen release: no robot was found (where an access control list is in force, ")
 
 
-def test_without_a_router_it_says_so(run: Run) -> None:
-    code, out, err = run("stop", "--mode", "client", "--connect", "tcp/127.0.0.1:1", "--timeout", "0.1")
+def test_without_a_router_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+    code = cli.main(["stop", "--mode", "client", "--connect", "tcp/127.0.0.1:1", "--timeout", "0.1"])
+    out, err = capsys.readouterr()
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert err.startswith("holozen stop: no robot was reached: cannot open Zenoh: ")
 
