@@ -1,7 +1,9 @@
 """A publisher writes messages, and gives the last one to whoever asks."""
 
 import math
+import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import zenoh
@@ -104,21 +106,27 @@ from holozen.transport.connection import Connection
 with Bus("holder", Connection(connect=(sys.argv[1],), listen=(sys.argv[1],))) as bus:
     odom, commands = bus.publisher("odom", Odometry), bus.subscribe_raw("cmd_vel", 10)
     print("ready", flush=True)
-    ctypes.PyDLL(None).sleep(5)  # no other thread of Python runs meanwhile
+    ctypes.PyDLL(None).read(0, ctypes.create_string_buffer(1), 1)  # no other thread of Python runs meanwhile
     print("awake", flush=True)
     signal.pause()
 """
 
 
 def test_many_gets_of_the_last_value_do_not_hold_up_the_link(wire: Wire) -> None:
-    with Process([sys.executable, "-c", HOLDER, wire.endpoint]) as holder:
+    reading, writing = os.pipe()
+    with (
+        os.fdopen(reading, "rb") as end,
+        ThreadPoolExecutor() as pool,
+        os.fdopen(writing, "wb"),  # closed before the pool, which a link that is held up would keep for ever
+        Process([sys.executable, "-c", HOLDER, wire.endpoint], stdin=end) as holder,
+    ):
         holder.wait_for_line("ready")
         asking = Bus("asking", Connection(mode="client", connect=(wire.endpoint,)))
         with asking:
             wait_for(asking.served("odom"))
             commands = asking.session.declare_publisher("cmd_vel", congestion_control=zenoh.CongestionControl.BLOCK)
             kept = [asking.ask("odom", 20.0) for _ in range(1000)]
-            for _ in range(200):
-                commands.put(bytes(200_000))  # more than buffers on the way take
+            # More than buffers on the way take.
+            pool.submit(lambda: [commands.put(bytes(200_000)) for _ in range(200)]).result(60)
             assert "awake" not in holder.out
             assert len(kept) == 1000
