@@ -3,7 +3,7 @@
 import math
 import os
 import sys
-from concurrent.futures import ThreadPoolExecutor
+import threading
 
 import pytest
 import zenoh
@@ -112,21 +112,25 @@ with Bus("holder", Connection(connect=(sys.argv[1],), listen=(sys.argv[1],))) as
 """
 
 
+PATIENCE = "transport/link/tx/queue/congestion_control/block/wait_before_close"  # us; then Zenoh opens another link
+
+
 def test_many_gets_of_the_last_value_do_not_hold_up_the_link(wire: Wire) -> None:
     reading, writing = os.pipe()
     with (
         os.fdopen(reading, "rb") as end,
-        ThreadPoolExecutor() as pool,
-        os.fdopen(writing, "wb"),  # closed before the pool, which a link that is held up would keep for ever
+        os.fdopen(writing, "wb"),
         Process([sys.executable, "-c", HOLDER, wire.endpoint], stdin=end) as holder,
     ):
         holder.wait_for_line("ready")
-        asking = Bus("asking", Connection(mode="client", connect=(wire.endpoint,)))
+        asking = Bus("asking", Connection(mode="client", connect=(wire.endpoint,), cfg=((PATIENCE, "200000000"),)))
         with asking:
             wait_for(asking.served("odom"))
             commands = asking.session.declare_publisher("cmd_vel", congestion_control=zenoh.CongestionControl.BLOCK)
             kept = [asking.ask("odom", 20.0) for _ in range(1000)]
             # More than buffers on the way take.
-            pool.submit(lambda: [commands.put(bytes(200_000)) for _ in range(200)]).result(60)
+            sending = threading.Thread(target=lambda: [commands.put(bytes(200_000)) for _ in range(200)], daemon=True)
+            sending.start()
+            wait_for(lambda: not sending.is_alive(), within=20)
             assert "awake" not in holder.out
             assert len(kept) == 1000
