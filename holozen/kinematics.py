@@ -29,6 +29,14 @@ def to_world(velocity: Planar, yaw: float, dt: float) -> tuple[float, float]:
     return x * cosine - y * sine, x * sine + y * cosine
 
 
+def travelled(velocity: Planar, yaw: float, seconds: float) -> tuple[float, float]:
+    """The way in metres in the world of a body that began at `yaw`, at a constant body-frame velocity: an arc."""
+    half = velocity[2] * seconds / 2
+    chord = seconds * math.sin(half) / half if abs(half) > 1e-9 else seconds
+    vx, vy = to_world(velocity, yaw, seconds)
+    return vx * chord, vy * chord
+
+
 def to_body(vx: float, vy: float, yaw: float) -> tuple[float, float]:
     """A world-frame velocity (m/s) in the frame of a body at `yaw`."""
     cosine, sine = math.cos(yaw), math.sin(yaw)

@@ -24,7 +24,7 @@ from holozen.transport.connection import Connection, from_environment
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Graph, NodeInfo
 from holozen.transport.peer_clocks import PeerClocks, clock_key
-from holozen.transport.pubsub import Declared, Latest, Publisher, RawSubscriber, Subscription, source, stamps
+from holozen.transport.pubsub import Declared, Gets, Latest, Publisher, RawSubscriber, Subscription, source, stamps
 from holozen.transport.rendezvous import PATIENCE
 from holozen.transport.services import RING, ROOM, Replies, Server
 from holozen.transport.session import CLOSE_LIMIT, linked, one_line, open_session, wait_for_threads
@@ -67,6 +67,7 @@ class Bus:
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
         self._declared: set[Declared] = set()
         self._defined: set[str] = set()  # types whose definition this node answers with
+        self._gets: dict[str, Gets] = {}  # by key expression
         self._closing = threading.Event()
         self._stamp: Callable[[], bytes] | None = None  # made with the first publisher
         self.clock_asked = threading.Event()  # set once another node has asked for this session's clock
@@ -180,15 +181,24 @@ class Bus:
                 congestion_control=zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP,
             )  # fmt: skip
         number = partial(zenoh.SourceInfo, publisher.id)
-        writer: Publisher[M] = Publisher(publisher, self.wire, self.stamp, number)
-        # A callback's queue would, when full, block Zenoh's thread and with it this link.
-        queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(GETS))
-        writer.thread = threading.Thread(target=writer.answer, args=(queryable.handler,), daemon=True)
-        writer.thread.start()
+        watch = partial(publisher.declare_matching_listener, zenoh.handlers.RingChannel(1))
+        writer: Publisher[M] = Publisher(publisher, self.wire, self.stamp, number, watch)
+        self._answer_gets(writer, key)
         self._define(kind)
         # Last, so that nodes that discover it can query it at once.
-        writer.ends += [queryable, self.announce("pub", kind.ROS, key)]
+        writer.ends.append(self.announce("pub", kind.ROS, key))
         return self._keep(writer)
+
+    def _answer_gets(self, writer: Publisher[Any], key: str) -> None:
+        """Robots share a thread: that of `Fred/odom` answers on `*/odom`."""
+        first, _, rest = key.partition("/")
+        expression = f"*/{rest}" if rest and not first.startswith("@") else key
+        writer.gets = self._gets.get(expression)
+        if not writer.gets or not writer.gets.add(writer):
+            # A callback's queue would, when full, block Zenoh's thread and with it this link.
+            queryable = self.session.declare_queryable(expression, zenoh.handlers.RingChannel(GETS))
+            writer.gets = self._gets[expression] = self._keep(Gets(queryable))
+            writer.gets.add(writer)
 
     def _define(self, kind: type[Message]) -> None:
         """Answer with the definition of a type that other processes may not have: one from the files of a package."""

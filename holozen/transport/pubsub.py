@@ -20,6 +20,7 @@ M = TypeVar("M", bound="Message")
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
 TRIM_AFTER = 1.0  # s
+GET_PATIENCE = 1.0  # s that a get waits for the next message of a publisher that sends only what is wanted
 SLOWEST = 5.0  # s; after this long any stream is stale
 PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
 """Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
@@ -158,12 +159,13 @@ class RawSubscriber(Declared):
     def __init__(self, subscriber: Any, limit: int = 0) -> None:
         super().__init__(subscriber)
         # Reading from the handler leaves the subscriber free to be undeclared at the same time.
-        self._samples, self._limit = subscriber.handler, limit
+        self._samples, self.limit = subscriber.handler, limit
+        self.listen = subscriber.handler.try_recv  # Zenoh's next sample or None, for `Subscription.waiting`
 
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""
         sample = self._samples.try_recv()
-        return sample and Sample(sample, self._limit)
+        return sample and Sample(sample, self.limit)
 
     def recv(self) -> Sample:
         """The next sample; waits for it. Raises BusError once the bus or this subscriber is closed."""
@@ -172,29 +174,56 @@ class RawSubscriber(Declared):
             sample = self._samples.recv()
         except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
             raise BusError("closed") from None
-        return Sample(sample, self._limit)
+        return Sample(sample, self.limit)
 
 
 class Publisher(Declared, Generic[M]):
-    """Writes messages, and answers a `get` on its key with the last one. Made by `Bus.publisher`.
+    """Writes messages; a `get` on its key is answered with the last one, see Gets. Made by `Bus.publisher`.
 
     Each carries the attachment that `stamp` makes, with the sender and the time of sending, and a sequence number, by
-    which readers count lost samples. `number` converts it to Zenoh's SourceInfo.
+    which readers count lost samples. `number` converts it to Zenoh's SourceInfo. `watch` declares a listener of whether
+    anyone subscribes.
     """
 
-    def __init__(self, publisher: Any, wire: str, stamp: Callable[[], bytes], number: Callable[[int], Any]) -> None:
+    def __init__(
+        self,
+        publisher: Any,
+        wire: str,
+        stamp: Callable[[], bytes],
+        number: Callable[[int], Any],
+        watch: Callable[[], Any],
+    ) -> None:
         from holozen.messages import codec
 
         super().__init__(publisher)
-        self._publisher, self._key, self._wire, self._stamp = publisher, publisher.key_expr, wire, stamp
+        self.key: Any = publisher.key_expr
+        self.gets: Gets | None = None  # set by the bus
+        self._publisher, self._wire, self._stamp = publisher, wire, stamp
         self._written, self._named, self._encoding = codec.written, codec.encoding, publisher.encoding
         self._last: tuple[bytes, Any] | None = None  # with its Encoding
         self.numbers = map(number, count())
+        self._statuses: Any = None
+        self._watch, self._is_matched = watch, False
+        self._next: threading.Event | None = None  # set by the next message; there once `wanted` was read
 
     @property
     def matched(self) -> bool:
         """Whether anyone subscribes to this key."""
         return bool(self._publisher.matching_status.matching)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anyone subscribes, or a get waits. Who reads it may leave out messages that nobody wants: from then
+        on a get is answered with the next message.
+        """
+        if self._next is None:
+            self._next = threading.Event()
+            listener = self._watch()
+            self.ends.append(listener)
+            self._statuses = listener.handler
+        if (status := self._statuses.try_recv()) is not None:
+            self._is_matched = status.matching
+        return self._is_matched or not self._next.is_set()
 
     def put(self, message: M) -> None:
         """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
@@ -207,18 +236,67 @@ class Publisher(Declared, Generic[M]):
         """Send an encoded payload, by default in the encoding of this publisher."""
         self._last = payload, encoding or self._encoding
         self._publisher.put(payload, encoding=encoding, attachment=self._stamp(), source_info=next(self.numbers))
+        if self._next is not None:
+            self._next.set()
 
-    def answer(self, gets: Any) -> None:
-        """Reply to each get with the last message, until this publisher is closed. Needs a thread of its own."""
+    def want(self) -> None:
+        """Let the next message be sent whoever subscribes: a get waits for it."""
+        if self._next is not None:
+            self._next.clear()
+
+    def reply(self, query: Any, deadline: float) -> None:
+        """Answer a get with the last message; after `want`, wait for the next until `deadline` (s, monotonic)."""
+        if self._next is not None:
+            self._next.wait(max(0.0, deadline - time.monotonic()))
+        if self._last is not None:
+            payload, encoding = self._last
+            query.reply(self.key, payload, encoding=encoding)
+
+    def close(self) -> None:
+        """Stop publishing and answering; all declarations are removed."""
+        super().close()
+        if self.gets:
+            self.gets.remove(self)
+
+
+class Gets(Declared):
+    """Answers each get on a key expression with the last messages of some publishers there, from one thread."""
+
+    def __init__(self, queryable: Any) -> None:
+        super().__init__(queryable)
+        self._queries, self._publishers = queryable.handler, set[Publisher[Any]]()
+        self._lock = threading.Lock()
+        self.thread = threading.Thread(target=self._answer, daemon=True)
+        self.thread.start()
+
+    def add(self, publisher: Publisher[Any]) -> bool:
+        """Answer for this publisher too; returns whether it can: it ended with the last one that was removed."""
+        with self._lock:
+            if self.ends:
+                self._publishers.add(publisher)
+            return bool(self.ends)
+
+    def remove(self, publisher: Publisher[Any]) -> None:
+        """Answer for a publisher no longer."""
+        with self._lock:
+            self._publishers.discard(publisher)
+            if not self._publishers:
+                self.close()
+
+    def _answer(self) -> None:
         while True:
             try:
-                query = gets.recv()
+                query = self._queries.recv()
             except Exception:  # as in RawSubscriber.recv
                 return
             with query:
-                if self._last is not None:
-                    payload, encoding = self._last
-                    query.reply(self._key, payload, encoding=encoding)
+                with self._lock:
+                    asked = [one for one in self._publishers if query.key_expr.intersects(one.key)]
+                for publisher in asked:
+                    publisher.want()
+                deadline = time.monotonic() + GET_PATIENCE
+                for publisher in asked:
+                    publisher.reply(query, deadline)
 
 
 class Received(NamedTuple, Generic[M]):
@@ -242,6 +320,11 @@ class Subscription(Generic[M]):
         """The next waiting message, or None."""
         sample = self.raw.try_recv()
         return None if sample is None else self._received(sample)
+
+    def waiting(self, first: Any) -> list[Received[M]]:
+        """The messages that wait, after the sample `first` that `raw.listen` returned; None: nothing waited."""
+        samples = [] if first is None else [Sample(first, self.raw.limit), *iter(self.raw.try_recv, None)]
+        return [self._received(sample) for sample in samples]
 
     def recv(self) -> Received[M]:
         """The next message; waits for it. Raises BusError once the bus is closed."""

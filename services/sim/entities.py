@@ -27,6 +27,7 @@ MAX_SHAPES = 500  # of one entity: each that touches the ground costs the engine
 MAX_REASON = 300  # characters
 GRAPH_SCAN = 0.02  # s between two scans of all tokens for the senders of commands
 MAX_DISTANCE = 1e4  # m from the origin; far beyond, the engine's numbers are too coarse for contacts
+SPREAD = 0.618  # of a period between the telemetry of a robot and that of the next; the golden ratio spreads any number
 Place = tuple[Vector, Rotation]
 
 
@@ -89,7 +90,8 @@ class Entities:
             self._check(name, prefix, model)
             entity = Entity(name, model, mover.body, prefix=prefix)
             if model.drive or mover.names:
-                entity.robot = Robot(self._bus, name, prefix, model, mover, self.limits, self._clocks)
+                phase = len(self.robots) * SPREAD % 1.0
+                entity.robot = Robot(self._bus, name, prefix, model, mover, self.limits, self._clocks, phase)
                 entity.robot.require_age(self.max_age)
         except Exception:
             mover.body.remove()

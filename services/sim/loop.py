@@ -73,10 +73,13 @@ class Loop:
         world, dt = self._world, self._world.spec.step
         try:
             for robot in self._robots:
-                robot.move(now, dt)
+                if robot.has_to_move(now):
+                    robot.move(now, dt)
             world.step()
+            sim_time = world.time
             for robot in self._robots:
-                robot.publish(world.time, dt)
+                if sim_time >= robot.publishes_at:
+                    robot.publish(sim_time, dt)
         except (ArithmeticError, ValueError) as error:  # such as a position that became NaN
             self._entities.fail(robot, error)
         if self._clock and self._clock_due.due(world.time):

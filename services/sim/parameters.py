@@ -43,7 +43,7 @@ def declared(entities: Entities, pace: Pace) -> Iterator[Number]:
 
 def _of_robot(robot: Robot) -> Iterator[Number]:
     place = f"{robot.prefix}." if robot.prefix else ""
-    arbiter, due = robot.arbiter, robot.odom_due
+    arbiter = robot.arbiter
     yield Number(
         f"{place}command_timeout", "the robot stops after this long without a command; below zero: never", "s",
         *TIMEOUTS,
@@ -51,5 +51,5 @@ def _of_robot(robot: Robot) -> Iterator[Number]:
     )  # fmt: skip
     yield Number(
         f"{place}odometry_rate", "rate of odometry, in simulated time", "Hz", *RATES,
-        lambda: due.rate, due.set_rate,
+        lambda: robot.odometry_rate, robot.set_odometry_rate,
     )  # fmt: skip

@@ -1,5 +1,7 @@
 """A robot in the world: reads commands from its keys, moves at each step, publishes its state."""
 
+import math
+
 from holozen.bus import Bus
 from holozen.messages import TFMessage, Time
 from holozen.robot.model import Balancing, Differential, RobotModel
@@ -23,12 +25,13 @@ Memory = tuple[Arbiter, Arbiter]
 class Robot:
     """A robot with a drive, with joints, or with both.
 
-    `name` is its name in the world, `prefix` that on the wire, which is empty at the root.
+    `name` is its name in the world, `prefix` that on the wire, which is empty at the root. `phase`, from 0 to 1, sets
+    its telemetry apart from that of others in time.
     """
 
     def __init__(
         self, bus: Bus, name: str, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float],
-        senders: Senders,
+        senders: Senders, phase: float = 0.0,
     ) -> None:  # fmt: skip
         self.mover, self._bus = mover, bus
         drive = model.drive
@@ -50,8 +53,9 @@ class Robot:
         self._services = RobotServices(bus, command, self.memory, self._publish_status)
         self._polled = self._now = 0.0  # when joint commands and requests were last read, and when commands were
         self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
-        self.odom_due = Schedule(drive.odometry_rate if drive else 0.0)
-        self._joints_due = Schedule(JOINT_RATE)
+        self._odom_due = Schedule(drive.odometry_rate if drive else 0.0, phase)
+        self._joints_due = Schedule(JOINT_RATE, phase)
+        self.publishes_at = -math.inf  # s of sim time from when on `publish` has something to do
 
     @property
     def memory(self) -> Memory:
@@ -67,14 +71,14 @@ class Robot:
         """Process the commands that wait at `now` and came after `since`. `clocks`: the times that stamps may be
         measured by. All in seconds.
         """
-        self._now = now
-        if self._drive:
-            self._drive.read_commands(now, clocks, since)
+        self._now, drive = now, self._drive
+        if drive and ((first := drive.listen()) is not None or drive.is_waiting):
+            drive.read_commands(first, now, clocks, since)
         if now - self._polled >= POLL:
             self._joints.read_commands(now, min(since, self._polled or since))
             self._services.answer(now)
-            if self._drive:
-                self._drive.publish_status(now)
+            if drive and now >= drive.status_at:
+                drive.publish_status(now)
             self._polled = now
 
     @property
@@ -110,6 +114,10 @@ class Robot:
             for arbiter in self.memory:
                 arbiter.forget(source)
 
+    def has_to_move(self, now: float) -> bool:
+        """Whether the next step needs `move`; else the robot goes on as it was told last."""
+        return not self.mover.body.glides or now > self.arbiter.due or not (self._drive and self._drive.is_steady)
+
     def move(self, now: float, dt: float) -> None:
         """Apply the commands to the next step of `dt` seconds."""
         if self._drive:
@@ -126,16 +134,29 @@ class Robot:
         if self._jointed:
             self._jointed.mimic()
 
+    @property
+    def odometry_rate(self) -> float:
+        """The rate of odometry in Hz of sim time."""
+        return self._odom_due.rate
+
+    def set_odometry_rate(self, rate: float) -> None:
+        """Set the rate of odometry in Hz of sim time."""
+        self._odom_due.set_rate(rate)
+        self.publishes_at = -math.inf
+
     def publish(self, time: float, dt: float) -> None:
-        """Publish what is due at the sim time `time`, after a step of `dt` seconds."""
-        odom_due, joints_due = self.odom_due.due(time), self._joints_due.due(time)
-        if not (odom_due or joints_due):
-            return
+        """Publish what is due at the sim time `time`, after a step of `dt` seconds, and wanted."""
+        drive = self._drive if self._odom_due.due(time) else None
+        joints = self._joints if self._joints_due.due(time) else None
+        self.publishes_at = min(self._odom_due.next, self._joints_due.next)
+        wanted = (drive and drive.wanted) or (joints and joints.wanted)
+        if self.mover.body.glides and not wanted:
+            return  # else encoders, and the wheels for the eye, count on whoever looks
         stamp, moved = Time.of(time), self.mover.moved(time, dt)
-        if odom_due and self._drive:
-            self._drive.publish(stamp, moved)
-        if joints_due:
-            self._joints.publish(stamp, self.mover.states())
+        if drive:
+            drive.publish(stamp, moved)
+        if joints and joints.wanted:
+            joints.publish(stamp, self.mover.states())
 
     def close(self) -> None:
         """Close its keys."""

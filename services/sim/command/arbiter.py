@@ -1,5 +1,6 @@
 """Who drives: the highest Zenoh priority among the fresh commands. No clock, no socket."""
 
+import math
 from dataclasses import dataclass, replace
 
 from holozen.limits import STOP
@@ -68,6 +69,7 @@ class Arbiter:
     def __init__(self, timeout: float) -> None:
         self.timeout, self.software_stop = timeout, SoftwareStop(timeout)
         self.resumed = 0  # how often `resume` succeeded
+        self.due = -math.inf  # s; `motion` stays as it was last asked for until then, or until an event sets this back
         self._driver: Driver | None = None
         self._held: dict[int, Held] = {}  # by rank
         self._highest = AUTOPILOT + 1  # the best rank that drove since the last resume
@@ -98,23 +100,20 @@ class Arbiter:
             return HELD
         if other and (stops or rank < other.rank):
             self._hold(other.source, other.rank, new)
-        self._driver = new
+        self._drive(new)
         self._highest = min(self._highest, rank)
         return ""
 
     def set_timeout(self, timeout: float, now: float) -> None:
         """Set `timeout` from `now` on. A longer one does not revive a source that has fallen silent."""
-        self._driver = self.driver(now)
+        self._drive(self.driver(now))
         self.timeout = timeout
         self.software_stop.set_timeout(timeout)
 
     def driver(self, now: float) -> Driver | None:
         """The source that drives at `now`; None when all are silent."""
         driver = self._driver
-        if driver is None:
-            return None
-        timeout = COMMAND_SILENCE if isinstance(driver.motion, JointMotion) else self.timeout
-        return None if 0 <= timeout < now - driver.sent else driver
+        return None if driver is None or 0 <= self._patience(driver) < now - driver.sent else driver
 
     def moves(self, source: str, now: float) -> bool:
         """Whether a source moves the robot at `now`."""
@@ -123,15 +122,28 @@ class Arbiter:
 
     def motion(self, now: float) -> Motion:
         """The commanded motion at `now`."""
+        self.due = math.inf
         driver = self.driver(now)
-        return driver.motion if driver else STOP
+        if driver is None:
+            return STOP
+        if (patience := self._patience(driver)) >= 0:
+            self.due = driver.sent + patience
+        return driver.motion
+
+    def _patience(self, driver: Driver) -> float:
+        """The silence in s after which a driver no longer drives; below zero: never."""
+        return COMMAND_SILENCE if isinstance(driver.motion, JointMotion) else self.timeout
+
+    def _drive(self, driver: Driver | None) -> None:
+        self._driver, self.due = driver, -math.inf
 
     def stop(self, by: str, now: float) -> None:
         """Set the software stop: no source drives until it is released, and no autopilot before `resume`."""
         driver = self.driver(now)
         moving = (driver.source, driver.rank) if driver and not is_stop(driver.motion) else None
         self.software_stop.set(by, moving, now)
-        self._driver, self._highest = None, PERSON
+        self._drive(None)
+        self._highest = PERSON
 
     def forget(self, source: str) -> None:
         """Stop the robot if this source drove: its process is gone.
@@ -139,7 +151,7 @@ class Arbiter:
         It counts as a stop sent with its last command, so that no other source takes over any sooner.
         """
         if self._driver and self._driver.source == source:
-            self._driver = replace(self._driver, motion=STOP)
+            self._drive(replace(self._driver, motion=STOP))
 
     def holds(self, source: str, rank: int, now: float) -> bool:
         """Whether a source has to wait for `resume`, or has to let go, before it may drive."""
@@ -160,7 +172,7 @@ class Arbiter:
         driver = self.driver(now)
         if driver and driver.rank < AUTOPILOT and not is_stop(driver.motion):
             return f"{driver.source} drives; stop first"
-        self._driver = driver if driver and driver.rank >= AUTOPILOT else None
+        self._drive(driver if driver and driver.rank >= AUTOPILOT else None)
         self._held.clear()
         self._highest = AUTOPILOT + 1
         self.resumed += 1

@@ -1,6 +1,8 @@
 """The keys of a robot's drive: commands in, odometry and status out."""
 
+import math
 from collections.abc import Mapping
+from typing import Any
 
 from holozen.bus import Bus
 from holozen.limits import STOP, Planar
@@ -55,16 +57,23 @@ class JointTopics:
 
     def read_commands(self, now: float, since: float) -> None:
         """Process the commands that wait at `now` and came after `since`, in seconds."""
-        arrived = list(iter(self._commands.try_recv, None))
+        arrived = self._commands.waiting(self._commands.raw.listen())
         if arrived or self._input.freshness.is_waiting:
             self._input.take(arrived, now, since)
 
+    @property
+    def wanted(self) -> bool:
+        """Whether anyone wants what `publish` sends."""
+        return self._states.wanted or self._tf.wanted
+
     def publish(self, stamp: Time, states: tuple[list[float], list[float]]) -> None:
-        """Publish the joints' positions and rates, and the transforms of the links."""
+        """Publish the joints' positions and rates, and the transforms of the links, to who wants them."""
         positions, rates = states
-        self._states.put(JointState(Header(stamp), self.names, positions, rates))
-        transforms = self._frames.transforms(stamp, dict(zip(self.names, positions, strict=True)))
-        self._tf.put(TFMessage(transforms))
+        if self._states.wanted:
+            self._states.put(JointState(Header(stamp), self.names, positions, rates))
+        if self._tf.wanted:
+            transforms = self._frames.transforms(stamp, dict(zip(self.names, positions, strict=True)))
+            self._tf.put(TFMessage(transforms))
 
     def close(self) -> None:
         """Close the keys."""
@@ -76,9 +85,12 @@ UNKNOWN = 1e12  # m^2, rad^2; Gazebo's variance of what planar_move does not con
 
 
 class Schedule:
-    """When something with a rate in Hz is due, on a monotonic clock in seconds."""
+    """When something with a rate in Hz is due, on a monotonic clock in seconds. `phase`, from 0 to 1, sets several of
+    one rate apart.
+    """
 
-    def __init__(self, rate: float) -> None:
+    def __init__(self, rate: float, phase: float = 0.0) -> None:
+        self._phase = phase
         self.set_rate(rate)
 
     def set_rate(self, rate: float) -> None:
@@ -87,10 +99,15 @@ class Schedule:
 
     def due(self, time: float) -> bool:
         """Whether a new period has begun since the last call."""
-        count = int(time * self.rate + 1e-6)
+        count = int(time * self.rate + self._phase + 1e-6)
         began = count > self._count
         self._count = count
         return began
+
+    @property
+    def next(self) -> float:
+        """From when on it is due, at the earliest."""
+        return (self._count + 1 - self._phase - 1e-6) / self.rate if self.rate else math.inf
 
 
 def covariance(drive: Drive) -> list[float]:
@@ -153,26 +170,42 @@ class DriveTopics:
         self._commands: list[Subscription[Twist | TwistStamped]] = [
             bus.subscribe(key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES) for key in twist_input.keys
         ]
+        self.listen = self._commands[0].raw.listen  # a cheap look whether any command waits
+        self.is_waiting = len(self._commands) > 1  # whether to read, though nothing came on the first key
         self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, prefix), Odometry)
         self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
         self._status_due = Schedule(STATUS_RATE)
+        self.status_at = -math.inf  # s from when on a status is due
 
-    def read_commands(self, now: float, clocks: tuple[float, ...], since: float) -> None:
-        """Process the commands that wait at `now` and came after `since`. `clocks`: the times that stamps may be
-        measured by. All in seconds.
+    def read_commands(self, first: Any, now: float, clocks: tuple[float, ...], since: float) -> None:
+        """Process the commands that wait at `now` and came after `since`, after the sample `first` that `listen`
+        returned. `clocks`: the times that stamps may be measured by. All in seconds.
         """
-        arrived = [received for commands in self._commands for received in iter(commands.try_recv, None)]
-        if arrived or self._input.freshness.is_waiting:
-            self._input.take(arrived, now, clocks, since)
+        arrived = [received for commands in self._commands for received in commands.waiting(commands.raw.listen())]
+        if first is not None:
+            arrived = self._commands[0].waiting(first) + arrived
+        self._input.take(arrived, now, clocks, since)
+        self.is_waiting = self._input.freshness.is_waiting or len(self._commands) > 1
 
     def publish_status(self, now: float, at_once: bool = False) -> None:
-        """Publish the command status, when it is due or `at_once`."""
-        if self._status_due.due(now) or at_once:
+        """Publish the command status, when it is due and wanted, or `at_once`."""
+        if at_once or (self._status_due.due(now) and self._status.wanted):
             status, drive = self._input.status(now), self._drive
             status.name, status.strafes = self._name, self._strafes
             status.max_linear = min(self._input.linear, drive.max_linear)
             status.max_angular = min(self._input.angular, drive.max_angular)
             self._status.put(status)
+        self.status_at = self._status_due.next
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anyone wants what `publish` sends."""
+        return (self._drive.publish_odom and self._odom.wanted) or (self._drive.publish_odom_tf and self._tf.wanted)
+
+    @property
+    def is_steady(self) -> bool:
+        """Whether `motion` remains the same while the command does."""
+        return self._limited.is_reached
 
     def motion(self, now: float, dt: float) -> Planar | JointMotion:
         """The commanded motion of the next step of `dt` seconds, within the limits of its file."""
@@ -183,13 +216,13 @@ class DriveTopics:
         return self._limited(motion, dt)
 
     def publish(self, stamp: Time, moved: Moved) -> None:
-        """Publish odometry."""
+        """Publish odometry to who wants it."""
         position, rotation, velocity = moved
         header = Header(stamp, f"{self._frames}{self._drive.odometry_frame}")
         base = f"{self._frames}{self._drive.robot_base_frame}"
-        if self._drive.publish_odom:
+        if self._drive.publish_odom and self._odom.wanted:
             self._odom.put(odometry(header, base, position, rotation, velocity, self._variances))
-        if self._drive.publish_odom_tf:
+        if self._drive.publish_odom_tf and self._tf.wanted:
             self._tf.put(TFMessage([transform(header, base, position, rotation)]))
 
     def close(self) -> None:

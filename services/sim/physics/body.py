@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 from holozen.kinematics import to_body
 from holozen.limits import Planar
-from holozen.rotation import rotate, yaw
+from holozen.rotation import multiply, rotate, yaw
 
 from .engine import NOTHING, Rotation, Vector, bullet
 
@@ -21,6 +21,7 @@ class Body:
         self._world, self._body = world, number
         self.weightless = {link: mass for link, mass in weightless.items() if mass > 0}
         self.is_removed = False
+        self.glides = False  # whether it goes on as it was told, without being told again at each step
         self._centre = centre
         self._axes = axes
         self._tilted = max(map(abs, axes[:3])) > 1e-9  # principal axes that are not the root's
@@ -45,11 +46,15 @@ class Body:
 
     def put(self, position: Vector, rotation: Rotation, linear: Vector, angular: Vector) -> None:
         """Place the root frame in the world, with its velocity and rotation rate there."""
-        centre = rotate(rotation, self._centre)
-        at = tuple(p + c for p, c in zip(position, centre, strict=True))
-        _, axes = bullet.multiplyTransforms((0, 0, 0), rotation, (0, 0, 0), self._axes)
-        bullet.resetBasePositionAndOrientation(self._body, at, axes, self._world)
+        centre = self._place(position, rotation)
         bullet.resetBaseVelocity(self._body, _at(linear, angular, centre), angular, self._world)
+
+    def _place(self, position: Vector, rotation: Rotation) -> Vector:
+        """Place the root frame in the world. Returns the offset from it to the centre of mass, in the world."""
+        (x, y, z), (cx, cy, cz) = position, rotate(rotation, self._centre)
+        axes = multiply(rotation, self._axes) if self._tilted else rotation
+        bullet.resetBasePositionAndOrientation(self._body, (x + cx, y + cy, z + cz), axes, self._world)
+        return cx, cy, cz
 
     def cancel_gravity(self, gravity: Vector) -> None:
         """Cancel the world's `gravity` on weightless links for the next step: the engine has no such flag."""

@@ -60,14 +60,20 @@ class PlanarMover:
 
     def move(self, velocity: Planar, dt: float) -> None:
         """Set the body's velocity."""
+        if velocity != self.body.told and self.body.glides:
+            self._roll(self.body.told)
         self.body.drive(velocity, dt)
 
     def moved(self, time: float, dt: float) -> Moved:
         """The true pose."""
         velocity = self.body.velocity(dt)
-        self._wheels.roll(velocity, time - self._rolled)
-        self._rolled = time
+        self._roll(velocity)
         return *self.body.pose(), velocity
+
+    def _roll(self, velocity: Planar) -> None:
+        """Roll the wheels up to now."""
+        self._wheels.roll(velocity, self.body.time - self._rolled)
+        self._rolled = self.body.time
 
     def states(self) -> tuple[list[float], list[float]]:
         """Angles and rates of the wheels, as rolling without slip would turn them."""
@@ -101,6 +107,7 @@ class Limited:
         limits = (drive.max_linear, drive.max_angular, drive.max_linear_acceleration, drive.max_angular_acceleration)
         self._unlimited = all(math.isinf(limit) for limit in limits)
         self._now: Planar = (0.0, 0.0, 0.0)
+        self.is_reached = True  # whether the velocity that is wanted is that of the next step
 
     def __call__(self, wanted: Planar, dt: float) -> Planar:
         """The velocity of the next step of `dt` seconds."""
@@ -111,6 +118,7 @@ class Limited:
         slower = all(abs(w) <= abs(n) and w * n >= 0 for w, n in zip(wanted, self._now, strict=True))
         limits = (drive.max_linear_acceleration, drive.max_angular_acceleration)
         self._now = wanted if slower else ramp(self._now, wanted, *limits, dt)
+        self.is_reached = self._now == wanted
         return self._now
 
 

@@ -14,7 +14,7 @@ from .body import Body
 from .dynamics import FRICTION
 from .engine import UPRIGHT, Rotation, Shapes, Vector, bullet
 from .jointed import MAX_JOINTS, JointedBody
-from .planar import PlanarBody
+from .planar import Field, PlanarBody
 
 Added = TypeVar("Added", PlanarBody, JointedBody)
 
@@ -24,7 +24,6 @@ class World:
 
     def __init__(self, spec: WorldSpec) -> None:
         self.spec = spec
-        self.steps = 0
         self.id: int = bullet.connect(bullet.DIRECT)
         self._shapes = Shapes(self.id)
         self._floating: list[Body] = []
@@ -37,27 +36,36 @@ class World:
             enableConeFriction=0,
             physicsClientId=self.id,
         )
+        level: int | None = None
         if spec.ground:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self.id)
             ground = bullet.createMultiBody(0, plane, physicsClientId=self.id)
             bullet.changeDynamics(ground, -1, lateralFriction=FRICTION, physicsClientId=self.id)
+            level = None if any(spec.gravity[:2]) or spec.gravity[2] >= 0 else ground
+        self._field = Field(self.id, spec.step, level)
+
+    @property
+    def steps(self) -> int:
+        """Steps since the start."""
+        return self._field.steps
 
     @property
     def time(self) -> float:
         """Simulated seconds since the start; from the count of steps, so that no error accumulates."""
-        return self.steps * self.spec.step
+        return self._field.time
 
     def step(self) -> None:
         """Advance the world by one step."""
         self._floating = [body for body in self._floating if not body.is_removed]
         for body in self._floating:
             body.cancel_gravity(self.spec.gravity)
-        bullet.stepSimulation(self.id)
-        self.steps += 1
+        if not self._field.rests:
+            bullet.stepSimulation(self.id)
+        self._field.stepped()
 
     def add(self, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT) -> PlanarBody:
         """Add a planar base, its root frame at `at`."""
-        return self._added(PlanarBody(self.id, self._shapes, body, at, rotation))
+        return self._added(PlanarBody(self._field, self._shapes, body, at, rotation))
 
     def add_jointed(
         self, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT, wheels: frozenset[str] = frozenset()
@@ -74,7 +82,10 @@ class World:
             raise RobotError(
                 f"{model.name!r} has {len(parts) - 1} moving joints; at most {MAX_JOINTS - 1} are simulated"
             )
-        return self._added(JointedBody(self.id, self._shapes, parts, at, rotation, wheels, model.static))
+        body = self._added(JointedBody(self.id, self._shapes, parts, at, rotation, wheels, model.static))
+        if not model.static or len(parts) > 1:
+            self._field.others.append(body)
+        return body
 
     def _added(self, body: Added) -> Added:
         if body.weightless:

@@ -290,3 +290,50 @@ def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: S
     commands.put(Twist())
     sim.run(1)
     assert sim.arbiter.motion(clock[0]) == STOP
+
+
+def test_the_first_and_the_300th_robot_stand_when_their_drivers_fall_silent_and_when_they_are_stopped(
+    clock: list[float], sim: Sim, wire: Wire
+) -> None:
+    for number in range(1, 300):
+        sim.entities.add(f"bot{number}", MODEL, ((2.0 * (number % 18), 2.0 * (number // 18), -0.04), UPRIGHT))
+    sim.run(120)
+    first, last = sim.entities.robots[0], sim.entities.robots[-1]
+    assert last.mover.body.glides
+
+    def speeds() -> list[float]:
+        sim.run(1)
+        return [robot.mover.body.twist()[0][0] for robot in sim.entities.robots]
+
+    assert not any(speeds())
+    for robot in (first, last):
+        robot.arbiter.offer("me", 4, FORWARD, clock[0])
+    driving = speeds()
+    assert (driving[0], driving[-1]) == pytest.approx((0.5, 0.5), abs=1e-3) and not any(driving[1:-1])
+    clock[0] += 0.499
+    driving = speeds()
+    assert (driving[0], driving[-1]) == pytest.approx((0.5, 0.5), abs=1e-3)
+    clock[0] += 0.002
+    assert not any(speeds())
+    me = wire.bus("me")
+    for robot, name in ((first, "Fred"), (last, "bot299")):
+        robot.set_timeout(-1.0)
+        robot.arbiter.offer("me", 4, FORWARD, clock[0])
+        assert sum(map(bool, speeds())) == 1
+        with ThreadPoolExecutor() as pool:
+            stopped = pool.submit(me.call, f"{name}/stop", TriggerRequest(), TriggerReply, 60.0)
+            while not stopped.done():
+                clock[0] += 0.005
+                sim.run(1)
+        assert stopped.result().success
+        assert not any(speeds())
+
+
+def test_a_changed_timeout_counts_for_who_drives_already(clock: list[float], sim: Sim) -> None:
+    sim.run(240)
+    sim.arbiter.offer("me", 4, FORWARD, clock[0])
+    sim.run(1)
+    sim.robot.set_timeout(0.1)
+    clock[0] += 0.11
+    sim.run(1)
+    assert sim.robot.mover.body.twist()[0] == (0, 0, 0)
