@@ -104,7 +104,7 @@ class Kitty:
         with socket.socket(socket.AF_UNIX) as door:
             door.bind(str(folder / "door"))
             door.listen()
-            door.settimeout(20)
+            door.settimeout(60)
             self._process = Process(
                 [*_kitty(self._dump, self._class), sys.executable, "-S", "-c", SHELL, str(folder / "door")],
                 env={**display.env, "HOME": str(folder), "KITTY_CONFIG_DIRECTORY": str(folder)},
@@ -116,7 +116,7 @@ class Kitty:
                 raise AssertionError(f"kitty did not start: {self._process.err}") from None
         self._lines = self._shell.makefile("r")
         self._shell.settimeout(30)
-        self.window = wait_for(lambda: self._windows()[:1], what="kitty's window")[0]
+        self.window = wait_for(lambda: self._windows()[:1], 30, "kitty's window")[0]
         display.focus(self.window)
 
     def __enter__(self) -> Self:

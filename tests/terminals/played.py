@@ -6,6 +6,7 @@ drivers/tty/vt/vt.c; those of xterm from its control sequences' documentation.
 
 import re
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -34,7 +35,7 @@ DUMB = Kind(False, "", "")
 
 class Played(Terminal):
     """A terminal of some kind. `late`: seconds until it answers. `kind` may be changed while it runs. `kept`: keys that
-    come in one breath with its next answers, the first with the first of them.
+    come with its next answers, the first with the first of them: in one breath, or so many seconds `apart`.
     """
 
     def __init__(
@@ -43,6 +44,7 @@ class Played(Terminal):
         self.kind, self.late = kind, late
         self.asked: list[str] = []  # the questions so far
         self.kept: list[str] = []
+        self.apart = 0.0
         self._answers = ""
         self._alternate = False
         self.pushed: dict[bool, list[int]] = {False: [], True: []}  # of both screens; the last is on
@@ -89,8 +91,8 @@ class Played(Terminal):
             self._hear(question[1].decode(), question[2].decode(), question[3].decode())
         self._rest = self._rest[end:]
         if self._answers:
-            text, self._answers = self._answers + (self.kept.pop(0) if self.kept else ""), ""
-            self._send(text)
+            answers, self._answers = self._answers, ""
+            self._send(answers, self.kept.pop(0) if self.kept else "")
 
     @property
     def _current(self) -> list[int]:
@@ -122,17 +124,21 @@ class Played(Terminal):
         self.asked.append(question)
         self._answers += answer
 
-    def _send(self, text: str) -> None:
+    def _send(self, answers: str, keys: str) -> None:
         if self.late:
-            timer = threading.Timer(self.late, self._say, [text])
+            timer = threading.Timer(self.late, self._say, [answers, keys])
             timer.daemon = True
             timer.start()
         else:
-            self._say(text)
+            self._say(answers, keys)
 
-    def _say(self, answer: str) -> None:
-        if not self.closed:
-            self.type(answer)
+    def _say(self, answers: str, keys: str) -> None:
+        if self.apart and keys:
+            self._say(answers, "")
+            time.sleep(self.apart)
+            self._say(keys, "")
+        elif not self.closed:
+            self.type(answers + keys)
 
 
 def event(code: int, modifiers: int = 0, kind: int = PRESS, *, shifted: int = 0, base: int = 0) -> str:

@@ -1,5 +1,6 @@
 """Where a terminal tells no releases, a key that repeats drives without a stutter, and stops after its last repeat."""
 
+import math
 import sys
 import time
 from itertools import pairwise
@@ -33,18 +34,13 @@ def hold(robot: Robot, terminal: Terminal) -> Hold:
     """Hold a key until it has repeated often."""
     begin = len(robot.commands.all())
     typed = terminal.hold("i", DELAY + (REPEATS - 0.5) * INTERVAL, DELAY, INTERVAL)
-
-    def commands(after: float, moving: bool) -> list[float]:
-        """When those were sent."""
-        stamped = ((received.sample.stamp, received.message) for received in robot.commands.all()[begin:])
-        return [s.sent for s, m in stamped if s and m and s.sent >= after and any(planar(m)) == moving]
-
-    def next_after(at: float, moving: bool) -> float:
-        return wait_for(lambda: commands(at, moving)[:1], what="a motion" if moving else "a stop")[0]
-
-    read = [next_after(at, True) for at in typed]
-    stopped = next_after(read[-1], False)
-    stutters = sum(at < read[-1] for at in commands(read[0], False))
+    robot.told_to_stop()
+    stamped = [(received.sample.stamp, received.message) for received in robot.commands.all()[begin:]]
+    moves = [stamp.sent for stamp, message in stamped if stamp and message and any(planar(message))]
+    stops = [stamp.sent for stamp, message in stamped if stamp and message and not any(planar(message))]
+    read = [next((at for at in moves if at >= key), math.inf) for key in typed]  # inf: a key that was not obeyed
+    stopped = next((at for at in stops if at > read[-1]), math.inf)
+    stutters = sum(read[0] < at < read[-1] for at in stops)
     return Hold(stutters, max(b - a for a, b in pairwise(read[1:])), stopped - read[-1])
 
 

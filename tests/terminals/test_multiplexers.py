@@ -122,6 +122,5 @@ def test_a_key_drives_while_it_repeats_and_a_paste_moves_nothing(
     robot.newest()
     assert [(r.sample.source, r.message) for r in robot.commands.all()[seen:]] == []
     since = Since(robot.odom)
-    window.hold("i", 0.7)
-    wait_for(lambda: since.drove(x=0.9 * V))
+    press_until(lambda: since.drove(x=0.9 * V), lambda: window.hold("i", 0.7), lambda: None, window.screen)
     stands(robot)

@@ -103,8 +103,7 @@ def assert_a_new_press_drives(terminal: Played, robot: Robot) -> None:
 def test_where_nobody_tells_releases_a_key_drives_while_it_repeats(start: Start, robot: Robot) -> None:
     terminal = start(CONSOLE)
     since = Since(robot.odom)
-    terminal.hold("i", 0.7)
-    wait_for(lambda: since.drove(x=V))
+    press_until(lambda: since.drove(x=V), lambda: terminal.hold("i", 0.7), lambda: None, terminal.screen)
     stands(robot)
     assert terminal.flags_left == {}
     assert "\x1b[>" not in terminal.raw, "an old Linux console would print the rest"
@@ -119,6 +118,7 @@ def test_a_repeat_without_a_press_moves_nothing(terminal: Played, robot: Robot) 
 
 
 def test_a_lost_focus_stops_until_a_new_press(terminal: Played, robot: Robot) -> None:
+    assert "\x1b[?1004h" in terminal.raw, "it asks to be told"
     drive(terminal, robot, x=V)
     terminal.type(FOCUS_OUT)
     stands(robot)
@@ -219,19 +219,23 @@ def test_a_terminal_that_hangs_stops_the_robot_and_what_was_typed_meanwhile_move
     drive(terminal, robot, KEY_L, turn=-W)
 
 
-BREATHS = [(kind, late) for kind in (KITTY, XTERM, TMUX) for late in (0.0, 0.1)] if OFTEN > 1 else [
-    (KITTY, 0.0), (XTERM, 0.1),
-]  # fmt: skip
+# Which terminal, after how many seconds it answers, and how many later the keys come that it kept.
+BREATHS = [
+    (kind, late, apart) for kind in (KITTY, XTERM, TMUX) for late in (0.0, 0.1) for apart in (0.0, 0.01)
+] if OFTEN > 1 else [(KITTY, 0.0, 0.0), (KITTY, 0.0, 0.01), (XTERM, 0.1, 0.0)]  # fmt: skip
 NAMES = {KITTY: "kitty", XTERM: "xterm", TMUX: "tmux"}
 
 
 @pytest.mark.parametrize("run", range(OFTEN))
-@pytest.mark.parametrize(("kind", "late"), BREATHS, ids=[f"{NAMES[kind]}, {late:g} s away" for kind, late in BREATHS])
+@pytest.mark.parametrize(("kind", "late", "apart"), BREATHS, ids=lambda value: NAMES.get(value, f"{value} s"))
 def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothing(
-    start: Start, robot: Robot, kind: Kind, late: float, run: int
+    start: Start, robot: Robot, kind: Kind, late: float, apart: float, run: int
 ) -> None:
-    """Both with those to old questions and with the first to a new one; nor does a key that is held since then."""
+    """Both with those to old questions and with the first to a new one, or right after it; nor does a key that is held
+    since then.
+    """
     terminal = start(kind, "--plain", "--mode", "latch", late=late)
+    terminal.apart = apart
     drive(terminal, robot, x=V)
     terminal.freeze()
     stands(robot)
