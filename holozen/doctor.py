@@ -30,6 +30,7 @@ ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
 MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
+OPTIONAL = ("matplotlib",)  # not in requirements.lock: only `bag plot` needs it
 SHARED = ("delete_entity", "get_entities", "get_entity_state", "set_entity_state")  # served by joined sims too
 DRIVES = 2.0  # Hz; a slower source is not taken to drive a robot
 
@@ -82,7 +83,8 @@ def packages() -> Iterator[Finding]:
             missing.setdefault(name, []).extend(text.partition('extra == "')[2].strip('"').split())
     for name, extras in missing.items():
         users = ", ".join(f"`holozen {extra}`" for extra in extras) or "every command"
-        fix = f"run scripts/venv, or: {sys.executable} -m pip install {name}"
+        by_hand = f"{sys.executable} -m pip install {name}"
+        fix = by_hand if name in OPTIONAL else f"run scripts/venv, or: {by_hand}"
         yield Finding("packages", WARNING if extras else ERROR, f"{name} is missing, which {users} needs", fix)
     if not missing:
         yield Finding("packages", OK, f"all packages of holozen {version('holozen')} are installed")

@@ -1,6 +1,9 @@
 """What the doctor concludes from ports, nodes, clocks and commands."""
 
 import json
+from pathlib import Path
+
+import pytest
 
 from holozen.doctor import ERROR, OK, WARNING, Peer, clocks, commands, duplicates, exposures, packages, read_peer
 from holozen.doctor import versions as versions_of
@@ -18,6 +21,16 @@ def peer(
 
 def test_in_this_environment_no_package_is_missing() -> None:
     assert [finding.level for finding in packages()] == [OK, OK]
+
+
+def test_what_scripts_venv_does_not_install_is_not_promised_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    lock = (Path(__file__).parents[2] / "requirements.lock").read_text()
+    monkeypatch.setattr("holozen.doctor.version", lambda _: "")
+    _, *missing = packages()
+    assert len(missing) > 5
+    for finding in missing:
+        name = finding.text.partition(" ")[0]
+        assert ("scripts/venv" in finding.fix) == (f"{name}==" in lock), finding
 
 
 def test_a_clock_is_measured_by_half_of_the_round_trip() -> None:
