@@ -1,7 +1,7 @@
 """rclpy: initialize, spin, shut down."""
 
-from collections.abc import Sequence
-from types import TracebackType
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, Self
 
 from holozen.ros.rclpy import logging
@@ -37,9 +37,7 @@ class InitContextManager:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
+    def __exit__(self, *_error: object) -> None:
         try_shutdown(context=self.context)
 
 
@@ -82,27 +80,9 @@ def try_shutdown(*, context: Context | None = None, uninstall_handlers: bool | N
     (get_default_context(shutting_down=True) if is_default else context or get_default_context()).try_shutdown()
 
 
-def create_node(
-    node_name: str,
-    *,
-    context: Context | None = None,
-    cli_args: Sequence[str] | None = None,
-    namespace: str | None = None,
-    use_global_arguments: bool = True,
-    enable_rosout: bool = True,
-    start_parameter_services: bool = True,
-    parameter_overrides: list[Any] | None = None,
-    allow_undeclared_parameters: bool = False,
-    automatically_declare_parameters_from_overrides: bool = False,
-    enable_logger_service: bool = False,
-) -> Node:
-    """A plain Node."""
-    return Node(
-        node_name, context=context, cli_args=cli_args, namespace=namespace, use_global_arguments=use_global_arguments,
-        start_parameter_services=start_parameter_services, parameter_overrides=parameter_overrides,
-        allow_undeclared_parameters=allow_undeclared_parameters,
-        automatically_declare_parameters_from_overrides=automatically_declare_parameters_from_overrides,
-    )  # fmt: skip
+def create_node(node_name: str, **options: Any) -> Node:
+    """A plain Node; the options are those of Node."""
+    return Node(node_name, **options)
 
 
 def get_global_executor() -> Executor:
@@ -118,34 +98,31 @@ def spin(node: Node, executor: Executor | None = None) -> None:
 
     Raises what a callback raises, and ExternalShutdownException when a signal shuts down rclpy while it spins.
     """
-    executor = executor or get_global_executor()
-    added = executor.add_node(node)
-    try:
-        executor.spin()
-    finally:
-        if added:
-            executor.remove_node(node)
+    with _spinning(node, executor) as running:
+        running.spin()
 
 
 def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
     """Run one callback. Waits for it at most so many seconds (None: for ever, 0: not at all)."""
-    executor = executor or get_global_executor()
-    added = executor.add_node(node)
-    try:
-        executor.spin_once(timeout_sec)
-    finally:
-        if added:
-            executor.remove_node(node)
+    with _spinning(node, executor) as running:
+        running.spin_once(timeout_sec)
 
 
 def spin_until_future_complete(
     node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
 ) -> None:
     """Run a node's callbacks until a future is done, at most so many seconds."""
+    with _spinning(node, executor) as running:
+        running.spin_until_future_complete(future, timeout_sec)
+
+
+@contextmanager
+def _spinning(node: Node, executor: Executor | None) -> Iterator[Executor]:
+    """The executor, which has the node for as long as it spins."""
     executor = executor or get_global_executor()
     added = executor.add_node(node)
     try:
-        executor.spin_until_future_complete(future, timeout_sec)
+        yield executor
     finally:
         if added:
             executor.remove_node(node)

@@ -6,10 +6,9 @@ import weakref
 from typing import Any
 
 from holozen.messages.codec import CodecError
-from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.exceptions import InvalidHandle
-from holozen.ros.rclpy.handle import NodeHandle
+from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
 from holozen.ros.rclpy.task import Future, TaskQueue
@@ -21,7 +20,7 @@ POLL = 0.01  # s between two looks for the service
 LONGEST = 86_400.0  # s for a service to answer
 
 
-class Client(HelpfulAttributes):
+class Client(Owned):
     """Created by `Node.create_client`. Each call waits for the service, and for its reply, in a thread of its own.
 
     So `call` works without a spinning executor. If the service refuses, the future raises ServiceError with the reason.
@@ -47,11 +46,6 @@ class Client(HelpfulAttributes):
     def service_name(self) -> str:
         """Its name, absolute and remapped."""
         return self.srv_name
-
-    @property
-    def logger_name(self) -> str:
-        """The name of its node's logger."""
-        return self._handle.logger.name
 
     def service_is_ready(self) -> bool:
         """Whether the service is available. Raises RCLError after `rclpy.shutdown()`, InvalidHandle if destroyed."""

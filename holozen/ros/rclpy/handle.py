@@ -3,6 +3,7 @@
 import threading
 
 from holozen.bus import Bus
+from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy import context as contexts
 from holozen.ros.rclpy import names
 from holozen.ros.rclpy.arguments import Arguments
@@ -63,3 +64,14 @@ class NodeHandle:
         """The endpoints of one kind of a node."""
         full = names.key(names.join(namespace, name))
         return [end for end in self.endpoints() if end.kind == kind and end.node == full]
+
+
+class Owned(HelpfulAttributes):
+    """A publisher, subscription, client or service of a node."""
+
+    _handle: NodeHandle
+
+    @property
+    def logger_name(self) -> str:
+        """The name of its node's logger."""
+        return self._handle.logger.name

@@ -2,17 +2,16 @@
 
 from typing import Any
 
-from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.exceptions import InvalidHandle
-from holozen.ros.rclpy.handle import NodeHandle
+from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import HistoryPolicy, QoSProfile
 
 __all__ = ["Publisher"]
 
 
-class Publisher(HelpfulAttributes):
+class Publisher(Owned):
     """Created by `Node.create_publisher`. Sends with Zenoh's priority DATA; late subscribers can get the last message.
 
     Messages are dropped where a link is full; with a history of KEEP_ALL the publisher waits instead.
@@ -29,11 +28,6 @@ class Publisher(HelpfulAttributes):
     def topic_name(self) -> str:
         """Its topic, absolute and remapped."""
         return self.topic
-
-    @property
-    def logger_name(self) -> str:
-        """The name of its node's logger."""
-        return self._handle.logger.name
 
     def publish(self, msg: Any) -> None:
         """Send a message, or the bytes of one. Raises TypeError for another type.

@@ -6,9 +6,8 @@ from functools import partial
 from typing import Any
 
 from holozen.messages.codec import CodecError
-from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
-from holozen.ros.rclpy.handle import NodeHandle
+from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
 from holozen.ros.rclpy.waitable import Inbox, Waker
@@ -24,7 +23,7 @@ class Refusal(ServiceError):
     """Raised by our own callbacks to refuse a request without ending the spin."""
 
 
-class Service(HelpfulAttributes):
+class Service(Owned):
     """Created by `Node.create_service`. Requests wait until its node is spun.
 
     An exception in the callback ends the spin, and the client receives it as an error.
@@ -49,11 +48,6 @@ class Service(HelpfulAttributes):
     def service_name(self) -> str:
         """Its name, absolute and remapped."""
         return self.srv_name
-
-    @property
-    def logger_name(self) -> str:
-        """The name of its node's logger."""
-        return self._handle.logger.name
 
     def send_response(self, response: Any, header: Any) -> None:
         """Raises NotImplementedError: the value that the callback returns is sent."""

@@ -11,9 +11,8 @@ from typing import Any
 from holozen import wire
 from holozen.bus import Bus
 from holozen.messages import codec
-from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
-from holozen.ros.rclpy.handle import NodeHandle
+from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile, as_profile, queue_length
 from holozen.ros.rclpy.waitable import Inbox, Waker
@@ -28,7 +27,7 @@ REMEMBERED = 100  # hashes of messages that have arrived, not the messages: a ma
 POLL = 0.1  # s between two looks whether rclpy was shut down
 
 
-class Subscription(HelpfulAttributes):
+class Subscription(Owned):
     """Created by `Node.create_subscription`. Keeps the newest `depth` messages, in order, until its node is spun.
 
     A message that cannot be decoded is logged and not given to the callback; `bad` counts them.
@@ -72,11 +71,6 @@ class Subscription(HelpfulAttributes):
     def topic_name(self) -> str:
         """Its topic, absolute and remapped."""
         return self.topic
-
-    @property
-    def logger_name(self) -> str:
-        """The name of its node's logger."""
-        return self._handle.logger.name
 
     def get_publisher_count(self) -> int:
         """How many publishers of holozen nodes its topic has."""
