@@ -43,7 +43,7 @@ class Mistake:
 
     at: Tag | Place | None
     problem: str
-    mend: str
+    fix: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,10 +76,10 @@ class Finding:
     place: Place
     problem: str
     why: str
-    mend: str
+    fix: str
 
     def __str__(self) -> str:
-        return f"{self.place}: {self.severity}: {self.problem} [{self.rule}]\n    {self.why}; {self.mend}"
+        return f"{self.place}: {self.severity}: {self.problem} [{self.rule}]\n    {self.why}; {self.fix}"
 
     def fields(self) -> dict[str, object]:
         """For JSON: flat, with the line as a number or null."""
@@ -91,7 +91,7 @@ class Finding:
             "expanded": self.place.expanded,
             "problem": self.problem,
             "reason": self.why,
-            "mend": self.mend,
+            "fix": self.fix,
         }
 
 

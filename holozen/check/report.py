@@ -50,7 +50,7 @@ _CASES = (
 )  # fmt: skip
 
 
-def mend(place: Place, reason: str) -> str:
+def how_to_fix(place: Place, reason: str) -> str:
     """How to fix a file that cannot be read; for broken XML by the reported line and the one before."""
     if "is a world" in reason:
         return "check takes a robot, or a single <model>"
@@ -182,7 +182,7 @@ def _once(findings: Iterable[Finding], expanded: bool) -> Iterable[Finding]:
     first: dict[tuple[str, Place, str], Finding] = {}
     for finding in findings:
         traced = expanded and finding.place.line and not finding.place.expanded
-        first.setdefault((finding.rule, finding.place, finding.mend if traced else finding.problem), finding)
+        first.setdefault((finding.rule, finding.place, finding.fix if traced else finding.problem), finding)
     return first.values()
 
 
@@ -201,7 +201,7 @@ def _fatal(path: Path, message: str) -> Finding:
     place, problem = split(message, path)
     if place.file == f"{path}{EXPANDED}":
         place = Place(str(path), place.line, True)
-    return Finding(FATAL.name, FATAL.severity, place, problem, FATAL.why, mend(place, problem))
+    return Finding(FATAL.name, FATAL.severity, place, problem, FATAL.why, how_to_fix(place, problem))
 
 
 def _unreported(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mistake]]) -> list[Mistake]:
@@ -219,7 +219,7 @@ def _unreported(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mis
 
 def _finding(rule: Rule, mistake: Mistake, subject: Subject) -> Finding:
     place: Place = subject.place(mistake.at)
-    return Finding(rule.name, rule.severity, place, _short(mistake.problem), rule.why, _short(mistake.mend))
+    return Finding(rule.name, rule.severity, place, _short(mistake.problem), rule.why, _short(mistake.fix))
 
 
 def _short(text: str) -> str:

@@ -31,14 +31,14 @@ class Given:
     inertia: Tensor | None
 
 
-def read_inertial(link: Tag, sdf: bool) -> Given | None:
+def read_inertial(link: Tag) -> Given | None:
     """The <inertial> of a link's element."""
     tag = link.first("inertial")
     if tag is None:
         return None
     mass, inertia = tag.first("mass"), tag.first("inertia")
-    value = number((mass.text if sdf else mass.attributes.get("value", "")).strip()) if mass else None
-    return Given(tag, mass, value, inertia, _tensor(inertia, sdf) if inertia else None)
+    value = number((mass.text if mass.sdf else mass.attributes.get("value", "")).strip()) if mass else None
+    return Given(tag, mass, value, inertia, _tensor(inertia) if inertia else None)
 
 
 @rule("no-inertia", "error", "a body without mass", "Gazebo drops it, or it cannot move")
@@ -67,7 +67,7 @@ def no_inertia(subject: Subject) -> Iterator[Mistake]:
 def bad_mass(subject: Subject) -> Iterator[Mistake]:
     """Negative or missing masses."""
     for name, tag in subject.links.items():
-        given = read_inertial(tag, subject.sdf)
+        given = read_inertial(tag)
         if given is None or (given.mass_tag is None and subject.sdf) or (given.mass == 0 and _is_frame(name, subject)):
             continue
         if given.mass_tag is None:
@@ -84,7 +84,7 @@ def bad_mass(subject: Subject) -> Iterator[Mistake]:
 def no_mass(subject: Subject) -> Iterator[Mistake]:
     """Links with a mass of zero or without moments of inertia, which are loaded nevertheless."""
     for name, tag in subject.links.items():
-        given = read_inertial(tag, subject.sdf)
+        given = read_inertial(tag)
         if given and given.mass == 0 and given.mass_tag and not _is_frame(name, subject):
             fix = "give it its mass in kg, or remove the <inertial> if it is only a frame"
             yield Mistake(given.mass_tag, f"link {name!r} has a mass of 0 kg", fix)
@@ -97,7 +97,7 @@ def absurd_mass(subject: Subject) -> Iterator[Mistake]:
     """Links denser than any metal, and robots denser than steel."""
     total = 0.0
     for name, tag in subject.links.items():
-        given = read_inertial(tag, subject.sdf)
+        given = read_inertial(tag)
         mass = given.mass if given and given.mass else 0.0
         total += max(mass, 0.0)
         box = box_of([shape for shape in subject.placed if shape.link == name])
@@ -115,7 +115,7 @@ def absurd_mass(subject: Subject) -> Iterator[Mistake]:
 def impossible_inertia(subject: Subject) -> Iterator[Mistake]:
     """Impossible inertias: missing, not positive definite, or one moment above the sum of the other two."""
     for name, tag in subject.links.items():
-        given = read_inertial(tag, subject.sdf)
+        given = read_inertial(tag)
         if given is None or not given.mass or (given.inertia_tag is None and subject.sdf):
             continue
         if given.inertia_tag is None:
@@ -137,7 +137,7 @@ def unlike_shape(subject: Subject) -> Iterator[Mistake]:
     for group in fixed_bodies(subject.model):
         weight = sum(inertial.mass for name in group if (inertial := subject.model.links[name].inertial))
         for name in group:
-            given, link = read_inertial(subject.links[name], subject.sdf), subject.model.links[name]
+            given, link = read_inertial(subject.links[name]), subject.model.links[name]
             if given is None or not given.inertia or not given.mass or given.mass < MINOR * weight:
                 continue
             solid = solid_moment(link, given.mass)
@@ -216,17 +216,13 @@ def _moment(shape: Shape, mass: float) -> float:
     return mass * (x + y + z - min(x, y, z)) / 3
 
 
-def _tensor(tag: Tag, sdf: bool) -> Tensor | None:
+def _tensor(tag: Tag) -> Tensor | None:
     """Omitted values are 0, in SDF 1 on the diagonal."""
-    values = []
-    for word in WORDS:
-        default = "1" if sdf and word[1] == word[2] else "0"
-        child = tag.first(word) if sdf else None
-        text = (child.text if child else default) if sdf else tag.attributes.get(word, default)
-        values.append(number(text.strip()))
-    if any(value is None for value in values):
+    texts = [tag.given(word) or ("1" if tag.sdf and word[1] == word[2] else "0") for word in WORDS]
+    values = [value for text in texts if (value := number(text)) is not None]
+    if len(values) < len(WORDS):
         return None
-    xx, xy, xz, yy, yz, zz = (value or 0.0 for value in values)
+    xx, xy, xz, yy, yz, zz = values
     return xx, xy, xz, yy, yz, zz
 
 

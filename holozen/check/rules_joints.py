@@ -27,7 +27,7 @@ def empty_limit(subject: Subject) -> Iterator[Mistake]:
         limit = _limit(tag, subject.sdf)
         if limit is None or not _is_bounded(tag):
             continue
-        lower, upper = (_value(limit, word, subject.sdf, None if subject.sdf else 0.0) for word in ("lower", "upper"))
+        lower, upper = (_value(limit, word, None if subject.sdf else 0.0) for word in ("lower", "upper"))
         if lower is not None and upper is not None and lower > upper:
             yield Mistake(limit, f"{tag} has lower={lower:g} above upper={upper:g}", "swap them")
         elif lower is not None and lower == upper:
@@ -43,7 +43,7 @@ def no_effort(subject: Subject) -> Iterator[Mistake]:
         if limit is None or not _moves(tag) or tag.first("mimic"):
             continue
         for word, unit in (("effort", "N m (or N)"), ("velocity", "rad/s (or m/s)")):
-            value = _value(limit, word, subject.sdf, math.inf if subject.sdf or not _is_bounded(tag) else None)
+            value = _value(limit, word, math.inf if subject.sdf or not _is_bounded(tag) else None)
             if value is None and not limit.attributes.get(word):
                 yield Mistake(limit, f"the limit of {tag} has no {word}", f'add {word}="...", in {unit}')
             elif value == 0:
@@ -91,12 +91,10 @@ def _limit(tag: Tag, sdf: bool) -> Tag | None:
     return axis.first("limit") if axis else None
 
 
-def _value(limit: Tag, word: str, sdf: bool, default: float | None) -> float | None:
-    """A number of a <limit>: an attribute in URDF, an element in SDF. None if missing or not a number."""
-    if sdf:
-        tag = limit.first(word)
-        return number(tag.text) if tag else default
-    return number(limit.attributes[word]) if word in limit.attributes else default
+def _value(limit: Tag, word: str, default: float | None) -> float | None:
+    """A number of a <limit>; None if it is left out without a default, or is not a number."""
+    text = limit.given(word)
+    return default if text is None else number(text)
 
 
 def _comes_back(name: str, leaders: dict[str, Tag | None]) -> bool:

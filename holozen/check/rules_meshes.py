@@ -112,14 +112,9 @@ def _meshes(subject: Subject) -> Iterator[tuple[Tag, str, Vector]]:
     """Each mesh of a link, its URI, and its scale."""
     for link in subject.root.all("link"):
         for tag in link.below("mesh"):
-            uri = _word(tag, "uri" if subject.sdf else "filename", subject.sdf)
+            uri = (tag.given("uri" if tag.sdf else "filename") or "").strip()
             if uri and not is_data(uri):
-                yield tag, uri, _scale(_word(tag, "scale", subject.sdf))
-
-
-def _word(tag: Tag, name: str, sdf: bool) -> str:
-    child = tag.first(name) if sdf else None
-    return child.text.strip() if child else tag.attributes.get(name, "").strip()
+                yield tag, uri, _scale(tag.given("scale") or "")
 
 
 def _scale(text: str) -> Vector:

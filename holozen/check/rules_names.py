@@ -31,7 +31,7 @@ def unknown_links(subject: Subject) -> Iterator[Mistake]:
     for joint in subject.root.all("joint"):
         for end in ("parent", "child"):
             tag = joint.first(end)
-            name = _end(tag, subject.sdf) if tag else ""
+            name = _end(tag) if tag else ""
             if tag and name and not _is_link(name, subject):
                 yield _unknown(tag, f"{joint} names the {end} link {name!r}, which does not exist", name, subject.links)
 
@@ -52,7 +52,7 @@ def unconnected(subject: Subject) -> Iterator[Mistake]:
     children = Counter[str]()
     for joint in subject.root.all("joint"):
         tag = joint.first("child")
-        child = _end(tag, subject.sdf) if tag else ""
+        child = _end(tag) if tag else ""
         children[child] += 1
         if tag and children[child] == 2 and child in subject.links:
             yield Mistake(tag, f"link {child!r} is the child of two joints", "remove one of them")
@@ -60,7 +60,7 @@ def unconnected(subject: Subject) -> Iterator[Mistake]:
     if not subject.sdf:
         yield from _circles(subject, roots)
     if len(roots) > 1 and not subject.sdf:
-        family = Counter(_end(tag, False) for joint in subject.root.all("joint") if (tag := joint.first("parent")))
+        family = Counter(_end(tag) for joint in subject.root.all("joint") if (tag := joint.first("parent")))
         root = max(roots, key=lambda name: family[name])
         for name in roots:
             if name != root:
@@ -73,7 +73,7 @@ def _circles(subject: Subject, roots: list[str]) -> Iterator[Mistake]:
     for joint in subject.root.all("joint"):
         parent, child = (joint.first(end) for end in ("parent", "child"))
         if parent and child:
-            children.setdefault(_end(parent, False), []).append(_end(child, False))
+            children.setdefault(_end(parent), []).append(_end(child))
     waiting = [*roots, *(name for name in children if name not in subject.links)]
     reached = set(waiting)
     while waiting:
@@ -154,8 +154,8 @@ def _words(source: SourceFile) -> list[str]:
     return re.findall(r"[A-Za-z_]\w*", re.sub(r"<!--.*?-->", "", source.text, flags=re.DOTALL))
 
 
-def _end(tag: Tag, sdf: bool) -> str:
-    return (tag.text if sdf else tag.attributes.get("link", "")).strip()
+def _end(tag: Tag) -> str:
+    return (tag.text if tag.sdf else tag.attributes.get("link", "")).strip()
 
 
 def _is_link(name: str, subject: Subject) -> bool:

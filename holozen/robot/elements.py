@@ -12,6 +12,7 @@ from holozen.robot.errors import RobotError, cut
 
 Vector = tuple[float, float, float]
 
+SHORTEST = 1e-6  # length of a vector that gives a direction
 LARGEST = 1e6  # m, kg, kg m^2; larger numbers are mistakes, and 1e308 makes the engine compute NaN
 
 MOST_TEXT = 4_000_000  # characters, or bytes of a file; these three keep malicious files from stalling the reader
@@ -21,7 +22,9 @@ DEEPEST = 200
 
 @dataclass(eq=False, slots=True)
 class Tag:
-    """`place` is the file and line for messages; `text` is the element's own text."""
+    """`place` is the file and line for messages; `text` is the element's own text. Below an `<sdf>`, where `sdf` is
+    true, a value such as a size is the text of a child; in URDF it is an attribute.
+    """
 
     name: str
     attributes: dict[str, str]
@@ -29,6 +32,7 @@ class Tag:
     parent: "Tag | None" = None
     text: str = ""
     children: "list[Tag]" = field(default_factory=list)
+    sdf: bool = False
 
     def all(self, name: str) -> "list[Tag]":
         """The children called `name`."""
@@ -65,34 +69,66 @@ class Tag:
             raise self.wrong(f'has no {attribute}="..."')
         return value
 
+    def empty(self, name: str) -> "Tag":
+        """An empty child called `name`, which the file leaves out."""
+        return Tag(name, {}, self.place, self, sdf=self.sdf)
+
+    def given(self, name: str) -> str | None:
+        """The text of a value; None if the file leaves it out."""
+        if not self.sdf:
+            return self.attributes.get(name)
+        child = self.first(name)
+        return child.text.strip() if child else None
+
     def numbers(
-        self, attribute: str, count: int, default: tuple[float, ...] | None = None, most: float = LARGEST
+        self, name: str, count: int, default: tuple[float, ...] | None = None, most: float = LARGEST
     ) -> tuple[float, ...]:
-        """`count` numbers separated by white space, from -`most` to `most`; else `default`."""
-        if attribute not in self.attributes and default is not None:
+        """A value of `count` numbers separated by white space, from -`most` to `most`; else `default`."""
+        if default is not None and self.given(name) is None:
             return default
-        text = self.word(attribute)
-        values = tuple(self._number(attribute, word, most) for word in text.split())
-        if len(values) != count:
-            raise self.wrong(f"{attribute}={cut(text)} has {len(values)} numbers instead of {count}")
-        return values
+        if not self.sdf:
+            return self._parsed(f"{self} {name}", self.word(name), count, most)
+        child = self.first(name)
+        if child is None:
+            raise self.wrong(f"has no <{name}>")
+        return child.content(count, most)
 
-    def number(self, attribute: str, default: float | None = None, most: float = LARGEST) -> float:
-        """One number, from -`most` to `most`."""
-        return self.numbers(attribute, 1, None if default is None else (default,), most)[0]
+    def number(self, name: str, default: float | None = None, most: float = LARGEST) -> float:
+        """A value of one number, from -`most` to `most`."""
+        return self.numbers(name, 1, None if default is None else (default,), most)[0]
 
-    def vector(self, attribute: str, default: Vector | None = None) -> Vector:
-        """Three numbers."""
-        x, y, z = self.numbers(attribute, 3, default)
+    def vector(self, name: str, default: Vector | None = None) -> Vector:
+        """A value of three numbers."""
+        x, y, z = self.numbers(name, 3, default)
         return x, y, z
 
-    def _number(self, attribute: str, word: str, most: float) -> float:
-        value = number(word)
-        if value is None:
-            raise self.wrong(f"{attribute}: {cut(word)} is not a finite number; write 0.25, and spaces between several")
-        if abs(value) > most:
-            raise self.wrong(f"{attribute}: {cut(word)} is beyond {most:g}; use metres and kilograms")
-        return value
+    def direction(self, name: str, default: Vector) -> Vector:
+        """A unit vector."""
+        x, y, z = self.vector(name, default)
+        length = math.hypot(x, y, z)
+        if length < SHORTEST:
+            raise self.wrong(f"has no direction in {name}; write 0 1 0 for y, 0 0 1 for z")
+        return x / length, y / length, z / length
+
+    def content(self, count: int, most: float = LARGEST) -> tuple[float, ...]:
+        """The `count` numbers that are the element's own text, from -`most` to `most`."""
+        return self._parsed(str(self), self.text.strip(), count, most)
+
+    def _parsed(self, where: str, text: str, count: int, most: float) -> tuple[float, ...]:
+        values = []
+        for word in text.split():
+            value = number(word)
+            if value is None:
+                problem = "is not a finite number; write 0.25, and spaces between several"
+            elif abs(value) > most:
+                problem = f"is beyond {most:g}; use metres, kilograms and radians"
+            else:
+                values.append(value)
+                continue
+            raise RobotError(f"{self.place}: {where}: {cut(word)} {problem}")
+        if len(values) != count:
+            raise RobotError(f"{self.place}: {where}: {cut(text)} has {len(values)} numbers instead of {count}")
+        return tuple(values)
 
     def __str__(self) -> str:
         owner: Tag | None = self
@@ -225,6 +261,7 @@ class _Reader:
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         tag = Tag(name, attributes, f"{self.place}, line {self.parser.CurrentLineNumber}", self.open)
+        tag.sdf = self.open.sdf or name == "sdf"
         self.count += 1
         if self.count > MOST_ELEMENTS:
             raise tag.wrong(f"is element number {self.count}; a file may have at most {MOST_ELEMENTS}")

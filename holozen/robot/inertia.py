@@ -78,6 +78,18 @@ def positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz:
 NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
+def read_inertia(inertial: Tag, moment: float) -> tuple[float, float, float, float, float, float]:
+    """The tensor of an `<inertial>`, whose moments are `moment` where it gives none; NO_INERTIA for one that is not
+    positive definite: rejecting those would stop many students' robots. Raises RobotError.
+    """
+    given = inertial.first("inertia") or inertial.empty("inertia")
+    xx, yy, zz = (given.number(name, moment) for name in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (given.number(name, 0.0) for name in ("ixy", "ixz", "iyz"))
+    if min(xx, yy, zz) < 0:
+        raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never negative")
+    return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
+
+
 def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool = False) -> Link:
     """The link, with the moments of inertia of its solid collision shapes if its own are NO_INERTIA or far smaller, and
     a warning unless `silent`. A link without shapes is unchanged: a point mass, if it has no inertia.

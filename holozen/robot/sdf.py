@@ -9,14 +9,15 @@ from functools import lru_cache
 from itertools import product
 from pathlib import Path
 
-from holozen.robot.elements import LARGEST, Source, Tag, Vector, check_size, number, read_xml
+from holozen.robot.elements import SHORTEST, Source, Tag, Vector, check_size, read_xml
 from holozen.robot.errors import RobotError, cut
-from holozen.robot.inertia import NO_INERTIA, positive_definite, with_moments
-from holozen.robot.model import Color, Inertial, Joint, Limits, Link, Mimic, Pose, Shape, Surface
+from holozen.robot.inertia import NO_INERTIA, read_inertia, with_moments
+from holozen.robot.model import Color, Inertial, Joint, Limits, Link, Pose, Shape, Surface
 from holozen.robot.packages import MODEL_PATHS, find_named, folders_above, local_packages
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import triple
-from holozen.robot.shapes import material_color, mesh_shape, needed
+from holozen.robot.shapes import SHAPES, SIZES, material_color, mesh_shape, needed, read_size
+from holozen.robot.urdf import read_dynamics, read_mimic
 from holozen.robot.xacro import read_text
 from holozen.rotation import to_rpy
 
@@ -24,7 +25,7 @@ from holozen.rotation import to_rpy
 
 
 ENDLESS = 1e16  # SDF's own number for a joint without a limit
-SHORTEST = 1e-6  # of a direction
+UP = (0.0, 0.0, 1.0)  # SDF's default direction
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,44 +40,6 @@ def word(tag: Tag, name: str, default: str = "") -> str:
     """The text of the child called `name`."""
     child = tag.first(name)
     return default if child is None else child.text.strip()
-
-
-def empty(tag: Tag) -> Tag:
-    """An empty element; its messages refer to `tag`."""
-    return Tag(tag.name, tag.attributes, tag.place, tag.parent)
-
-
-def numbers(tag: Tag, count: int, most: float = LARGEST) -> tuple[float, ...]:
-    """The `count` numbers that are the text of `tag`, from -`most` to `most`. Raises RobotError."""
-    words = tag.text.split()
-    values = tuple(_number(tag, word, most) for word in words)
-    if len(values) != count:
-        raise tag.wrong(f"has {len(values)} numbers instead of {count}: {cut(tag.text.strip())}")
-    return values
-
-
-def value(tag: Tag, name: str, default: float, most: float = LARGEST) -> float:
-    """The one number in the child called `name`. Raises RobotError."""
-    child = tag.first(name)
-    return default if child is None else numbers(child, 1, most)[0]
-
-
-def vector(tag: Tag, name: str, default: Vector) -> Vector:
-    """The three numbers in the child called `name`. Raises RobotError."""
-    child = tag.first(name)
-    if child is None:
-        return default
-    x, y, z = numbers(child, 3)
-    return x, y, z
-
-
-def direction(tag: Tag, name: str) -> Vector:
-    """The unit vector in the child called `name`; z by default, as in all of SDF. Raises RobotError."""
-    x, y, z = vector(tag, name, (0.0, 0.0, 1.0))
-    length = math.hypot(x, y, z)
-    if length < SHORTEST:
-        raise (tag.first(name) or tag).wrong("has no direction; write 0 0 1 for straight up")
-    return x / length, y / length, z / length
 
 
 def flag(tag: Tag, name: str, default: bool) -> bool:
@@ -112,7 +75,7 @@ def _pose(tag: Tag) -> Pose:
         return Pose()
     if tag.attributes.get("rotation_format", "euler_rpy") == "quat_xyzw":
         return _with_quaternion(tag)
-    x, y, z, *turns = numbers(tag, 6)
+    x, y, z, *turns = tag.content(6)
     if tag.attributes.get("degrees", "false").strip().lower() in ("true", "1"):
         turns = [math.radians(turn) for turn in turns]
     roll, pitch, yaw = turns
@@ -120,21 +83,12 @@ def _pose(tag: Tag) -> Pose:
 
 
 def _with_quaternion(tag: Tag) -> Pose:
-    x, y, z, *turn = numbers(tag, 7)
+    x, y, z, *turn = tag.content(7)
     length = math.hypot(*turn)
     if length < SHORTEST:
         raise tag.wrong("has a quaternion of length 0; write 0 0 0 1 for no rotation")
     a, b, c, w = (part / length for part in turn)
     return Pose((x, y, z), to_rpy((a, b, c, w)))
-
-
-def _number(tag: Tag, word: str, most: float) -> float:
-    value = number(word)
-    if value is None:
-        raise tag.wrong(f"has {cut(word)}, which is not a finite number")
-    if abs(value) > most:
-        raise tag.wrong(f"has {cut(word)}, which is beyond {most:g}; use metres, kilograms and radians")
-    return value
 
 
 # The elements of SDF: others, such as misspelt ones, cause a warning.
@@ -201,18 +155,7 @@ def _warn_unknown(outer: Tag, child: Tag, known: list[str], source: Source, warn
 # Shapes.
 
 
-SMALLEST = 1e-6  # of a size in metres, and of a mesh's scale
 AROUND, UPWARDS = 16, 9  # points of a round hull: per circle, and circles from pole to pole
-
-SIZES = {
-    "box": {"size": 3},
-    "sphere": {"radius": 1},
-    "cylinder": {"radius": 1, "length": 1},
-    "capsule": {"radius": 1, "length": 1},
-    "cone": {"radius": 1, "length": 1},
-    "ellipsoid": {"radii": 3},
-}
-"""The elements that give a shape's size, and how many numbers each contains."""
 
 LEFT_OUT = ("heightmap", "polyline", "image")
 
@@ -225,10 +168,10 @@ def read_shape(tag: Tag, frame: Pose, source: Source) -> Shape | None:
     """
     pose = compose(frame, read_pose(tag).pose)
     geometry = needed(tag, "geometry")
-    known = [child for child in geometry.children if child.name in (*SIZES, *LEFT_OUT, "plane", "mesh", "empty")]
+    known = [child for child in geometry.children if child.name in (*SIZES, *LEFT_OUT, "mesh", "empty")]
     if not known:
         found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
-        raise geometry.wrong(f"contains {found}; it must contain {_listed()}, <plane> or <mesh>")
+        raise geometry.wrong(f"contains {found}; it must contain {_listed()} or <mesh>")
     color = _color(tag, source) if tag.name == "visual" else None
     return _shape(known[0], tag.name, pose, color, source)
 
@@ -237,35 +180,22 @@ def _shape(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) 
     if tag.name == "empty":
         return None
     if tag.name in LEFT_OUT:
-        source.warn(tag, f"({use}) is left out; use {_listed()}, <plane> or <mesh>")
+        source.warn(tag, f"({use}) is left out; use {_listed()} or <mesh>")
         return None
     if tag.name == "mesh":
         return _mesh(tag, use, pose, color, source)
     if tag.name == "plane":
-        return Shape("plane", _plane_size(tag), compose(pose, _upon(direction(tag, "normal"))), color=color)
-    size = _size(tag)
-    if tag.name in ("box", "sphere", "cylinder"):
+        return Shape(
+            "plane", read_size(tag, (1.0, 1.0)), compose(pose, _upon(tag.direction("normal", UP))), color=color
+        )
+    size = read_size(tag)
+    if tag.name in SHAPES:
         return Shape(tag.name, size, pose, color=color)
     return Shape("hull", (), pose, color=color, points=tuple(_HULLS[tag.name](size)))
 
 
 def _listed() -> str:
     return ", ".join(f"<{name}>" for name in SIZES)
-
-
-def _size(tag: Tag) -> tuple[float, ...]:
-    size = tuple(value for name, count in SIZES[tag.name].items() for value in numbers(needed(tag, name), count))
-    if min(size) < SMALLEST:
-        raise tag.wrong(f"has the size {size} m; each number must be {SMALLEST:g} or more")
-    return size
-
-
-def _plane_size(tag: Tag) -> tuple[float, ...]:
-    size = tag.first("size")
-    sides = (1.0, 1.0) if size is None else numbers(size, 2)
-    if min(sides) < SMALLEST:
-        raise tag.wrong(f"has the size {sides} m; each number must be {SMALLEST:g} or more")
-    return sides
 
 
 def _upon(normal: Vector) -> Pose:
@@ -275,15 +205,12 @@ def _upon(normal: Vector) -> Pose:
 
 
 def _mesh(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) -> Shape | None:
-    scale = vector(tag, "scale", (1.0, 1.0, 1.0))
-    if min(abs(factor) for factor in scale) < SMALLEST:
-        raise tag.wrong(f"has the scale {scale}; a zero flattens the mesh (a negative scale mirrors it)")
     if tag.first("submesh") is not None:
         source.warn(tag, f"({use}) names a <submesh>; the whole file is used")
     uri = word(tag, "uri")
     if not uri:
         raise tag.wrong("has no <uri>")
-    return mesh_shape(tag, uri, scale, pose, use, source, color)
+    return mesh_shape(tag, uri, pose, use, source, color)
 
 
 def _color(tag: Tag, source: Source) -> Color | None:
@@ -293,13 +220,13 @@ def _color(tag: Tag, source: Source) -> Color | None:
     if color is None:
         return None
     red, green, blue, alpha = color
-    return red, green, blue, alpha * (1 - min(max(value(tag, "transparency", 0.0), 0.0), 1.0))
+    return red, green, blue, alpha * (1 - min(max(tag.number("transparency", 0.0), 0.0), 1.0))
 
 
 def _capsule(size: tuple[float, ...]) -> list[Vector]:
     radius, length = size
     ball = [(x * radius, y * radius, z * radius) for x, y, z in _ball()]
-    return [(x, y, z + math.copysign(length / 2, end)) for end in (1, -1) for x, y, z in ball if z * end > -SMALLEST]
+    return [(x, y, z + math.copysign(length / 2, end)) for end in (1, -1) for x, y, z in ball if z * end > -NOISE]
 
 
 def _cone(size: tuple[float, ...]) -> list[Vector]:
@@ -366,22 +293,13 @@ def _inertial(tag: Tag, frame: Pose, static: bool, source: Source) -> Inertial |
         return None if static else GAZEBOS_INERTIAL
     if inertial.attributes.get("auto", "false").strip().lower() in ("true", "1") and not static:
         source.warn(inertial, "is automatic, which is not supported; write <mass> and <inertia>")
-    mass = value(inertial, "mass", 1.0)
+    mass = inertial.number("mass", 1.0)
     if mass < 0:
         raise needed(inertial, "mass").wrong(f"is {mass} kg, which is negative")
     if mass == 0 and not static:
         source.warn(inertial, "has no mass; the link is treated as massless, with no inertia")
     pose = compose(frame, read_pose(inertial).pose)
-    return Inertial(pose, mass, _inertia(inertial) if mass else NO_INERTIA)
-
-
-def _inertia(tag: Tag) -> tuple[float, float, float, float, float, float]:
-    given = tag.first("inertia") or empty(tag)
-    xx, yy, zz = (value(given, name, 1.0) for name in ("ixx", "iyy", "izz"))
-    xy, xz, yz = (value(given, name, 0.0) for name in ("ixy", "ixz", "iyz"))
-    if min(xx, yy, zz) < 0:
-        raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never negative")
-    return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
+    return Inertial(pose, mass, read_inertia(inertial, 1.0) if mass else NO_INERTIA)
 
 
 def _surface(tag: Tag, self_collide: bool, source: Source) -> Surface:
@@ -409,7 +327,7 @@ def _first(surface: Tag, paths: tuple[str, ...]) -> float | None:
         for name in path.split("/"):
             tag = tag.first(name) if tag else None
         if tag is not None:
-            (number,) = numbers(tag, 1, most=math.inf)
+            (number,) = tag.content(1, most=math.inf)
             if number < 0:
                 raise tag.wrong(f"is {number}, which is negative")
             return number
@@ -442,13 +360,13 @@ def read_joint(tag: Tag, name: str, ends: tuple[str, str], frames: tuple[Frame, 
     if kind == "continuous":
         limits = Limits(limits.effort, limits.velocity)
     turned = _clean(triple(inner.inverse.rotation @ axis))
-    return Joint(name, kind, parent, child, pose, turned, limits, *_dynamics(tag), _mimic(tag))
+    return Joint(name, kind, parent, child, pose, turned, limits, *read_dynamics(_axis(tag)), read_mimic(_axis(tag)))
 
 
 def has_spring(tag: Tag) -> bool:
     """Whether a joint has a spring. Raises RobotError."""
     dynamics = _axis(tag).first("dynamics")
-    return dynamics is not None and value(dynamics, "spring_stiffness", 0.0, most=math.inf) != 0
+    return dynamics is not None and dynamics.number("spring_stiffness", 0.0, most=math.inf) != 0
 
 
 def kind_of(tag: Tag) -> str:
@@ -475,18 +393,19 @@ def axis_of(tag: Tag, version: tuple[int, ...]) -> tuple[Vector, str]:
     # Up to SDF 1.4 axes are in the model's frame, in 1.5 and 1.6 only if the flag is set.
     if flag(axis, "use_parent_model_frame", version < (1, 5)):
         within = within or "__model__"
-    return direction(axis, "xyz"), within
+    return axis.direction("xyz", UP), within
 
 
 def _axis(tag: Tag) -> Tag:
-    return tag.first("axis") or empty(tag)
+    return tag.first("axis") or tag.empty("axis")
 
 
 def _limits(tag: Tag) -> Limits:
-    limit = _axis(tag).first("limit") or empty(tag)
-    effort, velocity = (value(limit, name, -1.0, most=math.inf) for name in ("effort", "velocity"))
-    lower = value(limit, "lower", -ENDLESS, most=math.inf)
-    upper = value(limit, "upper", ENDLESS, most=math.inf)
+    limit = _axis(tag).first("limit") or tag.empty("limit")
+    effort, velocity = (limit.number(name, -1.0, most=math.inf) for name in ("effort", "velocity"))
+    lower, upper = (
+        limit.number(name, bound, most=math.inf) for name, bound in (("lower", -ENDLESS), ("upper", ENDLESS))
+    )
     if lower > upper:
         raise limit.wrong(f"has lower {lower} above upper {upper}")
     return Limits(
@@ -495,24 +414,6 @@ def _limits(tag: Tag) -> Limits:
         lower=-math.inf if lower <= -ENDLESS else lower,
         upper=math.inf if upper >= ENDLESS else upper,
     )
-
-
-def _dynamics(tag: Tag) -> tuple[float, float]:
-    """Friction and damping."""
-    dynamics = _axis(tag).first("dynamics") or empty(tag)
-    friction, damping = (value(dynamics, name, 0.0) for name in ("friction", "damping"))
-    if min(friction, damping) < 0:
-        raise dynamics.wrong(f"has friction {friction} and damping {damping}; neither may be negative")
-    return friction, damping
-
-
-def _mimic(tag: Tag) -> Mimic | None:
-    mimic = _axis(tag).first("mimic")
-    if mimic is None:
-        return None
-    multiplier = value(mimic, "multiplier", 1.0)
-    offset = value(mimic, "offset", 0.0) - multiplier * value(mimic, "reference", 0.0)
-    return Mimic(mimic.word("joint"), multiplier, offset)
 
 
 def _clean(axis: Vector) -> Vector:
@@ -528,7 +429,7 @@ MOST_PARTS = 5000  # models and links of one world; a few short files can expand
 
 SUN = "sun"  # a light, not a model
 PLANE = """
-<model name="ground_plane">
+<sdf><model name="ground_plane">
   <static>true</static>
   <link name="link">
     <collision name="collision"><geometry><plane><size>100 100</size></plane></geometry></collision>
@@ -537,7 +438,7 @@ PLANE = """
       <material><diffuse>0.7 0.7 0.7 1</diffuse></material>
     </visual>
   </link>
-</model>
+</model></sdf>
 """
 BUILT_IN = {"ground_plane": PLANE, "asphalt_plane": PLANE}
 """Models of Gazebo's library that worlds rely on."""
@@ -594,7 +495,7 @@ class Includes:
         if name == SUN:
             return None
         if name in BUILT_IN:
-            model = read_xml(BUILT_IN[name], tag.place)
+            model = read_xml(BUILT_IN[name], tag.place).children[0]
             return replace(outer, tag=_overridden(model, tag, tag.place))
         path = self._path(outer, uri)
         if path is None:
@@ -741,4 +642,4 @@ def _overridden(model: Tag, include: Tag, place: str) -> Tag:
     attributes = {**model.attributes, **({"name": name} if name else {})}
     kept = [tag for tag in model.children if tag.name not in given]
     added = [tag for tag in include.children if tag.name in (*given, "plugin", "placement_frame")]
-    return Tag("model", attributes, place, None, "", [*kept, *added])
+    return Tag("model", attributes, place, None, "", [*kept, *added], sdf=True)

@@ -11,8 +11,6 @@ from holozen.robot.sdf import (
     Piece,
     check_world,
     read_file,
-    value,
-    vector,
     version_of,
 )
 from holozen.robot.sdf_models import WORLD, Frames, add_frames, models_in
@@ -81,8 +79,8 @@ def _physics(world: Tag) -> tuple[float, float]:
     """The step in s and the real-time factor."""
     given = world.all("physics")
     chosen = [tag for tag in given if tag.attributes.get("default", "").lower() in ("1", "true")] or given
-    physics = chosen[0] if chosen else Tag("physics", {}, world.place, world)
-    step, rtf = value(physics, "max_step_size", STEP), value(physics, "real_time_factor", 1.0)
+    physics = chosen[0] if chosen else world.empty("physics")
+    step, rtf = physics.number("max_step_size", STEP), physics.number("real_time_factor", 1.0)
     if not SHORTEST <= step <= LONGEST:
         raise (physics.first("max_step_size") or physics).wrong(f"is {step:g} s; use {SHORTEST} to {LONGEST}")
     if not 0 <= rtf <= FASTEST:
@@ -96,7 +94,7 @@ def _gravity(world: Tag) -> Vector:
     owner = next((tag for tag in (world, *old) if tag.first("gravity")), None)
     if owner is None:
         return GRAVITY
-    gravity = vector(owner, "gravity", GRAVITY)
+    gravity = owner.vector("gravity", GRAVITY)
     if max(map(abs, gravity)) > STRONGEST:
         problem = f"is {' '.join(f'{part:g}' for part in gravity)}; use at most {STRONGEST:g} m/s^2 along each axis"
         raise (owner.first("gravity") or owner).wrong(problem)

@@ -3,6 +3,7 @@
 import math
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import replace
 
 from holozen.robot.elements import Source, Tag, Vector, number
@@ -158,9 +159,7 @@ EDGE = 0.1  # m; if the link gives no size
 SMALLEST_EDGE, LARGEST_EDGE = 1e-3, 2.0  # m; an inertia that implies another size is considered a mistake
 WIDEST_BOX = 0.3  # m; inertias are often guesses, and too large a box hides the robot
 
-MOMENTS = ("ixx", "iyy", "izz")
-EXTENTS = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
-"""What gives a shape's size: attributes in URDF, elements in SDF."""
+LARGEST_SHAPE = 1e3  # m
 
 
 def placeholder(tag: Tag, pose: Pose) -> Shape:
@@ -176,13 +175,12 @@ def placeholder(tag: Tag, pose: Pose) -> Shape:
     solid = [found for shape in (link.all("collision") if link and seen else ()) if (found := _box(shape))]
     if solid:
         edges, collision = max(solid, key=lambda found: math.prod(found[0]))
-        return Shape("box", edges, _origin(collision, _is_sdf(collision)) or pose)
+        return Shape("box", edges, _origin(collision) or pose)
     inertial = link.first("inertial") if link else None
     size = None if inertial is None else _box_of_inertia(inertial)
     if inertial is None or size is None:
         return Shape("box", (EDGE, EDGE, EDGE), pose)
-    mass = inertial.first("mass")
-    return Shape("box", size, _origin(inertial, mass is None or "value" not in mass.attributes) or pose)
+    return Shape("box", size, _origin(inertial) or pose)
 
 
 def _around(tag: Tag | None, name: str) -> Tag | None:
@@ -195,50 +193,35 @@ def _box(collision: Tag) -> tuple[tuple[float, ...], Tag] | None:
     """The edges of the box around a collision shape, and its element; None for a mesh or an invalid size."""
     geometry = collision.first("geometry")
     for shape in geometry.children if geometry else ():
-        numbers = [number(word) for name in EXTENTS.get(shape.name, ()) for word in _value(shape, name, name).split()]
-        edges = [value for value in numbers if value is not None and 1e-6 <= value <= 1e3]
-        if shape.name == "box" and len(edges) == 3:
-            return tuple(edges), collision
-        if shape.name == "cylinder" and len(edges) == 2:
-            return (2 * edges[0], 2 * edges[0], edges[1]), collision
-        if shape.name == "sphere" and len(edges) == 1:
-            return (2 * edges[0],) * 3, collision
+        if shape.name in SHAPES:
+            with suppress(RobotError):
+                x, *more = size = read_size(shape)
+                if max(size) <= LARGEST_SHAPE:
+                    return {"box": size, "cylinder": (2 * x, 2 * x, *more), "sphere": (2 * x,) * 3}[
+                        shape.name
+                    ], collision
     return None
-
-
-def _is_sdf(collision: Tag) -> bool:
-    """SDF uses elements where URDF uses attributes."""
-    geometry = collision.first("geometry")
-    return geometry is not None and any(shape.children for shape in geometry.children)
 
 
 def _box_of_inertia(inertial: Tag) -> tuple[float, ...] | None:
     inertia = inertial.first("inertia")
-    mass = number(_value(inertial, "mass", "value"))
-    moments = [number(_value(inertia, name, name)) for name in MOMENTS] if inertia else []
-    known = [moment for moment in moments if moment is not None]
-    if len(known) != 3 or mass is None or mass <= 0:
+    try:
+        mass = inertial.number("mass") if inertial.sdf else needed(inertial, "mass").number("value")
+        moments = [inertia.number(name, most=math.inf) for name in ("ixx", "iyy", "izz")] if inertia else []
+    except RobotError:
         return None
-    squares = [6 * (sum(known) - 2 * moment) / mass for moment in known]
+    if not moments or mass <= 0:
+        return None
+    squares = [6 * (sum(moments) - 2 * moment) / mass for moment in moments]
     if not all(SMALLEST_EDGE**2 <= square <= LARGEST_EDGE**2 for square in squares):
         return None
     return tuple(min(WIDEST_BOX, math.sqrt(square)) for square in squares)
 
 
-def _value(tag: Tag, name: str, attribute: str) -> str:
-    """The value of `name`: an attribute in URDF, a child's text in SDF."""
-    child = tag.first(name)
-    return tag.attributes.get(name, "") if child is None else child.attributes.get(attribute, child.text)
-
-
-def _origin(tag: Tag, sdf: bool) -> Pose | None:
+def _origin(tag: Tag) -> Pose | None:
     """Where a URDF's inertial or collision frame is; None in SDF, and for invalid numbers."""
-    origin = tag.first("origin")
-    if sdf:
-        return None
     try:
-        zero = (0.0, 0.0, 0.0)
-        return Pose() if origin is None else Pose(origin.vector("xyz", zero), origin.vector("rpy", zero))
+        return None if tag.sdf else read_pose(tag)
     except RobotError:
         return None
 
@@ -250,32 +233,42 @@ MOST_MESHES = 200  # in a text received over the network: each takes up to 1 ms 
 MOST_BYTES = 5_000_000  # of a file that such a text refers to: 0.3 s
 SMALLEST = 1e-6  # of a size in metres, and of a mesh's scale
 
-SIZES = {"box": ("size", 3), "cylinder": ("radius length", 1), "sphere": ("radius", 1)}
-"""Attributes that give a shape's size, and how many numbers each contains."""
+SHAPES = ("box", "cylinder", "sphere")  # of URDF
+SIZES = {
+    "box": {"size": 3},
+    "sphere": {"radius": 1},
+    "cylinder": {"radius": 1, "length": 1},
+    "capsule": {"radius": 1, "length": 1},
+    "cone": {"radius": 1, "length": 1},
+    "ellipsoid": {"radii": 3},
+    "plane": {"size": 2},
+}
+"""The values that give a shape's size, and how many numbers each contains."""
 
 
 def read_shape(tag: Tag, source: Source) -> Shape:
     """A `<visual>` or `<collision>`. Raises RobotError."""
     geometry = needed(tag, "geometry")
-    known = [child for child in geometry.children if child.name in SIZES or child.name == "mesh"]
+    known = [child for child in geometry.children if child.name in (*SHAPES, "mesh")]
     if not known:
         found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
         raise geometry.wrong(f"contains {found}; it must contain <box>, <cylinder>, <sphere> or <mesh>")
     shape = known[0]
     if shape.name == "mesh":
-        return mesh_shape(shape, shape.word("filename"), _scale(shape), read_pose(tag), tag.name, source)
-    return Shape(shape.name, _size(shape), read_pose(tag))
+        return mesh_shape(shape, shape.word("filename"), read_pose(tag), tag.name, source)
+    return Shape(shape.name, read_size(shape), read_pose(tag))
 
 
-def mesh_shape(
-    tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Source, color: Color | None = None
-) -> Shape:
+def mesh_shape(tag: Tag, uri: str, pose: Pose, use: str, source: Source, color: Color | None = None) -> Shape:
     """The mesh that `uri` names, for a visual or collision (`use`) of a link around `tag`, in URDF or SDF.
 
     A collision mesh is read, a visual one only located. A missing or invalid mesh is replaced by a box with a
     warning, or is a RobotError with `source.strict`. In text received over the network visual meshes are not even
     looked up.
     """
+    scale = tag.vector("scale", (1.0, 1.0, 1.0))
+    if min(abs(factor) for factor in scale) < SMALLEST:
+        raise tag.wrong(f"has the scale {scale}; a zero flattens the mesh (a negative scale mirrors it)")
     if use == "visual" and source.confined:
         return Shape("mesh", scale, pose, color=color)
     try:
@@ -328,16 +321,9 @@ def read_pose(tag: Tag) -> Pose:
     return Pose() if origin is None else Pose(origin.vector("xyz", zero), origin.vector("rpy", zero))
 
 
-def _size(tag: Tag) -> tuple[float, ...]:
-    attributes, count = SIZES[tag.name]
-    size = tuple(value for attribute in attributes.split() for value in tag.numbers(attribute, count))
+def read_size(tag: Tag, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
+    """The size of a shape in metres, as SIZES lists it. Raises RobotError."""
+    size = tuple(value for name, count in SIZES[tag.name].items() for value in tag.numbers(name, count, default))
     if min(size) < SMALLEST:
         raise tag.wrong(f"has the size {size} m; each number must be {SMALLEST:g} or more")
     return size
-
-
-def _scale(tag: Tag) -> Vector:
-    scale = tag.vector("scale", (1.0, 1.0, 1.0))
-    if min(abs(factor) for factor in scale) < SMALLEST:
-        raise tag.wrong(f"has the scale {scale}; a zero flattens the mesh (a negative scale mirrors it)")
-    return scale

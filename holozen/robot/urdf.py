@@ -12,7 +12,7 @@ from holozen.robot.inertia import (
     NO_INERTIA,
     check_drive,
     massless,
-    positive_definite,
+    read_inertia,
     warn_massless,
     with_moments,
     without,
@@ -173,7 +173,6 @@ def _with_contact(tag: Tag) -> Tag:
 # Links and joints.
 
 
-SMALLEST_AXIS = 1e-6
 WORLD = "world"  # a root of this name is the ground: Gazebo fixes the robot to it
 Part = TypeVar("Part", Link, Joint)
 
@@ -238,9 +237,8 @@ def read_joint(tag: Tag, source: Source) -> Joint:
         raise tag.wrong(f"has unknown type {cut(kind)}; known types: {', '.join(JOINT_KINDS)}")
     ends = {name: tag.first(name) for name in ("parent", "child")}
     parent, child = (needed(tag, name).word("link") for name in ends)
-    friction, damping = (_dynamics(tag, name) for name in ("friction", "damping"))
-    axis, limits = _axis(tag, kind), _limits(tag, kind, source)
-    return Joint(tag.word("name"), kind, parent, child, read_pose(tag), axis, limits, friction, damping, _mimic(tag))
+    axis, limits, pose = _axis(tag, kind), _limits(tag, kind, source), read_pose(tag)
+    return Joint(tag.word("name"), kind, parent, child, pose, axis, limits, *read_dynamics(tag), read_mimic(tag))
 
 
 def _visual(tag: Tag, source: Source, materials: Materials) -> Shape:
@@ -249,46 +247,36 @@ def _visual(tag: Tag, source: Source, materials: Materials) -> Shape:
     return replace(shape, color=color) if color else shape
 
 
-def _dynamics(tag: Tag, name: str) -> float:
-    dynamics = tag.first("dynamics")
-    value = 0.0 if dynamics is None else dynamics.number(name, 0.0)
-    if dynamics is not None and value < 0:
-        raise dynamics.wrong(f"{name}: {value} is negative; it would accelerate the joint")
-    return value
+def read_dynamics(owner: Tag) -> tuple[float, float]:
+    """Friction and damping of a URDF's joint, or an SDF's axis. Raises RobotError."""
+    dynamics = owner.first("dynamics") or owner.empty("dynamics")
+    friction, damping = (dynamics.number(name, 0.0) for name in ("friction", "damping"))
+    if min(friction, damping) < 0:
+        raise dynamics.wrong(f"has friction {friction} and damping {damping}; a negative one would drive the joint")
+    return friction, damping
 
 
-def _mimic(tag: Tag) -> Mimic | None:
-    mimic = tag.first("mimic")
+def read_mimic(owner: Tag) -> Mimic | None:
+    """What a URDF's joint, or an SDF's axis, follows. Raises RobotError."""
+    mimic = owner.first("mimic")
     if mimic is None:
         return None
-    return Mimic(mimic.word("joint"), mimic.number("multiplier", 1.0), mimic.number("offset", 0.0))
+    multiplier = mimic.number("multiplier", 1.0)
+    offset = mimic.number("offset", 0.0) - (multiplier * mimic.number("reference", 0.0) if mimic.sdf else 0.0)
+    return Mimic(mimic.word("joint"), multiplier, offset)
 
 
 def _inertial(tag: Tag) -> Inertial:
     mass = needed(tag, "mass").number("value")
     if mass < 0:
         raise needed(tag, "mass").wrong(f"value: {mass} kg is negative")
-    return Inertial(read_pose(tag), mass, _inertia(tag) if mass else NO_INERTIA)
-
-
-def _inertia(tag: Tag) -> tuple[float, float, float, float, float, float]:
-    given = tag.first("inertia") or Tag("inertia", {}, tag.place, tag)
-    xx, xy, xz, yy, yz, zz = (given.number(name, 0.0) for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-    if min(xx, yy, zz) < 0:
-        raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never negative")
-    # Rejecting tensors that are not positive definite would stop many students' robots.
-    return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
+    return Inertial(read_pose(tag), mass, read_inertia(tag, 0.0) if mass else NO_INERTIA)
 
 
 def _axis(tag: Tag, kind: str) -> Vector:
     axis = tag.first("axis")
-    if axis is None or kind in ("fixed", "floating"):
-        return (1.0, 0.0, 0.0)
-    x, y, z = axis.vector("xyz", (1.0, 0.0, 0.0))
-    length = math.hypot(x, y, z)
-    if length < SMALLEST_AXIS:
-        raise axis.wrong("has no direction; a wheel that turns about its y axis has xyz='0 1 0'")
-    return x / length, y / length, z / length
+    forward = (1.0, 0.0, 0.0)
+    return forward if axis is None or kind in ("fixed", "floating") else axis.direction("xyz", forward)
 
 
 def _limits(tag: Tag, kind: str, source: Source) -> Limits:

@@ -169,7 +169,7 @@ class Trace:
             try:
                 done = function(node, macros, symbols)
             except self.library.XacroException as error:
-                self._mend_call(error, node, macros, depth)
+                self._blame_call(error, node, macros, depth)
                 raise
             del self.calls[depth:]
             self._element, self.place = node, place or self.place
@@ -177,7 +177,7 @@ class Trace:
 
         return wrapped
 
-    def _mend_call(self, error: Any, node: Any, macros: Any, depth: int) -> None:
+    def _blame_call(self, error: Any, node: Any, macros: Any, depth: int) -> None:
         """A call that failed before the macro's body is itself at fault, not the macro."""
         words = str(error)
         unknown = words.startswith("unknown macro name:")

@@ -63,7 +63,7 @@ def test_json_has_one_object_a_line(tmp_path: Path) -> None:
     done = run(str(tmp_path / "r.urdf"), "--json")
     (finding,) = map(json.loads, done.stdout.splitlines())
     assert done.returncode == 1
-    assert set(finding) == {"severity", "rule", "file", "line", "expanded", "problem", "reason", "mend"}
+    assert set(finding) == {"severity", "rule", "file", "line", "expanded", "problem", "reason", "fix"}
     assert (finding["line"], finding["rule"], finding["severity"]) == (3, "attribute", "error")
 
 

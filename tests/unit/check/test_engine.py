@@ -61,8 +61,8 @@ def test_properties_and_macros_that_nothing_uses(findings: Findings) -> None:
         HEAD + WHEELS.replace(' ivz="0"', "") + '<xacro:property name="spare" value="1"/>\n<link name="base"/></robot>'
     )
     found = findings(text, "r.xacro")
-    told = [finding.problem for finding in found if finding.rule == "unused"]
-    assert told == ["macro 'part' is not used", "property 'spare' is not used"]
+    message = [finding.problem for finding in found if finding.rule == "unused"]
+    assert message == ["macro 'part' is not used", "property 'spare' is not used"]
 
 
 def test_what_xacro_warns_of_is_a_finding(findings: Findings) -> None:
@@ -94,7 +94,7 @@ def test_a_file_for_others_to_include_is_no_robot_and_no_mistake(rules: Callable
 
 def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
     for name in ["r.urdf", "r.xacro"]:
-        for text, line, mend in [
+        for text, line, fix in [
             ('<robot name="r">\n<lin k name="a"/>\n</robot>', 2, "the word k has no value"),
             ('<robot name="r">\n<link name=a/>\n</robot>', 2, "in quotes"),
             ('<robot name="r">\n<link name="a>\n</link></robot>', 3, "close the quotes"),
@@ -113,7 +113,7 @@ def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
             (finding,) = findings(text, name)
             assert (finding.rule, finding.severity) == ("file", "error")
             assert finding.place.line == line
-            assert mend in str(finding)
+            assert fix in str(finding)
             assert len(str(finding).splitlines()) == 2
 
 

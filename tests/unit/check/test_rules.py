@@ -115,7 +115,7 @@ FINE = [
     # what is in the good robot, and what may as well be there
     ("</robot>", '<gazebo reference="ball"><gravity>false</gravity></gazebo></robot>'),
     (PLUGIN, '<plugin name="x" filename="libgazebo_ros_force.so"><bodyName>base</bodyName></plugin>' + PLUGIN),
-    # Parameters of a plugin that nobody here knows may have any name.
+    # Parameters of a plugin that is unknown here may have any name.
     (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><max_x_velocity>1</max_x_velocity></plugin>' + PLUGIN),
     (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><some_joint>left_jiont</some_joint></plugin>' + PLUGIN),
     ("</robot>", BLUE + BLUE.replace("blue", "green") + "</robot>"),
@@ -141,7 +141,7 @@ FINE = [
 ]
 
 
-def test_what_is_no_mistake_is_not_told(good: str, findings: Findings) -> None:
+def test_what_is_no_mistake_is_not_reported(good: str, findings: Findings) -> None:
     for old, new in FINE:
         assert good.count(old) > 0
         assert findings(good.replace(old, new, 1)) == []
@@ -159,7 +159,7 @@ def test_ros2_control_alone_drives_nothing_here(instead: str, good: str, finding
     (finding,) = findings(text.replace("</robot>", ROS2_CONTROL + "</robot>"))
     assert (finding.rule, finding.severity) == ("no-drive", "warning")
     assert "2 wheels but no drive plugin; not supported:" in finding.problem and "ros2" in finding.problem
-    assert "libgazebo_ros_diff_drive.so" in finding.mend and "--drive planar_move" in finding.mend
+    assert "libgazebo_ros_diff_drive.so" in finding.fix and "--drive planar_move" in finding.fix
 
 
 def test_an_arm_needs_no_drive(findings: Findings) -> None:
@@ -171,10 +171,10 @@ def test_the_settings_of_a_file_for_others_to_include_are_not_lost(rules: Rules)
     assert "gazebo-link" not in rules('<robot name="r"><gazebo reference="base"><mu1>1</mu1></gazebo></robot>')
 
 
-def test_a_world_is_told_how_to_be_seen(findings: Findings) -> None:
+def test_a_world_is_refused_with_the_command_that_shows_it(findings: Findings) -> None:
     (finding,) = findings('<sdf version="1.9"><world name="w"/></sdf>', "w.sdf")
     assert "is a world; see it with: holozen sim --world FILE" in finding.problem
-    assert finding.mend == "check takes a robot, or a single <model>"
+    assert finding.fix == "check takes a robot, or a single <model>"
 
 
 def test_the_good_robots_are_silent(good: str, good_sdf: str, findings: Findings) -> None:
@@ -183,11 +183,11 @@ def test_the_good_robots_are_silent(good: str, good_sdf: str, findings: Findings
 
 
 def test_a_rule_finds_its_mistake_and_no_other_does(good: str, findings: Findings) -> None:
-    for rule, old, new, told in BROKEN:
+    for rule, old, new, message in BROKEN:
         assert good.count(old) > 0
         found = findings(good.replace(old, new, 1))
         assert {finding.rule for finding in found} == {rule}, "\n".join(map(str, found))
-        assert any(told in str(finding) for finding in found)
+        assert any(message in str(finding) for finding in found)
 
 
 def test_a_wheel_without_collision_sinks(good: str, rules: Rules) -> None:
@@ -273,7 +273,7 @@ def test_in_sdf_a_plugin_counts_in_a_model_a_world_or_a_sensor(good_sdf: str, ru
     assert rules(good_sdf.replace(link, link + plugin), "robot.sdf") == []
 
 
-def test_a_skid_steer_may_be_told_a_wider_base(good: str, rules: Rules) -> None:
+def test_a_skid_steer_may_be_given_a_wider_base(good: str, rules: Rules) -> None:
     wide = good.replace("<wheelSeparation>0.24", "<wheelSeparation>0.4")
     assert rules(wide) == ["wheel-measure"]
     start, end = wide.index('<link name="left_wheel">'), wide.index('<link name="ball">')
@@ -313,13 +313,13 @@ def test_names_are_wanted_by_a_file(good: str, findings: Findings, tmp_path: Pat
     ]
     (tmp_path / "names.txt").write_text("\n".join([*lines, "wheel x", "joint a b", "link"]))
     found = findings(good, requirements=Requirements(require=tmp_path / "names.txt"))
-    told = [(finding.rule, finding.place.line, finding.problem) for finding in found]
-    assert [line for rule, line, _ in told if rule == "require-file"] == [6, 7, 8]
-    assert [problem for rule, _, problem in told if rule == "require"] == [
+    message = [(finding.rule, finding.place.line, finding.problem) for finding in found]
+    assert [line for rule, line, _ in message if rule == "require-file"] == [6, 7, 8]
+    assert [problem for rule, _, problem in message if rule == "require"] == [
         "there is no link 'bsae' (did you mean 'base'?)",
         "joint 'left_joint' is continuous, not prismatic",
     ]
 
 
-def test_a_file_of_names_that_is_not_there_is_told(good: str, rules: Rules, tmp_path: Path) -> None:
+def test_a_file_of_names_that_is_not_there_is_reported(good: str, rules: Rules, tmp_path: Path) -> None:
     assert rules(good, requirements=Requirements(require=tmp_path / "nowhere.txt")) == ["require-file"]

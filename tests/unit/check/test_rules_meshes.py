@@ -54,24 +54,24 @@ def test_a_mesh_that_git_lfs_has_not_fetched(name: str, good: str, findings: Fin
     (finding,) = findings(with_mesh(good, name))
     assert finding.rule == "mesh-empty"
     assert finding.problem == f"mesh {tmp_path / name}: is a Git LFS pointer, not a mesh; run: git lfs pull"
-    assert finding.mend == "then check again"
+    assert finding.fix == "then check again"
 
 
 @pytest.mark.parametrize(
-    ("uri", "mend"), [("package://lost/a.stl", "write package://PACKAGE"), ("model://lost/a.stl", "GAZEBO_MODEL_PATH")]
+    ("uri", "fix"), [("package://lost/a.stl", "write package://PACKAGE"), ("model://lost/a.stl", "GAZEBO_MODEL_PATH")]
 )
-def test_where_a_package_was_looked_for_is_told_once(uri: str, mend: str, good: str, findings: Findings) -> None:
+def test_where_a_package_was_looked_for_is_reported_once(uri: str, fix: str, good: str, findings: Findings) -> None:
     other = '<sphere radius="0.015"/>'
     assert other in good
     found = findings(with_mesh(good, uri).replace(other, f'<mesh filename="{uri}"/>'))
     first, second = (finding for finding in found if finding.rule == "mesh")
     assert "packages found" in first.problem and "looked in" in first.problem
     assert second.problem.endswith("there is no package 'lost'")
-    assert mend in first.mend and mend in second.mend
+    assert fix in first.fix and fix in second.fix
 
 
 @pytest.mark.parametrize(
-    ("size", "scale", "mend"),
+    ("size", "scale", "fix"),
     [
         (300.0, "1 1 1", 'scale="0.001 0.001 0.001" makes it 0.3 m'),
         (0.3, "0.001 0.001 0.001", 'scale="1 1 1" makes it 0.3 m'),
@@ -81,12 +81,12 @@ def test_where_a_package_was_looked_for_is_told_once(uri: str, mend: str, good: 
     ],
 )
 def test_a_mesh_in_another_unit(
-    size: float, scale: str, mend: str, good: str, findings: Findings, tmp_path: Path
+    size: float, scale: str, fix: str, good: str, findings: Findings, tmp_path: Path
 ) -> None:
     stl(tmp_path / "body.stl", size)
     (finding,) = findings(with_mesh(good, "body.stl", scale))
     assert finding.rule == "mesh-unit"
-    assert mend in finding.mend
+    assert fix in finding.fix
 
 
 def test_a_mesh_that_is_only_seen_does_not_count_for_the_size(good: str, rules: Rules, tmp_path: Path) -> None:

@@ -21,9 +21,9 @@ from holozen.robot.errors import RobotError
 def refusal(text: str) -> str:
     with pytest.raises(RobotError) as error:
         read_xml(text, "f")
-    told = str(error.value)
-    assert "\n" not in told
-    return told
+    message = str(error.value)
+    assert "\n" not in message
+    return message
 
 
 def test_text_between_comments_and_elements_is_one_text() -> None:
@@ -46,14 +46,14 @@ def test_too_much_text_is_refused_with_its_size_and_what_is_allowed() -> None:
 def test_one_element_too_many_is_refused_before_the_rest_is_read() -> None:
     most = "<b/>" * (MOST_ELEMENTS - 1)
     assert len(read_xml(f"<a>{most}</a>", "f").children) == MOST_ELEMENTS - 1
-    told = refusal(f"<a>{most}\n<b/> < broken")
-    assert told == f"f, line 2: <b> is element number {MOST_ELEMENTS + 1}; a file may have at most {MOST_ELEMENTS}"
+    message = refusal(f"<a>{most}\n<b/> < broken")
+    assert message == f"f, line 2: <b> is element number {MOST_ELEMENTS + 1}; a file may have at most {MOST_ELEMENTS}"
 
 
 def test_elements_lie_two_hundred_deep_and_no_deeper() -> None:
     read_xml("<a>" * DEEPEST + "</a>" * DEEPEST, "f")
-    told = refusal("<a>" * DEEPEST + "<b>" + "<c> < broken")
-    assert told == f"f, line 1: <b> lies inside {DEEPEST} others; elements may be nested at most {DEEPEST} deep"
+    message = refusal("<a>" * DEEPEST + "<b>" + "<c> < broken")
+    assert message == f"f, line 1: <b> lies inside {DEEPEST} others; elements may be nested at most {DEEPEST} deep"
 
 
 def test_a_value_is_the_attribute_or_else_the_text() -> None:
@@ -70,7 +70,7 @@ def test_more_warnings_than_anyone_reads_are_cut() -> None:
     assert source.warnings[-1] == f"f, line 3: there are more than {MOST_WARNINGS} warnings; the rest are not listed"
 
 
-def test_the_nearest_name_is_told_whatever_its_case() -> None:
+def test_the_nearest_name_is_reported_whatever_its_case() -> None:
     source = Source(Path("r.urdf"), {})
     assert source.nearest("chasis", ["wheel", "chassis"]) == "; did you mean 'chassis'?"
     assert source.nearest("WHEEL", ["wheel", "chassis"]) == "; did you mean 'wheel'?"
@@ -87,8 +87,8 @@ def test_what_names_have_in_common_makes_them_no_nearer() -> None:
 
 def test_guessing_ends_in_a_file_of_nothing_but_mistakes() -> None:
     source = Source(Path("r.urdf"), {})
-    told = [source.nearest("whel", ["wheel"]) for _ in range(MOST_GUESSES + 1)]
-    assert told == ["; did you mean 'wheel'?"] * MOST_GUESSES + [""]
+    message = [source.nearest("whel", ["wheel"]) for _ in range(MOST_GUESSES + 1)]
+    assert message == ["; did you mean 'wheel'?"] * MOST_GUESSES + [""]
 
 
 HEADER = '<?xml version="1.0"?>'

@@ -1,4 +1,4 @@
-"""No message grows with the words of the file that it tells of."""
+"""Messages stay short, however long the words of the file are."""
 
 from pathlib import Path
 
@@ -43,8 +43,8 @@ def test_a_long_word_of_the_file_does_not_make_a_long_message() -> None:
         ]:
             text = f'<robot name="r">{LINK}{parts}</robot>'
             try:
-                told = parse(text, ORIGIN, confined=confined).warnings
+                message = parse(text, ORIGIN, confined=confined).warnings
             except RobotError as error:
-                told = (str(error),)
-            assert told
-            assert all(len(line) < 1000 for line in told)
+                message = (str(error),)
+            assert message
+            assert all(len(line) < 1000 for line in message)

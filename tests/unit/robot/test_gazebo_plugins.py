@@ -99,15 +99,15 @@ def test_a_negative_timeout_switches_the_watchdog_off() -> None:
     assert drive("<cmd_timeout>-0.2</cmd_timeout>").command_timeout == -1
 
 
-def test_a_base_frame_that_is_no_link_is_told_and_the_root_is_taken() -> None:
+def test_a_base_frame_that_is_no_link_is_reported_and_the_root_is_taken() -> None:
     model = robot(plugin("<robotBaseFrame>chasis</robotBaseFrame>"))
     assert model.drive is not None and model.drive.robot_base_frame == "base"
-    told = "<plugin name='drive'> names the base frame 'chasis', which is not a link; 'base' is used"
-    assert model.warnings == (f"{ORIGIN}, line 3: {told}",)
+    message = "<plugin name='drive'> names the base frame 'chasis', which is not a link; 'base' is used"
+    assert model.warnings == (f"{ORIGIN}, line 3: {message}",)
 
 
 def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it() -> None:
-    for filename, told in [
+    for filename, message in [
         (
             "libgazebo_ros_control.so",
             "is not supported; joint_states is published anyway, and joints follow joint_command",
@@ -127,10 +127,10 @@ def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it() ->
     ]:
         model = robot(plugin("<x/>", filename), plugin(""))
         assert model.drive is not None
-        assert model.warnings == (f"{ORIGIN}, line 3: <plugin name='drive'> ({filename}) {told}",)
+        assert model.warnings == (f"{ORIGIN}, line 3: <plugin name='drive'> ({filename}) {message}",)
 
 
-def test_a_plugin_without_file_name_is_told() -> None:
+def test_a_plugin_without_file_name_is_reported() -> None:
     (warning,) = robot("<plugin/>").warnings
     assert warning.endswith("<plugin> of <robot name='r'> (no filename) is unknown and is ignored")
 
@@ -147,7 +147,7 @@ def test_the_plugin_is_known_by_its_file_name(filename: str) -> None:
     assert robot(plugin("", filename)).drive is not None
 
 
-def test_a_second_planar_move_is_told_and_the_first_drives() -> None:
+def test_a_second_planar_move_is_reported_and_the_first_drives() -> None:
     first, second = (plugin(f"<odometryRate>{rate}</odometryRate>") for rate in (1, 2))
     for gazebo in ((first, second), (first + second,), (f"<a>{first}</a>{second}",), (f"<a>{first}{second}</a>",)):
         model = robot(*gazebo)
@@ -157,7 +157,7 @@ def test_a_second_planar_move_is_told_and_the_first_drives() -> None:
 
 
 def test_a_value_that_cannot_be_is_refused_with_its_tag() -> None:
-    for tags, told in [
+    for tags, message in [
         (
             "<odometryRate>0</odometryRate>",
             "<odometryRate> of <plugin name='drive'> is '0'; it must be a number above 0",
@@ -179,4 +179,4 @@ def test_a_value_that_cannot_be_is_refused_with_its_tag() -> None:
     ]:
         with pytest.raises(RobotError) as error:
             robot(plugin(tags))
-        assert str(error.value).startswith(f"{ORIGIN}, line 3: ") and told in str(error.value)
+        assert str(error.value).startswith(f"{ORIGIN}, line 3: ") and message in str(error.value)

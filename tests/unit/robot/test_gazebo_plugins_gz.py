@@ -40,7 +40,7 @@ def drive(*plugins: str) -> Drive:
     return model.drive
 
 
-def told(model: RobotModel) -> list[str]:
+def message(model: RobotModel) -> list[str]:
     return [warning.removeprefix(f"{ORIGIN}, line 3: ") for warning in model.warnings]
 
 
@@ -69,7 +69,7 @@ def test_each_tag_of_a_diff_drive_is_read() -> None:
     assert drive(plugin("diff-drive", tags)) == expected
 
 
-def test_a_limit_for_both_holds_where_none_of_its_own_is_told() -> None:
+def test_a_limit_for_both_holds_where_none_of_its_own_is_reported() -> None:
     tags = (
         "<max_velocity>1</max_velocity><max_angular_velocity>2</max_angular_velocity>"
         "<max_acceleration>3</max_acceleration>"
@@ -79,28 +79,28 @@ def test_a_limit_for_both_holds_where_none_of_its_own_is_told() -> None:
     assert (found.max_linear_acceleration, found.max_angular_acceleration) == (3, 3)
 
 
-def test_limits_that_differ_are_told_and_the_smaller_holds() -> None:
+def test_limits_that_differ_are_reported_and_the_smaller_holds() -> None:
     tags = "<max_linear_velocity>1</max_linear_velocity><min_linear_velocity>-0.5</min_linear_velocity>"
     model = robot(plugin("diff-drive", PAIRS + tags))
     assert model.drive is not None and model.drive.max_linear == 0.5
-    assert told(model) == [
+    assert message(model) == [
         "<min_linear_velocity> of <plugin name='p'> differs from max_linear_velocity; 0.5 holds both ways"
     ]
 
 
-def test_a_limit_of_jerk_and_a_start_in_motion_are_told() -> None:
+def test_a_limit_of_jerk_and_a_start_in_motion_are_reported() -> None:
     jerk = plugin("diff-drive", f"{PAIRS}<max_linear_jerk>1</max_linear_jerk>")
-    assert told(robot(jerk)) == [
+    assert message(robot(jerk)) == [
         "<max_linear_jerk> of <plugin name='p'> is ignored; velocity and acceleration are limited, jerk is not"
     ]
     moving = plugin(
         "velocity-control", "<initial_linear>0.3 0 0</initial_linear><initial_angular>0 0 0</initial_angular>"
     )
     turning = plugin("velocity-control", "<initial_angular>0 0 1</initial_angular>")
-    assert told(robot(turning)) == [
+    assert message(robot(turning)) == [
         "<initial_angular> of <plugin name='p'> is not used; a robot stands still until it is commanded"
     ]
-    assert told(robot(moving)) == [
+    assert message(robot(moving)) == [
         "<initial_linear> of <plugin name='p'> is not used; a robot stands still until it is commanded"
     ]
 
@@ -126,14 +126,16 @@ def test_a_mecanum_drive_has_a_wheel_at_each_corner() -> None:
     assert drive(plugin("mecanum-drive", CORNERS + measures)).mechanism == Mecanum(*WHEELS, 0.4, 0.5, 0.1)
 
 
-def test_a_second_wheel_at_a_corner_is_told() -> None:
+def test_a_second_wheel_at_a_corner_is_reported() -> None:
     model = robot(plugin("mecanum-drive", f"{CORNERS}<front_left_joint>rr</front_left_joint>"))
     assert model.drive is not None and model.drive.mechanism == Mecanum(*WHEELS)
-    assert told(model) == ["<front_left_joint> of <plugin name='p'> is a second wheel at one corner; only 'fl' drives"]
+    assert message(model) == [
+        "<front_left_joint> of <plugin name='p'> is a second wheel at one corner; only 'fl' drives"
+    ]
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_an_odometry_publisher_tells_the_true_pose_of_a_drive(first: bool) -> None:
+def test_an_odometry_publisher_publishes_the_true_pose_of_a_drive(first: bool) -> None:
     tags = (
         "<odom_frame>bot/map</odom_frame><robot_base_frame>bot/l_fl</robot_base_frame><odom_topic>/where</odom_topic>"
         "<odom_publish_frequency>10</odom_publish_frequency><dimensions>3</dimensions>"
@@ -158,10 +160,10 @@ def test_a_system_has_no_default_names_for_joints() -> None:
         parse(f'<robot name="bot">{links}{joint}<gazebo>{plugin("diff-drive")}</gazebo></robot>', ORIGIN)
 
 
-def test_an_odometry_publisher_without_a_drive_is_told() -> None:
+def test_an_odometry_publisher_without_a_drive_is_reported() -> None:
     model = robot(plugin("odometry-publisher"))
     assert model.drive is None
-    assert told(model) == ["<plugin name='p'> publishes the odometry of a drive, but there is no drive"]
+    assert message(model) == ["<plugin name='p'> publishes the odometry of a drive, but there is no drive"]
 
 
 def test_a_mistake_is_refused_with_the_tag() -> None:

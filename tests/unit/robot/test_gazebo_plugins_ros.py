@@ -54,9 +54,9 @@ def wheels(tags: str, filename: str = DIFF) -> Differential:
 def refusal(tags: str, filename: str = DIFF) -> str:
     with pytest.raises(RobotError) as error:
         robot(tags, filename)
-    told = str(error.value)
-    assert told.startswith(f"{ORIGIN}, line 3: ") and "\n" not in told
-    return told.removeprefix(f"{ORIGIN}, line 3: ")
+    message = str(error.value)
+    assert message.startswith(f"{ORIGIN}, line 3: ") and "\n" not in message
+    return message.removeprefix(f"{ORIGIN}, line 3: ")
 
 
 def test_without_tags_the_defaults_of_gazebo_hold_and_the_links_measure_the_wheels() -> None:
@@ -128,7 +128,7 @@ def test_the_joints_have_the_names_of_the_plugin_when_no_tag_names_them() -> Non
     assert joints_of(model.drive.mechanism) == ("left_joint", "right_joint")
 
 
-def test_pairs_that_differ_are_told_and_the_first_counts() -> None:
+def test_pairs_that_differ_are_reported_and_the_first_counts() -> None:
     pairs = (
         "<left_joint>fl</left_joint><left_joint>rl</left_joint>"
         "<right_joint>fr</right_joint><right_joint>rr</right_joint>"
@@ -136,11 +136,13 @@ def test_pairs_that_differ_are_told_and_the_first_counts() -> None:
     model = robot(f"{pairs}<wheel_diameter>0.2</wheel_diameter><wheel_diameter>0.3</wheel_diameter>")
     assert model.drive is not None and isinstance(model.drive.mechanism, Differential)
     assert model.drive.mechanism.radius == 0.1
-    told = "<wheel_diameter> of <plugin name='p'> differs from the first; one measure is kept for all pairs, the first"
-    assert model.warnings == (f"{ORIGIN}, line 3: {told}",)
+    message = (
+        "<wheel_diameter> of <plugin name='p'> differs from the first; one measure is kept for all pairs, the first"
+    )
+    assert model.warnings == (f"{ORIGIN}, line 3: {message}",)
 
 
-def test_a_skid_steer_has_four_wheels_and_tells_the_true_pose() -> None:
+def test_a_skid_steer_has_four_wheels_and_publishes_the_true_pose() -> None:
     assert drive(CORNERS, SKID) == Drive(
         odometry_rate=100,
         robot_base_frame="base",
@@ -202,7 +204,7 @@ def test_wheely_boi_balances_on_its_two_joints() -> None:
 
 
 def test_a_mistake_is_refused_with_the_tag_and_what_there_is() -> None:
-    for tags, told in [
+    for tags, message in [
         ("", "<plugin name='p'> has no <left_joint>; joints: fl, fr, rl, rr, stiff"),
         ("<leftJoint>fl</leftJoint>", "<plugin name='p'> has no <right_joint>; joints"),
         (
@@ -225,4 +227,4 @@ def test_a_mistake_is_refused_with_the_tag_and_what_there_is() -> None:
         (f"{PAIR}<odometrySource>gps</odometrySource>", "is 'gps'; it must be encoder (0) or world (1)"),
         (f"{PAIR}<publishOdomTF>often</publishOdomTF>", "is 'often'; it must be true or false"),
     ]:
-        assert told in refusal(tags)
+        assert message in refusal(tags)

@@ -1,4 +1,4 @@
-"""Wheels whose measures no tag tells: their links have them, or the plugin is refused."""
+"""Wheels whose measures no tag gives: their links have them, or the plugin is refused."""
 
 from pathlib import Path
 
@@ -47,9 +47,9 @@ def robot(filename: str, tags: str, shape: str = CYLINDER, places: dict[str, str
 def refusal(filename: str, tags: str, shape: str = CYLINDER, places: dict[str, str] = PLACES) -> str:
     with pytest.raises(RobotError) as error:
         robot(filename, tags, shape, places)
-    told = str(error.value)
-    assert told.startswith(f"{ORIGIN}, line 3: <") and "\n" not in told
-    return told
+    message = str(error.value)
+    assert message.startswith(f"{ORIGIN}, line 3: <") and "\n" not in message
+    return message
 
 
 def radius(model: RobotModel) -> float:
@@ -76,30 +76,30 @@ def test_a_cylinder_that_is_only_seen_has_its_radius() -> None:
 
 def test_wheels_without_a_shape_are_refused() -> None:
     for filename, tags in DRIVES.items():
-        told = refusal(filename, tags, "")
-        assert "its wheel 'l_fl' has no shape with a radius of 0.001 m or more; give <wheel_" in told
-        assert ("<wheelDiameter>" in told) == filename.startswith("lib")
+        message = refusal(filename, tags, "")
+        assert "its wheel 'l_fl' has no shape with a radius of 0.001 m or more; give <wheel_" in message
+        assert ("<wheelDiameter>" in message) == filename.startswith("lib")
 
 
 def test_wheels_at_one_place_are_refused() -> None:
     for filename, tags in DRIVES.items():
-        told = refusal(filename, tags, places=dict.fromkeys(PLACES, "0.2 0 0"))
+        message = refusal(filename, tags, places=dict.fromkeys(PLACES, "0.2 0 0"))
         assert (
             "has no <wheel_separation>, and its left and right wheels are at the same y; give <wheel_separation>"
-            in told
+            in message
         )
-        assert ("<wheelSeparation>" in told) == filename.startswith("lib")
+        assert ("<wheelSeparation>" in message) == filename.startswith("lib")
 
 
-def test_wheels_whose_measures_are_told_may_be_anywhere_and_of_any_shape() -> None:
+def test_wheels_whose_measures_are_given_may_be_anywhere_and_of_any_shape() -> None:
     tags = f"{PAIR}<wheelSeparation>0.4</wheelSeparation><wheelDiameter>0.2</wheelDiameter>"
     assert radius(robot("libgazebo_ros_diff_drive.so", tags, "", dict.fromkeys(PLACES, "0 0 0"))) == 0.1
 
 
 def test_a_mecanum_drive_needs_a_wheelbase() -> None:
     places = {name: at.replace("-0.2", "0.2") for name, at in PLACES.items()}
-    told = refusal("gz-sim-mecanum-drive-system", CORNERS, places=places)
-    assert "has no <wheelbase>, and its front and back wheels are at the same x; give <wheelbase>" in told
+    message = refusal("gz-sim-mecanum-drive-system", CORNERS, places=places)
+    assert "has no <wheelbase>, and its front and back wheels are at the same x; give <wheelbase>" in message
 
 
 @pytest.mark.parametrize(
@@ -113,13 +113,13 @@ def test_a_mecanum_drive_needs_a_wheelbase() -> None:
 )
 def test_a_measure_is_at_least_a_millimetre(filename: str, tag: str, least: float) -> None:
     for value in ("1e-310", str(least * 0.99)):
-        told = refusal(filename, f"{DRIVES[filename]}<{tag}>{value}</{tag}>")
-        assert f"<{tag}> of " in told and f"is '{value}'; it must be at least {least:g} m" in told
+        message = refusal(filename, f"{DRIVES[filename]}<{tag}>{value}</{tag}>")
+        assert f"<{tag}> of " in message and f"is '{value}'; it must be at least {least:g} m" in message
     robot(filename, f"{DRIVES[filename]}<{tag}>{least}</{tag}>")
 
 
 @pytest.mark.parametrize(
-    ("filename", "tags", "told"),
+    ("filename", "tags", "message"),
     [
         ("libgazebo_ros_diff_drive.so", PAIR.replace("fr", "fl"), "has the joint 'fl' on the left and on the right"),
         (
@@ -131,13 +131,13 @@ def test_a_measure_is_at_least_a_millimetre(filename: str, tag: str, least: floa
         ("gz-sim-mecanum-drive-system", CORNERS.replace("rr", "rl"), "has the joint 'rl' on the left and on the right"),
     ],
 )
-def test_a_joint_is_one_wheel(filename: str, tags: str, told: str) -> None:
-    assert told in refusal(filename, tags)
+def test_a_joint_is_one_wheel(filename: str, tags: str, message: str) -> None:
+    assert message in refusal(filename, tags)
 
 
 @pytest.mark.parametrize("shape", ["", BOX.format("collision"), CYLINDER.replace("0.1", "0.0005")])
 def test_a_robot_balances_on_round_wheels(shape: str) -> None:
     places = {"jointL": "0 0.2 0", "jointR": "0 -0.2 0"}
-    told = refusal("libwb_plugin.so", "", shape, places)
-    assert "balances on the wheel 'l_jointL', whose collision shapes are not round; give it a <cylinder>" in told
+    message = refusal("libwb_plugin.so", "", shape, places)
+    assert "balances on the wheel 'l_jointL', whose collision shapes are not round; give it a <cylinder>" in message
     assert robot("libwb_plugin.so", "", places=places).drive is not None

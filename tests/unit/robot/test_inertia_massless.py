@@ -1,4 +1,4 @@
-"""Links without mass: lumped over fixed joints, left out on moving ones, as in Gazebo Classic, and told."""
+"""Links without mass: lumped over fixed joints, left out on moving ones, as in Gazebo Classic, with a warning."""
 
 from pathlib import Path
 
@@ -49,11 +49,11 @@ def test_a_massless_link_gets_the_mass_of_what_is_fixed_to_it() -> None:
     assert (list(model.links), model.warnings) == (["a", "b", "c"], ())
 
 
-def test_a_mass_of_zero_on_a_fixed_joint_is_told_and_kept() -> None:
+def test_a_mass_of_zero_on_a_fixed_joint_is_reported_and_kept() -> None:
     model = robot(link("a", HEAVY), link("b", ZERO), joint("ab", "fixed"))
     assert list(model.links) == ["a", "b"]
-    told = "<inertial> of <link name='b'> has no mass; the link is treated as massless, with no inertia"
-    assert model.warnings == (f"{ORIGIN}, line 3: {told}",)
+    message = "<inertial> of <link name='b'> has no mass; the link is treated as massless, with no inertia"
+    assert model.warnings == (f"{ORIGIN}, line 3: {message}",)
 
 
 @pytest.mark.parametrize(("mass", "kept"), [("1e-6", False), ("2e-6", True)])
@@ -77,7 +77,7 @@ def test_what_hangs_on_a_link_that_is_gone_goes_too() -> None:
     assert len(model.warnings) == 2
 
 
-def test_a_base_frame_that_is_gone_is_told() -> None:
+def test_a_base_frame_that_is_gone_is_reported() -> None:
     move = (
         '<gazebo><plugin filename="libgazebo_ros_planar_move.so"><robotBaseFrame>b</robotBaseFrame></plugin></gazebo>'
     )
@@ -108,11 +108,11 @@ def test_a_drive_whose_wheel_has_no_mass_is_refused() -> None:
     )
 
 
-def test_a_root_without_mass_is_told_and_refused_where_wheels_have_to_push_it() -> None:
+def test_a_root_without_mass_is_reported_and_refused_where_wheels_have_to_push_it() -> None:
     parts = (link("a"), link("b", HEAVY), link("c", HEAVY), joint("ab"), joint("ac"))
-    told = f"{ORIGIN}, line 2: <link name='a'> is the root and has no mass, nor have the links fixed to it; "
+    message = f"{ORIGIN}, line 2: <link name='a'> is the root and has no mass, nor have the links fixed to it; "
     (warning,) = robot(*parts, drive("libgazebo_ros_planar_move.so")).warnings
-    assert warning == f"{told}Gazebo drops such a robot, but it is kept here: give it an <inertial>"
+    assert warning == f"{message}Gazebo drops such a robot, but it is kept here: give it an <inertial>"
     with pytest.raises(RobotError) as error:
         robot(*parts, drive("libgazebo_ros_diff_drive.so"))
-    assert str(error.value) == f"{told}Gazebo drops such a robot: give it an <inertial>"
+    assert str(error.value) == f"{message}Gazebo drops such a robot: give it an <inertial>"

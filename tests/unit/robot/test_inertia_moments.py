@@ -37,7 +37,7 @@ SMALL = "is absurdly small for the size of the link's collision shapes"
 
 
 def test_an_inertia_that_no_such_body_has_is_taken_from_the_shapes() -> None:
-    for inertia, told in [
+    for inertia, message in [
         ("", "<inertial> of <link name='a'> has no <inertia>"),
         ('<inertia ixx="0" iyy="0" izz="0"/>', "is zero or not positive definite, which is impossible"),
         ('<inertia ixx="1" iyy="1" izz="1" ixy="5"/>', "is zero or not positive definite, which is impossible"),
@@ -48,7 +48,7 @@ def test_an_inertia_that_no_such_body_has_is_taken_from_the_shapes() -> None:
         assert moments(model) == pytest.approx((CUBE, 0, 0, CUBE, 0, CUBE))
         (warning,) = model.warnings
         assert warning.startswith(f"{ORIGIN}, line 2: ")
-        assert warning.endswith(f"{told}; {TAKEN}")
+        assert warning.endswith(f"{message}; {TAKEN}")
 
 
 @pytest.mark.parametrize("factor", [1 / 50, 1, 50])

@@ -31,9 +31,9 @@ def robot(body: str) -> RobotModel:
 def refusal(body: str) -> str:
     with pytest.raises(RobotError) as error:
         robot(body)
-    told = str(error.value)
-    assert "\n" not in told
-    return told
+    message = str(error.value)
+    assert "\n" not in message
+    return message
 
 
 def inertial(mass: str = "1", inertia: str = 'ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"') -> str:
@@ -121,7 +121,7 @@ def test_joints_of_a_transmission_are_no_joints_of_the_robot() -> None:
 
 
 def test_a_mistake_is_refused_with_file_line_and_element() -> None:
-    for body, told in [
+    for body, message in [
         ("", "line 1: <robot name='r'> has no <link>; a robot has at least one"),
         ("<link/>", "line 2: <link> of <robot name='r'> has no name"),
         ('<link name="a"/>\n<link name="a"/>', "line 3: <link name='a'> is defined twice"),
@@ -145,7 +145,7 @@ def test_a_mistake_is_refused_with_file_line_and_element() -> None:
             TWO_LINKS + JOINT.format("").replace("<parent link", "<parent lnk"),
             "<parent> of <joint name='j'> has no link",
         ),
-        (TWO_LINKS + JOINT.format('<origin rpy="0 1"/>'), "rpy='0 1' has 2 numbers instead of 3"),
+        (TWO_LINKS + JOINT.format('<origin rpy="0 1"/>'), "rpy: '0 1' has 2 numbers instead of 3"),
         (TWO_LINKS + JOINT.format('<origin xyz="0, 1, 2"/>'), "xyz: '0,' is not a finite number"),
         (TWO_LINKS + JOINT.format('<origin xyz=""/>'), "<origin> of <joint name='j'> has no xyz"),
         (
@@ -154,7 +154,7 @@ def test_a_mistake_is_refused_with_file_line_and_element() -> None:
         ),
         (
             TWO_LINKS + JOINT.format('<dynamics friction="-1"/>'),
-            "<dynamics> of <joint name='j'> friction: -1.0 is negative",
+            "<dynamics> of <joint name='j'> has friction -1.0 and damping 0.0",
         ),
         (TWO_LINKS + JOINT.format('<dynamics damping="abc"/>'), "damping: 'abc' is not a finite number"),
         (TWO_LINKS + JOINT.format("<mimic/>"), "<mimic> of <joint name='j'> has no joint"),
@@ -180,11 +180,11 @@ def test_a_mistake_is_refused_with_file_line_and_element() -> None:
         (collision('<cylinder radius="-1" length="1"/>'), "has the size (-1.0, 1.0) m"),
         (collision('<sphere radius="0"/>'), "<sphere> of <link name='a'> has the size (0.0,) m"),
         (collision('<mesh filename="x" scale="0 1 1"/>'), "has the scale (0.0, 1.0, 1.0)"),
-        (collision('<mesh filename="x" scale="0.01"/>'), "scale='0.01' has 1 numbers instead of 3"),
+        (collision('<mesh filename="x" scale="0.01"/>'), "scale: '0.01' has 1 numbers instead of 3"),
         (collision("<mesh/>"), "<mesh> of <link name='a'> has no filename"),
     ]:
         line = refusal(body)
-        assert line.startswith(f"{ORIGIN}, line ") and told in line
+        assert line.startswith(f"{ORIGIN}, line ") and message in line
 
 
 def joined(*pairs: str) -> str:
@@ -201,12 +201,12 @@ def test_a_circle_of_joints_is_refused_also_beside_a_sound_tree() -> None:
 
 
 def test_a_link_with_two_parents_is_refused() -> None:
-    told = f"{ORIGIN}, line 5: <joint name='bc'> has the child link 'c', which is already the child of joint 'ac'"
-    assert refusal(joined("ab", "ac", "bc")) == told
+    message = f"{ORIGIN}, line 5: <joint name='bc'> has the child link 'c', which is already the child of joint 'ac'"
+    assert refusal(joined("ab", "ac", "bc")) == message
 
 
 def test_what_is_no_robot_is_refused_with_its_line() -> None:
-    for text, told in [
+    for text, message in [
         ("", ": the file is empty"),
         (" \r\n", ": the file is empty"),
         (
@@ -231,11 +231,11 @@ def test_what_is_no_robot_is_refused_with_its_line() -> None:
     ]:
         with pytest.raises(RobotError) as error:
             parse(text, ORIGIN)
-        assert str(error.value).startswith(f"{ORIGIN}{told}" if told[0] in ",:" else str(ORIGIN))
-        assert told in str(error.value)
+        assert str(error.value).startswith(f"{ORIGIN}{message}" if message[0] in ",:" else str(ORIGIN))
+        assert message in str(error.value)
 
 
-def test_an_inertia_that_no_body_has_makes_a_point_mass_and_is_told() -> None:
+def test_an_inertia_that_no_body_has_makes_a_point_mass_and_is_reported() -> None:
     for inertia, possible in [
         ('ixx="0" iyy="0" izz="0"', False),
         ('ixx="1" iyy="1" ivz="1"', False),
@@ -249,8 +249,8 @@ def test_an_inertia_that_no_body_has_makes_a_point_mass_and_is_told() -> None:
         part = model.links["a"].inertial
         assert part is not None and part.mass == 1
         assert any(part.inertia) == possible
-        told = f"{ORIGIN}, line 2: <inertia> of <link name='a'> is zero or not positive definite"
-        assert [warning.startswith(told) for warning in model.warnings] == ([] if possible else [True])
+        message = f"{ORIGIN}, line 2: <inertia> of <link name='a'> is zero or not positive definite"
+        assert [warning.startswith(message) for warning in model.warnings] == ([] if possible else [True])
 
 
 def test_a_long_value_is_cut_and_an_error_outside_all_elements_stands_alone() -> None:
@@ -261,7 +261,7 @@ def test_a_long_value_is_cut_and_an_error_outside_all_elements_stands_alone() ->
     assert str(error.value) == f"{ORIGIN}, line 1: broken XML: syntax error"
 
 
-def test_a_mass_of_zero_is_told() -> None:
+def test_a_mass_of_zero_is_reported() -> None:
     (warning,) = robot(inertial(mass="0")).warnings
     assert warning.startswith(f"{ORIGIN}, line 2: <inertial> of <link name='a'> has no mass")
 
@@ -478,8 +478,8 @@ def test_an_sdf_s_uri_in_cdata_is_replaced_whole(folder: Path) -> None:
 def test_a_mesh_that_cannot_be_sent_is_left_with_a_warning(folder: Path) -> None:
     text, warnings = sent(folder, URDF % "gone.stl")
     assert "'gone.stl'" in text and len(DATA.findall(text)) == 1
-    told = f"{folder}/robot.urdf: the collision mesh 'gone.stl' is not sent: no such file 'gone.stl'; looked for "
-    assert len(warnings) == 1 and warnings[0].startswith(told)
+    message = f"{folder}/robot.urdf: the collision mesh 'gone.stl' is not sent: no such file 'gone.stl'; looked for "
+    assert len(warnings) == 1 and warnings[0].startswith(message)
 
 
 def test_what_holds_its_mesh_already_is_kept(folder: Path) -> None:
@@ -488,15 +488,15 @@ def test_what_holds_its_mesh_already_is_kept(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("<robot>", "broken XML"),
         ('<!DOCTYPE r [<!ENTITY a "b">]><robot/>', "the entity 'a' is declared"),
         ("", "is empty"),
     ],
 )
-def test_a_file_that_is_none_is_refused(folder: Path, text: str, told: str) -> None:
-    with pytest.raises(RobotError, match=told):
+def test_a_file_that_is_none_is_refused(folder: Path, text: str, message: str) -> None:
+    with pytest.raises(RobotError, match=message):
         sent(folder, text)
 
 
@@ -560,7 +560,7 @@ def test_a_file_saved_on_windows_loads_as_well(home: Path, ends: str, mark: str)
 
 
 @pytest.mark.parametrize(
-    ("mistake", "told"),
+    ("mistake", "message"),
     [
         (
             {"frame": "chasis"},
@@ -602,8 +602,8 @@ def test_a_file_saved_on_windows_loads_as_well(home: Path, ends: str, mark: str)
         ),
     ],
 )
-def test_a_mistake_that_people_make_is_told_in_one_line_and_the_robot_drives(
-    home: Path, mistake: dict[str, str], told: str
+def test_a_mistake_that_people_make_is_reported_in_one_line_and_the_robot_drives(
+    home: Path, mistake: dict[str, str], message: str
 ) -> None:
     path = workspace(home, "ws", hb_bot(**mistake))  # type: ignore[arg-type]
     model = load(path)
@@ -611,10 +611,10 @@ def test_a_mistake_that_people_make_is_told_in_one_line_and_the_robot_drives(
     (warning,) = model.warnings
     place, _, problem = warning.partition(": ")
     assert place.startswith(f"{path} (as `holozen xacro` prints it), line ")
-    assert problem == told
+    assert problem == message
 
 
-def test_a_second_plugin_of_the_lesson_is_told(home: Path) -> None:
+def test_a_second_plugin_of_the_lesson_is_reported(home: Path) -> None:
     model = load(workspace(home, "ws", hb_bot(plugin=ROS_1 + ROS_2)))
     assert model.drive == DRIVE
     (warning,) = model.warnings

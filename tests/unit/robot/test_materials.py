@@ -44,7 +44,7 @@ def test_three_or_four_numbers_are_a_colour(words: str, color: Color) -> None:
     assert notes.warnings == []
 
 
-def test_anything_else_is_told_and_left_out() -> None:
+def test_anything_else_is_reported_and_left_out() -> None:
     for words in ["", "1 0", "1 0 0 0 0", "255 0 0 1", "-0.1 0 0", "red", "nan 0 0 1", "0,0,0,1"]:
         notes = source()
         assert read_color(TAG, words, notes) is None
@@ -73,7 +73,7 @@ def colors(model: RobotModel) -> list[Color | None]:
     return [shape.color for shape in model.links["a"].visuals]
 
 
-def told(model: RobotModel) -> list[str]:
+def message(model: RobotModel) -> list[str]:
     return [warning.removeprefix(f"{ORIGIN}, line ") for warning in model.warnings]
 
 
@@ -90,36 +90,36 @@ def test_a_material_gives_its_colour_by_itself_or_by_its_name() -> None:
         assert (colors(model), model.warnings) == ([(1, 0, 0, 1)], ())
 
 
-def test_a_material_told_in_one_visual_is_known_to_the_others_before_and_after() -> None:
+def test_a_material_defined_in_one_visual_is_known_to_the_others_before_and_after() -> None:
     model = robot('<material name="x"/>', f'<material name="x">{RED}</material>', '<material name="x"/>', "")
     assert (colors(model), model.warnings) == ([(1, 0, 0, 1)] * 3 + [None], ())
 
 
-def test_a_material_that_nothing_tells_is_a_warning_with_the_nearest_one() -> None:
+def test_an_undefined_material_causes_a_warning_with_the_nearest_one() -> None:
     model = robot('<material name="blak"/>', around=f'<material name="black">{RED}</material>')
     assert colors(model) == [None]
-    assert told(model) == [
+    assert message(model) == [
         "2: <material name='blak'> has no colour, neither here nor in <robot>; did you mean 'black'?"
     ]
 
 
-def test_a_colour_that_is_none_is_told_once() -> None:
+def test_a_colour_that_is_none_is_reported_once() -> None:
     model = robot('<material name="x"><color rgba="255 0 0 1"/></material>')
     assert colors(model) == [None]
-    (warning,) = told(model)
+    (warning,) = message(model)
     assert warning.startswith("2: <color> of <material name='x'> has the colour '255 0 0 1', which is left out")
 
 
-def test_a_material_twice_is_told_and_the_first_counts() -> None:
+def test_a_material_twice_is_reported_and_the_first_counts() -> None:
     twice = f'<material name="x">{RED}</material>\n<material name="x"><color rgba="0 1 0 1"/></material>'
     model = robot('<material name="x"/>', around=twice)
     assert colors(model) == [(1, 0, 0, 1)]
-    assert told(model) == ["4: <material name='x'> is defined twice; the first is used"]
+    assert message(model) == ["4: <material name='x'> is defined twice; the first is used"]
 
 
-def test_a_picture_without_colour_is_told() -> None:
+def test_a_picture_without_colour_is_reported() -> None:
     model = robot('<material name="x"><texture filename="a.png"/></material>')
-    (warning,) = told(model)
+    (warning,) = message(model)
     assert (
         warning == "2: <material name='x'> is a texture; textures are not shown, and it has no <color> to show instead"
     )
@@ -141,11 +141,11 @@ def test_the_colour_of_gazebo_wins_over_that_of_urdf() -> None:
         assert (colors(model), model.warnings) == ([(0, 1, 0, 1)] * 2, ())
 
 
-def test_a_colour_that_gazebo_does_not_know_is_told_and_urdfs_stays() -> None:
+def test_a_colour_that_gazebo_does_not_know_is_reported_and_urdfs_stays() -> None:
     gazebo = '<gazebo reference="a"><material>Gazebo/Gren</material></gazebo>'
     model = robot(f'<material name="x">{RED}</material>', around=gazebo)
     assert colors(model) == [(1, 0, 0, 1)]
-    assert told(model) == [
+    assert message(model) == [
         "3: <material> of <robot name='r'> names the colour 'Gazebo/Gren', which Gazebo does not have; "
         "did you mean 'Gazebo/Green'?"
     ]

@@ -83,7 +83,7 @@ def test_a_bad_mesh_is_read_once_too(cube: Path, reads: list[str]) -> None:
 
 
 def stl_of(triangles: int, corners: np.ndarray) -> bytes:
-    """A binary STL whose head tells `triangles`."""
+    """A binary STL whose header gives `triangles`."""
     body = b"".join(struct.pack("<12fH", 0, 0, 0, *row.ravel(), 0) for row in corners.reshape(-1, 3, 3))
     return bytes(80) + struct.pack("<I", triangles) + body
 
@@ -97,8 +97,8 @@ NEEDLE = stl_of(1, np.array([0, 0, 0, 1, 0, 0, 0, 2**-16, 0]))
 POINT = stl_of(1, np.ones(9))
 
 
-def test_a_bad_mesh_is_told_in_one_line_with_its_file(tmp_path: Path) -> None:
-    for name, data, told in [
+def test_a_bad_mesh_is_reported_in_one_line_with_its_file(tmp_path: Path) -> None:
+    for name, data, message in [
         ("a.stl", b"", "is empty (0 bytes)"),
         ("a.dae", b"", "is empty (0 bytes)"),
         ("a.obj", b"", "is empty (0 bytes)"),
@@ -118,7 +118,7 @@ def test_a_bad_mesh_is_told_in_one_line_with_its_file(tmp_path: Path) -> None:
     ]:
         path = tmp_path / name
         path.write_bytes(data)
-        assert refusal(path) == f"{path}: {told}"
+        assert refusal(path) == f"{path}: {message}"
 
 
 @pytest.mark.parametrize(("name", "size"), [("a.stl", 301_000_000), ("a.dae", 101_000_000), ("a.obj", 81_000_000)])
@@ -145,18 +145,18 @@ def test_a_fifo_is_not_opened(tmp_path: Path) -> None:
     assert refusal(path) == f"{path}: is not a file that could contain a mesh"
 
 
-def test_a_folder_and_a_missing_file_are_told(tmp_path: Path) -> None:
+def test_a_folder_and_a_missing_file_are_reported(tmp_path: Path) -> None:
     (tmp_path / "a.stl").mkdir()
     assert refusal(tmp_path / "a.stl") == f"{tmp_path}/a.stl: is not a file that could contain a mesh"
     assert refusal(tmp_path / "gone.stl") == f"{tmp_path}/gone.stl: No such file or directory"
     assert "null" in refusal(tmp_path / "\0.stl")
 
 
-def test_a_file_that_may_not_be_read_is_told(cube: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_may_not_be_read_is_reported(cube: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_words: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("builtins.open", refuse)  # root, who runs many a test, may read everything
+    monkeypatch.setattr("builtins.open", refuse)  # root, as whom many tests run, may read everything
     assert refusal(cube) == f"{cube}: Permission denied"
 
 
@@ -185,8 +185,8 @@ def encoded(data: bytes) -> str:
     return DATA + base64.b64encode(data).decode()
 
 
-def test_a_bad_data_uri_is_told() -> None:
-    for uri, told in [
+def test_a_bad_data_uri_is_reported() -> None:
+    for uri, message in [
         ("data:,x", "'data:,x' is not supported; write data:model/stl;base64,..."),
         (
             "data:text/html;base64,AAAA",
@@ -201,4 +201,4 @@ def test_a_bad_data_uri_is_told() -> None:
     ]:
         with pytest.raises(RobotError) as error:
             data_hull(uri)
-        assert str(error.value) == told
+        assert str(error.value) == message

@@ -132,8 +132,8 @@ ENTITY = dae().replace("<COLLADA", '<!DOCTYPE x [<!ENTITY a "aaaa">]>\n<COLLADA'
 LOOP = '<library_nodes><node id="n"><instance_node url="#n"/></node></library_nodes>'
 
 
-def test_what_is_no_mesh_is_told_in_one_line_with_its_place() -> None:
-    for text, told in [
+def test_what_is_no_mesh_is_reported_in_one_line_with_its_place() -> None:
+    for text, message in [
         ("<COLLADA><asset>", "a.dae, line 1: broken XML: no element found"),
         ("<html/>", "a.dae, line 1: <html> is not a <COLLADA>; a .dae file starts with one"),
         (ENTITY, "a.dae, line 2: the entity 'a' is declared; write out its text instead"),
@@ -151,7 +151,7 @@ def test_what_is_no_mesh_is_told_in_one_line_with_its_place() -> None:
         (dae().replace('stride="3"', 'stride="1"'), "<accessor> has offset 0 and stride 1"),
         (dae().replace('"POSITION"', '"NORMAL"'), "<vertices> has no <input semantic='POSITION'>"),
     ]:
-        assert told in refusal(text)
+        assert message in refusal(text)
         assert refusal(text).startswith("a.dae, line ")
 
 

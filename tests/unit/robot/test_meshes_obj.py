@@ -32,8 +32,8 @@ def test_a_file_without_faces_has_no_vertices() -> None:
     assert vertices(POINTS) == []
 
 
-def test_what_is_no_mesh_is_told_with_its_line() -> None:
-    for line, told in [
+def test_what_is_no_mesh_is_reported_with_its_line() -> None:
+    for line, message in [
         ("v 0 0", "a.obj, line 4: a vertex with 2 numbers instead of 3"),
         ("v 0 0 x", "a.obj, line 4: could not convert string to float: b'x'"),
         ("f 1 2 x", "a.obj, line 4: invalid literal for int() with base 10: b'x'"),
@@ -43,4 +43,4 @@ def test_what_is_no_mesh_is_told_with_its_line() -> None:
     ]:
         with pytest.raises(RobotError) as error:
             vertices(f"{POINTS}{line}\n")
-        assert str(error.value) == told
+        assert str(error.value) == message

@@ -49,11 +49,11 @@ def test_an_ascii_file_may_hold_several_solids() -> None:
 
 
 @pytest.mark.parametrize("data", [ASCII[:-20], ASCII[: len(ASCII) // 2], b"solid " + b"x" * 100])
-def test_an_ascii_file_that_is_cut_off_is_told(data: bytes) -> None:
+def test_an_ascii_file_that_is_cut_off_is_reported(data: bytes) -> None:
     assert refusal(data) == "a.stl: is cut off: it does not end with 'endsolid'; export it again as STL"
 
 
-def test_a_facet_of_two_vertices_is_told() -> None:
+def test_a_facet_of_two_vertices_is_reported() -> None:
     first = ASCII.index(b"vertex")
     assert "is cut off" in refusal(ASCII[:first] + ASCII[ASCII.index(b"vertex", first + 1) :])
 
@@ -66,7 +66,7 @@ def test_a_long_file_without_facets_is_not_gathered(monkeypatch: pytest.MonkeyPa
     assert file.tell() < 1000
 
 
-def test_a_vertex_without_numbers_is_told() -> None:
+def test_a_vertex_without_numbers_is_reported() -> None:
     data = b"solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\nendloop\nendfacet\nendsolid a" + b" " * 84
     assert refusal(data) == "a.stl: a vertex is not a number: could not convert string to float: b'x'"
 

@@ -32,7 +32,7 @@ def test_a_given_folder_wins_over_everything_else(home: Path, monkeypatch: pytes
     assert find_package("holo", start, {"holo": given}) == given
 
 
-def test_a_given_folder_that_does_not_exist_is_told(home: Path) -> None:
+def test_a_given_folder_that_does_not_exist_is_reported(home: Path) -> None:
     with pytest.raises(RobotError, match=r"--package holo=.*gone: there is no such folder"):
         find_package("holo", robot_file(home), {"holo": home / "gone"})
 
@@ -241,20 +241,20 @@ def test_a_path_of_another_machine_is_not_looked_for_in_hidden_folders(start: Pa
         resolve_uri("/home/asha/lost.stl", start)
 
 
-def test_a_missing_file_is_told_with_the_places_it_was_looked_for(start: Path, home: Path) -> None:
+def test_a_missing_file_is_reported_with_the_places_it_was_looked_for(start: Path, home: Path) -> None:
     with pytest.raises(RobotError) as error:
         resolve_uri("package://holo/meshes/gone.dae", start)
     expected = f"no such file 'package://holo/meshes/gone.dae'; looked for {home}/holo/meshes/gone.dae"
     assert str(error.value) == expected
 
 
-def test_what_is_no_file_is_told(start: Path) -> None:
+def test_what_is_no_file_is_reported(start: Path) -> None:
     for uri in ["", "package://holo", "meshes", "package://holo/%00", "x" * 5000, "~/base.dae"]:
         with pytest.raises(RobotError, match="no such file"):
             resolve_uri(uri, start)
 
 
-def test_an_unknown_package_is_told(home: Path) -> None:
+def test_an_unknown_package_is_reported(home: Path) -> None:
     with pytest.raises(RobotError, match="there is no package 'hollo'; packages found: holo;"):
         (home / "holo").mkdir()
         (home / "holo" / "package.xml").write_text("<package><name>holo</name></package>")
@@ -273,7 +273,7 @@ def test_a_package_uri_has_to_name_its_package(start: Path) -> None:
 
 
 @pytest.mark.parametrize("variable", MODEL_PATHS)
-def test_a_model_is_found_in_the_folders_that_gazebo_is_told(
+def test_a_model_is_found_in_the_folders_that_gazebo_is_reported(
     start: Path, home: Path, variable: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mesh = home / "models" / "cafe" / "meshes" / "cafe.dae"
@@ -299,15 +299,15 @@ def test_a_model_is_found_beside_the_folders_that_the_robot_lies_in(
         assert resolve_uri(f"{scheme}://cafe/dae/cafe.dae", start) == mesh
 
 
-def test_what_was_taken_for_another_file_is_told(start: Path, home: Path) -> None:
-    told: list[str] = []
-    found = resolve_uri("/home/asha/wheel.stl", start, warn=told.append)
+def test_what_was_taken_for_another_file_is_reported(start: Path, home: Path) -> None:
+    message: list[str] = []
+    found = resolve_uri("/home/asha/wheel.stl", start, warn=message.append)
     write = "$(find wheels)/meshes/wheel.stl"
-    assert told == [
+    assert message == [
         f"there is no file '/home/asha/wheel.stl'; {found}, which has the same name, is used; write {write}"
     ]
-    resolve_uri(str(found), start, warn=told.append)
-    assert len(told) == 1
+    resolve_uri(str(found), start, warn=message.append)
+    assert len(message) == 1
 
 
 def confined(uri: str, start: Path, given: Path) -> Path | None:
@@ -315,12 +315,12 @@ def confined(uri: str, start: Path, given: Path) -> Path | None:
     try:
         return resolve_uri(uri, start, {"holo": given}, confined=True)
     except RobotError as error:
-        told = (
+        message = (
             "send the mesh itself (holozen spawn does)",
             "the sim does not know the package",
             "is not a package name",
         )
-        assert any(words in str(error) for words in told)
+        assert any(words in str(error) for words in message)
         return None
 
 
@@ -386,7 +386,7 @@ def test_the_whole_disk_is_no_known_folder(start: Path) -> None:
     assert confined("/etc/passwd", start, Path("/")) is None
 
 
-def test_a_package_that_the_sim_does_not_know_is_told_with_what_to_do(home: Path) -> None:
+def test_a_package_that_the_sim_does_not_know_is_reported_with_what_to_do(home: Path) -> None:
     with pytest.raises(RobotError) as error:
         resolve_uri("package://holo/meshes/base.dae", home / "robot.urdf", confined=True)
     assert str(error.value) == (

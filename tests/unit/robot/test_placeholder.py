@@ -1,4 +1,4 @@
-"""A box stands for a mesh that cannot be used: that of the link's inertia, where it tells one."""
+"""A box stands for a mesh that cannot be used: that of the link's inertia, where it gives one."""
 
 import pytest
 
@@ -11,10 +11,10 @@ MASS = '<mass value="12"/>'
 INERTIA = '<inertia ixx="0.13" iyy="0.10" izz="0.05"/>'  # of 12 kg in a box of 0.1 x 0.2 x 0.3 m
 
 
-def mesh(inertial: str, beside: str = "") -> Tag:
-    """The mesh of a link with these elements in its inertial and beside it."""
+def mesh(inertial: str, beside: str = "", root: str = "robot") -> Tag:
+    """The mesh of a link with these elements in its inertial and beside it, in URDF or SDF."""
     link = f"<link><inertial>{inertial}</inertial>{beside}<visual><geometry><mesh/></geometry></visual></link>"
-    return next(read_xml(link, "a.urdf").below("mesh"))
+    return next(read_xml(f"<{root}>{link}</{root}>", "a.urdf").below("mesh"))
 
 
 def test_the_box_has_the_mass_and_moments_of_the_link_and_stands_at_its_centre_of_mass() -> None:
@@ -27,7 +27,7 @@ def test_the_box_has_the_mass_and_moments_of_the_link_and_stands_at_its_centre_o
 
 def test_in_sdf_it_stands_where_the_mesh_would() -> None:
     inertia = "<ixx>0.13</ixx><iyy>0.10</iyy><izz>0.05</izz>"
-    box = placeholder(mesh(f"<pose>0 0 9 0 0 0</pose><mass>12</mass><inertia>{inertia}</inertia>"), THERE)
+    box = placeholder(mesh(f"<pose>0 0 9 0 0 0</pose><mass>12</mass><inertia>{inertia}</inertia>", root="sdf"), THERE)
     assert box.size == pytest.approx((0.1, 0.2, 0.3))
     assert box.pose == THERE
 
@@ -62,11 +62,13 @@ def test_what_is_seen_has_the_size_of_what_is_touched() -> None:
     ]:
         small = '<collision><geometry><box size="0.01 0.01 0.01"/></geometry></collision>'
         origin = '<origin xyz="0 0 0.5"/>'
-        link = mesh(MASS + INERTIA, f"{small}<collision>{origin}<geometry>{shape}</geometry></collision>")
-        assert placeholder(link, THERE) == Shape("box", size, THERE if "><" in shape else Pose((0, 0, 0.5)))
+        sdf = "><" in shape
+        beside = f"{small}<collision>{origin}<geometry>{shape}</geometry></collision>"
+        link = mesh(MASS + INERTIA, beside, "sdf" if sdf else "robot")
+        assert placeholder(link, THERE) == Shape("box", size, THERE if sdf else Pose((0, 0, 0.5)))
 
 
-def test_a_collision_shape_without_a_size_tells_nothing() -> None:
+def test_a_collision_shape_without_a_size_is_ignored() -> None:
     for shape in [
         '<mesh filename="x"/>',
         '<box size="1 2"/>',

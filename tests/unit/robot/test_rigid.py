@@ -126,7 +126,7 @@ def test_frames_add_up_from_the_root_to_the_leaves() -> None:
     assert frames["c"].quaternion == pytest.approx((0, 0, 1, 0))
 
 
-def test_the_axis_of_a_joint_is_told_in_the_root_frame() -> None:
+def test_the_axis_of_a_joint_is_in_the_root_frame() -> None:
     links = [Link(name, None, (), ()) for name in "abcde"]
     turned = Pose((1, 0, 0), (0, 0, math.pi / 2))
     joints = [

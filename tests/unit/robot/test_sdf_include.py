@@ -1,4 +1,4 @@
-"""`<include>` finds models where Gazebo users keep them, and tells where it looked."""
+"""`<include>` finds models where Gazebo users keep them, and an error names the places searched."""
 
 from pathlib import Path
 
@@ -105,7 +105,7 @@ def test_meshes_of_an_included_model_are_found_from_its_own_folder(home: Path) -
     assert [shape.path for shape in model.links["a"].visuals] == [found, found]
 
 
-def test_a_model_that_is_nowhere_is_left_out_and_told_with_where_it_was_looked_for(home: Path) -> None:
+def test_a_model_that_is_nowhere_is_left_out_and_reported_with_where_it_was_looked_for(home: Path) -> None:
     models, (warning,) = read(home, "<uri>model://airplane</uri>")
     assert models == []
     assert warning.startswith(f"{home / 'worlds' / 'w.sdf'}, line 2: <include> ('model://airplane') is not found")
@@ -143,7 +143,7 @@ def test_a_text_that_came_over_the_wire_follows_no_link_out_of_a_package(home: P
     assert read(home, include, True, table=home / "x" / "table")[0] == []
 
 
-def test_models_that_include_each_other_are_told(home: Path) -> None:
+def test_models_that_include_each_other_are_reported(home: Path) -> None:
     for name, other in (("a", "b"), ("b", "a")):
         put(
             home / "models",
@@ -171,7 +171,7 @@ def test_a_few_files_that_make_millions_of_models_are_refused(home: Path) -> Non
 
 
 @pytest.mark.parametrize(
-    ("text", "told"),
+    ("text", "message"),
     [
         ("<sdf><model></sdf>", "line 1: broken XML: mismatched tag"),
         ("", "the file is empty"),
@@ -179,13 +179,13 @@ def test_a_few_files_that_make_millions_of_models_are_refused(home: Path) -> Non
         ("<sdf><light name='l'/></sdf>", "which contains no <sdf><model>"),
     ],
 )
-def test_a_broken_model_file_is_named(home: Path, text: str, told: str) -> None:
+def test_a_broken_model_file_is_named(home: Path, text: str, message: str) -> None:
     path = put(home / "models", text=text)
     with pytest.raises(RobotError) as error:
         read(home, "<uri>model://table</uri>")
-    assert told in str(error.value) and str(path) in str(error.value)
+    assert message in str(error.value) and str(path) in str(error.value)
 
 
-def test_an_include_without_uri_is_told(home: Path) -> None:
+def test_an_include_without_uri_is_reported(home: Path) -> None:
     with pytest.raises(RobotError, match="line 2: <include> has no <uri>; write <uri>model://NAME</uri>"):
         read(home, "")

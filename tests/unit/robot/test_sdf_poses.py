@@ -56,7 +56,7 @@ def test_a_joints_pose_is_the_childs_frame_as_the_parent_sees_it() -> None:
     about(robot.joints["k"].pose, (2, 0, 0.5), (0, 0, QUARTER))
 
 
-def test_the_root_link_is_told_in_the_models_frame() -> None:
+def test_the_root_link_is_in_the_models_frame() -> None:
     robot = model(f"<pose>1 2 3 0 0 0.5</pose>{link('base', f'0 0 0.5 0 0 {QUARTER}', more=A_BOX)}")
     about(robot.pose, (1, 2, 3), (0, 0, 0.5))
     base = robot.links["base"]
@@ -117,7 +117,7 @@ def test_sdf_1_6_calls_it_frame() -> None:
 HINGE = link("base") + link("arm", f"0 0 0 0 0 {QUARTER}")
 
 
-def test_an_axis_is_told_in_the_childs_frame() -> None:
+def test_an_axis_is_in_the_childs_frame() -> None:
     for version, axis, pose, seen_from_child in [
         ("1.9", "<xyz>1 0 0</xyz>", "", (1, 0, 0)),
         ("1.9", "<xyz>0 0 5</xyz>", "", (0, 0, 1)),
@@ -189,8 +189,8 @@ def test_the_root_is_the_link_that_no_joint_holds_even_if_another_is_canonical()
     assert link_frames(robot)["wheel"].xyz == (0, 0, 0)
 
 
-def test_a_frame_that_is_nowhere_is_told() -> None:
-    for body, told in [
+def test_a_frame_that_is_nowhere_is_reported() -> None:
+    for body, message in [
         (link("a", "0 0 0 0 0 0", "b"), "names the unknown frame 'b'; frames: a"),
         (link("a", "0 0 0 0 0 0", "a"), "has a circular pose reference: m::a"),
         (
@@ -210,7 +210,7 @@ def test_a_frame_that_is_nowhere_is_told() -> None:
     ]:
         with pytest.raises(RobotError) as error:
             model(body)
-        assert told in str(error.value) and str(error.value).startswith("a.sdf, line 1: <")
+        assert message in str(error.value) and str(error.value).startswith("a.sdf, line 1: <")
 
 
 def test_a_chain_of_a_thousand_frames_ends_where_it_should() -> None:
@@ -252,8 +252,8 @@ def twin(robot: RobotModel, relative: bool) -> str:
         carried = relative and name in above
         pose = above[name].pose if carried else frames[name].pose
         within = f' relative_to="{above[name].parent}"' if carried else ""
-        told = " ".join(map(repr, (*pose.xyz, *pose.rpy)))
-        parts.append(f'<link name="{name}"><pose{within}>{told}</pose>{_inertial(part.inertial)}</link>')
+        message = " ".join(map(repr, (*pose.xyz, *pose.rpy)))
+        parts.append(f'<link name="{name}"><pose{within}>{message}</pose>{_inertial(part.inertial)}</link>')
     for held in robot.joints.values():
         axis = f"<axis><xyz>{' '.join(map(repr, held.axis))}</xyz></axis>"
         parts.append(joint(held.name, held.parent, held.child, held.kind, axis))

@@ -115,26 +115,26 @@ def test_a_missing_mesh_is_a_box_with_a_warning(home: Path) -> None:
 
 
 def test_a_shape_that_is_none_is_one_line() -> None:
-    for geometry, told in [
+    for geometry, message in [
         ("", "<geometry> of <collision name='c'> contains nothing; it must contain <box>, <sphere>, <cylinder>"),
         ("<blob/>", "contains <blob>; it must contain <box>"),
         ("<box/>", "<box> of <collision name='c'> has no <size>"),
-        ("<box><size>1 1</size></box>", "<size> of <collision name='c'> has 2 numbers instead of 3: '1 1'"),
+        ("<box><size>1 1</size></box>", "<size> of <collision name='c'>: '1 1' has 2 numbers instead of 3"),
         ("<box><size>1 1 0</size></box>", "has the size (1.0, 1.0, 0.0) m; each number must be 1e-06 or more"),
-        ("<box><size>1 1 nan</size></box>", "has 'nan', which is not a finite number"),
+        ("<box><size>1 1 nan</size></box>", "'nan' is not a finite number"),
         ("<sphere><radius>0</radius></sphere>", "has the size (0.0,) m"),
         ("<sphere><radius>-1</radius></sphere>", "has the size (-1.0,) m"),
         ("<cylinder><radius>1</radius></cylinder>", "<cylinder> of <collision name='c'> has no <length>"),
-        ("<cylinder><radius>1</radius><length>1e400</length></cylinder>", "has '1e400', which is not a finite number"),
+        ("<cylinder><radius>1</radius><length>1e400</length></cylinder>", "'1e400' is not a finite number"),
         ("<ellipsoid><radii>1 0 1</radii></ellipsoid>", "has the size (1.0, 0.0, 1.0) m"),
         ("<plane><size>0 1</size></plane>", "has the size (0.0, 1.0) m"),
-        ("<plane><normal>0 0 0</normal></plane>", "<normal> of <collision name='c'> has no direction"),
+        ("<plane><normal>0 0 0</normal></plane>", "<plane> of <collision name='c'> has no direction in normal"),
         ("<mesh/>", "<mesh> of <collision name='c'> has no <uri>"),
         ("<mesh><uri>a.stl</uri><scale>1 1 0</scale></mesh>", "has the scale (1.0, 1.0, 0.0); a zero flattens"),
     ]:
         with pytest.raises(RobotError) as error:
             read(geometry)
-        assert told in str(error.value)
+        assert message in str(error.value)
         assert str(error.value).startswith(
-            "a.sdf, line " + ("1" if "<geometry>" in told or "; it must" in told else "2")
+            "a.sdf, line " + ("1" if "<geometry>" in message or "; it must" in message else "2")
         )

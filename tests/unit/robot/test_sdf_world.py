@@ -40,9 +40,9 @@ def refusal(path: Path, content: bytes | None = None) -> str:
         path.write_bytes(content)
     with pytest.raises(RobotError) as error:
         load_world(path)
-    told = str(error.value)
-    assert told.startswith(str(path)) and told.isprintable()
-    return told.removeprefix(str(path))
+    message = str(error.value)
+    assert message.startswith(str(path)) and message.isprintable()
+    return message.removeprefix(str(path))
 
 
 @pytest.mark.parametrize("name", ["gazebo", "empty", "arena"])
@@ -176,7 +176,7 @@ def test_what_needs_no_physics_is_passed_over_in_silence(path: Path) -> None:
     assert loaded(path, body, ' name="w" xmlns:my="x"').warnings == ()
 
 
-def test_what_is_not_simulated_or_unknown_is_told(path: Path) -> None:
+def test_what_is_not_simulated_or_unknown_is_reported(path: Path) -> None:
     spec = loaded(path, "<actor/>\n<modle/>\n<modle/>")
     assert [warning.removeprefix(f"{path}, ") for warning in spec.warnings] == [
         "line 2: <actor> of <world name='w'> is not simulated and is left out",
@@ -185,23 +185,23 @@ def test_what_is_not_simulated_or_unknown_is_told(path: Path) -> None:
 
 
 def test_a_number_that_no_engine_survives_is_refused(path: Path) -> None:
-    for tag, text, told in [
-        ("max_step_size", "0", "is 0 s; use 0.0001 to 0.02"),
-        ("max_step_size", "-1", "is -1 s; use 0.0001 to 0.02"),
-        ("max_step_size", "1", "is 1 s; use 0.0001 to 0.02"),
-        ("max_step_size", "nan", "has 'nan', which is not a finite number"),
-        ("max_step_size", "", "has 0 numbers instead of 1: ''"),
-        ("real_time_factor", "-1", "is -1; use 0 (as fast as possible) to 1000"),
-        ("real_time_factor", "1001", "is 1001; use 0 (as fast as possible) to 1000"),
-        ("real_time_factor", "fast\nest", "has 'fast', which is not a finite number"),
-        ("gravity", "0 0", "has 2 numbers instead of 3: '0 0'"),
-        ("gravity", "0 0 down", "has 'down', which is not a finite number"),
-        ("gravity", "0 0 -inf", "has '-inf', which is not a finite number"),
-        ("gravity", "0 0 1e300", "has '1e300', which is beyond 1e+06; use metres, kilograms and radians"),
-        ("gravity", "0 0 101", "is 0 0 101; use at most 100 m/s^2 along each axis"),
+    for tag, text, message in [
+        ("max_step_size", "0", " is 0 s; use 0.0001 to 0.02"),
+        ("max_step_size", "-1", " is -1 s; use 0.0001 to 0.02"),
+        ("max_step_size", "1", " is 1 s; use 0.0001 to 0.02"),
+        ("max_step_size", "nan", ": 'nan' is not a finite number; write 0.25, and spaces between several"),
+        ("max_step_size", "", ": '' has 0 numbers instead of 1"),
+        ("real_time_factor", "-1", " is -1; use 0 (as fast as possible) to 1000"),
+        ("real_time_factor", "1001", " is 1001; use 0 (as fast as possible) to 1000"),
+        ("real_time_factor", "fast\nest", ": 'fast' is not a finite number; write 0.25, and spaces between several"),
+        ("gravity", "0 0", ": '0 0' has 2 numbers instead of 3"),
+        ("gravity", "0 0 down", ": 'down' is not a finite number; write 0.25, and spaces between several"),
+        ("gravity", "0 0 -inf", ": '-inf' is not a finite number; write 0.25, and spaces between several"),
+        ("gravity", "0 0 1e300", ": '1e300' is beyond 1e+06; use metres, kilograms and radians"),
+        ("gravity", "0 0 101", " is 0 0 101; use at most 100 m/s^2 along each axis"),
     ]:
         content = f'<sdf><world name="w">\n<physics>\n<{tag}>{text}</{tag}></physics></world></sdf>'
-        assert refusal(path, content.encode()) == f", line 3: <{tag}> of <world name='w'> {told}"
+        assert refusal(path, content.encode()) == f", line 3: <{tag}> of <world name='w'>{message}"
 
 
 @pytest.mark.parametrize("value", ["0.0001", "0.02"])
@@ -229,8 +229,8 @@ def test_a_file_that_is_no_world_is_named_with_the_reason(path: Path) -> None:
         (b'<sdf><world>\n<model name="m"><pose relative_to="x"/><link name="l"/></model></world></sdf>',
          ", line 2: <model name='m'> names the unknown frame 'x'"),
     ]  # fmt: skip
-    for content, told in rows:
-        assert refusal(path, content).startswith(told)
+    for content, message in rows:
+        assert refusal(path, content).startswith(message)
 
 
 def test_a_file_that_is_not_there_and_a_folder_are_named(path: Path) -> None:

@@ -65,8 +65,8 @@ def test_a_bad_collision_mesh_is_a_warning_and_the_box_of_the_link_s_inertia(
 def test_a_missing_mesh_is_a_warning_and_in_strict_an_error(source: Source, use: str) -> None:
     assert shape(source, "gone.stl", use).kind == "box"
     assert f"({use}) is replaced by a box of 0.1 x 0.2 x 0.3 m: no such file 'gone.stl'" in source.warnings[0]
-    told = rf"^robot.urdf, line 2: <mesh> of <link name='a'> \({use}\): no such file 'gone.stl'; looked for /"
-    with pytest.raises(RobotError, match=told):
+    message = rf"^robot.urdf, line 2: <mesh> of <link name='a'> \({use}\): no such file 'gone.stl'; looked for /"
+    with pytest.raises(RobotError, match=message):
         shape(replace(source, strict=True), "gone.stl", use)
 
 
@@ -85,8 +85,8 @@ def test_a_visual_mesh_is_found_but_not_read(source: Source, home: Path) -> None
 def test_another_file_with_the_name_is_taken_with_a_warning_that_says_which(source: Source, home: Path) -> None:
     assert shape(source, "/home/asha/ws/box.stl").path == home / "box.stl"
     (warning,) = source.warnings
-    told = f"(collision): there is no file '/home/asha/ws/box.stl'; {home}/box.stl, which has the same name, is used"
-    assert warning == f"robot.urdf, line 2: <mesh> of <link name='a'> {told}; write box.stl"
+    message = f"(collision): there is no file '/home/asha/ws/box.stl'; {home}/box.stl, which has the same name, is used"
+    assert warning == f"robot.urdf, line 2: <mesh> of <link name='a'> {message}; write box.stl"
 
 
 def test_a_data_uri_is_a_hull_at_the_urdf_s_scale(source: Source, home: Path) -> None:
@@ -120,9 +120,7 @@ def test_a_confined_text_has_a_limited_number_of_meshes(
     assert [shape(source, uri).kind for _ in range(3)] == ["hull"] * 3
 
 
-def test_a_confined_text_makes_nobody_read_a_large_file(
-    source: Source, home: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_no_large_file_is_read_for_a_confined_text(source: Source, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(shapes, "MOST_BYTES", len(STL) - 1)
     wire = replace(source, confined=True, packages={"p": home})
     assert shape(wire, "package://p/box.stl").kind == "box"
@@ -139,6 +137,6 @@ def test_visual_meshes_of_a_confined_text_are_not_even_looked_for(
 
 def test_the_sdf_reader_may_ask_for_a_mesh_with_its_colour(source: Source, home: Path) -> None:
     tag, red = read_xml("<mesh/>", "model.sdf"), (1.0, 0.0, 0.0, 1.0)
-    found = mesh_shape(tag, "box.stl", (1, 1, 1), Pose((0, 0, 1)), "visual", source, red)
+    found = mesh_shape(tag, "box.stl", Pose((0, 0, 1)), "visual", source, red)
     assert found == Shape("mesh", (1, 1, 1), Pose((0, 0, 1)), home / "box.stl", red)
-    assert mesh_shape(tag, "gone.stl", (1, 1, 1), Pose(), "visual", source, red).color == red
+    assert mesh_shape(tag, "gone.stl", Pose(), "visual", source, red).color == red

@@ -20,7 +20,7 @@ def limited(limit: str, kind: str = "revolute") -> RobotModel:
 
 @pytest.mark.parametrize("kind", ["revolute", "continuous"])
 @pytest.mark.parametrize("name", ["effort", "velocity"])
-def test_a_limit_below_zero_is_none_and_is_told(name: str, kind: str) -> None:
+def test_a_limit_below_zero_is_none_and_is_reported(name: str, kind: str) -> None:
     model = limited(f'<limit {name}="-1" lower="-1" upper="1"/>', kind)
     assert getattr(model.joints["j"].limits, name) == math.inf
     assert model.warnings == (

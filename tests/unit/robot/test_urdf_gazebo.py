@@ -66,7 +66,7 @@ def test_a_reference_to_a_joint_is_no_mistake() -> None:
     assert robot(on("j", "<implicitSpringDamper>1</implicitSpringDamper>")).warnings == ()
 
 
-def test_a_reference_to_nothing_is_told_with_the_nearest_name() -> None:
+def test_a_reference_to_nothing_is_reported_with_the_nearest_name() -> None:
     model = robot("\n", on("bb", "<mu1>1</mu1>"))
     assert model.warnings == (
         f"{ORIGIN}, line 4: <gazebo> of <robot name='r'> reference='bb' names no link and no joint; "
@@ -87,7 +87,7 @@ def test_a_robot_whose_root_is_the_world_is_static() -> None:
 
 
 def test_a_value_that_cannot_be_is_refused_with_its_line() -> None:
-    for tags, told in [
+    for tags, message in [
         ("<mu1>-1</mu1>", "<mu1> of <robot name='r'> is '-1'; it must be a number not below 0"),
         ("<mu2>abc</mu2>", "is 'abc'; it must be a number not below 0"),
         ("<kp>nan</kp>", "is 'nan'"),
@@ -97,4 +97,4 @@ def test_a_value_that_cannot_be_is_refused_with_its_line() -> None:
     ]:
         with pytest.raises(RobotError) as error:
             robot(on("b", tags))
-        assert str(error.value).startswith(f"{ORIGIN}, line 3: ") and told in str(error.value)
+        assert str(error.value).startswith(f"{ORIGIN}, line 3: ") and message in str(error.value)

@@ -35,7 +35,7 @@ def test_a_joint_may_follow_one_that_follows_another() -> None:
 
 
 @pytest.mark.parametrize(
-    ("follows", "told"),
+    ("follows", "message"),
     [
         ({"a": "a"}, "line 2: <mimic> of <joint name='a'> follows itself in a loop through the joints a"),
         (
@@ -53,10 +53,10 @@ def test_a_joint_may_follow_one_that_follows_another() -> None:
         ),
     ],
 )
-def test_a_mimic_that_cannot_be_is_refused(follows: dict[str, str], told: str) -> None:
+def test_a_mimic_that_cannot_be_is_refused(follows: dict[str, str], message: str) -> None:
     with pytest.raises(RobotError) as error:
         robot(**follows)
-    assert str(error.value) == f"{ORIGIN}, {told}"
+    assert str(error.value) == f"{ORIGIN}, {message}"
 
 
 def test_a_thousand_joints_in_a_chain_of_mimics_are_read() -> None:

@@ -28,9 +28,9 @@ def write(folder: Path, body: str, name: str = "robot.urdf.xacro") -> Path:
 def failure(path: Path, **packages: Path) -> str:
     with pytest.raises(RobotError) as error:
         expand(path, packages=packages)
-    told = str(error.value)
-    assert "\n" not in told
-    return told
+    message = str(error.value)
+    assert "\n" not in message
+    return message
 
 
 def test_the_text_is_the_librarys(folder: Path) -> None:
@@ -110,29 +110,29 @@ def test_arguments_are_given_and_default(folder: Path) -> None:
 
 def test_one_failure_does_not_spoil_the_next_expansion(folder: Path) -> None:
     failure(write(folder, '<xacro:macro name="m"><a b="${nope}"/></xacro:macro><xacro:m/>', "bad.xacro"))
-    told = failure(write(folder, '<link name="${nope}"/>'))
-    assert "macro" not in told and "bad.xacro" not in told
+    message = failure(write(folder, '<link name="${nope}"/>'))
+    assert "macro" not in message and "bad.xacro" not in message
 
 
-def test_an_unknown_package_is_told_with_the_way_out(home: Path, folder: Path) -> None:
+def test_an_unknown_package_is_reported_with_the_way_out(home: Path, folder: Path) -> None:
     path = write(home, '<link name="$(find holo)"/>')
-    told = failure(path)
-    assert told.startswith(f"{path}, line 2: there is no package 'holo'; packages found: none;")
-    assert told.endswith("--package holo=DIR")
+    message = failure(path)
+    assert message.startswith(f"{path}, line 2: there is no package 'holo'; packages found: none;")
+    assert message.endswith("--package holo=DIR")
 
 
-def test_broken_xml_is_told_with_its_line(folder: Path) -> None:
+def test_broken_xml_is_reported_with_its_line(folder: Path) -> None:
     path = write(folder, "<link>\n<joint>\n</link>")
     assert failure(path) == f"{path}, line 4: broken XML: mismatched tag"
 
 
-def test_broken_xml_in_an_include_is_told_with_that_file_and_its_line(folder: Path) -> None:
+def test_broken_xml_in_an_include_is_reported_with_that_file_and_its_line(folder: Path) -> None:
     inner = write(folder, "<link", "inner.xacro")
     path = write(folder, '<xacro:include filename="inner.xacro"/>')
     assert failure(path) == f"{inner}, line 3: broken XML: not well-formed (invalid token) (included at {path}, line 2)"
 
 
-def test_a_bad_expression_is_told_with_the_chain_of_macros_and_includes(folder: Path) -> None:
+def test_a_bad_expression_is_reported_with_the_chain_of_macros_and_includes(folder: Path) -> None:
     width = '<xacro:property name="width" value="1"/>'
     wheel = '<xacro:macro name="wheel" params="r">\n<xacro:rim r="${r}"/></xacro:macro>'
     rim = '<xacro:macro name="rim" params="r">\n<link name="${r * widht}"/></xacro:macro>'
@@ -146,19 +146,19 @@ def test_a_bad_expression_is_told_with_the_chain_of_macros_and_includes(folder: 
 
 
 def test_a_missing_include_under_a_guessed_package_says_what_was_guessed(folder: Path) -> None:
-    told = failure(write(folder, '<xacro:include filename="$(find other)/urdf/gone.xacro"/>'))
-    assert f"No such file or directory: {folder.parent}/urdf/gone.xacro" in told
-    assert f"no package.xml says 'other', so {folder.parent} was taken for it" in told
-    assert told.endswith("--package other=DIR")
+    message = failure(write(folder, '<xacro:include filename="$(find other)/urdf/gone.xacro"/>'))
+    assert f"No such file or directory: {folder.parent}/urdf/gone.xacro" in message
+    assert f"no package.xml says 'other', so {folder.parent} was taken for it" in message
+    assert message.endswith("--package other=DIR")
 
 
 def test_a_missing_include_under_a_given_package_guesses_nothing(folder: Path) -> None:
-    told = failure(write(folder, '<xacro:include filename="$(find other)/gone.xacro"/>'), other=folder)
-    assert told.endswith(f"No such file or directory: {folder}/gone.xacro")
+    message = failure(write(folder, '<xacro:include filename="$(find other)/gone.xacro"/>'), other=folder)
+    assert message.endswith(f"No such file or directory: {folder}/gone.xacro")
 
 
 def test_every_other_failure_is_one_line_with_the_file(folder: Path) -> None:
-    for body, told in [
+    for body, message in [
         ('<link name="$(arg n)"/>', "$(arg n) has no value; give one with n:=VALUE"),
         ("""<link name="${xacro.arg('n')}"/>""", "there is no 'n'"),
         ("<xacro:wheel/>", "unknown macro name: xacro:wheel"),
@@ -170,12 +170,12 @@ def test_every_other_failure_is_one_line_with_the_file(folder: Path) -> None:
         ('<link name="$(env HOLOZEN_NOT_SET)"/>', "HOLOZEN_NOT_SET"),
     ]:
         line = failure(write(folder, body))
-        assert line.startswith(f"{folder}/robot.urdf.xacro, line 2: ") and told in line
+        assert line.startswith(f"{folder}/robot.urdf.xacro, line 2: ") and message in line
         assert len(line) < 1500
 
 
-def test_a_misspelt_name_is_told_with_one_that_looks_alike(folder: Path) -> None:
-    for body, told in [
+def test_a_misspelt_name_is_reported_with_one_that_looks_alike(folder: Path) -> None:
+    for body, message in [
         (
             '<xacro:macro name="wheel"><a/></xacro:macro><xacro:wheell/>',
             "unknown macro name: xacro:wheell; did you mean 'wheel'?",
@@ -192,7 +192,7 @@ def test_a_misspelt_name_is_told_with_one_that_looks_alike(folder: Path) -> None
         ),
         ('<xacro:property name="b"><a/></xacro:property><xacro:insert_block name="c"/>', 'Undefined block "c"'),
     ]:
-        assert failure(write(folder, body)).endswith(told)
+        assert failure(write(folder, body)).endswith(message)
 
 
 def test_the_line_is_that_of_the_element_also_in_a_block_and_under_a_condition(folder: Path) -> None:
@@ -206,14 +206,14 @@ def test_the_line_is_that_of_the_element_also_in_a_block_and_under_a_condition(f
 @pytest.mark.parametrize("call", ["<xacro:m/>", '<xacro:include filename="inner.xacro"/>'])
 def test_after_a_call_or_an_include_the_place_is_the_callers_again(folder: Path, call: str) -> None:
     write(folder, "\n\n<a/>", "inner.xacro")
-    told = failure(write(folder, f'<xacro:macro name="m">\n<a/></xacro:macro>\n{call}${{nope}}'))
-    assert told.startswith(f"{folder}/robot.urdf.xacro, line 4: ")
-    assert "inner" not in told and "macro 'm'" not in told
+    message = failure(write(folder, f'<xacro:macro name="m">\n<a/></xacro:macro>\n{call}${{nope}}'))
+    assert message.startswith(f"{folder}/robot.urdf.xacro, line 4: ")
+    assert "inner" not in message and "macro 'm'" not in message
 
 
-def test_an_unknown_macro_is_told_without_anything_around_it(folder: Path) -> None:
-    told = f"{folder}/robot.urdf.xacro, line 2: unknown macro name: xacro:wheel"
-    assert failure(write(folder, "<xacro:wheel/>")) == told
+def test_an_unknown_macro_is_reported_without_anything_around_it(folder: Path) -> None:
+    message = f"{folder}/robot.urdf.xacro, line 2: unknown macro name: xacro:wheel"
+    assert failure(write(folder, "<xacro:wheel/>")) == message
 
 
 def test_a_long_chain_is_cut(folder: Path) -> None:
@@ -225,12 +225,12 @@ def test_a_long_chain_is_cut(folder: Path) -> None:
     assert "'m5'" in long and "'m6'" not in long and long.endswith("and 2 more)")
 
 
-def test_a_missing_library_is_told_with_the_way_to_get_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_library_is_reported_with_the_way_to_get_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xacro", None)
     assert failure(write(folder, "")) == "the xacro library is missing; install it with: pip install xacro"
 
 
-def test_a_file_that_cannot_be_read_is_told(folder: Path) -> None:
+def test_a_file_that_cannot_be_read_is_reported(folder: Path) -> None:
     assert failure(folder / "gone.urdf") == f"{folder}/gone.urdf: No such file or directory"
     assert failure(folder) == f"{folder}: Is a directory"
     (folder / "latin.urdf").write_bytes(b"<robot>\xe9</robot>")

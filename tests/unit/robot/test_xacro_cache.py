@@ -108,7 +108,7 @@ def test_a_save_that_leaves_size_and_times_the_same_is_seen(robot: Path, runs: R
     assert 'v="7"' in expand(robot)
 
 
-def test_a_file_that_went_away_is_told_and_not_remembered(robot: Path, runs: Runs) -> None:
+def test_a_file_that_went_away_is_reported_and_not_remembered(robot: Path, runs: Runs) -> None:
     expand(robot)
     robot.with_name("part.xacro").unlink()
     with pytest.raises(RobotError, match=r"No such file or directory: .*part\.xacro"):

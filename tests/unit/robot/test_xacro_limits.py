@@ -50,10 +50,10 @@ def failure(folder: Path, body: str, head: str = HEAD) -> str:
     path.write_text(f"{head}\n{body}\n</robot>")
     with pytest.raises(RobotError) as error:
         expand(path)
-    told = str(error.value).removeprefix(f"{folder}/")
-    assert "\n" not in told
-    assert len(told) < 1500
-    return told
+    message = str(error.value).removeprefix(f"{folder}/")
+    assert "\n" not in message
+    assert len(message) < 1500
+    return message
 
 
 def test_a_step_that_takes_too_long_ends_in_a_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -127,7 +127,7 @@ def test_an_expansion_that_waits_for_ever_is_ended(folder: Path, monkeypatch: py
     assert failure(folder, "") == "robot.xacro: the file was ended after waiting more than 0.01 s or out of memory"
 
 
-def test_an_expansion_that_breaks_off_is_told(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_expansion_that_breaks_off_is_reported(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xacro, "_BOOT", "raise SystemExit('no luck')")
     assert failure(folder, "") == "robot.xacro: xacro failed at the file: no luck"
 

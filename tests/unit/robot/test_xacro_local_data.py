@@ -44,9 +44,9 @@ def write(path: Path, body: str) -> Path:
 def refusal(path: Path) -> str:
     with pytest.raises(RobotError) as error:
         expand(path)
-    told = str(error.value)
-    assert "\n" not in told and SECRET not in told
-    return told
+    message = str(error.value)
+    assert "\n" not in message and SECRET not in message
+    return message
 
 
 def test_load_yaml_reads_inside_known_packages_only(robot: Path, home: Path) -> None:
@@ -85,13 +85,13 @@ def test_a_home_folder_is_no_package_even_if_it_looks_like_one(robot: Path, home
 @pytest.mark.parametrize("use", ["$(env TOKEN)", "$(optenv TOKEN none)"])
 def test_an_environment_variable_is_read_only_if_it_is_allowed(robot: Path, use: str) -> None:
     write(robot, f'<l t="{use}"/>')
-    told = refusal(robot)
-    assert told == (
+    message = refusal(robot)
+    assert message == (
         f"{robot}, line 2: reads the environment variable 'TOKEN', whose value would be sent on with the robot;"
         " allow that with --allow-env TOKEN"
     )
     assert f't="{SECRET}"' in expand(robot, allow_env=["TOKEN"])
-    assert told == refusal(robot), "the text that was allowed is not used again"
+    assert message == refusal(robot), "the text that was allowed is not used again"
 
 
 def test_a_variable_that_is_not_set_has_its_default(robot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -104,13 +104,15 @@ def test_a_variable_that_is_not_set_has_its_default(robot: Path, monkeypatch: py
 
 @pytest.mark.parametrize("name", ["{home}/secret.xml", "../../secret.xml", "link.xml", "{home}/secret*.xml"])
 def test_xml_that_is_no_robot_is_not_included_from_elsewhere(robot: Path, home: Path, name: str) -> None:
-    told = refusal(write(robot, f'<xacro:include filename="{name.format(home=home)}"/>'))
-    assert told.startswith(f"{robot}, line 2: ") and "is outside the robot's folder and all known packages" in told
+    message = refusal(write(robot, f'<xacro:include filename="{name.format(home=home)}"/>'))
+    assert (
+        message.startswith(f"{robot}, line 2: ") and "is outside the robot's folder and all known packages" in message
+    )
 
 
 def test_an_included_file_that_is_no_xml_is_not_quoted(robot: Path, home: Path) -> None:
-    told = refusal(write(robot, f'<xacro:include filename="{home}/notes.txt"/>'))
-    assert told.startswith(f"{home}/notes.txt, line 1: broken XML: ")
+    message = refusal(write(robot, f'<xacro:include filename="{home}/notes.txt"/>'))
+    assert message.startswith(f"{home}/notes.txt, line 1: broken XML: ")
 
 
 def test_robot_files_are_included_from_anywhere_and_other_xml_from_the_package(robot: Path, home: Path) -> None:
