@@ -9,12 +9,9 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from types import FrameType
+from typing import NoReturn
 
 from holozen.console import drain, give_up_readers
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    from typing import NoReturn
 
 _PR_SET_PDEATHSIG = 1  # prctl(2)
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -75,7 +72,7 @@ class Ending:
         self._before: Callable[[int, FrameType | None], object]
         atexit.register(self._end)
 
-    def leave(self, code: "int | str | None") -> "NoReturn":
+    def leave(self, code: "int | str | None") -> NoReturn:
         """Exit, once all non-daemon threads and the callbacks of atexit are done. Ctrl-C ends that wait."""
         self.code = code if isinstance(code, int) else int(code is not None)
         before = signal.getsignal(signal.SIGINT)

@@ -3,14 +3,11 @@
 By default nothing leaves this machine: peers meet on loopback at the rendezvous points; no router, no multicast.
 """
 
+import argparse  # loaded by holozen.flags anyway
 import os
 
 from holozen.flags import nearest, refused
 from holozen.transport.errors import BusError
-
-TYPE_CHECKING = False
-if TYPE_CHECKING:
-    import argparse
 
 RENDEZVOUS = tuple(f"tcp/127.0.0.1:{port}" for port in (7447, 7448, 7449))
 """Where the processes of one machine meet: Zenoh's own port, and two more in case its holder does not answer."""
@@ -128,7 +125,7 @@ _ALWAYS: dict[str, object] = {
 }
 
 
-def add_arguments(parser: "argparse.ArgumentParser") -> None:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add Zenoh's own flags, with the names that its other tools use."""
     text = f"how to connect; by default peers meet on loopback at {RENDEZVOUS[0]}. Where a flag is not given, "
     group = parser.add_argument_group("zenoh", f"{text}{', '.join(VARIABLES.values())} say the same.")
@@ -142,7 +139,7 @@ def add_arguments(parser: "argparse.ArgumentParser") -> None:
         help="a single Zenoh setting")  # fmt: skip
 
 
-def from_arguments(args: "argparse.Namespace") -> Connection:
+def from_arguments(args: argparse.Namespace) -> Connection:
     """The Connection that the flags of `add_arguments` describe. Exits with code 2 for a wrong environment variable."""
     given = {name: value for name in VARIABLES if (value := getattr(args, name)) is not None}
     try:

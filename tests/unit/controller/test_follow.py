@@ -1,4 +1,4 @@
-"""The follower on a real bus, with a robot that moves exactly as it is told."""
+"""The follower on a real bus, with a robot that moves exactly as commanded."""
 
 import math
 import threading
@@ -49,12 +49,12 @@ class Robot:
         self._time = 0.0
 
     def status(self, **fields: object) -> bool:
-        """Tell who drives; whether anybody listens."""
+        """Report who drives; whether anyone listens."""
         self._status.put(CommandStatus(**fields))  # type: ignore[arg-type]
         return self._status.matched
 
     def live(self, end: threading.Event) -> None:
-        """Hear, move and tell until the end; pauses while `moving` is not set."""
+        """Receive, move and publish until the end; pauses while `moving` is not set."""
         while not end.wait(STEP / 10):
             if self.moving.is_set():
                 self._step()
@@ -174,7 +174,7 @@ def test_when_odom_goes_stale_it_stops_the_robot_once(case: Case) -> None:
     assert len(lap.result(30)) == 2
 
 
-def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) -> None:
+def test_it_yields_to_any_other_driver_and_sends_not_even_a_stop(case: Case) -> None:
     wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.follower.status.count)
     case.goals()
     lap = case.lap()
@@ -187,7 +187,7 @@ def test_it_yields_to_whoever_else_drives_and_sends_not_even_a_stop(case: Case) 
 
 
 def test_a_stopped_robot_is_not_commanded_and_after_the_resume_it_begins_with_a_stop(case: Case) -> None:
-    """Whoever commanded a stopped robot has to let go of it first."""
+    """A source that commanded a stopped robot has to release it first."""
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
@@ -243,14 +243,14 @@ def test_a_stop_is_repeated_until_the_robot_rests(case: Case) -> None:
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
-    case.robot.slips.set()  # a robot that goes on whatever it is told
+    case.robot.slips.set()  # a robot that goes on whatever is commanded
     case.stop.set()
     lap.result(30)
     case.follower.halt()
     assert case.robot.heard.count(Twist()) > 3
 
 
-def test_told_to_stop_it_ends_its_lap_and_halts_the_robot(case: Case) -> None:
+def test_asked_to_stop_it_ends_its_lap_and_halts_the_robot(case: Case) -> None:
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.robot.heard)

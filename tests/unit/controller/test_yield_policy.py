@@ -24,7 +24,7 @@ def test_it_goes_on_while_it_is_the_one_obeyed(policy: YieldPolicy) -> None:
     assert policy.yielded_to == ""
 
 
-def test_it_yields_to_anybody_else_who_drives(policy: YieldPolicy) -> None:
+def test_it_yields_to_any_other_driver(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(obeyed=ME))
     policy.update(CommandStatus(obeyed=PERSON, held=True))
     assert policy.yielded_to == PERSON
@@ -36,7 +36,7 @@ def test_it_does_not_take_the_robot_back_when_the_other_falls_silent(policy: Yie
     assert policy.yielded_to == PERSON
 
 
-def test_it_yields_to_the_last_who_drove(policy: YieldPolicy) -> None:
+def test_it_yields_to_the_last_driver(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(obeyed=PERSON, held=True))
     policy.update(CommandStatus(obeyed="topic_pub@3", held=True))
     assert policy.yielded_to == "topic_pub@3"
@@ -85,8 +85,10 @@ def test_it_yields_to_a_software_stop_and_says_what_frees_the_robot(policy: Yiel
     policy.update(CommandStatus(obeyed=ME))
     assert policy.reason == ""
     policy.update(CommandStatus(held=True, stopped="stop@3"))
-    told = "yields: the robot is stopped by stop@3; `holozen release` ends that, and then `holozen controller --resume`"
-    assert policy.reason.startswith(told)
+    message = (
+        "yields: the robot is stopped by stop@3; `holozen release` ends that, and then `holozen controller --resume`"
+    )
+    assert policy.reason.startswith(message)
 
 
 def test_after_the_release_it_still_waits_for_the_resume(policy: YieldPolicy) -> None:

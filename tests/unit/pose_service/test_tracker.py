@@ -1,4 +1,4 @@
-"""The tracker tells the last odom of a robot, or why it has none."""
+"""The tracker returns the last odom of a robot, or why it has none."""
 
 import re
 from functools import partial
@@ -19,14 +19,14 @@ SILENCE = next(row.silence for row in TOPICS if row.key == "odom")
 
 
 class Robots:
-    """A tracker, and robots that tell their odom to it."""
+    """A tracker, and robots that publish odom to it."""
 
     def __init__(self, wire: Wire) -> None:
         self.sim, listener = wire.bus("sim"), wire.bus("pose_service")
         self.tracker = Tracker(listener.subscribe("**/odom", Odometry, depth=256))
         self._wait: dict[str, Publisher[Odometry]] = {}
 
-    def tell(self, key: str, x: float = 0.0) -> None:
+    def publish(self, key: str, x: float = 0.0) -> None:
         """One odom of the robot with this key."""
         odom = Odometry()
         odom.pose.pose.position.x = x
@@ -54,28 +54,28 @@ def robots(wire: Wire) -> Robots:
     return Robots(wire)
 
 
-def told_until_heard(robots: Robots, name: str, x: float) -> GetPoseReply | None:
-    """Have a robot tell its odom until the tracker has it."""
+def reply_once_heard(robots: Robots, name: str, x: float) -> GetPoseReply | None:
+    """Publish a robot's odom until the tracker has it."""
     key = f"{name}/odom" if name else "odom"
 
     def heard() -> GetPoseReply | None:
-        robots.tell(key, x)
+        robots.publish(key, x)
         return robots.heard(name, x)
 
     return wait_for(heard)
 
 
-def test_the_last_odom_of_each_robot_is_told_with_its_age(robots: Robots) -> None:
+def test_the_last_odom_of_each_robot_is_reported_with_its_age(robots: Robots) -> None:
     for name, x in (("", 1.0), ("Fred", 2.0), ("Fred", 3.0), ("", 1.5)):
-        reply = told_until_heard(robots, name, x)
+        reply = reply_once_heard(robots, name, x)
         assert reply is not None
         assert 0 <= reply.age <= SILENCE
 
 
 def test_a_robot_that_was_never_heard_is_named_with_those_that_were(robots: Robots) -> None:
     assert robots.refusal("") == "no odom was received; robots with odom: none"
-    told_until_heard(robots, "", 1.0)
-    told_until_heard(robots, "Ann", 1.0)
+    reply_once_heard(robots, "", 1.0)
+    reply_once_heard(robots, "Ann", 1.0)
     assert robots.refusal("Fred") == "no Fred/odom was received; robots with odom: '' (at the root), Ann"
 
 
@@ -85,19 +85,19 @@ def test_a_name_that_no_robot_may_have_is_refused(robots: Robots, name: str) -> 
 
 
 def test_odom_that_is_too_old_is_refused_with_its_age(robots: Robots) -> None:
-    told_until_heard(robots, "Fred", 1.0)
+    reply_once_heard(robots, "Fred", 1.0)
     wait_for(lambda: not robots.heard("Fred", 1.0))
-    told = re.fullmatch(
+    message = re.fullmatch(
         r"Fred/odom is stale: the last one came (.*) s ago; is the sim running\?", robots.refusal("Fred")
     )
-    assert told is not None
-    assert float(told[1]) >= SILENCE
+    assert message is not None
+    assert float(message[1]) >= SILENCE
 
 
 def test_what_is_no_odom_of_a_robot_is_left_out(robots: Robots) -> None:
-    robots.tell("a/b/odom")
+    robots.publish("a/b/odom")
     robots.sim.session.put("Ann/odom", b"nonsense")
-    told_until_heard(robots, "Fred", 1.0)  # which came after the others
+    reply_once_heard(robots, "Fred", 1.0)  # which came after the others
     assert robots.refusal("Ann") == "no Ann/odom was received; robots with odom: Fred"
 
 
@@ -107,13 +107,13 @@ def test_of_too_many_robots_the_one_that_has_been_silent_for_longest_is_forgotte
     monkeypatch.setattr(tracker, "MAX_ROBOTS", 60)
     odom = encode(Odometry())
 
-    def told(name: str) -> GetPoseReply | None:
+    def reply(name: str) -> GetPoseReply | None:
         robots.sim.session.put(f"{name}/odom", odom)
         return robots.heard(name, 0.0)
 
     names = ["Silent", "Steady", *(f"R{number}" for number in range(58)), "Steady", "Last"]
     for name in names:
-        wait_for(partial(told, name))
+        wait_for(partial(reply, name))
     assert robots.heard("Steady", 0.0) or "stale" in robots.refusal("Steady")
     refusal = robots.refusal("Silent")
     assert refusal.startswith("no Silent/odom was received; robots with odom: Last, R")

@@ -50,10 +50,10 @@ def test_an_unknown_package_is_an_error_that_says_how_to_mend_it(my_bot: Path, w
     with pytest.raises(ament.PackageNotFoundError) as error:
         ament.get_package_share_directory("my_bott")
     assert isinstance(error.value, KeyError)
-    told = str(error.value)
-    assert told.startswith(f"no package 'my_bott' around {my_bot}, ")
-    assert "did you mean 'my_bot'?" in told
-    assert told.endswith("to give its folder: --package my_bott=DIR")
+    message = str(error.value)
+    assert message.startswith(f"no package 'my_bott' around {my_bot}, ")
+    assert "did you mean 'my_bot'?" in message
+    assert message.endswith("to give its folder: --package my_bott=DIR")
 
 
 @pytest.mark.parametrize("wrong", ["", None, 7])

@@ -91,8 +91,8 @@ def test_what_ros_takes_and_means_nothing_here_is_taken() -> None:
     assert (found.unparsed, found.quiet) == (["script.py"], True)
 
 
-def test_what_cannot_be_read_is_told_in_one_line() -> None:
-    for words, told in [
+def test_what_cannot_be_read_is_reported_in_one_line() -> None:
+    for words, message in [
         (["-r"], "-r needs a value"),
         (["-r", "--"], "-r needs a value"),
         (["-r", "chat"], "-r chat: write FROM:=TO"),
@@ -110,11 +110,11 @@ def test_what_cannot_be_read_is_told_in_one_line() -> None:
     ]:
         with pytest.raises(RCLInvalidROSArgsError) as error:
             parse("--ros-args", *words)
-        assert told in str(error.value)
+        assert message in str(error.value)
         assert "\n" not in str(error.value)
 
 
-def test_an_unknown_flag_is_told_with_the_nearest() -> None:
+def test_an_unknown_flag_is_reported_with_the_nearest() -> None:
     with pytest.raises(UnknownROSArgsError, match="'--params'; did you mean '--param"):
         parse("--ros-args", "--params", "x")
     with pytest.raises(UnknownROSArgsError, match="end the ROS arguments with --"):

@@ -74,20 +74,20 @@ def test_outside_of_what_is_known_nothing_is_guessed(frames, when, side):
         frames.lookup("odom", "arm", when)
 
 
-def test_an_unknown_frame_is_told_with_the_nearest(frames):
+def test_an_unknown_frame_is_reported_with_the_nearest(frames):
     with pytest.raises(LookupException, match="the source frame 'bass' does not exist; did you mean 'base'"):
         frames.lookup("odom", "bass")
     with pytest.raises(LookupException, match="the target frame 'odom' does not exist; no frames so far"):
         BufferCore().lookup("odom", "base")
 
 
-def test_two_trees_are_told(frames):
+def test_two_trees_are_reported(frames):
     frames.put("elsewhere", "thing", S, moved(1.0))
     with pytest.raises(ConnectivityException, match="two unconnected trees, with the roots 'map' and 'elsewhere'"):
         frames.lookup("base", "thing")
 
 
-def test_a_circle_is_told(frames):
+def test_a_circle_is_reported(frames):
     frames.put("arm", "map", S, moved(1.0))
     with pytest.raises(LookupException, match="form a loop"):
         frames.lookup("map", "base")
@@ -110,7 +110,7 @@ def test_a_clock_that_was_set_back_begins_anew(frames: BufferCore) -> None:
 
 def test_a_straggler_is_no_clock_that_was_set_back(frames: BufferCore) -> None:
     for _ in range(5):
-        for stamp in (12 * S, S, 2 * S):  # of two who tell, one is late
+        for stamp in (12 * S, S, 2 * S):  # of two publishers, one is late
             frames.put("odom", "base", stamp, moved(stamp / S))
     assert frames.lookup("odom", "base") == (12 * S, moved(12.0))
 
@@ -129,7 +129,7 @@ def test_a_frame_that_changes_its_parent_keeps_both(frames):
 
 
 @pytest.mark.parametrize("static", [True, False])
-def test_what_was_told_last_says_whether_it_moves(frames: BufferCore, static: bool) -> None:
+def test_the_last_transform_decides_whether_it_is_static(frames: BufferCore, static: bool) -> None:
     frames.put("odom", "base", 4 * S, moved(4.0), static=not static)
     frames.put("odom", "base", 5 * S, moved(5.0), static=static)
     assert frames.histories()["base"].stamps == [5 * S]
@@ -156,7 +156,7 @@ def test_clear_keeps_what_is_static(frames):
 
 
 @pytest.mark.parametrize(
-    ("parent", "child", "rigid", "told"),
+    ("parent", "child", "rigid", "message"),
     [
         ("a", "a", Transform(), "cannot be its own parent"),
         ("", "a", Transform(), "'' is not a frame"),
@@ -165,8 +165,8 @@ def test_clear_keeps_what_is_static(frames):
         ("a", "b", Transform(rotation=(0.0, 0.0, 0.0, 0.0)), "from 'a' to 'b' the rotation"),
     ],
 )
-def test_what_cannot_be_is_refused(frames, parent, child, rigid, told):
-    with pytest.raises(InvalidArgumentException, match=told):
+def test_what_cannot_be_is_refused(frames, parent, child, rigid, message):
+    with pytest.raises(InvalidArgumentException, match=message):
         frames.put(parent, child, S, rigid)
 
 

@@ -1,4 +1,4 @@
-"""Whoever uses an attribute that an object of ROS's does not have here is told, and pointed to what there is."""
+"""An attribute or module of ROS that does not exist here raises an error with a hint."""
 
 import subprocess
 import sys
@@ -36,16 +36,16 @@ def lacks(something: Any, name: str) -> str:
     return str(error.value)
 
 
-def test_the_nearest_name_and_the_page_are_told() -> None:
+def test_the_nearest_name_and_the_page_are_reported() -> None:
     for kind in OBJECTS:
         something, name, nearest = OBJECTS[kind]
-        told = f"{kind!r} object has no attribute {name!r}; did you mean {nearest}?; what {kind} has here: {PAGE}"
-        assert lacks(something, name) == told
+        message = f"{kind!r} object has no attribute {name!r}; did you mean {nearest}?; what {kind} has here: {PAGE}"
+        assert lacks(something, name) == message
         assert lacks(something, "zzz") == f"{kind!r} object has no attribute 'zzz'; what {kind} has here: {PAGE}"
         assert lacks(something, "_zzz") == f"{kind!r} object has no attribute '_zzz'"
 
 
-def test_a_scripts_own_node_is_told_by_its_name(ros: Wire) -> None:
+def test_an_error_names_the_scripts_own_subclass_of_node(ros: Wire) -> None:
     class Robot(rclpy.Node):
         pass
 
@@ -56,7 +56,7 @@ def test_a_scripts_own_node_is_told_by_its_name(ros: Wire) -> None:
     assert lacks(robot, "handle").endswith(f"; see {PAGE}")
 
 
-def test_a_time_for_a_stamp_is_told_how_to_be_written() -> None:
+def test_an_error_suggests_to_msg_for_a_time_in_a_stamp() -> None:
     with pytest.raises(AssertionError, match=r"; append \.to_msg\(\)$"):
         generated.find("std_msgs/msg/Header")(stamp=Time())
 

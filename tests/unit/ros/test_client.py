@@ -42,7 +42,7 @@ def test_a_call_that_is_made_before_its_service_is_there_is_answered(ros: Wire) 
     assert future.result() == Trigger.Response(success=True, message="done")
 
 
-def test_a_synchronous_call_needs_nobody_who_spins(ros: Wire) -> None:
+def test_a_synchronous_call_needs_no_executor(ros: Wire) -> None:
     serve(ros)
     client = rclpy.create_node("tom").create_client(Trigger, "go")
     assert client.call(Trigger.Request()).message == "done"
@@ -119,7 +119,7 @@ def test_a_wait_for_a_service_ends_with_rclpy(ros: Wire) -> None:
             look()
 
 
-def test_nobody_waits_for_a_service_after_a_signal(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wait_for_a_service_ends_at_a_signal(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(context, "GRACE", 1000.0)
     client = rclpy.create_node("tom").create_client(Trigger, "go")
     rclpy.get_default_context().interrupt()
@@ -136,7 +136,7 @@ def test_a_destroyed_client_waits_for_nothing(ros: Wire) -> None:
         client.wait_for_service(10)
 
 
-def test_a_request_of_another_type_is_told(ros: Wire) -> None:
+def test_a_request_of_another_type_is_reported(ros: Wire) -> None:
     client = rclpy.create_node("tom").create_client(Trigger, "go")
     for wrong, given in ((3, "int"), (Trigger.Request, "Trigger_Request"), (Trigger.Response(), "Trigger_Response")):
         with pytest.raises(TypeError, match=rf"^/go: expected a Trigger\.Request, and got a {given}$"):
@@ -157,7 +157,7 @@ def test_a_destroyed_client_cancels_what_it_asked(ros: Wire) -> None:
 
 def test_a_call_that_waits_for_its_reply_ends_with_its_client(ros: Wire) -> None:
     server, node = rclpy.create_node("server"), rclpy.create_node("tom")
-    server.create_service(Trigger, "go", lambda _request, response: response)  # and nobody spins
+    server.create_service(Trigger, "go", lambda _request, response: response)  # and no executor spins
     client = node.create_client(Trigger, "go")
     assert client.wait_for_service(10)
     future = client.call_async(Trigger.Request())
@@ -172,7 +172,7 @@ def test_a_call_that_waits_for_its_reply_ends_with_its_client(ros: Wire) -> None
 
 def test_a_call_that_waits_for_its_reply_ends_with_its_node(ros: Wire) -> None:
     server, node = rclpy.create_node("server"), rclpy.create_node("tom")
-    server.create_service(Trigger, "go", lambda _request, response: response)  # and nobody spins
+    server.create_service(Trigger, "go", lambda _request, response: response)  # and no executor spins
     client = node.create_client(Trigger, "go")
     future = client.call_async(Trigger.Request())
     assert client.wait_for_service(10)

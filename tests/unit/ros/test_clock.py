@@ -1,4 +1,4 @@
-"""Clocks: what they show, how long one sleeps on them, and who is told when they jump."""
+"""Clocks: what they show, how long one sleeps on them, and the callbacks when they jump."""
 
 import threading
 import time
@@ -40,7 +40,7 @@ def simulated(seconds: float = 0.0) -> ROSClock:
 
 
 class Sleeper:
-    """Somebody who sleeps in a thread; `woken` is what the sleep returned."""
+    """A sleep in a thread; `woken` is what the sleep returned."""
 
     def __init__(self, sleep: Callable[[], bool]) -> None:
         self.woken: bool | None = None
@@ -85,7 +85,7 @@ def test_simulated_time_begins_at_zero_and_is_what_was_given() -> None:
 def test_it_says_how_long_a_time_is_away() -> None:
     clock = simulated(1.0)
     assert clock.wait_seconds(at(1).nanoseconds) == 0.0
-    assert clock.wait_seconds(at(2).nanoseconds) is None, "nobody knows how fast simulated time goes"
+    assert clock.wait_seconds(at(2).nanoseconds) is None, "the speed of simulated time is unknown"
     steady = Clock(clock_type=ClockType.STEADY_TIME)
     wait = steady.wait_seconds(steady.nanoseconds() + 10**12)
     assert wait is not None
@@ -128,7 +128,7 @@ def test_a_sleep_ends_when_simulated_time_begins_or_ends(context: Context) -> No
     wait_for(woken_by_a_change)
 
 
-def test_who_sleeps_wrongly_is_told(context: Context) -> None:
+def test_a_wrong_argument_of_sleep_is_reported(context: Context) -> None:
     with pytest.raises(NotInitializedException):
         Clock().sleep_for(Duration(seconds=1), Context())
     with pytest.raises(ValueError, match="clock of SYSTEM_TIME, and the time is of ROS_TIME"):
@@ -149,33 +149,33 @@ def test_watchers_are_called_when_simulated_time_moves() -> None:
     assert seen == [1, 2]
 
 
-def test_jumps_beyond_a_threshold_are_told_before_and_after() -> None:
-    clock, told = simulated(10), list[object]()
+def test_jumps_beyond_a_threshold_are_reported_before_and_after() -> None:
+    clock, events = simulated(10), list[object]()
     threshold = JumpThreshold(min_forward=Duration(seconds=5), min_backward=Duration(seconds=-1))
     handle = clock.create_jump_callback(
-        threshold, pre_callback=lambda: told.append(clock.now()), post_callback=told.append
+        threshold, pre_callback=lambda: events.append(clock.now()), post_callback=events.append
     )
     for second in (14, 13.5, 20, 18):
         clock.set_ros_time_override(at(second))
-    assert told == [
+    assert events == [
         at(13.5), TimeJump(ClockChange.ROS_TIME_NO_CHANGE, Duration(seconds=6.5)),
         at(20), TimeJump(ClockChange.ROS_TIME_NO_CHANGE, Duration(seconds=-2)),
     ]  # fmt: skip
     clock._set_ros_time_is_active(False)
-    assert isinstance(told[-1], TimeJump)
-    assert told[-1].clock_change == ClockChange.ROS_TIME_DEACTIVATED
+    assert isinstance(events[-1], TimeJump)
+    assert events[-1].clock_change == ClockChange.ROS_TIME_DEACTIVATED
     handle.unregister()
     handle.unregister()
     clock._set_ros_time_is_active(True)
-    assert len(told) == 6
+    assert len(events) == 6
 
 
 def test_a_wrong_threshold_is_refused() -> None:
-    for forward, backward, told in (
+    for forward, backward, message in (
         (Duration(), None, "min_forward must be positive"),
         (None, Duration(), "min_backward must be negative"),
     ):
-        with pytest.raises(ValueError, match=told):
+        with pytest.raises(ValueError, match=message):
             JumpThreshold(min_forward=forward, min_backward=backward)
     with pytest.raises(ValueError, match="report no jump"):
         JumpThreshold(min_forward=None, min_backward=None, on_clock_change=False)
@@ -201,12 +201,12 @@ class Tom(Node):
 
 
 class Sim:
-    """Who tells the time."""
+    """A publisher of the time."""
 
     def __init__(self, wire: Wire, key: str = "clock") -> None:
         self._clock = wire.bus("sim").publisher(key, ClockMessage)
 
-    def tell(self, node: Tom, seconds: float, clock: Clock | None = None) -> None:
+    def publish(self, node: Tom, seconds: float, clock: Clock | None = None) -> None:
         def shown() -> Any:
             self._clock.put(ClockMessage(TimeMessage.of(seconds)))
             return (clock or node.clock).nanoseconds() == seconds * 1e9
@@ -218,65 +218,65 @@ def readers(graph: Graph) -> set[str]:
     return {row.key for row in graph.endpoints() if row.kind == "sub"}
 
 
-def test_a_node_shows_the_systems_time_unless_told(ros: Wire) -> None:
-    node, told = Tom(), Tom("-p", "use_sim_time:=true")
+def test_a_node_shows_the_systems_time_by_default(ros: Wire) -> None:
+    node, simulated = Tom(), Tom("-p", "use_sim_time:=true")
     assert node.seconds() > 1e9
-    assert told.seconds() == 0.0, "simulated time begins at zero"
-    assert (node.source.ros_time_is_active, told.source.ros_time_is_active) == (False, True)
+    assert simulated.seconds() == 0.0, "simulated time begins at zero"
+    assert (node.source.ros_time_is_active, simulated.source.ros_time_is_active) == (False, True)
 
 
-def test_time_passes_with_the_messages_while_nobody_spins(ros: Wire) -> None:
+def test_time_passes_with_the_messages_without_an_executor(ros: Wire) -> None:
     node, sim = Tom("-p", "use_sim_time:=true"), Sim(ros)
     for seconds in (1.0, 2.5, 0.5):
-        sim.tell(node, seconds)
+        sim.publish(node, seconds)
 
 
 def test_the_parameter_switches_it_on_and_off(ros: Wire) -> None:
     node, sim = Tom(), Sim(ros)
     node.use_sim_time(True)
-    sim.tell(node, 3.0)
+    sim.publish(node, 3.0)
     graph = ros.bus().graph()
     wait_for(lambda: readers(graph) == {"clock"})
     node.use_sim_time(False)
     assert node.seconds() > 1e9
     wait_for(lambda: readers(graph) == set())
     node.use_sim_time(True)
-    sim.tell(node, 4.0)
+    sim.publish(node, 4.0)
     node.source.close()
     assert node.seconds() > 1e9
 
 
 def test_the_topic_can_be_another_one(ros: Wire) -> None:
-    Sim(ros, "lab/clock").tell(Tom("-p", "use_sim_time:=true", "-r", "/clock:=/lab/clock"), 5.0)
+    Sim(ros, "lab/clock").publish(Tom("-p", "use_sim_time:=true", "-r", "/clock:=/lab/clock"), 5.0)
 
 
 def test_more_clocks_get_the_time_and_lose_it(ros: Wire) -> None:
     node, sim, another = Tom("-p", "use_sim_time:=true"), Sim(ros), ROSClock()
-    sim.tell(node, 2.0)
+    sim.publish(node, 2.0)
     node.source.attach_clock(another)
     assert another.nanoseconds() == 2_000_000_000
-    sim.tell(node, 3.0, another)
+    sim.publish(node, 3.0, another)
     node.source.detach_clock(another)
-    sim.tell(node, 4.0)
+    sim.publish(node, 4.0)
     assert another.nanoseconds() == 3_000_000_000
     with pytest.raises(ValueError, match="only clocks of ROS_TIME"):
         node.source.attach_clock(Clock())
 
 
-def test_what_is_no_time_is_told_and_changes_nothing(ros: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_no_time_is_reported_and_changes_nothing(ros: Wire, capsys: pytest.CaptureFixture[str]) -> None:
     node, sim = Tom("-p", "use_sim_time:=true"), Sim(ros)
-    sim.tell(node, 2.0)
+    sim.publish(node, 2.0)
     wrong = ros.bus("wrong").publisher("clock", Twist)
-    told: list[str] = []
+    message: list[str] = []
 
-    def is_told() -> bool:
+    def is_reported() -> bool:
         wrong.put(Twist())
-        told.append(capsys.readouterr().err)
-        return "[WARN]" in "".join(told)
+        message.append(capsys.readouterr().err)
+        return "[WARN]" in "".join(message)
 
-    wait_for(is_told)
-    assert "[tom]: invalid time on /clock: " in "".join(told)
-    assert "".join(told).count("\n") == 1
+    wait_for(is_reported)
+    assert "[tom]: invalid time on /clock: " in "".join(message)
+    assert "".join(message).count("\n") == 1
     assert node.clock.now() == Time(seconds=2, clock_type=node.clock.clock_type)
 
 
@@ -289,5 +289,5 @@ def test_time_goes_on_when_a_callback_for_jumps_fails(ros: Wire, capsys: pytest.
     threshold = JumpThreshold(min_forward=None, min_backward=Duration(nanoseconds=-1))
     node.clock.create_jump_callback(threshold, post_callback=fail)
     for seconds in (2.0, 1.0, 3.0):
-        sim.tell(node, seconds)
+        sim.publish(node, seconds)
     assert capsys.readouterr().err.count("RuntimeError: oh") == 1

@@ -1,4 +1,4 @@
-"""A context begins once and ends once, and tells those who asked for it."""
+"""A context begins once and ends once, and calls its shutdown callbacks."""
 
 import signal
 import sys
@@ -50,25 +50,25 @@ def test_it_ends_once_and_not_before_it_began() -> None:
 
 
 @pytest.mark.parametrize("end", [Context.shutdown, Context.try_shutdown, Context.interrupt])
-def test_who_asked_is_told_of_the_end_once(end: Callable[[Context], None]) -> None:
-    context, told = Context(), list[str]()
+def test_shutdown_callbacks_run_once(end: Callable[[Context], None]) -> None:
+    context, called = Context(), list[str]()
 
     class Owner:
-        def tell(self) -> None:
-            told.append("method")
+        def on_shutdown(self) -> None:
+            called.append("method")
 
     owner, forgotten = Owner(), Owner()
     context.init([])
-    context.on_shutdown(owner.tell)
-    context.on_shutdown(forgotten.tell)
-    context.on_shutdown(lambda: told.append("function"))
+    context.on_shutdown(owner.on_shutdown)
+    context.on_shutdown(forgotten.on_shutdown)
+    context.on_shutdown(lambda: called.append("function"))
     del forgotten
     end(context)
-    wait_for(lambda: len(told) == 2)
+    wait_for(lambda: len(called) == 2)
     context.try_shutdown()
-    assert told == ["method", "function"]
-    context.on_shutdown(lambda: told.append("late"))
-    assert told[-1] == "late"
+    assert called == ["method", "function"]
+    context.on_shutdown(lambda: called.append("late"))
+    assert called[-1] == "late"
 
 
 def test_what_is_open_is_closed_at_the_end_but_not_by_a_signal() -> None:
@@ -101,7 +101,7 @@ def test_a_block_begins_and_ends_it() -> None:
         context.shutdown()
 
 
-def test_a_domain_is_told_to_separate_nobody(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_domain_id_causes_a_warning_that_it_has_no_effect(capfd: pytest.CaptureFixture[str]) -> None:
     context = Context()
     context.init([], domain_id=7)
     context.shutdown()
@@ -236,18 +236,18 @@ def script(wire: Wire, tmp_path: Path) -> Script:
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_signal_ends_it(script: Script, case: str) -> None:
-    text, number, code, told = CASES[case]
+    text, number, code, message = CASES[case]
     with script(text) as process:
         process.wait_for_line("up")
         process.signal(number)
         assert process.wait(5) == code, process.err
-        assert told in process.err if told else not process.err
+        assert message in process.err if message else not process.err
         assert "Fatal Python error" not in process.err
         assert ("stopped" in process.out) == (text == POLITE)
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "told"),
+    ("text", "code", "message"),
     [
         ("pub.publish(Twist())", 0, ""),
         ("sys.exit(3)", 3, ""),
@@ -259,10 +259,10 @@ def test_a_signal_ends_it(script: Script, case: str) -> None:
         ("threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\nup()", 0, None),
     ],
 )
-def test_it_ends_by_itself(script: Script, text: str, code: int, told: str | None) -> None:
+def test_it_ends_by_itself(script: Script, text: str, code: int, message: str | None) -> None:
     with script(text) as process:
         assert process.wait(10) == code, process.err
-        assert told is None or (told in process.err if told else not process.err)
+        assert message is None or (message in process.err if message else not process.err)
         assert "Fatal Python error" not in process.err
 
 

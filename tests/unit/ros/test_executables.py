@@ -71,22 +71,24 @@ def test_console_scripts_are_read_from_setup_cfg(my_bot: Path, write: Write) -> 
     assert find("my_bot", "drive").function == "main"
 
 
-def test_a_console_script_without_its_module_is_told(my_bot: Path, write: Write) -> None:
+def test_a_console_script_without_its_module_is_reported(my_bot: Path, write: Write) -> None:
     write("src/my_bot/setup.py", SETUP_PY)
     with pytest.raises(NotFound, match=r"'drive' is my_bot.controller:main in its setup file, but .*\.py does not"):
         find("my_bot", "drive")
 
 
 @pytest.mark.parametrize(
-    ("file", "text", "told"),
+    ("file", "text", "message"),
     [
         ("setup.py", "setup(\n  entry_points={'console", r"setup.py:2: unterminated string"),
         ("setup.cfg", "[options.entry_points", r"setup.cfg: File contains no section headers"),
     ],
 )
-def test_a_setup_file_that_cannot_be_read_is_told(my_bot: Path, write: Write, file: str, text: str, told: str) -> None:
+def test_a_setup_file_that_cannot_be_read_is_reported(
+    my_bot: Path, write: Write, file: str, text: str, message: str
+) -> None:
     write(f"src/my_bot/{file}", text)
-    with pytest.raises(NotFound, match=told) as error:
+    with pytest.raises(NotFound, match=message) as error:
         find("my_bot", "drive")
     assert str(error.value).isprintable()
 
@@ -99,19 +101,19 @@ def test_where_it_is_installed_lib_is_looked_into(home: Path, write: Write, monk
     assert find("my_bot", "controller.py").path == path
 
 
-def test_an_unknown_executable_is_told_with_all_there_are(my_bot: Path, write: Write) -> None:
+def test_an_unknown_executable_is_reported_with_all_there_are(my_bot: Path, write: Write) -> None:
     write("src/my_bot/setup.py", SETUP_PY)
     write("src/my_bot/scripts/service_node.py")
     write("src/my_bot/my_bot/__init__.py")
     with pytest.raises(NotFound) as error:
         find("my_bot", "servce_node.py")
-    told = f"no executable 'servce_node.py'; did you mean 'service_node.py'?; executables in {my_bot}: "
-    assert str(error.value).endswith(f"{told}drive, pose, service_node.py, shape")
+    message = f"no executable 'servce_node.py'; did you mean 'service_node.py'?; executables in {my_bot}: "
+    assert str(error.value).endswith(f"{message}drive, pose, service_node.py, shape")
     with pytest.raises(NotFound, match=r"^give an executable; executables in"):
         find("my_bot", "")
 
 
-def test_an_unknown_package_is_told_with_those_around(my_bot: Path) -> None:
+def test_an_unknown_package_is_reported_with_those_around(my_bot: Path) -> None:
     with pytest.raises(NotFound, match=r"no package 'my_boot' around .*; did you mean 'my_bot'\?; .* --package"):
         find("my_boot", "controller.py")
 
@@ -143,7 +145,7 @@ def test_a_package_in_a_repository_of_packages_is_found(my_bot: Path, write: Wri
     assert find("arm", "a").path.parts[-4:] == ("repo", "arm", "scripts", "a.py")
 
 
-def test_a_file_that_is_not_there_is_told_with_its_neighbours(write: Write) -> None:
+def test_a_file_that_is_not_there_is_reported_with_its_neighbours(write: Write) -> None:
     path = write("scripts/controller.py")
     with pytest.raises(NotFound, match=r"no file '.*/controler.py'; did you mean 'controller.py'\?"):
         from_file(path.with_name("controler.py"))

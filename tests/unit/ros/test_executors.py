@@ -1,4 +1,4 @@
-"""Executors run callbacks in turn, wait as long as they are told, and hand on what a callback raises."""
+"""Executors run callbacks in turn, wait for their timeout, and pass on what a callback raises."""
 
 import threading
 import time
@@ -28,7 +28,7 @@ def test_entities_take_turns_however_much_one_has_to_do(ros: Wire) -> None:
     assert order == ["a", "b", "c"] * 3
 
 
-def test_nobody_is_woken_while_callbacks_run(ros: Wire, spin_for: Spin) -> None:
+def test_the_executor_is_not_woken_while_callbacks_run(ros: Wire, spin_for: Spin) -> None:
     node, waits, executor = rclpy.create_node("tom"), list[bool](), rclpy.get_global_executor()
     node.create_timer(0.001, lambda: waits.append(executor.waker.waiting))
     spin_for(lambda: len(waits) > 5, node)
@@ -146,7 +146,7 @@ def test_a_spin_within_a_callback_leaves_the_outer_one_its_node(ros: Wire, spin_
     spin_for(lambda: "inner" in got and got[-1] == "outer", node)
 
 
-def test_data_that_come_while_things_are_made_and_destroyed_harm_nobody(ros: Wire, spin_for: Spin) -> None:
+def test_data_that_arrive_while_things_are_made_and_destroyed_do_no_harm(ros: Wire, spin_for: Spin) -> None:
     node, got, made = rclpy.create_node("tom"), list[Any](), list[Any]()
     writer = rclpy.create_node("writer").create_publisher(Twist, "a", 10)
     stop = threading.Event()
@@ -197,7 +197,7 @@ def test_an_executor_of_the_scripts_own_is_given_callbacks(ros: Wire) -> None:
     executor.shutdown()
 
 
-def test_a_signal_between_two_spins_is_told_by_the_next(ros: Wire) -> None:
+def test_a_signal_between_two_spins_is_reported_by_the_next(ros: Wire) -> None:
     node = rclpy.create_node("tom")
     rclpy.spin_once(node, timeout_sec=0)
     rclpy.get_default_context().interrupt()
@@ -313,7 +313,7 @@ def test_while_all_threads_are_busy_the_newest_wait(ros: Wire) -> None:
     assert executor.shutdown()
 
 
-def test_a_shutdown_tells_whether_all_callbacks_have_ended(ros: Wire) -> None:
+def test_a_shutdown_returns_whether_all_callbacks_have_ended(ros: Wire) -> None:
     executor, gate, begun = MultiThreadedExecutor(2), threading.Event(), threading.Event()
     node = rclpy.create_node("tom")
 

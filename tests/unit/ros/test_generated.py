@@ -99,7 +99,7 @@ def test_fields_are_given_by_their_names_only() -> None:
         generated.find("std_msgs/msg/Empty")().x = 1
 
 
-def test_a_value_that_does_not_fit_is_told() -> None:
+def test_a_value_that_does_not_fit_is_reported() -> None:
     for kind, value, reason in [
         ("float64", 1, "of type 'float', not 'int' (1); write 1.0, or float(...)"),
         ("float64", np.float32(1), "of type 'float', not 'float32' (np.float32(1.0)); write float(...)"),
@@ -123,11 +123,11 @@ def test_a_value_that_does_not_fit_is_told() -> None:
         ("float64[<=2]", [1.0] * 3, "a sequence of at most 2 values of type 'float', not of 3 values"),
         ("float64[]", np.array(1.0), "a sequence of values of type 'float', not 'ndarray' (array(1.))"),
     ]:
-        told = refused(made(f"{kind} some")(), "some", value)
-        assert told.startswith(f"The 'some' field of t.msg.T must be {reason}")
+        expected = refused(made(f"{kind} some")(), "some", value)
+        assert expected.startswith(f"The 'some' field of t.msg.T must be {reason}")
 
 
-def test_an_element_that_does_not_fit_is_told_with_its_place() -> None:
+def test_an_element_that_does_not_fit_is_reported_with_its_place() -> None:
     for kind, values, reason in [
         ("float64[]", [1.0, 2], "[1]' field of t.msg.T must be of type 'float', not 'int' (2); write 2.0"),
         ("float64[]", np.array([1, 2]), "[0]' field of t.msg.T must be of type 'float', not 'int' (1)"),
@@ -211,7 +211,7 @@ def test_a_class_is_made_once_for_each_definition() -> None:
 @pytest.mark.parametrize(
     "member", [Field("lambda", "int8"), Field("get_fields_and_field_types", "int8"), Constant("ROS", "int8", 1)]
 )
-def test_a_name_that_no_class_can_have_is_told(member: Any) -> None:
+def test_a_name_that_no_class_can_have_is_reported(member: Any) -> None:
     halves = ((member,), ()) if isinstance(member, Field) else ((), (member,))
     with pytest.raises(InterfaceError, match=f"^t/msg/T: '{member.name}' is reserved"):
         generated.make(Interface("t/msg/T", "msg", *halves))
@@ -285,7 +285,7 @@ def test_an_array_is_the_one_that_was_given_unless_it_has_another_typecode() -> 
     assert same(scan.ranges, "f", [np.float32(0.1)])
 
 
-def test_what_no_array_of_its_type_holds_is_told() -> None:
+def test_what_no_array_of_its_type_holds_is_reported() -> None:
     rows = [
         ("uint8[]", "ab", "' field of t.msg.T must be a sequence of values of type 'int' in [0, 255], not 'str'"),
         ("uint8[]", 3, "' field of t.msg.T must be a sequence of values of type 'int' in [0, 255], not 'int'"),
@@ -343,7 +343,7 @@ def test_what_was_appended_beyond_a_bound_is_refused_when_it_is_written(wire: st
         encode(message, wire)
 
 
-def test_numbers_from_the_wire_that_do_not_fit_are_told_in_one_line() -> None:
+def test_numbers_from_the_wire_that_do_not_fit_are_reported_in_one_line() -> None:
     for kind, value, reason in [
         ("uint8[]", [1, 256], "not a T: Expected `int` <= 255 - at `$.some[1]`"),
         ("uint8[]", [True], "not a T: Expected `int`, got `bool` - at `$.some[0]`"),
@@ -366,7 +366,7 @@ def test_numbers_from_the_wire_that_do_not_fit_are_told_in_one_line() -> None:
 
 
 @pytest.mark.parametrize("wrong", [b"\xff\xff\xff\xff", b"\5\0\0\0abcd", b"\3\0\0\0abc", b"\1\0"])
-def test_cdr_that_is_cut_off_or_too_long_is_told(wrong: bytes) -> None:
+def test_cdr_that_is_cut_off_or_too_long_is_reported(wrong: bytes) -> None:
     with pytest.raises(CodecError, match=r"^not a T: (a sequence of|cut off)"):
         decode(b"\0\1\0\0" + wrong, WIRES["cdr"], (made("uint8[<=2] some"),))
 

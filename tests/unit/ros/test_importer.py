@@ -1,4 +1,4 @@
-"""What a script imports is found, made when it is first used, and told in one line where it is not there."""
+"""Imports of a script are found, generated on first use, and answered in one line where they do not exist."""
 
 import importlib
 import linecache
@@ -189,13 +189,13 @@ def test_an_unknown_package_is_reported_with_the_nearest_and_the_folders_searche
     assert line("import zebra") == f"{script}:1: No module named 'zebra'"
 
 
-def test_a_given_folder_that_is_none_is_told(tmp_path: Path) -> None:
+def test_a_given_folder_that_is_none_is_reported(tmp_path: Path) -> None:
     importer.install({"my_pkg": tmp_path / "none"})
-    told = refused("import my_pkg.srv", ModuleNotFoundError)
-    assert told == f"--package my_pkg={tmp_path / 'none'}: there is no such folder"
+    expected = refused("import my_pkg.srv", ModuleNotFoundError)
+    assert expected == f"--package my_pkg={tmp_path / 'none'}: there is no such folder"
 
 
-def test_an_unknown_type_is_told_with_the_nearest(package: Path) -> None:
+def test_an_unknown_type_is_reported_with_the_nearest(package: Path) -> None:
     importer.install({"my_pkg": package})
     assert refused("from geometry_msgs.msg import Twsit") == (
         "no type 'geometry_msgs/msg/Twsit'; did you mean geometry_msgs/msg/Twist?"
@@ -207,7 +207,7 @@ def test_an_unknown_type_is_told_with_the_nearest(package: Path) -> None:
     assert refused("import std_msgs.foo").startswith("no type 'std_msgs/foo'")
 
 
-def test_a_definition_that_is_broken_is_told_with_its_line(package: Path) -> None:
+def test_a_definition_that_is_broken_is_reported_with_its_line(package: Path) -> None:
     file = package / "srv" / "Broken.srv"
     file.write_text("int64 a\n---\nint65 b\n")
     importer.install({"my_pkg": package})
@@ -218,12 +218,12 @@ def test_a_definition_that_is_broken_is_told_with_its_line(package: Path) -> Non
     assert refused("from my_pkg.srv import Broken") == f"{file}: 0 lines of '---'; a .srv has 1"
 
 
-def test_what_a_package_does_not_have_is_told(package: Path) -> None:
+def test_what_a_package_does_not_have_is_reported(package: Path) -> None:
     (package / "msg" / "Shape.msg").unlink()
     importer.install({"my_pkg": package})
-    told = f"package 'my_pkg' has no .msg files in {package / 'msg'}"
-    assert refused("from my_pkg.msg import Shape", ModuleNotFoundError) == told
-    assert refused("import my_pkg\nmy_pkg.msg", AttributeError) == told
+    expected = f"package 'my_pkg' has no .msg files in {package / 'msg'}"
+    assert refused("from my_pkg.msg import Shape", ModuleNotFoundError) == expected
+    assert refused("import my_pkg\nmy_pkg.msg", AttributeError) == expected
     assert refused("import my_pkg\nmy_pkg.other", AttributeError) == "my_pkg has no 'other'; it has msg and srv"
     assert refused("import geometry_msgs.srv", ModuleNotFoundError) == "package 'geometry_msgs' has no .srv files"
 
@@ -254,18 +254,18 @@ def test_a_module_of_ros_has_what_ours_exports(pretend: ModuleType) -> None:
     assert set(ran("from rclpy.pretend import *")) == {"__builtins__", "Thing", "PretendError"}
 
 
-def test_a_type_that_is_imported_from_its_package_is_told_where_it_is() -> None:
+def test_an_import_of_a_type_from_its_package_is_answered_with_its_module() -> None:
     importer.install()
-    told = "geometry_msgs has no Twist; write: from geometry_msgs.msg import Twist"
-    assert refused("from geometry_msgs import Twist", ImportError) == told
+    expected = "geometry_msgs has no Twist; write: from geometry_msgs.msg import Twist"
+    assert refused("from geometry_msgs import Twist", ImportError) == expected
 
 
-def test_what_a_module_of_ros_lacks_is_told(pretend: ModuleType) -> None:
+def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     importer.install()
     page = "; see docs/coming-from-ros.md"
-    told = f"rclpy.pretend has no 'Thign' here; did you mean Thing?{page}"
-    assert refused("from rclpy.pretend import Thign") == told
-    assert refused("import rclpy.pretend\nrclpy.pretend.Thign", AttributeError) == told
+    expected = f"rclpy.pretend has no 'Thign' here; did you mean Thing?{page}"
+    assert refused("from rclpy.pretend import Thign") == expected
+    assert refused("import rclpy.pretend\nrclpy.pretend.Thign", AttributeError) == expected
     assert refused("from rclpy.pretend import hidden") == f"rclpy.pretend has no 'hidden' here{page}"
     assert refused("from rclpy.pretend import Other") == f"rclpy.pretend has no 'Other' here; it is in rclpy{page}"
     assert refused("import rclpy\nrclpy.__file__", AttributeError) == "rclpy has no '__file__'"
@@ -274,12 +274,12 @@ def test_what_a_module_of_ros_lacks_is_told(pretend: ModuleType) -> None:
     assert "numpy.frombuffer(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
 
 
-def test_actions_are_told_to_be_missing(package: Path, pretend: ModuleType) -> None:
+def test_actions_are_reported_to_be_missing(package: Path, pretend: ModuleType) -> None:
     importer.install({"my_pkg": package})
     for line in ("from my_pkg.action import Turn", "from rclpy.action import ActionClient", "from rclpy import action"):
-        told = refused(line, ModuleNotFoundError)
-        assert "there are no actions here; use a service" in told
-        assert told.endswith("; see docs/coming-from-ros.md")
+        expected = refused(line, ModuleNotFoundError)
+        assert "there are no actions here; use a service" in expected
+        assert expected.endswith("; see docs/coming-from-ros.md")
 
 
 def test_the_module_of_one_type_has_the_same_class(package: Path) -> None:

@@ -104,7 +104,7 @@ def test_a_place_that_counts_has_one_level() -> None:
             logger.log("x", level, once=True)
 
 
-def test_what_is_wrong_is_told() -> None:
+def test_what_is_wrong_is_reported() -> None:
     logger = logging.get_logger("tom")
     for name in ("", None):
         with pytest.raises(ValueError, match="not empty"):

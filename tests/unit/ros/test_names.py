@@ -36,7 +36,7 @@ def test_at_the_root_nothing_comes_before_a_name() -> None:
     assert names.key("/ns/cmd_vel") == "ns/cmd_vel"
 
 
-def test_a_wrong_name_is_told_with_the_place() -> None:
+def test_a_wrong_name_is_reported_with_the_place() -> None:
     for name, place, fault in [
         ("", 0, "empty"),
         ("a b", 1, "' '"),

@@ -222,7 +222,7 @@ def test_counts(node: Node) -> None:
     assert (node.count_publishers("~/cmd_vel"), node.count_services("come")) == (0, 0)
 
 
-def test_who_writes_and_who_reads(node: Node) -> None:
+def test_publishers_and_subscribers_are_listed(node: Node) -> None:
     (writer,) = node.get_publishers_info_by_topic("cmd_vel")
     assert writer[:3] == ("talker", "/Fred", TWIST)
     assert isinstance(writer, TopicEndpointInfo)
@@ -247,7 +247,7 @@ def test_a_node_is_waited_for(node: Node) -> None:
     late.join()  # it is in the graph before all that it has is made
 
 
-def test_nobody_looks_after_the_end(node: Node) -> None:
+def test_the_graph_is_closed_after_the_end(node: Node) -> None:
     other = Node("other")
     other.destroy_node()
     with pytest.raises(InvalidHandle, match="node /other was destroyed"):
@@ -369,7 +369,7 @@ class Early(Node):
         self.get_logger()
 
 
-def test_what_a_node_lacks_is_told(ros: Wire) -> None:
+def test_what_a_node_lacks_is_reported(ros: Wire) -> None:
     node: Any = Closes("tom")
     assert not hasattr(node, "nothing")
     with pytest.raises(AttributeError, match=r"^'Closes' object has no attribute 'nothing'; what Node has here: "):

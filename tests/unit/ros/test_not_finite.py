@@ -51,7 +51,7 @@ def test_a_scan_with_an_infinite_range_is_published_and_read(ros: Wire, used: st
     assert [repr(each.ranges.tolist()) for each in got] == ["[1.0]", "[1.0, inf, nan]", "[2.0]"]
 
 
-def test_who_comes_late_gets_it_too(used: str, ros: Wire, spin_for: Spin) -> None:
+def test_a_late_subscriber_gets_it_too(used: str, ros: Wire, spin_for: Spin) -> None:
     node, got = rclpy.create_node("tom"), list[Any]()
     rclpy.create_node("base").create_publisher(Battery, "battery", LATCHED).publish(Battery(current=math.nan))
     node.create_subscription(Battery, "battery", got.append, LATCHED)
@@ -94,13 +94,13 @@ def test_a_request_of_our_own_is_refused(wire: Wire) -> None:
         bus.call("next_goal", m.NextGoalReply(math.nan), m.NextGoalReply)
 
 
-def test_what_cdr_cannot_hold_is_told() -> None:
+def test_what_cdr_cannot_hold_is_reported() -> None:
     kind: Any = make(Interface("t/msg/Wide", "msg", (Field("x", "float32", "sequence"), Field("text", "wstring"))))
     assert written(kind(x=[1.0]), "json")[1] == "json"
     with pytest.raises(CodecError) as error:
         written(kind(x=[1.0, math.nan]), "json")
-    told = "Wide.x[1] is not a finite number, which needs CDR, and that cannot hold the rest: "
-    assert str(error.value).startswith(told)
+    message = "Wide.x[1] is not a finite number, which needs CDR, and that cannot hold the rest: "
+    assert str(error.value).startswith(message)
     assert "wstring" in str(error.value)
     for finite in (kind(x=[1.0], text="null"), kind(x=[1.0])):
         for wire in ("json", "msgpack"):

@@ -26,6 +26,6 @@ def test_topics_go_both_ways(wire: Wire) -> None:
 def test_services_answer_either(ours: bool, wire: Wire) -> None:
     trigger = generated.find("std_srvs/srv/Trigger")
     theirs = (trigger.Request, trigger.Response)
-    (request, reply), (asked, told) = ((TriggerRequest, TriggerReply), theirs)[:: 1 if ours else -1]
+    (request, reply), (asked, expected) = ((TriggerRequest, TriggerReply), theirs)[:: 1 if ours else -1]
     wire.bus("server").serve("resume", request, reply, lambda _: reply(success=True, message="done")).start()
-    assert wire.bus("client").call("resume", asked(), told) == told(success=True, message="done")
+    assert wire.bus("client").call("resume", asked(), expected) == expected(success=True, message="done")

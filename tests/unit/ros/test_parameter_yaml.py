@@ -57,8 +57,8 @@ def test_an_empty_file_says_nothing(file: Path) -> None:
     assert given(file, "tom:\n  ros__parameters:\n", "/tom") == {}
 
 
-def test_a_wrong_file_is_told_in_one_line(file: Path) -> None:
-    for text, told in [
+def test_a_wrong_file_is_reported_in_one_line(file: Path) -> None:
+    for text, message in [
         ("tom:\n  x: 1\n", "section /tom has a value for 'x' outside of ros__parameters"),
         ("x: 1\n", "the file has a value for 'x' outside of ros__parameters"),
         ("[1, 2]", "it has no names with values"),
@@ -71,7 +71,7 @@ def test_a_wrong_file_is_told_in_one_line(file: Path) -> None:
         file.write_text(text)
         with pytest.raises(ValueError, match=r"params\.yaml: ") as error:
             parameter_yaml.read(str(file))
-        assert told in str(error.value)
+        assert message in str(error.value)
         assert "\n" not in str(error.value)
 
 
@@ -82,7 +82,7 @@ def test_a_few_lines_cannot_stand_for_millions_of_values(file: Path) -> None:
         parameter_yaml.read(str(file))
 
 
-def test_a_file_that_is_no_text_is_told(file: Path) -> None:
+def test_a_file_that_is_no_text_is_reported(file: Path) -> None:
     file.write_bytes(b"\xff\xfe")
     with pytest.raises(RCLInvalidROSArgsError, match="not UTF-8"):
         arguments.parse(["--ros-args", "--params-file", str(file)])

@@ -84,15 +84,15 @@ def test_a_declared_type_needs_a_value_before_it_is_read() -> None:
 
 def test_declaring_by_name_alone_is_warned_of() -> None:
     node = Tom("-p", "x:=[1, 2]")
-    with pytest.warns(UserWarning, match="'.' accepts any type: give it a default") as told:
+    with pytest.warns(UserWarning, match="'.' accepts any type: give it a default") as message:
         assert node.declare_parameter("x").value == [1, 2]
         node.declare_parameters("", [("y",)])
-    assert [each.filename for each in told] == [__file__] * 2
+    assert [each.filename for each in message] == [__file__] * 2
     assert node.set(x="a") == [""]
     assert node.describe_parameter("x").dynamic_typing
 
 
-def test_what_cannot_be_declared_is_told() -> None:
+def test_what_cannot_be_declared_is_reported() -> None:
     rows: list[tuple[Any, type[Exception], str]] = [
         (("a", 1), e.ParameterAlreadyDeclaredException, "a: declared twice"),
         (("", 1), e.InvalidParameterException, "not a valid parameter name"),
@@ -106,16 +106,16 @@ def test_what_cannot_be_declared_is_told() -> None:
         (("whole", 7, Descriptor(integer_range=[IntegerRange(from_value=2, to_value=8)])),
          e.InvalidParameterValueException, "'whole' rejects 1: use a number from 2 to 8"),
     ]  # fmt: skip
-    for declare, error, told in rows:
+    for declare, error, message in rows:
         node = Tom("-p", "word:=fast", "-p", "whole:=1")
         node.declare_parameter("a", 1)
         with pytest.raises(error) as found:
             node.declare_parameter(*declare)
-        assert told in str(found.value)
+        assert message in str(found.value)
         assert not isinstance(declare[0], str) or declare[0] == "a" or not node.has_parameter(declare[0])
 
 
-def test_what_is_no_entry_is_told() -> None:
+def test_what_is_no_entry_is_reported() -> None:
     for wrong in ("speed", (), ("a", 1, None, None)):
         with pytest.raises(TypeError, match="does not declare a parameter"):
             Tom().declare_parameters("", [wrong])  # type: ignore[list-item]
@@ -186,17 +186,17 @@ def test_callbacks_change_refuse_and_hear_what_is_set() -> None:
         heard.append(("on", parameters[0].value, node.values("x")))
         return set_result("" if parameters[0].value < 10 else "too many")
 
-    def told(parameters: list[Parameter]) -> None:
+    def message(parameters: list[Parameter]) -> None:
         heard.append(("post", parameters[0].value, node.values("x")))
 
     node.add_pre_set_parameters_callback(double)
     node.add_on_set_parameters_callback(check)
-    node.add_post_set_parameters_callback(told)
+    node.add_post_set_parameters_callback(message)
     assert (node.set(x=2), node.set(x=7)) == ([""], ["too many"])
     assert heard == [("on", 4, [1]), ("post", 4, [4]), ("on", 14, [4])]
     node.remove_pre_set_parameters_callback(double)
     node.remove_on_set_parameters_callback(check)
-    node.remove_post_set_parameters_callback(told)
+    node.remove_post_set_parameters_callback(message)
     assert (node.set(x=70), node.values("x"), len(heard)) == ([""], [70], 3)
     with pytest.raises(ValueError, match="not in list"):
         node.remove_on_set_parameters_callback(check)
@@ -225,7 +225,7 @@ def test_a_callback_refuses_a_declaration_too() -> None:
     assert not node.has_parameter("x")
 
 
-def test_a_callback_that_returns_nothing_is_told() -> None:
+def test_a_callback_that_returns_nothing_is_reported() -> None:
     node = Tom(allow_undeclared_parameters=True)
     node.add_on_set_parameters_callback(lambda _parameters: None)
     with pytest.raises(TypeError, match=r"<lambda> returned None; return a SetParametersResult\(successful=True\)"):

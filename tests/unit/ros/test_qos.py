@@ -31,7 +31,7 @@ def test_a_profile_that_says_too_little_is_refused(said: dict[str, Any]) -> None
         QoSProfile(**said)
 
 
-def test_a_wrong_argument_is_told() -> None:
+def test_a_wrong_argument_is_reported() -> None:
     rows: list[tuple[dict[str, Any], str]] = [
         ({"deepth": 1}, "QoSProfile has no deepth; use history, depth"),
         ({"depth": "10"}, r"depth: '10' is a str; use a int"),
@@ -40,8 +40,8 @@ def test_a_wrong_argument_is_told() -> None:
         ({"deadline": 5}, "deadline: 5 is a int; use a Duration"),
         ({"avoid_ros_namespace_conventions": 1}, "use a bool"),
     ]
-    for said, told in rows:
-        with pytest.raises(AssertionError, match=told):
+    for said, message in rows:
+        with pytest.raises(AssertionError, match=message):
             QoSProfile(**{"depth": 1, **said})
 
 
@@ -87,7 +87,7 @@ def test_the_presets_are_those_of_ros() -> None:
         HistoryPolicy.get_from_short_key("fast")
 
 
-def test_whoever_takes_a_profile_takes_a_depth() -> None:
+def test_a_depth_is_accepted_instead_of_a_profile() -> None:
     assert qos.as_profile(7) == QoSProfile(depth=7)
     assert qos.as_profile(0).depth == 10
     assert qos.as_profile(qos.qos_profile_parameters) is qos.qos_profile_parameters

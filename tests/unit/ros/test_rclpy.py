@@ -63,7 +63,7 @@ def test_a_context_of_its_own_leaves_the_default_one_alone(ros: Wire) -> None:
 @pytest.mark.parametrize(
     "spin", [rclpy.spin, rclpy.spin_once, lambda node: rclpy.spin_until_future_complete(node, rclpy.Future())]
 )
-def test_a_spin_after_the_end_is_told(ros: Wire, spin: Callable[[rclpy.Node], None]) -> None:
+def test_a_spin_after_the_end_is_reported(ros: Wire, spin: Callable[[rclpy.Node], None]) -> None:
     node = rclpy.create_node("tom")
     rclpy.shutdown()
     with pytest.raises(RCLError, match="rclpy is not running"):

@@ -36,8 +36,8 @@ def environment(**more: str) -> dict[str, str]:
 
 def test_a_script_is_main_with_its_own_words_and_folder_first(run: Run, write: Write) -> None:
     write("scripts/helper.py", "word = 'helped'")
-    told = "print(__name__, sys.argv, __file__, sys.modules['__main__'].__dict__ is globals(), helper.word)"
-    path = write("scripts/a.py", f"import sys, helper\n{told}")
+    message = "print(__name__, sys.argv, __file__, sys.modules['__main__'].__dict__ is globals(), helper.word)"
+    path = write("scripts/a.py", f"import sys, helper\n{message}")
     done = run("scripts/a.py", "x", "--connect", "-h", "--ros-args", "-r", "a:=b")
     words = [str(path), "x", "--connect", "-h", "--ros-args", "-r", "a:=b"]
     assert done.stdout == f"__main__ {words} {path} True helped\n"
@@ -62,7 +62,7 @@ def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Pat
 
 
 def test_the_exit_code_is_the_scripts(run: Run, write: Write) -> None:
-    for end, code, told in [
+    for end, code, message in [
         ("", 0, ""),
         ("sys.exit(3)", 3, ""),
         ("sys.exit('no robot')", 1, "no robot\n"),
@@ -72,7 +72,7 @@ def test_the_exit_code_is_the_scripts(run: Run, write: Write) -> None:
     ]:
         write("a.py", f"import os, sys, time\n{end}")
         done = run("a.py")
-        assert (done.returncode, done.stderr) == (code, told)
+        assert (done.returncode, done.stderr) == (code, message)
 
 
 def test_what_a_script_wrote_to_a_file_that_it_left_open_is_there(run: Run, write: Write, home: Path) -> None:
@@ -93,9 +93,9 @@ def test_a_traceback_is_the_users_and_shows_none_of_ours(run: Run, write: Write)
 def test_ours_is_left_out_of_what_an_error_came_from(run: Run, write: Write) -> None:
     failing = "try:\n    rclpy.create_node('a')\nexcept Exception as e:\n    raise OSError('b') from e"
     write("a.py", f"import rclpy\n{failing}")
-    told = run("a.py").stderr
-    assert "direct cause" in told
-    assert "holozen/" not in told
+    message = run("a.py").stderr
+    assert "direct cause" in message
+    assert "holozen/" not in message
 
 
 @pytest.mark.parametrize("text", ["def f(:\n  pass", "x = '\0'"])
@@ -122,7 +122,7 @@ rclpy.spin(node)
     assert done.stderr.count("  File ") == 2
 
 
-def test_a_name_that_is_not_there_is_told_in_the_users_traceback(run: Run, write: Write) -> None:
+def test_a_name_that_is_not_there_is_reported_in_the_users_traceback(run: Run, write: Write) -> None:
     write("a.py", "from geometry_msgs.msg import Twost\n")
     done = run("a.py")
     assert "holozen/ros" not in done.stderr
@@ -130,7 +130,7 @@ def test_a_name_that_is_not_there_is_told_in_the_users_traceback(run: Run, write
 
 
 def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> None:
-    for words, told in [
+    for words, message in [
         (["q.py"], "no file 'q.py'; Python files there: controller.py"),
         (["scripts/b.py"], "no file 'scripts/b.py'"),
         (["my_boot", "a.py"], "no package 'my_boot' around "),
@@ -140,16 +140,17 @@ def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> 
         write("controller.py")
         done = run(*words)
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
-        assert told in done.stderr
+        assert message in done.stderr
         assert done.stderr.startswith("holozen run: ")
 
 
 def test_where_ros_is_sourced_it_refuses_unless_forced(run: Run, write: Write) -> None:
     write("a.py", "import rclpy; print(rclpy.init.__module__)")
     done = run("a.py", ROS_DISTRO="humble")
-    told = "ROS is sourced in this terminal (ROS_DISTRO=humble)"
+    message = "ROS is sourced in this terminal (ROS_DISTRO=humble)"
     assert (
-        done.stderr == f"holozen run: {told}: start the script with ROS's own `ros2 run`, or over Zenoh with --force\n"
+        done.stderr
+        == f"holozen run: {message}: start the script with ROS's own `ros2 run`, or over Zenoh with --force\n"
     )
     assert done.returncode == 1
     assert run("a.py", flags=("--force",), ROS_DISTRO="humble").stdout.startswith("holozen.")
@@ -242,7 +243,7 @@ def test_a_thread_that_spins_ends_without_a_word(wire: Wire, write: Write) -> No
         assert (process.wait(within=10), process.err) == (0, "")
 
 
-def test_an_error_in_a_thread_is_told_with_the_users_frames(run: Run, write: Write) -> None:
+def test_an_error_in_a_thread_is_reported_with_the_users_frames(run: Run, write: Write) -> None:
     write("a.py", """
 import rclpy, threading
 rclpy.init()
@@ -259,7 +260,7 @@ thread.start()
 
 
 @pytest.mark.parametrize(
-    ("line", "told"),
+    ("line", "message"),
     [
         (
             "rclpy.get_default_context().interrupt(); rclpy.spin_once(node)",
@@ -270,8 +271,8 @@ thread.start()
         ("from holozen.messages.codec import CodecError; raise CodecError('no')", "CodecError: no"),
     ],
 )
-def test_an_error_of_ours_is_called_as_in_ros(run: Run, write: Write, line: str, told: str) -> None:
+def test_an_error_of_ours_is_called_as_in_ros(run: Run, write: Write, line: str, message: str) -> None:
     write("a.py", f"import rclpy\nrclpy.init()\nnode = rclpy.create_node('a')\n{line}\n")
     done = run("a.py")
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith(told)
+    assert done.stderr.splitlines()[-1].startswith(message)

@@ -1,4 +1,4 @@
-"""Requests are answered in spin; what goes wrong is told to the caller."""
+"""Requests are answered in spin; errors reach the caller."""
 
 import threading
 from collections.abc import Callable
@@ -52,25 +52,27 @@ def test_a_request_of_our_bus_is_answered_in_spin(ros: Wire, spin_for: Spin) -> 
 
 
 @pytest.mark.parametrize(
-    ("wrong", "told"),
+    ("wrong", "expected"),
     [
         (None, "NoneType; write `return response` at its end"),
         (3, "int"),
         (SetBool.Response(), "SetBool_Response"),
     ],
 )
-def test_a_callback_that_returns_no_response_is_told_to_both(ros: Wire, spin_for: Spin, wrong: Any, told: str) -> None:
+def test_a_callback_that_returns_no_response_is_reported_to_both(
+    ros: Wire, spin_for: Spin, wrong: Any, expected: str
+) -> None:
     node = rclpy.create_node("tom")
     node.create_service(Trigger, "go", lambda _request, _response: wrong)
     reply = asked(ros.bus("bus"))
-    text = f"the callback of /go must return a Trigger.Response, and gave a {told}"
+    text = f"the callback of /go must return a Trigger.Response, and gave a {expected}"
     with pytest.raises(TypeError) as error:
         spin_for(reply, node)
     assert str(error.value) == text
     assert spin_for(reply, node) == text
 
 
-def test_an_exception_ends_the_spin_and_the_caller_is_told(ros: Wire, spin_for: Spin) -> None:
+def test_an_exception_ends_the_spin_and_reaches_the_caller(ros: Wire, spin_for: Spin) -> None:
     node = rclpy.create_node("tom")
     node.create_service(Trigger, "go", lambda _request, _response: 1 / 0)
     reply = asked(ros.bus("bus"))

@@ -61,7 +61,7 @@ def test_a_message_of_our_bus_comes_as_rosss_and_the_other_way_round(ros: Wire, 
 
 
 @pytest.mark.parametrize(("profile", "kept"), [(3, 3), (QoSProfile(depth=4), 4), (qos.qos_profile_sensor_data, 5)])
-def test_who_is_slow_gets_the_newest_in_order(ros: Wire, profile: Any, kept: int) -> None:
+def test_a_slow_subscriber_gets_the_newest_in_order(ros: Wire, profile: Any, kept: int) -> None:
     node, bus, got = rclpy.create_node("tom"), ros.bus("bus"), list[Any]()
     node.create_subscription(Twist, "a", got.append, profile)
     writer = bus.publisher("a", OurTwist)
@@ -135,7 +135,7 @@ def test_a_loop_that_never_waits_sees_the_newest(ros: Wire) -> None:
     assert numbers(got) == list(range(200))
 
 
-def test_what_cannot_be_read_is_told_once_and_left_out(
+def test_what_cannot_be_read_is_reported_once_and_left_out(
     ros: Wire, spin_for: Spin, capfd: pytest.CaptureFixture[str]
 ) -> None:
     node, bus, got = rclpy.create_node("tom"), ros.bus("bus"), list[Any]()
@@ -211,7 +211,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 LARGE = 1_000_000  # bytes
 
 
-def test_who_comes_late_gets_the_last_of_each_publisher(ros: Wire, spin_for: Spin) -> None:
+def test_a_late_subscriber_gets_the_last_of_each_publisher(ros: Wire, spin_for: Spin) -> None:
     node, got = rclpy.create_node("tom"), list[str]()
     for name, texts in (("one", "ab"), ("two", "cd")):
         writer = rclpy.create_node(name).create_publisher(String, "map", LATCHED)
@@ -254,7 +254,7 @@ def test_a_volatile_one_gets_nothing_old(ros: Wire, spin_for: Spin) -> None:
     other, end = rclpy.create_node("one"), node._holozen.bus.subscribe_raw("end")
     writer = other.create_publisher(String, "map", LATCHED)
     writer.publish(String(data="old"))
-    # What was sent before it has come by now, to nobody.
+    # What was sent before has been dropped by now.
     wait_for(lambda: other._holozen.bus.session.put("end", b"") or end.try_recv())
     node.create_subscription(String, "map", lambda message: got.append(message.data), 10)
     wait_for(writer.get_subscription_count)
@@ -282,21 +282,21 @@ def test_the_next_message_is_given_also_while_another_thread_spins(ros: Wire) ->
     spins = threading.Thread(target=executor.spin)
     spins.start()
 
-    def tell() -> None:
+    def publish() -> None:
         wait_for(lambda: writer.matched)
         writer.put(OurTwist.planar(0.5))
 
-    teller = threading.Thread(target=tell)
-    teller.start()
+    publisher = threading.Thread(target=publish)
+    publisher.start()
     there, message = wait_for_message(Twist, node, "cmd_vel", time_to_wait=10)
     assert (there, message.linear.x) == (True, 0.5)
-    teller.join()
+    publisher.join()
     wait_for(lambda: not writer.matched)
     executor.shutdown()
     spins.join()
 
 
-def test_it_waits_no_longer_than_it_was_told(ros: Wire) -> None:
+def test_it_waits_no_longer_than_its_timeout(ros: Wire) -> None:
     node = rclpy.create_node("tom")
     assert wait_for_message(Twist, node, "cmd_vel", time_to_wait=0.02) == (False, None)
     assert node.count_subscribers("cmd_vel") == 0

@@ -26,7 +26,7 @@ def test_the_first_result_stays() -> None:
     assert (future.result(), future.cancelled()) == (1, False)
 
 
-def test_an_exception_is_raised_by_who_asks_for_the_result() -> None:
+def test_an_exception_is_raised_by_result() -> None:
     future = Future()
     future.set_exception(ValueError("no"))
     assert future.done()
@@ -34,7 +34,7 @@ def test_an_exception_is_raised_by_who_asks_for_the_result() -> None:
         future.result()
 
 
-def test_an_exception_that_nobody_asks_for_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_exception_that_is_never_retrieved_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     future = Future()
     future.set_exception(ValueError("no"))
     del future
@@ -63,22 +63,22 @@ def test_done_callbacks_with_an_executor_wait_for_it() -> None:
     assert called == [future]
 
 
-def test_a_watcher_is_told_in_the_same_moment_unless_it_gave_up() -> None:
-    future, told = Future(executor=TaskQueue()), list[str]()
+def test_a_watcher_is_called_at_once_unless_it_was_removed() -> None:
+    future, message = Future(executor=TaskQueue()), list[str]()
 
     def first() -> None:
-        told.append("first")
+        message.append("first")
 
     def second() -> None:
-        told.append("second")
+        message.append("second")
 
     future.watch(first)
     future.watch(second)
     future.unwatch(second)
     future.set_result(None)
-    assert told == ["first"]
+    assert message == ["first"]
     future.watch(second)
-    assert told == ["first", "second"]
+    assert message == ["first", "second"]
 
 
 def test_a_task_is_the_future_of_what_its_function_returns() -> None:

@@ -1,4 +1,4 @@
-"""tf2_ros between real nodes: what one tells, the other can ask for."""
+"""tf2_ros between real nodes: what one broadcasts, the other can look up."""
 
 import math
 import threading
@@ -68,24 +68,24 @@ def buffer() -> tf2_ros.Buffer:
     return buffer
 
 
-def test_what_is_told_can_be_asked_for(node: Make) -> None:
+def test_a_broadcast_transform_can_be_looked_up(node: Make) -> None:
     teller, asker = node("teller"), node("asker")
     buffer = tf2_ros.Buffer()
     listener = tf2_ros.TransformListener(buffer, asker)
     assert listener.buffer is buffer
     broadcaster, executor = tf2_ros.TransformBroadcaster(teller), spinning(asker)
 
-    def told() -> bool:
+    def expected() -> bool:
         broadcaster.sendTransform([transform("odom", "base", 2.0), transform("base", "arm", 1.0)])
         return bool(buffer.can_transform("odom", "arm", NEWEST))
 
-    spun_until(executor, told)
+    spun_until(executor, expected)
     found = buffer.lookup_transform("odom", "arm", NEWEST)
     assert (found.header.frame_id, found.child_frame_id, found.header.stamp.sec) == ("odom", "arm", 1)
     assert found.transform.translation.x == 3.0
 
 
-def test_who_comes_late_gets_all_that_is_static(node: Make) -> None:
+def test_a_late_listener_gets_all_static_transforms(node: Make) -> None:
     teller = node("teller")
     broadcaster = tf2_ros.StaticTransformBroadcaster(teller)
     broadcaster.sendTransform([transform("map", "odom", 1.0), transform("map", "other", 1.0)])
@@ -134,8 +134,8 @@ def test_between_two_stamps_it_is_between(buffer: tf2_ros.Buffer) -> None:
     with pytest.raises(tf2_ros.ExtrapolationException):
         buffer.lookup_transform("odom", "base", Time(seconds=5))
     assert buffer.can_transform("odom", "base", Time(seconds=5)) is False
-    answer, told = buffer.can_transform("odom", "base", Time(seconds=5), return_debug_tuple=True)
-    assert (answer, "3.000 s after" in told) == (False, True)
+    answer, expected = buffer.can_transform("odom", "base", Time(seconds=5), return_debug_tuple=True)
+    assert (answer, "3.000 s after" in expected) == (False, True)
 
 
 def test_from_one_time_to_another(buffer: tf2_ros.Buffer) -> None:
@@ -171,7 +171,7 @@ def test_a_covariance_is_turned_too(buffer: tf2_ros.Buffer) -> None:
     assert (there.pose.covariance[0], there.pose.covariance[7]) == pytest.approx((0.0, 4.0))
 
 
-def test_a_message_that_cannot_be_transformed_is_told(buffer: tf2_ros.Buffer) -> None:
+def test_a_message_that_cannot_be_transformed_is_reported(buffer: tf2_ros.Buffer) -> None:
     with pytest.raises(tf2_ros.TypeException, match="TwistStamped cannot be transformed; Point"):
         buffer.transform(stamped("TwistStamped", "base"), "map")
 

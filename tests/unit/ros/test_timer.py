@@ -1,4 +1,4 @@
-"""Timers keep their beat on their clock, and a rate needs nobody who spins."""
+"""Timers keep their period on their clock, and a rate needs no executor."""
 
 import threading
 from collections.abc import Callable
@@ -66,7 +66,7 @@ def test_a_clock_that_is_set_back_begins_a_new_period(clock: Watch) -> None:
     assert calls(made(clock), clock, 110, 50, 59, 60) == [110, 60]
 
 
-def test_simulated_time_that_has_not_begun_calls_nobody() -> None:
+def test_no_timer_is_called_before_simulated_time_has_begun() -> None:
     clock = Watch()
     assert calls(made(clock), clock, 0, 500, 509, 510) == [510]
 
@@ -75,7 +75,7 @@ def test_a_period_of_zero_calls_at_every_look(clock: Watch) -> None:
     assert calls(made(clock, 0), clock, 100, 100, 101) == [100, 100, 101]
 
 
-def test_it_tells_where_it_stands(clock: Watch) -> None:
+def test_it_reports_the_time_since_the_last_and_until_the_next_call(clock: Watch) -> None:
     timer = made(clock)
     clock.set(104)
     assert (timer.is_ready(), timer.time_since_last_call(), timer.time_until_next_call()) == (False, 4, 6)
@@ -112,7 +112,7 @@ def test_a_period_below_zero_is_refused(clock: Watch) -> None:
         made(clock, -1)
 
 
-def test_a_move_of_simulated_time_wakes_who_waits(clock: Watch) -> None:
+def test_a_move_of_simulated_time_wakes_the_waiting_thread(clock: Watch) -> None:
     timer, waker = made(clock), Waker()
     timer.arm(waker)
     assert timer.wait_seconds() is None

@@ -21,7 +21,7 @@ def taken(inbox: Inbox[Sample]) -> list[bytes]:
     return [sample.payload for sample in iter(inbox.take, None)]
 
 
-def test_nobody_reads_until_somebody_waits(wire: Wire) -> None:
+def test_no_thread_reads_until_an_executor_waits(wire: Wire) -> None:
     bus = wire.bus()
     inbox = boxed(bus, 3)
     for number in range(5):
@@ -30,7 +30,7 @@ def test_nobody_reads_until_somebody_waits(wire: Wire) -> None:
     assert inbox.thread is None
 
 
-def test_who_waits_is_woken_and_finds_what_came(wire: Wire) -> None:
+def test_a_waiting_executor_is_woken_and_finds_the_message(wire: Wire) -> None:
     bus, waker = wire.bus(), Waker()
     inbox = boxed(bus, 3)
     waker.waiting = True
@@ -41,7 +41,7 @@ def test_who_waits_is_woken_and_finds_what_came(wire: Wire) -> None:
         assert wait_for(partial(taken, inbox)) == [text.encode()]
 
 
-def test_the_thread_stops_reading_while_nobody_waits(wire: Wire) -> None:
+def test_the_thread_stops_reading_while_no_executor_waits(wire: Wire) -> None:
     bus, waker = wire.bus(), Waker()
     inbox = boxed(bus, 2)
     waker.waiting = True
@@ -54,7 +54,7 @@ def test_the_thread_stops_reading_while_nobody_waits(wire: Wire) -> None:
     assert taken(inbox) == [b"4", b"5"]
 
 
-def test_who_begins_to_wait_finds_the_newest_at_once(wire: Wire) -> None:
+def test_an_executor_that_begins_to_wait_finds_the_newest_at_once(wire: Wire) -> None:
     bus, waker = wire.bus(), Waker()
     inbox = boxed(bus, 2)
     waker.waiting = True
@@ -93,7 +93,7 @@ def test_nothing_is_lost_or_turned_round_while_waits_and_looks_take_turns(wire: 
     assert got == [str(number).encode() for number in range(count)]
 
 
-def test_who_begins_to_wait_in_the_moment_when_the_thread_gives_up_is_waited_for(wire: Wire) -> None:
+def test_an_executor_that_begins_to_wait_as_the_thread_parks_is_still_served(wire: Wire) -> None:
     bus = wire.bus()
     inbox = boxed(bus, 2)
     arms: list[threading.Thread] = []
@@ -101,7 +101,7 @@ def test_who_begins_to_wait_in_the_moment_when_the_thread_gives_up_is_waited_for
     class Asked(Waker):
         @property
         def waiting(self) -> bool:
-            """Nobody waits, and then somebody does at once."""
+            """No executor waits, and the next moment one does."""
             arm = threading.Thread(target=inbox.arm, args=(last,))
             arm.start()
             arms.append(arm)
@@ -149,7 +149,7 @@ def test_a_wake_is_kept_for_the_next_wait_but_not_counted() -> None:
     assert not waker.wait(0.0)
 
 
-def test_a_trigger_from_another_thread_wakes_who_spins(ros: Wire, spin_for: Callable[..., Any]) -> None:
+def test_a_trigger_from_another_thread_wakes_the_executor(ros: Wire, spin_for: Callable[..., Any]) -> None:
     node, threads = rclpy.create_node("tom"), list[threading.Thread]()
     guard = node.create_guard_condition(lambda: threads.append(threading.current_thread()))
     threading.Thread(target=guard.trigger).start()

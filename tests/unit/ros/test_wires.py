@@ -218,7 +218,7 @@ def test_two_types_with_one_name_in_one_message(wire: str) -> None:
         ("cdr", b"\0\1\0\0\0", "not a Twist: cut off after 5 bytes"),
     ],
 )
-def test_bad_bytes_are_told_as_for_ours(wire: str, payload: bytes, reason: str) -> None:
+def test_bad_bytes_are_reported_as_for_ours(wire: str, payload: bytes, reason: str) -> None:
     with pytest.raises(CodecError) as error:
         decode(payload, WIRES[wire], (generated.find("geometry_msgs/msg/Twist"),))
     assert str(error.value) == reason

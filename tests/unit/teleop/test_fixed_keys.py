@@ -1,4 +1,4 @@
-"""Each key has one name, and who writes another is told it."""
+"""Each key has one name, which the error for another spelling gives."""
 
 import pytest
 

@@ -118,7 +118,7 @@ def test_a_dead_man_that_is_held_at_the_start_does_not_count(device: Recorded) -
         assert joystick.direction == AHEAD
 
 
-def test_presses_are_told_in_their_order(device: Recorded) -> None:
+def test_presses_are_reported_in_their_order(device: Recorded) -> None:
     with Joystick(device, "") as joystick:
         device.play((EV_KEY, BTN_START, 1), REPORT, (EV_KEY, BTN_START, 0), (EV_ABS, ABS_HAT0Y, -1), REPORT)
         device.play((EV_ABS, ABS_HAT0Y, 1), REPORT)
@@ -263,7 +263,7 @@ def test_what_is_no_input_device_is_refused_and_never_waited_for(tmp_path: Path)
         assert str(error.value) == f"joystick {path}: {words}".replace("\0", "?")
 
 
-def test_a_folder_without_gamepads_is_told_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_without_gamepads_is_reported_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for folder in (f"{tmp_path}/none", str(tmp_path)):
         monkeypatch.setattr(gamepad, "FOLDER", folder)
         with pytest.raises(JoystickError) as error:
@@ -287,7 +287,7 @@ def nobody() -> Iterator[None]:
         os.seteuid(before)
 
 
-def test_devices_that_may_not_be_read_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_devices_that_may_not_be_read_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     with tempfile.TemporaryDirectory() as folder:
         os.chmod(folder, 0o755)
         Path(folder, "event0").touch(0)

@@ -1,4 +1,4 @@
-"""Which keys are held, in terminals that tell releases, in those that only repeat, and latched."""
+"""Which keys are held, in terminals that report releases, in those that only repeat, and latched."""
 
 import itertools
 import random

@@ -48,7 +48,7 @@ def test_what_terminals_send_is_named() -> None:
         assert (event.name, event.kind) == (name, "typed")
 
 
-def test_the_kitty_protocol_tells_presses_and_releases() -> None:
+def test_the_kitty_protocol_reports_presses_and_releases() -> None:
     rows = [
         ("105u", Key("i", "i", "press", "105")), ("105;1:3u", Key("i", "i", "release", "105")),
         ("105;1:2u", Key("i", "i", "repeat", "105")), ("106:74;2u", Key("J", "J", "press", "106")),
@@ -71,7 +71,7 @@ def test_a_key_is_the_same_when_its_release_comes_after_a_change_of_layout() -> 
     assert pressed.code == released.code
 
 
-def test_a_foreign_keyboard_tells_letter_and_place() -> None:
+def test_a_foreign_keyboard_reports_letter_and_place() -> None:
     rows = [
         ("122::121u", "z", "y"), ("44:59;2u", ";", "<"), ("252::91u", "ü", "["), ("97::113u", "a", "q"),
         ("1096::105u", "ш", "i"), ("1083:1051:107;2u", "Л", "K"), ("1089::99;5u", "ctrl+\u0441", "ctrl+c"),
@@ -93,13 +93,13 @@ def test_shift_and_its_like_mean_nothing_alone() -> None:
         assert read(f"\x1b[{code};2u\x1b[{code};2:3u".encode(), releases=True) == []
 
 
-def test_answers_and_focus_are_told_apart_from_keys() -> None:
+def test_answers_and_focus_are_reported_apart_from_keys() -> None:
     sent = b"\x1b[?15u\x1b[?62;c\x1b[0n\x1b[I\x1b[O"
     alive = [Answer("keyboard", 15), Answer("terminal", 0), Answer("alive"), Focus(True), Focus(False)]
     assert read(sent) == alive
 
 
-def test_reports_and_pastes_are_nobodys_key() -> None:
+def test_reports_and_pastes_are_no_keys() -> None:
     rows = [PASTED, b"\x1b[<0;3;4M", b"\x1b[<0;3;4m", b"\x1b[3;7R", b"\x1b[?2026;2$y", b"\x1b[8;24;80t",
      b"\x1b]11;rgb:1/2/3\x07",
      b"\x1bP>|kitty(0.26.5)\x1b\\", b"\x1b[>1;4000;26c"]  # fmt: skip
@@ -160,9 +160,9 @@ def test_an_unfinished_sequence_is_a_stop_and_its_rest_no_key() -> None:
         keyboard = Keyboard()
         assert keyboard.feed(start, 1.0) == []
         assert keyboard.wait(1.0 + LATE / 2) == []
-        (told,) = keyboard.wait(1.0 + LATE)
-        assert isinstance(told, Unknown)
-        assert keyboard.wait(2.0) == [], "it is told once"
+        (message,) = keyboard.wait(1.0 + LATE)
+        assert isinstance(message, Unknown)
+        assert keyboard.wait(2.0) == [], "it is reported once"
 
 
 def test_the_end_of_a_paste_may_be_long_in_coming() -> None:

@@ -1,4 +1,4 @@
-"""The layouts mean what people are used to, and tell it in words that fit the screen."""
+"""The layouts mean what people are used to, and their help fits the screen."""
 
 import pytest
 from hypothesis import given
@@ -128,7 +128,7 @@ def test_a_press_means_a_key_of_the_layout() -> None:
     for keyboard, name, typed, base, key in [
         ("US", "ttk", "i", "i", "i"),
         ("US", "ttk", "<", "<", "<"),
-        ("any, no place told", "ttk", "i", "", "i"),
+        ("any, no place reported", "ttk", "i", "", "i"),
         ("AZERTY: the letter counts", "ttk", ",", "m", ","),
         ("AZERTY: a sign by its place", "ttk", ";", ",", ","),
         ("QWERTZ: a sign by its place", "ttk", ";", "<", "<"),
@@ -147,7 +147,7 @@ def test_a_press_means_a_key_of_the_layout() -> None:
         ("AZERTY", "wasd", "a", "q", "q"),
         ("AZERTY, shift", "wasd", "Z", "W", "W"),
         ("AZERTY: no meaning by place", "wasd", "-", "6", "-"),
-        ("AZERTY, no place told", "wasd", "z", "", "z"),
+        ("AZERTY, no place reported", "wasd", "z", "", "z"),
         ("AZERTY: the letter of another place", "wasd", "w", "z", "z"),
         ("Dvorak", "wasd", ",", "w", "w"),
         ("Dvorak: the letter of another place", "wasd", "w", ",", ","),

@@ -13,11 +13,11 @@ def test_elsewhere_somebody_is_always_there() -> None:
 
 
 @pytest.mark.parametrize("multiplexer", ["tmux", "screen"])
-def test_a_detached_multiplexer_has_nobody(tmp_path: Path, multiplexer: str) -> None:
+def test_a_detached_multiplexer_has_no_operator(tmp_path: Path, multiplexer: str) -> None:
     socket = tmp_path / "1234.pts-0"
     socket.touch(0o700)
-    told = {"tmux": {"TMUX": f"{socket},42,0"}, "screen": {"STY": socket.name, "SCREENDIR": str(tmp_path)}}
-    look = attached(told[multiplexer])
+    message = {"tmux": {"TMUX": f"{socket},42,0"}, "screen": {"STY": socket.name, "SCREENDIR": str(tmp_path)}}
+    look = attached(message[multiplexer])
     assert look()
     socket.chmod(0o600)
     assert not look()

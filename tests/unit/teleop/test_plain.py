@@ -11,7 +11,7 @@ from tests.unit.teleop.states import BROKEN, states
 GOOD = scene()
 
 
-def test_a_robot_that_drives_is_told_in_one_line() -> None:
+def test_a_robot_that_drives_is_described_in_one_line() -> None:
     assert plain_line(GOOD) == (
         "Fred; you drive; command x +0.500 y +0.250 m/s turn -1.000 rad/s; "
         "measured x +0.471 y +0.221 m/s turn -0.813 rad/s; "
@@ -30,9 +30,9 @@ def test_alarms_come_first() -> None:
 
 
 def test_what_is_not_known_is_said() -> None:
-    told = plain_line(replace(GOOD, stale=True, command=None))
-    assert "command silent; measured unknown;" in told
-    assert "+0.471" not in told
+    message = plain_line(replace(GOOD, stale=True, command=None))
+    assert "command silent; measured unknown;" in message
+    assert "+0.471" not in message
 
 
 def test_the_last_warning_is_at_the_end() -> None:
@@ -41,6 +41,6 @@ def test_the_last_warning_is_at_the_end() -> None:
 
 @given(states())
 def test_any_state_is_one_line_of_printable_ascii(state: State) -> None:
-    told = plain_line(state)
-    assert told.isascii()
-    assert told.isprintable()
+    message = plain_line(state)
+    assert message.isascii()
+    assert message.isprintable()

@@ -1,4 +1,4 @@
-"""Who types what started teleop_twist_keyboard gets the same here, or one line that names what there is not."""
+"""The arguments of teleop_twist_keyboard work here too, or one line names the one that does not."""
 
 import pytest
 from hypothesis import given

@@ -29,7 +29,7 @@ class Terminal:
         self.stream.feed(text)
 
     def resize(self, columns: int, rows: int) -> None:
-        """As its window does, and the teleop that is told so: it goes home and draws anew."""
+        """As its window does; the teleop is notified: it moves the cursor home and redraws."""
         self.screen.resize(rows, columns)
         self.drawing.size = columns, rows
         self.drawing.forget()

@@ -30,7 +30,7 @@ def test_each_line_is_a_step() -> None:
     ]  # fmt: skip
 
 
-def test_a_wrong_line_is_told_with_its_number() -> None:
+def test_a_wrong_line_is_reported_with_its_number() -> None:
     for line, reason in [
         ("0.5s y", "'y' is no key of ttk"),
         ("i", "how long is 'i' held? write `0.5s i`"),
@@ -43,10 +43,10 @@ def test_a_wrong_line_is_told_with_its_number() -> None:
         ("stop now", "'stop' is no key"),
         ("1s \x1b[A", "is no key"),
     ]:
-        with pytest.raises(ScriptError, match=r"^drive\.txt, line 2: ") as told:
+        with pytest.raises(ScriptError, match=r"^drive\.txt, line 2: ") as expected:
             parse(f"0.1s i\n{line}\n0.1s J")
-        assert reason in str(told.value)
-        assert "\n" not in str(told.value)
+        assert reason in str(expected.value)
+        assert "\n" not in str(expected.value)
 
 
 def test_a_script_without_an_end_is_refused() -> None:
@@ -54,12 +54,12 @@ def test_a_script_without_an_end_is_refused() -> None:
         parse("1s i\n" * 300_000)
 
 
-def test_what_cannot_be_read_is_told_in_one_line(tmp_path: Path) -> None:
+def test_what_cannot_be_read_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe1s i")
     for path in ("none", ".", "binary"):
-        with pytest.raises(ScriptError) as told:
+        with pytest.raises(ScriptError) as expected:
             script.load(str(tmp_path / path), TTK)
-        assert str(tmp_path / path) in str(told.value)
+        assert str(tmp_path / path) in str(expected.value)
 
 
 @pytest.fixture
@@ -84,13 +84,13 @@ def test_a_script_is_driven_as_written_and_ends_in_a_stop(session: Session, comm
     assert script.run(parse("100ms i\n100ms J\nq\n50ms i\nstop"), session, threading.Event()) == ""
     session.halt()
     wait_for(lambda: not session.mapper.engaged)
-    told = heard(commands)
-    assert told[0] == FORWARD
-    assert [message for message in told if message != STOP] == [FORWARD, STRAFE, Twist.planar(0.55)]
-    assert told[-1] == STOP
+    expected = heard(commands)
+    assert expected[0] == FORWARD
+    assert [message for message in expected if message != STOP] == [FORWARD, STRAFE, Twist.planar(0.55)]
+    assert expected[-1] == STOP
 
 
-def test_a_script_that_is_told_to_end_lets_go(session: Session, commands: Subscription[Twist]) -> None:
+def test_a_script_that_is_ended_releases_its_keys(session: Session, commands: Subscription[Twist]) -> None:
     stop = threading.Event()
     stop.set()
     assert script.run(parse("60s i"), session, stop) == "ended by a signal"
@@ -99,14 +99,14 @@ def test_a_script_that_is_told_to_end_lets_go(session: Session, commands: Subscr
 
 
 def test_a_script_that_somebody_stopped_breaks_off(wire: Wire, session: Session, commands: Subscription[Twist]) -> None:
-    """The robot obeys nobody then, and stands."""
+    """The robot obeys no source then, and stands."""
     status = wire.bus("sim").publisher("cmd_vel_status", CommandStatus)
     wait_for(lambda: status.matched)
     wait_for(lambda: status.matched)
     status.put(CommandStatus(sources=[CommandSource(session.bus.source, "INTERACTIVE_HIGH", 20.0, False, True)]))
     wait_for(lambda: session.client.status().sources)
-    told = script.run(parse("60s i"), session, threading.Event())
-    assert told.startswith("the robot was stopped or taken over")
+    expected = script.run(parse("60s i"), session, threading.Event())
+    assert expected.startswith("the robot was stopped or taken over")
 
 
 @pytest.mark.parametrize("words", [["--mode", "latch"], ["--key-timeout", "0"]])

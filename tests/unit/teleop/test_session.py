@@ -36,7 +36,7 @@ T = TypeVar("T")
 
 
 class Robot:
-    """The other side: what arrives on cmd_vel, and the odom that it tells."""
+    """The other side: what arrives on cmd_vel, and the odom that it publishes."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus
@@ -44,7 +44,7 @@ class Robot:
         self.odom: Publisher[Odometry] = bus.publisher("Fred/odom", Odometry)
         self._status: Publisher[CommandStatus] = bus.publisher("Fred/cmd_vel_status", CommandStatus)
 
-    def tell(self, x: float, y: float = 0.0, turn: float = 0.0) -> None:
+    def publish(self, x: float, y: float = 0.0, turn: float = 0.0) -> None:
         odom = Odometry()
         odom.twist.twist = Twist.planar(x, y, turn)
         self.odom.put(odom)
@@ -53,7 +53,7 @@ class Robot:
         self._status.put(CommandStatus(**fields))  # type: ignore[arg-type]
 
     def is_heard(self) -> bool:
-        """Whether what it tells from now on arrives."""
+        """Whether what it publishes from now on arrives."""
         return self.odom.matched and self._status.matched
 
     def heard(self) -> list[Twist | TwistStamped | None]:
@@ -74,15 +74,15 @@ def session_of(wire: Wire, robot: Robot, settings: Settings | None = None, stamp
 
 
 def see(session: Session, robot: Robot, x: float, y: float = 0.0, turn: float = 0.0) -> None:
-    """Have the robot tell its speed once, and wait until the session has it."""
+    """Have the robot publish its speed once, and wait until the session has it."""
     wait_for(lambda: robot.odom.matched)
     before = session.client.odom.count
-    robot.tell(x, y, turn)
+    robot.publish(x, y, turn)
     wait_for(lambda: session.client.odom.count > before)
 
 
 def tell_place(session: Session, robot: Robot, stamp: float, x: float) -> None:
-    """Have the robot tell when it is where, and the session look at it."""
+    """Have the robot publish its pose at a time, and the session look at it."""
     odom, before = Odometry(), session.client.odom.count
     odom.header.stamp, odom.pose.pose.position.x = Time.of(stamp), x
     robot.odom.put(odom)
@@ -91,7 +91,7 @@ def tell_place(session: Session, robot: Robot, stamp: float, x: float) -> None:
 
 
 def press(session: Session, key: str) -> None:
-    """A key in a terminal that tells no releases."""
+    """A key in a terminal that reports no releases."""
     session.take(Key(key, key), time.monotonic())
 
 
@@ -189,7 +189,7 @@ def test_halt_stops_a_robot_and_returns_when_it_rests(wire: Wire, robot: Robot) 
     press(session, "i")
     see(session, robot, 0.5)
     robot.heard()
-    session.halt()  # nobody tells that it rests: given up after a second
+    session.halt()  # no odom reports rest: given up after a second
     heard = robot.heard()
     assert len(heard) > 10
     assert set(map(str, heard)) == {str(Twist())}
@@ -325,8 +325,8 @@ def test_another_key_takes_the_resume_back(wire: Wire, robot: Robot, resume: lis
 def test_without_a_sim_the_resume_key_says_so(wire: Wire, robot: Robot) -> None:
     session = session_of(wire, robot)
     press(session, "r")
-    told = tick(session, lambda: session.warning)
-    assert told.startswith(f"not handed over: no reply from 'Fred/resume' within {RESUME_TIMEOUT} s")
+    expected = tick(session, lambda: session.warning)
+    assert expected.startswith(f"not handed over: no reply from 'Fred/resume' within {RESUME_TIMEOUT} s")
 
 
 def test_odom_that_comes_no_more_stops_the_robot_until_a_key_is_pressed_anew(wire: Wire, robot: Robot) -> None:
@@ -341,7 +341,7 @@ def test_odom_that_comes_no_more_stops_the_robot_until_a_key_is_pressed_anew(wir
     press(session, "J")
     for _ in range(5):
         session.tick(time.monotonic())
-    assert session.sent == Twist.planar(0, 0.5), "who wants to drive blind may"
+    assert session.sent == Twist.planar(0, 0.5), "driving without odom is allowed"
 
 
 @pytest.mark.parametrize(("stamp", "x"), [(1.0, 0.0), (6.0, 2.0)], ids=["a sim started again", "a robot spawned anew"])

@@ -1,4 +1,4 @@
-"""A terminal that does not answer in time has nobody before it."""
+"""A terminal that does not answer in time has lost its operator."""
 
 from services.teleop.input.terminal_liveness import EVERY, IDLE, LIMIT, RETRY, ROUNDS, Heartbeat
 
@@ -75,7 +75,7 @@ def test_it_is_found_again_when_it_answers_in_time_what_was_asked_after_it_was_b
 
 
 def test_answers_that_may_be_to_older_questions_are_counted_off() -> None:
-    """As with a terminal that was detached: some of what it was asked nobody will answer, and which is not known."""
+    """As with a terminal that was detached: some queries will never be answered, and which is not known."""
     heartbeat = lost(questions=3)
     assert ask(heartbeat, 3.0) == 4
     for _ in range(3):

@@ -24,7 +24,7 @@ def mapper() -> TwistMapper:
 
 
 def typed(mapper: TwistMapper, key: str, now: float) -> str:
-    """A key in a terminal that tells no releases."""
+    """A key in a terminal that reports no releases."""
     return mapper.take(Key(key, key), now)
 
 
@@ -88,7 +88,7 @@ def test_without_a_key_for_the_timeout_the_robot_stops(mapper: TwistMapper) -> N
     assert says(mapper, 1.6) == Twist()
 
 
-def test_a_command_never_outlives_the_timeout_even_if_nobody_looked(mapper: TwistMapper) -> None:
+def test_a_command_never_outlives_the_timeout_even_without_a_tick(mapper: TwistMapper) -> None:
     typed(mapper, "i", 1.0)
     assert says(mapper, 5.0) == Twist()
 
@@ -151,7 +151,7 @@ def test_a_key_during_a_stop_drives_at_once(mapper: TwistMapper) -> None:
 
 
 @pytest.mark.parametrize("key", SPEEDS)
-def test_a_speed_key_changes_the_speeds_and_drives_nobody(mapper: TwistMapper, key: str) -> None:
+def test_a_speed_key_changes_the_speeds_and_moves_nothing(mapper: TwistMapper, key: str) -> None:
     typed(mapper, key, 1.0)
     speed, turn = SPEEDS[key]
     assert mapper.settings.speed == pytest.approx(0.5 * speed)
@@ -232,7 +232,7 @@ def test_opposite_keys_cancel_and_that_is_a_stop() -> None:
     assert says(mapper, 1.0) == Twist.planar(0.5)
 
 
-def test_a_repeat_of_a_key_that_is_not_held_drives_nobody() -> None:
+def test_a_repeat_of_a_key_that_is_not_held_moves_nothing() -> None:
     mapper = TwistMapper(HELD, TTK)
     mapper.take(Key("i", "i", "repeat", "i"), 1.0)
     assert says(mapper, 1.0) is None

@@ -1,4 +1,4 @@
-"""What a person sees at 80x24, 120x40, 40x12 and smaller: velocities, who drives, and an alarm for what is amiss."""
+"""What a person sees at 80x24, 120x40, 40x12 and smaller: velocities, who drives, and an alarm for each problem."""
 
 import math
 import unicodedata
@@ -76,7 +76,7 @@ def test_what_is_amiss_is_loud_at_every_size() -> None:
             assert any(line.startswith(words) for line in found), words
 
 
-def test_every_alarm_is_told_whole_where_there_is_room() -> None:
+def test_every_alarm_is_shown_whole_where_there_is_room() -> None:
     assert loud(BROKEN, (80, 24)) == [
         "STOPPED by topic@77aa00: `holozen release Fred` lets it drive again",
         "NO SUBSCRIBER on Fred/cmd_vel",
@@ -114,7 +114,7 @@ def test_at_every_size_one_sees_what_matters_for_safety(size: tuple[int, int]) -
         assert "speed" in shown
 
 
-def test_the_smallest_still_tells_alarms_and_the_speed() -> None:
+def test_the_smallest_screen_still_shows_alarms_and_the_speed() -> None:
     assert rows(BROKEN, (20, 5)) == [*(f" {words}"[-20:] for words in ALARMS[:3]), ALARMS[3], "speed ? of 0.50"]
     assert "speed 0.52 of 0.50" in rows(GOOD, (20, 5))
     assert "go +0.50 +0.25 -1.00" in rows(GOOD, (20, 5))
@@ -168,7 +168,7 @@ def test_a_full_bar_is_the_speed_that_is_set_or_more_if_there_is_more() -> None:
     assert bars(replace(GOOD, measured=(math.nan, math.inf, 0)), "x forward") == [(0, 11), (0, 0)]
 
 
-def test_the_speeds_are_told_with_their_limits() -> None:
+def test_the_speeds_are_shown_with_their_limits() -> None:
     assert "0.500 m/s, limit 1.5 " in row(GOOD, "speed")
     assert "turn 1.000 rad/s, limit 3" in row(GOOD, "speed")
     assert row(GOOD, "speed", (40, 12)) == " speed 0.500 of 1.5  turn 1.000 of 3"
@@ -176,7 +176,7 @@ def test_the_speeds_are_told_with_their_limits() -> None:
     assert row(slow, "speed", (40, 12)) == " speed 0.500 of 1000  turn 1.000 of 1000"
 
 
-def test_who_listens_how_old_odom_is_and_how_far_the_sim_is_away() -> None:
+def test_listeners_odom_age_and_round_trip_are_shown() -> None:
     assert "sim, recorder" in row(GOOD, "listening")
     assert row(GOOD, "odom age").split("real time 1.00x")[0] == " odom age  12 ms  round trip 0.61 ms   "
     late = replace(GOOD, real_time_factor=0.4, round_trip=0.25)
@@ -212,7 +212,7 @@ def test_the_driver_is_named_and_is_a_warning_where_somebody_else_has_the_robot(
     assert "no driver; the autopilot is held" in text(replace(GOOD, obeyed="", held=True))
 
 
-def test_the_mode_is_told_with_its_reason() -> None:
+def test_the_mode_is_shown_with_its_reason() -> None:
     assert "hold: this terminal reports key releases" in rows(GOOD)[1]
     latched = replace(GOOD, mode="latch", why="--mode latch", deadman=True, deadman_held=True)
     assert "latch + dead man: --mode latch" in text(latched)
@@ -289,11 +289,11 @@ def test_the_map_shows_trail_heading_and_scale() -> None:
 
 
 def test_the_scale_of_the_map_grows_in_steps() -> None:
-    told = []
+    message = []
     for reach in (0.1, 1.0, 3.0, 7.0, 40.0, 900.0, 1e5):
         line = next(line for line in rows(replace(GOOD, pose=None, trail=[(0, 0), (reach, reach)])) if " grid " in line)
-        told.append(line.split(" grid ")[1])
-    assert told == ["0.5 m", "0.5 m", "2 m", "5 m", "20 m", "500 m", "50000 m"]
+        message.append(line.split(" grid ")[1])
+    assert message == ["0.5 m", "0.5 m", "2 m", "5 m", "20 m", "500 m", "50000 m"]
 
 
 def test_places_that_cannot_be_are_not_on_the_map() -> None:

@@ -34,14 +34,14 @@ def test_an_argument_has_the_value_given_or_its_default(follow: Follow, capsys: 
 
 
 @pytest.mark.parametrize(
-    ("declared", "told"),
+    ("declared", "message"),
     [
         (a.DeclareLaunchArgument("which"), "launch argument 'which' has no value; give which:=VALUE"),
         (a.DeclareLaunchArgument("who", choices=["Ann", "Bob"]), "who:=Fred: it must be one of Ann, Bob"),
     ],
 )
-def test_an_argument_without_a_good_value_is_told(follow: Follow, declared: Any, told: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+def test_an_argument_without_a_good_value_is_reported(follow: Follow, declared: Any, message: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
         follow([declared], who="Fred")
 
 
@@ -80,7 +80,7 @@ def generate_launch_description():
 
 
 @pytest.mark.parametrize(
-    ("name", "text", "told"),
+    ("name", "text", "message"),
     [
         ("b.launch.xml", "<launch/>", "launch files in XML and YAML are not supported; Python only"),
         ("b.launch.txt", "", "only launch files in Python are supported"),
@@ -89,14 +89,16 @@ def generate_launch_description():
         ("c.launch.py", "", r"no launch file '.*/b.launch.py'; did you mean 'c.launch.py'"),
     ],
 )
-def test_a_file_that_cannot_be_included_is_told(follow: Follow, write: Write, name: str, text: str, told: str) -> None:
+def test_a_file_that_cannot_be_included_is_reported(
+    follow: Follow, write: Write, name: str, text: str, message: str
+) -> None:
     path = write(f"other/{name}", text)
     wanted = path if name[0] == "b" else path.with_name("b.launch.py")
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
         follow([a.IncludeLaunchDescription(wanted)])
 
 
-def test_files_that_include_themselves_are_told(follow: Follow, write: Write) -> None:
+def test_files_that_include_themselves_are_reported(follow: Follow, write: Write) -> None:
     text = """
 from holozen.ros.launch.actions import IncludeLaunchDescription
 from holozen.ros.launch import LaunchDescription
@@ -122,7 +124,7 @@ def test_a_function_is_called_and_what_it_returns_is_done(follow: Follow, capsys
 
 
 @pytest.mark.parametrize("function", [lambda _context: [7], lambda _context: 7])
-def test_a_function_that_returns_no_actions_is_told(follow: Follow, function: Any) -> None:
+def test_a_function_that_returns_no_actions_is_reported(follow: Follow, function: Any) -> None:
     with pytest.raises(LaunchError, match=r"7 is not an action; write Node"):
         follow([a.OpaqueFunction(function=function)])
 
@@ -208,7 +210,7 @@ def test_other_programs_are_started_as_they_are(follow: Follow) -> None:
     assert third.respawn == 2.0
 
 
-def test_what_is_written_wrong_is_told_with_its_place() -> None:
+def test_what_is_written_wrong_is_reported_with_its_place() -> None:
     rows: list[tuple[Any, str]] = [
         (
             lambda: a.ExecuteProcess(cmd="echo a"),
@@ -220,19 +222,19 @@ def test_what_is_written_wrong_is_told_with_its_place() -> None:
         (lambda: a.OpaqueFunction(function="f"), "function='f' is not a function"),
         (lambda: a.EmitEvent(event="stop"), r"only launch.events.Shutdown\(\) can be emitted here"),
     ]
-    for make, told in rows:
-        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+    for make, message in rows:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
             make()
 
 
 @pytest.mark.parametrize(
-    ("action", "told"),
+    ("action", "message"),
     [
         (lambda: a.ExecuteProcess(), "ExecuteProcess has no cmd"),
         (lambda: a.TimerAction(period=-1, actions=[]), "period is '-1'; it must be a number from 0 up"),
         (lambda: a.GroupAction([], scoped="perhaps"), "scoped is 'perhaps'; it must be true or false"),
     ],
 )
-def test_what_cannot_be_done_is_told_with_its_place(follow: Follow, action: Any, told: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+def test_what_cannot_be_done_is_reported_with_its_place(follow: Follow, action: Any, message: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
         follow([action()])

@@ -85,7 +85,7 @@ def test_gazebo_as_a_program_is_the_sim(follow: Follow, command: list[str], worl
 
 
 @pytest.mark.parametrize(
-    ("package", "name", "told"),
+    ("package", "name", "message"),
     [
         ("gazebo_ros", "gazeb.launch.py", "has no 'launch/gazeb.launch.py'; did you mean 'gazebo.launch.py'"),
         (
@@ -96,8 +96,8 @@ def test_gazebo_as_a_program_is_the_sim(follow: Follow, command: list[str], worl
         ("nav2_bringup", "x.launch.py", "no package 'nav2_bringup'"),
     ],
 )
-def test_a_launch_file_that_nobody_stands_in_for_is_told(follow: Follow, package: str, name: str, told: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+def test_an_unknown_launch_file_of_gazebo_is_reported(follow: Follow, package: str, name: str, message: str) -> None:
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
         follow([included(package, name)])
 
 
@@ -184,7 +184,7 @@ def test_the_spawner_of_new_gazebo_takes_texts_too(follow: Follow) -> None:
 
 
 def test_a_robot_that_cannot_be_found_is_one_line(follow: Follow) -> None:
-    for words, told in [
+    for words, message in [
         (
             ["-topic", "robot_description"],
             "-topic robot_description: nothing in this launch file publishes",
@@ -195,5 +195,5 @@ def test_a_robot_that_cannot_be_found_is_one_line(follow: Follow) -> None:
         (["-database", "r"], "unknown flag '-database' to spawn a robot"),
         (["-file"], "-file needs a value"),
     ]:
-        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{told}"):
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
             follow([spawn(*words)])

@@ -85,7 +85,7 @@ def test_a_node_runs_with_its_words(launch: Launch, write: Write, words: list[st
     assert done.returncode == 0
 
 
-def test_show_args_tells_the_arguments_and_starts_nothing(launch: Launch, write: Write) -> None:
+def test_show_args_lists_the_arguments_and_starts_nothing(launch: Launch, write: Write) -> None:
     gui = "DeclareLaunchArgument('gui', default_value=PathJoinSubstitution(['a', 'b']), choices=['a', 'b'])"
     others = "DeclareLaunchArgument('world')", "ExecuteProcess(cmd=['false'])"
     write("a.launch.py", described(*ARGUMENTS, f"GroupAction([{gui}])", *others))
@@ -100,10 +100,10 @@ def test_show_args_tells_the_arguments_and_starts_nothing(launch: Launch, write:
     assert launch("a.launch.py", "--show-args").stdout == "it has no arguments\n"
 
 
-def test_a_value_that_nothing_uses_is_told(launch: Launch, write: Write) -> None:
+def test_a_value_that_nothing_uses_is_reported(launch: Launch, write: Write) -> None:
     write("a.launch.py", described(*ARGUMENTS))
-    told = "holozen launch: a.launch.py does not use 'kpp'; did you mean 'kp'?\n"
-    assert (launch("a.launch.py", "kpp:=3").stderr) == told
+    message = "holozen launch: a.launch.py does not use 'kpp'; did you mean 'kp'?\n"
+    assert (launch("a.launch.py", "kpp:=3").stderr) == message
 
 
 NAP = "ExecuteProcess(cmd=['sleep', '60'])"
@@ -113,7 +113,7 @@ LATER = "RegisterEventHandler(OnProcessExit(on_exit=[LogInfo(msg=LaunchConfigura
 @pytest.mark.parametrize(
     "actions", [(NAP,), (LATER.format("kp"), NAP), (f"TimerAction(period=99.0, actions=[{NAP}])",)]
 )
-def test_a_value_that_nothing_uses_is_told_while_the_launch_goes_on(
+def test_a_value_that_nothing_uses_is_reported_while_the_launch_goes_on(
     my_bot: Path, wire: Wire, write: Write, actions: tuple[str, ...]
 ) -> None:
     write("a.launch.py", described(*ARGUMENTS, *actions))
@@ -128,7 +128,7 @@ def test_a_value_that_nothing_uses_is_told_while_the_launch_goes_on(
     "later",
     [LATER.format("kpp"), "TimerAction(period=0.1, actions=[OpaqueFunction(function=lambda c: c.used.add('kpp'))])"],
 )
-def test_a_value_that_may_be_used_later_is_not_told(launch: Launch, write: Write, later: str) -> None:
+def test_a_value_that_may_be_used_later_is_not_reported(launch: Launch, write: Write, later: str) -> None:
     write("a.launch.py", described(*ARGUMENTS, later, "ExecuteProcess(cmd=['true'])"))
     assert "kpp" not in launch("a.launch.py", "kpp:=3").stderr.replace("launch: x", "")
 
@@ -141,7 +141,7 @@ def test_a_launch_file_of_a_package_in_xml_is_not_read(launch: Launch, write: Wr
 
 
 def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> None:
-    for text, told in [
+    for text, message in [
         ("from launch.actions import ExecuteLocal", "a.launch.py:1: launch.actions has no 'ExecuteLocal' here"),
         ("import launch.frontend", "a.launch.py:1: launch has no 'frontend' here"),
         ("import launch_testing", "a.launch.py:1: "),
@@ -181,11 +181,11 @@ def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> No
         done = launch(str(Path("a.launch.py").absolute()))
         assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)
         assert done.stderr.startswith("holozen launch: ")
-        assert told in done.stderr
+        assert message in done.stderr
 
 
 @pytest.mark.parametrize(
-    ("words", "code", "told"),
+    ("words", "code", "message"),
     [
         (["b.launch.py"], 1, "no launch file 'b.launch.py'"),
         (["my_bot", "b.launch.py"], 1, "no launch file 'b.launch.py' in "),
@@ -194,13 +194,13 @@ def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> No
         (["x:=1"], 2, "give FILE, or PACKAGE FILE, not 'nothing'"),
     ],
 )
-def test_a_file_that_is_not_there_is_one_line(launch: Launch, words: list[str], code: int, told: str) -> None:
+def test_a_file_that_is_not_there_is_one_line(launch: Launch, words: list[str], code: int, message: str) -> None:
     done = launch(*words)
     assert (done.returncode, done.stderr.count("\n")) == (code, 1)
-    assert told in done.stderr
+    assert message in done.stderr
 
 
-def test_an_error_of_the_launch_file_is_told_by_its_own_traceback(launch: Launch, write: Write) -> None:
+def test_an_error_in_the_launch_file_has_its_own_traceback(launch: Launch, write: Write) -> None:
     write("a.launch.py", "def generate_launch_description():\n    return {}['lost']\n")
     done = launch("a.launch.py")
     assert done.returncode == 1
@@ -239,7 +239,7 @@ def test_a_signal_ends_the_nodes_and_the_launch(wire: Wire, write: Write, my_bot
         assert "Traceback" not in process.err.replace("[controller.py-1] Traceback", "")
 
 
-def test_a_signal_ends_it_also_where_nobody_reads_what_it_writes(wire: Wire, write: Write, my_bot: Path) -> None:
+def test_a_signal_ends_it_even_if_its_output_is_not_read(wire: Wire, write: Write, my_bot: Path) -> None:
     write("a.launch.py", described("ExecuteProcess(cmd=['yes'])"))
     with subprocess.Popen(line(wire, "a.launch.py"), env=environment(), stdout=subprocess.PIPE) as process:
         assert process.stdout
@@ -251,14 +251,14 @@ def test_a_signal_ends_it_also_where_nobody_reads_what_it_writes(wire: Wire, wri
             process.kill()
 
 
-def test_a_static_transform_is_told(wire: Wire, write: Write, my_bot: Path) -> None:
+def test_a_static_transform_is_published(wire: Wire, write: Write, my_bot: Path) -> None:
     words = "arguments=['1', '0', '0', '0', '0', '0', 'map', 'odom'], name='still'"
     write("a.launch.py", described(f"Node(package='tf2_ros', executable='static_transform_publisher', {words})"))
     with Process(line(wire, "a.launch.py"), env=environment()):
         bus = wire.bus()
-        (told,) = wait_for(lambda: list(bus.ask("tf_static", 5.0)), within=20)  # by who comes late
-        assert isinstance(told, Sample)
-        (transform,) = decode(told.payload, told.encoding, (TFMessage,)).transforms
+        (message,) = wait_for(lambda: list(bus.ask("tf_static", 5.0)), within=20)  # by who comes late
+        assert isinstance(message, Sample)
+        (transform,) = decode(message.payload, message.encoding, (TFMessage,)).transforms
         assert (transform.header.frame_id, transform.child_frame_id) == ("map", "odom")
         assert transform.transform.translation.x == 1.0
         assert "still" in {end.node for end in bus.graph().settled(bus.connected)}

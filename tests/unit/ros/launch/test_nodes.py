@@ -101,13 +101,13 @@ def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
         ({"cwd": "nowhere"}, "cwd='nowhere' is not a folder"),
         ({"respawn": "often"}, "respawn is 'often'; it must be true or false"),
     ]
-    for wrong, told in rows:
-        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+    for wrong, message in rows:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
             follow([node(**wrong)])
 
 
 @pytest.mark.parametrize(
-    ("package", "executable", "told"),
+    ("package", "executable", "message"),
     [
         (
             "my_bot",
@@ -118,10 +118,10 @@ def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
         ("nav2_bringup", "bt_navigator", "no package 'nav2_bringup' around "),
     ],
 )
-def test_a_node_that_is_not_there_is_told_before_anything_runs(
-    follow: Follow, package: str, executable: str, told: str
+def test_a_node_that_is_not_there_is_reported_before_anything_runs(
+    follow: Follow, package: str, executable: str, message: str
 ) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {told}"):
+    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
         follow([Node(package=package, executable=executable)])
 
 
@@ -141,7 +141,7 @@ def test_a_group_that_is_not_scoped_lets_it_out(follow: Follow) -> None:
 
 
 def test_what_is_left_out_is_named_with_what_to_use(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
-    for package, executable, told in [
+    for package, executable, message in [
         ("rviz2", "rviz2", "rviz2 rviz2 is left out: `holozen map` in another terminal"),
         ("rqt_graph", "rqt_graph", "is left out: `holozen plot`"),
         ("joint_state_publisher_gui", "joint_state_publisher_gui", "is left out: the sim publishes joint_states"),
@@ -151,7 +151,7 @@ def test_what_is_left_out_is_named_with_what_to_use(follow: Follow, capsys: pyte
     ]:
         action = Node(package=package, executable=executable)
         kept = follow([action])
-        assert told in capsys.readouterr().err
+        assert message in capsys.readouterr().err
         assert (kept.programs, kept.left) == ([], [(action, False)])
 
 

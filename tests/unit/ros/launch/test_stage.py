@@ -69,12 +69,12 @@ def test_what_is_set_comes_to_the_process(play: Play, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("script", "told"),
+    ("script", "message"),
     [("exit 3", "launch: p-1 failed with exit code 3"), ("kill -9 $$", "launch: p-1 was ended by SIGKILL")],
 )
-def test_a_process_that_fails_is_told_and_the_others_go_on(play: Play, script: str, told: str) -> None:
+def test_a_process_that_fails_is_reported_and_the_others_go_on(play: Play, script: str, message: str) -> None:
     good, out, err = play(sh(script), sh("echo on", name="q"))
-    assert (good, out, err) == (False, ["[q-2] on"], [told])
+    assert (good, out, err) == (False, ["[q-2] on"], [message])
 
 
 def test_a_required_process_ends_all(play: Play) -> None:
@@ -143,7 +143,7 @@ def test_respawn_starts_it_again(play: Play, tmp_path: Path) -> None:
     assert err == ["launch: p-3 failed with exit code 1", "launch: ends: the launch file requested it"]
 
 
-def test_a_program_that_is_not_there_is_told_with_its_place(play: Play) -> None:
+def test_a_program_that_is_not_there_is_reported_with_its_place(play: Play) -> None:
     with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: cannot start 'no_such_program': No such file"):
         play(sh("sleep 60"), a.ExecuteProcess(cmd=["no_such_program"]))
 

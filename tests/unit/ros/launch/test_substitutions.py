@@ -61,8 +61,8 @@ def test_places_of_the_launch_file_and_of_packages(context: LaunchContext, my_bo
     assert text(context, s.FindExecutable(name=sys.executable)) == sys.executable
 
 
-def test_what_gives_no_text_is_told_with_its_place(context: LaunchContext) -> None:
-    for substitution, told in [
+def test_what_gives_no_text_is_reported_with_its_place(context: LaunchContext) -> None:
+    for substitution, message in [
         (
             s.LaunchConfiguration("valu"),
             "launch argument 'valu' is not declared before it is used; did you mean 'value'",
@@ -84,7 +84,7 @@ def test_what_gives_no_text_is_told_with_its_place(context: LaunchContext) -> No
         (s.Command("xacro nowhere.xacro"), "nowhere.xacro: No such file"),
         (s.Command("xacro 'a"), "No closing quotation"),
     ]:
-        with pytest.raises(LaunchError, match=told) as error:
+        with pytest.raises(LaunchError, match=message) as error:
             text(context, substitution)
         placed = not isinstance(substitution, int | s.NotSubstitution)
         assert str(error.value).startswith(f"{__file__}:") == placed
@@ -135,13 +135,13 @@ def test_an_action_is_done_if_its_condition_holds(follow: Follow, capsys: pytest
         assert capsys.readouterr().err == ("done\n" if holds else "")
 
 
-def test_a_condition_that_says_neither_is_told_with_its_place(follow: Follow) -> None:
+def test_a_condition_that_says_neither_is_reported_with_its_place(follow: Follow) -> None:
     with pytest.raises(LaunchError, match=rf"{__file__}:\d+: the condition is 'perhaps'; it must be true or false"):
         follow(
             [DeclareLaunchArgument("gui"), LogInfo(msg="", condition=c.IfCondition(VALUE))], gui="1", value="perhaps"
         )
 
 
-def test_what_is_no_condition_is_told(follow: Follow) -> None:
+def test_what_is_no_condition_is_reported(follow: Follow) -> None:
     with pytest.raises(LaunchError, match=r"condition=True is not a condition; write IfCondition\(...\)"):
         LogInfo(msg="", condition=True)
