@@ -319,15 +319,6 @@ PLUGIN_OWNERS = ("model", "world", "sensor")  # in SDF
 
 
 @dataclass(frozen=True, slots=True)
-class LoaderMessage:
-    """A message of the loader, and the element that it is about, if known."""
-
-    severity: str
-    at: Tag | Place | None
-    text: str
-
-
-@dataclass(frozen=True, slots=True)
 class Requirements:
     """Requirements on the robot. `fits`: length, width and, if given, height in metres. `require`: a file of names."""
 
@@ -349,7 +340,7 @@ class Subject:
     requirements: Requirements = Requirements()
     sdf: bool = False
     model: RobotModel | None = None
-    messages: list[LoaderMessage] = field(default_factory=list)
+    messages: list[tuple[Severity, Mistake]] = field(default_factory=list)
     origins: Mapping[Tag, Place] = field(default_factory=dict)
     forgiven: list[Mistake] = field(default_factory=list)
 
@@ -371,7 +362,7 @@ class Subject:
     @property
     def guessed(self) -> bool:
         """Whether a mesh is missing, so that the extent of some part is unknown."""
-        return any("is replaced by a box" in message.text for message in self.messages)
+        return any("is replaced by a box" in message.problem for _, message in self.messages)
 
     @cached_property
     def wheels(self) -> list[Wheel]:
@@ -469,9 +460,7 @@ def read(
     subject = Subject(path, robot, sources, packages, requirements, robot.name == "model")
     subject.forgiven = [Mistake(Place(place, line), problem, FORGIVEN) for line, problem in mistakes]
     subject.origins = _origins(root, sources, args, packages, path, allow_env) if expanded else {}
-    for line in outcome.warnings:
-        at, message = split(line, path)
-        subject.messages.append(LoaderMessage("warning", at, message))
+    subject.messages += [_message("warning", *split(line, path)) for line in outcome.warnings]
     if not (expanded and is_library(subject)):
         _load(subject, root, plain, place)
     return subject
@@ -484,10 +473,14 @@ def is_library(subject: Subject) -> bool:
     return offers and all(tag.name in ("material", "gazebo") for tag in subject.root.children)
 
 
-def loader_mistakes(subject: Subject, severity: str) -> list[Mistake]:
+def loader_mistakes(subject: Subject, severity: Severity) -> list[Mistake]:
     """The loader's messages of this severity."""
+    return [message for found, message in subject.messages if found == severity]
+
+
+def _message(severity: Severity, at: Tag | Place, text: str) -> tuple[Severity, Mistake]:
     fix = "fix it as described" if severity == "error" else "check that this is intended"
-    return [Mistake(each.at, each.text, fix) for each in subject.messages if each.severity == severity]
+    return severity, Mistake(at, text, fix)
 
 
 def _robot(root: Tag) -> Tag:
@@ -507,19 +500,20 @@ def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
     by_line: dict[int, list[Tag]] = {}
     for tag in elements(root):
         by_line.setdefault(_line(tag), []).append(tag)
+    severity: Severity = "warning"
     try:
         subject.model = _model(subject, root, text, place)
-        lines = [("warning", line) for line in subject.model.warnings]
+        lines = subject.model.warnings
     except RobotError as error:
-        lines = [("error", str(error))]
-    for severity, line in lines:
+        severity, lines = "error", (str(error),)
+    for line in lines:
         where, message = split(line, subject.path)
         here = by_line.get(where.line, []) if where.file == place else []
         # A line may contain several elements; the message starts with the one it is about.
         at = next((tag for tag in here if message.startswith(f"{tag} ")), here[0] if here else where)
         quiet = isinstance(at, Tag) and (_within(at, SILENT) or at.attributes.get("name") == "world")
         if severity == "error" or not quiet:
-            subject.messages.append(LoaderMessage(severity, at, message))
+            subject.messages.append(_message(severity, at, message))
 
 
 def _model(subject: Subject, root: Tag, text: str, place: str) -> RobotModel:

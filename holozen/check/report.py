@@ -131,21 +131,10 @@ def check(
     packages: Mapping[str, Path] = {},
     requirements: Requirements = Requirements(),  # noqa: B008
     allow_env: Collection[str] = (),
-) -> list[Finding]:
-    """The findings in a xacro, URDF or SDF file, by place. `args`, `packages` and `allow_env` as for
-    `xacro.expand`. Any file is accepted; one that is not a robot has a finding that says so.
-    """
-    return examine(path, args, packages, requirements, allow_env)[0]
-
-
-def examine(
-    path: Path,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    requirements: Requirements,
-    allow_env: Collection[str],
 ) -> tuple[list[Finding], str]:
-    """As `check`, with a one-line summary of the file; empty for a file that cannot be read."""
+    """The findings in a xacro, URDF or SDF file, by place, and a one-line summary of it. `args`, `packages` and
+    `allow_env` as for `xacro.expand`. Any file is accepted; one that cannot be read has one finding and no summary.
+    """
     try:
         subject = read(path, args, packages, requirements, allow_env)
     except RobotError as error:

@@ -43,7 +43,7 @@ def unknown_references(subject: Subject) -> Iterator[Mistake]:
         name = gazebo.attributes.get("reference", "").strip()
         if name and name not in subject.links and name not in subject.joints:
             known = [*subject.links, *subject.joints]
-            yield _unknown(gazebo, f"reference={name!r} is no link and no joint", name, known)
+            yield _unknown(gazebo, f"reference={name!r} is neither a link nor a joint", name, known)
 
 
 @rule("tree", "error", "links that are not one tree", "the robot falls apart")

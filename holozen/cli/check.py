@@ -33,10 +33,10 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str]) -> int:
     args = parser().parse_args(argv)
     from holozen.check.engine import Requirements
-    from holozen.check.report import examine
+    from holozen.check.report import check
 
     requirements = Requirements(args.fits, args.require)
-    findings, summary = examine(args.file, dict(args.args), dict(args.package), requirements, args.allow_env)
+    findings, summary = check(args.file, dict(args.args), dict(args.package), requirements, args.allow_env)
     for finding in findings:
         text = json.dumps(finding.fields()) if args.json else "\n".join(map(printable, str(finding).split("\n")))
         print(text)

@@ -39,9 +39,9 @@ def find_named(name: str, start: Path, given: Mapping[str, Path] = {}) -> Path |
         raise RobotError(f"{start}: {cut(name)} is not a package name; a name has letters, digits, '_' and '-' only")
     if name in given:
         return _given_folder(name, given[name])
-    shared = (prefix / "share" / name for prefix in _environment("AMENT_PREFIX_PATH"))
+    shared = (prefix / "share" / name for prefix in folders_listed("AMENT_PREFIX_PATH"))
     found = next((folder for folder in shared if os.path.isdir(folder)), None)
-    return found or _named(name, _environment("ROS_PACKAGE_PATH")) or _named(name, folders_above(start))
+    return found or _named(name, folders_listed("ROS_PACKAGE_PATH")) or _named(name, folders_above(start))
 
 
 def nearest_robot_folder(start: Path) -> Path | None:
@@ -59,8 +59,8 @@ def known_folders(start: Path, given: Mapping[str, Path] = {}) -> list[Path]:
     environment, and those around the file, except any that contains the user's home.
     """
     around = [*local_packages(start).values(), *([found] if (found := nearest_robot_folder(start)) else [])]
-    shared = [prefix / "share" for prefix in _environment("AMENT_PREFIX_PATH")]
-    return [*given.values(), *shared, *_environment("ROS_PACKAGE_PATH"), *without_home(around)]
+    shared = [prefix / "share" for prefix in folders_listed("AMENT_PREFIX_PATH")]
+    return [*given.values(), *shared, *folders_listed("ROS_PACKAGE_PATH"), *without_home(around)]
 
 
 def without_home(folders: Iterable[Path]) -> list[Path]:
@@ -122,8 +122,10 @@ def _is_shared(folder: Path) -> bool:
     return bool(mode & stat.S_IWOTH and mode & stat.S_ISVTX)
 
 
-def _environment(variable: str) -> list[Path]:
-    return [Path(part) for part in os.environ.get(variable, "").split(os.pathsep) if part]
+def folders_listed(*variables: str, absolute: bool = False) -> list[Path]:
+    """The folders that environment variables list."""
+    parts = [part for variable in variables for part in os.environ.get(variable, "").split(os.pathsep)]
+    return [Path(part) for part in parts if part and (os.path.isabs(part) or not absolute)]
 
 
 def _named(name: str, folders: list[Path]) -> Path | None:
@@ -165,8 +167,8 @@ def _name_in_package_xml(folder: Path) -> str | None:
 
 
 def _unknown(name: str, start: Path, given: Mapping[str, Path]) -> str:
-    searched = [*_environment("AMENT_PREFIX_PATH"), *_environment("ROS_PACKAGE_PATH"), *folders_above(start)]
-    known = packages_in(_environment("ROS_PACKAGE_PATH")) | local_packages(start) | dict(given)
+    searched = [*folders_listed("AMENT_PREFIX_PATH"), *folders_listed("ROS_PACKAGE_PATH"), *folders_above(start)]
+    known = packages_in(folders_listed("ROS_PACKAGE_PATH")) | local_packages(start) | dict(given)
     return (
         f"{start}: there is no package {cut(name)}; packages found: {listed(list(known))};"
         f" looked in {', '.join(map(str, searched)) or 'no folder'}; give its folder: --package {name[:80]}=DIR"
@@ -247,14 +249,9 @@ def _confined(uri: str, scheme: str, rest: str, given: Mapping[str, Path]) -> Pa
 
 def _known_folders(given: Mapping[str, Path]) -> list[Path]:
     """The folders in which untrusted text may refer to files."""
-    shared = [prefix / "share" for prefix in _folders_in_environment("AMENT_PREFIX_PATH")]
+    shared = [prefix / "share" for prefix in folders_listed("AMENT_PREFIX_PATH", absolute=True)]
     own = [data.find(folder) for folder in ("meshes", "urdf", "worlds")]
-    return [*given.values(), *shared, *_folders_in_environment("ROS_PACKAGE_PATH", *MODEL_PATHS), *own]
-
-
-def _folders_in_environment(*variables: str) -> list[Path]:
-    texts = [os.environ.get(variable, "") for variable in variables]
-    return [Path(part) for text in texts for part in text.split(os.pathsep) if os.path.isabs(part)]
+    return [*given.values(), *shared, *folders_listed("ROS_PACKAGE_PATH", *MODEL_PATHS, absolute=True), *own]
 
 
 def _split(uri: str) -> tuple[str, str]:
@@ -284,7 +281,7 @@ def _folders(name: str, start: Path, given: Mapping[str, Path]) -> list[Path]:
 
 def _named_folders(name: str, start: Path, given: Mapping[str, Path]) -> list[Path]:
     named = find_named(name, start, given)
-    models = [folder / name for folder in _folders_in_environment(*MODEL_PATHS) if os.path.isdir(folder / name)]
+    models = [folder / name for folder in folders_listed(*MODEL_PATHS, absolute=True) if os.path.isdir(folder / name)]
     models += [folder / name for folder in folders_above(start) if _is_model(folder / name)]
     return [*([named] if named else []), *models]
 

@@ -13,7 +13,7 @@ from holozen.robot.elements import SHORTEST, Source, Tag, Vector, check_size, re
 from holozen.robot.errors import RobotError, cut
 from holozen.robot.inertia import NO_INERTIA, read_inertia, with_moments
 from holozen.robot.model import Color, Inertial, Joint, Limits, Link, Pose, Shape, Surface
-from holozen.robot.packages import MODEL_PATHS, find_named, folders_above, local_packages
+from holozen.robot.packages import MODEL_PATHS, find_named, folders_above, folders_listed, local_packages
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import triple
 from holozen.robot.shapes import SHAPES, SIZES, material_color, mesh_shape, needed, read_size
@@ -34,12 +34,6 @@ class Placed:
 
     pose: Pose
     within: str
-
-
-def word(tag: Tag, name: str, default: str = "") -> str:
-    """The text of the child called `name`."""
-    child = tag.first(name)
-    return default if child is None else child.text.strip()
 
 
 def flag(tag: Tag, name: str, default: bool) -> bool:
@@ -207,7 +201,7 @@ def _upon(normal: Vector) -> Pose:
 def _mesh(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) -> Shape | None:
     if tag.first("submesh") is not None:
         source.warn(tag, f"({use}) names a <submesh>; the whole file is used")
-    uri = word(tag, "uri")
+    uri = tag.given("uri")
     if not uri:
         raise tag.wrong("has no <uri>")
     return mesh_shape(tag, uri, pose, use, source, color)
@@ -488,7 +482,7 @@ class Includes:
 
     def included(self, outer: Piece) -> Piece | None:
         """The model of an `<include>`. Raises RobotError for a broken file and for circular includes."""
-        tag, uri = outer.tag, word(outer.tag, "uri")
+        tag, uri = outer.tag, outer.tag.given("uri")
         if not uri:
             raise tag.wrong("has no <uri>; write <uri>model://NAME</uri>")
         name = uri.removeprefix("model://").strip("/")
@@ -575,21 +569,18 @@ def _model_places(rest: str, source: Source) -> Iterator[Path]:
         return
     if name in source.packages:
         yield source.packages[name] / inside
-    for folder in _shared() if source.confined else (*_shared(), *_near(source.origin)):
+    for folder in (*folders_listed(*MODEL_PATHS, absolute=True), *([] if source.confined else _near(source.origin))):
         yield folder / name / inside
     package = None if source.confined else _package(name, source)
     if package is not None:
         yield package / inside
 
 
-def _shared() -> list[Path]:
-    parts = [part for key in MODEL_PATHS for part in os.environ.get(key, "").split(os.pathsep)]
-    return [Path(part) for part in parts if os.path.isabs(part)]
-
-
 def _is_known(file: Path, source: Source) -> bool:
     """Whether a file, symbolic links resolved, is in a folder that untrusted text may refer to."""
-    roots = [os.path.realpath(folder) for folder in (*source.packages.values(), *_shared())]
+    roots = [
+        os.path.realpath(folder) for folder in (*source.packages.values(), *folders_listed(*MODEL_PATHS, absolute=True))
+    ]
     return any(str(file).startswith(root + os.sep) for root in roots)
 
 
@@ -638,7 +629,7 @@ def _folder(origin: Path) -> Path:
 def _overridden(model: Tag, include: Tag, place: str) -> Tag:
     """The model with its `<include>`'s name, pose and static applied; messages locate it at `place`."""
     given = {tag.name for tag in include.children if tag.name in ("pose", "static")}
-    name = word(include, "name")
+    name = include.given("name")
     attributes = {**model.attributes, **({"name": name} if name else {})}
     kept = [tag for tag in model.children if tag.name not in given]
     added = [tag for tag in include.children if tag.name in (*given, "plugin", "placement_frame")]

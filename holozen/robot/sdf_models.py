@@ -25,7 +25,6 @@ from holozen.robot.sdf import (
     read_pose,
     rolls,
     version_of,
-    word,
 )
 from holozen.robot.urdf import check_mimics
 
@@ -187,7 +186,7 @@ def add_frames(tag: Tag, scope: str, frames: Frames) -> None:
 
 def joint_end(tag: Tag, end: str) -> str:
     """What the `<parent>` or `<child>` of a joint names. Raises RobotError."""
-    name = word(tag, end)
+    name = tag.given(end)
     if not name:
         raise tag.wrong(f"has no <{end}>; write the name of a link there")
     return name

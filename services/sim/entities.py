@@ -232,6 +232,8 @@ def checked_place(position: Vector, rotation: Rotation) -> Place:
         )
     length = math.hypot(*rotation)
     if not 0.9 < length < 1.1:
-        raise EntityError(si.SpawnEntityReply.INVALID_POSE, f"orientation {rotation} is no unit quaternion x, y, z, w")
+        raise EntityError(
+            si.SpawnEntityReply.INVALID_POSE, f"orientation {rotation} is not a unit quaternion x, y, z, w"
+        )
     x, y, z, w = (part / length for part in rotation)
     return position, (x, y, z, w)

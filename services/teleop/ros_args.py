@@ -98,7 +98,7 @@ def _node(remaps: list[tuple[str, str, str]]) -> list[str]:
     names = [(value, word) for name, value, word in remaps if name in ("__node", "__name")]
     for value, word in names:
         if not _NODE_NAME.fullmatch(value):
-            raise _wrong(word, f"{cut(value)} is no name for a node; use a letter, then letters, digits or '_'")
+            raise _wrong(word, f"{cut(value)} is not a valid node name; use a letter, then letters, digits or '_'")
     return [f"--name={names[-1][0]}"] if names else []
 
 
@@ -128,7 +128,7 @@ def _resolved(name: str, inside: str) -> str:
 
 def _legal(name: str, word: str) -> str:
     if not _TOPIC.fullmatch(name):
-        raise _wrong(word, f"{cut(name)} is no ROS name; use letters, digits and '_', such as Fred/cmd_vel")
+        raise _wrong(word, f"{cut(name)} is not a ROS name; use letters, digits and '_', such as Fred/cmd_vel")
     return name
 
 

@@ -8,10 +8,10 @@ import sys
 from asyncio import get_running_loop
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import contextmanager
 
 from prompt_toolkit.data_structures import Size
-from prompt_toolkit.input import Input
+from prompt_toolkit.input import DummyInput
 from prompt_toolkit.key_binding.key_processor import KeyPress
 from prompt_toolkit.keys import Keys
 from prompt_toolkit.layout import Window
@@ -42,7 +42,7 @@ class EventPress(KeyPress):
         self.event, self.counts = event, counts
 
 
-class TerminalInput(Input):
+class TerminalInput(DummyInput):
     """Reads a terminal whose modes are already set. `read` and `flush` return new keys, and those complete by timeout;
     `taken` is called once all input was processed.
     """
@@ -62,10 +62,6 @@ class TerminalInput(Input):
         """For the loop."""
         return self._fileno
 
-    def typeahead_hash(self) -> str:
-        """Unique, so that prompt_toolkit never keeps typeahead for another application."""
-        return f"{id(self)}"
-
     def read_keys(self) -> list[KeyPress]:
         """The keys that are available."""
         return self._read()
@@ -73,14 +69,6 @@ class TerminalInput(Input):
     def flush_keys(self) -> list[KeyPress]:
         """The keys that are complete by timeout."""
         return self._flush()
-
-    def raw_mode(self) -> AbstractContextManager[None]:
-        """The terminal is in its mode already."""
-        return nullcontext()
-
-    def cooked_mode(self) -> AbstractContextManager[None]:
-        """Not needed: nothing else uses the terminal."""
-        return nullcontext()
 
     @contextmanager
     def attach(self, input_ready_callback: Callable[[], None]) -> Iterator[None]:
@@ -120,26 +108,11 @@ class TerminalOutput(Vt100_Output):
         if data != RESET:  # all that prompt_toolkit writes if nothing changed
             self._write(f"{BEGIN}{data}{END}")
 
-    def enter_alternate_screen(self) -> None:
-        """The terminal is on it already."""
+    def _keep(self) -> None:
+        """`Terminal` has set this mode, and restores it at the end."""
 
-    def quit_alternate_screen(self) -> None:
-        """The terminal leaves it at the end."""
-
-    def enable_bracketed_paste(self) -> None:
-        """It is on."""
-
-    def disable_bracketed_paste(self) -> None:
-        """It stays on until the end."""
-
-    def reset_cursor_key_mode(self) -> None:
-        """Both modes are understood."""
-
-    def hide_cursor(self) -> None:
-        """It is hidden."""
-
-    def show_cursor(self) -> None:
-        """It stays hidden."""
+    enter_alternate_screen = quit_alternate_screen = enable_bracketed_paste = disable_bracketed_paste = _keep
+    reset_cursor_key_mode = hide_cursor = show_cursor = _keep
 
     def _size(self) -> Size:
         columns, rows = self._columns_and_rows()

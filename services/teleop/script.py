@@ -67,7 +67,7 @@ def _step(words: list[str], where: str, layout: Layout) -> Step:
     keys = tuple(words[1:] if match else words)
     for key in keys:
         if key not in layout.moves and key not in layout.speeds:
-            raise ScriptError(f"{where}: {key!r} is no key of {layout.name}; write `0.5s i`, `q` or `stop`")
+            raise ScriptError(f"{where}: {key!r} is not a key of {layout.name}; write `0.5s i`, `q` or `stop`")
         if key in layout.moves and not seconds:
             raise ScriptError(f"{where}: how long is {key!r} held? write `0.5s {key}`")
     return Step(seconds, keys)

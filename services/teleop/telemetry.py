@@ -111,7 +111,6 @@ class Telemetry:
             odom_age=age,
             stale=client.stale(),
             round_trip=self._round_trip.seconds,
-            link_delay=self._round_trip.seconds,
             real_time_factor=self._track.real_time_factor(),
             pose=self._track.pose,
             trail=self._track.trail,

@@ -26,7 +26,7 @@ def read(path: str) -> dict[str, Any]:
     try:
         text = _bytes(path).decode()
     except UnicodeDecodeError as error:
-        raise TomlError(f"{path}: is no text in UTF-8 (byte {error.start})") from None
+        raise TomlError(f"{path}: is not UTF-8 text (byte {error.start})") from None
     for number, line in enumerate(text.split("\n"), 1):
         if len(line) > LONGEST:
             raise TomlError(f"{path}:{number}: is longer than {LONGEST} characters")
@@ -56,17 +56,13 @@ def _bytes(path: str) -> bytes:
     try:
         number = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
         with open(number, "rb") as file:
-            if not stat.S_ISREG(os.fstat(number).st_mode):
-                raise TomlError(f"{path}: is no regular file")
-            found = file.read(LARGEST + 1)
+            is_file, found = stat.S_ISREG(os.fstat(number).st_mode), file.read(LARGEST + 1)
     except IsADirectoryError:
         raise TomlError(f"{path}: is a folder") from None
-    except OSError as error:
-        raise TomlError(f"{path}: {error.strerror}") from None
-    except TomlError:
-        raise
-    except ValueError as error:  # a path with a NUL in it
-        raise TomlError(f"{path}: {error}") from None
+    except (OSError, ValueError) as error:  # a path with a NUL in it is a ValueError
+        raise TomlError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    if not is_file:
+        raise TomlError(f"{path}: is not a regular file")
     if len(found) > LARGEST:
         raise TomlError(f"{path}: is larger than {LARGEST // 1024} KB")
     return found

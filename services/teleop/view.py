@@ -46,8 +46,7 @@ class State:
     measured: Planar = STOP
     odom_age: float = math.inf  # inf before the first
     stale: bool = True
-    round_trip: float | None = None
-    link_delay: float | None = None  # to the robot and back; None: not known
+    round_trip: float | None = None  # to the sim and back; None: not known
     real_time_factor: float | None = None
     listeners: list[str] = field(default_factory=list)
     sources: list[Source] = field(default_factory=list)  # command sources as reported by the sim; may include ourselves
@@ -134,8 +133,8 @@ def alarms(state: State) -> list[list[str]]:
         found.append(["NO ODOM: nothing was heard from a robot", "NO ODOM"])
     elif state.stale:
         found.append([f"ODOM IS STALE: the last one came {seconds(state.odom_age)} ago", "ODOM IS STALE"])
-    if state.link_delay is not None and state.link_delay > LINK_LIMIT:
-        delay = seconds(state.link_delay)
+    if state.round_trip is not None and state.round_trip > LINK_LIMIT:
+        delay = seconds(state.round_trip)
         found.append([f"SLOW LINK: the robot answers {delay} later", f"SLOW LINK: {delay}"])
     if state.deadman and not state.deadman_held:
         found.append(["dead man: hold space", "dead man"])

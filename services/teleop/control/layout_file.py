@@ -105,7 +105,7 @@ def _motion(text: str) -> Direction:
     for word in text.split("+"):
         one = MOTIONS.get(word.strip())
         if one is None:
-            raise _Wrong(f"{cut(word.strip())} is no motion; {closest(word.strip(), [*MOTIONS])}")
+            raise _Wrong(f"{cut(word.strip())} is not a motion; {closest(word.strip(), [*MOTIONS])}")
         axis = next(index for index, value in enumerate(one) if value)
         if total[axis]:
             raise _Wrong(f"{cut(word.strip())} is there already, or its opposite")

@@ -41,10 +41,10 @@ def key_name(text: str) -> str:
     if is_character(last):
         _check_character(modifiers, last)
     elif last not in NAMED:
-        raise KeyNameError(f"is no key: write one character, or a name: {closest(last, list(NAMED))}")
+        raise KeyNameError(f"is not a key: write one character, or a name: {closest(last, list(NAMED))}")
     name = "+".join([*modifiers, last])
     if text != name:
-        raise KeyNameError(f"is no key: write {name!r}")
+        raise KeyNameError(f"is not a key: write {name!r}")
     return name
 
 
@@ -63,9 +63,9 @@ def is_foreign(key: str) -> bool:
 
 def _check_character(words: list[str], last: str) -> None:
     if "shift" in words:
-        raise KeyNameError(f"is no key: write what it types, such as {last.upper()!r}")
+        raise KeyNameError(f"is not a key: write what it types, such as {last.upper()!r}")
     if "ctrl" in words and last.lower() != last:
-        raise KeyNameError(f"is no key: write 'ctrl+{last.lower()}'")
+        raise KeyNameError(f"is not a key: write 'ctrl+{last.lower()}'")
     if words == ["ctrl"] and f"ctrl+{last}" in SAME:
         raise KeyNameError(f"is {SAME[f'ctrl+{last}']!r} to a terminal")
 
@@ -85,50 +85,6 @@ ACTION_WORDS = {
     "stop": "stop",
 }
 SHORT = ("resume", "help", "quit")
-
-Moves = Mapping[str, tuple[int, int, int, int]]
-Speeds = Mapping[str, tuple[float, float]]
-Actions = Mapping[str, str]
-
-
-def help_rows(moves: Moves, speeds: Speeds, actions: Actions) -> list[tuple[list[str], str]]:
-    """(keys, meaning) of everything in display order: motions from simple to combined, speeds, actions."""
-    order = sorted(dict.fromkeys(moves.values()), key=_simple_first)
-    found = [(_keys(moves, direction), _motion(direction)) for direction in order]
-    found += [(_keys(speeds, factors), _change(factors)) for factors in dict.fromkeys(speeds.values())]
-    found += [(_keys(actions, action), words) for action, words in ACTION_WORDS.items() if action in actions.values()]
-    return found
-
-
-def help_table(moves: Moves, speeds: Speeds, actions: Actions) -> list[str]:
-    """A line for each meaning, `meaning keys`, wrapped at 40 columns."""
-    lines = []
-    for keys, meaning in help_rows(moves, speeds, actions):
-        text = f"{meaning:<20} {' '.join([*keys, *([OTHER] if meaning == 'stop' else [])])}"
-        lines += textwrap.wrap(text, WIDTH, subsequent_indent=" " * 21)
-    return lines
-
-
-def help_lines(moves: Moves, speeds: Speeds, actions: Actions) -> list[str]:
-    """The first key for each motion and speed, opposites together, as many per line as fit."""
-    items = [f"{keys} {meaning}" for keys, meaning in [*_pairs(moves), *_speeds(speeds)]]
-    items += [f"{_keys(actions, action)[0]} {ACTION_WORDS[action]}" for action in SHORT if action in actions.values()]
-    lines: list[str] = []
-    for item in [*items, f"{OTHER} stop"]:
-        if lines and len(f"{lines[-1]}{GAP}{item}") <= WIDTH:
-            lines[-1] += f"{GAP}{item}"
-        else:
-            lines += textwrap.wrap(item, WIDTH)
-    return lines
-
-
-def help_markdown(moves: Moves, speeds: Speeds, actions: Actions) -> str:
-    """The rows as a Markdown table."""
-    lines = ["| keys | meaning |", "|---|---|"]
-    for keys, meaning in help_rows(moves, speeds, actions):
-        words = [*(f"`{key}`" for key in keys), *(["and all others"] if meaning == "stop" else [])]
-        lines.append(f"| {' '.join(words)} | {meaning} |")
-    return "\n".join(lines) + "\n"
 
 
 def _keys(table: Mapping[str, object], meaning: object) -> list[str]:
@@ -153,7 +109,7 @@ def _which(factors: tuple[float, float]) -> str:
     return "both speeds" if speed == turn else "speed" if turn == 1 else "turn speed"
 
 
-def _pairs(moves: Moves) -> list[tuple[str, str]]:
+def _pairs(moves: Mapping[str, "Direction"]) -> list[tuple[str, str]]:
     """The simple motions, each with its opposite; then combinations with turning, and the diagonals."""
     found = []
     for axis, words in enumerate(PAIRS):
@@ -164,7 +120,7 @@ def _pairs(moves: Moves) -> list[tuple[str, str]]:
     return [(keys, words) for keys, words in found if keys]
 
 
-def _speeds(speeds: Speeds) -> list[tuple[str, str]]:
+def _speeds(speeds: Mapping[str, tuple[float, float]]) -> list[tuple[str, str]]:
     """The first keys that increase and decrease, for both speeds together and for each."""
     found: dict[str, dict[bool, str]] = {}
     for key, factors in speeds.items():
@@ -196,19 +152,36 @@ class Layout:
     actions: Mapping[str, str]
     positional: bool = False
 
+    def meanings(self) -> list[tuple[list[str], str]]:
+        """(keys, meaning) of everything in display order: motions from simple to combined, speeds, actions."""
+        order = sorted(dict.fromkeys(self.moves.values()), key=_simple_first)
+        found = [(_keys(self.moves, direction), _motion(direction)) for direction in order]
+        found += [(_keys(self.speeds, factors), _change(factors)) for factors in dict.fromkeys(self.speeds.values())]
+        return found + [
+            (keys, words) for action, words in ACTION_WORDS.items() if (keys := _keys(self.actions, action))
+        ]
+
     @cached_property
     def help(self) -> list[str]:
-        """The most important keys in few lines, each at most 40 columns wide."""
-        return help_lines(self.moves, self.speeds, self.actions)
+        """The first key for each motion and speed, opposites together, in lines of at most 40 columns."""
+        items = [f"{keys} {meaning}" for keys, meaning in [*_pairs(self.moves), *_speeds(self.speeds)]]
+        items += [f"{keys[0]} {ACTION_WORDS[action]}" for action in SHORT if (keys := _keys(self.actions, action))]
+        lines: list[str] = []
+        for item in [*items, f"{OTHER} stop"]:
+            if lines and len(f"{lines[-1]}{GAP}{item}") <= WIDTH:
+                lines[-1] += f"{GAP}{item}"
+            else:
+                lines += textwrap.wrap(item, WIDTH)
+        return lines
 
     @cached_property
     def table(self) -> list[str]:
         """All keys, a line for each meaning, at most 40 columns wide."""
-        return help_table(self.moves, self.speeds, self.actions)
-
-    def markdown(self) -> str:
-        """All keys as a Markdown table."""
-        return help_markdown(self.moves, self.speeds, self.actions)
+        lines = []
+        for keys, meaning in self.meanings():
+            text = f"{meaning:<20} {' '.join([*keys, *([OTHER] if meaning == 'stop' else [])])}"
+            lines += textwrap.wrap(text, WIDTH, subsequent_indent=" " * 21)
+        return lines
 
     def key_for(self, typed: str, base: str) -> str:
         """The key of this layout that was pressed. `typed` is what it types, `base` what its place types on a

@@ -199,7 +199,7 @@ def stick(x: float, y: float) -> tuple[float, float]:
 FOLDER = "/dev/input"
 MOST_READS = 16  # of 64 events each; the rest waits for the next call
 GONE = (OSError, EOFError)
-GROUP = "join the group that may: sudo usermod -aG input $USER, then log in anew"
+GROUP = "join the group that may: sudo usermod -aG input $USER, then log in again"
 
 
 class JoystickError(Exception):
@@ -223,7 +223,7 @@ class Joystick:
         axes = device.axes()
         missing = _missing(axes, device.keys())
         if missing:
-            raise JoystickError(f"joystick {path}: {self.name!r} is no gamepad: it has no {', '.join(missing)}")
+            raise JoystickError(f"joystick {path}: {self.name!r} is not a gamepad: it has no {', '.join(missing)}")
         self._axes = [axis for axis in (*AXES, ABS_HAT0Y) if axis in axes]
         ranges = {axis: device.axis(axis)[1] for axis in AXES}
         for axis, (low, high) in ranges.items():
@@ -311,7 +311,7 @@ class Joystick:
             try:
                 made = cls(device, path)
             except OSError:
-                raise JoystickError(f"joystick {path}: is no input device; use one of {FOLDER}/event*") from None
+                raise JoystickError(f"joystick {path}: is not an input device; use one of {FOLDER}/event*") from None
             stack.pop_all()
             return made
 

@@ -33,7 +33,7 @@ def findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Findings:
 
     def look(text: str, name: str = "robot.urdf", **options: object) -> list[Finding]:
         (tmp_path / name).write_text(text)
-        return check(tmp_path / name, **options)  # type: ignore[arg-type]
+        return check(tmp_path / name, **options)[0]  # type: ignore[arg-type]
 
     return look
 

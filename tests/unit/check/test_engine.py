@@ -30,7 +30,7 @@ USE = (
 
 
 def places(path: Path) -> list[tuple[str, str, int]]:
-    return [(finding.rule, Path(finding.place.file).name, finding.place.line) for finding in check(path)]
+    return [(finding.rule, Path(finding.place.file).name, finding.place.line) for finding in check(path)[0]]
 
 
 def test_a_line_in_a_macro_and_one_in_its_call(findings: Findings, tmp_path: Path) -> None:
@@ -51,7 +51,7 @@ def test_a_line_that_cannot_be_traced_is_one_of_the_expanded_text(findings: Find
     (tmp_path / "wheels.xacro").write_text(HEAD + WHEELS + "</robot>")
     computed = '<xacro:arg name="f" default="wheels"/><xacro:include filename="$(arg f).xacro"/>\n'
     findings(HEAD + computed + USE, "r.xacro")
-    found = check(tmp_path / "r.xacro")
+    found = check(tmp_path / "r.xacro")[0]
     assert [finding.place.expanded for finding in found] == [False, True, True]
     assert "line of `holozen xacro`'s output" in str(found[1])
 
@@ -128,7 +128,7 @@ def test_a_file_that_is_no_robot_is_one_finding(text: str, findings: Findings) -
 
 def test_a_file_that_is_not_there_is_one_finding(tmp_path: Path) -> None:
     for path in (tmp_path / "nowhere.urdf", tmp_path, Path("a\0b")):
-        (finding,) = check(path)
+        (finding,) = check(path)[0]
         assert finding.rule == "file"
 
 
@@ -180,6 +180,6 @@ def test_a_long_word_of_the_file_does_not_make_a_long_finding(tmp_path: Path) ->
     ]:
         file = tmp_path / "robot.urdf"
         file.write_text(f'<robot name="r"><link name="a">{MASS}</link>{parts}</robot>')
-        findings = check(file)
+        findings = check(file)[0]
         assert findings
         assert all(len(str(finding)) < 5000 for finding in findings)

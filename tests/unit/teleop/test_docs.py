@@ -5,14 +5,24 @@ from pathlib import Path
 
 import pytest
 
-from services.teleop.control import layouts
 from services.teleop.control.layout_file import MOTIONS, load
-from services.teleop.control.layouts import ACTIONS, FIXED, LAYOUTS
+from services.teleop.control.layouts import ACTIONS, FIXED, LAYOUTS, Layout
 from services.teleop.ros_args import ros_arguments
 from services.teleop.settings import NAMES, read
 
 DOCS = Path(__file__).parents[3] / "docs" / "teleop.md"
-TABLES = {name: layout.markdown() for name, layout in LAYOUTS.items()} | {"fixed": layouts.help_markdown({}, {}, FIXED)}
+
+
+def table(layout: Layout) -> str:
+    """The meanings of all keys in Markdown."""
+    lines = ["| keys | meaning |", "|---|---|"]
+    for keys, meaning in layout.meanings():
+        words = [*(f"`{key}`" for key in keys), *(["and all others"] if meaning == "stop" else [])]
+        lines.append(f"| {' '.join(words)} | {meaning} |")
+    return "\n".join(lines) + "\n"
+
+
+TABLES = {name: table(layout) for name, layout in (LAYOUTS | {"fixed": Layout("fixed", {}, {}, FIXED)}).items()}
 
 
 def examples() -> list[str]:

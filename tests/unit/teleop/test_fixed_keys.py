@@ -21,24 +21,24 @@ def test_a_blank_is_space() -> None:
 
 def test_a_wrong_name_is_refused() -> None:
     for text, words in [
-        ("Up", "is no key: write 'up'"),
-        ("Shift+Left", "is no key: write 'shift+left'"),
-        ("shift+ctrl+left", "is no key: write 'ctrl+shift+left'"),
-        ("shift+shift+left", "is no key: write 'shift+left'"),
-        ("shift+w", "is no key: write what it types, such as 'W'"),
-        ("ctrl+X", "is no key: write 'ctrl+x'"),
+        ("Up", "is not a key: write 'up'"),
+        ("Shift+Left", "is not a key: write 'shift+left'"),
+        ("shift+ctrl+left", "is not a key: write 'ctrl+shift+left'"),
+        ("shift+shift+left", "is not a key: write 'shift+left'"),
+        ("shift+w", "is not a key: write what it types, such as 'W'"),
+        ("ctrl+X", "is not a key: write 'ctrl+x'"),
         ("ctrl+i", "is 'tab' to a terminal"),
         ("ctrl+m", "is 'enter' to a terminal"),
-        ("lef", "is no key: write one character, or a name: did you mean 'left'?"),
-        ("meta+x", "is no key: write one character, or a name: use up, down"),
-        ("ctrl+", "is no key: write one character, or a name"),
+        ("lef", "is not a key: write one character, or a name: did you mean 'left'?"),
+        ("meta+x", "is not a key: write one character, or a name: use up, down"),
+        ("ctrl+", "is not a key: write one character, or a name"),
         ("", "is empty"),
         ("  ", "is empty"),
         ("\t", "is empty"),
-        ("\x1b", "is no key"),
-        ("界", "is no key"),
-        ("\u0301", "is no key"),
-        ("ab", "is no key"),
+        ("\x1b", "is not a key"),
+        ("界", "is not a key"),
+        ("\u0301", "is not a key"),
+        ("ab", "is not a key"),
     ]:
         with pytest.raises(KeyNameError) as error:
             key_name(text)

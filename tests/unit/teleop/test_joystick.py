@@ -229,9 +229,9 @@ def test_a_pad_that_is_closed_rests(device: Recorded) -> None:
 @pytest.mark.parametrize(
     ("answers", "words"),
     [
-        ({GET_AXES: bits([ABS_X, ABS_Y], 8)}, "is no gamepad: it has no ABS_RX"),
-        ({GET_AXES: bytes(8)}, "is no gamepad: it has no ABS_X, ABS_Y, ABS_RX"),
-        ({GET_KEYS: bytes(96)}, "is no gamepad: it has no BTN_SOUTH, BTN_TL"),  # a pad's motion sensors
+        ({GET_AXES: bits([ABS_X, ABS_Y], 8)}, "is not a gamepad: it has no ABS_RX"),
+        ({GET_AXES: bytes(8)}, "is not a gamepad: it has no ABS_X, ABS_Y, ABS_RX"),
+        ({GET_KEYS: bytes(96)}, "is not a gamepad: it has no BTN_SOUTH, BTN_TL"),  # a pad's motion sensors
         ({GET_AXIS + ABS_RX: absinfo(0, 0, 0)}, "has no range for ABS_RX: 0 to 0"),
         ({GET_AXIS + ABS_X: absinfo(0, 255, 0)}, "has no range for ABS_X: 255 to 0"),
     ],
@@ -250,7 +250,7 @@ def test_a_name_that_moves_the_cursor_is_made_harmless(device: Recorded) -> None
 
 def test_what_is_no_input_device_is_refused_and_never_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "fifo")
-    no_device = "is no input device; use one of /dev/input/event*"
+    no_device = "is not an input device; use one of /dev/input/event*"
     for path, words in (
         (f"{tmp_path}/none", "No such file or directory"),
         (str(tmp_path), no_device),

@@ -72,18 +72,18 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path) -> None:
         ('positional = "yes"', ": positional is 'yes'; write true or false"),
         ("moves = 1", ": moves is 1; write a section [moves] of lines"),
         ("[[moves]]", ": moves is [{}]; write a section [moves] of lines"),
-        ('[moves]\nw = "forwards"', ": [moves] 'w' = 'forwards': 'forwards' is no motion; did you mean 'forward'?"),
+        ('[moves]\nw = "forwards"', ": [moves] 'w' = 'forwards': 'forwards' is not a motion; did you mean 'forward'?"),
         ('[moves]\nw = "turn_left"',
-         ": [moves] 'w' = 'turn_left': 'turn_left' is no motion; did you mean 'turn-left'?"),
-        ('[moves]\nw = "Up"', ": [moves] 'w' = 'Up': 'Up' is no motion; did you mean 'up'?"),
-        ('[moves]\nw = ""', f": [moves] 'w' = '': '' is no motion; use {', '.join(MOTIONS)}"),
+         ": [moves] 'w' = 'turn_left': 'turn_left' is not a motion; did you mean 'turn-left'?"),
+        ('[moves]\nw = "Up"', ": [moves] 'w' = 'Up': 'Up' is not a motion; did you mean 'up'?"),
+        ('[moves]\nw = ""', f": [moves] 'w' = '': '' is not a motion; use {', '.join(MOTIONS)}"),
         ('[moves]\nw = "forward+back"', ": [moves] 'w' = 'forward+back': 'back' is there already, or its opposite"),
         ('[moves]\nw = "left+left"', ": [moves] 'w' = 'left+left': 'left' is there already, or its opposite"),
         ("[moves]\nw = 1", ": [moves] 'w' = 1; put key and meaning in quotes"),
         ('[moves]\nw.x = "back"', ": [moves] 'w' = {'x': 'back'}; put key and meaning in quotes"),
         ('[moves]\nup = "back"\nlft = "left"',
-         ": [moves] 'lft' is no key: write one character, or a name: did you mean 'left'?"),
-        ('[moves]\n"shift+w" = "back"', ": [moves] 'shift+w' is no key: write what it types, such as 'W'"),
+         ": [moves] 'lft' is not a key: write one character, or a name: did you mean 'left'?"),
+        ('[moves]\n"shift+w" = "back"', ": [moves] 'shift+w' is not a key: write what it types, such as 'W'"),
         ('[moves]\nspace = "back"', ": [moves] 'space' is fixed: it means stop in every layout"),
         ('[moves]\n" " = "back"', ": [moves] ' ' is fixed: it means stop in every layout"),
         ('[moves]\n"ctrl+c" = "back"', ": [moves] 'ctrl+c' is fixed: it means quit in every layout"),
@@ -109,14 +109,14 @@ def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path: Path) -> None
     os.mkfifo(tmp_path / "ttk")
     for name, words in (
         ("", "is a folder"),
-        ("fifo", "is no regular file"),
+        ("fifo", "is not a regular file"),
         ("none", "No such file"),
         ("a\0b", "null"),
     ):
         with pytest.raises(LayoutError, match=words) as error:
             load(f"{tmp_path}/{name}")
         assert str(error.value).isprintable()
-    with pytest.raises(LayoutError, match="is no regular file"):
+    with pytest.raises(LayoutError, match="is not a regular file"):
         load(f"{tmp_path}/ttk")  # with a slash it is a file, though there is a layout of this name
 
 

@@ -32,16 +32,16 @@ def test_each_line_is_a_step() -> None:
 
 def test_a_wrong_line_is_reported_with_its_number() -> None:
     for line, reason in [
-        ("0.5s y", "'y' is no key of ttk"),
+        ("0.5s y", "'y' is not a key of ttk"),
         ("i", "how long is 'i' held? write `0.5s i`"),
         ("0s i", "how long is 'i' held?"),
-        ("1e3s i", "'1e3s' is no key"),
-        ("-1s i", "'-1s' is no key"),
-        ("nans i", "'nans' is no key"),
+        ("1e3s i", "'1e3s' is not a key"),
+        ("-1s i", "'-1s' is not a key"),
+        ("nans i", "'nans' is not a key"),
         ("99999s i", "'99999s' is longer than 3600s"),
-        ("0.5s ctrl+c", "'ctrl+c' is no key"),
-        ("stop now", "'stop' is no key"),
-        ("1s \x1b[A", "is no key"),
+        ("0.5s ctrl+c", "'ctrl+c' is not a key"),
+        ("stop now", "'stop' is not a key"),
+        ("1s \x1b[A", "is not a key"),
     ]:
         with pytest.raises(ScriptError, match=r"^drive\.txt, line 2: ") as expected:
             parse(f"0.1s i\n{line}\n0.1s J")

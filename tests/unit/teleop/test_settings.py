@@ -138,7 +138,7 @@ def test_wrong_flags_and_help_come_before_a_wrong_file(tmp_path: Path, capsys: p
 def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
-    for name, words in (("", "is a folder"), ("fifo", "is no regular file"), ("loop", "Too many levels")):
+    for name, words in (("", "is a folder"), ("fifo", "is not a regular file"), ("loop", "Too many levels")):
         with pytest.raises(SettingsError, match=words):
             read(str(tmp_path / name))
 
@@ -147,7 +147,7 @@ def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path: Path) -> None
     ("content", "words"),
     [
         (b"#" * 65537, "is larger than 64 KB"),
-        (b"name = '\xff'", r"is no text in UTF-8 \(byte 8\)"),
+        (b"name = '\xff'", r"is not UTF-8 text \(byte 8\)"),
         (b"a = " + b"[\n" * 30000, "is nested too deeply"),
         (b"a = 1\n" + b"a." * 500 + b"a = 1", ":2: is longer than 1000 characters"),
         (b"\0", r":1: is not TOML: Invalid statement: '\\x00'"),

@@ -373,5 +373,5 @@ def test_a_terminal_without_a_size_shows_nothing(size: tuple[int, int]) -> None:
 
 
 def test_a_slow_link_is_reported_with_the_figure() -> None:
-    assert "SLOW LINK" not in text(replace(GOOD, link_delay=0.25))
-    assert "SLOW LINK: the robot answers 310 ms later" in text(replace(GOOD, link_delay=0.31))
+    assert "SLOW LINK" not in text(replace(GOOD, round_trip=0.25))
+    assert "SLOW LINK: the robot answers 310 ms later" in text(replace(GOOD, round_trip=0.31))
