@@ -206,13 +206,7 @@ def read_sources(path: Path, packages: Mapping[str, Path]) -> list[SourceFile]:
     return list(files.values())
 
 
-def trace(
-    plain: Tag,
-    sources: list[SourceFile],
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    allow_env: Collection[str] = (),
-) -> list[str]:
+def trace(subject: "Subject", plain: Tag) -> list[str]:
     """For each element of the expanded text in order: "source file number:line", or nothing if unknown.
 
     The files are expanded a second time, with a mark in each start tag. The result is used only if the text is the
@@ -220,7 +214,7 @@ def trace(
     """
     try:
         with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
-            outcome = _expanded(Path(folder), sources, args, packages, allow_env)
+            outcome = _expanded(Path(folder), subject)
     except OSError:  # there is no writable folder
         return []
     if outcome.error:
@@ -231,18 +225,14 @@ def trace(
     return places if same else []
 
 
-def _expanded(
-    folder: Path,
-    sources: list[SourceFile],
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    allow_env: Collection[str],
-) -> Outcome:
+def _expanded(folder: Path, subject: "Subject") -> Outcome:
     """The expansion of the marked copies in `folder`."""
+    sources = subject.sources
     copies = {source.path: folder / f"{number}.xacro" for number, source in enumerate(sources)}
     for number, source in enumerate(sources):
         copies[source.path].write_bytes(_marked(source, number, copies))
-    return expand_in_child(copies[sources[0].path], args, {**_packages(sources, packages), **packages}, allow_env)
+    packages = {**_packages(sources, subject.packages), **subject.packages}
+    return expand_in_child(copies[sources[0].path], subject.args, packages, subject.allow_env)
 
 
 def elements(root: Tag) -> Iterator[Tag]:
@@ -336,7 +326,9 @@ class Subject:
     path: Path
     root: Tag
     sources: list[SourceFile]
+    args: Mapping[str, str] = field(default_factory=dict)
     packages: Mapping[str, Path] = field(default_factory=dict)
+    allow_env: Collection[str] = ()
     requirements: Requirements = Requirements()
     sdf: bool = False
     model: RobotModel | None = None
@@ -457,9 +449,9 @@ def read(
     root = read_xml(plain, place)
     sources = read_sources(path, packages) if expanded else []
     robot = _robot(root)
-    subject = Subject(path, robot, sources, packages, requirements, robot.name == "model")
+    subject = Subject(path, robot, sources, args, packages, allow_env, requirements, robot.name == "model")
     subject.forgiven = [Mistake(Place(place, line), problem, FORGIVEN) for line, problem in mistakes]
-    subject.origins = _origins(root, sources, args, packages, path, allow_env) if expanded else {}
+    subject.origins = _origins(subject, root) if expanded else {}
     subject.messages += [_message("warning", *split(line, path)) for line in outcome.warnings]
     if not (expanded and is_library(subject)):
         _load(subject, root, plain, place)
@@ -530,25 +522,18 @@ def _within(tag: Tag | None, names: tuple[str, ...]) -> bool:
     return False
 
 
-def _origins(
-    root: Tag,
-    sources: list[SourceFile],
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    path: Path,
-    allow_env: Collection[str],
-) -> dict[Tag, Place]:
+def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:
     """Element of the expanded text -> its place in a source file, or in the text if unknown."""
     try:
-        marks = trace(root, sources, args, packages, allow_env)
+        marks = trace(subject, root)
     except (RobotError, OSError):
         marks = []
     tags = list(elements(root))
-    places = {tag: Place(str(path), _line(tag), True) for tag in tags}
+    places = {tag: Place(str(subject.path), _line(tag), True) for tag in tags}
     for tag, mark in zip(tags, marks, strict=False):
         number, colon, line = mark.partition(":")
         if colon:
-            places[tag] = Place(str(sources[int(number)].path), int(line))
+            places[tag] = Place(str(subject.sources[int(number)].path), int(line))
     return places
 
 

@@ -4,11 +4,10 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from xml.parsers import expat
 
-from holozen.robot.errors import RobotError, cut
+from holozen.robot.errors import RobotError, cut, suggest
 
 Vector = tuple[float, float, float]
 
@@ -327,13 +326,6 @@ class Source:
         return read_xml(text, place)
 
     def nearest(self, name: str, known: Iterable[str], common: str = "", alike: float = 0.6) -> str:
-        """The closest match for `name` in `known`, as the phrase "; did you mean ...?", else nothing.
-
-        `alike` is the similarity required, from 0 to 1; the prefix `common` is ignored.
-        """
+        """As `suggest`; nothing after MOST_GUESSES."""
         self.guesses += 1
-        if self.guesses > MOST_GUESSES:
-            return ""
-        same = {other.removeprefix(common).casefold()[:60]: other for other in known}
-        found = get_close_matches(name.removeprefix(common).casefold()[:60], same, 1, alike)
-        return f"; did you mean {cut(same[found[0]])}?" if found else ""
+        return "" if self.guesses > MOST_GUESSES else suggest(name, known, common, alike)

@@ -1,4 +1,6 @@
-"""The one error of this folder."""
+"""The one error of this folder, and the parts of its messages."""
+
+from collections.abc import Iterable
 
 MOST = 2000  # characters of a message
 
@@ -24,9 +26,13 @@ def listed(names: list[str], most: int = 12) -> str:
     return shown + f" and {len(names) - most} more" if len(names) > most else shown or "none"
 
 
-def suggest(name: str, known: list[str]) -> str:
-    """ "; did you mean ...?" with the closest match in `known`, for the end of a message; else nothing."""
+def suggest(name: str, known: Iterable[str], common: str = "", alike: float = 0.6) -> str:
+    """ "; did you mean ...?" with the closest match in `known`, for the end of a message; else nothing.
+
+    `alike` is the similarity required, from 0 to 1; case and the prefix `common` are ignored.
+    """
     from difflib import get_close_matches
 
-    match = get_close_matches(name[:80], known, 1)
-    return f"; did you mean {cut(match[0])}?" if match else ""
+    same = {other.removeprefix(common).casefold()[:80]: other for other in known}
+    found = get_close_matches(name.removeprefix(common).casefold()[:80], same, 1, alike)
+    return f"; did you mean {cut(same[found[0]])}?" if found else ""
