@@ -367,16 +367,7 @@ def _cross(a: Vector, b: Vector) -> Vector:
 OFF = 0.2  # of the robot's own dimension
 SKID = 2.5  # times its own: a skid-steer is deliberately given a wider base
 ACROSS = 0.01  # m; minimum offset to the wrong side
-
-
-@dataclass(frozen=True, slots=True)
-class DriveMeasures:
-    """A drive's settings: joints of both sides, and metres, 0 if not given."""
-
-    left: tuple[str, ...]
-    right: tuple[str, ...]
-    separation: float
-    radius: float
+Wheels = Differential | Mecanum
 
 
 @rule(
@@ -387,7 +378,7 @@ class DriveMeasures:
 )
 def sides(subject: Subject) -> Iterator[Mistake]:
     """Wheels that a plugin names as left but that are on the right, or vice versa."""
-    drive = _drive_measures(subject)
+    drive = _driven(subject)
     if drive is None or not _level(drive, subject):
         return
     places = {name: _lateral(name, subject)[0] for name in (*drive.left, *drive.right)}
@@ -408,7 +399,7 @@ def sides(subject: Subject) -> Iterator[Mistake]:
 )
 def measures(subject: Subject) -> Iterator[Mistake]:
     """A wheel separation or diameter that differs from the robot's."""
-    drive = _drive_measures(subject)
+    drive = _driven(subject)
     if drive is None:
         return
     tag = _tag(subject, "wheelseparation")
@@ -427,24 +418,19 @@ def measures(subject: Subject) -> Iterator[Mistake]:
         yield Mistake(tag, problem, f"write {radii[0] * twice:.3g}")
 
 
-def _drive_measures(subject: Subject) -> DriveMeasures | None:
+def _driven(subject: Subject) -> Wheels | None:
     mechanism = subject.model.drive.mechanism if subject.model and subject.model.drive else None
-    match mechanism:
-        case Differential(left, right, separation, radius):
-            return DriveMeasures(left, right, separation, radius)
-        case Mecanum(one, other, back, last, separation, _, radius):
-            return DriveMeasures((one, back), (other, last), separation, radius)
-    return None
+    return mechanism if isinstance(mechanism, Wheels) else None
 
 
-def _level(drive: DriveMeasures, subject: Subject) -> bool:
+def _level(drive: Wheels, subject: Subject) -> bool:
     """Whether the axles lie along y: a robot that drives along another axis has other sides."""
     assert subject.model is not None
     axes = joint_axes(subject.model)
     return all(abs(dot(axes[name].direction, (0.0, 1.0, 0.0))) > 0.9 for name in (*drive.left, *drive.right))
 
 
-def _separations(drive: DriveMeasures, subject: Subject) -> list[float]:
+def _separations(drive: Wheels, subject: Subject) -> list[float]:
     """The distance in metres between the sides' wheels, and between their joints."""
     left, right = ([_lateral(name, subject) for name in names] for names in (drive.left, drive.right))
     return [abs(fmean(a) - fmean(b)) for a, b in zip(zip(*left, strict=True), zip(*right, strict=True), strict=True)]
@@ -476,7 +462,7 @@ def _child(joint: str, subject: Subject) -> str:
     return subject.model.joints[joint].child
 
 
-def _side(joint: str, drive: DriveMeasures) -> str:
+def _side(joint: str, drive: Wheels) -> str:
     return "left" if joint in drive.left else "right"
 
 

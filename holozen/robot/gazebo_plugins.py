@@ -24,6 +24,7 @@ from holozen.robot.model import (
     Planar,
     RobotModel,
     Shape,
+    sides_of,
 )
 from holozen.robot.rigid import link_frames
 from holozen.robot.rotation import Array, matrix_of
@@ -252,7 +253,7 @@ def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
     wheels = drive.mechanism
     if isinstance(wheels, Planar):
         return drive
-    left, right = _sides(wheels)
+    left, right = sides_of(wheels)
     _check_once(left, right, plugin)
     if any(robot.joints[name].child not in robot.links for name in (*left, *right)):
         return drive  # such a wheel has no mass, which `check_drive` reports
@@ -264,16 +265,6 @@ def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
         return drive
     link, radius = _first_radius(left[0], plugin, robot)
     return drive if _round(link) else replace(drive, mechanism=replace(wheels, radius=radius))
-
-
-def _sides(wheels: Differential | Mecanum | Balancing) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    match wheels:
-        case Differential():
-            return wheels.left, wheels.right
-        case Mecanum():
-            return (wheels.front_left, wheels.back_left), (wheels.front_right, wheels.back_right)
-        case Balancing():
-            return (wheels.left,), (wheels.right,)
 
 
 def _check_once(left: tuple[str, ...], right: tuple[str, ...], plugin: Tag) -> None:
@@ -296,7 +287,7 @@ def _check_round(names: tuple[str, ...], plugin: Tag, robot: RobotModel) -> None
 
 
 def _check_apart(wheels: Differential | Mecanum, plugin: Tag, robot: RobotModel) -> None:
-    left, right = _sides(wheels)
+    left, right = sides_of(wheels)
     if not wheels.separation and _apart(left, right, 1, robot) < SMALLEST:
         raise _missing_tag(plugin, "wheel_separation", "its left and right wheels are at the same y")
     if isinstance(wheels, Mecanum) and not wheels.wheelbase:

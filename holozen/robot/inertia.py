@@ -2,12 +2,13 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
 from holozen.robot.elements import Source, Tag
 from holozen.robot.errors import cut, listed
-from holozen.robot.model import Drive, Joint, Link, Planar, Pose, Shape, descend, joints_of
+from holozen.robot.model import Drive, Joint, Link, Planar, Pose, Shape, descend, sides_of
 from holozen.robot.rotation import Array, matrix_of, symmetric
 from holozen.robot.shapes import solid
 
@@ -207,7 +208,7 @@ def check_drive(
     A root without mass that no wheels push only causes a warning.
     """
     tags = {tag.word("name"): tag for tag in robot.all("link")}
-    for name in joints_of(drive.mechanism) if drive else ():
+    for name in chain(*sides_of(drive.mechanism)) if drive else ():
         child = joints[name].child
         if child in lost:
             problem = f"has no mass, so the joint {cut(name)} is left out, as in Gazebo, but the drive needs it"

@@ -156,6 +156,16 @@ class Mecanum:
     radius: float = 0.0
     encoder: bool = True
 
+    @property
+    def left(self) -> tuple[str, ...]:
+        """The joints on the left."""
+        return self.front_left, self.back_left
+
+    @property
+    def right(self) -> tuple[str, ...]:
+        """The joints on the right."""
+        return self.front_right, self.back_right
+
 
 @dataclass(frozen=True, slots=True)
 class Balancing:
@@ -168,17 +178,14 @@ class Balancing:
 Mechanism = Planar | Differential | Mecanum | Balancing
 
 
-def joints_of(mechanism: Mechanism) -> tuple[str, ...]:
-    """The joints that a mechanism turns."""
+def sides_of(mechanism: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The joints that a mechanism turns, on the left and on the right."""
     match mechanism:
         case Planar():
-            return ()
-        case Differential():
-            return *mechanism.left, *mechanism.right
-        case Mecanum():
-            return mechanism.front_left, mechanism.front_right, mechanism.back_left, mechanism.back_right
+            return (), ()
         case Balancing():
-            return mechanism.left, mechanism.right
+            return (mechanism.left,), (mechanism.right,)
+    return mechanism.left, mechanism.right
 
 
 @dataclass(frozen=True, slots=True)

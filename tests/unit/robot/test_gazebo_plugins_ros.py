@@ -7,7 +7,7 @@ import pytest
 
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse
-from holozen.robot.model import Balancing, Differential, Drive, RobotModel, joints_of
+from holozen.robot.model import Balancing, Differential, Drive, RobotModel, sides_of
 
 ORIGIN = Path("somewhere/robot.urdf")
 DIFF, SKID, MULTI, WB = (
@@ -125,7 +125,7 @@ def test_publish_tf_of_ros_1_switches_odometry_off() -> None:
 def test_the_joints_have_the_names_of_the_plugin_when_no_tag_names_them() -> None:
     model = robot("", DIFF, ("left_joint", "right_joint"))
     assert model.drive is not None
-    assert joints_of(model.drive.mechanism) == ("left_joint", "right_joint")
+    assert sum(sides_of(model.drive.mechanism), ()) == ("left_joint", "right_joint")
 
 
 def test_pairs_that_differ_are_reported_and_the_first_counts() -> None:
@@ -163,7 +163,7 @@ def test_a_skid_steer_has_four_wheels_and_publishes_the_true_pose() -> None:
 def test_the_joints_of_a_skid_steer_have_default_names() -> None:
     names = ("left_front_joint", "left_rear_joint", "right_front_joint", "right_rear_joint")
     model = robot("", SKID, names)
-    assert model.drive is not None and joints_of(model.drive.mechanism) == names
+    assert model.drive is not None and sum(sides_of(model.drive.mechanism), ()) == names
 
 
 def test_hectors_plugin_names_all_wheels_of_a_side_in_one_tag() -> None:
@@ -174,7 +174,7 @@ def test_hectors_plugin_names_all_wheels_of_a_side_in_one_tag() -> None:
 def test_hectors_plugin_understands_the_tags_of_the_others_and_has_their_default_names() -> None:
     assert wheels(PAIR, MULTI).left == ("fl",)
     model = robot("", MULTI, ("left_joint", "right_joint"))
-    assert model.drive is not None and joints_of(model.drive.mechanism) == ("left_joint", "right_joint")
+    assert model.drive is not None and sum(sides_of(model.drive.mechanism), ()) == ("left_joint", "right_joint")
 
 
 def test_a_wheel_may_hang_on_a_revolute_joint() -> None:
@@ -185,12 +185,12 @@ def test_a_wheel_may_hang_on_a_revolute_joint() -> None:
     links = "".join(f'<link name="{name}">{inertial}</link>' for name in ("a", "fl", "fr"))
     plugin = f'<gazebo><plugin filename="{DIFF}">{PAIR}</plugin></gazebo>'
     model = parse(f'<robot name="r">{links}{joint.format("fl", 1)}{joint.format("fr", -1)}{plugin}</robot>', ORIGIN)
-    assert model.drive is not None and joints_of(model.drive.mechanism) == ("fl", "fr")
+    assert model.drive is not None and sum(sides_of(model.drive.mechanism), ()) == ("fl", "fr")
 
 
 def test_a_joint_with_a_space_in_its_name_is_one_joint() -> None:
     model = robot("<leftJoint>left one</leftJoint><rightJoint>fr</rightJoint>", DIFF, ("left one", "fr"))
-    assert model.drive is not None and joints_of(model.drive.mechanism) == ("left one", "fr")
+    assert model.drive is not None and sum(sides_of(model.drive.mechanism), ()) == ("left one", "fr")
 
 
 def test_wheely_boi_balances_on_its_two_joints() -> None:
