@@ -65,6 +65,6 @@ def test_the_words_of_ros_mean_the_flags_beside_them() -> None:
 def test_the_error_that_is_shown_is_the_one_that_comes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("my_keys.toml").write_text('[moves]\nw = "forwards"\n')
-    with pytest.raises(ValueError, match="no motion") as error:
+    with pytest.raises(ValueError, match="not a motion") as error:
         load("my_keys.toml")
     assert f"```\n{error.value}\n```" in DOCS.read_text()
