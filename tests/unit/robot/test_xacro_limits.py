@@ -67,14 +67,14 @@ def test_a_step_that_takes_too_long_ends_in_a_line(folder: Path, monkeypatch: py
         (f'<xacro:macro name="m" params="a:={"b" * 40}\'"/>', 2, f"this element {SLOW}"),
         (f'{PROPERTIES}<l n="${{p11}}"/>', 13, f"{LARGE}|{SLOW}"),  # whichever a busy machine comes to first
     ]
-    for body, line, told in rows:
-        check(folder, body, line, told)
+    for body, line, expected in rows:
+        check(folder, body, line, expected)
 
 
-def check(folder: Path, body: str, line: int, told: str) -> None:
+def check(folder: Path, body: str, line: int, expected: str) -> None:
     said = failure(folder, body)
     assert said.startswith(f"robot.xacro, line {line}: ")
-    assert any(words in said for words in told.split("|"))
+    assert any(words in said for words in expected.split("|"))
 
 
 def test_a_runaway_ends_in_a_line(folder: Path) -> None:
@@ -88,8 +88,8 @@ def test_a_runaway_ends_in_a_line(folder: Path) -> None:
         (f'{BLOCKS}<xacro:insert_block name="b8"/>', 3, CALLS),
         ("<a/>" * (MOST_ELEMENTS + 1), 2, f"it expands without end; at most {MOST_ELEMENTS} elements are expanded"),
     ]  # fmt: skip
-    for body, line, told in rows:
-        check(folder, body, line, told)
+    for body, line, expected in rows:
+        check(folder, body, line, expected)
 
 
 @pytest.mark.parametrize(

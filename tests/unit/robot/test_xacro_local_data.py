@@ -59,9 +59,9 @@ def test_load_yaml_reads_inside_known_packages_only(robot: Path, home: Path) -> 
         ("load_yaml", "$(find bot)/config/.env"),
     ]:
         body = f'<xacro:property name="f" value="{name.format(home=home)}"/><l t="${{{function}(f)}}"/>'
-        told = refusal(write(robot, body))
-        assert told.startswith(f"{robot}, line 2: load_yaml reads inside known packages only, and ")
-        assert told.endswith("--package NAME=DIR")
+        expected = refusal(write(robot, body))
+        assert expected.startswith(f"{robot}, line 2: load_yaml reads inside known packages only, and ")
+        assert expected.endswith("--package NAME=DIR")
 
 
 def test_load_yaml_reads_what_a_package_holds(robot: Path, home: Path) -> None:

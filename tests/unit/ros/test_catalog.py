@@ -101,11 +101,11 @@ def test_a_star_brings_what_the_module_imports(tmp_path: Path) -> None:
     assert (done.stdout, done.stderr) == ("1 SetParametersResult TransformStamped\n", "")
 
 
-def test_a_script_that_imports_what_is_not_there_is_told_what_is(tmp_path: Path) -> None:
+def test_an_import_that_does_not_exist_here_is_answered_with_a_hint(tmp_path: Path) -> None:
     script = tmp_path / "all.py"
     tries = [f"try:\n    import {name}\nexcept ModuleNotFoundError as error:\n    print(error)\n" for name in HINTS]
     script.write_text("".join(tries))
     done = subprocess.run(command("run", str(script)), capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stderr) == (0, "")
-    for hint, told in zip(HINTS.values(), done.stdout.splitlines(), strict=True):
-        assert told.endswith(f"{hint}; see docs/coming-from-ros.md")
+    for hint, expected in zip(HINTS.values(), done.stdout.splitlines(), strict=True):
+        assert expected.endswith(f"{hint}; see docs/coming-from-ros.md")

@@ -99,7 +99,7 @@ def test_ours_is_left_out_of_what_an_error_came_from(run: Run, write: Write) -> 
 
 
 @pytest.mark.parametrize("text", ["def f(:\n  pass", "x = '\0'"])
-def test_what_is_no_python_is_told_as_python_does(run: Run, write: Write, text: str) -> None:
+def test_what_is_no_python_is_reported_as_python_does(run: Run, write: Write, text: str) -> None:
     write("a.py", text)
     done = run("a.py")
     assert done.returncode == 1
