@@ -163,7 +163,7 @@ STEP_TIME = 1.2  # s of CPU time for one expression or element, after which the 
 PATIENCE = 60.0  # s; the child's own CPU time limits end it long before, unless it sleeps
 _ROOT = str(Path(__file__).resolve().parents[2])
 # Without `site`, whose search path is passed in, startup takes half as long.
-_BOOT = """
+BOOT = """
 import json, sys
 asked = json.load(sys.stdin)
 sys.path[:] = asked["modules"]
@@ -195,7 +195,7 @@ def expand_in_child(
 
 def _ask(question: bytes, note: int) -> tuple[int, bytes, bytes]:
     """Exit code, standard output and standard error of the child."""
-    words = [sys.executable, "-I", "-S", "-X", "utf8", "-c", _BOOT]
+    words = [sys.executable, "-I", "-S", "-X", "utf8", "-c", BOOT]
     pipe = subprocess.PIPE
     try:
         # A session of its own: only this process gets Ctrl-C, and it always ends the child.

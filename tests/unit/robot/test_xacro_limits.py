@@ -59,7 +59,7 @@ def failure(folder: Path, body: str, head: str = HEAD) -> str:
 def test_a_step_that_takes_too_long_ends_in_a_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(xacro, "STEP_TIME", 0.2)
     shorter = "import holozen.robot.xacro\nholozen.robot.xacro.STEP_TIME = 0.2\nfrom holozen.robot.xacro_child"
-    monkeypatch.setattr(xacro, "_BOOT", xacro._BOOT.replace("from holozen.robot.xacro_child", shorter))
+    monkeypatch.setattr(xacro, "BOOT", xacro.BOOT.replace("from holozen.robot.xacro_child", shorter))
     rows = [
         ('<a/>\n<l n="${9**9**9}"/>', 3, f"the expression '9**9**9' {SLOW}"),
         ('<l n="$(eval 9**9**9)"/>', 2, f"the expression '$(eval 9**9**9)' {SLOW}"),
@@ -122,13 +122,13 @@ def test_what_is_no_file_is_not_waited_for(folder: Path) -> None:
 
 
 def test_an_expansion_that_waits_for_ever_is_ended(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xacro, "_BOOT", "import time; time.sleep(1000)")
+    monkeypatch.setattr(xacro, "BOOT", "import time; time.sleep(1000)")
     monkeypatch.setattr(xacro, "PATIENCE", 0.01)
     assert failure(folder, "") == "robot.xacro: the file was ended after waiting more than 0.01 s or out of memory"
 
 
 def test_an_expansion_that_breaks_off_is_reported(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xacro, "_BOOT", "raise SystemExit('no luck')")
+    monkeypatch.setattr(xacro, "BOOT", "raise SystemExit('no luck')")
     assert failure(folder, "") == "robot.xacro: xacro failed at the file: no luck"
 
 

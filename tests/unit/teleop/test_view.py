@@ -189,8 +189,8 @@ def test_listeners_odom_age_and_round_trip_are_shown() -> None:
 
 
 def test_a_link_of_more_than_a_quarter_of_a_second_is_an_alarm_with_its_delay() -> None:
-    assert loud(replace(GOOD, link_delay=0.25), (80, 24)) == []
-    assert loud(replace(GOOD, link_delay=0.31), (80, 24)) == ["SLOW LINK: the robot answers 310 ms later"]
+    assert loud(replace(GOOD, round_trip=0.25), (80, 24)) == []
+    assert loud(replace(GOOD, round_trip=0.31), (80, 24)) == ["SLOW LINK: the robot answers 310 ms later"]
 
 
 def test_each_publisher_is_named_with_its_priority_its_rate_and_what_becomes_of_it() -> None:
