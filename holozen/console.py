@@ -17,6 +17,7 @@ from typing import Self
 
 KEPT = 256  # lines that wait for a slow reader
 SHORT_WAIT = 0.005  # s; usually enough to write the line, which keeps the order of a process's output
+LOG_WAIT = 0.1  # s, once, for a slow reader of a script's log
 LAST_WAIT = 0.2  # s at the end of the process, for a reader that does not read
 BUSY = 5.0  # s at most then, on a busy machine
 EVERY = {True: 0.1, False: 1.0}  # s between two pictures, in a terminal and elsewhere
@@ -37,6 +38,11 @@ def report(text: str) -> None:
 def output(text: str) -> None:
     """Write one line on standard output, for processes that must go on even if it is not read."""
     _OUTPUT.write(printable(text))
+
+
+def log(text: str, stdout: bool = False) -> None:
+    """Write a script's log as it is, with line breaks and colours, on standard error or output."""
+    (_OUTPUT if stdout else _ERRORS).write(text, LOG_WAIT)
 
 
 def drain(seconds: float = LAST_WAIT) -> None:
@@ -61,20 +67,22 @@ class _Lines:
         self._waiting: deque[bytes] = deque()
         self._dropped = 0
         self._is_given_up = False
-        self._lock = threading.Lock()
+        self._lock = threading.Condition(threading.Lock())  # notified when there is room
         self._idle = threading.Event()
         self._idle.set()
 
-    def write(self, line: str) -> None:
-        """Write a line, now or later."""
+    def write(self, line: str, patience: float = SHORT_WAIT) -> None:
+        """Write a line, now or later. If too many wait, it waits for the reader for `patience` seconds, once."""
         stream, usual = (sys.stdout, sys.__stdout__) if self._number == 1 else (sys.stderr, sys.__stderr__)
         if stream is not usual:  # replaced by a test or a script
-            with contextlib.suppress(OSError):  # a terminal that is gone is not an error
+            with contextlib.suppress(OSError, ValueError):  # a terminal that is gone is not an error, nor a closed file
                 print(line, file=stream, flush=True)
             return
         if stream is None:  # closed by the parent process; the descriptor may be another file's now
             return
         with self._lock:
+            if not self._dropped:
+                self._lock.wait_for(lambda: len(self._waiting) < KEPT, patience)
             if len(self._waiting) >= KEPT:
                 self._dropped += 1
                 return
@@ -122,6 +130,7 @@ class _Lines:
         """The next data to write; empty when this thread may end."""
         with self._lock:
             if self._waiting:
+                self._lock.notify()
                 return self._waiting.popleft()
             dropped, self._dropped = self._dropped, 0
             if dropped:

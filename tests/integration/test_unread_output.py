@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from holozen.bus import Bus
-from holozen.messages import Odometry
+from holozen.messages import Odometry, Point
 from holozen.messages import rcl_interfaces as r
 from holozen.testing import Wire, wait_for
 
@@ -139,11 +139,21 @@ def test_a_line_that_waits_for_its_reader_ends_with_a_signal(wire: Wire, unread:
 
 LOGS = """
 import rclpy
+from geometry_msgs.msg import Point
 from rclpy.executors import ExternalShutdownException
 
 rclpy.init()
 node = rclpy.create_node("talker")
-node.create_timer(0.001, lambda: node.get_logger().info(200 * "x"))
+lines = node.create_publisher(Point, "lines", 1)
+count = 0
+
+def speak():
+    global count
+    node.get_logger().info(200 * "x")
+    count += 1
+    lines.publish(Point(x=float(count)))
+
+node.create_timer(0.001, speak)
 try:
     rclpy.spin(node)
 except ExternalShutdownException:
@@ -151,9 +161,18 @@ except ExternalShutdownException:
 """
 
 
-def test_a_script_whose_log_nobody_reads_ends_with_a_signal(wire: Wire, unread: int, tmp_path: Path) -> None:
+def test_a_script_whose_log_nobody_reads_goes_on_and_ends_with_a_signal(
+    wire: Wire, unread: int, tmp_path: Path
+) -> None:
     script = tmp_path / "talker.py"
     script.write_text(LOGS)
+    lines = wire.bus().subscribe("lines", Point)
     run = wire.start("run", str(script), stderr=unread)
-    wait_for(lambda: "pipe" in Path(f"/proc/{run.pid}/wchan").read_text(), 30)
+
+    def has_logged_more_than_anything_holds() -> bool:
+        received = lines.try_recv()
+        return received is not None and received.message is not None and received.message.x > 2000
+
+    wait_for(has_logged_more_than_anything_holds, 60)
+    assert is_full(unread)
     assert run.terminate(2 * SOON) == 0

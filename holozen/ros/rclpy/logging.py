@@ -4,7 +4,6 @@ ROS's environment variables apply: RCUTILS_CONSOLE_OUTPUT_FORMAT, RCUTILS_COLORI
 RCUTILS_LOGGING_USE_STDOUT (1).
 """
 
-import contextlib
 import os
 import re
 import sys
@@ -14,6 +13,7 @@ from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple, TextIO
 
+from holozen.console import log
 from holozen.ros.catalog import HelpfulAttributes
 
 __all__ = [
@@ -49,14 +49,13 @@ class Place(NamedTuple):
 
 
 def _write(severity: LoggingSeverity, name: str, message: str, place: Place) -> None:
-    """Print a line to standard error. A closed terminal is not an error."""
-    stream = sys.stdout if os.environ.get("RCUTILS_LOGGING_USE_STDOUT") == "1" else sys.stderr
+    """Print a line to standard error."""
+    on_stdout = os.environ.get("RCUTILS_LOGGING_USE_STDOUT") == "1"
+    stream = sys.stdout if on_stdout else sys.stderr
     line = formatted(severity, name, message, place, time.time_ns())
     if severity in COLORS and _colored(stream):
         line = f"\033[{COLORS[severity]}m{line}\033[0m"
-    with contextlib.suppress(OSError, ValueError):
-        stream.write(line + "\n")  # in one call: lines of two threads must not mix
-        stream.flush()
+    log(line, on_stdout)
 
 
 def formatted(severity: LoggingSeverity, name: str, message: str, place: Place, now: int) -> str:
