@@ -3,6 +3,7 @@
 Several sims may run on one wire, of which one spawns. Requests about entities go to all of them.
 """
 
+from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
 from holozen.bus import Bus
@@ -12,7 +13,10 @@ from holozen.transport.errors import NoReply, ServiceError
 
 NOTICE = 3.0  # s for a sim to answer
 PATIENCE = 30.0  # s for a request to complete
+AT_ONCE = 32  # requests of `for_each` that wait at the sim
 
+T = TypeVar("T")
+U = TypeVar("U")
 R = TypeVar("R", si.SpawnEntityReply, si.DeleteEntityReply, si.GetEntityStateReply, si.GetEntitiesReply)
 
 
@@ -47,6 +51,19 @@ def spawn(bus: Bus, name: str, text: str, at: Pose, namespace: str = "") -> tupl
     request = si.SpawnEntityRequest(name, resource_string=text, entity_namespace=namespace, initial_pose=place)
     (reply,) = _ask(bus, "spawn_entity", request, si.SpawnEntityReply, PATIENCE, everyone=False)
     return reply.entity_name or name, reply.result.error_message.splitlines()
+
+
+def for_each(ask: Callable[[T], U], items: Iterable[T]) -> Iterator[U]:
+    """`ask` each item, many at a time, since a sim reads requests every 20 ms only. The results in order; raises the
+    first error, after which what is under way is not waited for.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    pool = ThreadPoolExecutor(AT_ONCE)
+    try:
+        yield from pool.map(ask, items)
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
 
 
 def is_taken(error: ServiceError) -> bool:

@@ -57,13 +57,16 @@ def _entities(bus: Bus) -> Iterator[tuple[str, Pose]]:
     with deferred_interrupt():
         from holozen import entities
 
-    for name in entities.names(bus):
+    def where(name: str) -> Pose | None:
         try:
-            yield name, entities.pose(bus, name)
+            return entities.pose(bus, name)
         except NoReply:
             raise
         except ServiceError:  # it was deleted in the meantime
-            continue
+            return None
+
+    names = entities.names(bus)
+    yield from ((name, pose) for name, pose in zip(names, entities.for_each(where, names), strict=True) if pose)
 
 
 def delete(args: argparse.Namespace) -> int:

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, replace
@@ -91,6 +92,10 @@ def parser() -> argparse.ArgumentParser:
         help="its keys are below this; / is the root (default: its name)")  # fmt: skip
     parser.add_argument("--timeout", "-timeout", type=flags.number(0.1, 3600, "s"), default=0.0, metavar="S",
         help=f"seconds to wait for a sim (default: {PATIENCE:g})")  # fmt: skip
+    parser.add_argument("--count", type=flags.count(1), default=0, metavar="N",
+        help="a fleet of N copies on a grid: bot0, bot1 ..., or NAME0, NAME1 ...")  # fmt: skip
+    parser.add_argument("--grid", type=flags.number(0.01, 100, "m"), default=2.0, metavar="M",
+        help="metres between two of --count (default: %(default)g)")  # fmt: skip
     parser.add_argument("--replace", action="store_true", help="replace the entity with that name")
     parser.add_argument("--drive", choices=("planar_move",), help="the drive of a robot whose file has none")
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
@@ -114,16 +119,50 @@ def main(argv: list[str]) -> int:
     options = parser()
     args = options.parse_intermixed_args(_joined(argv))  # plain parse_args takes no name:=value after a flag
     file, values = _words(options, args)
+    if args.count and (args.replace or args.namespace):
+        options.error("--count gives names of its own: leave out --replace and --namespace")
     place = Place(args.x, args.y, args.z, args.R, args.P, args.Y)
     try:
         candidate = read(file, args.name, values, dict(args.package), args.drive or "", args.strict, args.allow_env)
         candidate = replace(candidate, namespace=args.namespace)
         with Bus("spawn", connection.from_arguments(args), patience=args.timeout or None) as bus:
+            if args.count:
+                return _put_fleet(bus, candidate, place, args)
             spawned = put(bus, candidate, place, args.replace, args.timeout)
         print(spawned.as_json() if args.json else spawned)
     except RobotError as error:
         report(f"holozen spawn: {error}")
         return 1
+    return 0
+
+
+def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Namespace) -> int:
+    """Spawn many copies on a square grid, called bot0, bot1 and so on, or by the name given. Several requests wait at
+    the sim at a time. Raises ServiceError; those that were spawned by then stay.
+    """
+    from holozen import entities
+    from holozen.messages import Point, Pose
+
+    side, base = math.ceil(math.sqrt(args.count)), args.name or "bot"
+    there = {f"{base}{number}" for number in range(args.count)}.intersection(entities.names(bus, args.timeout))
+    if there:
+        raise ServiceError(f"{len(there)} of these are there already, such as {min(there)}; --name gives another name")
+    first = _chosen(candidate.model, place)
+
+    def spawn(number: int) -> Spawned:
+        at = first.position
+        pose = Pose(
+            Point(at.x + args.grid * (number % side), at.y + args.grid * (number // side), at.z), first.orientation
+        )
+        name, _ = entities.spawn(bus, f"{base}{number}", candidate.text, pose)
+        return _spawned(name, candidate, pose)
+
+    fleet = list(entities.for_each(spawn, range(args.count)))
+    if args.json:
+        print(*(one.as_json() for one in fleet), sep="\n")
+    else:
+        listen = f"listen on {fleet[0].key} .. {fleet[-1].key}" if fleet[0].key else fleet[0].hint or "stand there"
+        print(f"{fleet[0].name} .. {fleet[-1].name} {listen}")
     return 0
 
 

@@ -133,7 +133,8 @@ class Graph:
         return [self._gone.popleft() for _ in range(len(self._gone))]
 
     def publishers(self, key: str) -> Iterable[str]:
-        """The sessions that have a publisher on a key, at the last update."""
+        """The sessions that have a publisher on a key."""
+        self._update()
         return self._publishers.get(key, ())
 
     def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.015) -> list[Endpoint]:

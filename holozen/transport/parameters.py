@@ -100,9 +100,9 @@ class Parameters:
             bus.serve(f"{node}/list_parameters", r.ListParametersRequest, r.ListParametersReply, self._list),
         ]
 
-    def answer(self) -> None:
-        """Answer waiting requests, for a short time."""
-        answer_in_turn(self._servers)
+    def answer(self) -> bool:
+        """Answer waiting requests, for a short time. Returns whether more may wait."""
+        return answer_in_turn(self._servers)
 
     def start(self) -> None:
         """Answer from threads, until the bus is closed."""

@@ -178,8 +178,10 @@ class Server(Declared):
         return self._codec.decode(bytes(query.payload), str(query.encoding), (self._request,))
 
 
-def answer_in_turn(servers: list[Server], seconds: float = BUDGET) -> None:
-    """Answer waiting requests of several services: one request of each in turn, for `seconds`, but at least one."""
+def answer_in_turn(servers: list[Server], seconds: float = BUDGET) -> bool:
+    """Answer waiting requests of several services: one request of each in turn, for `seconds`, but at least one.
+    Returns whether more may wait.
+    """
     for server in servers:
         server.take_in()
     deadline, idle = time.monotonic() + seconds, 0
@@ -187,7 +189,8 @@ def answer_in_turn(servers: list[Server], seconds: float = BUDGET) -> None:
         idle = 0 if servers[0].answer_pending(most=1) else idle + 1
         servers.append(servers.pop(0))
         if not idle and time.monotonic() >= deadline:
-            return
+            return True
+    return False
 
 
 def refuse(query: Any, text: str, fields: Mapping[str, object] = {}) -> None:

@@ -61,6 +61,7 @@ class Entities:
         self._seen_at = 0.0
         self._all: dict[str, Entity] = {}
         self.before: dict[str, Memory] = {}  # prefix -> held sources and software stop of the last robot there
+        self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
         self.robots: list[Robot] = []
 
     @property
@@ -98,6 +99,7 @@ class Entities:
             raise
         self._all[name] = entity
         if entity.robot:
+            self._keys |= dict.fromkeys(keys_of(model, prefix), name)
             self._remember(prefix, entity.robot)
             self.robots.append(entity.robot)
         return entity
@@ -166,6 +168,7 @@ class Entities:
         if entity.robot:
             self.robots.remove(entity.robot)
             entity.robot.close()
+            self._keys = {key: owner for key, owner in self._keys.items() if owner != name}
         entity.body.remove()
 
     def free_name(self, wanted: str) -> str:
@@ -203,14 +206,14 @@ class Entities:
                 raise EntityError(
                     si.SpawnEntityReply.NAMESPACE_INVALID, f"the robot's file puts two things on the key {key[:80]!r}"
                 )
-        for other in (other for other in self if other.robot):
-            if both := set(keys) & set(keys_of(other.model, other.prefix)):
-                raise EntityError(
-                    si.SpawnEntityReply.NAME_NOT_UNIQUE, f"{min(both)} is the key of {other.name!r}; use another name"
-                )
+        if both := self._keys.keys() & keys:
+            problem = f"{min(both)} is the key of {self._keys[min(both)]!r}; use another name"
+            raise EntityError(si.SpawnEntityReply.NAME_NOT_UNIQUE, problem)
 
     def _check_alone(self, key: str) -> None:
         """Two sims on the same keys would each get the other's commands."""
+        if not self._graph.publishers(key):  # nearly always, and the graph of a fleet is large
+            return
         others = on_key(self._graph.endpoints(), key, "pub")
         for other in (other for other in others if other.session != self._bus.id):
             problem = f"{key} is published by {other.node} ({other.session[:6]}) already"

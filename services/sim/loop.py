@@ -1,5 +1,6 @@
 """The loop: read commands, move, step, publish, at the pace of the clock."""
 
+import math
 import threading
 import time
 
@@ -34,6 +35,7 @@ class Loop:
         self.pace = Pace(world.spec.step, rtf, time.monotonic())
         self.answers = [services.answer] if services else []  # called between steps
         self._served = self.graph_polled = 0.0
+        self._more_wait = False  # whether requests were left unanswered
         self._clock: Publisher[Clock] | None = bus.publisher("clock", Clock) if is_clock else None
         self._clock_due = Schedule(CLOCK_RATE)
         self._last_read = self._before_stall = time.monotonic()
@@ -48,7 +50,7 @@ class Loop:
             now = time.monotonic()
             self._read_inputs(now)
             if (left := pace.left(now)) > 0:
-                stop.wait(min(left, POLL))
+                stop.wait(min(left, 0.0 if self._more_wait else POLL))
             else:
                 self._step(now)
                 pace.stepped(now)
@@ -65,9 +67,8 @@ class Loop:
             self._entities.watch_senders(now)  # after their last commands were read
             self.graph_polled = now
         if now - self._served >= POLL:
-            for answer in self.answers:
-                answer()
-            self._served = now
+            self._more_wait = sum(answer() for answer in self.answers) > 0  # each of them answers
+            self._served = -math.inf if self._more_wait else now
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

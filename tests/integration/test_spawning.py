@@ -178,3 +178,19 @@ def test_a_topic_that_the_robots_file_names_is_published_to_by_its_readers_type(
     fred.odom.next(lambda odom: odom.twist.twist.linear.x > 0.29)
     pub.terminate()
     fred.stands()
+
+
+def test_a_fleet_is_spawned_on_a_grid(wire: Wire, sim: Process) -> None:
+    told = done(wire, "spawn", HB_BOT, "--count", "5", "--grid", "1.5", "-x", "1")
+    assert told == "bot0 .. bot4 listen on bot0/cmd_vel .. bot4/cmd_vel\n"
+    lines = [line.split() for line in done(wire, "list").splitlines()]
+    assert [(name, x, y) for name, _, x, _, y, *_ in lines] == [
+        ("bot0", "1.000", "0.000"), ("bot1", "2.500", "0.000"), ("bot2", "4.000", "0.000"), ("bot3", "1.000", "1.500"),
+        ("bot4", "2.500", "1.500"),
+    ]  # fmt: skip
+    assert "5 of these are there already, such as bot0; --name gives another name" in refused(
+        wire, "spawn", HB_BOT, "--count", "6"
+    )
+    assert done(wire, "spawn", HB_BOT, "--count", "1", "--name", "Ann").startswith("Ann0 .. Ann0 ")
+    assert wire.run("spawn", HB_BOT, "--count", "2", "--replace").returncode == 2
+    Robot(wire.bus(), "bot4").drive(0.3)

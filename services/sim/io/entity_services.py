@@ -1,7 +1,9 @@
 """The services of simulation_interfaces that add, list, move and delete entities."""
 
 import re
+import time
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 from holozen.bus import Bus
@@ -22,12 +24,24 @@ from ..physics.engine import Rotation, Vector
 MAX_SPEED = 100.0  # m/s and rad/s, of a state to set
 MAX_SPAWNS = 64  # waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
 PEER_CHECK = 50  # polls, about a second, after which all other nodes are known
+REUSED = (
+    2.0  # s that a model serves all requests with the same text, as of a fleet; then its meshes are looked for anew
+)
 MAX_WARNINGS = 20  # about a robot's text in a reply
 MAX_TAGS = 20_000  # "<" in a text; parsing more of them would stall the steps
 WORLD = ("", "world", "odom", "map")  # frames that mean the world
 _OK = si.Result(si.Result.OK)
 # The namespace alone may remain after an expansion.
 _XACRO = re.compile(r"<xacro:|\$\{|\$\((?:find|arg|env|optenv|eval|cwd|dirname|anon)\b")
+
+
+@dataclass(frozen=True, slots=True)
+class Parsed:
+    """A robot's text, and its model, which counts `until` a time in s (monotonic)."""
+
+    text: str
+    model: RobotModel
+    until: float
 
 
 class EntityServices:
@@ -39,6 +53,7 @@ class EntityServices:
     def __init__(self, bus: Bus, entities: Entities, packages: Mapping[str, Path], spawns: bool = True) -> None:
         self._entities, self._packages = entities, packages
         self._bus, self._graph, self._polls, self._spawns = bus, bus.graph(), 0, spawns
+        self._last: Parsed | None = None
         serve = bus.serve
         self._servers = [
             serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
@@ -51,12 +66,15 @@ class EntityServices:
                 serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self.spawn, MAX_SPAWNS)
             )
 
-    def answer(self) -> None:
-        """Answer waiting requests for a short time: many at once must not stall the steps."""
-        answer_in_turn(self._servers)
+    def answer(self) -> bool:
+        """Answer waiting requests for a short time: many at once must not stall the steps. Returns whether more may
+        wait.
+        """
+        more = answer_in_turn(self._servers)
         self._polls += 1
         if self._spawns and self._polls == PEER_CHECK:
             self._report_other_sims()
+        return more
 
     def _report_other_sims(self) -> None:
         others = on_key(self._graph.endpoints(), "spawn_entity", "srv")
@@ -79,7 +97,9 @@ class EntityServices:
 
     def _read(self, request: si.SpawnEntityRequest) -> RobotModel:
         """The robot of a request. No expression in it is evaluated, and only files of known packages are opened."""
-        text = request.resource_string
+        text, last = request.resource_string, self._last
+        if last and last.text == text and time.monotonic() < last.until:
+            return last.model
         if not text:
             problem = "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn FILE` sends it"
             raise EntityError(
@@ -94,9 +114,11 @@ class EntityServices:
                 "resource_string is xacro; expand it first: `holozen xacro FILE`",
             )
         try:
-            return parse(text, Path("resource_string"), self._packages, confined=True)
+            model = parse(text, Path("resource_string"), self._packages, confined=True)
         except RobotError as error:
             raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
+        self._last = Parsed(text, model, time.monotonic() + REUSED)
+        return model
 
     def delete(self, request: si.DeleteEntityRequest) -> si.DeleteEntityReply:
         """Remove an entity."""
