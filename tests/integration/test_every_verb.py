@@ -30,7 +30,7 @@ from .verbs import VERBS, Row
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 BALL = """<robot name="ball"><link name="b"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
-SIDE_BY_SIDE, MANY = 12, 40  # processes at once: those that work, and those that mostly wait
+SIDE_BY_SIDE, MANY = 6, 20  # processes at once: those that work, and those that mostly wait
 
 RACE = "dispatcher/resource.rs"
 """Where a thread of Zenoh's panics when many sessions come and go beside each other: eclipse-zenoh/zenoh#2624."""
@@ -123,7 +123,7 @@ def run(words: list[str], stdout: Any = subprocess.PIPE) -> Done:
         stdout=stdout,
         stderr=subprocess.PIPE,
         text=True,
-        timeout=60,
+        timeout=120,
     )
 
 

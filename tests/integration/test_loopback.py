@@ -76,9 +76,13 @@ def test_the_commands_of_the_readme_work_as_they_stand(network: Host, up: Proces
         subscriber.wait_for_line("footprint_link")
     assert network.run(*command("topic", "info", "cmd_vel")).stdout.startswith("Type: geometry_msgs/msg/Twist\n")
     assert json.loads(network.run(*command("topic", "echo", "odom", "--once", "--json")).stdout)["child_frame_id"]
-    put = network.run(ZENOH, *CLIENT, "put", "-k", "cmd_vel", "-v", '{"linear":{"x":0.3}}')
-    assert put.returncode == 0
-    up.wait_for_line("controller: yields to anonymous (DATA)")
+
+    def taken() -> bool:
+        put = network.run(ZENOH, *CLIENT, "put", "-k", "cmd_vel", "-v", '{"linear":{"x":0.3}}', within=60)
+        assert put.returncode == 0
+        return "controller: yields to anonymous (DATA)" in up.out + up.err
+
+    wait_for(taken, within=60, what="the controller to yield")
     wait_for(lambda: network.run(*command("controller", "--resume")).returncode == 0, within=30)
     up.wait_for_line("controller: continues")
 
