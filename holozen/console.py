@@ -114,9 +114,12 @@ class _Lines:
         poll.register(self._number, select.POLLOUT)
         now = time.monotonic()
         end, given_up = now + BUSY, now + seconds
-        while not self._is_given_up and not self._idle.wait(0.01) and (now := time.monotonic()) < min(end, given_up):
+        while not self._is_given_up and not self._idle.wait(0.01):
+            now = time.monotonic()
             if poll.poll(0):  # there is room: the writing thread has not run yet, on a busy machine
                 given_up = now + seconds
+            if now >= min(end, given_up):
+                return
 
     def _run(self) -> None:
         while data := self._next():

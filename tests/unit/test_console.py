@@ -62,3 +62,25 @@ def test_the_last_line_is_written_before_a_process_ends() -> None:
     code = "import os, threading\nfrom holozen.console import report\nfor n in range(100):\n report('a line')"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=30)
     assert (done.returncode, done.stderr) == (0, "a line\n" * 100)
+
+
+STALLS = """
+import _thread, os, time, types
+from holozen import console
+begun = _thread.start_new_thread
+times = iter(range(1000))
+setattr(console, "time", types.SimpleNamespace(monotonic=lambda: 0.25 * next(times)))
+def late(work, words):
+    time.sleep(0.1)
+    work(*words)
+setattr(console, "_thread", types.SimpleNamespace(start_new_thread=lambda *work: begun(late, work)))
+console.report("the reason")
+console.drain()
+os._exit(0)
+"""
+
+
+def test_the_last_line_is_written_on_a_machine_that_stalls_while_it_waits() -> None:
+    """Each look at the clock is a quarter of a second after the one before."""
+    done = subprocess.run([sys.executable, "-c", STALLS], capture_output=True, text=True, timeout=60)
+    assert done.stderr == "the reason\n"
