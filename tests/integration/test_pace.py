@@ -33,7 +33,7 @@ def test_the_real_time_factor_is_the_pace() -> None:
 
 def test_a_factor_of_zero_is_as_fast_as_it_goes() -> None:
     real, fast = advances((), ("--rtf", "0"), span=0.5)
-    assert fast > 5 * real
+    assert fast > 2 * real
 
 
 def test_a_fast_sim_still_hears_and_stops_by_real_time(wire: Wire) -> None:

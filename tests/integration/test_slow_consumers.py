@@ -40,7 +40,7 @@ def slow(wire: Wire, fast_robot: Robot) -> Iterator[Process]:
                 pass
             return 100_000 < before == held_back(wire)
 
-        wait_for(full, 60, lambda: f"full buffers; {held_back(wire)} bytes wait")
+        wait_for(full, 120, lambda: f"full buffers; {held_back(wire)} bytes wait")
         yield process
 
 
