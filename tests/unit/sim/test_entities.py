@@ -196,7 +196,7 @@ REFUSED: dict[str, tuple[dict[str, object], int, str]] = {
         si.SpawnEntityReply.INVALID_POSE,
         "use finite numbers up to 10000 m",
     ),
-    "no rotation": ({"initial_pose": TURNED_BY_NOTHING}, si.SpawnEntityReply.INVALID_POSE, "no unit quaternion"),
+    "no rotation": ({"initial_pose": TURNED_BY_NOTHING}, si.SpawnEntityReply.INVALID_POSE, "not a unit quaternion"),
 }
 
 
