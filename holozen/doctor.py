@@ -13,10 +13,10 @@ from importlib import metadata
 from typing import TYPE_CHECKING, NamedTuple
 
 from holozen.transport import graph
-from holozen.transport.connection import LOOPBACK, RENDEZVOUS, VARIABLES, Connection
+from holozen.transport.connection import LOOPBACK, RENDEZVOUS, VARIABLES, Connection, address
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, version
-from holozen.transport.listeners import HERE, Holder, address, exposure, holders, reached
+from holozen.transport.listeners import HERE, Holder, exposure, holders, reached
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
@@ -331,6 +331,6 @@ def commands(key: str, status: "CommandStatus") -> Iterator[Finding]:
 
 
 def _rank(source: "CommandSource") -> int:
-    from holozen.transport.pubsub import PRIORITIES
+    from holozen.transport.samples import PRIORITIES
 
     return PRIORITIES.index(source.priority) if source.priority in PRIORITIES else len(PRIORITIES)

@@ -13,7 +13,7 @@ from holozen.messages import Clock, Message
 from holozen.messages.codec import CodecError
 from holozen.messages.definitions import InterfaceError
 from holozen.transport.graph import Graph, on_key
-from holozen.transport.pubsub import RawSubscriber, Sample
+from holozen.transport.samples import RawSubscriber, Sample
 
 DEPTH = 8192  # samples that a subscriber holds while its thread is not scheduled
 QUEUE = 256 << 20  # bytes that may wait for the writer: a slow disk must not exhaust the memory

@@ -12,7 +12,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from holozen.bus import Bus
-from holozen.cli.verb import Noun, is_any
+from holozen.cli.hints import is_any
+from holozen.cli.verb import Noun
 from holozen.flags import Parser, package
 from holozen.transport import connection
 from holozen.transport.graph import Endpoint

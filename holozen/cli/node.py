@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 
-from holozen.cli.verb import Noun, Verb, by_name, is_any, listed, no_nodes, open_bus
+from holozen.cli.hints import is_any, listed, no_nodes
+from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
 from holozen.flags import key, nearest
 from holozen.transport.graph import Endpoint, includes

@@ -6,9 +6,9 @@ import json
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
-from holozen.bus import Bus
 from holozen.transport.graph import on_key
-from holozen.transport.pubsub import Sample
+from holozen.transport.node import Node
+from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,7 +43,7 @@ class Reader:
         if type_name:
             self._interface(type_name)
 
-    def read(self, sample: Sample, bus: Bus) -> Any:
+    def read(self, sample: Sample, bus: Node) -> Any:
         """The value of a sample; a Hex if its bytes cannot be decoded."""
         name, _, schema = sample.encoding.partition(";")
         if name != CDR and (name not in UNSPECIFIC or sample.payload[:2] not in CDR_STARTS):
@@ -59,7 +59,7 @@ class Reader:
             self.why = f"{error}; --type is wrong, or the bytes are{other}" if self._given else str(error)
         return hex_dump(sample.payload, sample.encoding)
 
-    def _cdr(self, kind: str, payload: bytes, bus: Bus) -> Any:
+    def _cdr(self, kind: str, payload: bytes, bus: Node) -> Any:
         from holozen.messages import cdr
 
         return cdr.read(self._interface(kind, bus.definition), payload)
@@ -73,7 +73,7 @@ class Reader:
             self._interfaces[name] = self._registry.learn(name, define)
         return self._interfaces[name]
 
-    def _announced_type(self, key: str, bus: Bus) -> str:
+    def _announced_type(self, key: str, bus: Node) -> str:
         if key not in self._announced:
             types = {end.type for end in on_key(bus.endpoints(), key, "pub")}
             self._announced[key] = min(types, default="")

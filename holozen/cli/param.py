@@ -121,7 +121,7 @@ def _as_many(found: list[Any], asked: list[Any], node: str) -> list[Any]:
 
 def list_names(args: argparse.Namespace) -> int:
     """Print the names of one node's parameters, or of all nodes', each node once."""
-    with open_bus(args, early=True) as bus:
+    with open_bus(args) as bus:
         return _list_names(args, Nodes(bus, args.timeout))
 
 
@@ -170,7 +170,7 @@ def load(args: argparse.Namespace) -> int:
 
 def _set(args: argparse.Namespace, wanted: dict[str, Any]) -> int:
     """Set values and report the result of each; 1 if they were refused."""
-    with open_bus(args, early=True) as bus:
+    with open_bus(args) as bus:
         nodes = Nodes(bus, args.timeout)
         node = nodes.only(args.node)
         results = nodes.set(node, wanted)
@@ -384,7 +384,7 @@ def _of_node(work: Callable[[argparse.Namespace, Nodes, str], int]) -> Callable[
     """Wraps a verb that works on one node, the one its arguments name."""
 
     def run(args: argparse.Namespace) -> int:
-        with open_bus(args, early=True) as bus:
+        with open_bus(args) as bus:
             nodes = Nodes(bus, args.timeout)
             return work(args, nodes, nodes.only(args.node))
 

@@ -13,14 +13,15 @@ from typing import Any
 
 from holozen.bus import Bus
 from holozen.cli.fields import path, pick
+from holozen.cli.hints import suggest_key
 from holozen.cli.output import Reader
-from holozen.cli.verb import Verb, add_packages, by_name, open_bus, suggest_key
+from holozen.cli.verb import Verb, add_packages, by_name, open_bus
 from holozen.console import Screen, printable, report
 from holozen.flags import number
 from holozen.plotting import Plane, Point, Robot, draw, panels
 from holozen.process import stop_event
 from holozen.transport.errors import ServiceError
-from holozen.transport.pubsub import RawSubscriber
+from holozen.transport.samples import RawSubscriber
 
 Field = tuple[str, str, tuple[str | int, ...]]
 """A field as written on the command line, its key, and its path in the messages."""

@@ -14,8 +14,9 @@ from collections.abc import Callable, Iterator
 from holozen import wire
 from holozen.bus import Bus
 from holozen.cli import values
+from holozen.cli.hints import suggest_key
 from holozen.cli.values import Form, Ours
-from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE, suggest_key
+from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE
 from holozen.console import report
 from holozen.messages import CommandStatus, Message
 from holozen.process import stop_event

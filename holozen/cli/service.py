@@ -7,8 +7,9 @@ import json
 import time
 
 from holozen.bus import Bus
+from holozen.cli.hints import listed, none_found, suggest_key, unknown
 from holozen.cli.output import CDR, Hex, Reader, lines
-from holozen.cli.verb import Noun, Verb, add_packages, by_name, listed, none_found, open_bus, suggest_key, unknown
+from holozen.cli.verb import Noun, Verb, add_packages, by_name, open_bus
 from holozen.console import printable, report
 from holozen.flags import key, nearest, number
 from holozen.process import deferred_interrupt
@@ -88,7 +89,7 @@ def info(args: argparse.Namespace) -> int:
 
 def call(args: argparse.Namespace) -> int:
     """Send a request and print the reply; a service's error is one line and exit code 1."""
-    with open_bus(args, early=True) as bus:
+    with open_bus(args) as bus:
         with deferred_interrupt():  # while the session opens
             from holozen.cli import values
 

@@ -14,13 +14,14 @@ from itertools import pairwise
 from typing import Any
 
 from holozen.bus import Bus
+from holozen.cli.hints import suggest_key
 from holozen.cli.output import Reader
-from holozen.cli.verb import Verb, by_name, open_bus, suggest_key
+from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import printable, report
 from holozen.flags import count, key, number
 from holozen.process import stop_event
 from holozen.transport.errors import BusError
-from holozen.transport.pubsub import RawSubscriber, Sample
+from holozen.transport.samples import RawSubscriber, Sample
 
 Report = dict[str, Any]
 Measure = Callable[[Sample, float], float | None]

@@ -10,10 +10,10 @@ from holozen.console import printable, report
 from holozen.flags import Parser, number
 from holozen.transport import connection
 from holozen.transport.errors import TIMEOUT, BusError
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
-    from holozen.transport.services import Replies
+    from holozen.transport.samples import Replies
 
 TOKENS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/{verb}"
 DONE = {"stop": "is stopped", "release": "is released"}

@@ -10,12 +10,13 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
-from holozen.cli.verb import Noun, Verb, by_name, listed, no_nodes, open_bus
+from holozen.cli.hints import listed, no_nodes
+from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
 from holozen.flags import nearest, number, robot
 from holozen.process import stop_event
 from holozen.rotation import Transform, to_rpy
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
     from holozen.messages import TFMessage
@@ -73,7 +74,7 @@ class Frames:
 def echo(args: argparse.Namespace) -> int:
     """Print the pose of a frame in another one, until interrupted."""
     stop = stop_event()
-    with open_bus(args, early=True, stop=stop) as bus:
+    with open_bus(args, stop=stop) as bus:
         from holozen.messages import TFMessage  # while the session opens
 
         keys = [f"{args.robot}/{key}" if args.robot else key for key in ("tf", "tf_static")]

@@ -1,16 +1,21 @@
-"""What verbs of the command line share: their declaration, bus, common flags and messages."""
+"""What verbs of the command line share: their declaration, common flags and bus. Loads no more than the flags need."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
-from collections.abc import Callable, Iterable
-from typing import Any
+import threading
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
 
-from holozen.bus import Bus
-from holozen.flags import Parser, nearest, package
+from holozen.flags import Parser, package
+from holozen.process import deferred_interrupt
 from holozen.transport import connection
-from holozen.transport.graph import Endpoint
+from holozen.transport.session import Opening
+
+if TYPE_CHECKING:
+    from holozen.transport.bus import Bus
+    from holozen.transport.node import Node
 
 JSON = "one JSON object a line"
 ROS2_TITLE = "accepted for compatibility with ros2"
@@ -39,7 +44,8 @@ class Verb:
     """A verb, such as `topic list` or `plot`.
 
     `about` is its line of help, `arguments` adds its flags to a parser, `run` does the work and returns the exit code.
-    `json` is the help of its flag `--json`. The parsed flags have its name as `verb`.
+    A `run` such as "echo.echo" names a function of a module of holozen.cli that takes the flags and a node; the module
+    is loaded while the session opens. `json` is the help of its flag `--json`. The flags have its name as `verb`.
     """
 
     def __init__(
@@ -48,7 +54,7 @@ class Verb:
         about: str,
         example: str,
         arguments: Callable[[argparse.ArgumentParser], object],
-        run: Callable[[Any], int],
+        run: Callable[[Any], int] | str,
         json: str = JSON,
     ) -> None:
         self.name, self.about, self._example = name, about, example
@@ -56,7 +62,14 @@ class Verb:
 
     def main(self, argv: list[str]) -> int:
         """Run it with the words of a command line; returns the exit code."""
-        return self._run(self.parser().parse_args(argv))
+        args = self.parser().parse_args(argv)
+        if not isinstance(self._run, str):
+            return self._run(args)
+        module, _, function = self._run.partition(".")
+        with open_node(args) as node:
+            with deferred_interrupt():
+                work = importlib.import_module(f"holozen.cli.{module}")
+            return int(getattr(work, function)(args, node))
 
     def parser(self) -> Parser:
         """Its parser alone."""
@@ -129,45 +142,25 @@ def add_packages(parser: argparse.ArgumentParser) -> None:
         help="the folder of package NAME, whose msg and srv files define its types")  # fmt: skip
 
 
-def open_bus(args: argparse.Namespace, **options: Any) -> Bus:
-    """The bus of a verb, connected according to its flags. `options` are those of Bus."""
-    return Bus(args.verb.replace(" ", "_"), connection.from_arguments(args), **options)
-
-
-def no_nodes(where: str) -> str:
-    """The message that no node was found, and how to start some."""
-    return f"no nodes found at {where}; `holozen up` starts a robot"
-
-
-def none_found(what: str, ends: list[Endpoint], where: str) -> str:
-    """The message that the nodes at `where`, with the endpoints `ends`, have no `what`, or that there are none."""
-    return f"no {what}: {f'the nodes at {where} have none' if ends else no_nodes(where)}"
-
-
-def unknown(word: str, known: list[str], where: str) -> str:
-    """The message that no node has a key; `known` are the keys at `where`."""
-    if not known:
-        return f"unknown key {word!r}: {no_nodes(where)}"
-    return f"unknown key {word!r}{nearest(word, known)}; known: {listed(known)}"
-
-
-def suggest_key(bus: Bus, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
-    """`; did you mean 'odom'?` with the live key nearest to the first of `keys` that no node has, or `; no nodes found
-    at ...`; empty where neither applies.
+def open_node(args: argparse.Namespace, stop: threading.Event | None = None) -> Node:
+    """The node of a verb, connected according to its flags, for samples as bytes. Its session opens while this and the
+    caller load their modules. `stop` as in Opening.
     """
-    ends = [end for end in bus.endpoints() if end.session != bus.id]
-    if not ends and not bus.connected():
-        return f"; {no_nodes(bus.where)}"
-    live = {end.key for end in ends if end.kind in kinds and not is_any(end) and "*" not in end.key}
-    lost = [key for key in keys if key not in live and "*" not in key]
-    return nearest(lost[0], sorted(live)) if lost else ""
+    node: Node = _open(args, stop, "node", "Node")
+    return node
 
 
-def is_any(end: Endpoint) -> bool:
-    """Whether an endpoint accepts any type, as those of echo do."""
-    return end.type.startswith("any/")
+def open_bus(args: argparse.Namespace, stop: threading.Event | None = None) -> Bus:
+    """The same for messages."""
+    bus: Bus = _open(args, stop, "bus", "Bus")
+    return bus
 
 
-def listed(words: Iterable[str]) -> str:
-    """The words separated by commas; `none` if there are none."""
-    return ", ".join(words) or "none"
+def _open(args: argparse.Namespace, stop: threading.Event | None, module: str, name: str) -> Any:
+    opening = Opening(connection.from_arguments(args), stop=stop, early=True)
+    try:
+        kind = getattr(importlib.import_module(f"holozen.transport.{module}"), name)
+    except BaseException:  # Ctrl-C
+        opening.closing.set()
+        raise
+    return kind(args.verb.replace(" ", "_"), opening)

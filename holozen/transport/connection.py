@@ -227,3 +227,18 @@ def fault(text: str) -> str:
     if not host or not colon or not port.isdecimal() or int(port) > 65535:
         return f"{text!r} has no port from 0 to 65535: {HOW}"
     return ""
+
+
+def address(endpoint: str) -> tuple[str, int] | None:
+    """Host and port of a TCP endpoint such as tcp/127.0.0.1:7447; None for any other."""
+    kind, _, place = endpoint.partition("#")[0].partition("?")[0].partition("/")
+    host, _, port = place.rpartition(":")
+    return (host.strip("[]"), int(port)) if kind in ("tcp", "tls") and port.isdecimal() and int(port) < 65536 else None
+
+
+def covers(listening: str, endpoint: str) -> bool:
+    """Whether listening at one endpoint includes the other, as tcp/0.0.0.0:7447 includes tcp/127.0.0.1:7447."""
+    mine, other = address(listening), address(endpoint)
+    if listening == endpoint or mine is None or other is None or mine[1] != other[1]:
+        return listening == endpoint
+    return mine[0] in ("0.0.0.0", "::", other[0]) or {mine[0], other[0]} <= {"127.0.0.1", "localhost", "::1"}

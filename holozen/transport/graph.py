@@ -15,7 +15,7 @@ from collections import Counter, deque, namedtuple
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from holozen.transport.pubsub import Declared, source
+from holozen.transport.samples import Declared, source
 
 ALL = "@holozen/**"
 ALL_NODE_INFO = "@holozen/*/about"

@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from holozen.console import printable
+from holozen.transport.connection import address
 
 PATIENCE = 0.4  # s to connect
 HERE = ("127.0.0.1", "localhost", "::1", "0.0.0.0", "::")  # this machine
@@ -111,14 +112,6 @@ def is_open(endpoint: str) -> bool:
     return not all(one.startswith("127.") or one == "::1" for one in found)
 
 
-def covers(listening: str, endpoint: str) -> bool:
-    """Whether listening at one endpoint includes the other, as tcp/0.0.0.0:7447 includes tcp/127.0.0.1:7447."""
-    mine, other = address(listening), address(endpoint)
-    if listening == endpoint or mine is None or other is None or mine[1] != other[1]:
-        return listening == endpoint
-    return mine[0] in ("0.0.0.0", "::", other[0]) or {mine[0], other[0]} <= {"127.0.0.1", "localhost", "::1"}
-
-
 def reached(endpoints: Iterable[str]) -> dict[str, str]:
     """Endpoint -> why a TCP connection to it fails, empty if it succeeds. Other protocols are skipped."""
     endpoints = [endpoint for endpoint in endpoints if address(endpoint)]
@@ -136,10 +129,3 @@ def unanswered(endpoints: Iterable[str], within: float) -> str:
             return f"{endpoint} accepts connections but does not answer as Zenoh does; check what listens there"
     where = ", ".join(endpoints)
     return f"no answer from {where} within {within:g} s; check address and network, and what listens there"
-
-
-def address(endpoint: str) -> tuple[str, int] | None:
-    """Host and port of a TCP endpoint such as tcp/127.0.0.1:7447; None for any other."""
-    kind, _, place = endpoint.partition("#")[0].partition("?")[0].partition("/")
-    host, _, port = place.rpartition(":")
-    return (host.strip("[]"), int(port)) if kind in ("tcp", "tls") and port.isdecimal() and int(port) < 65536 else None

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from holozen.transport.errors import BusError
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 
 DRIFT = 1e-3  # s a second; a quartz is good to 1e-4, and NTP slews a clock by up to 5e-4
 CONTRADICTION = 0.002  # s; bounds that contradict each other by more: a clock jumped, or a computer was suspended
@@ -84,14 +84,13 @@ class PeerClocks:
     def track_first(self, session: str, now: float) -> None:
         """Measure the clock of a session that commands, ahead of those that only might.
 
-        Where there are MAX_PEERS, one that has never answered is forgotten for it: first those that never commanded,
-        then the oldest.
+        Where there are MAX_PEERS, one that has never answered is forgotten for it.
         """
         if session not in self._peers and len(self._peers) >= MAX_PEERS:
-            silent = [other for other, peer in self._peers.items() if peer.confirmed < 0]
-            if not silent:
+            silent = (other for other, peer in self._peers.items() if peer.confirmed < 0 and not peer.commands)
+            if (other := next(silent, None)) is None:
                 return
-            del self._peers[min(silent, key=lambda other: self._peers[other].commands)]
+            del self._peers[other]
         self._peers.setdefault(session, _Peer(now)).commands = True
 
     def ages(self, session: str, sent: float, now: float) -> tuple[float, float] | None:
@@ -102,12 +101,11 @@ class PeerClocks:
         peer = self._peers.get(session)
         if peer is None or peer.highest is None:
             return None
-        read = self._clock()  # it may have come after `now`
-        if sent - read > peer.at_most(now) + CONTRADICTION:  # from the future: measure again
+        if sent - now > peer.at_most(now) + CONTRADICTION:  # from the future: measure again
             peer.due = min(peer.due, now)
             return None
-        if sent - read > peer.at_least(now):
-            peer.lowest = (sent - read, now)
+        if sent - now > peer.at_least(now):
+            peer.lowest = (sent - now, now)
         elapsed = now - sent
         return max(0.0, elapsed + peer.at_least(now)), max(0.0, elapsed + peer.at_most(now))
 
@@ -123,7 +121,7 @@ class PeerClocks:
 
     def poll(self, now: float) -> None:
         """Read replies, and send the requests that are due."""
-        due: list[tuple[bool, bool, float, str]] = []
+        due: list[tuple[bool, float, str]] = []
         room = MAX_ASKED
         for session, peer in self._peers.items():
             if peer.replies is not None:
@@ -131,8 +129,8 @@ class PeerClocks:
             if peer.replies is not None:
                 room -= now - peer.asked < SLOW  # whoever never answers keeps no place
             elif now >= peer.due:
-                due.append((not peer.commands, peer.asked > 0 > peer.confirmed, peer.due, session))
-        for *_, session in sorted(due)[: max(room, 0)]:
+                due.append((not peer.commands, peer.due, session))
+        for _, _, session in sorted(due)[: max(room, 0)]:
             peer = self._peers[session]
             peer.asked = self._clock()
             peer.replies = self._ask(session, GIVE_UP)

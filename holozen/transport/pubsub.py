@@ -1,8 +1,7 @@
-"""Topics: publishers and subscribers, as bytes or as messages. The codec is loaded with the first typed one."""
+"""Topics: publishers and subscribers of messages."""
 
 from __future__ import annotations
 
-import contextlib
 import math
 import threading
 import time
@@ -11,170 +10,15 @@ from itertools import count
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from holozen.transport.errors import BusError
+from holozen.transport.samples import Declared, RawSubscriber, Sample
 
 if TYPE_CHECKING:
     from holozen.messages import Message
 
 M = TypeVar("M", bound="Message")
 
-MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
-LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
-TRIM_AFTER = 1.0  # s
 GET_PATIENCE = 1.0  # s that a get waits for the next message of a publisher that sends only what is wanted
 SLOWEST = 5.0  # s; after this long any stream is stale
-PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
-"""Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
-
-
-def source(node: str, session: str) -> str:
-    """The name of a sender, for messages and status."""
-    return f"{node}@{session[:6]}"
-
-
-class Stamp(NamedTuple):
-    """How a sample was sent: the session, an increasing sequence number, and the sender's clock in s (monotonic)."""
-
-    session: str
-    number: int
-    sent: float
-
-
-def stamps(node: str, session: str) -> Callable[[], bytes]:
-    """A function that makes attachments with sender and stamp: `node@session;number;nanoseconds`."""
-    start, numbers = f"{node}@{session};", count()
-    return lambda: f"{start}{next(numbers)};{time.monotonic_ns()}".encode()
-
-
-def source_in(attachment: Any) -> str:
-    """The sender in the attachment of a sample or a request; empty if there is none."""
-    if not attachment or len(attachment) > MAX_ATTACHMENT_BYTES:
-        return ""
-    name, _, session = bytes(attachment).decode(errors="replace").partition(";")[0].rpartition("@")
-    return source(name, session)[:80] if name else session[:80]
-
-
-def _stamp_in(attachment: Any) -> Stamp | None:
-    """The stamp in an attachment; None if it is missing or malformed."""
-    parts = bytes(attachment).split(b";") if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else []
-    if len(parts) != 3 or not all(part.isdigit() and len(part) < 20 for part in parts[1:]):
-        return None
-    session = parts[0].rpartition(b"@")[2]
-    if not 0 < len(session) <= 32 or not session.isalnum():
-        return None
-    return Stamp(session.decode(), int(parts[1]), int(parts[2]) * 1e-9)
-
-
-def release_memory() -> None:
-    """Return the memory of a refused payload to the system, in a second: the C library would keep it.
-
-    It came in fragments, some of which lie between memory in use.
-    """
-    global _trimmer
-    if _trimmer is None or not _trimmer.is_alive():
-        _trimmer = threading.Timer(TRIM_AFTER, _trim)
-        _trimmer.daemon = True
-        _trimmer.start()
-
-
-_trimmer: threading.Timer | None = None
-
-
-def _trim() -> None:
-    import ctypes
-
-    with contextlib.suppress(OSError, AttributeError):  # not in every C library
-        ctypes.CDLL(None).malloc_trim(0)
-
-
-class Sample:
-    """A received sample. It is `oversized`, and has no payload, if its `size` in bytes is over the reader's limit, or
-    its attachment is too long. A limit of 0 means no limit.
-
-    Most readers need only the payload, so the rest is read from Zenoh's sample on demand.
-    """
-
-    __slots__ = ("_sample", "encoding", "oversized", "payload", "size")
-
-    def __init__(self, sample: Any, limit: int = 0) -> None:
-        payload = sample.payload
-        self._sample, self.encoding, self.size = sample, str(sample.encoding), len(payload)
-        if limit and (named := len(sample.attachment or b"")) > MAX_ATTACHMENT_BYTES:
-            self.size += max(named, limit)
-        self.oversized = 0 < limit < self.size
-        self.payload = b"" if self.oversized else bytes(payload)
-        if self.oversized and self.size > LARGE:
-            release_memory()
-
-    @property
-    def key(self) -> str:
-        """Its key."""
-        return str(self._sample.key_expr)
-
-    @property
-    def priority(self) -> str:
-        """The name of its Zenoh priority."""
-        return PRIORITIES[int(self._sample.priority) - 1]
-
-    @property
-    def source(self) -> str:
-        """Its sender; empty if it names none."""
-        return source_in(self._sample.attachment)
-
-    @property
-    def stamp(self) -> Stamp | None:
-        """Its stamp as claimed by the sender; None without one."""
-        return _stamp_in(self._sample.attachment)
-
-    @property
-    def number(self) -> tuple[str, int] | None:
-        """The publisher's id and its sequence number; None without them."""
-        info = self._sample.source_info
-        return info and (f"{info.source_id.zid}:{info.source_id.eid}", info.source_sn)
-
-    @property
-    def delivery(self) -> tuple[str, bool]:
-        """Congestion control ("DROP" or "BLOCK"), and whether it is express (not batched)."""
-        return str(self._sample.congestion_control).rpartition(".")[2], bool(self._sample.express)
-
-
-class Declared:
-    """What a bus has declared to all others, in `ends`, until `close`."""
-
-    def __init__(self, *ends: Any) -> None:
-        self.ends = list(ends)
-        self.thread: threading.Thread | None = None  # the one that waits for Zenoh here
-        self.kept: set[Declared] = set()  # by the bus, with all that is declared
-
-    def close(self) -> None:
-        """Remove the declarations: nothing more arrives, and others see it leave. Does nothing the second time."""
-        self.kept.discard(self)
-        ends, self.ends = self.ends, []
-        for end in reversed(ends):
-            end.undeclare()
-
-
-class RawSubscriber(Declared):
-    """Raw samples; if too many wait, the oldest are dropped."""
-
-    def __init__(self, subscriber: Any, limit: int = 0) -> None:
-        super().__init__(subscriber)
-        # Reading from the handler leaves the subscriber free to be undeclared at the same time.
-        self._samples, self.limit = subscriber.handler, limit
-        self.listen = subscriber.handler.try_recv  # Zenoh's next sample or None, for `Subscription.waiting`
-
-    def try_recv(self) -> Sample | None:
-        """The next waiting sample, or None."""
-        sample = self._samples.try_recv()
-        return sample and Sample(sample, self.limit)
-
-    def recv(self) -> Sample:
-        """The next sample; waits for it. Raises BusError once the bus or this subscriber is closed."""
-        self.thread = threading.current_thread()
-        try:
-            sample = self._samples.recv()
-        except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
-            raise BusError("closed") from None
-        return Sample(sample, self.limit)
 
 
 class Publisher(Declared, Generic[M]):

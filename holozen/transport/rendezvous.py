@@ -2,19 +2,17 @@
 
 When a process loses one, another takes it over. Since no process holds two, processes find each other even if the
 holder of the first one is suspended, or does not speak Zenoh. Zenoh can retry a taken port by itself, but such a
-session takes 10 s to close; so this asks the kernel first.
+session takes 10 s to close; so this asks the kernel when a point is free.
 """
 
 import errno
 import os
-import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Sequence
 
 from holozen.console import report
 from holozen.transport.errors import BusError
-from holozen.transport.listeners import Attempts, unanswered
 
 POLL = 0.2  # s between two checks of the points
 QUICK = 0.3  # s; a link on one machine is up by then
@@ -67,6 +65,8 @@ def is_free(endpoint: str) -> bool:
 
 def listen_error(endpoint: str) -> str:
     """Why a TCP endpoint cannot be listened on now, as the system's text (IN_USE); empty if it can."""
+    import socket  # takes 5 ms to load, which a verb that meets a robot does not need
+
     host, _, port = endpoint.partition("?")[0].partition("#")[0].removeprefix("tcp/").rpartition(":")
     with socket.socket(socket.AF_INET6 if host[:1] == "[" else socket.AF_INET) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -77,24 +77,37 @@ def listen_error(endpoint: str) -> str:
     return ""
 
 
+def is_taken(endpoint: str) -> bool:
+    """Whether another process holds a TCP endpoint of this machine."""
+    return not endpoint.endswith(":0") and listen_error(endpoint) == IN_USE
+
+
 def wait_for_link(
-    connected: Callable[[], bool], endpoints: Iterable[str], lasting: bool, patience: float, stop: threading.Event
+    connected: Callable[[], bool],
+    endpoints: Iterable[str],
+    lasting: bool,
+    patience: float,
+    stop: threading.Event,
+    known: Sequence[str] = (),
 ) -> None:
-    """Wait until a link is up, if a process listens at one of `endpoints`; at most `patience` s.
+    """Wait until a link is up, if a process listens at one of `endpoints`, as it does at those `known`; at most
+    `patience` s.
 
     Raises BusError if one is held and does not answer. A `lasting` process goes on without remote ones: those links
     come up later. Exits with code 0 when `stop` is set.
     """
     near = [one for one in endpoints if one.startswith("tcp/") and one[4:].rpartition(":")[0] in LOOPBACK]
     far = [one for one in endpoints if one.startswith(("tcp/", "tls/")) and one not in near]
-    attempts: Attempts | None = None
+    attempts = None
     begin = looked = reported = time.monotonic()
-    taken = _taken(near)
+    taken = [one for one in near if one in known] or [*filter(is_taken, near)]
     while not connected():
         now = time.monotonic()
         if now - looked > 0.1:
-            taken, looked = _taken(near), now
+            taken, looked = [*filter(is_taken, near)], now
         if far and attempts is None and now - begin > QUICK:
+            from holozen.transport.listeners import Attempts  # loads socket
+
             attempts = Attempts(far, patience)
         waiting = taken + [one for one in far if attempts is None or not attempts.failed(one)]
         if not waiting:
@@ -105,10 +118,8 @@ def wait_for_link(
         if lasting and not taken and reported > begin:
             return
         if now - begin > patience:
+            from holozen.transport.listeners import unanswered
+
             raise BusError(unanswered(waiting, patience))
         if stop.wait(0.001 if now - begin < QUICK else 0.02):
             raise SystemExit(0)
-
-
-def _taken(endpoints: list[str]) -> list[str]:
-    return [one for one in endpoints if listen_error(one) == IN_USE]

@@ -6,12 +6,12 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from holozen.console import report
 from holozen.transport.errors import TIMEOUT, BusError, NoReply, ServiceError
-from holozen.transport.pubsub import Declared, Sample, release_memory, source_in
+from holozen.transport.samples import Declared, Replies, Sample, release_memory, source_in
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -211,33 +211,6 @@ class Asks(Protocol):
     def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
         """Ask all services of a key once."""
         ...
-
-
-class Replies:
-    """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error. With a `replier`, `try_recv`
-    skips those of any other session, by Zenoh's own id of who replied.
-    """
-
-    def __init__(self, replies: Any, replier: str = "") -> None:
-        self._replies, self._replier = replies, replier
-
-    def try_recv(self) -> Sample | bytes | None:
-        """The next reply, or None. Raises BusError when there will be no more."""
-        try:
-            while (reply := self._replies.try_recv()) is not None:
-                if not self._replier or (reply.replier_id and str(reply.replier_id.zid) == self._replier):
-                    return _read(reply)
-        except Exception:  # zenoh's own error type, which only bus.py may name: all have replied, or it timed out
-            raise BusError("no more replies") from None
-        return None
-
-    def __iter__(self) -> Iterator[Sample | bytes]:
-        """All replies; waits for each."""
-        return map(_read, self._replies)
-
-
-def _read(reply: Any) -> Sample | bytes:
-    return Sample(reply.ok) if reply.ok else bytes(reply.err.payload)
 
 
 def call(bus: Asks, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = False) -> list[R]:

@@ -13,11 +13,11 @@ from typing import Any
 
 import zenoh
 
+from holozen.background import at_once, background
 from holozen.console import report
 from holozen.transport import rendezvous
-from holozen.transport.connection import CLIENT_TRY, Connection
+from holozen.transport.connection import CLIENT_TRY, Connection, covers
 from holozen.transport.errors import BusError
-from holozen.transport.listeners import covers, reached, unanswered
 
 LAST = 1.0  # s to wait for threads at the end of the process
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
@@ -30,6 +30,7 @@ class Opened:
         self.session, self.took = session, took
         self.keeper: threading.Thread | None = None
         self.listens: list[str] = []  # the endpoints of this session itself
+        self.taken: list[str] = []  # the endpoints where it would have listened, but another process does
         self.is_guarded = False  # whether connections need a password, a certificate or a permission
         self.point = ""  # the rendezvous point that this session itself holds
 
@@ -37,6 +38,35 @@ class Opened:
         """Close it, even if it is closed already."""
         rendezvous.held.discard(self.point)
         close(self.session)
+
+
+class Opening:
+    """A session that is being opened: `early` in a thread, while the caller loads and checks what it needs, else by the
+    time that this returns. `opened` waits for it, and raises its error. `closing`: set it to give up.
+
+    If `lasting`, it holds a rendezvous point, and as a client waits for its router until `stop`. Others give up after
+    `patience` seconds, by default 5, where a process listens and does not answer, or there is no router.
+    """
+
+    def __init__(
+        self,
+        connection: Connection,
+        *,
+        lasting: bool = False,
+        patience: float | None = None,
+        stop: threading.Event | None = None,
+        early: bool = False,
+    ) -> None:
+        self.where, self.wire, self.closing = connection.where, connection.wire, threading.Event()
+        opening = partial(
+            open_session, connection, lasting=lasting, stop=stop or self.closing, closing=self.closing,
+            patience=None if lasting else rendezvous.PATIENCE if patience is None else patience,
+        )  # fmt: skip
+        try:
+            self.opened = background(opening) if early else at_once(opening)
+        except BaseException:  # Ctrl-C, and nobody will close it: a thread that opens it gives up
+            self.closing.set()
+            raise
 
 
 def open_session(
@@ -61,7 +91,7 @@ def open_session(
         others = [one for one in connect if not any(covers(listening, one) for listening in mine)]
         try:
             limit = rendezvous.PATIENCE if patience is None else patience
-            rendezvous.wait_for_link(lambda: linked(opened.session), others, lasting, limit, stop)
+            rendezvous.wait_for_link(lambda: linked(opened.session), others, lasting, limit, stop, opened.taken)
         except BaseException:
             closing.set()
             closer = threading.Thread(target=opened.close, daemon=True)
@@ -74,20 +104,22 @@ def open_session(
 
 def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> Opened:
     """The session of a peer or a router. A peer skips the endpoints that are in use."""
-    listen = endpoints(config, "listen", mode)
+    listen, taken = endpoints(config, "listen", mode), []
     while True:
         if mode == "peer" and not connection.config:
-            listen = [one for one in listen if rendezvous.listen_error(one) != rendezvous.IN_USE]
+            # Zenoh reports that the first is in use before it listens at another; to load socket takes 5 ms.
+            listen = listen[:1] + [one for one in listen[1:] if not rendezvous.is_taken(one)]
             config.insert_json5("listen/endpoints", json.dumps(listen))
         try:
             opened = Opened(zenoh.open(config))
         except zenoh.ZError as error:
-            taken = next((one for one in listen if one in str(error) and "in use" in str(error)), None)
-            if mode != "peer" or not taken:
+            used = next((one for one in listen if one in str(error) and "in use" in str(error)), None)
+            if mode != "peer" or not used:
                 raise BusError(opening(error, mode, connection.where, None)) from None
-            listen.remove(taken)  # another process was faster
+            listen.remove(used)
+            taken.append(used)
             continue
-        opened.listens, opened.is_guarded = listen, _is_guarded(config)
+        opened.listens, opened.taken, opened.is_guarded = listen, taken, _is_guarded(config)
         opened.point = next((one for one in connection.rendezvous if one in listen), "")
         if opened.point:
             rendezvous.held.add(opened.point)
@@ -155,6 +187,8 @@ def _may_recover(error: Exception) -> bool:
 
 
 def _unreached(connection: Connection, config: zenoh.Config, patience: float) -> str:
+    from holozen.transport.listeners import reached, unanswered  # loads socket
+
     reasons = reached(endpoints(config, "connect", "client"))
     silent = [endpoint for endpoint, reason in reasons.items() if not reason]
     if silent:

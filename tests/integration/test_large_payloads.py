@@ -10,7 +10,7 @@ from holozen.bus import Bus
 from holozen.messages import CommandStatus, Odometry, Twist
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.connection import Connection
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 from holozen.transport.services import MAX_REQUEST_BYTES, refusal
 
 from .conftest import start_sim

@@ -13,8 +13,8 @@ from holozen.robot.xacro import expand
 from holozen.testing import Wire, wait_for
 from holozen.transport.connection import Connection
 from holozen.transport.errors import TIMEOUT
-from holozen.transport.pubsub import Sample
-from holozen.transport.services import Replies, refusal
+from holozen.transport.samples import Replies, Sample
+from holozen.transport.services import refusal
 
 from .conftest import start_sim
 from .robots import URDF, Robot, moves, rests

@@ -10,7 +10,7 @@ from holozen.bag.formats import format_of
 from holozen.bag.writer import BagWriter
 from holozen.messages import Message, Odometry, Twist, codec
 from holozen.testing import Wire, wait_for
-from holozen.transport.pubsub import RawSubscriber, Sample
+from holozen.transport.samples import RawSubscriber, Sample
 
 from .processes import read
 from .robots import Robot, moves

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from holozen import wire
 from holozen.messages import Odometry, Twist
-from holozen.transport.pubsub import PRIORITIES
+from holozen.transport.samples import PRIORITIES
 
 LETTERS = string.ascii_letters
 

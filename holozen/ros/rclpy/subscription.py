@@ -17,7 +17,7 @@ from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile, as_profile, queue_length
 from holozen.ros.rclpy.waitable import Inbox, Waker
 from holozen.transport.errors import BusError
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 
 __all__ = ["Subscription", "wait_for_message"]
 

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 from holozen.limits import STOP
-from holozen.transport.pubsub import PRIORITIES
+from holozen.transport.samples import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
 
 from .motion import JointMotion, Motion, is_stop

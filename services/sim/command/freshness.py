@@ -11,7 +11,8 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from holozen.messages import Message
-from holozen.transport.pubsub import Received, Stamp
+from holozen.transport.pubsub import Received
+from holozen.transport.samples import Stamp
 from holozen.wire import COMMAND_SILENCE
 
 M = TypeVar("M", bound=Message)
@@ -26,7 +27,6 @@ OLD = "old: it was sent up to {age:.2f} s ago; at most {limit:g} s"
 GONE = "gone: its sender has left"
 OUT_OF_ORDER = "out of order: number {number} came after {last}"
 UNANSWERED = "late: it was under way for {age:.2f} s or more, and its sender has not answered since"
-WAITED = "late: it was sent up to {age:.2f} s ago, before its sender was asked whether it is alive"
 UNKNOWN = "unknown clock: its sender has not answered with its time"
 UNSTAMPED = "unstamped: this sender stamps its commands"
 
@@ -80,8 +80,8 @@ class Freshness(Generic[M]):
     A stamped command (see holozen.transport.pubsub.Stamp) is measured by its sender's clock; it waits until that is
     known, for at most 0.5 s. The greatest possible age counts. A command is refused if it is older than `max_age`, out
     of order, or its sender has left. A slow command that would set the robot moving suggests that a link was held up:
-    its sender has to answer a request first, which no dead process does, and only commands that were sent after the
-    request and arrive after the answer move the robot.
+    its sender has to answer a request first, which no dead process does, and only commands that arrive after the answer
+    move the robot.
 
     The age of a command without a stamp is unknown. Of those that arrive together only the newest counts.
 
@@ -169,8 +169,6 @@ class Freshness(Generic[M]):
         if sender in self._doubted:
             if self._senders.answered(session) < self._doubted[sender]:
                 return Judged(received, sent, oldest, UNANSWERED.format(age=youngest))
-            if sent < self._doubted[sender]:  # the answer overtook it
-                return Judged(received, sent, oldest, WAITED.format(age=oldest))
             del self._doubted[sender]
         if oldest > self.max_age:
             return Judged(received, sent, oldest, OLD.format(age=oldest, limit=self.max_age))
@@ -180,11 +178,11 @@ class Freshness(Generic[M]):
         sender, there = _sender(received), self._senders.has(stamp.session)
         if sender in self._waiting:
             came = min(came, self._waiting[sender][1])
-        if there:
-            self._senders.track_first(stamp.session, now)
         if now - came > COMMAND_SILENCE or (sender not in self._waiting and len(self._waiting) >= MAX_WAITING):
             self._waiting.pop(sender, None)
             return Judged(received, -math.inf, 0.0, UNKNOWN if there else GONE)
+        if there:
+            self._senders.track_first(stamp.session, now)
         self._waiting[sender] = (received, came)
         return None
 

@@ -12,7 +12,8 @@ from holozen.limits import Planar, clamp_speed
 from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped
 from holozen.messages.message import not_finite
 from holozen.robot.errors import listed
-from holozen.transport.pubsub import PRIORITIES, Received
+from holozen.transport.pubsub import Received
+from holozen.transport.samples import PRIORITIES
 from holozen.wire import MAX_STAMP_AGE, implausible
 
 from .arbiter import Arbiter

@@ -18,7 +18,7 @@ from holozen.cli.stats import (
     spread,
     stamp_of,
 )
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 
 
 def test_a_rate_is_told_with_its_gaps() -> None:

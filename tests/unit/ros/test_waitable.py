@@ -9,7 +9,7 @@ from holozen.bus import Bus
 from holozen.ros import rclpy
 from holozen.ros.rclpy.waitable import Inbox, Waker
 from holozen.testing import Wire, wait_for
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 
 
 def boxed(bus: Bus, depth: int) -> Inbox[Sample]:

@@ -5,7 +5,8 @@ from types import SimpleNamespace
 from typing import TypeVar
 
 from holozen.messages import Message
-from holozen.transport.pubsub import PRIORITIES, Received, Sample
+from holozen.transport.pubsub import Received
+from holozen.transport.samples import PRIORITIES, Sample
 
 M = TypeVar("M", bound=Message)
 

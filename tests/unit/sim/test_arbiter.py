@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
 from holozen.limits import STOP, Planar
-from holozen.transport.pubsub import PRIORITIES
+from holozen.transport.samples import PRIORITIES
 from services.sim.command.arbiter import AUTOPILOT, HELD, MAX_HELD, Arbiter, Driver
 from services.sim.command.motion import JointMotion, Motion
 

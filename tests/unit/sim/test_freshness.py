@@ -39,9 +39,9 @@ def test_a_fresh_command_passes_with_the_time_when_it_was_sent_at_the_earliest(r
     assert judged.refusal.startswith("late")  # nothing drives, and it was under way for at least 0.08 s
     robot.driving = True
     robot.senders.answers["aa"] = 10.0
-    (judged,) = robot.freshness.sift([robot.sent(2, 10.1)], 10.2, 10.196)
+    (judged,) = robot.freshness.sift([robot.sent(2, 10.0)], 10.1, 10.096)
     assert judged.refusal == ""
-    assert (judged.sent, judged.age) == pytest.approx((10.08, 0.12))
+    assert (judged.sent, judged.age) == pytest.approx((9.98, 0.12))
 
 
 def test_what_may_have_been_sent_more_than_half_a_second_ago_moves_nothing(robot: Robot) -> None:
@@ -152,13 +152,6 @@ def test_a_flood_of_unknown_senders_takes_bounded_memory(robot: Robot) -> None:
     assert robot.hear(10.1, robot.sent(1, 10.1)) == [""]
 
 
-def test_where_many_wait_the_clock_of_one_more_is_measured_too(robot: Robot) -> None:
-    robot.hear(10.0, *(received(GO, f"x@z{number};1;1") for number in range(MAX_WAITING)))
-    robot.senders.known.remove("aa")
-    assert robot.hear(10.1, robot.sent(1, 10.1)) == ["unknown clock"]
-    assert robot.senders.tracked == ["aa"]
-
-
 class TestALinkThatWasHeldUp:
     """Commands that waited arrive at once: the first to arrive may be the last that its sender ever sent."""
 
@@ -174,11 +167,6 @@ class TestALinkThatWasHeldUp:
         assert robot.hear(10.43, robot.sent(3, 10.43)) == ["late"]
         robot.senders.answers["aa"] = 10.41
         assert robot.hear(10.45, robot.sent(4, 10.45)) == [""]
-
-    def test_an_answer_that_overtakes_what_waited_makes_that_no_fresher(self, robot: Robot) -> None:
-        assert robot.hear(10.4, robot.sent(1, 10.3)) == ["late"]
-        robot.senders.answers["aa"] = 10.41
-        assert robot.hear(10.42, robot.sent(2, 10.35), robot.sent(3, 10.41)) == ["late", ""]
 
     def test_a_robot_that_drives_goes_on(self, robot: Robot) -> None:
         robot.driving = True

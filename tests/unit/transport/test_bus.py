@@ -27,14 +27,14 @@ from holozen.messages import (
     TwistStamped,
 )
 from holozen.testing import Wire, wait_for
-from holozen.transport import bus as bus_module
 from holozen.transport import services as module
+from holozen.transport import session as session_module
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, NoReply, ServiceError
 from holozen.transport.graph import ALL, Endpoint, Graph
 from holozen.transport.pubsub import Publisher
 from holozen.transport.rendezvous import is_free
-from holozen.transport.session import Opened
+from holozen.transport.session import Opened, Opening
 
 
 @pytest.fixture
@@ -391,7 +391,7 @@ def test_a_client_waits_for_its_router_and_says_so(wire: Wire, capsys: pytest.Ca
 
 
 def test_an_early_bus_opens_meanwhile_and_its_first_use_waits(wire: Wire) -> None:
-    with wire.bus("early", early=True) as early, wire.bus("other") as other:
+    with Bus("early", Opening(wire.connection, early=True)) as early, wire.bus("other") as other:
         odom = early.subscribe("odom", Odometry)
         publisher = other.publisher("odom", Odometry)
         wait_for(lambda: publisher.matched)
@@ -402,7 +402,7 @@ def test_an_early_bus_opens_meanwhile_and_its_first_use_waits(wire: Wire) -> Non
 
 def test_an_early_bus_that_cannot_open_says_so_at_its_first_use_and_closes(wire: Wire) -> None:
     nowhere = Connection("client", connect=(wire.endpoint,))
-    with Bus("early", nowhere, patience=0.1, early=True) as bus:
+    with Bus("early", Opening(nowhere, patience=0.1, early=True)) as bus:
         for _ in range(2):
             with pytest.raises(BusError, match="no router answers"):
                 bus.subscribe_raw("odom")
@@ -415,16 +415,16 @@ def test_an_early_bus_that_is_interrupted_as_it_starts_leaves_no_thread_that_ope
         background(work)
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(bus_module, "background", interrupted)
+    monkeypatch.setattr(session_module, "background", interrupted)
     nowhere = Connection("client", connect=(wire.endpoint,))
     before = threading.active_count()
     with pytest.raises(KeyboardInterrupt):
-        Bus("early", nowhere, patience=60, early=True)
+        Opening(nowhere, patience=60, early=True)
     wait_for(lambda: threading.active_count() <= before, 30)
 
 
 def test_an_early_bus_may_be_closed_before_it_is_open(wire: Wire) -> None:
-    with Bus("early", Connection("client", connect=(wire.endpoint,)), early=True):
+    with Bus("early", Opening(Connection("client", connect=(wire.endpoint,)), early=True)):
         pass
 
 

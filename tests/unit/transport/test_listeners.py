@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from holozen.testing import Process, wait_for
-from holozen.transport.listeners import Holder, address, covers, holders, is_open, reached
+from holozen.transport.connection import address, covers
+from holozen.transport.listeners import Holder, holders, is_open, reached
 
 LISTEN = """
 import socket, time

@@ -13,7 +13,7 @@ from holozen.messages import Twist
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import BusError
 from holozen.transport.peer_clocks import AGAIN, MAX_PEERS, PeerClocks, clock_key
-from holozen.transport.pubsub import Sample, Stamp
+from holozen.transport.samples import Sample, Stamp
 
 OFFSET = 7200.0  # s that the peer's clock is ahead of ours
 
@@ -100,17 +100,6 @@ def test_a_sample_from_the_future_says_nothing_and_asks_for_another_round_trip()
     assert link.asked > asked
 
 
-def test_a_sample_that_came_during_a_hang_says_nothing_false() -> None:
-    """The receiver looked at its clock, hung for 40 ms, and then read a sample that had been sent meanwhile."""
-    link = Link(0.05, 0.05)
-    link.run(1.0)
-    ages = link.clocks.ages("aa", link.now + OFFSET, link.now - 0.04)
-    assert ages and ages[0] == 0.0
-    link.now += 0.001
-    youngest, oldest = link.ages(0.0) or (1.0, 0.0)
-    assert youngest <= 0.001 <= oldest
-
-
 def test_a_clock_that_jumped_is_measured_anew() -> None:
     link = Link(0.01, 0.01)
     link.run(2.0)
@@ -149,20 +138,6 @@ def test_a_session_that_commands_is_measured_among_many_that_never_answer() -> N
     link.clocks.track_first("bb", link.now)
     link.run(1.1)  # those that do not answer keep their places for a second at most
     assert link.clocks.ages("bb", link.now + OFFSET, link.now) is not None
-
-
-def test_many_that_command_and_never_answer_keep_no_other_out() -> None:
-    link = Link()
-    link.run(0.1)
-    link.silent = True
-    for number in range(2 * MAX_PEERS):
-        link.clocks.track_first(f"forged{number}", link.now)
-    link.run(2.0)
-    link.silent = False
-    link.clocks.track_first("bb", link.now)
-    link.run(1.1)
-    assert link.clocks.ages("bb", link.now + OFFSET, link.now) is not None
-    assert link.ages(0.0), "who has answered is kept"
 
 
 @pytest.fixture

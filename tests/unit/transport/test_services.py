@@ -12,8 +12,8 @@ from holozen.messages import NextGoalReply, NextGoalRequest, TriggerReply, Trigg
 from holozen.messages.codec import WIRES, encoding
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import NoReply, ServiceError
-from holozen.transport.pubsub import Sample
-from holozen.transport.services import MAX_REQUEST_BYTES, Replies, Server, answer_in_turn, call_bytes, refusal
+from holozen.transport.samples import Replies, Sample
+from holozen.transport.services import MAX_REQUEST_BYTES, Server, answer_in_turn, call_bytes, refusal
 
 R = TypeVar("R")
 

@@ -11,7 +11,8 @@ from holozen.messages import Twist, TwistStamped
 from holozen.messages.codec import encode
 from holozen.testing import wait_for
 from holozen.transport.errors import BusError
-from holozen.transport.pubsub import SLOWEST, Arrivals, Latest, RawSubscriber, Subscription
+from holozen.transport.pubsub import SLOWEST, Arrivals, Latest, Subscription
+from holozen.transport.samples import RawSubscriber
 
 
 class Stream:

@@ -12,7 +12,7 @@ import pytest
 from holozen.messages import TFMessage
 from holozen.messages.codec import decode
 from holozen.testing import Process, Wire, wait_for
-from holozen.transport.pubsub import Sample
+from holozen.transport.samples import Sample
 
 from ..conftest import Write
 

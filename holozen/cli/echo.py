@@ -1,0 +1,157 @@
+"""`holozen topic echo`: print the messages of a key."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import threading
+from functools import partial
+from typing import Any
+
+from holozen.cli.hints import suggest_key
+from holozen.cli.output import Hex, Reader, csv_row, cut, lines, strict
+from holozen.console import printable, report
+from holozen.transport.errors import BusError
+from holozen.transport.node import Node
+from holozen.transport.samples import RawSubscriber, Sample
+
+WAITING = 1.0  # s without a message until that is reported
+
+
+def echo(args: argparse.Namespace, bus: Node) -> int:
+    """Print every message of a key, until interrupted."""
+    try:
+        printer, reader = Printer(args), Reader(args.type_flag or args.type or "", args.package)
+    except ValueError as error:
+        report(f"holozen topic echo: {error}")
+        return 2
+    tap = bus.subscribe_raw(args.key)
+    tap.ends.append(bus.announce("sub", "any/msg/Any", args.key))
+    return _echo(args, bus, tap, printer, reader)
+
+
+def _echo(args: argparse.Namespace, bus: Node, tap: RawSubscriber, printer: Printer, reader: Reader) -> int:
+    what = "no message that passes the filter" if args.filter else "no messages"
+    late = threading.Timer(
+        args.timeout or WAITING, tap.close if args.timeout else partial(_wait, args, bus, what, printer)
+    )
+    late.daemon = True
+    late.start()
+    try:
+        while True:
+            try:
+                sample = tap.recv()
+            except BusError:
+                nothing = f"{what} on {args.key} within {args.timeout:g} s"
+                report(f"holozen topic echo: {nothing}{_hint(args, bus, printer)}")
+                return 1
+            if not args.filter:
+                late.cancel()
+            if printer.show(sample, reader.read(sample, bus)):
+                late.cancel()
+                if args.once:
+                    return 0
+    except LookupError as error:
+        report(f"holozen topic echo: {args.key}: {error.args[0]}")
+        return 1
+    finally:
+        printer.report_skipped(reader.why)
+
+
+def _wait(args: argparse.Namespace, bus: Node, what: str, printer: Printer) -> None:
+    try:
+        report(f"waiting for {args.key}; {what} yet{_hint(args, bus, printer)}")
+    except Exception:  # the session was closed in the meantime, for which zenoh raises an error of its own
+        return
+
+
+def _hint(args: argparse.Namespace, bus: Node, printer: Printer) -> str:
+    if printer.stopped:
+        from holozen.cli.fields import lacking
+
+        return f"; {why}" if (why := lacking(args.filter, printer.stopped)) else ""
+    return suggest_key(bus, [args.key])
+
+
+class Printer:
+    """Prints values according to the flags, and counts those it cannot show. Raises ValueError for an invalid flag."""
+
+    def __init__(self, args: argparse.Namespace) -> None:
+        self._args, self._many = args, "*" in args.key
+        self._count = self._undecoded = self._fieldless = 0
+        self._path = self._passes = None
+        self.stopped: Any = None  # the last message that the filter rejected
+        if args.field:
+            from holozen.cli import fields
+
+            self._path, self._pick = fields.path(args.field), fields.pick
+        if args.filter:
+            from holozen.cli import fields
+
+            self._passes = fields.compiled(args.filter)
+        self._short = args.truncate_length or args.no_arr or args.no_str
+
+    def show(self, sample: Sample, value: Any) -> bool:
+        """Print a value; returns whether it was shown. Raises LookupError if the field is missing."""
+        self._count += 1
+        self._undecoded += isinstance(value, Hex)
+        if self._passes and not self._passes(value):
+            self.stopped = value
+            return False
+        if self._path:
+            try:
+                value = self._pick(value, self._path)
+            except LookupError:
+                if not self._many and not isinstance(value, Hex):
+                    raise
+                self._fieldless += 1
+                return False
+        if self._short:
+            value = cut(value, self._args.truncate_length, not self._args.no_arr, not self._args.no_str)
+        self._write(sample, value)
+        return True
+
+    def _write(self, sample: Sample, value: Any) -> None:
+        if self._args.raw:
+            return self._write_raw(sample.payload)
+        if self._args.json:
+            text = self._as_json(sample, value)
+        elif self._args.csv:
+            text = csv_row([sample.key, value] if self._many else value)
+        else:
+            head = [printable(f"# {sample.key}")] if self._many else []
+            text = "\n".join([*head, *lines(value, longest=0 if self._args.full_length else None), "---"])
+        print(text, flush=True)
+        return None
+
+    def _as_json(self, sample: Sample, value: Any) -> str:
+        """One JSON object: the message, or anything that is not one under `value` or `hex`."""
+        # An object received as one line of JSON is printed unchanged.
+        whole = not (self._many or self._path or self._short) and isinstance(value, dict)
+        text = sample.payload.decode() if whole and sample.payload.startswith(b"{") and sample.payload.isascii() else ""
+        if text and text.isprintable() and "NaN" not in text and "Infinity" not in text:
+            return text
+        if isinstance(value, Hex):
+            found = {"hex": sample.payload.hex(), "size": sample.size, "encoding": sample.encoding}
+        elif isinstance(value, dict) and not self._many:
+            found = value
+        else:
+            found = {"value": value}
+        return json.dumps(strict({"key": sample.key, **found} if self._many else found))
+
+    def _write_raw(self, payload: bytes) -> None:
+        """The bytes as received; escaped on a terminal, which control sequences could harm."""
+        if sys.stdout.isatty():
+            print(payload, flush=True)
+        else:
+            sys.stdout.buffer.write(payload if self._args.once else payload + b"\n")
+            sys.stdout.buffer.flush()
+
+    def report_skipped(self, why: str) -> None:
+        """Report how many samples could not be shown, if any, and `why` for the last of them."""
+        if self._undecoded:
+            last = "the last: " * (self._undecoded > 1)
+            report(f"{self._undecoded} of {self._count} samples could not be decoded; {last}{why}")
+        if self._fieldless:
+            report(f"{self._fieldless} of {self._count} samples have no field {self._args.field}")

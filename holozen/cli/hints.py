@@ -1,0 +1,48 @@
+"""Messages about keys and nodes that were not found, with the nearest that were."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from holozen.flags import nearest
+from holozen.transport.graph import Endpoint
+from holozen.transport.node import Node
+
+
+def no_nodes(where: str) -> str:
+    """The message that no node was found, and how to start some."""
+    return f"no nodes found at {where}; `holozen up` starts a robot"
+
+
+def none_found(what: str, ends: list[Endpoint], where: str) -> str:
+    """The message that the nodes at `where`, with the endpoints `ends`, have no `what`, or that there are none."""
+    return f"no {what}: {f'the nodes at {where} have none' if ends else no_nodes(where)}"
+
+
+def unknown(word: str, known: list[str], where: str) -> str:
+    """The message that no node has a key; `known` are the keys at `where`."""
+    if not known:
+        return f"unknown key {word!r}: {no_nodes(where)}"
+    return f"unknown key {word!r}{nearest(word, known)}; known: {listed(known)}"
+
+
+def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
+    """`; did you mean 'odom'?` with the live key nearest to the first of `keys` that no node has, or `; no nodes found
+    at ...`; empty where neither applies.
+    """
+    ends = [end for end in bus.endpoints() if end.session != bus.id]
+    if not ends and not bus.connected():
+        return f"; {no_nodes(bus.where)}"
+    live = {end.key for end in ends if end.kind in kinds and not is_any(end) and "*" not in end.key}
+    lost = [key for key in keys if key not in live and "*" not in key]
+    return nearest(lost[0], sorted(live)) if lost else ""
+
+
+def is_any(end: Endpoint) -> bool:
+    """Whether an endpoint accepts any type, as those of echo do."""
+    return end.type.startswith("any/")
+
+
+def listed(words: Iterable[str]) -> str:
+    """The words separated by commas; `none` if there are none."""
+    return ", ".join(words) or "none"

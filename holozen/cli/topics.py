@@ -1,0 +1,267 @@
+"""What `holozen topic list`, `info`, `type` and `find` do."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import time
+from typing import Any
+
+from holozen.cli.hints import listed, none_found, unknown
+from holozen.cli.output import decode
+from holozen.cli.topic import LISTEN
+from holozen.console import printable, report
+from holozen.flags import nearest
+from holozen.transport.connection import FORBIDDEN
+from holozen.transport.errors import BusError
+from holozen.transport.graph import Endpoint, on_key
+from holozen.transport.node import Node
+from holozen.transport.samples import Replies, Sample
+
+LOOK = 0.002  # s between two polls
+
+
+class Topic:
+    """A key: its types, and how many publish and subscribe."""
+
+    def __init__(self, key: str, ends: list[Endpoint]) -> None:
+        self.key = key
+        self.types = sorted({end.type for end in ends if not end.type.startswith("any/")})
+        self.publishers = sum(end.kind == "pub" for end in ends)
+        self.subscriptions = sum(end.kind == "sub" for end in ends)
+
+    def line(self, counted: str, number: int) -> str:
+        """The line of `list -v`."""
+        return f" * {self.key} [{', '.join(self.types) or 'unknown'}] {number} {counted}{'s' * (number != 1)}"
+
+
+def topics(endpoints: list[Endpoint]) -> list[Topic]:
+    """The keys that nodes read or write, sorted; without key expressions and keys that only tools such as echo read."""
+    ends: dict[str, list[Endpoint]] = {}
+    for end in endpoints:
+        if end.kind in ("pub", "sub") and "*" not in end.key:
+            ends.setdefault(end.key, []).append(end)
+    found = (Topic(key, its) for key, its in sorted(ends.items()))
+    return [topic for topic in found if topic.types or topic.publishers]
+
+
+def list_topics(args: argparse.Namespace, bus: Node) -> int:
+    """Print each key that nodes read or write, once."""
+    heard: set[str] = set()
+    if args.heard:
+        tap, deadline = bus.subscribe_raw("**"), time.monotonic() + args.heard
+        while time.monotonic() < deadline:
+            while (sample := tap.try_recv()) is not None:
+                heard.add(sample.key)
+            time.sleep(0.005)
+    ends = bus.endpoints()
+    hint = FORBIDDEN if bus.connected() and not ends else ""
+    found = topics(ends)
+    found += [Topic(name, []) for name in sorted(heard - {topic.key for topic in found})]
+    if args.count_topics:
+        print(json.dumps({"count": len(found)}) if args.json else len(found))
+    elif args.json:
+        for topic in found:
+            print(json.dumps(vars(topic)))
+    elif args.verbose:
+        _print_verbose(found)
+    else:
+        for topic in found:
+            shown = f"{topic.key} [{', '.join(topic.types) or 'unknown'}]" if args.show_types else topic.key
+            print(printable(shown))
+    if not found:
+        report(none_found("topics", ends, bus.where) + hint)
+    return 0
+
+
+def _print_verbose(found: list[Topic]) -> None:
+    print("Published topics:")
+    for topic in found:
+        if topic.publishers or not topic.subscriptions:
+            print(printable(topic.line("publisher", topic.publishers)))
+    print("\nSubscribed topics:")
+    for topic in found:
+        if topic.subscriptions:
+            print(printable(topic.line("subscriber", topic.subscriptions)))
+
+
+def type_of(args: argparse.Namespace, bus: Node) -> int:
+    """Print a key's type; exit code 1 if no node states it."""
+    found = topics(bus.endpoints())
+    types = next((topic.types for topic in found if topic.key == args.key), [])
+    met = None if types else foreign_sample(bus, args.key)
+    if met and (found_type := type_in(met[0].encoding)):
+        types = [found_type]
+    for name in types:
+        print(json.dumps({"key": args.key, "type": name}) if args.json else printable(name))
+    if met and not types:
+        report(f"holozen topic type: {args.key!r} has no known type; its samples are {met[0].encoding}")
+    elif not types:
+        report(f"holozen topic type: {unknown(args.key, [topic.key for topic in found], bus.where)}")
+    return 0 if types else 1
+
+
+def find(args: argparse.Namespace, bus: Node) -> int:
+    """Print the keys of a type; exit code 1 if there are none."""
+    found = topics(bus.endpoints())
+    keys = [topic.key for topic in found if any(f"/{name}".endswith(f"/{args.type}") for name in topic.types)]
+    if args.count_topics:
+        print(json.dumps({"count": len(keys)}) if args.json else len(keys))
+    else:
+        for name in keys:
+            print(json.dumps({"key": name, "type": args.type}) if args.json else printable(name))
+    if not keys:
+        types = sorted({name for topic in found for name in topic.types})
+        report(f"holozen topic find: no topic of type {args.type!r}{nearest(args.type, types)}; types: {listed(types)}")
+    return 0 if keys else 1
+
+
+Row = dict[str, Any]
+"""A publisher or a subscription, as `info --json` prints it."""
+
+SOURCE = {"source": str, "priority": str, "rate": int | float, "obeyed": bool, "held": bool}  # of CommandSource
+ASK = 0.5  # s
+ENOUGH = 200  # samples, after which `info -v` stops listening
+
+
+def info(args: argparse.Namespace, bus: Node) -> int:
+    """Print a key's type, publishers and subscribers."""
+    endpoints = bus.endpoints()
+    publishers = [_row(end) for end in on_key(endpoints, args.key, "pub")]
+    subscriptions = [_row(end) for end in on_key(endpoints, args.key, "sub")]
+    status = _status(bus, args.key, endpoints)
+    if args.verbose:
+        _add_heard(publishers, _listen(bus, args.key))
+    if not publishers + subscriptions:
+        _add_foreign(publishers, bus, args.key)
+    _add_status(publishers, status)
+    if not publishers + subscriptions:
+        report(f"holozen topic info: {unknown(args.key, [topic.key for topic in topics(endpoints)], bus.where)}")
+        return 1
+    types = sorted({row["type"] for row in publishers + subscriptions} - {"", "any/msg/Any"})
+    if args.json:
+        summary = {"key": args.key, "types": types, "publishers": publishers, "subscriptions": subscriptions}
+        print(json.dumps(summary | ({"status": status} if status else {})))
+        return 0
+    print(printable(f"Type: {', '.join(types) or 'unknown'}"))
+    for title, rows in (("Publisher", publishers), ("Subscription", subscriptions)):
+        print(f"{title} count: {len(rows)}")
+        for row in rows:
+            print(printable(f"  {_line(row)}"))
+    if status:
+        print(printable(f"Obeyed: {status.get('obeyed') or 'none'}{_stop(status)}"))
+    return 0
+
+
+def _row(end: Endpoint) -> Row:
+    return {"node": end.node, "session": end.session, "type": end.type, "source": f"{end.node}@{end.session[:6]}"}
+
+
+def _status(bus: Node, name: str, endpoints: list[Endpoint]) -> Row:
+    """The sim's status of the commands on a key; empty if it publishes none."""
+    if not on_key(endpoints, f"{name}_status", "pub"):
+        return {}
+    answers = bus.ask(f"{name}_status", ASK)  # publishers answer queries with their last message
+    sample = next((answer for answer in answers if isinstance(answer, Sample)), None)
+    status = decode(sample.payload, sample.encoding) if sample else {}
+    return status if isinstance(status, dict) else {}
+
+
+def _add_status(publishers: list[Row], status: Row) -> None:
+    """Add the sim's status to each publisher; sources without a token become rows of their own."""
+    by_source = {row["source"]: row for row in publishers}
+    for source in _sources(status):
+        row = by_source.get(source["source"])
+        if row is None:
+            publishers.append(row := {"node": source["source"], "session": "", "type": "", "source": source["source"]})
+        row |= {name: source[name] for name in ("priority", "rate", "obeyed", "held")}
+
+
+def _sources(status: Row) -> list[Row]:
+    """The well-formed sources of a status, which came over the wire and was not validated."""
+    found = status.get("sources")
+    rows = [row for row in found if isinstance(row, dict)] if isinstance(found, list) else []
+    return [row for row in rows if all(isinstance(row.get(name), kind) for name, kind in SOURCE.items())]
+
+
+def _listen(bus: Node, name: str) -> dict[str, list[Sample]]:
+    """The samples of a key by source, received within LISTEN seconds or until there are ENOUGH."""
+    heard: dict[str, list[Sample]] = {}
+    tap, deadline, count = bus.subscribe_raw(name), time.monotonic() + LISTEN, 0
+    while time.monotonic() < deadline and count < ENOUGH:
+        if (sample := tap.try_recv()) is None:
+            time.sleep(LOOK)
+            continue
+        heard.setdefault(sample.source, []).append(sample)
+        count += 1
+    return heard
+
+
+def _add_heard(publishers: list[Row], heard: dict[str, list[Sample]]) -> None:
+    by_source = {row["source"]: row for row in publishers}
+    for source, samples in heard.items():
+        name = source or "anonymous"
+        row = by_source.get(source)
+        if row is None:
+            publishers.append(row := {"node": name, "session": "", "type": "", "source": name})
+        last = samples[-1]
+        row["type"] = row["type"] or type_in(last.encoding)
+        congestion, express = last.delivery
+        row |= {"priority": last.priority, "encoding": last.encoding, "congestion": congestion, "express": express}
+
+
+def _add_foreign(publishers: list[Row], bus: Node, name: str) -> None:
+    """Add a node without a token that publishes a key or answers queries for it."""
+    if found := foreign_sample(bus, name):
+        sample, answered = found
+        _add_heard(publishers, {sample.source: [sample]})
+        publishers[-1]["node"] += ", when asked" * answered
+
+
+def _line(row: Row) -> str:
+    """One publisher or subscriber: `teleop (ab12cd)  INTERACTIVE_HIGH  20.0 Hz  obeyed`."""
+    session = row["session"]
+    words = [f"{row['node']} ({session[:6]})" if session else str(row["node"])]
+    words += [row[name] for name in ("priority",) if name in row]
+    words += [f"{row['rate']:.1f} Hz"] if "rate" in row else []
+    words += [name for name in ("obeyed", "held") if row.get(name)]
+    words += [row["encoding"]] if "encoding" in row else []
+    words += [f"{row['congestion']} when full{', at once' * row['express']}"] if "congestion" in row else []
+    return "  ".join(map(str, words))
+
+
+def _stop(status: Row) -> str:
+    text = f"; stopped by {status['stopped']}" if status.get("stopped") else ""
+    return text + ("; sources below a person are held until `resume`" if status.get("held") else "")
+
+
+def foreign_sample(bus: Node, key: str) -> tuple[Sample, bool] | None:
+    """The first sample of a key within LISTEN seconds, and whether it is a reply to our query.
+
+    Foreign nodes hold no tokens: only their samples and replies reveal them.
+    """
+    if not bus.connected():
+        return None
+    # `key/**` includes the key itself, and no service takes such a query for a request.
+    tap, replies, deadline = bus.subscribe_raw(key), bus.ask(f"{key}/**", LISTEN), time.monotonic() + LISTEN
+    while time.monotonic() < deadline:
+        if sample := tap.try_recv():
+            return sample, False
+        if answer := _answer(replies, key):
+            return answer, True
+        time.sleep(LOOK)
+    return None
+
+
+def type_in(encoding: str) -> str:
+    """The type named by an encoding such as `application/cdr;geometry_msgs/msg/Twist`; empty if it names none."""
+    schema = encoding.partition(";")[2]
+    return schema if schema.count("/") == 2 else ""
+
+
+def _answer(replies: Replies, key: str) -> Sample | None:
+    try:
+        reply = replies.try_recv()
+    except BusError:  # all have answered
+        return None
+    return reply if isinstance(reply, Sample) and key in (reply.key, "**") else None

@@ -1,0 +1,209 @@
+"""A node on the wire: one Zenoh session with samples as bytes, and the graph. All that looking on needs.
+
+No work is done in Zenoh's threads: samples wait in ring channels, so a slow reader delays only itself.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import re
+import threading
+from collections.abc import Callable
+from functools import partial
+from typing import Any, Self, TypeVar
+
+import zenoh
+
+from holozen.console import report
+from holozen.transport import graph as graphs
+from holozen.transport.connection import Connection, from_environment
+from holozen.transport.errors import BusError
+from holozen.transport.graph import Graph, NodeInfo
+from holozen.transport.samples import Declared, RawSubscriber, Replies, source
+from holozen.transport.session import CLOSE_LIMIT, Opening, linked, one_line, wait_for_threads
+
+D = TypeVar("D", bound=Declared)
+
+ROLL_CALL = 0.5  # s
+DEFINITION_WAIT = 0.5  # s for a node to answer
+
+
+class Node:
+    """A node on the wire. Use it in `with`: an open session keeps a Python process from ending.
+
+    `wire` is "json" or "msgpack", by default as the connection says. `lasting` is for long-running nodes, which are
+    listed in the graph; with `patience` and `stop` it is one of Opening. With an early Opening, the first use waits for
+    it, and raises its error.
+    """
+
+    def __init__(
+        self,
+        node: str,
+        connection: Connection | Opening | None = None,
+        *,
+        wire: str = "",
+        patience: float | None = None,
+        lasting: bool = False,
+        stop: threading.Event | None = None,
+    ) -> None:
+        if not isinstance(connection, Opening):
+            connection = Opening(connection or from_environment(), lasting=lasting, patience=patience, stop=stop)
+        self.node, self.wire, self.where = node, wire or connection.wire, connection.where
+        self._closing, self._opened = connection.closing, connection.opened
+        self._declared: set[Declared] = set()
+        self._keeper = self._opened().keeper if lasting else None
+        if lasting:
+            if exposed := self.exposed():
+                from holozen.transport.listeners import exposure
+
+                report(f"{node}: {exposure(exposed)}")
+            info = self._keep(NodeInfo(self.session, zenoh.handlers.RingChannel(16), node, exposed))
+            info.ends.append(self.announce("node"))
+
+    @property
+    def session(self) -> Any:
+        """Zenoh's session. Raises BusError if it could not be opened."""
+        return self._opened().session
+
+    @property
+    def took(self) -> float:
+        """Seconds until the session was open and had a link: about three round trips over a slow network."""
+        return self._opened().took
+
+    @property
+    def id(self) -> str:
+        """The session's id."""
+        return str(self.session.zid())
+
+    @property
+    def source(self) -> str:
+        """The name of this node in the samples that it sends."""
+        return source(self.node, self.id)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        self.close()
+
+    @property
+    def listens(self) -> list[str]:
+        """The endpoints where this session listens, also those of a configuration file. Raises BusError."""
+        return self._opened().listens
+
+    def exposed(self) -> list[str]:
+        """The endpoints that other machines can reach without a password, a certificate or a permission."""
+        if self._opened().is_guarded or all(one.startswith("tcp/127.0.0.1:") for one in self.listens):
+            return []
+        from holozen.transport.listeners import is_open  # loads socket
+
+        return [*filter(is_open, self.listens)]
+
+    def close(self) -> None:
+        """Close the session. Returns within 0.2 s, whatever the other side does."""
+        self._closing.set()
+        declared = list(self._declared)
+        closer = threading.Thread(target=self._leave, args=(declared,), daemon=True)
+        closer.start()
+        wait_for_threads((closer, self._keeper, *(one.thread for one in declared)), CLOSE_LIMIT)
+
+    def _leave(self, declared: list[Declared]) -> None:
+        # A link that another session opens at this moment may survive the session, and Zenoh would go on to show there
+        # all that was declared. So that goes first.
+        for one in declared:
+            with contextlib.suppress(Exception):  # closed, or in use, by another thread
+                one.close()
+        with contextlib.suppress(BusError, SystemExit):  # an error of opening was reported already
+            self._opened().close()
+
+    def _keep(self, declared: D) -> D:
+        """Keep something until it, or the bus, is closed."""
+        declared.kept = self._declared
+        self._declared.add(declared)
+        return declared
+
+    def announce(self, kind: str = "node", type_name: str = "", key: str = "") -> Any:
+        """List a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
+        endpoint = graphs.Endpoint(key, kind, type_name, self.node, self.id)
+        with one_line(f"key {key!r}"):
+            _ = kind == "node" or zenoh.KeyExpr(key)  # the token's own error would name the token
+            return self.session.liveliness().declare_token(graphs.token(endpoint))
+
+    def subscribe_raw(self, key: str, depth: int = 1024, limit: int = 0) -> RawSubscriber:
+        """A reader of bytes on any key expression. Raises BusError if it is not valid."""
+        with one_line(f"key {key!r}"):
+            subscriber = self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth))
+        return self._keep(RawSubscriber(subscriber, limit))
+
+    def ask(self, key: str, timeout: float, replier: str = "", **request: Any) -> Replies:
+        """Send one request, without waiting for the service. `replier`: the session whose replies are read."""
+        with one_line(f"key {key!r}"):
+            replies = self.session.get(key, timeout=timeout, attachment=self.source, **request)
+        return Replies(replies, replier)
+
+    def served(self, key: str) -> Callable[[], bool]:
+        """A function that returns whether any node, also a foreign one, answers on `key` now."""
+        with one_line(f"key {key!r}"):
+            querier = self.session.declare_querier(key)
+        return lambda: bool(querier.matching_status.matching)
+
+    def writers(self, key: str) -> RawSubscriber:
+        """A reader of a sample for each holozen publisher on `key` that exists, appears or disappears."""
+        tokens = f"@holozen/*/*/pub/*/*/*/{graphs.quoted(key)}"
+        live = self.session.liveliness()
+        return self._keep(RawSubscriber(live.declare_subscriber(tokens, zenoh.handlers.RingChannel(64), history=True)))
+
+    def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
+        """Query all servers of `key`, ahead of other traffic."""
+        return self.ask(
+            key, timeout, target=zenoh.QueryTarget.ALL, consolidation=zenoh.ConsolidationMode.NONE,
+            priority=zenoh.Priority.REAL_TIME, express=True, congestion_control=zenoh.CongestionControl.BLOCK,
+            **request,
+        )  # fmt: skip
+
+    def definition(self, type_name: str) -> str:
+        """The definition of a type and of those nested in it, from a node that publishes it; empty without one."""
+        if not re.fullmatch(r"\w+/(?:msg|srv)/\w+", type_name):
+            return ""
+        for reply in self.ask_all(graphs.definition_key("*", type_name), DEFINITION_WAIT):
+            if not isinstance(reply, bytes):
+                return reply.payload.decode(errors="replace")
+        return ""
+
+    def graph(self, keys: str = graphs.ALL) -> Graph:
+        """The endpoints of all nodes, or those with tokens that match `keys`, kept up to date."""
+        live = self.session.liveliness()
+        tokens = live.declare_subscriber(keys, zenoh.handlers.RingChannel(4096), history=True)
+        return Graph(
+            partial(_token_change, tokens),
+            lambda: list(live.get(keys, timeout=max(ROLL_CALL, self.took))),
+            lambda: map(str, self.session.info.peers_zid() if keys == graphs.ALL else ()),
+            partial(_undeclare, tokens),
+        )
+
+    def endpoints(self, keys: str = graphs.ALL, patience: float = 0.5) -> list[graphs.Endpoint]:
+        """A snapshot of the graph, as of `Graph.settled`, which leaves nothing declared.
+
+        It waits as long as the session took to connect, if that is more than `patience`: the network is slow.
+        """
+        with self.graph(keys) as graph:
+            return graph.settled(self.connected, max(patience, self.took))
+
+    def connected(self) -> bool:
+        """Whether this session has a link to any other. Raises BusError once the bus is closed."""
+        if self._closing.is_set():
+            raise BusError("closed")
+        return linked(self.session)
+
+
+def _undeclare(tokens: Any) -> None:
+    with contextlib.suppress(zenoh.ZError):  # the session is closed
+        tokens.undeclare()
+
+
+def _token_change(tokens: Any) -> tuple[str, bool] | None:
+    try:
+        sample = tokens.try_recv()
+    except zenoh.ZError:
+        raise BusError("closed") from None
+    return sample and (str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
