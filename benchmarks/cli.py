@@ -9,7 +9,8 @@ import os
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from benchmarks.company import beside, guest, host, meeting_point
@@ -44,6 +45,16 @@ def company(endpoint: str, rate: float) -> None:
         tell_for_ever(bus, rate)
 
 
+@contextmanager
+def sim(endpoint: str) -> Iterator[None]:
+    """Within this block a sim with its default robot runs."""
+    with subprocess.Popen([HOLOZEN, "sim", *meet_at(endpoint)], cwd=ROOT, stderr=subprocess.DEVNULL) as process:
+        try:
+            yield
+        finally:
+            process.terminate()
+
+
 def wall(*words: str) -> list[float]:
     """Milliseconds from the start of a process to its end."""
     start = time.perf_counter()
@@ -55,12 +66,14 @@ def wall(*words: str) -> list[float]:
 
 def verbs(turns: int, timed: Sequence[str] = VERBS) -> list[Case]:
     """Verbs beside Python that only prints."""
-    endpoint = meeting_point()
-    with beside(company, endpoint, 50.0):
-        _wait(endpoint)
+    looked_at, driven = meeting_point(), meeting_point()
+    with beside(company, looked_at, 50.0), sim(driven):
+        _wait(looked_at)
+        _wait(driven)
 
         def ours(verb: str) -> Callable[[], list[float]]:
-            return lambda: wall(HOLOZEN, *verb.split(), *meet_at(endpoint))
+            # Who publishes a command waits for the sim's word on it.
+            return lambda: wall(HOLOZEN, *verb.split(), *meet_at(driven if " pub " in verb else looked_at))
 
         def alone() -> list[float]:
             return wall(sys.executable, "-c", "print('up')")
@@ -128,7 +141,7 @@ def _each(call: Callable[[], object]) -> list[float]:
 
 def _wait(endpoint: str) -> None:
     with Bus("waits", guest(endpoint)) as bus:
-        assert bus.latest("odom", Odometry).wait(0, timeout=10), "the robot did not come up within 10 s"
+        assert bus.latest("odom", Odometry).wait(0, timeout=20), "the robot did not come up within 20 s"
 
 
 def loaded() -> list[str]:

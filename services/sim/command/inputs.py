@@ -44,6 +44,7 @@ class TwistInput:
         self.arbiter, self.stats, self._rates = arbiter, CommandStats(report), SourceRates()
         self.freshness: Freshness[Twist | TwistStamped] = Freshness((key, *others), senders, _stops, arbiter.moves)
         self.keys, self.linear, self.angular = (key, *others), linear, angular
+        self.has_news = False  # whether a source came that no status has named yet
 
     def take(
         self, arrived: Iterable[Received[Twist | TwistStamped]], now: float, clocks: tuple[float, ...], since: float
@@ -58,7 +59,7 @@ class TwistInput:
     def _take(self, judged: Judged[Twist | TwistStamped], now: float, clocks: tuple[float, ...]) -> None:
         received, sent, delay, refusal = judged
         rank, source = PRIORITIES.index(received.sample.priority), source_of(received)
-        self._rates.record(source, rank, now, delay)
+        self.has_news |= self._rates.record(source, rank, now, delay)
         message = self.stats.validated(received, self.keys, now)
         if message is None:
             return None
@@ -76,6 +77,7 @@ class TwistInput:
 
     def status(self, now: float) -> CommandStatus:
         """The source that drives, the sources of recent commands, and the counts so far."""
+        self.has_news = False
         driver, held = self.arbiter.driver(now), self.arbiter.holds
         obeyed = driver.source if driver else ""
         return CommandStatus(
@@ -212,15 +214,18 @@ class SourceRates:
     def __init__(self) -> None:
         self._all: dict[tuple[str, int], SourceRate] = {}
 
-    def record(self, source: str, rank: int, now: float, delay: float = 0.0) -> None:
-        """Record a command from `source` at `now` (s), at most `delay` seconds old (0: unknown)."""
+    def record(self, source: str, rank: int, now: float, delay: float = 0.0) -> bool:
+        """Record a command from `source` at `now` (s), at most `delay` seconds old (0: unknown). Returns whether the
+        source is new.
+        """
         each = self._all.get((source, rank))
-        if each is None:
+        if is_new := each is None:
             if len(self._all) >= MAX_SOURCES:
                 del self._all[max(self._all, key=lambda name: (name[1], -self._all[name].last))]
             each = self._all[source, rank] = SourceRate(now)
         each.rank, each.last, each.delay = rank, now, delay
         each.count += 1
+        return is_new
 
     def recent(self, now: float) -> list[tuple[str, int, float, float]]:
         """(source, rank, rate in Hz, delay in s) of recent sources, the highest rank first."""

@@ -185,11 +185,13 @@ class DriveTopics:
         if first is not None:
             arrived = self._commands[0].waiting(first) + arrived
         self._input.take(arrived, now, clocks, since)
+        if self._input.has_news:
+            self.status_at = now
         self.is_waiting = self._input.freshness.is_waiting or len(self._commands) > 1
 
     def publish_status(self, now: float, at_once: bool = False) -> None:
-        """Publish the command status, when it is due and wanted, or `at_once`."""
-        if at_once or (self._status_due.due(now) and self._status.wanted):
+        """Publish the command status, when it is due or names a new source, and is wanted, or `at_once`."""
+        if at_once or ((self._status_due.due(now) or self._input.has_news) and self._status.wanted):
             status, drive = self._input.status(now), self._drive
             status.name, status.strafes = self._name, self._strafes
             status.max_linear = min(self._input.linear, drive.max_linear)

@@ -35,7 +35,7 @@ from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, PRIORITY_OF
 from services.sim import loop as loop_module
 from services.sim.entities import Entities
-from services.sim.loop import DISTRUST, Loop
+from services.sim.loop import DISTRUST, POLL, Loop
 from services.sim.physics.engine import UPRIGHT
 from services.sim.physics.world import World
 
@@ -280,6 +280,19 @@ def test_commands_that_waited_through_a_stall_are_refused(clock: list[float], si
     sim.run(1)
     told = [received.message for received in iter(status.try_recv, None) if received.message]
     assert told[-1].refused == {"late": 2}
+
+
+def test_a_new_source_is_in_a_status_at_once(clock: list[float], sim: Sim) -> None:
+    """Whoever publishes one command waits for that. Too little time passes here for a status to be due."""
+    status = sim.bus.subscribe("Fred/cmd_vel_status", CommandStatus)
+    sim.run(1)
+    assert [received.message for received in iter(status.try_recv, None)], "the first is due at once"
+    for name, is_new in (("one", True), ("one", False), ("two", True), ("one", False)):
+        sim.bus.session.put("Fred/cmd_vel", encode(Twist()), attachment=f"{name}@abc")
+        clock[0] += POLL
+        sim.run(1)
+        told = [received.message for received in iter(status.try_recv, None) if received.message]
+        assert [f"{name}@abc" in [each.source for each in one.sources] for one in told] == [True] * is_new
 
 
 def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: Sim) -> None:
