@@ -21,8 +21,8 @@ def loaded_by(code: str) -> set[str]:
 
 
 def test_looking_at_topics_loads_nothing_heavy() -> None:
-    loaded = loaded_by("import holozen.cli, holozen.cli.topic, holozen.cli.output")
-    assert "holozen.bus" in loaded
+    loaded = loaded_by("import holozen.cli, holozen.cli.topics, holozen.cli.echo")
+    assert "holozen.transport.node" in loaded
     assert loaded & HEAVY == set()
 
 
