@@ -72,7 +72,7 @@ class Ending:
         self._before: Callable[[int, FrameType | None], object]
         atexit.register(self._end)
 
-    def leave(self, code: "int | str | None") -> NoReturn:
+    def leave(self, code: int | str | None) -> NoReturn:
         """Exit, once all non-daemon threads and the callbacks of atexit are done. Ctrl-C ends that wait."""
         self.code = code if isinstance(code, int) else int(code is not None)
         before = signal.getsignal(signal.SIGINT)
