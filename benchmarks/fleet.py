@@ -70,8 +70,8 @@ def fleet(bus: Bus, world: World, model: RobotModel, robots: int) -> tuple[Entit
 
 
 def bare(model: RobotModel, robots: int) -> Stepper:
-    """The same bodies on the same ground, and nothing but steps."""
-    world, body = World(WORLD), lump(model)
+    """The same bodies and nothing but steps. Where the world is not quite level they keep their contacts."""
+    world, body = World(replace(WORLD, gravity=(1e-9, 0.0, WORLD.gravity[2]))), lump(model)
     for at in places(robots):
         world.add(body, at)
 

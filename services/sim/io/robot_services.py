@@ -33,11 +33,14 @@ class RobotServices:
             bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer)
             for verb, answer in zip(self.VERBS, answers, strict=True)
         )
+        self._in_order = (self._stop, self._release, self._resume)
         self._now = 0.0
 
     def answer(self, now: float) -> None:
         """Answer the requests that wait at `now` (s)."""
         self._now = now
+        if not sum(server.take_in() for server in self._in_order):  # nearly always
+            return
         if self._stop.take_in():  # a stop wins over requests that wait with it
             for server in (self._release, self._resume):
                 server.take_in(RING)  # now: a release that is sent once the stop is confirmed counts
