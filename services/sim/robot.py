@@ -153,6 +153,8 @@ class Robot:
         if self.mover.body.glides and not wanted:
             return  # else encoders, and the wheels for the eye, count on whoever looks
         stamp, moved = Time.of(time), self.mover.moved(time, dt)
+        if not math.isfinite(sum(moved[0])):  # nobody may read, and so nobody encode, what would show it
+            raise ValueError(f"its position became {moved[0]}")
         if drive:
             drive.publish(stamp, moved)
         if joints and joints.wanted:
