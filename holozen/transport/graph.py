@@ -90,7 +90,7 @@ class Graph:
 
     `change` returns the next token's key and whether it exists now, or None without news. `roll_call` returns when all
     nodes that are connected by now have sent their tokens; `met` returns their sessions. `undeclare` ends the
-    subscription. Use it in `with`, or keep it until the bus is closed.
+    subscription. `took`: the seconds that the first link took. Use it in `with`, or keep it until the bus is closed.
     """
 
     def __init__(
@@ -99,8 +99,10 @@ class Graph:
         roll_call: Callable[[], object] = lambda: None,
         met: Callable[[], Iterable[str]] = tuple,
         undeclare: Callable[[], object] = lambda: None,
+        took: float = 0.0,
     ) -> None:
         self._change, self._roll_call, self._met, self._undeclare = change, roll_call, met, undeclare
+        self._took = took
         self._tokens: set[str] = set()
         self._sessions: dict[str, set[str]] = {}  # the tokens of each
         self._publishers: dict[str, Counter[str]] = {}  # key -> sessions with a publisher there
@@ -140,8 +142,9 @@ class Graph:
     def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.015) -> list[Endpoint]:
         """The endpoints once there is a link and nothing has changed for a while; at most twice `patience` seconds.
 
-        Peers introduce further peers, which takes a moment: `quiet` seconds, or twice the time that the last change
-        took, since a slow network or machine needs longer. A peer without tokens may be foreign, or about to send some.
+        Peers introduce further peers, which takes a moment: `quiet` seconds, or twice the time that the first link or
+        the last change took, since a slow network or machine needs longer. A peer without tokens may be foreign, or
+        about to send some.
         """
         start = time.monotonic()
         while not connected():
@@ -152,7 +155,7 @@ class Graph:
         self._roll_call()  # on a new link there may be nothing yet that answers
         known, since = self.endpoints(), time.monotonic()
         while (now := time.monotonic()) < deadline:
-            passed, enough = now - since, max(quiet, 2 * (since - start))
+            passed, enough = now - since, max(quiet, 2 * self._took, 2 * (since - start))
             if known and (passed > SILENT_FACTOR * enough or (passed > enough and self._all_announced())):
                 break
             time.sleep(0.001)

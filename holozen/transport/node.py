@@ -179,6 +179,7 @@ class Node:
             lambda: list(live.get(keys, timeout=max(ROLL_CALL, self.took))),
             lambda: map(str, self.session.info.peers_zid() if keys == graphs.ALL else ()),
             partial(_undeclare, tokens),
+            self.took,
         )
 
     def endpoints(self, keys: str = graphs.ALL, patience: float = 0.5) -> list[graphs.Endpoint]:

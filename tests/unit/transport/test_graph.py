@@ -152,6 +152,14 @@ def test_who_is_met_and_has_told_nothing_yet_is_waited_for_longer() -> None:
     assert graph.settled(lambda: True) == [ODOM, late]
 
 
+def test_where_the_first_link_took_long_so_may_the_next() -> None:
+    late = ODOM._replace(session="b2")
+    looks = iter([*[None] * 30, (token(late), True)])
+    changes = deque([(token(ODOM), True)])
+    graph = Graph(lambda: changes.popleft() if changes else next(looks, None), took=0.02)
+    assert graph.settled(lambda: True) == [ODOM, late]
+
+
 def test_tokens_of_strangers_are_ignored() -> None:
     odd = ("@holozen", "@holozen/x", "@holozen/x/y", "x", "@holozen/a/b/pub/z", "@holozen///", "@holozen/a/b/node/c")
     graph = graph_of(*((key, True) for key in odd), (token(ODOM), True), *((key, False) for key in odd))
