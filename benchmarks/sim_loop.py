@@ -33,7 +33,7 @@ from services.sim.physics.world import World
 from services.sim.robot import Robot
 from services.sim.spawn import spawn_all
 
-AIM = "ratio <= 1.11 (ours / bare engine), which is 0.9 of its speed"
+AIM = "ratio <= 0.6 (ours / bare engine)"
 ROBOT = data.find("urdf", "hb_bot.urdf.xacro")
 WORLD = load_world(data.find("worlds", "gazebo.world"))
 COMMAND = Twist.planar(0.3, 0.1, 0.4)

@@ -62,13 +62,14 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str]) -> int:
     args = parser().parse_args(argv)
+    where = connection.from_arguments(args).arguments()
     stop = stop_event()
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     if not has_terminal:
         report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
     with tempfile.TemporaryFile("w+", errors="replace") as log:
-        team = Team(connection.from_arguments(args).arguments(), log if has_terminal else None, not args.no_restart)
+        team = Team(where, log if has_terminal else None, not args.no_restart)
         try:
             robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
             packages = [word for package in args.package for word in ("--package", package)]

@@ -31,11 +31,21 @@ def words_of(pid: int) -> list[str]:
         return []
 
 
+def parent_of(pid: int) -> int:
+    """The parent's process id; 0 if the process is gone."""
+    try:
+        return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+    except OSError:
+        return 0
+
+
 def parts_at(wire: Wire) -> dict[str, int]:
     """The verbs that run on this wire, with their process ids; `up` itself too."""
     found = {}
     for pid in map(int, filter(str.isdecimal, os.listdir("/proc"))):
         words = words_of(pid)
+        if words == words_of(parent_of(pid)):  # it is about to become another program
+            continue
         if wire.endpoint in words and "holozen" in words and "-c" not in words:
             found[words[words.index("holozen") + 1]] = pid
     return found

@@ -131,7 +131,7 @@ def test_a_stopped_robot_is_told_and_is_no_error(wire: Wire) -> None:
     wire.start("sim").wait_for_line("listens on")
     assert wire.run("stop").returncode == 0
     code, rows = doctor(wire)
-    assert (code, bad(rows, "cmd_vel")[0].startswith("warning: the robot is stopped by stop@")) == (0, True)
+    assert (code, bad(rows, "cmd_vel")[0].startswith("warning: hb_bot is stopped by stop@")) == (0, True)
 
 
 @contextlib.contextmanager
@@ -158,7 +158,7 @@ def test_two_that_fight_for_a_robot_are_told(wire: Wire) -> None:
     wire.start("sim").wait_for_line("listens on")
     with commanding(wire.bus("left"), wire.bus("right")):
         (text,) = wait_for(lambda: bad(doctor(wire)[1], "cmd_vel"), within=30)
-    assert text.startswith("error: 2 sources command the robot at once: left@")
+    assert text.startswith("error: 2 sources command hb_bot at once: left@")
     assert "DATA" in text and "not obeyed" in text and "right@" in text
 
 
@@ -245,7 +245,7 @@ def test_variables_put_every_process_on_a_network_and_the_doctor_shows_them(wire
 
     with Process(command("up"), env=env) as up:
         up.wait_for_line("goals")
-        assert "controller" in wire.run("node", "list").stdout, "up and all that it starts are there"
+        wait_for(lambda: "controller" in wire.run("node", "list").stdout, what="all that up starts")
         assert run("topic", "echo", "odom", "--once").returncode == 0
         shown = run("doctor", "--json", "--mode", "peer").stdout
         found = [row["text"] for row in map(json.loads, shown.splitlines()) if row["check"] == "environment"]

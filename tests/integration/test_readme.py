@@ -25,7 +25,7 @@ LASTING = {
     "teleop": "listening sim",
     "xacro my_bot.urdf.xacro --watch": "Fred",
     "sim": "listens on cmd_vel",
-    "run examples/lesson/hb_control/scripts/service_node.py": "the shape is a square",
+    "run examples/lesson/hb_control/scripts/service_node.py": "the shape is a",
     "run examples/lesson/hb_control/scripts/controller.py": "goal 1",
     "launch": "goal 1",
 }

@@ -114,7 +114,7 @@ VERBS = {
     "graph": row("", silent=("", 0, "no nodes found at ")),
     "completion": row("bash", ("tcsh", 2, "'tcsh'; there are bash, zsh, fish"), bus=False),
     "interface list": row("", ("--package a=/no/such", 1, "there is no such folder"), bus=False),
-    "interface show": row(TWIST, ("geometry_msgs/msg/Twsit", *TYPO), silent=("odom", 1, "'odom' is not a type")),
+    "interface show": row("odom", ("geometry_msgs/msg/Twsit", *TYPO), silent=("odom", 1, "'odom' is not a type")),
     "interface proto": row(TWIST, ("geometry_msgs/msg/Twsit", *TYPO), bus=False),
     "record": RECORD,
     "replay": REPLAY,
