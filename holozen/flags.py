@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from holozen.console import report
+from holozen.suggest import suggest
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -49,7 +50,7 @@ class Parser(argparse.ArgumentParser):
         if left and not before:
             message = f"unexpected argument {left!r}"
         if not verbs and (flag := self._unknown_flag(message, [] if before else left.split())):
-            message = f"no flag {flag!r}{nearest(flag, self._option_string_actions)}"
+            message = f"no flag {flag!r}{suggest(flag, self._option_string_actions)}"
         report(f"{self.prog}: {message}; see `{self.prog} --help`")
         raise SystemExit(2)
 
@@ -68,7 +69,7 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             words = [str(choice) for choice in action.choices]
-            raise argparse.ArgumentError(action, f"{value!r}{nearest(value, words)}; there are {', '.join(words)}")
+            raise argparse.ArgumentError(action, f"{value!r}{suggest(value, words)}; there are {', '.join(words)}")
 
 
 def refused(text: str) -> Exception:
@@ -100,19 +101,6 @@ def count(low: int = 0) -> Callable[[str], int]:
         return int(text)
 
     return parse
-
-
-def nearest(word: str, words: Iterable[str]) -> str:
-    """`; did you mean ...?` with the closest of `words`; empty if none is close. For the end of an error message."""
-    from difflib import SequenceMatcher
-
-    def likeness(other: str) -> float:
-        """Similarity from 0 to 1; the start of a word scores nearly as high."""
-        whole, start = (SequenceMatcher(None, word, text).ratio() for text in (other, other[: len(word)]))
-        return max(whole, 0.95 * start)
-
-    closest = max(words, key=likeness, default="")
-    return f"; did you mean {closest!r}?" if closest and likeness(closest) > 0.65 else ""
 
 
 def key(text: str) -> str:

@@ -98,8 +98,6 @@ class Finding:
 # Suggestions for misspelt words.
 
 
-MOST_NAMES = 1000  # compared with one word
-
 ALIASES = {
     "height": "length",
     "min": "lower",
@@ -153,18 +151,6 @@ def nearest(word: str, known: Iterable[str], shortest: int = 2) -> str | None:
     near = [other for other in words if distance(plain, _plain(other)) <= allowed]
     # Of two spellings of one word, prefer the one in the same style.
     return min(near, key=lambda other: (distance(plain, _plain(other)), distance(word, other)), default=None)
-
-
-def closest(word: str, known: Iterable[str]) -> str:
-    """` (did you mean 'x'?)` with the closest existing name, else nothing."""
-    words = list(known)
-    if len(words) > MOST_NAMES:
-        return ""
-    found = nearest(word, words)
-    if found is None:
-        parts = [other for other in words if len(word) > 2 and (word.lower() in other.lower())]
-        found = min(parts, key=len, default=None)
-    return f" (did you mean {found!r}?)" if found else ""
 
 
 def _plain(word: str) -> str:

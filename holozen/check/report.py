@@ -33,6 +33,7 @@ from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, kind_of
 from holozen.robot.xacro import read_text
+from holozen.suggest import shorten
 
 # Fixes for a file that cannot be read.
 
@@ -213,5 +214,4 @@ def _finding(rule: Rule, mistake: Mistake, subject: Subject) -> Finding:
 
 def _short(text: str) -> str:
     """The text with long words, and itself, truncated: file contents may be of any length."""
-    text = _LONG.sub(lambda word: f"{word[0][:77]}...", text)
-    return text if len(text) <= LONGEST else f"{text[: LONGEST - 3]}..."
+    return shorten(_LONG.sub(lambda word: shorten(word[0]), text), LONGEST)

@@ -4,12 +4,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from holozen.check.engine import Mistake, Place, Subject, closest, rule
+from holozen.check.engine import Mistake, Place, Subject, rule
 from holozen.check.geometry import box_of, size_of
 from holozen.check.rules_inertia import dimensions
-from holozen.robot.errors import RobotError, listed
+from holozen.robot.errors import RobotError
 from holozen.robot.model import JOINT_KINDS
 from holozen.robot.xacro import read_text
+from holozen.suggest import listed, suggest
 
 GRAIN = 1e-6  # m; rounding error of sums of decimals
 
@@ -60,7 +61,7 @@ def missing_names(subject: Subject) -> Iterator[Mistake]:
             continue
         there = subject.links if need.kind == "link" else subject.joints
         if need.name not in there:
-            problem = f"there is no {need.kind} {need.name!r}{closest(need.name, there)}"
+            problem = f"there is no {need.kind} {need.name!r}{suggest(need.name, there)}"
             yield Mistake(subject.root, problem, f"rename or add one; there are: {listed(list(there))}")
         elif need.type and (kind := there[need.name].attributes.get("type")) != need.type:
             yield Mistake(there[need.name], f"joint {need.name!r} is {kind}, not {need.type}", f'type="{need.type}"')

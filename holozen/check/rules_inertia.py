@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.geometry import MOVING, box_of, fixed_bodies, half_sizes, size_of
 from holozen.robot.elements import Tag, Vector, number
-from holozen.robot.errors import listed
 from holozen.robot.inertia import positive_definite
 from holozen.robot.model import Link, Shape
+from holozen.suggest import listed
 
 FACTOR = 10.0  # between the given inertia and that of the solid shape
 MINOR = 0.1  # of the mass of what a link is fixed to; the inertia of a smaller part is irrelevant

@@ -3,8 +3,9 @@
 import math
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, Subject, closest, rule
+from holozen.check.engine import Mistake, Subject, rule
 from holozen.robot.elements import Tag, number
+from holozen.suggest import suggest
 
 LARGE_ANGLE = 20.0  # rad; more than three turns, and written as a round number of degrees
 
@@ -57,7 +58,7 @@ def mimics(subject: Subject) -> Iterator[Mistake]:
     for name, mimic in leaders.items():
         leader = mimic.attributes.get("joint", "").strip() if mimic else ""
         if mimic and leader and leader not in subject.joints:
-            problem = f"joint {name!r} mimics {leader!r}, which does not exist{closest(leader, subject.joints)}"
+            problem = f"joint {name!r} mimics {leader!r}, which does not exist{suggest(leader, subject.joints)}"
             yield Mistake(mimic, problem, "name a joint of this robot")
         elif mimic and _comes_back(name, leaders):
             yield Mistake(

@@ -4,9 +4,9 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, SourceFile, Subject, closest, rule
+from holozen.check.engine import Mistake, SourceFile, Subject, rule
 from holozen.robot.elements import Tag
-from holozen.robot.errors import listed
+from holozen.suggest import listed, suggest
 
 PALETTE = 2  # this many unused colours are a palette shared by several robots
 
@@ -102,7 +102,7 @@ def colours(subject: Subject) -> Iterator[Mistake]:
     for name, tag in given.items():
         if name and not tag.children and not name.startswith("Gazebo/"):
             fix = f'write <material name="{name}"> with a <color rgba="..."/> in it, next to the links'
-            yield Mistake(tag, f"material {name!r} has no colour anywhere{closest(name, known)}", fix)
+            yield Mistake(tag, f"material {name!r} has no colour anywhere{suggest(name, known)}", fix)
 
 
 @rule("unused-colour", "warning", "a material that nothing uses", "a name may be misspelt")
@@ -169,7 +169,7 @@ def _has_parts(subject: Subject) -> bool:
 
 def _unknown(tag: Tag, problem: str, name: str, known: object) -> Mistake:
     names = list(known)  # type: ignore[call-overload]
-    return Mistake(tag, problem + closest(name, names), f"known names: {listed(names)}")
+    return Mistake(tag, problem + suggest(name, names), f"known names: {listed(names)}")
 
 
 def _materials(subject: Subject) -> Iterator[Tag]:

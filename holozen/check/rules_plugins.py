@@ -3,10 +3,10 @@
 import re
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, Subject, closest, nearest, rule
+from holozen.check.engine import Mistake, Subject, nearest, rule
 from holozen.robot.elements import Tag
-from holozen.robot.errors import listed
 from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
+from holozen.suggest import listed, suggest
 
 SUGGESTED = ("gazebo_ros_planar_move", "gazebo_ros_diff_drive", "gazebo_ros_skid_steer_drive")  # to drive with
 FAMILIES = re.compile(
@@ -51,7 +51,7 @@ def plugin_links(subject: Subject) -> Iterator[Mistake]:
         if not name or name in subject.links or "::" in name or not subject.links:
             continue
         if sort in LINK_TAGS:
-            problem = f"<{tag.name}> is {name!r}, which names no link{closest(name, subject.links)}"
+            problem = f"<{tag.name}> is {name!r}, which names no link{suggest(name, subject.links)}"
             yield Mistake(tag, problem, f"links: {listed(list(subject.links))}")
         elif sort in FRAME_TAGS and (suggestion := nearest(name, subject.links)):
             yield Mistake(tag, f"<{tag.name}> is {name!r}, which names no link", f"write {suggestion}")
@@ -62,7 +62,7 @@ def plugin_joints(subject: Subject) -> Iterator[Mistake]:
     """Plugin joints that do not exist."""
     for tag, name in subject.plugin_joints:
         if name not in subject.joints and "::" not in name and subject.joints:
-            problem = f"<{tag.name}> is {name!r}, which names no joint{closest(name, subject.joints)}"
+            problem = f"<{tag.name}> is {name!r}, which names no joint{suggest(name, subject.joints)}"
             yield Mistake(tag, problem, f"joints: {listed(list(subject.joints))}")
 
 

@@ -128,10 +128,10 @@ def _main(words: list[str]) -> int:
         return complete(words[1:], VERBS, command)
     if words[0] not in VERBS:
         from holozen.console import report
-        from holozen.flags import nearest
+        from holozen.suggest import suggest
 
         instead = ELSEWHERE.get(words[0])
-        hint = f"; {instead}" if instead else nearest(words[0], VERBS)
+        hint = f"; {instead}" if instead else suggest(words[0], VERBS)
         report(f"holozen: no verb {words[0]!r}{hint}; `holozen --help` lists the verbs")
         return 2
     return _run(words[0], words[1:])

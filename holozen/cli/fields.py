@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from itertools import pairwise
 from typing import Any
 
-from holozen.flags import nearest
+from holozen.suggest import suggest
 
 Path = tuple[str | int, ...]
 
@@ -50,7 +50,7 @@ def _missing(value: Any, part: str | int) -> str:
     if not isinstance(value, dict):
         return f"no field {part!r} in a {'list; write [0]' if isinstance(value, list) else type(value).__name__}"
     names = [str(name) for name in value]
-    return f"no field {part!r}{nearest(str(part), names)}; there are {', '.join(names) or 'none'}"
+    return f"no field {part!r}{suggest(str(part), names)}; there are {', '.join(names) or 'none'}"
 
 
 LONGEST = 1000  # characters

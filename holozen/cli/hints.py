@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from holozen.flags import nearest
+from holozen.suggest import listed, suggest
 from holozen.transport.graph import Endpoint
 from holozen.transport.node import Node
 
@@ -23,7 +23,7 @@ def unknown(word: str, known: list[str], where: str) -> str:
     """The message that no node has a key; `known` are the keys at `where`."""
     if not known:
         return f"unknown key {word!r}: {no_nodes(where)}"
-    return f"unknown key {word!r}{nearest(word, known)}; known: {listed(known)}"
+    return f"unknown key {word!r}{suggest(word, known)}; known: {listed(known)}"
 
 
 def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
@@ -35,14 +35,9 @@ def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub",
         return f"; {no_nodes(bus.where)}"
     live = {end.key for end in ends if end.kind in kinds and not is_any(end) and "*" not in end.key}
     lost = [key for key in keys if key not in live and "*" not in key]
-    return nearest(lost[0], sorted(live)) if lost else ""
+    return suggest(lost[0], sorted(live)) if lost else ""
 
 
 def is_any(end: Endpoint) -> bool:
     """Whether an endpoint accepts any type, as those of echo do."""
     return end.type.startswith("any/")
-
-
-def listed(words: Iterable[str]) -> str:
-    """The words separated by commas; `none` if there are none."""
-    return ", ".join(words) or "none"

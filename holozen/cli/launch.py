@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from holozen import flags
 from holozen.console import report
+from holozen.suggest import suggest
 from holozen.transport import connection
 
 if TYPE_CHECKING:
@@ -92,7 +93,7 @@ def _report_unused(path: Path, used: set[str], left: set[str], later: set[str]) 
     unused = left - used - later if ANY not in later else set()
     left -= unused
     for name in sorted(unused):
-        hint = flags.nearest(name, used) or f"; it has {', '.join(sorted(used)) or 'no arguments'}"
+        hint = suggest(name, used) or f"; it has {', '.join(sorted(used)) or 'no arguments'}"
         report(f"holozen launch: {path.name} does not use {name!r}{hint}")
 
 
@@ -111,7 +112,7 @@ def _file(words: list[str], options: argparse.ArgumentParser) -> Path:
     found = next((each for each in there if each.name == name), None)
     if found is None:
         names = [each.name for each in there if each.suffix == ".py"]
-        hint = flags.nearest(name, names) or f"; there are {', '.join(names) or 'none'}"
+        hint = suggest(name, names) or f"; there are {', '.join(names) or 'none'}"
         raise NotFound(f"no launch file {name!r} in {folder / 'launch'}{hint}")
     return found
 

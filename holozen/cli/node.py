@@ -5,10 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 
-from holozen.cli.hints import is_any, listed, no_nodes
+from holozen.cli.hints import is_any, no_nodes
 from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
-from holozen.flags import key, nearest
+from holozen.flags import key
+from holozen.suggest import listed, suggest
 from holozen.transport.graph import Endpoint, includes
 
 TITLES = {"sub": "Subscribers", "pub": "Publishers", "srv": "Service Servers"}
@@ -38,7 +39,7 @@ def info(args: argparse.Namespace) -> int:
     if not ends:
         names = sorted({end.node for end in endpoints})
         known = f"known: {listed(names)}" if names else no_nodes(bus.where)
-        report(f"holozen node info: unknown node {args.name!r}{nearest(name, names)}; {known}")
+        report(f"holozen node info: unknown node {args.name!r}{suggest(name, names)}; {known}")
         return 1
     for session in sorted({end.session for end in ends}):
         _print_node(name, [end for end in ends if end.session == session], args.json)

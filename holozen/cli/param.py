@@ -21,8 +21,9 @@ from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
-from holozen.flags import key, nearest, number
+from holozen.flags import key, number
 from holozen.process import deferred_interrupt
+from holozen.suggest import suggest
 from holozen.transport.errors import BusError
 
 if TYPE_CHECKING:
@@ -110,7 +111,7 @@ class Nodes:
     def _there(self, name: str) -> str:
         if not self.sessions:
             return "; no node has any; `holozen up` starts a robot"
-        return nearest(name, sorted(self.sessions)) or f"; there are {', '.join(sorted(self.sessions))}"
+        return suggest(name, sorted(self.sessions)) or f"; there are {', '.join(sorted(self.sessions))}"
 
 
 def _as_many(found: list[Any], asked: list[Any], node: str) -> list[Any]:

@@ -7,12 +7,13 @@ import json
 import time
 
 from holozen.bus import Bus
-from holozen.cli.hints import listed, none_found, suggest_key, unknown
+from holozen.cli.hints import none_found, suggest_key, unknown
 from holozen.cli.output import CDR, Hex, Reader, lines
 from holozen.cli.verb import Noun, Verb, add_packages, by_name, open_bus
 from holozen.console import printable, report
-from holozen.flags import key, nearest, number
+from holozen.flags import key, number
 from holozen.process import deferred_interrupt
+from holozen.suggest import listed, suggest
 from holozen.transport.errors import NoReply
 from holozen.transport.graph import Endpoint
 from holozen.transport.services import call_bytes
@@ -63,7 +64,7 @@ def find(args: argparse.Namespace) -> int:
         print(json.dumps({"key": name, "type": args.type}) if args.json else printable(name))
     if not keys:
         types = sorted({end.type for end in served})
-        near = nearest(args.type, types)
+        near = suggest(args.type, types)
         report(f"holozen service find: no service of type {args.type!r}{near}; types: {listed(types)}")
     return 0 if keys else 1
 

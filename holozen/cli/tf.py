@@ -10,12 +10,13 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
-from holozen.cli.hints import listed, no_nodes
+from holozen.cli.hints import no_nodes
 from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
-from holozen.flags import nearest, number, robot
+from holozen.flags import number, robot
 from holozen.process import stop_event
 from holozen.rotation import Transform, to_rpy
+from holozen.suggest import listed, suggest
 from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ class Frames:
         """
         for name in (source, target):
             if name not in (names := self.names()):
-                raise LookupError(f"no frame {name!r}{nearest(name, names)}; frames: {listed(names)}")
+                raise LookupError(f"no frame {name!r}{suggest(name, names)}; frames: {listed(names)}")
         root, to_source, first = self._to_root(source)
         other, to_target, second = self._to_root(target)
         if root != other:

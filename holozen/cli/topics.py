@@ -7,11 +7,11 @@ import json
 import time
 from typing import Any
 
-from holozen.cli.hints import listed, none_found, unknown
+from holozen.cli.hints import none_found, unknown
 from holozen.cli.output import decode
 from holozen.cli.topic import LISTEN
 from holozen.console import printable, report
-from holozen.flags import nearest
+from holozen.suggest import listed, suggest
 from holozen.transport.connection import FORBIDDEN
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, on_key
@@ -112,7 +112,7 @@ def find(args: argparse.Namespace, bus: Node) -> int:
             print(json.dumps({"key": name, "type": args.type}) if args.json else printable(name))
     if not keys:
         types = sorted({name for topic in found for name in topic.types})
-        report(f"holozen topic find: no topic of type {args.type!r}{nearest(args.type, types)}; types: {listed(types)}")
+        report(f"holozen topic find: no topic of type {args.type!r}{suggest(args.type, types)}; types: {listed(types)}")
     return 0 if keys else 1
 
 

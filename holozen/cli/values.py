@@ -16,9 +16,9 @@ from holozen import messages as m
 from holozen import wire
 from holozen.bus import Bus
 from holozen.console import report
-from holozen.flags import nearest
 from holozen.messages import CodecError, Message, codec
 from holozen.messages.message import not_finite
+from holozen.suggest import suggest
 from holozen.transport.graph import Endpoint
 
 if TYPE_CHECKING:
@@ -146,7 +146,7 @@ def _field_hint(reason: str, value: Any, kinds: Kinds) -> str:
         if known:
             break
     names = list(known) if isinstance(known, dict) else []
-    return f"{nearest(word, names)}; there are {', '.join(names) or 'none'}"
+    return f"{suggest(word, names)}; there are {', '.join(names) or 'none'}"
 
 
 class Ours:
@@ -306,5 +306,5 @@ def _fields(kind: Interface) -> list[list[str]]:
 
 def _untyped(key: str, servers: list[Endpoint]) -> str:
     known = [service.key for service in wire.SERVICES]
-    near = nearest(key, dict.fromkeys([*(end.key for end in servers), *known]))
+    near = suggest(key, dict.fromkeys([*(end.key for end in servers), *known]))
     return f"{key!r} has no known type{near}; known: {', '.join(known)}; give the type, or --any"

@@ -10,6 +10,7 @@ import msgspec
 from holozen.console import printable
 from holozen.messages import CodecError
 from holozen.messages.message import Message, listed, not_finite
+from holozen.suggest import shorten
 
 __all__ = ["WIRES", "CodecError", "convert", "decode", "encode", "encoding", "written"]
 
@@ -130,8 +131,7 @@ def _first(makers: Makers[M], value: Any) -> M:
 
 def _short(text: str) -> str:
     """One line: a field's name in it came over the wire and may be anything."""
-    text = printable(text)
-    return text if len(text) <= LONGEST else text[:LONGEST] + " ..."
+    return shorten(printable(text), LONGEST)
 
 
 def _write_json(message: Message) -> tuple[bytes, bool]:

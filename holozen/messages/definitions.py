@@ -6,8 +6,10 @@ along, and an echo has to start at once. The spellings of ROS 1 are read too: He
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, NamedTuple
+
+from holozen.suggest import shorten, suggest
 
 LARGEST = 16_000_000  # bytes of the smallest message of a type; nested fixed arrays multiply
 MOST_FIELDS = 10_000  # of a type, nested ones included; each level can double them
@@ -285,7 +287,7 @@ def completed(interface: Interface, value: Any, path: str = "") -> dict[str, Any
         if name not in names:
             where = f"{path}.{name}" if path else f"{name}"
             raise InterfaceError(
-                f"{interface.name} has no field {where[:80]!r}{closest(str(name), names) or _listed(names)}"
+                f"{interface.name} has no field {where[:80]!r}{suggest(str(name), names) or _listed(names)}"
             )
     return {
         field.name: _checked(field, value[field.name], f"{path}.{field.name}".lstrip("."))
@@ -365,17 +367,7 @@ def _is_unicode(text: str) -> bool:
 
 
 def _shown(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:80]}..."
-
-
-def closest(name: str, known: Iterable[str]) -> str:
-    """`; did you mean X?` with the most similar name in `known`; empty if none is similar."""
-    import difflib
-
-    folded = {each.lower().rpartition("/")[2]: each for each in known}  # the package is no sign of similarity
-    found = difflib.get_close_matches(name.lower().rpartition("/")[2], folded, 1)
-    return f"; did you mean {folded[found[0]]}?" if found else ""
+    return shorten(repr(value))
 
 
 SEPARATOR = "=" * 80  # between two definitions

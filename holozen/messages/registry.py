@@ -7,7 +7,8 @@ import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from holozen.messages.definitions import LARGEST_FILE, Interface, InterfaceError, closest, parse, split_text
+from holozen.messages.definitions import LARGEST_FILE, Interface, InterfaceError, parse, split_text
+from holozen.suggest import last_part, listed, suggest
 
 TABLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "interfaces")
 KINDS = ("msg", "srv")
@@ -264,21 +265,16 @@ class Registry:
 
     def _bare(self, name: str) -> str:
         same = [full for full in self.names() if full.rpartition("/")[2].lower() == name.lower()]
-        hint = f"did you mean {' or '.join(same)}?" if same else "`holozen interface list` lists all"
+        hint = f"did you mean {' or '.join(map(repr, same))}?" if same else "`holozen interface list` lists all"
         return f"{name[:80]!r} is not a type: the package is missing; {hint}"
 
     def _unknown(self, name: str, package: str) -> str:
         known = [f"{package}/{each}" for each in self.places.names(package)]
         if not known:
             there = self.places.packages()
-            hint = closest(package, there) or f"; known: {listed(there)}"
+            hint = suggest(package, there) or f"; known: {listed(there, MOST)}"
             return f"no package {package!r} with interfaces{hint}; give its folder: --package {package}=DIR"
-        return f"no type {name!r}{closest(name, known) or '; known: ' + listed(known)}"
-
-
-def listed(names: list[str]) -> str:
-    """The first names, and how many more there are."""
-    return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "")
+        return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MOST)}"
 
 
 def full_name(name: str) -> str:

@@ -2,12 +2,13 @@
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
 
-from holozen.robot.errors import RobotError, cut, suggest
+from holozen.robot.errors import RobotError
+from holozen.suggest import cut, suggest
 
 Vector = tuple[float, float, float]
 
@@ -325,7 +326,7 @@ class Source:
         self.warnings += [f"{place}, line {line}: {problem}" for line, problem in mistakes[:MOST_WARNINGS]]
         return read_xml(text, place)
 
-    def nearest(self, name: str, known: Iterable[str], common: str = "", alike: float = 0.6) -> str:
-        """As `suggest`; nothing after MOST_GUESSES."""
+    def suggest(self, name: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
+        """As holozen.suggest's; nothing after MOST_GUESSES."""
         self.guesses += 1
-        return "" if self.guesses > MOST_GUESSES else suggest(name, known, common, alike)
+        return "" if self.guesses > MOST_GUESSES else suggest(name, known, part, alike)

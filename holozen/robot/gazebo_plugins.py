@@ -12,7 +12,7 @@ from itertools import product
 import numpy as np
 
 from holozen.robot.elements import LARGEST, Source, Tag, Vector, number
-from holozen.robot.errors import RobotError, cut, listed
+from holozen.robot.errors import RobotError
 from holozen.robot.model import (
     Balancing,
     Differential,
@@ -29,6 +29,7 @@ from holozen.robot.model import (
 from holozen.robot.rigid import link_frames
 from holozen.robot.rotation import Array, matrix_of
 from holozen.robot.shapes import solid
+from holozen.suggest import cut, listed, shorten
 from holozen.wire import COMMAND_SILENCE
 
 _GZ_FILE = re.compile(r"(?:gz-sim|ignition-gazebo)\d*-(.+)-system")
@@ -189,7 +190,7 @@ def wheel_joints(settings: Settings, joints: Joints, source: Source, default: st
 def turning(tag: Tag, name: str, joints: Joints, source: Source) -> str:
     """`name`. Raises RobotError, listing the joints, unless it is a joint that turns."""
     if name not in joints:
-        near = source.nearest(name, joints)
+        near = source.suggest(name, joints)
         problem = f"names the joint {cut(name)}, which does not exist{near}"
         raise tag.wrong(f"{problem}; joints: {listed(list(joints))}")
     if joints[name].kind not in TURNING:
@@ -716,13 +717,16 @@ def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
     elif kind in SENSING:
         source.warn(plugin, f"({SENSING[kind]}) is not simulated yet")
     else:
-        near = source.nearest(kind, KNOWN, "gazebo_ros_", alike=0.8) if kind else ""
+        near = source.suggest(kind, KNOWN, _own_name, alike=0.8) if kind else ""
         source.warn(plugin, f"({_file(plugin) or 'no filename'}) is unknown and is ignored{near}")
 
 
+def _own_name(kind: str) -> str:
+    return kind.removeprefix("gazebo_ros_")
+
+
 def _file(plugin: Tag) -> str:
-    name = file_of(plugin)
-    return name if len(name) <= 80 else f"{name[:77]}..."
+    return shorten(file_of(plugin))
 
 
 def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, Link], root: str, source: Source) -> Drive:

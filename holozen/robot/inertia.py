@@ -7,10 +7,10 @@ from itertools import chain
 import numpy as np
 
 from holozen.robot.elements import Source, Tag
-from holozen.robot.errors import cut, listed
 from holozen.robot.model import Drive, Joint, Link, Planar, Pose, Shape, descend, sides_of
 from holozen.robot.rotation import Array, matrix_of, symmetric
 from holozen.robot.shapes import solid
+from holozen.suggest import cut, listed
 
 # Moments of inertia of solid shapes, per mass: kg m^2 per kg.
 

@@ -6,13 +6,14 @@ from pathlib import Path
 from xml.parsers import expat
 
 from holozen.robot.elements import Source, read_xml, repair_xml
-from holozen.robot.errors import RobotError, cut
+from holozen.robot.errors import RobotError
 from holozen.robot.meshes import data_uri
 from holozen.robot.model import RobotModel
 from holozen.robot.packages import is_data, resolve_uri
 from holozen.robot.sdf_models import parse_sdf
 from holozen.robot.urdf import read_robot
 from holozen.robot.xacro import expand, is_xacro, read_text
+from holozen.suggest import cut
 
 
 def load(

@@ -18,8 +18,9 @@ import numpy as np
 import numpy.typing as npt
 
 from holozen.robot.elements import Tag, Vector, read_xml
-from holozen.robot.errors import RobotError, cut
+from holozen.robot.errors import RobotError
 from holozen.robot.rotation import Array, triple
+from holozen.suggest import cut
 
 # Approximate the convex hull of many points by the farthest one along each of 256 fixed directions. The bounding box
 # is exact, and no kept point lies outside the true hull. The hull has the true extent along the 256 directions, one of

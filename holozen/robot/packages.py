@@ -10,7 +10,8 @@ from pathlib import Path
 from urllib.parse import unquote
 
 from holozen import data
-from holozen.robot.errors import RobotError, cut, listed, suggest
+from holozen.robot.errors import RobotError
+from holozen.suggest import cut, listed, suggest
 
 PACKAGE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
 MOST = 200  # folders below a workspace that are searched for packages

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from holozen.robot.elements import Vector
-from holozen.robot.errors import RobotError, cut
+from holozen.robot.errors import RobotError
 from holozen.robot.inertia import is_absurd, moments
 from holozen.robot.model import HERE, Inertial, Joint, Link, Pose, RobotModel, Shape, Surface, descend
 from holozen.robot.rotation import Array, matrix_of, principal, quaternion_of, rpy_of, symmetric, triple
 from holozen.robot.shapes import solid
 from holozen.rotation import XYZW, conjugate, rotate
+from holozen.suggest import cut
 
 SMALLEST_MASS = 1e-6  # kg; an engine divides by the mass
 SMALLEST_GYRATION = 1e-3  # m; and by the moments of inertia, of which a point mass would have none

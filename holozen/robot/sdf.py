@@ -10,7 +10,7 @@ from itertools import product
 from pathlib import Path
 
 from holozen.robot.elements import SHORTEST, Source, Tag, Vector, check_size, read_xml
-from holozen.robot.errors import RobotError, cut
+from holozen.robot.errors import RobotError
 from holozen.robot.inertia import NO_INERTIA, read_inertia, with_moments
 from holozen.robot.model import Color, Inertial, Joint, Limits, Link, Pose, Shape, Surface
 from holozen.robot.packages import MODEL_PATHS, find_named, folders_above, folders_listed, local_packages
@@ -20,6 +20,7 @@ from holozen.robot.shapes import SHAPES, SIZES, material_color, mesh_shape, need
 from holozen.robot.urdf import read_dynamics, read_mimic
 from holozen.robot.xacro import read_text
 from holozen.rotation import to_rpy
+from holozen.suggest import cut
 
 # Text of elements: numbers, vectors, flags, names and poses.
 
@@ -142,7 +143,7 @@ def _warn_unknown(outer: Tag, child: Tag, known: list[str], source: Source, warn
     key = f"{outer.name} {child.name}"
     if ":" not in child.name and key not in warned:
         warned.add(key)
-        near = source.nearest(child.name, known)
+        near = source.suggest(child.name, known)
         source.warn(child, f"is not an SDF child of <{outer.name}> and is ignored{near}")
 
 

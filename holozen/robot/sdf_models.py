@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from holozen.robot.elements import Source, Tag, Vector, read_xml
-from holozen.robot.errors import RobotError, cut, listed
+from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import read_plugins, warn_sensor
 from holozen.robot.model import MOST_PARTS, Joint, Limits, Link, Pose, RobotModel, descend
 from holozen.robot.rigid import Frame
@@ -27,6 +27,7 @@ from holozen.robot.sdf import (
     version_of,
 )
 from holozen.robot.urdf import check_mimics
+from holozen.suggest import cut, listed
 
 # Named frames. A full name starts at the outermost model: `table::drawer::knob`. The empty name is the world.
 

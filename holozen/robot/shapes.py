@@ -7,10 +7,11 @@ from contextlib import suppress
 from dataclasses import replace
 
 from holozen.robot.elements import Source, Tag, Vector, number
-from holozen.robot.errors import RobotError, cut
+from holozen.robot.errors import RobotError
 from holozen.robot.meshes import data_hull, hull
 from holozen.robot.model import Color, Pose, Shape
 from holozen.robot.packages import is_data, resolve_uri
+from holozen.suggest import cut
 
 # Colours, by Gazebo's names or as numbers.
 
@@ -73,7 +74,7 @@ def read_color(tag: Tag, words: str, source: Source) -> Color | None:
 
 def nearest_gazebo(word: str, source: Source) -> str:
     """A suggestion for a misspelt Gazebo material; `Black` is accepted for `Gazebo/Black`."""
-    return source.nearest(word if "/" in word else f"Gazebo/{word}", GAZEBO)
+    return source.suggest(word if "/" in word else f"Gazebo/{word}", GAZEBO)
 
 
 # Materials of URDF, and those of Gazebo, which take precedence.
@@ -112,7 +113,7 @@ def urdf_color(visual: Tag, materials: Materials, source: Source) -> Color | Non
     if name in GAZEBO or not name.strip():
         return GAZEBO.get(name) or _own_color(tag, source)
     if not tag.first("texture"):
-        source.warn(tag, f"has no colour, neither here nor in <robot>{source.nearest(name, materials)}")
+        source.warn(tag, f"has no colour, neither here nor in <robot>{source.suggest(name, materials)}")
     return _own_color(tag, source)
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import TypeVar
 
 from holozen.robot.elements import Source, Tag, Vector
-from holozen.robot.errors import RobotError, cut, listed
+from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import Settings, read_plugins, warn_sensors
 from holozen.robot.inertia import (
     NO_INERTIA,
@@ -31,6 +31,7 @@ from holozen.robot.model import (
     descend,
 )
 from holozen.robot.shapes import Materials, gazebo_color, needed, read_materials, read_pose, read_shape, urdf_color
+from holozen.suggest import cut, listed
 
 # The tree of links and joints.
 
@@ -77,7 +78,7 @@ def check_mimics(robot: Tag, joints: Mapping[str, Joint], source: Source) -> Non
     followed = {joint.name: joint.mimic.joint for joint in joints.values() if joint.mimic}
     for name, other in followed.items():
         if other not in joints:
-            near = source.nearest(other, joints)
+            near = source.suggest(other, joints)
             problem = f"follows the joint {cut(other)}, which does not exist{near}"
             raise _wrong(robot, name, f"{problem}; joints: {listed(list(joints))}")
     done: set[str] = set()
@@ -104,7 +105,7 @@ def warn_transmissions(robot: Tag, joints: Mapping[str, Joint], source: Source) 
         names = [joint.attributes.get("name", "").strip() for joint in tag.all("joint")]
         unknown = [name for name in names if name not in joints]
         if unknown:
-            near = source.nearest(unknown[0], joints)
+            near = source.suggest(unknown[0], joints)
             source.warn(tag, f"names the joint {cut(unknown[0])}, which does not exist{near}; it is left out")
         elif not names:
             source.warn(tag, "names no joint; it is left out")
@@ -133,7 +134,7 @@ def read_gazebo(
         elif name in dressed:
             dressed[name] = _dressed(dressed[name], tag, source)
         elif name not in joints:
-            near = source.nearest(name, (*links, *joints))
+            near = source.suggest(name, (*links, *joints))
             problem = f"reference={cut(name)} names no link and no joint{near}; it is left out"
             source.warn(tag, f"{problem}; links: {listed(list(links))}")
     return dressed, static

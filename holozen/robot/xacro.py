@@ -17,8 +17,9 @@ from typing import IO, Any
 
 from holozen.console import report
 from holozen.robot.elements import MOST_TEXT, check_size
-from holozen.robot.errors import RobotError, cut
+from holozen.robot.errors import RobotError
 from holozen.robot.packages import find_package
+from holozen.suggest import cut
 
 # The result of an expansion, and its inputs: files, wildcards, environment variables and packages.
 

@@ -21,7 +21,7 @@ from xml.dom import expatbuilder, minidom
 from xml.parsers.expat import ErrorString, ExpatError
 
 from holozen.robot.elements import MOST_ELEMENTS, check_size
-from holozen.robot.errors import RobotError, cut, suggest
+from holozen.robot.errors import RobotError
 from holozen.robot.packages import (
     find_by_name,
     find_named,
@@ -32,6 +32,7 @@ from holozen.robot.packages import (
     without_home,
 )
 from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, unchanged
+from holozen.suggest import cut, shorten, suggest
 
 # Elements annotated with file and line, in the documents that the library reads and copies.
 
@@ -286,8 +287,7 @@ def _reason(cause: BaseException, suffix: str) -> str:
 
 def one_line(text: str, most: int = 400) -> str:
     """`text` as one line of at most `most` characters."""
-    text = " ".join(text.split())
-    return text if len(text) <= most else f"{text[: most - 3]}..."
+    return shorten(" ".join(text.split()), most)
 
 
 def _cause(error: Any) -> tuple[BaseException, str]:

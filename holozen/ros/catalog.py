@@ -5,7 +5,7 @@ What a module of ours lists in `__all__` is what scripts find there; the documen
 
 from typing import TYPE_CHECKING, Any
 
-from holozen.messages.definitions import closest
+from holozen.suggest import suggest
 
 PAGE = "docs/coming-from-ros.md"
 
@@ -178,4 +178,4 @@ def _missing_attribute(kind: type, name: str) -> str:
     if name in NODE_HINTS and ours.__name__ == "Node":
         return f"{lacks}; {NODE_HINTS[name]}; see {PAGE}"
     known = (each for each in dir(kind) if each[0] != "_" and each not in INTERNAL)
-    return f"{lacks}{closest(name, known)}; what {ours.__name__} has here: {PAGE}"
+    return f"{lacks}{suggest(name, known)}; what {ours.__name__} has here: {PAGE}"

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from holozen.flags import nearest
-from holozen.robot.errors import RobotError, listed
+from holozen.robot.errors import RobotError
 from holozen.ros import packages
+from holozen.suggest import listed, suggest
 
 FOLDERS = ("scripts", "{package}", "nodes", "src", "bin")  # where scripts lie in a package's sources
 _HEAD = 200  # bytes of a file that show whether it is a script
@@ -46,7 +46,7 @@ def from_file(path: Path) -> Script:
         raise NotFound(f"{path} is a folder; give a Python file, or PACKAGE EXECUTABLE")
     if not path.exists():
         files = sorted(each.name for each in path.parent.glob("*.py")) if path.parent.is_dir() else []
-        hint = nearest(path.name, files) or f"; Python files there: {listed(files, 20)}"
+        hint = suggest(path.name, files) or f"; Python files there: {listed(files, 20)}"
         raise NotFound(f"no file {str(path)!r}{hint}")
     try:
         with path.open("rb") as file:
@@ -82,7 +82,7 @@ def _found(folder: Path, package: str, name: str) -> Script:
         if wanted in files:
             return from_file(files[wanted])
     known = sorted({*declared, *files})
-    fault = f"package {package!r} has no executable {name!r}{nearest(name, known)}" if name else "give an executable"
+    fault = f"package {package!r} has no executable {name!r}{suggest(name, known)}" if name else "give an executable"
     raise NotFound(f"{fault}; executables in {folder}: {listed(known, 20)}")
 
 

@@ -29,10 +29,10 @@ from holozen.messages.definitions import (
     Field,
     Interface,
     InterfaceError,
-    closest,
 )
 from holozen.messages.message import packed
 from holozen.messages.registry import Registry
+from holozen.suggest import shorten, suggest
 
 Check = Callable[[Any], Any]
 """Takes the value assigned to a field and returns what is stored, or raises AssertionError."""
@@ -224,7 +224,7 @@ def _last(interface: Interface) -> str:
 
 def _no_field(kind: Any, name: str) -> str:
     known = kind.__struct_fields__
-    hint = closest(name, known) or (f"; it has {', '.join(known)}" if known else "; it has none")
+    hint = suggest(name, known) or (f"; it has {', '.join(known)}" if known else "; it has none")
     return f"{kind.__module__}.{kind.__name__} has no field {name!r}{hint}"
 
 
@@ -546,5 +546,4 @@ def _class_name(value: Any) -> str:
 
 
 def _short(value: Any) -> str:
-    text = repr(value).replace("\n", " ")
-    return text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+    return shorten(repr(value).replace("\n", " "), _LONGEST)

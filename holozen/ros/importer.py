@@ -15,11 +15,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from holozen.messages.definitions import InterfaceError, closest
+from holozen.messages.definitions import InterfaceError
 from holozen.messages.registry import Places, Registry, tables
 from holozen.robot.packages import folders_above, local_packages
 from holozen.ros import generated
 from holozen.ros.catalog import ACTIONS, HINTS, MESSAGES, MODULES, PAGE, REEXPORTS
+from holozen.suggest import suggest
 
 KINDS = ("msg", "srv")
 _SUFFIXES = ("_msgs", "_srvs", "_interfaces", "_interface", "_msg", "_srv")  # of names that only interfaces have
@@ -116,7 +117,7 @@ class _Finder:
         known = {*self.places.packages(), *(found for start in starts for found in local_packages(start))} - {"holozen"}
         folders = list(dict.fromkeys(str(above[0]) for start in starts if (above := folders_above(start))))
         return (
-            f"no package {name!r} with .msg or .srv files{closest(name, known)}; searched AMENT_PREFIX_PATH,"
+            f"no package {name!r} with .msg or .srv files{suggest(name, known)}; searched AMENT_PREFIX_PATH,"
             f" ROS_PACKAGE_PATH and the package.xml files around {', '.join(folders) or 'no folder'};"
             f" to give its folder: --package {name}=DIR"
         )
@@ -247,7 +248,8 @@ def _missing_name(module: str, name: str, known: Sequence[str]) -> str:
     elif place := _defined_in(name, module.partition(".")[0]):
         hint = f"; it is in {place}"
     else:
-        hint = closest(name, [*known, *(each for each in MODULES if each.startswith(f"{module}."))])
+        below = (each.removeprefix(f"{module}.") for each in MODULES if each.startswith(f"{module}."))
+        hint = suggest(name, [*known, *below])
     return f"{module} has no {name!r} here{hint}; see {PAGE}"
 
 

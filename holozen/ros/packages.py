@@ -7,8 +7,9 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from holozen.robot.errors import RobotError, listed, suggest
+from holozen.robot.errors import RobotError
 from holozen.robot.packages import find_named, folders_above, folders_below, nearest_robot_folder, packages_in
+from holozen.suggest import listed, suggest
 
 LEVELS = 3  # of folders below the working folder that are searched
 MOST_FOLDERS = 500  # on each level: a home folder has thousands

@@ -7,7 +7,8 @@ import argparse
 import json
 import os
 
-from holozen.flags import nearest, refused
+from holozen.flags import refused
+from holozen.suggest import suggest
 from holozen.transport.errors import BusError
 
 RENDEZVOUS = tuple(f"tcp/127.0.0.1:{port}" for port in (7447, 7448, 7449))
@@ -169,7 +170,7 @@ def _variable(name: str) -> "str | list[str] | None":
     if not text:
         return None
     if name == "mode" and text not in MODES:
-        wrong = f"{nearest(text, MODES)}; use {', '.join(MODES)}"
+        wrong = f"{suggest(text, MODES)}; use {', '.join(MODES)}"
     if name == "config" and not os.path.isfile(text):
         wrong = ": there is no such file"
     if wrong:
@@ -210,7 +211,7 @@ def fault(text: str) -> str:
     if not slash or not address or not text.isprintable() or " " in text:
         return f"{text!r} is not an endpoint: {HOW}"
     if protocol not in PROTOCOLS:
-        return f"{text!r}: no protocol {protocol!r}{nearest(protocol, PROTOCOLS)}; there are {', '.join(PROTOCOLS)}"
+        return f"{text!r}: no protocol {protocol!r}{suggest(protocol, PROTOCOLS)}; there are {', '.join(PROTOCOLS)}"
     if protocol not in _WITH_PORT:
         return ""
     host, colon, port = address.partition("#")[0].partition("?")[0].rpartition(":")

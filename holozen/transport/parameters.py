@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from holozen.console import report
-from holozen.flags import nearest
 from holozen.messages import rcl_interfaces as r
+from holozen.suggest import shorten, suggest
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import Server, answer_in_turn
 
@@ -173,7 +173,7 @@ class Parameters:
 def unknown(node: str, name: str, known: Iterable[str]) -> str:
     """The error for an unknown parameter, with the closest name or the known ones."""
     names = list(known)
-    hint = nearest(name[:LONGEST], names) or f"; it has {', '.join(names[:20])}"
+    hint = suggest(name[:LONGEST], names) or f"; it has {', '.join(names[:20])}"
     return f"{node} has no parameter {name[:LONGEST]!r}{hint}"
 
 
@@ -191,7 +191,7 @@ def is_below(name: str, prefixes: list[str], depth: int) -> bool:
 
 def _shown(value: object) -> str:
     text = "no value" if value is None else _formatted(value) if isinstance(value, float) else repr(value)
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+    return shorten(text, LONGEST)
 
 
 def _formatted(value: object) -> str:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 from holozen.bus import Bus
 from holozen.console import report
 from holozen.messages import simulation_interfaces as si
-from holozen.robot.errors import RobotError, listed
+from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import MOVING
+from holozen.suggest import listed
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import on_key
 from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name

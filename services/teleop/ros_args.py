@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 from holozen import flags
 from holozen.console import printable
+from holozen.suggest import shorten
 
-from .toml_file import closest, cut
+from .toml_file import cut, one_of
 
 # ROS 1 has all of them; ROS 2 has speed, turn, stamped and frame_id.
 PARAMETERS = ("speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "key_timeout", "stamped", "frame_id")
@@ -81,7 +82,7 @@ def _ros_2(flag: str, word: str | None) -> RosArgument:
 def _parameter(name: str, value: str, word: str) -> str:
     """The flag that sets a parameter. Numbers are checked with the flags."""
     if name not in PARAMETERS:
-        raise _wrong(word, f"there is no parameter {cut(name)}; {closest(name, [*PARAMETERS])}")
+        raise _wrong(word, f"there is no parameter {cut(name)}{one_of(name, [*PARAMETERS])}")
     flag = f"--{name.replace('_', '-')}"
     if len(value) > 1 and value[0] == value[-1] and value[0] in "'\"":  # YAML's quotes
         value = value[1:-1]
@@ -140,5 +141,4 @@ def _is_robot(name: str) -> bool:
 
 
 def _wrong(word: str, text: str) -> RosArgError:
-    shown = word if len(word) <= 60 else f"{word[:57]}..."
-    return RosArgError(printable(f"{shown}: {text}"))
+    return RosArgError(printable(f"{shorten(word, 60)}: {text}"))

@@ -9,7 +9,7 @@ from holozen.console import printable
 from . import toml_file
 from .control.layouts import LAYOUTS
 from .ros_args import ros_arguments
-from .toml_file import closest, cut
+from .toml_file import cut, one_of
 
 NAMES = (
     "speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "key_timeout", "stamped", "frame_id",
@@ -45,7 +45,7 @@ def read(path: str | None) -> dict[str, Setting]:
         raise SettingsError(str(error)) from None
     for name, value in found.items():
         if name not in NAMES:
-            raise _wrong(path, f"{cut(name)} is unknown; {closest(name.replace('-', '_'), [*NAMES])}")
+            raise _wrong(path, f"{cut(name)} is unknown{one_of(name.replace('-', '_'), [*NAMES])}")
         if not isinstance(value, Setting):
             raise _wrong(path, f"{name} is {cut(value)}; write one number, true, false or a text in quotes")
     return found
@@ -94,7 +94,7 @@ def _checked(action: argparse.Action, value: Setting) -> object:
     made = action.type(str(value)) if callable(action.type) else str(value)
     choices = MODES if action.dest == "mode" else action.choices
     if choices is not None and made not in choices:
-        raise ValueError(f"{cut(value)}: {closest(str(value), [str(choice) for choice in choices])}")
+        raise ValueError(f"{cut(value)}{one_of(str(value), [str(choice) for choice in choices])}")
     return made
 
 

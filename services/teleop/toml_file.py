@@ -6,6 +6,7 @@ import stat
 from typing import Any
 
 from holozen.console import printable
+from holozen.suggest import shorten, suggest
 
 LARGEST = 64 * 1024  # bytes
 LONGEST = 1000  # characters in a line; a long dotted key keeps tomllib busy for many seconds
@@ -40,16 +41,12 @@ def read(path: str) -> dict[str, Any]:
 
 def cut(value: object) -> str:
     """A value for a message: as written in Python, but shortened."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+    return shorten(repr(value), 60)
 
 
-def closest(name: str, known: list[str]) -> str:
-    """A hint with the closest known name, or else with all of them."""
-    from difflib import get_close_matches
-
-    match = get_close_matches(name[:60].lower(), known, 1)
-    return f"did you mean {match[0]!r}?" if match else f"use {', '.join(known)}"
+def one_of(name: str, known: list[str]) -> str:
+    """The end of a message about an unknown name: the closest known one, or else all of them."""
+    return suggest(name, known) or f"; use {', '.join(known)}"
 
 
 def _bytes(path: str) -> bytes:

@@ -173,7 +173,7 @@ def test_any_type_is_published_as_its_fields_say(town: Wire) -> None:
             assert json.loads(echo.out)["ranges"] == [1.0, 2.5]
         echo = town.start("topic", "echo", "scan", "--once", "--json")
     echo.close()
-    told = "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn'; did you mean sensor_msgs/msg/LaserScan?"
+    told = "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn'; did you mean 'sensor_msgs/msg/LaserScan'?"
     assert_one_line(town.run("topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, told)
 
 

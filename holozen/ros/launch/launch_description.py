@@ -4,8 +4,8 @@ import inspect
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from holozen.flags import nearest
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, here
+from holozen.suggest import suggest
 
 Entities = Sequence["LaunchDescriptionEntity"]
 
@@ -91,4 +91,4 @@ def _unknown_argument(kind: type, word: str) -> str:
     }
     if (new := word.removeprefix("node_")) != word and new in names:
         return f"{kind.__name__} has no argument {word!r}, which is ROS's old name; write {new}=..."
-    return f"{kind.__name__} has no argument {word!r}{nearest(word, names)}; arguments: {', '.join(sorted(names))}"
+    return f"{kind.__name__} has no argument {word!r}{suggest(word, names)}; arguments: {', '.join(sorted(names))}"

@@ -3,10 +3,10 @@
 from pathlib import Path
 from types import ModuleType
 
-from holozen.flags import nearest
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Text, describe, here, text
 from holozen.ros.launch.launch_description import LaunchDescription
 from holozen.ros.launch.stand_ins import gazebo_launch_file
+from holozen.suggest import suggest
 
 __all__ = ["AnyLaunchDescriptionSource", "FrontendLaunchDescriptionSource", "PythonLaunchDescriptionSource"]
 
@@ -44,7 +44,7 @@ def read(path: Path) -> LaunchDescription:
     if not path.is_file():
         folder = path.parent
         files = sorted(each.name for each in folder.iterdir() if each.is_file()) if folder.is_dir() else []
-        hint = nearest(path.name, files) or (f"; files there: {', '.join(files[:20])}" if files else "")
+        hint = suggest(path.name, files) or (f"; files there: {', '.join(files[:20])}" if files else "")
         raise LaunchError(f"no launch file {str(path)!r}{hint}")
     if path.suffix in (".xml", ".yaml", ".yml"):
         raise LaunchError(f"{path}: launch files in XML and YAML are not supported; Python only")

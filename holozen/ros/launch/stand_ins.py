@@ -12,12 +12,12 @@ from pathlib import Path
 
 from holozen import data
 from holozen.console import report
-from holozen.flags import nearest
 from holozen.robot.errors import RobotError
 from holozen.robot.xacro import read_text
 from holozen.ros import packages
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Program, Text, text
 from holozen.ros.launch.launch_description import Action, Entities, LaunchDescription
+from holozen.suggest import suggest
 
 ROOT = "/"  # the namespace of a robot without one: its keys are cmd_vel and odom
 SPAWN_TIMEOUT = "60"  # s for the sim to start
@@ -132,7 +132,7 @@ def gazebo_launch_file(path: Path) -> LaunchDescription | None:
     package = path.parts[len(NOWHERE.parts)]
     known = GAZEBO_LAUNCH_FILES[package]
     if path.name not in known or path.parent.name != "launch":
-        hint = nearest(path.name, known) or f"; files: {', '.join(known)}"
+        hint = suggest(path.name, known) or f"; files: {', '.join(known)}"
         raise LaunchError(f"{package} is replaced here, and has no {'/'.join(path.parts[3:])!r}{hint}")
     return LaunchDescription([known[path.name]()])
 
@@ -274,7 +274,7 @@ class Spawn(Action):
                     flags += [_SPAWN_FLAGS[flag], value]
             else:
                 known = [*_SPAWN_FLAGS, *_DESCRIPTION_FLAGS]
-                hint = nearest(flag, known) or f"; known: {', '.join(known)}"
+                hint = suggest(flag, known) or f"; known: {', '.join(known)}"
                 raise LaunchError(f"unknown flag {flag!r} to spawn a robot{hint}", self.place)
         if not description[0] and "-file" not in flags:
             raise LaunchError("to spawn a robot, give -file FILE or -topic robot_description", self.place)

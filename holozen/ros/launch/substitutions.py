@@ -7,7 +7,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from holozen.flags import nearest
 from holozen.robot.errors import RobotError
 from holozen.robot.xacro import expand_xacro, read_text
 from holozen.ros import executables, packages
@@ -21,6 +20,7 @@ from holozen.ros.launch.launch_context import (
     text,
     truth,
 )
+from holozen.suggest import suggest
 
 __all__ = [
     "AndSubstitution", "AnonName", "Command", "EnvironmentVariable", "EqualsSubstitution", "ExecutableInPackage",
@@ -59,7 +59,7 @@ class LaunchConfiguration(Substitution):
         if name in values:
             return values[name]
         if self.default is None:
-            hint = nearest(name, values) or f"; declared arguments: {', '.join(values) or 'none'}"
+            hint = suggest(name, values) or f"; declared arguments: {', '.join(values) or 'none'}"
             raise LaunchError(f"launch argument {name!r} is not declared before it is used{hint}", self.place)
         return str(self.default) if isinstance(self.default, bool | int | float) else text(context, self.default)
 

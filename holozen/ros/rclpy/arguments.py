@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from holozen.console import printable
-from holozen.flags import nearest
 from holozen.ros import parameter_yaml
 from holozen.ros.parameter_yaml import Section, Value
 from holozen.ros.rclpy import names
 from holozen.ros.rclpy.exceptions import NameValidationException, RCLInvalidROSArgsError, UnknownROSArgsError
 from holozen.ros.rclpy.logging import LoggingSeverity
+from holozen.suggest import suggest
 
 START, END = "--ros-args", "--"
 REMAP, PARAM, FILE, LEVEL = "--remap", "--param", "--params-file", "--log-level"
@@ -111,7 +111,7 @@ class _Parsed:
         full = SHORT.get(flag, flag)
         if full not in WITH_VALUE:
             known = (*WITH_VALUE, *SHORT, *WITHOUT_VALUE)
-            hint = nearest(flag, known) or "; end the ROS arguments with -- before your own"
+            hint = suggest(flag, known) or "; end the ROS arguments with -- before your own"
             raise UnknownROSArgsError(f"unknown ROS argument {flag!r}{hint}")
         text = next(words, None)
         if text is None or text == END:

@@ -16,6 +16,7 @@ from holozen.ros.rclpy.exceptions import (
     ParameterAlreadyDeclaredException,
     ParameterNotDeclaredException,
 )
+from holozen.suggest import shorten
 
 __all__ = [
     "PARAMETER_SEPARATOR_STRING", "Parameter", "get_parameter_value", "parameter_dict_from_yaml_file",
@@ -196,8 +197,7 @@ def _is_a(value: object, kind: type) -> bool:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 80 else f"{text[:80]} ..."
+    return shorten(repr(value))
 
 
 TOLERANCE = 1e-9  # of the steps of a range: decimal fractions are not exact in binary

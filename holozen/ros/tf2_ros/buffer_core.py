@@ -7,8 +7,8 @@ import math
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass, field
 
-from holozen.flags import nearest
 from holozen.rotation import Transform, normalize
+from holozen.suggest import suggest
 
 CACHE_TIME = 10 * 10**9  # ns
 RESET_AGE = 10**9  # ns before the newest stamp; that many stamps in a row this old are no stragglers:
@@ -143,7 +143,7 @@ class BufferCore:
             raise InvalidArgumentException(f"the {role} frame {name!r} starts with a slash; write {bare!r}")
         if name not in self._histories and name not in self._parents:
             frames = self.names()
-            hint = nearest(name, frames) or f"; frames: {', '.join(frames[:20])}" if frames else "; no frames so far"
+            hint = suggest(name, frames) or f"; frames: {', '.join(frames[:20])}" if frames else "; no frames so far"
             raise LookupException(f"the {role} frame {name!r} does not exist{hint}")
         return name
 

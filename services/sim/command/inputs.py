@@ -11,7 +11,7 @@ from holozen.console import report
 from holozen.limits import Planar, clamp_speed
 from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped
 from holozen.messages.message import not_finite
-from holozen.robot.errors import listed
+from holozen.suggest import listed
 from holozen.transport.pubsub import Received
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import MAX_STAMP_AGE, implausible

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from holozen.console import printable
 
 from .. import toml_file
-from ..toml_file import closest, cut
+from ..toml_file import cut, one_of
 from .layouts import ACTIONS, FIXED, LAYOUTS, Direction, KeyNameError, Layout, LayoutError, key_name
 
 T = TypeVar("T")
@@ -32,7 +32,7 @@ def load(name_or_path: str) -> Layout:
 def read(path: str) -> Layout:
     """The layout in the file at `path`; LayoutError."""
     if not os.path.lexists(path) and os.sep not in path:
-        raise LayoutError(printable(f"{path}: no such file, and no such layout; {closest(path, [*LAYOUTS])}"))
+        raise LayoutError(printable(f"{path}: no such file, and no such layout{one_of(path, [*LAYOUTS])}"))
     try:
         return _layout(path, toml_file.read(path))
     except toml_file.TomlError as error:
@@ -48,7 +48,7 @@ class _Wrong(ValueError):
 def _layout(path: str, found: Mapping[str, Any]) -> Layout:
     for name in found:
         if name not in _TOP:
-            raise _Wrong(f"{cut(name)} is unknown; {closest(name, _TOP)}")
+            raise _Wrong(f"{cut(name)} is unknown{one_of(name, _TOP)}")
     name = found.get("name", os.path.splitext(os.path.basename(path))[0])
     if not isinstance(name, str) or not (0 < len(name) <= 40) or not name.isprintable():
         raise _Wrong(f"name is {cut(name)}; write up to 40 letters in quotes")
@@ -105,7 +105,7 @@ def _motion(text: str) -> Direction:
     for word in text.split("+"):
         one = MOTIONS.get(word.strip())
         if one is None:
-            raise _Wrong(f"{cut(word.strip())} is not a motion; {closest(word.strip(), [*MOTIONS])}")
+            raise _Wrong(f"{cut(word.strip())} is not a motion{one_of(word.strip(), [*MOTIONS])}")
         axis = next(index for index, value in enumerate(one) if value)
         if total[axis]:
             raise _Wrong(f"{cut(word.strip())} is there already, or its opposite")
@@ -120,11 +120,11 @@ def _factors(text: str) -> tuple[float, float]:
     factor = round(1 + float(match[2]) / 100, 6)
     which = {"both": (factor, factor), "speed": (factor, 1.0), "turn": (1.0, factor)}
     if match[1] not in which:
-        raise _Wrong(f"{cut(match[1])} is unknown; {closest(match[1], [*which])}")
+        raise _Wrong(f"{cut(match[1])} is unknown{one_of(match[1], [*which])}")
     return which[match[1]]
 
 
 def _action(text: str) -> str:
     if text not in ACTIONS:
-        raise _Wrong(f"is unknown; {closest(text, [*ACTIONS])}")
+        raise _Wrong(f"is unknown{one_of(text, [*ACTIONS])}")
     return text

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from ..toml_file import closest
+from ..toml_file import one_of
 
 NAMED = (
     "up", "down", "left", "right", "space", "tab", "escape", "enter", "backspace",
@@ -41,7 +41,7 @@ def key_name(text: str) -> str:
     if is_character(last):
         _check_character(modifiers, last)
     elif last not in NAMED:
-        raise KeyNameError(f"is not a key: write one character, or a name: {closest(last, list(NAMED))}")
+        raise KeyNameError(f"is not a key: write one character, or a name{one_of(last, list(NAMED))}")
     name = "+".join([*modifiers, last])
     if text != name:
         raise KeyNameError(f"is not a key: write {name!r}")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from holozen.check.engine import closest, distance, nearest
+from holozen.check.engine import distance, nearest
 from holozen.check.report import check
 from holozen.check.rules_xml import PLUGIN, URDF
 from tests.unit.check.conftest import Findings
@@ -157,12 +157,6 @@ def test_of_two_spellings_the_one_in_the_same_style_is_meant() -> None:
 def test_short_and_far_words_are_not_guessed_at() -> None:
     assert nearest("kp", ["kd"], 4) is None
     assert nearest("x" * 50, ["x" * 49]) is None
-
-
-def test_a_hint_names_what_is_there() -> None:
-    assert closest("whel", ["wheel", "arm"]) == " (did you mean 'wheel'?)"
-    assert closest("arm", ["left_arm_link"]) == " (did you mean 'left_arm_link'?)"
-    assert closest("zzz", ["wheel"]) == ""
 
 
 LONG = "x" * 300_000

@@ -316,7 +316,7 @@ def test_names_are_wanted_by_a_file(good: str, findings: Findings, tmp_path: Pat
     message = [(finding.rule, finding.place.line, finding.problem) for finding in found]
     assert [line for rule, line, _ in message if rule == "require-file"] == [6, 7, 8]
     assert [problem for rule, _, problem in message if rule == "require"] == [
-        "there is no link 'bsae' (did you mean 'base'?)",
+        "there is no link 'bsae'; did you mean 'base'?",
         "joint 'left_joint' is continuous, not prismatic",
     ]
 

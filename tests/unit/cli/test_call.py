@@ -53,7 +53,7 @@ def test_the_type_of_a_package_with_the_same_fields_calls_our_service(
     assert run("service", "call", "/next_goal", TYPE, REQUEST) == (0, REPLY, "")
     assert run("service", "call", "/next_goal", "hb_interfaces/NextGoal", REQUEST) == (0, REPLY, "")
     code, _, err = run("service", "call", "next_goal", TYPE, "{request_gaol: 2}")
-    assert (code, "did you mean request_goal?" in err, err.count("\n")) == (1, True, 1)
+    assert (code, "did you mean 'request_goal'?" in err, err.count("\n")) == (1, True, 1)
 
 
 def test_a_package_that_is_not_found_calls_a_service_of_the_same_name_and_says_so(
@@ -72,7 +72,7 @@ def test_a_package_that_is_not_found_calls_a_service_of_the_same_name_and_says_s
     ("kind", "told"),
     [
         ("std_srvs/srv/Trigger", "next_goal: its type is holozen/srv/NextGoal, not std_srvs/srv/Trigger\n"),
-        ("std_srvs/srv/Triger", "no type 'std_srvs/srv/Triger'; did you mean std_srvs/srv/Trigger?"),
+        ("std_srvs/srv/Triger", "no type 'std_srvs/srv/Triger'; did you mean 'std_srvs/srv/Trigger'?"),
         ("hb_interface/srv/GetPose", "give its folder: --package hb_interface=DIR; its type is holozen/srv/NextGoal\n"),
         ("geometry_msgs/msg/Twist", "next_goal: geometry_msgs/msg/Twist is a message; "),
     ],

@@ -118,9 +118,9 @@ def test_a_prototype_in_json_is_what_our_messages_begin_with(capsys: pytest.Capt
     [
         (
             ("show", "geometry_msgs/msg/Twsit"),
-            "no type 'geometry_msgs/msg/Twsit'; did you mean geometry_msgs/msg/Twist?",
+            "no type 'geometry_msgs/msg/Twsit'; did you mean 'geometry_msgs/msg/Twist'?",
         ),
-        (("proto", "Twist"), "'Twist' is not a type: the package is missing; did you mean geometry_msgs/msg/Twist?"),
+        (("proto", "Twist"), "'Twist' is not a type: the package is missing; did you mean 'geometry_msgs/msg/Twist'?"),
         (("show", "a b\x1b"), "'a b\\x1b' is not a type; write PACKAGE/msg/NAME, such as geometry_msgs/msg/Twist"),
         (("list", "--package", "a=/no/such"), "--package a=/no/such: there is no such folder"),
     ],

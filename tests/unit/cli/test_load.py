@@ -17,7 +17,7 @@ SLOW = {
 
 ECHO = {
     "holozen", "holozen.background", "holozen.cli", "holozen.cli.echo", "holozen.cli.hints", "holozen.cli.output",
-    "holozen.cli.topic", "holozen.cli.verb", "holozen.console", "holozen.flags", "holozen.process", "holozen.transport",
+    "holozen.cli.topic", "holozen.cli.verb", "holozen.console", "holozen.flags", "holozen.process", "holozen.suggest", "holozen.transport",
     "holozen.transport.connection", "holozen.transport.errors", "holozen.transport.graph", "holozen.transport.node",
     "holozen.transport.rendezvous", "holozen.transport.samples", "holozen.transport.session",
 }  # fmt: skip

@@ -104,7 +104,7 @@ def test_echo_shows_a_message_of_a_key_or_an_expression(sim: Bus, run: Run) -> N
 
 
 def test_echo_of_a_silent_key_ends_with_its_timeout(sim: Bus, run: Run, wire: Wire) -> None:
-    told = "holozen topic echo: no messages on odom within 0.1 s\n"
+    told = "holozen topic echo: no messages on odom within 0.1 s; did you mean 'Fred/odom'?\n"
     assert run("topic", "echo", "odom", "--timeout", "0.1") == (1, "", told)
 
 

@@ -56,7 +56,7 @@ def test_plot_draws_them(run: Run, written: None, thing: str) -> None:
 def test_pub_checks_the_fields_of_a_package_that_is_given(run: Run, wire: Wire, thing: str) -> None:
     words = ("topic", "pub", "--once", "thing", TYPE)
     assert "; give its folder: --package my_if=DIR" in run(*words, "{width: 2}")[2]
-    assert "did you mean width?" in run(*words, "{widht: 2}", "--package", thing)[2]
+    assert "did you mean 'width'?" in run(*words, "{widht: 2}", "--package", thing)[2]
     tap = wire.bus("reader").subscribe_raw("thing")
     assert run(*words, "{width: 2}", "--package", thing)[0] == 0
     assert tap.recv().payload == b'{"width": 2.0, "name": ""}'

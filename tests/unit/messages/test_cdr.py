@@ -186,5 +186,5 @@ def test_a_wrong_value_is_told_with_its_path() -> None:
     twist = REGISTRY.find("geometry_msgs/msg/Twist")
     with pytest.raises(CodecError, match=r"^linear\.x: 'fast' is not a valid float64$"):
         cdr.write(twist, {"linear": {"x": "fast"}})
-    with pytest.raises(CodecError, match=r"has no field 'linaer'; did you mean linear\?$"):
+    with pytest.raises(CodecError, match=r"has no field 'linaer'; did you mean 'linear'\?$"):
         cdr.write(twist, {"linaer": {}})

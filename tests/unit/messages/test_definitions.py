@@ -202,7 +202,7 @@ def test_what_does_not_fit_is_told_with_its_path() -> None:
     rows: list[tuple[Any, str]] = [
         ([], "t/msg/All: [] is not a mapping of fields"),
         (None, "t/msg/All: None is not a mapping of fields"),
-        ({"txet": ""}, "t/msg/All has no field 'txet'; did you mean text?"),
+        ({"txet": ""}, "t/msg/All has no field 'txet'; did you mean 'text'?"),
         ({"at": {"z": 1}}, "t/msg/Point has no field 'at.z'; it has x, y"),
         ({1: 2}, "t/msg/All has no field '1'"),
         ({"on": 1}, "on: 1 is not a valid bool"),

@@ -107,18 +107,18 @@ def test_a_package_that_is_given_comes_before_ours(lesson: Path) -> None:
 
 def test_a_wrong_name_is_told_with_the_closest(lesson: Path) -> None:
     for name, reason in [
-        ("geometry_msgs/msg/Twsit", "no type 'geometry_msgs/msg/Twsit'; did you mean geometry_msgs/msg/Twist?"),
-        ("geometry_msgs/msg/TWIST", "; did you mean geometry_msgs/msg/Twist?"),
+        ("geometry_msgs/msg/Twsit", "no type 'geometry_msgs/msg/Twsit'; did you mean 'geometry_msgs/msg/Twist'?"),
+        ("geometry_msgs/msg/TWIST", "; did you mean 'geometry_msgs/msg/Twist'?"),
         ("rosgraph_msgs/msg/Zzzzz", "; known: rosgraph_msgs/msg/Clock"),
-        ("geometry_msg/msg/Twist", "no package 'geometry_msg' with interfaces; did you mean geometry_msgs?"),
+        ("geometry_msg/msg/Twist", "no package 'geometry_msg' with interfaces; did you mean 'geometry_msgs'?"),
         ("lesson/srv/NextGoal", "; give its folder: --package lesson=DIR"),
-        ("Twist", "'Twist' is not a type: the package is missing; did you mean geometry_msgs/msg/Twist?"),
+        ("Twist", "'Twist' is not a type: the package is missing; did you mean 'geometry_msgs/msg/Twist'?"),
         ("Zwist", "the package is missing; `holozen interface list` lists all"),
         ("a/msg/../B", "'a/msg/../B' is not a type; write PACKAGE/msg/NAME"),
         ("../a/b", "is not a type"),
         ("a/action/B", "is not a type"),
         ("", "'' is not a type"),
-        ("std_srvs/srv/Trigger_Requst", "did you mean std_srvs/srv/Trigger?"),
+        ("std_srvs/srv/Trigger_Requst", "did you mean 'std_srvs/srv/Trigger'?"),
     ]:
         assert reason in refusal(Registry(), name)
 

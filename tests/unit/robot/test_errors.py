@@ -2,8 +2,9 @@
 
 from pathlib import Path
 
-from holozen.robot.errors import MOST, RobotError, cut, listed
+from holozen.robot.errors import MOST, RobotError
 from holozen.robot.loading import parse
+from holozen.suggest import cut, listed
 
 ORIGIN = Path("somewhere/robot.urdf")
 LONG = "x" * 300_000

@@ -51,7 +51,7 @@ def test_an_error_names_the_scripts_own_subclass_of_node(ros: Wire) -> None:
 
     robot = Robot("robot")
     assert lacks(robot, "create_subscriber").startswith(
-        "'Robot' object has no attribute 'create_subscriber'; did you mean create_subscription?; what Node has here"
+        "'Robot' object has no attribute 'create_subscriber'; did you mean 'create_subscription'?; what Node has here"
     )
     assert lacks(robot, "handle").endswith(f"; see {PAGE}")
 

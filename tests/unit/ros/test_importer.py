@@ -179,12 +179,12 @@ def test_an_unknown_package_is_reported_with_the_nearest_and_the_folders_searche
         return tracebacks.import_error_line(error.value)
 
     assert line("from my_pgk.srv import NextGoal") == (
-        f"{script}:1: no package 'my_pgk' with .msg or .srv files; did you mean my_pkg?; searched AMENT_PREFIX_PATH, "
+        f"{script}:1: no package 'my_pgk' with .msg or .srv files; did you mean 'my_pkg'?; searched AMENT_PREFIX_PATH, "
         f"ROS_PACKAGE_PATH and the package.xml files around {package}, {Path.cwd()}; "
         "to give its folder: --package my_pgk=DIR"
     )
-    assert "did you mean std_msgs?" in line("import std_mgs.msg")
-    assert "did you mean geometry_msgs?" in line("import geometri_msgs")
+    assert "did you mean 'std_msgs'?" in line("import std_mgs.msg")
+    assert "did you mean 'geometry_msgs'?" in line("import geometri_msgs")
     assert "--package zebra=DIR" in line("from zebra.msg import X")
     assert line("import zebra") == f"{script}:1: No module named 'zebra'"
 
@@ -198,10 +198,10 @@ def test_a_given_folder_that_is_none_is_reported(tmp_path: Path) -> None:
 def test_an_unknown_type_is_reported_with_the_nearest(package: Path) -> None:
     importer.install({"my_pkg": package})
     assert refused("from geometry_msgs.msg import Twsit") == (
-        "no type 'geometry_msgs/msg/Twsit'; did you mean geometry_msgs/msg/Twist?"
+        "no type 'geometry_msgs/msg/Twsit'; did you mean 'geometry_msgs/msg/Twist'?"
     )  # fmt: skip
-    assert "did you mean my_pkg/srv/NextGoal?" in refused("from my_pkg.srv import NextGaol")
-    assert "did you mean geometry_msgs/msg/Twist?" in refused(
+    assert "did you mean 'my_pkg/srv/NextGoal'?" in refused("from my_pkg.srv import NextGaol")
+    assert "did you mean 'geometry_msgs/msg/Twist'?" in refused(
         "import geometry_msgs.msg\ngeometry_msgs.msg.Twits", AttributeError
     )
     assert refused("import std_msgs.foo").startswith("no type 'std_msgs/foo'")
@@ -269,7 +269,7 @@ def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     assert refused("from rclpy.pretend import hidden") == f"rclpy.pretend has no 'hidden' here{page}"
     assert refused("from rclpy.pretend import Other") == f"rclpy.pretend has no 'Other' here; it is in rclpy{page}"
     assert refused("import rclpy\nrclpy.__file__", AttributeError) == "rclpy has no '__file__'"
-    assert "did you mean rclpy.pretend?" in refused("import rclpy.pretens", ModuleNotFoundError)
+    assert "did you mean 'rclpy.pretend'?" in refused("import rclpy.pretens", ModuleNotFoundError)
     assert "this belongs to ROS 1; here is ROS 2's rclpy" in refused("import rospy", ModuleNotFoundError)
     assert "numpy.frombuffer(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
 

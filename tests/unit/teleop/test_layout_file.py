@@ -82,7 +82,7 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path) -> None:
         ("[moves]\nw = 1", ": [moves] 'w' = 1; put key and meaning in quotes"),
         ('[moves]\nw.x = "back"', ": [moves] 'w' = {'x': 'back'}; put key and meaning in quotes"),
         ('[moves]\nup = "back"\nlft = "left"',
-         ": [moves] 'lft' is not a key: write one character, or a name: did you mean 'left'?"),
+         ": [moves] 'lft' is not a key: write one character, or a name; did you mean 'left'?"),
         ('[moves]\n"shift+w" = "back"', ": [moves] 'shift+w' is not a key: write what it types, such as 'W'"),
         ('[moves]\nspace = "back"', ": [moves] 'space' is fixed: it means stop in every layout"),
         ('[moves]\n" " = "back"', ": [moves] ' ' is fixed: it means stop in every layout"),

@@ -142,7 +142,7 @@ def test_what_a_parameter_does_not_take_is_refused(node: Node) -> None:
         ("shape", of(4), "shape: 4: use one of square, hexagon"),
         ("file", of("other.txt"), "file: it is read-only"),
         ("sped", of(1.0), "node has no parameter 'sped'; did you mean 'speed'?"),
-        ("shape", of("x" * 500), f"shape: '{'x' * 79} ...: use one of square, hexagon"),
+        ("shape", of("x" * 500), f"shape: '{'x' * 76}...: use one of square, hexagon"),
     ]:
         assert node.refused(name, value) == reason
 

@@ -1,0 +1,23 @@
+from holozen.suggest import cut, last_part, listed, suggest
+
+
+def test_a_hint_names_what_is_there() -> None:
+    assert suggest("whel", ["arm", "wheel"]) == "; did you mean 'wheel'?"
+    assert suggest("arm", ["wheel", "left_arm_link"]) == "; did you mean 'left_arm_link'?"
+    assert suggest("odo", ["cmd_vel", "ODOM"]) == "; did you mean 'ODOM'?"
+    assert suggest("zzz", ["wheel"]) == suggest("zzz", []) == suggest("", ["wheel"]) == ""
+
+
+def test_a_package_makes_types_no_more_similar() -> None:
+    known = ["geometry_msgs/msg/Twist", "geometry_msgs/msg/Pose"]
+    assert suggest("geometry_msgs/msg/Foo", known) != ""
+    assert suggest("geometry_msgs/msg/Foo", known, last_part) == ""
+    assert suggest("geometry_msgs/msg/Twsit", known, last_part) == "; did you mean 'geometry_msgs/msg/Twist'?"
+
+
+def test_messages_stay_short() -> None:
+    long = "x" * 300_000
+    assert len(suggest(long[:-1] + "y", [long])) < 120
+    assert len(cut(long)) < 90
+    assert listed(str(n) for n in range(100)).endswith(" and 88 more")
+    assert listed([]) == "none"
