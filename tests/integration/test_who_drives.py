@@ -63,10 +63,16 @@ def drive(robot: Robot, hand: Hand, x: float, *others: tuple[Hand, float]) -> No
 
 
 def refused(robot: Robot, hand: Hand, reason: str) -> CommandStatus:
-    """Command once, and wait until the sim says that it was refused for this reason."""
+    """Command until the sim says that it refused a command for this reason."""
     before = robot.status().refused.get(reason, 0)
-    hand(0.9)
-    return robot.status_when(lambda status: status.refused.get(reason, 0) > before)
+
+    def counted() -> CommandStatus | None:
+        hand(0.9)
+        return status if (status := robot.status()).refused.get(reason, 0) > before else None
+
+    status = wait_for(counted, what=lambda: f"{reason} in {robot.status().refused}")
+    assert status
+    return status
 
 
 def test_teleop_controller_and_plain_put_have_these_priorities() -> None:

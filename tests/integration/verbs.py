@@ -123,5 +123,5 @@ VERBS = {
     "bag record": RECORD,
     "bag play": REPLAY,
     "plot": PLOT,
-    "map": row("--once -w 2", silent=("--once -w 0.2", 1, "no robot is there"), endless=Endless("", "robot x ")),
+    "map": row("--once -w 2", silent=("--once -w 0.2", 1, "no robot is there"), endless=Endless("", "bot x ")),
 }  # fmt: skip

@@ -17,9 +17,9 @@ SLOW = {
 
 ECHO = {
     "holozen", "holozen.background", "holozen.cli", "holozen.cli.echo", "holozen.cli.hints", "holozen.cli.output",
-    "holozen.cli.topic", "holozen.cli.verb", "holozen.console", "holozen.flags", "holozen.process", "holozen.suggest", "holozen.transport",
-    "holozen.transport.connection", "holozen.transport.errors", "holozen.transport.graph", "holozen.transport.node",
-    "holozen.transport.rendezvous", "holozen.transport.samples", "holozen.transport.session",
+    "holozen.cli.topic", "holozen.cli.verb", "holozen.console", "holozen.flags", "holozen.process", "holozen.suggest",
+    "holozen.transport", "holozen.transport.connection", "holozen.transport.errors", "holozen.transport.graph",
+    "holozen.transport.node", "holozen.transport.rendezvous", "holozen.transport.samples", "holozen.transport.session",
 }  # fmt: skip
 """All that an echo needs of us: half a millisecond each."""
 
