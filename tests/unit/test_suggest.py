@@ -1,3 +1,5 @@
+"""What a message says about a misspelt name, and how short it stays."""
+
 from holozen.suggest import cut, last_part, listed, suggest
 
 

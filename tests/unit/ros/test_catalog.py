@@ -39,7 +39,7 @@ def lacks(something: Any, name: str) -> str:
 def test_the_nearest_name_and_the_page_are_reported() -> None:
     for kind in OBJECTS:
         something, name, nearest = OBJECTS[kind]
-        message = f"{kind!r} object has no attribute {name!r}; did you mean {nearest}?; what {kind} has here: {PAGE}"
+        message = f"{kind!r} object has no attribute {name!r}; did you mean {nearest!r}?; what {kind} has here: {PAGE}"
         assert lacks(something, name) == message
         assert lacks(something, "zzz") == f"{kind!r} object has no attribute 'zzz'; what {kind} has here: {PAGE}"
         assert lacks(something, "_zzz") == f"{kind!r} object has no attribute '_zzz'"

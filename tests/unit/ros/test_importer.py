@@ -263,7 +263,7 @@ def test_an_import_of_a_type_from_its_package_is_answered_with_its_module() -> N
 def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     importer.install()
     page = "; see docs/coming-from-ros.md"
-    expected = f"rclpy.pretend has no 'Thign' here; did you mean Thing?{page}"
+    expected = f"rclpy.pretend has no 'Thign' here; did you mean 'Thing'?{page}"
     assert refused("from rclpy.pretend import Thign") == expected
     assert refused("import rclpy.pretend\nrclpy.pretend.Thign", AttributeError) == expected
     assert refused("from rclpy.pretend import hidden") == f"rclpy.pretend has no 'hidden' here{page}"
