@@ -248,8 +248,8 @@ def _missing_name(module: str, name: str, known: Sequence[str]) -> str:
     elif place := _defined_in(name, module.partition(".")[0]):
         hint = f"; it is in {place}"
     else:
-        below = (each.removeprefix(f"{module}.") for each in MODULES if each.startswith(f"{module}."))
-        hint = suggest(name, [*known, *below])
+        below = (each for each in MODULES if each.startswith(f"{module}."))
+        hint = suggest(name, [*known, *below], lambda each: each.rpartition(".")[2])
     return f"{module} has no {name!r} here{hint}; see {PAGE}"
 
 
