@@ -1,5 +1,6 @@
 """Encodes and decodes messages: JSON, msgpack or CDR, by the Zenoh Encoding that travels with the bytes."""
 
+import threading
 from collections.abc import Callable
 from functools import lru_cache, partial
 from types import ModuleType
@@ -111,6 +112,7 @@ def _fields(kind: type[Message]) -> dict[str, Any]:
 
 def convert(value: Any, types: tuple[type[M], ...]) -> M:
     """`decode` for the dicts, lists and numbers of parsed JSON or YAML. Unknown fields are refused."""
+    _decoders(types, "", "json")  # prepares the types
     makers = tuple((kind, partial(msgspec.convert, type=kind, strict=False)) for kind in types)
     made: M = _first(makers, value)
     return made
@@ -146,13 +148,18 @@ _WRITERS: dict[str, Callable[[Message], tuple[bytes, bool]]] = {
 }
 
 
+_preparing = threading.Lock()
+"""msgspec crashes where two threads prepare the first decoder of a type at once."""
+
+
 @lru_cache(maxsize=64)
 def _decoders(types: tuple[type[M], ...], encoding: str, form: str) -> Makers[M]:
     if form == "cdr":
         kinds = _named(types, encoding.partition(";")[2])
         return tuple((kind, _structs().codec(kind).read) for kind in kinds)
     module = msgspec.json if form == "json" else msgspec.msgpack
-    return tuple((kind, module.Decoder(kind).decode) for kind in types)
+    with _preparing:
+        return tuple((kind, module.Decoder(kind).decode) for kind in types)
 
 
 def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
