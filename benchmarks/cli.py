@@ -16,7 +16,7 @@ from pathlib import Path
 from benchmarks.company import beside, guest, host, meeting_point
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
-from benchmarks.startup import HOLOZEN, ROOT, echo, meet_at, tell_for_ever
+from benchmarks.startup import HOLOZEN, ROOT, echo, meet_at, publish_odom
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, Odometry, TriggerReply, TriggerRequest, Twist, codec
 from holozen.transport.connection import LOOPBACK
@@ -37,12 +37,12 @@ BATCH = 2000  # messages that are decoded for one sample
 
 
 def company(endpoint: str, rate: float) -> None:
-    """A robot with all that the verbs look for; tells its odom at `rate` Hz."""
+    """A robot with all that the verbs look for, which publishes odom at `rate` Hz."""
     with Bus("robot", host(endpoint), lasting=True) as bus:
         bus.publisher("cmd_vel_status", CommandStatus).put(CommandStatus())
         bus.subscribe("cmd_vel", Twist)
         bus.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply()).start()
-        tell_for_ever(bus, rate)
+        publish_odom(bus, rate)
 
 
 @contextmanager
@@ -65,20 +65,26 @@ def wall(*words: str) -> list[float]:
 
 
 def verbs(turns: int, timed: Sequence[str] = VERBS) -> list[Case]:
-    """Verbs beside Python that only prints."""
+    """Verbs beside raw zenoh that only opens, links and closes, and Python that only prints."""
     looked_at, driven = meeting_point(), meeting_point()
     with beside(company, looked_at, 50.0), sim(driven):
         _wait(looked_at)
         _wait(driven)
 
         def ours(verb: str) -> Callable[[], list[float]]:
-            # Who publishes a command waits for the sim's word on it.
+            # A publisher of commands waits for the sim's status.
             return lambda: wall(HOLOZEN, *verb.split(), *meet_at(driven if " pub " in verb else looked_at))
+
+        def floor() -> list[float]:
+            return wall(sys.executable, str(ROOT / "benchmarks" / "raw_open.py"), looked_at)
 
         def alone() -> list[float]:
             return wall(sys.executable, "-c", "print('up')")
 
-        return [Case(verb, "ms", WALL_AIM).take_turns(turns, holozen=ours(verb), python_alone=alone) for verb in timed]
+        return [
+            Case(verb, "ms", WALL_AIM).take_turns(turns, holozen=ours(verb), raw_zenoh=floor, python_alone=alone)
+            for verb in timed
+        ]
 
 
 def work(seconds: float, *words: str) -> list[float]:

@@ -11,7 +11,7 @@ from typing import Any
 
 from holozen.transport.connection import Connection
 
-PATIENCE = 10.0  # s for the other process to come up
+PATIENCE = 60.0  # s for the other process to come up
 
 
 def meeting_point() -> str:

@@ -1,24 +1,26 @@
 """A fleet of planar robots that drive, as fast as the loop goes: 1 to 1000 of them, with odom at 20 Hz of sim time.
 
-Another process commands each robot four times a second, a third one subscribes to `*/odom`. Beside it, in turns, the
-bare engine steps the same bodies on the same ground. Time is processor time of all threads of the sim's process, so
-the real-time factor is that of one core.
+Another process commands each robot once a second of sim time, a third one subscribes to `*/odom`. Beside it, in turns,
+the bare engine steps the same bodies on the same ground. Time is processor time of all threads of the sim's process, so
+the real-time factor is that of one core. The last case is a fleet in one sim and in two shards, each a process.
 """
 
 import math
+import multiprocessing
 import re
 import sys
 import threading
 import time
-from contextlib import closing
+from contextlib import ExitStack, closing
 from dataclasses import replace
-from itertools import count
+from pathlib import Path
+from typing import Any
 
 from benchmarks.company import beside, guest, host, meeting_point, until
 from benchmarks.report import Case, parser, publish
 from benchmarks.sim_loop import REST, ROBOT, WORLD, Stepper
 from holozen.bus import Bus
-from holozen.messages import Odometry, Twist
+from holozen.messages import Clock, Twist
 from holozen.robot.loading import load
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import lump
@@ -31,7 +33,8 @@ AIM = "300 robots at 5 times real time on one core, 1000 at 1; a robot costs the
 FLEETS = (1, 10, 100, 300, 1000)
 GRID = 2.0  # m between two robots; each drives a circle of 0.4 m, all in step
 COMMAND = Twist.planar(0.2, 0.0, 0.5)
-COMMANDED = 4.0  # Hz of real time, of each robot
+COMMANDED = 1.0  # Hz of sim time, of each robot
+SHARDED = 300  # robots of the case with shards
 SETTLING = 120  # steps until all stand on the ground
 
 
@@ -45,15 +48,18 @@ def drive(endpoint: str, robots: int) -> None:
     """The pilot of them all."""
     with Bus("pilot", guest(endpoint)) as bus:
         commands = [bus.publisher(f"bot{i}/cmd_vel", Twist) for i in range(robots)]
-        period = 1 / COMMANDED / robots
-        start = time.monotonic()
-        for number in count():
-            commands[number % robots].put(COMMAND)
-            time.sleep(max(0.0, start + number * period - time.monotonic()))
+        clock, sent = bus.subscribe("clock", Clock, depth=1), 0
+        while True:
+            if (message := clock.recv().message) is None:
+                continue
+            due = int(message.clock.seconds() * COMMANDED * robots)
+            for number in range(max(sent, due - robots), due):
+                commands[number % robots].put(COMMAND)
+            sent = due
 
 
 def watch(endpoint: str) -> None:
-    """Who reads all odometry."""
+    """A reader of all odometry."""
     with Bus("watcher", guest(endpoint)) as bus:
         odoms = bus.subscribe_raw("*/odom")
         while True:
@@ -107,12 +113,10 @@ def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]
         spawning, memory = time.process_time() - start, resident() - before
         ours(SETTLING)
         with beside(drive, endpoint, robots), beside(watch, endpoint):
-            odom = bus.subscribe(f"bot{robots - 1}/odom", Odometry)
 
             def driving() -> bool:
                 ours(12)
-                moved = [received.message for received in iter(odom.try_recv, None)]
-                return any(message and message.twist.twist.linear.x > 0.1 for message in moved)
+                return all(robot.arbiter.driver(time.monotonic()) for robot in entities.robots)
 
             until(driving, every=0)
             other = bare(model, robots)
@@ -120,7 +124,6 @@ def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]
             case = Case(f"{robots} robots", "us a robot and step", AIM).take_turns(
                 turns, holozen=lambda: timed(ours, steps, robots), bare_engine=lambda: timed(other, steps, robots)
             )
-            assert all(robot.arbiter.driver(time.monotonic()) for robot in entities.robots), "a robot was not commanded"
     cost = case.sides()["holozen"]["p50"]
     return case, {
         "robots": robots,
@@ -130,17 +133,73 @@ def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]
     }
 
 
+def one_shard(endpoint: str, robots: int, seconds: float, results: Any) -> None:
+    """A sim in a process of its own with some robots; puts the robots' steps in a second of real time."""
+    model = load(ROBOT)
+    with Bus("sim", guest(endpoint)) as bus, closing(World(WORLD)) as world:
+        entities, step = fleet(bus, world, model, robots)
+        for robot in entities.robots:
+            robot.arbiter.offer("benchmark", 4, (0.2, 0.0, 0.5), time.monotonic() + 1e6)
+        step(SETTLING)
+        results.put(None)
+        start, before = time.monotonic(), world.steps
+        while time.monotonic() < start + seconds:
+            step(12)
+        results.put((world.steps - before) * robots / (time.monotonic() - start))
+        time.sleep(60)  # until it is ended
+
+
+def sharded(count: int, seconds: float) -> list[float]:
+    """Microseconds of real time a robot and step, of a fleet in `count` sims at once."""
+    results, endpoint = multiprocessing.get_context("spawn").Queue(), meeting_point()
+    with ExitStack() as sims, Bus("watcher", host(endpoint)) as bus:
+        odoms = bus.subscribe_raw("*/odom", depth=1)
+        for _ in range(count):
+            sims.enter_context(beside(one_shard, endpoint, SHARDED // count, seconds, results))
+        found = [results.get(timeout=300) for _ in range(2 * count)]
+        odoms.close()
+    return [1e6 / sum(filter(None, found))]
+
+
+def plot(fleets: list[dict[str, float]], cases: list[Case], file: Path) -> None:
+    """Draw what a robot and step costs over the number of robots, beside the bare engine."""
+    from matplotlib import pyplot
+
+    figure, axes = pyplot.subplots(figsize=(6, 3.2))
+    robots = [row["robots"] for row in fleets]
+    for side in ("holozen", "bare engine"):
+        axes.plot(robots, [case.sides()[side]["p50"] for case in cases], marker="o", label=side)
+    axes.set(xscale="log", ylim=(0, None), xlabel="robots", ylabel="us a robot and step")
+    axes.legend()
+    axes.grid(alpha=0.3)
+    figure.tight_layout()
+    figure.savefig(file)
+    print(f"plot: {file}")
+
+
 def main() -> int:
     flags = parser("fleet", __doc__)
     flags.add_argument("--robots", type=int, nargs="+", default=FLEETS, metavar="N", help="how many (default: all)")
+    flags.add_argument("--plot", type=Path, metavar="FILE", help="draw the costs, as SVG or PNG")
     args = flags.parse_args()
-    cases, fleets = [], []
+    cases: list[Case] = []
+    fleets: list[dict[str, float]] = []
     for robots in args.robots:
-        turns, steps = (1, 24) if args.quick else (9, max(48, 12 * (2000 // robots)))
+        turns, steps = (1, 24) if args.quick else (9, max(240, 12 * (2000 // robots)))
         case, figures = measure(robots, turns, steps)
         cases.append(case)
         fleets.append(figures)
         print(", ".join(f"{name.replace('_', ' ')} {value:.4g}" for name, value in figures.items()), flush=True)
+    if args.plot:
+        plot(fleets, cases, args.plot)
+    seconds = 0.2 if args.quick else 3.0
+    case = Case(f"{SHARDED} robots, two shards against one sim", "us of real time a robot and step", "ratio <= 0.6")
+    cases.append(
+        case.take_turns(
+            1 if args.quick else 5,
+            two_shards=lambda: sharded(2, seconds), one_sim=lambda: sharded(1, seconds),
+        )
+    )  # fmt: skip
     publish("fleet", cases, args.json, fleets=fleets)
     return 0
 

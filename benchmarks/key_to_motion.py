@@ -77,7 +77,7 @@ class Seat:
 
 @contextmanager
 def seat() -> Iterator[Seat]:
-    """A sim with a box, and somebody who drives it."""
+    """A sim with a box, and a teleop that drives it."""
     with tempfile.TemporaryDirectory() as folder, Wire() as wire:
         file = Path(folder) / "box.urdf"
         file.write_text(BOX)
@@ -87,13 +87,13 @@ def seat() -> Iterator[Seat]:
             yield Seat(wire, terminal)
 
 
-def tell_when(endpoint: str) -> None:
+def stamp_commands(endpoint: str) -> None:
     """Answer each message with the time at which it came."""
     with open_raw(host(endpoint)) as session:
-        asked, told = raw_ends(session, reads="cmd_vel", writes="odom")
+        commands, stamps = raw_ends(session, reads="cmd_vel", writes="odom")
         while True:
-            asked.recv()
-            told.put(str(time.monotonic_ns()))
+            commands.recv()
+            stamps.put(str(time.monotonic_ns()))
 
 
 @contextmanager
@@ -121,7 +121,7 @@ def main() -> int:
     turns, count = (2, 5) if args.quick else (40, 25)
     cases = [Case(name, "ms", AIM, {"holozen": [], "step and raw zenoh": []}) for name in ("to motion", "to rest")]
     endpoint = meeting_point()
-    with seat() as ours, beside(tell_when, endpoint), one_way(endpoint) as raw:
+    with seat() as ours, beside(stamp_commands, endpoint), one_way(endpoint) as raw:
         ours.start_and_stop(10)
         for _ in range(turns):
             least = raw(count)

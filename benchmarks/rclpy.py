@@ -1,6 +1,6 @@
 """A script's callback on odom at 1 kHz: an rclpy node that spins, beside a plain subscriber of our bus.
 
-Each in a process of its own, in turns, with the same robot. Told are latency, processor time, and what was lost.
+Each in a process of its own, in turns, with the same robot. Result are latency, processor time, and what was lost.
 """
 
 import multiprocessing
@@ -23,12 +23,12 @@ FIRST = 200  # messages that are not counted, while the two meet and caches fill
 
 Arrivals = list[tuple[float, int]]
 """Of each message: how long it took in microseconds, and its number."""
-Told = tuple[list[float], float, int]
+Result = tuple[list[float], float, int]
 """The latencies in microseconds, the processor time in microseconds a message, and how many were lost."""
 
 
 def robot(endpoint: str) -> None:
-    """Tells its odom at 1 kHz: in its stamp when it was sent, in its child's frame which it is."""
+    """Publishes odom at 1 kHz: the stamp is the time of sending, child_frame_id the number."""
     with Bus("robot", host(endpoint)) as bus:
         odom = bus.publisher("odom", Odometry)
         number, due = 0, time.perf_counter()
@@ -57,7 +57,7 @@ class Ear:
             self._before = time.process_time()
         return len(self.heard) < FIRST + self._count
 
-    def told(self) -> Told:
+    def result(self) -> Result:
         """The figures of what came after the first ones."""
         spent, counted = time.process_time() - self._before, self.heard[FIRST:]
         numbers = [number for _, number in counted]
@@ -65,7 +65,7 @@ class Ear:
         return [took for took, _ in counted], spent / len(counted) * 1e6, lost
 
 
-def listen_as_node(endpoint: str, count: int) -> Told:
+def listen_as_node(endpoint: str, count: int) -> Result:
     """A node that spins."""
     from holozen.ros import rclpy
     from holozen.ros.generated import find
@@ -78,36 +78,36 @@ def listen_as_node(endpoint: str, count: int) -> Told:
 
     def callback(message: Any) -> None:
         if not done.done() and not ear.hear(message):
-            done.set_result(ear.told())
+            done.set_result(ear.result())
 
     node.create_subscription(find("nav_msgs/msg/Odometry"), "odom", callback, DEPTH)
     rclpy.spin_until_future_complete(node, done)
     rclpy.shutdown()
-    told: Told = done.result()
-    return told
+    result: Result = done.result()
+    return result
 
 
-def listen_on_bus(endpoint: str, count: int) -> Told:
+def listen_on_bus(endpoint: str, count: int) -> Result:
     """A subscriber of our bus that waits in `recv`."""
     with Bus("listener", guest(endpoint)) as bus:
         odom, ear = bus.subscribe("odom", Odometry, depth=DEPTH), Ear(count)
         while ear.hear(odom.recv().message):
             pass
-        return ear.told()
+        return ear.result()
 
 
-def in_a_process(job: Callable[[str, int], Told], endpoint: str, count: int) -> Told:
-    """What `job` tells, run in a process of its own."""
+def in_a_process(job: Callable[[str, int], Result], endpoint: str, count: int) -> Result:
+    """The result of `job`, run in a process of its own."""
     spawn = multiprocessing.get_context("spawn")
     here, there = spawn.Pipe()
-    process = spawn.Process(target=_tell, args=(there, job, endpoint, count), daemon=True)
+    process = spawn.Process(target=_send_result, args=(there, job, endpoint, count), daemon=True)
     process.start()
-    told: Told = here.recv()
+    result: Result = here.recv()
     process.join()
-    return told
+    return result
 
 
-def _tell(pipe: "Pipe[Any, Any]", job: Callable[[str, int], Told], endpoint: str, count: int) -> None:
+def _send_result(pipe: "Pipe[Any, Any]", job: Callable[[str, int], Result], endpoint: str, count: int) -> None:
     pipe.send(job(endpoint, count))
 
 

@@ -1,7 +1,7 @@
 """`holozen record` of 50 topics at 100 Hz: is everything in the file, and how late was it taken in?
 
 The publisher is our bus in another process: typed Odometry with a number in each message. Whatever is missing in the
-file is told, by where it was lost. Nothing else records Zenoh keys into MCAP, so there is no other side.
+file is counted, by where it was lost. Nothing else records Zenoh keys into MCAP, so there is no other side.
 """
 
 import json
@@ -46,7 +46,7 @@ def send(bus: Bus, seconds: float) -> int:
 
 
 def record(seconds: float, folder: Path) -> tuple[int, dict[str, Any], Path, float]:
-    """Record while somebody publishes: messages a topic, the recorder's last words, its file and its CPU seconds."""
+    """Record while another process publishes: messages a topic, the recorder's last line, its file and its CPU s."""
     endpoint = meeting_point()
     flags = guest(endpoint).arguments()
     words = [HOLOZEN, "record", "-a", "--json", "-o", str(folder / "bag"), *flags]
@@ -87,7 +87,7 @@ def main() -> int:
         size = path.stat().st_size
         numbers, late = read(path)
     found = sum(map(len, numbers.values()))
-    told = {
+    reported = {
         "sent": count * TOPICS,
         "in the file": found,
         "lost before the recorder": count * TOPICS - last["messages"] - last["dropped"],
@@ -99,10 +99,10 @@ def main() -> int:
         "cpu percent": round(100 * cpu / seconds, 1),
     }
     case = Case(f"{TOPICS} topics at {RATE:g} Hz, sent to taken in", "ms", AIM, {"holozen": [late]})
-    publish("record", [case], args.json, counts=told)
-    for name, value in told.items():
+    publish("record", [case], args.json, counts=reported)
+    for name, value in reported.items():
         print(f"{name}: {value}")
-    return 0 if told["lost after it was received"] == 0 else 1
+    return 0 if reported["lost after it was received"] == 0 else 1
 
 
 if __name__ == "__main__":

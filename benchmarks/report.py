@@ -18,7 +18,7 @@ HEAD = ("case", "side", "p50", "p99", "rounds' medians", "samples")
 
 
 class Figures(TypedDict):
-    """What is told of one side. `spread`: the 10th and the 90th percentile of its rounds' medians."""
+    """The figures of one side. `spread`: the 10th and the 90th percentile of its rounds' medians."""
 
     p50: float
     p99: float
@@ -28,9 +28,9 @@ class Figures(TypedDict):
 
 @dataclass
 class Case:
-    """One comparison: side -> its rounds, each a list of times in `unit`. `aim` says in words what was hoped for.
+    """One comparison: side -> its rounds, each a list of times in `unit`. `aim` is the target in words.
 
-    The first side is ours. Its ratio is told against the second, time by time: below 1 is faster.
+    The first side is ours. Its ratio is to the second, time by time: below 1 is faster.
     """
 
     name: str
@@ -66,12 +66,12 @@ class Case:
         if ratio := self.ratio():
             yield self.name, "ratio", f"{ratio[0]:.2f}", "", _between(ratio[1], ".2f"), ""
 
-    def told(self) -> dict[str, object]:
+    def as_json(self) -> dict[str, object]:
         """This case for the JSON file."""
-        told: dict[str, object] = {"case": self.name, "unit": self.unit, "aim": self.aim, "sides": self.sides()}
+        row: dict[str, object] = {"case": self.name, "unit": self.unit, "aim": self.aim, "sides": self.sides()}
         if ratio := self.ratio():
-            told["ratio"] = {"of_medians": ratio[0], "spread": ratio[1]}
-        return told
+            row["ratio"] = {"of_medians": ratio[0], "spread": ratio[1]}
+        return row
 
 
 def parser(name: str, description: str | None) -> argparse.ArgumentParser:
@@ -90,8 +90,8 @@ def publish(name: str, cases: list[Case], file: Path, **more: object) -> None:
     for aim in dict.fromkeys(case.aim for case in cases if case.aim):
         print(f"aim: {aim}")
     machine = {"cpus": os.cpu_count(), "system": platform.platform(), "python": platform.python_version()}
-    told = {"benchmark": name, "machine": machine, "load": os.getloadavg(), "cases": [c.told() for c in cases]}
-    file.write_text(json.dumps(told | more, indent=1) + "\n")
+    figures = {"benchmark": name, "machine": machine, "load": os.getloadavg(), "cases": [c.as_json() for c in cases]}
+    file.write_text(json.dumps(figures | more, indent=1) + "\n")
     print(f"figures: {file}")
 
 

@@ -27,23 +27,23 @@ INSTALL = (
 
 @contextmanager
 def ros(port: str) -> Iterator[tuple[dict[str, str], str]]:
-    """A master, and a node that tells odom at 50 Hz: the environment that finds them, and a service of the node."""
+    """A master, and a node that publishes odom at 50 Hz: the environment that finds them, and a service of the node."""
     environment = {**os.environ, "ROS_MASTER_URI": f"http://127.0.0.1:{port}", "ROS_IP": "127.0.0.1"}
     silent = {"env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     with subprocess.Popen(["rosmaster", "--core", "-p", port], **silent) as master:  # type: ignore[call-overload]
         until(lambda: _served(environment) is not None)
-        tell = ["rostopic", "pub", "-r", "50", "/odom", "nav_msgs/Odometry", "{}"]
-        with subprocess.Popen(tell, **silent) as teller:  # type: ignore[call-overload]
+        publish = ["rostopic", "pub", "-r", "50", "/odom", "nav_msgs/Odometry", "{}"]
+        with subprocess.Popen(publish, **silent) as publisher:  # type: ignore[call-overload]
             try:
                 until(lambda: _served(environment))
                 yield environment, (_served(environment) or [""])[0]
             finally:
-                teller.terminate()
+                publisher.terminate()
                 master.terminate()
 
 
 def _served(environment: Mapping[str, str]) -> list[str] | None:
-    """The services that tell of loggers, which every node of ROS 1 has; None while there is no master."""
+    """The services that list loggers, which every node of ROS 1 has; None while there is no master."""
     done = subprocess.run(["rosservice", "list"], env=environment, capture_output=True, text=True)
     if done.returncode:
         return None

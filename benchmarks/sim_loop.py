@@ -1,7 +1,7 @@
 """The sim's loop as fast as it goes, commands and publishing included, against a bare stepSimulation loop.
 
 The bare engine steps the same robot as it loads it: four links, three joints. Ours is one body whose wheels turn for
-the eye, so the engine alone with that body is told too. --profile also tells where our time goes.
+the eye, so the engine alone with that body is measured too. --profile also prints where our time goes.
 """
 
 import sys
@@ -55,7 +55,7 @@ PARTS = {
 
 
 def drive(endpoint: str) -> None:
-    """A pilot who holds a key."""
+    """A teleop with a key held down."""
     with Bus("pilot", guest(endpoint)) as bus:
         commands = bus.publisher("cmd_vel", Twist)
         while True:
@@ -162,7 +162,7 @@ def compare(name: str, sides: tuple[Stepper, Stepper, Stepper], turns: int, step
 
 def main() -> int:
     flags = parser("sim_loop", __doc__)
-    flags.add_argument("--profile", action="store_true", help="also tell where our time goes")
+    flags.add_argument("--profile", action="store_true", help="also print where our time goes")
     args = flags.parse_args()
     turns, steps = (2, 300) if args.quick else (60, 2400)
     endpoint = meeting_point()

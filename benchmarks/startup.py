@@ -22,13 +22,13 @@ ROOT = Path(__file__).resolve().parent.parent
 HOLOZEN = str(Path(sys.executable).with_name("holozen"))
 
 
-def tell_odom(endpoint: str, rate: float) -> None:
-    """A robot that stands at `endpoint` and tells its odom."""
+def odom_publisher(endpoint: str, rate: float) -> None:
+    """A robot that stands at `endpoint` and publishes odom."""
     with Bus("robot", host(endpoint)) as bus:
-        tell_for_ever(bus, rate)
+        publish_odom(bus, rate)
 
 
-def tell_for_ever(bus: Bus, rate: float) -> None:
+def publish_odom(bus: Bus, rate: float) -> None:
     """Publish odom at `rate` Hz."""
     odom = bus.publisher("odom", Odometry)
     due = time.monotonic()
@@ -60,8 +60,8 @@ def first_odom() -> list[float]:
             came = odom.wait(0, timeout=20)
             took = time.perf_counter() - start
             process.terminate()
-            told = process.communicate()[1].decode()
-    assert came, f"no odom from `holozen up` within 20 s; it said:\n{told}"
+            err = process.communicate()[1].decode()
+    assert came, f"no odom from `holozen up` within 20 s; its stderr:\n{err}"
     return [took * 1000]
 
 
@@ -71,11 +71,11 @@ def meet_at(endpoint: str) -> Sequence[str]:
 
 
 def echo(rate: float, turns: int) -> Case:
-    """The first echoed line against the raw subscriber's, while a robot tells its odom at `rate`."""
+    """The first echoed line against the raw subscriber's, while a robot publishes odom at `rate`."""
     endpoint = meeting_point()
-    with beside(tell_odom, endpoint, rate):
+    with beside(odom_publisher, endpoint, rate):
         with Bus("waits", guest(endpoint)) as bus:
-            assert bus.latest("odom", Odometry).wait(0, timeout=10), "the telling process did not come up within 10 s"
+            assert bus.latest("odom", Odometry).wait(0, timeout=10), "the publisher did not come up within 10 s"
         return Case(f"first line, odom at {rate:g} Hz", "ms", ECHO_AIM).take_turns(
             turns,
             holozen=lambda: first_line(HOLOZEN, "topic", "echo", "odom", "--once", *meet_at(endpoint)),

@@ -6,6 +6,7 @@ A check yields findings; `diagnose` runs all of them in their order.
 import contextlib
 import json
 import os
+import re
 import sys
 import time
 from collections.abc import Iterable, Iterator, Mapping
@@ -13,10 +14,10 @@ from importlib import metadata
 from typing import TYPE_CHECKING, NamedTuple
 
 from holozen.transport import graph
-from holozen.transport.connection import LOOPBACK, RENDEZVOUS, VARIABLES, Connection, address
+from holozen.transport.connection import ROS_DOMAIN, VARIABLES, Connection, address
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, version
-from holozen.transport.listeners import HERE, Holder, exposure, holders, reached
+from holozen.transport.listeners import Holder, exposure, holders, reached
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
@@ -30,8 +31,13 @@ ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
 MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
-OPTIONAL = ("matplotlib",)  # not in requirements.lock: only `bag plot` needs it
-SHARED = ("delete_entity", "get_entities", "get_entity_state", "set_entity_state")  # served by joined sims too
+OPTIONAL = ("matplotlib", "pycollada", "viser")  # not in requirements.lock: only `bag plot` and `view` need them
+SHARED = (
+    "delete_entity", "get_entities", "get_entity_state", "set_entity_state", "get_simulation_state",
+    "set_simulation_state", "step_simulation", "reset_simulation", "get_scene", "robot_description",
+)  # fmt: skip
+"""Served by joined sims too."""
+SHARD = re.compile(r"sim_\d+_of_\d+")  # the node of a sim that adds its share of the entities
 DRIVES = 2.0  # Hz; a slower source is not taken to drive a robot
 
 
@@ -118,6 +124,11 @@ def environment(given: Mapping[str, object], environ: Mapping[str, str] = os.env
         if value := environ.get(variable, "").strip():
             text = f"is in force for every verb without --{name}" if given[name] is None else f"yields to --{name} here"
             yield Finding("environment", OK, f"{variable}={value} {text}")
+    if value := environ.get(ROS_DOMAIN, "").strip():
+        ours = f"{VARIABLES['domain']}={environ[VARIABLES['domain']]}" if environ.get(VARIABLES["domain"]) else ""
+        stronger = "--domain here" if given["domain"] is not None else ours
+        text = f"yields to {stronger}" if stronger else "is in force for every verb without --domain"
+        yield Finding("environment", OK, f"{ROS_DOMAIN}={value} {text}")
 
 
 def nodes(connection: Connection) -> Iterator[Finding]:
@@ -125,7 +136,7 @@ def nodes(connection: Connection) -> Iterator[Finding]:
     from holozen.bus import Bus
 
     if connection.mode == "peer" and not connection.config:
-        connection = connection.replace(listen=(LOOPBACK,))  # hold no port that another process may want
+        connection = connection.replace(listen=(connection.own_endpoint,))  # hold none that another process may want
     with Bus("doctor", connection, patience=OPEN) as bus:
         endpoints = bus.graph().settled(bus.connected, patience=FIND)
         began = time.monotonic()
@@ -145,14 +156,14 @@ def nodes(connection: Connection) -> Iterator[Finding]:
 
 
 def meeting_points(connection: Connection, connected: bool) -> Iterator[Finding]:
-    """Who holds the endpoints to connect to. `connected`: whether any node was reached."""
+    """The holders of the endpoints to connect to. `connected`: whether any node was reached."""
     listed = json.loads(connection.settings().get("connect/endpoints", "[]"))
     endpoints = [one for one in listed if isinstance(one, str)] if isinstance(listed, list) else []
     asked_for = connection.connect is not None
     for endpoint, reason in reached(endpoints).items():
-        host, port = address(endpoint) or ("", 0)
-        here = holders(port) if host in HERE else []
-        if endpoint in RENDEZVOUS[1:] and not asked_for and not (here and not reason and not connected):
+        port = (address(endpoint) or ("", 0))[1]
+        here = holders(endpoint)
+        if endpoint in connection.meeting_points[1:] and not asked_for and not (here and not reason and not connected):
             continue  # they matter where the first does not answer
         yield _meeting_point(endpoint, port, reason, here, connected, asked_for)
 
@@ -265,6 +276,8 @@ def duplicates(endpoints: Iterable[Endpoint], peers: Mapping[str, Peer]) -> Iter
     """Nodes that share a service or a key that only one should publish, such as two sims with the same robot."""
     holders: dict[tuple[str, str], dict[str, str]] = {}
     for end in endpoints:
+        if end.key == "spawn_entity" and SHARD.fullmatch(end.node):
+            continue
         if (end.kind == "srv" and end.key not in SHARED) or (end.kind == "pub" and end.type in EXCLUSIVE):
             holders.setdefault((end.kind, end.key), {})[end.session] = end.node
     groups: dict[tuple[tuple[str, str], ...], list[str]] = {}
@@ -322,7 +335,7 @@ def commands(key: str, status: "CommandStatus") -> Iterator[Finding]:
     if not driving:
         yield Finding(key, OK, f"nothing commands {robot}; `holozen teleop` or `holozen controller` does")
     if len(driving) > 1:
-        level = ERROR if _rank(driving[0]) == _rank(driving[1]) else WARNING  # among equals it is chance who drives
+        level = ERROR if _rank(driving[0]) == _rank(driving[1]) else WARNING  # among equals chance decides
         names = [
             f"{one.source} ({one.priority}, {one.rate:.0f} Hz, {'' if one.obeyed else 'not '}obeyed)" for one in driving
         ]

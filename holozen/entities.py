@@ -17,16 +17,28 @@ AT_ONCE = 32  # requests of `for_each` that wait at the sim
 
 T = TypeVar("T")
 U = TypeVar("U")
-R = TypeVar("R", si.SpawnEntityReply, si.DeleteEntityReply, si.GetEntityStateReply, si.GetEntitiesReply)
+R = TypeVar(
+    "R",
+    si.SpawnEntityReply,
+    si.DeleteEntityReply,
+    si.GetEntityStateReply,
+    si.GetEntitiesReply,
+    si.GetSimulationStateReply,
+)
 
 
 def names(bus: Bus, notice: float = 0.0) -> list[str]:
     """The names of all entities, sorted. Raises ServiceError, also if no sim answers within `notice` seconds (3)."""
+    replies = ask_sims(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice)
+    return sorted({name for reply in replies for name in reply.entities})
+
+
+def ask_sims(bus: Bus, key: str, request: Message, reply: type[R], notice: float = 0.0) -> list[R]:
+    """The good replies of all sims. Raises ServiceError, also if no sim answers within `notice` seconds (3)."""
     notice = notice or NOTICE
     bus.endpoints()  # once they are known, all sims are connected
     try:
-        replies = _ask(bus, "get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, notice)
-        return sorted({name for reply in replies for name in reply.entities})
+        return _ask(bus, key, request, reply, notice)
     except NoReply:
         raise ServiceError(f"no sim answered within {notice:g} s; start one in another terminal: holozen sim") from None
 
@@ -68,8 +80,17 @@ def for_each(ask: Callable[[T], U], items: Iterable[T]) -> Iterator[U]:
 
 def is_taken(error: ServiceError) -> bool:
     """Whether a spawn failed only because its name is taken."""
+    return _code(error) == si.SpawnEntityReply.NAME_NOT_UNIQUE
+
+
+def has_no_room(error: ServiceError) -> bool:
+    """Whether a spawn failed because something else is at its place."""
+    return _code(error) == si.SpawnEntityReply.INVALID_POSE
+
+
+def _code(error: ServiceError) -> object:
     result = error.fields.get("result")
-    return isinstance(result, dict) and result.get("result") == si.SpawnEntityReply.NAME_NOT_UNIQUE
+    return result.get("result") if isinstance(result, dict) else None
 
 
 def _ask(bus: Bus, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = True) -> list[R]:

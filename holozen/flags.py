@@ -14,6 +14,8 @@ from holozen.suggest import suggest
 if TYPE_CHECKING:
     from pathlib import Path
 
+DRIVES = ("planar_move", "omni")
+DRIVE = "planar_move for a robot whose file has no drive; omni: on its own wheels, instead of planar_move"
 WIDTH = 100  # characters of a line of help where there is no terminal
 
 
@@ -125,7 +127,10 @@ def package(text: str) -> tuple[str, Path]:
     name, equals, folder = text.partition("=")
     if not (name and equals and folder):
         raise refused(f"{text!r}: write NAME=DIR, such as holo=~/ws/src/holo")
-    return name, Path(folder).expanduser()
+    path = Path(folder).expanduser()
+    if not path.is_dir():
+        raise refused(f"{text!r}: there is no folder {str(path)!r}")
+    return name, path
 
 
 def variable(text: str) -> str:

@@ -97,6 +97,19 @@ class Ending:
         os._exit(self.code)
 
 
+@contextlib.contextmanager
+def quiet() -> Iterator[None]:
+    """Discard what C code prints to stderr."""
+    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, 2)
+    try:
+        yield
+    finally:
+        os.dup2(saved, 2)
+        os.close(saved)
+        os.close(null)
+
+
 def dies_with_parent() -> Callable[[], None]:
     """For subprocess's `preexec_fn`: have the kernel end the child when this process is killed."""
     import ctypes

@@ -1,7 +1,7 @@
 """Rotations and rigid transforms in plain floats: no numpy, no messages, no clock.
 
 Metres and radians. Quaternions are x, y, z, w, as in geometry_msgs; those taken and returned have length 1 unless a
-function says otherwise. Matrices, and rotations of whole arrays, are in holozen/robot/rotation.py.
+docstring differs. Matrices, and rotations of whole arrays, are in holozen/robot/rotation.py.
 """
 
 import math

@@ -8,7 +8,7 @@ MOST = 1000  # names that are compared with one
 
 
 def suggest(word: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
-    """`; did you mean 'x'?` with the `known` name most similar to `word`, for the end of a message; else empty.
+    """` (did you mean 'x'?)` with the `known` name most similar to `word`, for the end of a message; else empty.
 
     `alike` is the similarity required, from 0 to 1; the start of a name is nearly as similar as the whole, and a part
     of it somewhat. Case is ignored; `part` is what of both is compared.
@@ -29,7 +29,7 @@ def suggest(word: str, known: Iterable[str], part: Callable[[str], str] = str, a
         return found
 
     best = max(islice(known, MOST), key=likeness, default="")
-    return f"; did you mean {shorten(best)!r}?" if best and likeness(best) > alike else ""
+    return f" (did you mean {shorten(best)!r}?)" if best and likeness(best) > alike else ""
 
 
 def last_part(name: str) -> str:

@@ -15,14 +15,17 @@ COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stops
 MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded
 MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a TwistStamped is refused
 MAX_SPEED, MAX_TURN = 100.0, 1000.0  # m/s, rad/s; a command beyond is a mistake: it is refused, not clamped
+MAX_FORCE = 1e4  # N, N m; also of a mistake
 MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N; also of a mistake
 
-PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
+LATCHED = ("tf_static", "robot_description", "map")  # in ROS 2, late subscribers receive their last message too
+
+PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "view": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
 """Zenoh priority of each command source. Others have DATA, as a plain `zenoh put`."""
 
 
 class Topic(NamedTuple):
-    """A key with a stream of messages. `rate` in Hz; After `silence` seconds readers call it stale."""
+    """A key with a stream of messages. `rate` in Hz, 0: on demand. After `silence` seconds readers call it stale."""
 
     key: str
     types: tuple[type[m.Message], ...]
@@ -39,8 +42,8 @@ class Topic(NamedTuple):
 
     @property
     def is_command(self) -> bool:
-        """Whether it moves a robot."""
-        return "sim" in self.readers
+        """Whether it moves a robot: all else comes from the sim and its cameras."""
+        return not {"sim", "camera"} & set(self.writers)
 
 
 class Service(NamedTuple):
@@ -54,16 +57,26 @@ class Service(NamedTuple):
 
 
 TOPICS = (
-    Topic("cmd_vel", (m.Twist, m.TwistStamped), ("teleop", "controller"), ("sim",), 20.0, COMMAND_SILENCE,
+    Topic("cmd_vel", (m.Twist, m.TwistStamped), ("teleop", "view", "controller"), ("sim",), 20.0, COMMAND_SILENCE,
           "0.5 s without a fresh one: the robot stands"),
-    Topic("odom", (m.Odometry,), ("sim",), ("teleop", "controller", "pose_service"), 50.0, 0.2,
+    Topic("odom", (m.Odometry,), ("sim",), ("teleop", "view", "controller", "pose_service"), 50.0, 0.2,
           "0.2 s: shown as stale, the controller stops"),
-    Topic("cmd_vel_status", (m.CommandStatus,), ("sim",), ("teleop", "controller"), 10.0, 1.0, ""),
+    Topic("cmd_vel_status", (m.CommandStatus,), ("sim",), ("teleop", "view", "controller"), 10.0, 1.0, ""),
     Topic("joint_states", (m.JointState,), ("sim",), (), 50.0, 0.2, ""),
     Topic("tf", (m.TFMessage,), ("sim",), (), 50.0, 0.2, ""),
     Topic("clock", (m.Clock,), ("sim",), (), 50.0, 0.2, ""),
+    Topic("simulation_status", (m.SimulationStatus,), ("sim",), (), 10.0, 1.0, ""),
+    Topic("scan", (m.LaserScan,), ("sim",), (), 10.0, 1.0, ""),
+    Topic("imu", (m.Imu,), ("sim",), (), 100.0, 0.2, ""),
+    Topic("exposures", (m.Exposure,), ("sim",), ("camera",), 10.0, 1.0, ""),
+    Topic("image_raw", (m.Image,), ("camera",), (), 10.0, 1.0, ""),
+    Topic("camera_info", (m.CameraInfo,), ("camera",), (), 10.0, 1.0, ""),
     Topic("joint_command", (m.JointState,), (), ("sim",), 20.0, COMMAND_SILENCE,
           "0.5 s without a fresh one: joints hold still"),
+    Topic("gazebo_ros_force", (m.Wrench,), (), ("sim",), 20.0, COMMAND_SILENCE,
+          "0.5 s without a fresh one: the force ends"),
+    Topic("goal_pose", (m.PoseStamped,), ("view",), ("controller",), 0.0, 0.0,
+          "once for each goal; the controller stops without fresh odom"),
 )  # fmt: skip
 
 SERVICES = (
@@ -79,6 +92,42 @@ SERVICES = (
     Service("get_entities", s.GetEntitiesRequest, s.GetEntitiesReply, "sim", "the names of all entities"),
     Service("get_entity_state", s.GetEntityStateRequest, s.GetEntityStateReply, "sim", "an entity's pose and velocity"),
     Service("set_entity_state", s.SetEntityStateRequest, s.SetEntityStateReply, "sim", "moves an entity"),
+    Service(
+        "get_simulation_state",
+        s.GetSimulationStateRequest,
+        s.GetSimulationStateReply,
+        "sim",
+        "whether it plays, is paused or stopped",
+    ),
+    Service(
+        "set_simulation_state",
+        s.SetSimulationStateRequest,
+        s.SetSimulationStateReply,
+        "sim",
+        "plays, pauses, stops or ends it",
+    ),
+    Service(
+        "step_simulation",
+        s.StepSimulationRequest,
+        s.StepSimulationReply,
+        "sim",
+        "makes steps while it is paused; the reply follows all their messages",
+    ),
+    Service(
+        "reset_simulation",
+        s.ResetSimulationRequest,
+        s.ResetSimulationReply,
+        "sim",
+        "sets time, poses or entities back to the start",
+    ),
+    Service("get_scene", m.GetSceneRequest, m.GetSceneReply, "sim", "all entities, their keys and poses"),
+    Service(
+        "robot_description",
+        m.RobotDescriptionRequest,
+        m.RobotDescriptionReply,
+        "sim",
+        "an entity's URDF, with its visual meshes in it",
+    ),
 )
 
 OF_NODES = (
@@ -103,9 +152,10 @@ def table() -> str:
 def _topic_row(row: Topic) -> str:
     types = row.type.ROS + "".join(f" ({other.__name__} accepted)" for other in row.types[1:])
     # Any plain Zenoh tool may write commands and read everything.
-    writers = [*row.writers, "anyone"] if row.key in ("cmd_vel", "joint_command") else row.writers
+    writers = [*row.writers, "anyone"] if row.is_command else row.writers
     ends = f"{', '.join(writers)} -> {', '.join(row.readers) or 'anyone'}"
-    return f"| `{row.key}` | {types} | {ends} | {row.rate:g} Hz | {row.rule} |"
+    rate = f"{row.rate:g} Hz" if row.rate else "on demand"
+    return f"| `{row.key}` | {types} | {ends} | {rate} | {row.rule} |"
 
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
@@ -119,8 +169,10 @@ def robot_name(text: str) -> str:
 
 
 def key_for(key: str, robot: str = "") -> str:
-    """The key of a robot's topic or service: `cmd_vel` for the robot at the root, else `Fred/cmd_vel`."""
-    return f"{robot}/{key}" if robot else key
+    """The key of a robot's topic or service: `cmd_vel` for the robot at the root, else `Fred/cmd_vel`. A file may hold
+    the robot's name already.
+    """
+    return f"{robot}/{key}" if robot and not key.startswith(f"{robot}/") else key
 
 
 def topic(key: str) -> Topic | None:
@@ -141,6 +193,11 @@ def is_command(key: str, types: Iterable[type[m.Message]]) -> bool:
 
 def implausible(command: m.Message) -> str:
     """Which component of a command is a mistake, whatever the robot's limits, and the bound; empty if none is."""
+    if isinstance(command, m.Wrench):
+        for part, unit in (("force", "N"), ("torque", "N m")):
+            for axis in "xyz":
+                if abs(value := getattr(getattr(command, part), axis)) > MAX_FORCE:
+                    return f"{part}.{axis} is {value:g} {unit}; at most {MAX_FORCE:g}"
     if isinstance(command, m.JointState):
         for kind, most in MAX_OF_JOINT.items():
             for index, value in enumerate(getattr(command, kind)):
@@ -156,7 +213,7 @@ def implausible(command: m.Message) -> str:
     return ""
 
 
-_COMMAND_TYPES = {kind.ROS for row in TOPICS if row.is_command for kind in row.types} - {
+_COMMAND_TYPES = {kind.ROS for row in TOPICS if "sim" in row.readers for kind in row.types} - {
     kind.ROS for row in TOPICS if not row.is_command for kind in row.types
 }
 

@@ -3,9 +3,10 @@
 import argparse
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 from holozen import cli
-from holozen.cli.verb import ROS2_TITLE
+from holozen.cli.verb import ROS2_TITLE, Service
 
 PAGE = Path(__file__).parents[1] / "docs" / "cli.md"
 MARK = "<!-- table -->\n"
@@ -14,8 +15,14 @@ LEFT_OUT = ("zenoh", ROS2_TITLE)  # groups of flags that many verbs have
 
 def table() -> str:
     """A row for each verb: how it is called, what it does, its flags, an example."""
-    rows = [_row(parser) for verb in cli.VERBS for parser in _verbs(cli.command(verb).parser())]
+    rows = [_row(parser) for verb in cli.VERBS for parser in _parsers(cli.command(verb))]
     return "\n".join(["| command | does | flags |", "|---|---|---|", *rows]) + "\n"
+
+
+def _parsers(command: Any) -> Iterator[argparse.ArgumentParser]:
+    yield from _verbs(command.parser())
+    if isinstance(command, Service):
+        yield from (command.verb(name).parser() for name in command.modules)
 
 
 def _verbs(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
@@ -36,16 +43,16 @@ def _row(parser: argparse.ArgumentParser) -> str:
     flags = [f"`{_flag(action)}`" for action in actions if action.option_strings]
     does = " ".join((parser.description or "").split())
     example = (parser.epilog or "").partition("example: ")[2]
-    told = f"{does}<br>`{example}`" if example else does
+    cell = f"{does}<br>`{example}`" if example else does
     return (
-        " | ".join((f"| `{_cell(' '.join([parser.prog, *places]))}`", _cell(told), " ".join(map(_cell, flags)))) + " |"
+        " | ".join((f"| `{_cell(' '.join([parser.prog, *places]))}`", _cell(cell), " ".join(map(_cell, flags)))) + " |"
     )
 
 
 def _place(action: argparse.Action) -> str:
     name = action.dest.upper() if action.metavar is None else str(action.metavar)
     if name.startswith("["):
-        return name  # it says itself how often
+        return name  # its text shows how often
     return {"?": f"[{name}]", "*": f"[{name} ...]", "+": f"{name} ..."}.get(str(action.nargs), name)
 
 

@@ -25,9 +25,11 @@ import pytest
 from holozen.process import Ending
 
 PACKAGES = {
+    "chromium": "chromium",
     "debootstrap": "debootstrap",
     "docker": "docker.io",
     "docker-compose": "docker-compose",
+    "faketime": "faketime",
     "Xvfb": "xvfb",
     "ip": "iproute2",
     "kitty": "kitty",
@@ -44,7 +46,7 @@ PACKAGES = {
 """Debian's package of each command that a test may need."""
 
 IN_CI = os.environ.get("CI") == "true"
-ALONE = Path(__file__).parent / "terminals"
+QUICK = Path(__file__).parent / "unit"
 LONG = os.environ.get("HOLOZEN_LONG") == "1"
 
 
@@ -53,7 +55,9 @@ def pytest_configure(config: pytest.Config) -> None:
     for number, handler in ((signal.SIGINT, signal.default_int_handler), (signal.SIGHUP, signal.SIG_DFL)):
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)
-    config.addinivalue_line("markers", "alone: measures time, so scripts/test runs it beside no other test")
+    config.addinivalue_line(
+        "markers", "alone: measures time, or needs what keeps it; scripts/test runs it beside no other test"
+    )
     config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
 
 
@@ -65,14 +69,12 @@ def pytest_sessionfinish(exitstatus: int) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:
-        if item.path.parent == ALONE:
-            item.add_marker("alone")
+    items.sort(key=lambda item: QUICK in item.path.parents)  # the long files first: none is left over at the end
 
 
 @pytest.fixture(autouse=True, scope="session")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, None]:
-    """Nothing is read from, or left in, the cache folder of who runs the tests."""
+    """Nothing is read from, or left in, the user's cache folder."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         yield
@@ -119,7 +121,7 @@ def _packages(commands: list[str]) -> list[str]:
 
 
 def _install(packages: list[str]) -> None:
-    """Try it; the test says what is missing if that fails."""
+    """Try it; the test names what is missing if that fails."""
     if not packages or not shutil.which("apt-get"):
         return
     quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}

@@ -1,4 +1,6 @@
-"""Bags: MCAP files of messages, recorded from keys, inspected, drawn and played back."""
+"""Bags: files of messages, recorded from keys, inspected, drawn and played back."""
+
+from typing import NamedTuple
 
 ENCODING = "zenoh_encoding"
 """The key in a channel's metadata that holds the Zenoh Encoding."""
@@ -6,3 +8,28 @@ ENCODING = "zenoh_encoding"
 
 class BagError(Exception):
     """A file that cannot be read, or cannot be written any further. The text is one line with the reason."""
+
+
+class Channel(NamedTuple):
+    """A stream of a bag: its key, Zenoh Encoding, MCAP encoding and type (empty if unknown)."""
+
+    key: str
+    encoding: str
+    format: str
+    type: str
+
+
+class Message(NamedTuple):
+    """A message. `at`: when it was recorded, in ns since 1970 or of the sim's time. `number` counts the messages of its
+    channel, including lost ones.
+    """
+
+    channel: Channel
+    at: int
+    payload: bytes
+    number: int = 0
+
+
+def cdr_encoding(kind: str) -> str:
+    """The Zenoh Encoding of CDR of a type; of an unknown one if `kind` is empty."""
+    return f"application/cdr;{kind}" if kind else "application/cdr"

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from holozen import wire
-from holozen.bag import BagError
-from holozen.bag.reader import Bag, Message
+from holozen.bag import BagError, Message
+from holozen.bag.reader import Bag
 from holozen.messages import Odometry, Twist, TwistStamped, codec
 
 FORMATS = (".png", ".svg")

@@ -14,6 +14,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from holozen import wire
+from holozen.bag import cdr_encoding
 from holozen.messages import Message, codec
 from holozen.messages.definitions import Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
@@ -21,6 +22,7 @@ from holozen.messages.registry import Registry
 # Encodings that may carry JSON; the first ones do not describe the content.
 _MAYBE_JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
 _MCAP = {"application/msgpack": "msgpack", "application/cdr": "cdr", "application/protobuf": "protobuf"}
+_FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _KEPT = ("type", "items", "properties")
 
 
@@ -44,6 +46,27 @@ def format_of(payload: bytes, encoding: str, types: tuple[type[Message], ...]) -
 def as_cdr(message: Message) -> tuple[Format, bytes]:
     """A message as ROS 2 writes it, and its format. Raises CodecError for a number that is not finite."""
     return _format("cdr", codec.encoding("cdr", type(message)), type(message)), codec.encode(message, "cdr")
+
+
+def offered_qos(topic: str) -> str:
+    """The QoS profiles of a topic's publishers, as YAML; empty for ROS 2's default.
+
+    The numbers are those of rmw: keep last, reliable, transient local, automatic liveliness.
+    """
+    if topic.rpartition("/")[2] not in wire.LATCHED:
+        return ""
+    profile = {
+        "history": 1, "depth": 1, "reliability": 1, "durability": 1, "deadline": _FOREVER, "lifespan": _FOREVER,
+        "liveliness": 1, "liveliness_lease_duration": _FOREVER, "avoid_ros_namespace_conventions": False,
+    }  # fmt: skip
+    return json.dumps([profile])
+
+
+def interface_as_cdr(name: str, payload: bytes, encoding: str) -> tuple[Format, bytes]:
+    """A message of a type without a Struct as ROS 2 writes it, and its format. Raises CodecError, InterfaceError."""
+    interface = _registry().find(name)
+    form = Format("cdr", cdr_encoding(name), name, "ros2msg", msg_schema(name))
+    return form, codec.transcoded(interface, payload, encoding)
 
 
 def types_of(key: str, names: Callable[[], set[str]]) -> tuple[type[Message], ...]:

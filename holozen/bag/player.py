@@ -10,13 +10,12 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any, NamedTuple, Protocol
 
 from holozen import wire
-from holozen.bag import BagError
-from holozen.bag.reader import Channel, Message
+from holozen.bag import BagError, Channel, Message
 from holozen.bus import Bus
-from holozen.messages import Twist, TwistStamped, codec
+from holozen.messages import Twist, TwistStamped, Wrench, codec
 from holozen.transport.graph import Endpoint, includes, on_key
 
-STOPPED = {kind.ROS: kind for kind in (Twist, TwistStamped)}
+STOPPED = {kind.ROS: kind for kind in (Twist, TwistStamped, Wrench)}
 STOPS, STOP_EVERY = 5, 0.02  # s; several stops, since a congested link may drop some
 SETTLE = 0.3  # s for subscribers to match, so that they receive the first messages
 LOOK = 0.05  # s between two polls of the keyboard and of `stop`
@@ -131,8 +130,8 @@ class Outlet:
                 self._driven.add(message.channel)
 
     def stop(self) -> None:
-        """Stop every robot that was moved. Joints stop by themselves after a short timeout."""
-        drives = [channel for channel in self._driven if not _is_joints(channel.key, self._targets[channel])]
+        """Stop every robot that was moved."""
+        drives = [channel for channel in self._driven if not _ends_by_itself(channel.key, self._targets[channel])]
         stops = [(self._publishers[channel], *_stop(channel)) for channel in drives]
         for _ in range(STOPS if stops else 0):
             for publisher, payload, encoding in stops:
@@ -141,8 +140,9 @@ class Outlet:
         self._driven.clear()
 
 
-def _is_joints(*keys: str) -> bool:
-    return any(key.rpartition("/")[2] == "joint_command" for key in keys)
+def _ends_by_itself(*keys: str) -> bool:
+    """Joints stop after a short timeout, and no velocity would stop a controller."""
+    return any(key.rpartition("/")[2] in ("joint_command", "goal_pose") for key in keys)
 
 
 def _stop(channel: Channel) -> tuple[bytes, str]:

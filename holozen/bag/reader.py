@@ -1,177 +1,98 @@
-"""Reads and summarizes bags, which may be truncated, damaged or malicious."""
+"""Opens and summarizes bags: MCAP files, ROS 2's sqlite3 files, and the folders in which ROS 2 keeps either."""
 
-import dataclasses
-import struct
+import re
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import IO, Any, NamedTuple, Self
+from typing import Protocol, Self
 
-from mcap.data_stream import ReadDataStream
-from mcap.exceptions import EndOfFile, InvalidMagic, McapError, RecordLengthLimitExceeded
-from mcap.records import Channel as ChannelRecord
-from mcap.records import Chunk, DataEnd, Header, McapRecord, Schema
-from mcap.records import Message as MessageRecord
-from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk, read_magic
-from mcap.writer import MCAP0_MAGIC
+from holozen.bag import BagError, Channel, Message
 
-from holozen.bag import ENCODING, BagError
-
-LARGEST = 256 << 20  # bytes of a record, compressed and uncompressed
-NAMES = 64 << 20  # bytes of all schemas and channels of a file
-LIBRARY = "holozen"
-# The Encodings of MCAP's message encodings, for bags of other programs, which note no Zenoh Encoding.
-_ZENOH = {"json": "application/json", "msgpack": "application/msgpack", "cdr": "application/cdr",
-    "protobuf": "application/protobuf", "": "zenoh/bytes"}  # fmt: skip
+FILES = (".mcap", ".db3")
 
 
-class Channel(NamedTuple):
-    """A stream of a bag: its key, Zenoh Encoding, MCAP encoding and type (empty if unknown)."""
+class File(Protocol):
+    """A file of a bag."""
 
-    key: str
-    encoding: str
-    format: str
-    type: str
+    size: int  # bytes
+    cut_off: bool
+    numbered: bool
 
+    def messages(self) -> Iterator[Message]:
+        """All messages, in the order of the file. Raises BagError at damage."""
+        ...
 
-class Message(NamedTuple):
-    """A message. `at`: when it was recorded, in ns since 1970 or of the sim's time. `number` counts the messages of its
-    channel, including lost ones.
-    """
-
-    channel: Channel
-    at: int
-    payload: bytes
-    number: int = 0
+    def close(self) -> None:
+        """Close it."""
+        ...
 
 
 class Bag:
-    """A file to read.
+    """A file to read, or a folder of ROS 2 with such files.
 
-    After its messages were read, `cut_off` is true if its end is missing, and `numbered` if the numbers of its
-    messages include lost ones.
+    After its messages were read, `cut_off` is true if the end of a file is missing. While they are, `numbered` is true
+    if the numbers of the messages include lost ones.
     """
 
     def __init__(self, path: Path) -> None:
-        self.path, self.cut_off, self.numbered, self.profile = path, False, False, ""
+        self.path, self.cut_off, self.numbered = path, False, False
+        self._files: list[File] = []
         try:
-            self._stream = path.open("rb")
-        except OSError as error:
-            raise BagError(f"cannot read {path}: {error.strerror}") from None
-        self.size = path.stat().st_size  # bytes
+            for one in files_of(path):
+                self._files.append(_opened(one))
+        except BaseException:
+            self.close()
+            raise
+        self.size = sum(file.size for file in self._files)  # bytes
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_error: object) -> None:
-        self._stream.close()
+        self.close()
+
+    def close(self) -> None:
+        """Close its files."""
+        for file in self._files:
+            file.close()
 
     def messages(self) -> Iterator[Message]:
-        """All messages, in the order of the file. Raises BagError at damage."""
-        types: dict[int, str] = {0: ""}
-        channels: dict[int, Channel] = {}
-        room = NAMES
-        for record in self._records():
-            match record:
-                case Header():
-                    self.profile, self.numbered = record.profile, record.library == LIBRARY
-                case Schema():
-                    types[record.id] = record.name
-                    room -= len(record.name) + len(record.data)
-                case ChannelRecord():
-                    channels[record.id] = _channel(record, types)
-                    room -= len(record.topic) + len(str(record.metadata))
-                case MessageRecord():
-                    if (channel := channels.get(record.channel_id)) is None:
-                        raise self._damaged("a message without a channel")
-                    yield Message(channel, record.log_time, record.data, record.sequence)
-            if room < 0:
-                raise BagError(f"{self.path}: its schemas and channels take more than {NAMES} bytes")
-
-    def _records(self) -> Iterator[McapRecord]:
-        """The records up to the end of the data, out of their chunks."""
-        self._stream.seek(0)
-        whole: Any = _WholeReads(self._stream, self.size)
-        reader = StreamReader(whole, skip_magic=True, emit_chunks=True, record_size_limit=LARGEST)
-        try:
-            read_magic(ReadDataStream(whole))
-        except (InvalidMagic, EndOfFile):
-            raise BagError(f"{self.path} is not an MCAP file{'' if self.size else ': it is empty'}") from None
-        try:
-            for record in reader.records:
-                if isinstance(record, DataEnd):
-                    return
-                yield from _opened(record) if isinstance(record, Chunk) else [record]
-        except EndOfFile:
-            self._stream.seek(max(len(MCAP0_MAGIC), self.size - len(MCAP0_MAGIC)))
-            if self._stream.read() == MCAP0_MAGIC:  # the file is complete
-                raise self._damaged("a record is longer than the file") from None
-            self.cut_off = True
-        except RecordLengthLimitExceeded as error:
-            raise BagError(f"{self.path}: {error}") from None
-        except CRCValidationError:
-            raise self._damaged("the checksum is wrong") from None
-        except (McapError, ValueError, struct.error, KeyError) as error:
-            raise self._damaged(str(error) or type(error).__name__) from None
-
-    def _damaged(self, why: str) -> BagError:
-        return BagError(f"{self.path} is damaged before byte {self._stream.tell()}: {' '.join(why.split())}")
+        """All messages, file by file, in the order of each. Raises BagError at damage."""
+        for file in self._files:
+            for message in file.messages():
+                self.numbered = file.numbered
+                yield message
+            self.cut_off |= file.cut_off
 
 
-class _WholeReads:
-    """A stream that returns exactly as many bytes as requested, or raises EndOfFile."""
+def files_of(path: Path) -> list[Path]:
+    """The files of a bag: `path` itself, or those in the folder `path`, by the numbers in their names.
 
-    def __init__(self, stream: IO[bytes], size: int) -> None:
-        self._stream, self._size = stream, size
-
-    def read(self, count: int) -> bytes:
-        """The next `count` bytes. Nothing is allocated for bytes that the file does not have."""
-        if not 0 <= count <= self._size - self._stream.tell():
-            raise EndOfFile
-        return self._stream.read(count)
-
-
-def _opened(chunk: Chunk) -> list[McapRecord]:
-    """The records of a chunk. Raises ValueError."""
-    if chunk.uncompressed_size > LARGEST:
-        raise ValueError(f"a chunk of {chunk.uncompressed_size} bytes; at most {LARGEST} are read")
-    data = _decompressed(chunk.data, chunk.compression, chunk.uncompressed_size)
+    metadata.yaml lists them too, but is missing after a recorder was killed. Raises BagError for a folder without any.
+    """
+    if not path.is_dir():
+        return [path]
     try:
-        return breakup_chunk(dataclasses.replace(chunk, compression="", data=data), validate_crc=True)
-    except (EndOfFile, struct.error):
-        raise ValueError("a record is longer than its chunk") from None
+        names = sorted(one.name for one in path.iterdir())
+    except OSError as error:
+        raise BagError(f"cannot read {path}: {error.strerror}") from None
+    found = [path / name for name in names if name.endswith(FILES)]
+    if packed := [name for name in names if name.endswith(tuple(f"{end}.zstd" for end in FILES))]:
+        raise BagError(f"{path / packed[0]} is compressed as a whole; unpack it first: zstd -d --rm {path}/*.zstd")
+    if not found:
+        raise BagError(f"{path} is a folder without {' or '.join(FILES)} files")
+    return sorted(found, key=lambda one: int((re.findall(r"\d+", one.stem[-19:]) or ["0"])[-1]))
 
 
-def _decompressed(data: bytes, compression: str, size: int) -> bytes:
-    """The data of a chunk. At most `size` + 1 bytes are decompressed, since a few bytes could expand without limit."""
-    if compression == "zstd":
-        import zstandard
+def _opened(path: Path) -> File:
+    if path.suffix == ".db3":
+        from holozen.bag.sqlite_file import SqliteFile
 
-        try:
-            with zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(data) as reader:
-                data = reader.read(size + 1)
-        except zstandard.ZstdError as error:
-            raise ValueError(str(error)) from None
-    elif compression == "lz4":
-        import lz4.frame
+        return SqliteFile(path)
+    from holozen.bag.mcap_file import McapFile
 
-        try:
-            data = lz4.frame.LZ4FrameDecompressor().decompress(data, size + 1)
-        except RuntimeError as error:
-            raise ValueError(str(error)) from None
-    elif compression:
-        raise ValueError(f"unknown compression {compression[:20]!r}; known: zstd, lz4")
-    if len(data) != size:
-        raise ValueError("a chunk does not have the size it claims")
-    return data
-
-
-def _channel(record: ChannelRecord, types: dict[int, str]) -> Channel:
-    form = record.message_encoding
-    kind = record.metadata.get("type") or types.get(record.schema_id, "")
-    # Topics of ROS begin with a slash, keys of Zenoh do not.
-    return Channel(record.topic.removeprefix("/"), record.metadata.get(ENCODING) or _ZENOH.get(form, form), form, kind)
+    return McapFile(path)
 
 
 @dataclass

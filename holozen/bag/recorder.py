@@ -1,13 +1,14 @@
 """Recording: samples are received as fast as they arrive, and written when the disk is ready."""
 
 import contextlib
+import re
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple, Self
 
-from holozen.bag.formats import Format, as_cdr, format_of, interface_schema, known, learn, types_of
+from holozen.bag.formats import Format, as_cdr, format_of, interface_as_cdr, interface_schema, known, learn, types_of
 from holozen.bag.writer import CHANNELS, BagWriter
 from holozen.messages import Clock, Message
 from holozen.messages.codec import CodecError
@@ -22,6 +23,7 @@ LARGEST = 128 << 20  # bytes of a sample; a bag with larger ones could not be re
 BATCH = 1000  # samples
 OVERHEAD = 300  # bytes of memory of a queued sample besides its payload
 PATIENCE = 0.5  # s
+_TOPIC = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 CLOCK = "clock"  # the key of the sim's time
 LONGEST_TICK = 100_000_000  # ns; between two ticks the sim's time advances by at most this, as the sim may be paused
 
@@ -174,13 +176,21 @@ class _Listener:
         self._intake.add(sample.key, sample.payload, sample.encoding, sample.number)
 
 
+class LeftOut(NamedTuple):
+    """How many messages of a key a bag for ROS 2 cannot hold, and why."""
+
+    messages: int
+    why: str
+
+
 class Recorder:
     """Writes the samples of an intake.
 
     The types of keys are those of the wire table, or those that their publishers announce.
-    With `ros`, messages of known types are written as by ROS 2: in CDR, on topics with a leading slash. All others,
-    and all without `ros`, stay as they arrived. With `time`, times are those of the sim, and samples before its
-    first tick are left out. `define` returns the definition of a type that is not known here, from its publisher.
+    With `ros`, messages are written as by ROS 2: in CDR, on topics with a leading slash. Those of unknown types and
+    those on keys that are no topics of ROS 2 are left out (`left_out`). Without `ros`, messages stay as they arrived.
+    With `time`, times are those of the sim, and samples before its first tick are left out. `define` returns the
+    definition of a type that is not known here, from its publisher.
     """
 
     def __init__(
@@ -192,6 +202,7 @@ class Recorder:
         self._learned: dict[str, str] = {}  # key -> its type, if it has no Struct
         self._types: dict[str, tuple[type[Message], ...]] = {}
         self.refused = 0  # samples beyond the number of channels that a bag can have
+        self.left_out: dict[str, LeftOut] = {}  # by key
         self.early = 0  # samples from before the sim's clock was known
 
     def write_some(self) -> bool:
@@ -205,27 +216,47 @@ class Recorder:
         return bool(batch)
 
     def _write(self, sample: Waiting) -> None:
-        form, payload, message = self._formatted(sample)
-        at: int | None = sample.at
-        if self._time:
-            if isinstance(message, Clock) and sample.key == CLOCK:
-                self._time.tick(message.clock.sec * 10**9 + message.clock.nanosec, sample.at)
-            at = self._time.of(sample.at)
+        form, message = format_of(sample.payload, sample.encoding, self._types_of(sample.key))
+        payload, at = sample.payload, self._time_of(sample, message)
         if at is None:
             self.early += 1
             return
-        topic = f"/{sample.key}" if self._ros else sample.key
-        self.refused += not self._writer.write(topic, form, payload, at, sample.missed)
-
-    def _formatted(self, sample: Waiting) -> tuple[Format, bytes, Message | None]:
-        form, message = format_of(sample.payload, sample.encoding, self._types_of(sample.key))
-        if self._ros and message is not None and form.encoding != "cdr":
-            with contextlib.suppress(CodecError):
-                return *as_cdr(message), message
-        if form.encoding == "json" and not form.schema and (name := self._learned.get(sample.key)):
+        topic = sample.key
+        if self._ros:
+            topic = f"/{sample.key}"
+            try:
+                form, payload = self._as_ros(sample, form, message)
+            except (CodecError, InterfaceError) as error:
+                self._leave_out(sample.key, str(error))
+                return
+        elif form.encoding == "json" and not form.schema and (name := self._learned.get(sample.key)):
             schema = interface_schema(name)
             form = form._replace(schema=name, schema_encoding="jsonschema" if schema else "", schema_data=schema)
-        return form, sample.payload, message
+        self.refused += not self._writer.write(topic, form, payload, at, sample.missed)
+
+    def _time_of(self, sample: Waiting, message: Message | None) -> int | None:
+        if not self._time:
+            return sample.at
+        if isinstance(message, Clock) and sample.key == CLOCK:
+            self._time.tick(message.clock.sec * 10**9 + message.clock.nanosec, sample.at)
+        return self._time.of(sample.at)
+
+    def _as_ros(self, sample: Waiting, form: Format, message: Message | None) -> tuple[Format, bytes]:
+        """A sample in CDR. Raises CodecError or InterfaceError with the reason why it cannot be."""
+        if not _TOPIC.fullmatch(sample.key):
+            raise CodecError("a topic of ROS 2 has letters, digits and '_' alone, and no part that begins with a digit")
+        if form.encoding == "cdr" and form.schema_encoding:
+            return form, sample.payload
+        if message is not None:
+            return as_cdr(message)
+        if name := self._learned.get(sample.key):
+            return interface_as_cdr(name, sample.payload, sample.encoding)
+        raise CodecError("the type is not known")
+
+    def _leave_out(self, key: str, why: str) -> None:
+        count = self.left_out[key].messages if key in self.left_out else 0
+        if count or len(self.left_out) < CHANNELS:
+            self.left_out[key] = LeftOut(count + 1, why)
 
     def _types_of(self, key: str) -> tuple[type[Message], ...]:
         if key not in self._types:

@@ -10,7 +10,7 @@ from pathlib import Path
 from mcap.writer import CompressionType, Writer
 
 from holozen.bag import ENCODING, BagError
-from holozen.bag.formats import Format
+from holozen.bag.formats import Format, offered_qos
 
 RESERVE = 8 << 20  # bytes of the disk kept free for the end of a file; a chunk and the summary take less
 CHUNK = 1 << 20  # bytes, before compression
@@ -20,11 +20,14 @@ CHANNELS = 65_535  # MCAP numbers them with two bytes
 class BagWriter:
     """Writes the files of one recording: `NAME.mcap`, or `NAME_0.mcap`, `NAME_1.mcap`, ... each of about `limit` bytes.
 
+    With a limit, or `numbered`, the first file has a number too. `profile` is MCAP's, "ros2" for ROS 2.
+
     Raises OSError if a file cannot be created, BagError if it cannot be continued; flushed data stays readable.
     """
 
-    def __init__(self, name: str, limit: int = 0, profile: str = "") -> None:
+    def __init__(self, name: str, limit: int = 0, profile: str = "", numbered: bool = False) -> None:
         self._name, self._limit, self._profile = name.removesuffix(".mcap"), limit, profile
+        self._numbered = numbered or limit > 0
         self.files: list[Path] = []
         self.messages = 0
         self._before = 0  # bytes of the previous files
@@ -80,7 +83,7 @@ class BagWriter:
             raise BagError(error.strerror or str(error)) from None
 
     def _open(self) -> None:
-        number = f"_{len(self.files)}" if self._limit else ""
+        number = f"_{len(self.files)}" if self._numbered else ""
         path = Path(f"{self._name}{number}.mcap")
         self._file = SafeFile(path)
         self.files.append(path)
@@ -116,6 +119,8 @@ class BagWriter:
                 self._schemas[key] = self._writer.register_schema(form.schema, form.schema_encoding, form.schema_data)
             schema = self._schemas[key]
         metadata = {ENCODING: form.zenoh_encoding} | ({"type": form.schema} if form.schema else {})
+        if self._profile == "ros2":
+            metadata["offered_qos_profiles"] = offered_qos(topic)
         channel = self._writer.register_channel(topic, form.encoding, schema, metadata)
         self._channels[topic, form] = channel
         return channel

@@ -11,13 +11,13 @@ from typing import Literal
 from xml.parsers import expat
 
 from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
-from holozen.robot.elements import Source, Tag, read_xml, repair_xml
+from holozen.robot.elements import Tag, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.packages import find_by_name, find_package
-from holozen.robot.sdf_models import parse_sdf
+from holozen.robot.rigid import check_simulated
 from holozen.robot.xacro import Outcome, expand_in_child, is_xacro, process, read_text
 
 Severity = Literal["error", "warning"]
@@ -242,7 +242,7 @@ def _included(name: str, path: Path, start: Path, packages: Mapping[str, Path]) 
         found = path.parent / _FIND.sub(lambda match: str(find_package(match[1], start, packages)), name)
         if "$" in str(found) or found.is_file():
             return found if "$" not in str(found) else None
-        return find_by_name(name, start, packages) if os.path.isabs(name) else None
+        return next(iter(find_by_name(name, start, packages)), None) if os.path.isabs(name) else None
     except (RobotError, OSError, ValueError):
         return None
 
@@ -412,9 +412,7 @@ def _joint_names(tag: Tag) -> Iterator[tuple[Tag, str]]:
 
 EXPANDED = " (expanded)"  # after the file's name, in messages about the expanded text
 SEE_WORLD = "; see it with: holozen sim --world FILE"
-FORGIVEN = "correct it: other parsers reject the file"
-SILENT = ("gazebo", "plugin", "sensor", "material", "inertial", "mesh")
-"""Elements whose loader warnings are not mistakes of the file, or have rules of their own."""
+FORGIVEN = "correct it"
 
 
 def read(
@@ -480,8 +478,9 @@ def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
         by_line.setdefault(_line(tag), []).append(tag)
     severity: Severity = "warning"
     try:
-        subject.model = _model(subject, root, text, place)
+        subject.model = parse(text, subject.path, subject.packages, place)
         lines = subject.model.warnings
+        subject.messages += _refusals(subject)
     except RobotError as error:
         severity, lines = "error", (str(error),)
     for line in lines:
@@ -489,23 +488,16 @@ def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
         here = by_line.get(where.line, []) if where.file == place else []
         # A line may contain several elements; the message starts with the one it is about.
         at = next((tag for tag in here if message.startswith(f"{tag} ")), here[0] if here else where)
-        quiet = isinstance(at, Tag) and (_within(at, SILENT) or at.attributes.get("name") == "world")
-        if severity == "error" or not quiet:
-            subject.messages.append(_message(severity, at, message))
+        subject.messages.append(_message(severity, at, message))
 
 
-def _model(subject: Subject, root: Tag, text: str, place: str) -> RobotModel:
-    if not subject.sdf:
-        return parse(text, subject.path, subject.packages, place)
-    return parse_sdf(root, Source(subject.path, subject.packages))
-
-
-def _within(tag: Tag | None, names: tuple[str, ...]) -> bool:
-    while tag is not None:
-        if tag.name in names:
-            return True
-        tag = tag.parent
-    return False
+def _refusals(subject: Subject) -> Iterator[tuple[Severity, Mistake]]:
+    """What a sim refuses in a robot that could be loaded."""
+    assert subject.model is not None
+    try:
+        check_simulated(subject.model)
+    except RobotError as error:
+        yield _message("error", subject.root, str(error))
 
 
 def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:

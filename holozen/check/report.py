@@ -32,50 +32,19 @@ from holozen.check.engine import (
 from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, kind_of
-from holozen.robot.xacro import read_text
 from holozen.suggest import shorten
 
-# Fixes for a file that cannot be read.
+# A file that cannot be read.
 
 
-_CASES = (
-    (re.compile("[\u2018-\u201f]"), "replace the curly quotes with straight ones"),
-    (re.compile(r"&(?!#?\w+;)"), "write &amp; for &"),
-    (re.compile(r"<!--(?:(?!-->).)*--(?!>)"), "a comment must not contain -- before its end"),
-    (re.compile(r"""\s[\w:.-]+\s*=\s*(?!["'\s])"""), 'put the value in quotes: name="value"'),
-    (re.compile(r"""<[\w:.-]+(?:\s+[\w:.-]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s+([\w:.-]+)(?=\s+[\w:.-]+\s*=|\s*/?>)"""),
-     'the word {0} has no value: write {0}="...", or join it to its neighbour'),
-    (re.compile(r"""=\s*(?:"[^"]*|'[^']*)$"""), "close the quotes"),
-    (re.compile(r"""(?:"[^"]*"|'[^']*')[\w:.-]+\s*="""), "put a space between two attributes"),
-    (re.compile(r"<\s+\w|<\d"), "no space and no digit may follow <"),
-)  # fmt: skip
-
-
-def how_to_fix(place: Place, reason: str) -> str:
-    """How to fix a file that cannot be read; for broken XML by the reported line and the one before."""
+def how_to_fix(reason: str) -> tuple[str, str]:
+    """Why a file cannot be read, and how to fix it, which messages about broken XML end with."""
+    if "broken XML" in reason:
+        problem, _, fix = reason.rpartition("; ")
+        return problem, fix
     if "is a world" in reason:
-        return "check takes a robot, or a single <model>"
-    if "broken XML" not in reason:
-        return "fix this, then the rest is checked"
-    if "mismatched" in reason or "no element found" in reason:
-        return "close each element, inner ones first: </name>, or /> at the end of its tag"
-    if "declaration not at start" in reason:
-        return "nothing, not even a space, may come before <?xml"
-    if "junk after" in reason:
-        return "a file has a single <robot> around everything; remove what follows its end"
-    lines = _lines(Path(place.file))
-    for line in lines[max(0, place.line - 2) : place.line][::-1]:
-        for pattern, advice in _CASES:
-            if match := pattern.search(line):
-                return advice.format(*match.groups())
-    return 'write each element as <name attribute="value"> and close it'
-
-
-def _lines(path: Path) -> list[str]:
-    try:
-        return read_text(path).splitlines()
-    except RobotError:
-        return []
+        return reason, "check takes a robot, or a single <model>"
+    return reason, "fix this, then the rest is checked"
 
 
 # The rules, in the order in which they are best fixed.
@@ -191,20 +160,30 @@ def _fatal(path: Path, message: str) -> Finding:
     place, problem = split(message, path)
     if place.file == f"{path}{EXPANDED}":
         place = Place(str(path), place.line, True)
-    return Finding(FATAL.name, FATAL.severity, place, problem, FATAL.why, how_to_fix(place, problem))
+    problem, fix = how_to_fix(problem)
+    return Finding(FATAL.name, FATAL.severity, place, problem, FATAL.why, fix)
 
 
 def _unreported(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mistake]]) -> list[Mistake]:
-    """The loader's messages about parts in which no rule found anything as serious."""
-    reported: list[Tag] = []
-    for other, mistake in mistakes:
-        if isinstance(mistake.at, Tag) and (rule is NOTE or other.severity == "error"):
-            reported += [subject.part(mistake.at), *([subject.root] if other.name in WHOLE else [])]
+    """The loader's warnings about elements in which no rule found anything, and its error unless a rule found one in
+    that part: an error has several consequences, and a warning hidden by another one is never seen.
+    """
+    found = [(other, mistake.at) for other, mistake in mistakes if isinstance(mistake.at, Tag)]
+    if rule is NOTE:
+        reported = [owner for _, at in found for owner in (at, _inertial(at))]
+        return [mistake for mistake in rule.find(subject) if mistake.at not in reported]
+    broken = [(other, at) for other, at in found if other.severity == "error"]
+    parts = [part for other, at in broken for part in (subject.part(at), subject.root if other.name in WHOLE else at)]
     return [
         mistake
         for mistake in rule.find(subject)
-        if not isinstance(mistake.at, Tag) or subject.part(mistake.at) not in reported
+        if not isinstance(mistake.at, Tag) or subject.part(mistake.at) not in parts
     ]
+
+
+def _inertial(tag: Tag) -> Tag:
+    """The `<inertial>` of a mass or an inertia: the loader speaks of the whole; of others the element itself."""
+    return tag.parent if tag.parent and tag.parent.name == "inertial" else tag
 
 
 def _finding(rule: Rule, mistake: Mistake, subject: Subject) -> Finding:

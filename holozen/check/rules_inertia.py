@@ -8,6 +8,7 @@ from holozen.check.geometry import MOVING, box_of, fixed_bodies, half_sizes, siz
 from holozen.robot.elements import Tag, Vector, number
 from holozen.robot.inertia import positive_definite
 from holozen.robot.model import Link, Shape
+from holozen.robot.rigid import FALLS, falls_through
 from holozen.suggest import listed
 
 FACTOR = 10.0  # between the given inertia and that of the solid shape
@@ -68,7 +69,7 @@ def bad_mass(subject: Subject) -> Iterator[Mistake]:
     """Negative or missing masses."""
     for name, tag in subject.links.items():
         given = read_inertial(tag)
-        if given is None or (given.mass_tag is None and subject.sdf) or (given.mass == 0 and _is_frame(name, subject)):
+        if given is None or (given.mass_tag is None and subject.sdf):
             continue
         if given.mass_tag is None:
             yield Mistake(given.tag, f"the <inertial> of link {name!r} has no <mass>", 'add <mass value="..."/>, in kg')
@@ -85,7 +86,7 @@ def no_mass(subject: Subject) -> Iterator[Mistake]:
     """Links with a mass of zero or without moments of inertia, which are loaded nevertheless."""
     for name, tag in subject.links.items():
         given = read_inertial(tag)
-        if given and given.mass == 0 and given.mass_tag and not _is_frame(name, subject):
+        if given and given.mass == 0 and given.mass_tag:
             fix = "give it its mass in kg, or remove the <inertial> if it is only a frame"
             yield Mistake(given.mass_tag, f"link {name!r} has a mass of 0 kg", fix)
         elif given and given.mass and given.inertia and not any(given.inertia):
@@ -161,6 +162,13 @@ def floating(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(_gravity(light[0], subject), problem, "remove that setting unless it is meant to float")
 
 
+@rule("no-collision", "warning", "a robot without a collision shape", "nothing carries it")
+def bodiless(subject: Subject) -> Iterator[Mistake]:
+    """Robots that fall, since nothing of them touches the ground."""
+    if subject.model is not None and falls_through(subject.model):
+        yield Mistake(subject.root, f"{subject.root} {FALLS}", "give a link a <collision>")
+
+
 def _whole(name: str, group: list[str]) -> str:
     return "it" if group == [name] else f"what is fixed together with it ({listed(group)})"
 
@@ -224,13 +232,6 @@ def _tensor(tag: Tag) -> Tensor | None:
         return None
     xx, xy, xz, yy, yz, zz = values
     return xx, xy, xz, yy, yz, zz
-
-
-def _is_frame(name: str, subject: Subject) -> bool:
-    """Whether a link is only a frame on another one: it has no shape, and its parent joint is fixed."""
-    if subject.model is None or subject.links[name].first("visual") or subject.links[name].first("collision"):
-        return False
-    return all(joint.kind == "fixed" for joint in subject.model.joints.values() if name in (joint.child, joint.parent))
 
 
 def _carries(name: str, subject: Subject) -> bool:

@@ -374,7 +374,7 @@ Wheels = Differential | Mecanum
     "wheel-side",
     "error",
     "a left wheel on the right side, or the other way round",
-    "it turns the wrong way: the plugin's tags say which side is which",
+    "it turns the wrong way: the plugin's tags define the sides",
 )
 def sides(subject: Subject) -> Iterator[Mistake]:
     """Wheels that a plugin names as left but that are on the right, or vice versa."""

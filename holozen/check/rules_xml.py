@@ -7,6 +7,7 @@ from holozen.check.engine import Mistake, Subject, nearest, rule
 from holozen.robot.elements import Tag
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.model import JOINT_KINDS
+from holozen.suggest import listed
 
 # The words of URDF, of its Gazebo elements, and of SDF.
 
@@ -29,7 +30,7 @@ def _words(attributes: str, children: str = "") -> Words:
 
 URDF = {
     "robot": _words("name version", "link joint material gazebo transmission ros2_control sensor"),
-    "link": _words("name type", "inertial visual collision"),
+    "link": _words("name type", "inertial visual collision gravity"),
     "inertial": _words("", "origin mass inertia"),
     "origin": _words("xyz rpy quat_xyzw"),
     "mass": _words("value"),
@@ -199,11 +200,15 @@ def misplaced(subject: Subject) -> Iterator[Mistake]:
 
 @rule("ignored", "warning", "an element that URDF does not have", "URDF parsers ignore it")
 def ignored(subject: Subject) -> Iterator[Mistake]:
-    """Elements of SDF, or of older URDF, in a URDF."""
+    """Elements that URDF does not have there, and that are no misspelling of one that it has."""
+    spelt = {mistake.at for mistake in misspelt_tags.find(subject)}
     for parent in _urdf_elements(subject):
+        known = URDF[parent.name].children
         for tag in parent.children if parent.name not in FREE else ():
-            if tag.name in IGNORED:
-                yield Mistake(tag, f"<{tag.name}> in {parent} is not read", IGNORED[tag.name])
+            if tag.name in known or tag.name in MISPLACED or ":" in tag.name or tag in spelt:
+                continue
+            fix = IGNORED.get(tag.name, f"remove it, or write one of {listed(sorted(known))}" if known else "remove it")
+            yield Mistake(tag, f"<{tag.name}> in {parent} is not read", fix)
 
 
 @rule("joint-type", "error", "a joint type that does not exist", "the robot cannot be loaded")

@@ -13,11 +13,15 @@ VERBS = {
     "up": "start the sim, the controller, the pose service, and the teleop in this terminal",
     "stop": "stop robots, all of them or some, until they are released",
     "release": "let stopped robots drive again",
-    "sim": "simulate robots",
+    "sim": "simulate robots; pause, play, step, reset",
     "teleop": "drive a robot from the keyboard",
     "controller": "drive a robot to the goals of next_goal",
+    "camera": "render what the cameras of robots see; the sim starts it",
+    "view": "show the robots in a browser, and drive them from there",
     "pose-service": "answer next_goal and get_pose",
     "router": "run a Zenoh router",
+    "ros2": "join ROS 2 nodes that use rmw_zenoh",
+    "secure": "init, add, revoke, show",
     "run": "run a Python script that was written for ROS 2",
     "launch": "run a Python launch file that was written for ROS 2",
     "spawn": "put a robot or object into the sim",
@@ -40,13 +44,19 @@ VERBS = {
     "plot": "draw fields of live messages in the terminal",
     "map": "draw the robots, their paths and their goals in the terminal",
 }
-MODULES = {"graph": "node", "list": "robot", "delete": "robot", "map": "plot"}  # of verbs in another noun's module
-NOUNS = ("topic", "service", "node", "param", "tf", "interface", "bag")  # followed by a verb
-_DRAWS = "`holozen map` draws robots and `holozen plot` numbers, in the terminal"
+MODULES = {
+    "graph": "node",
+    "list": "robot",
+    "delete": "robot",
+    "map": "plot",
+    "release": "stop",
+}  # of verbs in another noun's module
+NOUNS = ("secure", "topic", "service", "node", "param", "tf", "interface", "bag")  # followed by a verb
+_DRAWS = "`holozen view` shows robots in a browser, `holozen map` and `holozen plot` draw in the terminal"
 _NO_ACTIONS = "there are no actions here; `holozen service` calls services"
 _TYPES = "`holozen interface` shows messages and services"
 ELSEWHERE = {
-    "view": _DRAWS, "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
+    "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
     "action": _NO_ACTIONS, "pkg": "`--package NAME=DIR` gives the folder of a package",
     "tf2_echo": "write `holozen tf echo SOURCE TARGET`", "tf2": "write `holozen tf`",
     "rqt_graph": "write `holozen graph`", "wtf": "write `holozen doctor`", "msg": _TYPES, "srv": _TYPES,
@@ -60,16 +70,28 @@ ELSEWHERE = {
 }  # fmt: skip
 """Verbs of ROS's tools and other likely guesses, with what to use instead."""
 EXTRAS = (
+    "collada",
+    "cryptography",
     "lz4",
     "matplotlib",
     "mcap",
     "numpy",
     "pybullet",
     "transforms3d",
+    "viser",
+    "websockets",
     "xacro",
     "zstandard",
 )  # libraries that only some verbs need
-SERVICES = {"sim": "sim", "teleop": "teleop", "controller": "controller", "pose-service": "pose_service"}
+OF_SERVICES = {"sim": dict.fromkeys(("pause", "play", "step", "reset"), "simulation")}  # verbs and their modules
+SERVICES = {
+    "sim": "sim",
+    "teleop": "teleop",
+    "controller": "controller",
+    "camera": "camera",
+    "view": "view",
+    "pose-service": "pose_service",
+}
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -150,12 +172,17 @@ def _run(verb: str, words: list[str]) -> int:
         name = (error.name or "").partition(".")[0]
         if name not in EXTRAS:
             raise
-        report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install '.[{verb}]'")
+        extra = "secure" if name == "cryptography" else verb  # any verb with --secure needs it
+        report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install '.[{extra}]'")
         return 1
 
 
 def command(verb: str) -> Any:
     """What implements a verb, with `main(argv)` and `parser()`: a Verb, a Noun, or the module of a service."""
+    if verb in OF_SERVICES:
+        from holozen.cli.verb import Service
+
+        return Service(verb, _service(SERVICES[verb]), OF_SERVICES[verb])
     if verb in SERVICES:
         return _service(SERVICES[verb])
     module = importlib.import_module(f"holozen.cli.{MODULES.get(verb, verb)}")

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from holozen.bus import Bus
 from holozen.cli.hints import is_any
-from holozen.cli.verb import Noun
+from holozen.cli.verb import Noun, Service
 from holozen.flags import Parser, package
 from holozen.transport import connection
 from holozen.transport.graph import Endpoint
@@ -86,7 +86,9 @@ def _candidates(words: list[str], verbs: Iterable[str], command: Callable[[str],
         return [verb for verb in verbs if verb.startswith(current)]
     parser, left = _parser(command(before[0]), before[1:])
     action = _wanted(parser, left)
-    if current.startswith("-"):
+    if isinstance(noun := command(before[0]), Service) and not before[1:] and not current.startswith("-"):
+        found = list(noun.modules)
+    elif current.startswith("-"):
         found = [flag for flag in parser._option_string_actions if flag.startswith("--")]
     elif action is None:
         return []

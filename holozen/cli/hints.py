@@ -27,7 +27,7 @@ def unknown(word: str, known: list[str], where: str) -> str:
 
 
 def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
-    """`; did you mean 'odom'?` with the live key nearest to the first of `keys` that no node has, or `; no nodes found
+    """` (did you mean 'odom'?)` with the live key nearest to the first of `keys` that no node has, or `; no nodes found
     at ...`; empty where neither applies.
     """
     ends = [end for end in bus.endpoints() if end.session != bus.id]

@@ -55,7 +55,7 @@ class Reader:
                 return self._cdr(kind, sample.payload, bus)
             self.why = "for CDR give the type: --type T"
         except ValueError as error:  # bytes of another type, or a type that is not known here
-            other = f", its encoding says {schema}" if schema not in ("", self._given) else ""
+            other = f", its encoding is {schema}" if schema not in ("", self._given) else ""
             self.why = f"{error}; --type is wrong, or the bytes are{other}" if self._given else str(error)
         return hex_dump(sample.payload, sample.encoding)
 

@@ -13,8 +13,7 @@ import argparse
 import json
 import math
 import re
-import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
 from holozen.background import background
@@ -23,6 +22,8 @@ from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
 from holozen.flags import key, number
 from holozen.process import deferred_interrupt
+from holozen.ros import parameter_yaml
+from holozen.ros.parameter_yaml import Value
 from holozen.suggest import suggest
 from holozen.transport.errors import BusError
 
@@ -32,14 +33,9 @@ if TYPE_CHECKING:
 LIST = "/list_parameters"
 TOKENS = "@holozen/*/*/srv/rcl_interfaces/srv/ListParameters/**"
 
-LARGEST = 1_000_000  # characters of a file
-DEEPEST = 20  # sections within sections
-HERE = "ros__parameters"
-_EXPONENT = re.compile(r"[+-]?[0-9]+[eE][+-]?[0-9]+")  # a number except in YAML 1.1
 _PLAIN = re.compile(r"/?[A-Za-z][A-Za-z0-9_./]*")
 _NO_NAMES = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")  # not strings in YAML 1.1
 Word = bool | int | float | str
-Value = Word | list[bool] | list[int] | list[float] | list[str]
 
 
 class Nodes:
@@ -245,8 +241,6 @@ def typed(text: str) -> Value:
     Anything but a finite number or a list of one type stays text, which a node that expects another type refuses.
     """
     if text.startswith("["):
-        from holozen.ros import parameter_yaml
-
         try:
             found = parameter_yaml.parse(text)
         except ValueError:
@@ -270,100 +264,33 @@ def _scalar(text: str) -> Word:
 def file_lines(node: str, values: dict[str, Any]) -> list[str]:
     """The file that holds `values`."""
     rows = [f"    {_written_name(name)}: {_written(value)}" for name, value in values.items()]
-    return [f"{_written_name('/' + node)}:", f"  {HERE}:" + ("" if rows else " {}"), *rows]
+    return [f"{_written_name('/' + node)}:", f"  {parameter_yaml.KEY}:" + ("" if rows else " {}"), *rows]
 
 
 def read_file(path: str, node: str, wildcards: bool = True) -> dict[str, Value]:
     """The values that a file has for a node. Raises BusError with the reason and the file's sections."""
-    sections = list(_sections(_parsed(path), "", path))
-    wanted = {node, "**", "*"} if wildcards else {node}
-    mine = [(place, values) for place, values in sections if place in wanted]
+    try:
+        sections = parameter_yaml.read(path)
+    except ValueError as error:
+        raise BusError(str(error)) from None
+    full = f"/{node}"
+    mine = [section for section in sections if (section.is_for(full) if wildcards else section.place == full)]
     if not mine:
-        there = ", ".join(place for place, _ in sections) or f"none with {HERE}"
+        there = ", ".join(section.place for section in sections) or f"none with {parameter_yaml.KEY}"
         raise BusError(f"{path}: it has no section for the node {node!r}; sections: {there}")
     found: dict[str, Value] = {}
-    for place, values in sorted(mine, key=lambda section: section[0] == node):  # its own section overrides the others
-        found |= dict(_flat(values, "", f"{path}: {place}"))
+    for section in mine:  # its own section comes last, and overrides those with wildcards
+        found |= section.values
     if not found:
         raise BusError(f"{path}: it has no parameter for the node {node!r}")
+    for name, value in found.items():
+        if not all(math.isfinite(each) for each in _listed(value) if isinstance(each, float)):
+            raise BusError(f"{path}: {name} is {value}; write a finite number")
     return found
 
 
-def _parsed(path: str) -> Any:
-    text = _file_text(path)
-    try:
-        return json.loads(text)
-    except RecursionError:
-        raise BusError(f"{path}: it is nested too deeply") from None
-    except ValueError:
-        pass
-    try:
-        import yaml
-    except ModuleNotFoundError:
-        raise BusError(f"{path}: it is no JSON; to read YAML: pip install pyyaml") from None
-    try:
-        return yaml.safe_load(text)
-    except RecursionError:
-        raise BusError(f"{path}: it is nested too deeply") from None
-    except (yaml.YAMLError, ValueError) as error:  # ValueError: an invalid date
-        raise BusError(f"{path}: it is no YAML: {' '.join(str(error).split())}") from None
-
-
-def _file_text(path: str) -> str:
-    try:
-        if path == "-":
-            text = sys.stdin.read(LARGEST + 1)
-        else:
-            with open(path, encoding="utf-8") as file:
-                text = file.read(LARGEST + 1)
-    except OSError as error:
-        raise BusError(f"cannot read {path}: {error.strerror}") from None
-    except UnicodeDecodeError:
-        raise BusError(f"{path}: it is not UTF-8 text") from None
-    if len(text) > LARGEST:
-        raise BusError(f"{path}: it is longer than {LARGEST} characters")
-    return text
-
-
-def _sections(value: Any, place: str, path: str, depth: int = 0) -> Iterator[tuple[str, dict[Any, Any]]]:
-    """(node, values) of each section, also of nested ones: ROS 2 nests namespaces."""
-    if not isinstance(value, dict):
-        where = f"section {place!r}" if place else "it"
-        raise BusError(f"{path}: {where} has no names with values; write NODE: {{{HERE}: {{NAME: VALUE}}}}")
-    for name, inner in value.items():
-        if name == HERE and place:
-            if not isinstance(inner, dict):
-                raise BusError(f"{path}: {HERE} of {place!r} has no names with values")
-            yield place, inner
-        elif depth < DEEPEST:
-            yield from _sections(inner, f"{place}/{str(name).strip('/')}".strip("/"), path, depth + 1)
-
-
-def _flat(values: dict[Any, Any], prefix: str, where: str, depth: int = 0) -> Iterator[tuple[str, Value]]:
-    for name, value in values.items():
-        full = f"{prefix}{name}"
-        if isinstance(value, dict) and depth < DEEPEST:
-            yield from _flat(value, f"{full}.", where, depth + 1)
-        elif isinstance(value, bool):
-            yield full, value
-        elif isinstance(value, str):
-            yield full, _scalar(value) if _EXPONENT.fullmatch(value) else value
-        elif isinstance(value, int | float):
-            yield full, value if math.isfinite(value) and abs(value) < 2**63 else str(value)
-        elif isinstance(value, list):
-            yield full, _listed(value, f"{where}: {full}")
-        else:
-            wanted = "write a number, a word, true or false, or a list of one of them"
-            raise BusError(f"{where}: {full} is a {type(value).__name__}; {wanted}")
-
-
-def _listed(values: list[Any], where: str) -> Any:
-    words = [_scalar(each) if isinstance(each, str) and _EXPONENT.fullmatch(each) else each for each in values]
-    kinds = sorted({type(each).__name__ for each in words})
-    if len(kinds) > 1 or not set(kinds) <= {"bool", "int", "float", "str"}:
-        wanted = "write a list of numbers, of words, or of true and false"
-        raise BusError(f"{where} is a list of {', '.join(kinds)}; {wanted}")
-    return words
+def _listed(value: Value) -> Sequence[Word]:
+    return value if isinstance(value, list) else [value]
 
 
 def _written_name(name: str) -> str:

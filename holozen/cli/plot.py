@@ -42,10 +42,11 @@ def plot(args: argparse.Namespace) -> int:
         lines = Lines(bus, args.fields, Reader(packages=args.package))
         keys = [key for _, key, _ in args.fields]
         hint = "" if args.once else suggest_key(bus, keys)
+        waiting = f"waiting for {', '.join(dict.fromkeys(keys))}{hint}" if hint else ""
         if hint:
-            report(f"holozen {args.verb}: waiting for {', '.join(dict.fromkeys(keys))}{hint}")
+            report(f"holozen {args.verb}: {waiting}")
         try:
-            (_print_rows if args.json else _draw)(lines, args, stop)
+            _print_rows(lines, args, stop) if args.json else _draw(lines, args, stop, waiting)
         except LookupError as error:
             report(f"holozen {args.verb}: {error.args[0]}")
             return 1
@@ -108,7 +109,8 @@ def _print_rows(lines: Lines, args: argparse.Namespace, stop: threading.Event) -
             print(json.dumps({"time": round(time.time(), 4)} | row), flush=True)
 
 
-def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None:
+def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event, waiting: str) -> None:
+    """`waiting` is shown until there is a first point: the screen hides what was printed before."""
     begun = time.monotonic()
     picture: list[str] = []
     with Screen(args.once, args.ascii) as screen:
@@ -121,6 +123,8 @@ def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None
             picture = [printable(line) for line in panels(lines.points, now, args.window, screen.size, screen.ascii)]
             if args.once:
                 break
+            if waiting and not any(lines.points.values()):
+                picture[0] = printable(waiting)[: screen.size[0]]
             screen.show(picture)
     if args.once:
         print("\n".join(line.rstrip() for line in picture), flush=True)

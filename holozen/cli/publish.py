@@ -72,9 +72,10 @@ def _run(
             return 1
         if args.wait and matched < args.wait and not stop.is_set():
             raise Refused(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
-    feedback = CommandFeedback(bus, args.key) if form.stop() else None
-    if feedback and matched:
-        bus.clock_asked.wait(CLOCK_PATIENCE)  # a robot obeys a command once it knows our clock
+    stopping = form.stop()
+    feedback = CommandFeedback(bus, args.key) if stopping else None
+    if feedback and matched and payload != stopping:
+        bus.clock_asked.wait(CLOCK_PATIENCE)  # only a stop is obeyed before the robot knows our clock
     turns = _lines(form, args, stop) if args.stdin else _turns(form, payload, args, stop)
     sent = 0
     try:
@@ -86,7 +87,6 @@ def _run(
         if feedback and args.once and matched:
             feedback.wait(stop)
     finally:
-        stopping = form.stop()
         if stopping and not args.once:
             _stop_robot(publisher, stopping)
     if args.json:

@@ -25,7 +25,7 @@ def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="holozen record",
         description="Record the messages of keys into an MCAP file, until Ctrl-C. It needs 8 MB of free disk space, "
-        "reserved to finish the file on a full disk. --wire cdr is for the tools of ROS 2.",
+        "reserved to finish the file on a full disk.",
         epilog="example: holozen record odom cmd_vel -o square",
     )
     parser.add_argument("keys", nargs="*", type=key, metavar="KEY", help="a key or key expression, such as */odom")
@@ -37,6 +37,8 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--use-sim-time", action="store_true", help="use the times of the sim's clock, which are those of the stamps"
     )
+    parser.add_argument("--ros2", action="store_true",
+        help="write the folder NAME as `ros2 bag record` does, for `ros2 bag play`")  # fmt: skip
     parser.add_argument("--json", action="store_true", help="the figures as one JSON object a line")
     connection.add_arguments(parser)
     return parser
@@ -47,16 +49,22 @@ def main(argv: list[str]) -> int:
     args = arguments.parse_args(argv)
     if bool(args.keys) == args.all:
         arguments.error("name the keys to record, or use -a for all")
+    from holozen.bag.rosbag2 import RosBagWriter
     from holozen.bag.writer import BagWriter
 
     name = args.output or time.strftime("holozen_%Y_%m_%d-%H_%M_%S")
     stop = stop_event()
     try:
-        writer = BagWriter(name, round((args.max_size or 0) * 1e6), "ros2" if args.wire == "cdr" else "")
+        limit = round((args.max_size or 0) * 1e6)
+        writer = RosBagWriter(name, limit) if args.ros2 else BagWriter(name, limit, "ros2" if _for_ros(args) else "")
     except OSError as error:
         report(f"holozen record: cannot write {error.filename or name}: {error.strerror}{_fix(error)}")
         return 1
     return _record(args, writer, stop)
+
+
+def _for_ros(args: argparse.Namespace) -> bool:
+    return bool(args.ros2) or args.wire == "cdr"
 
 
 def _fix(error: OSError) -> str:
@@ -81,7 +89,7 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
                 f"recording {'every key' if args.all else ' '.join(args.keys)} into {writer.files[0]}; Ctrl-C ends it"
             )
             sim_time = SimTime() if args.use_sim_time else None
-            recorder = Recorder(intake, writer, bus.graph(), args.wire == "cdr", sim_time, bus.definition)
+            recorder = Recorder(intake, writer, bus.graph(), _for_ros(args), sim_time, bus.definition)
             progress = Progress(args.json, intake, recorder, writer)
             try:
                 _until(stop, args.max_duration, recorder, writer, progress)
@@ -151,10 +159,14 @@ class Progress:
             print(json.dumps(self._figures() | {"files": files, "error": failed}), flush=True)
         elif files:
             print(printable(f"{', '.join(files)}: {self._line()}"), flush=True)
+        for name, (count, why) in self._recorder.left_out.items():
+            report(f"holozen record: left out {count} messages of {name}: {why}")
         if failed:
             report(f"holozen record: stopped: {failed}; everything written before can be read")
         elif not files and self._recorder.early:
             report("holozen record: no file is left: nothing arrived on clock, so the sim's time is unknown")
+        elif not files and self._recorder.left_out:
+            report("holozen record: no file is left: a bag for ROS 2 can hold none of these messages")
         elif not files:
             report("holozen record: nothing arrived, so no file is left; `holozen topic list` shows what is published")
         return 1 if failed or not files else 0
@@ -165,6 +177,7 @@ class Progress:
             "messages": self._writer.messages,
             "bytes": self._writer.size,
             "dropped": self._intake.dropped + self._recorder.refused,
+            "left_out": sum(left.messages for left in self._recorder.left_out.values()),
             "lost": self._intake.lost,
             "overran": self._intake.overran,
         }

@@ -16,8 +16,9 @@ from holozen.transport import connection
 if TYPE_CHECKING:
     from pathlib import Path
 
+    from holozen.bag import Message
     from holozen.bag.player import Outlet, Plan, Player
-    from holozen.bag.reader import Message, Summary
+    from holozen.bag.reader import Summary
 
 WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # us
 AGAIN = 0.02  # s between two rounds of a loop, so that a very short bag does not flood the bus

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
-from holozen.cli.verb import Verb, by_name, open_bus
+from holozen.cli.verb import Verb, by_name, no_arguments, open_bus
 from holozen.console import printable, report
 from holozen.flags import refused
 from holozen.process import deferred_interrupt
@@ -18,6 +18,7 @@ from holozen.transport.errors import NoReply, ServiceError
 if TYPE_CHECKING:
     from holozen.messages import Pose
 
+SIMS = "@holozen/*/*/srv/*/*/*/get_entities"  # the tokens of their services
 TILTED = 5.0  # degrees; a robot on a slope or a balancing one has less
 
 
@@ -25,6 +26,7 @@ def list_entities(args: argparse.Namespace) -> int:
     """Print the name and the pose of each entity; nothing if the world is empty."""
     with open_bus(args) as bus:
         found = list(_entities(bus))
+        sims = len(bus.endpoints(SIMS))
     if args.json:
         from msgspec import to_builtins
 
@@ -34,6 +36,8 @@ def list_entities(args: argparse.Namespace) -> int:
     width = max((len(name) for name, _ in found), default=0)
     for name, pose in found:
         print(printable(f"{name:<{width}}  {_where(pose)}"))
+    if sims > 1 and found:
+        report(f"they are in {sims} sims; robots of different sims do not collide")
     if not found:
         report("the world is empty; holozen spawn FILE --name NAME puts a robot there")
     return 0
@@ -100,16 +104,12 @@ def _name(text: str) -> str:
         raise refused(str(error)) from None
 
 
-def _no_arguments(_parser: argparse.ArgumentParser) -> None:
-    pass
-
-
 def _delete_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("names", nargs="+", type=_name, metavar="NAME", help="as `holozen list` shows them")
 
 
 VERBS = by_name(
-    Verb("list", "Show the robots and objects in the sim.", "--json", _no_arguments, list_entities,
+    Verb("list", "Show the robots and objects in the sim.", "--json", no_arguments, list_entities,
         "name and pose as one JSON object a line"),
     Verb("delete", "Remove robots or objects from the sim.", "Fred", _delete_arguments, delete),
 )  # fmt: skip

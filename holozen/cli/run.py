@@ -1,7 +1,7 @@
 """`holozen run`: run a Python script that was written for ROS 2, without ROS."""
 
 import argparse
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -46,7 +46,7 @@ def main(argv: list[str]) -> int:
         report(f"holozen run: {error}")
         return 1
     source = script.path.read_text(errors="replace")
-    words, found = _split(words, [flag for flag in _BEHIND if flag not in source])
+    words, found = _split(words, [flag for flag in _BEHIND if flag not in source], sure=("--package",))
     args = parser().parse_args([*found, args.target], args)
     from holozen.ros import importer
     from holozen.ros.rclpy import context
@@ -56,8 +56,10 @@ def main(argv: list[str]) -> int:
     return runner.run(script, words)
 
 
-def _split(words: list[str], flags: list[str]) -> tuple[list[str], list[str]]:
-    """The words for the script, and those of the given holozen flags among them that have a valid value."""
+def _split(words: list[str], flags: list[str], sure: Collection[str] = ()) -> tuple[list[str], list[str]]:
+    """The words for the script, and those of the given holozen flags among them that have a valid value, or are `sure`
+    to be ours.
+    """
     kept: list[str] = []
     found: list[str] = []
     waiting = list(words)
@@ -65,7 +67,7 @@ def _split(words: list[str], flags: list[str]) -> tuple[list[str], list[str]]:
         word = waiting.pop(0)
         flag, equals, value = word.partition("=")
         value = value if equals else "".join(waiting[:1])
-        if flag not in flags or not _is_valid(flag, value):
+        if flag not in flags or not (flag in sure or _is_valid(flag, value)):
             kept.append(word)
             continue
         found += [flag, value]

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 FAR = 1e6  # m
 PATIENCE = 3.0  # s to wait for a router and for a sim
 ROUND = 6.2832  # rad; a larger angle was probably given in degrees
-PLUGIN = '<gazebo><plugin name="planar_move" filename="libgazebo_ros_planar_move.so"/></gazebo>'
-ENDS = {"</robot>": PLUGIN, "</model>": PLUGIN.removeprefix("<gazebo>").removesuffix("</gazebo>")}
-"""The end tag of a robot in URDF and SDF, and the plugin inserted before it for a drive."""
+PLUGINS = {"planar_move": "libgazebo_ros_planar_move.so", "omni": "libholozen_omni_drive.so"}
+ENDS = {"</robot>": "<gazebo>{}</gazebo></robot>", "</model>": "{}</model>"}
+"""The end tag of a robot in URDF and SDF, with the plugin of a drive before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ def parser() -> argparse.ArgumentParser:
     parser.add_argument("--grid", type=flags.number(0.01, 100, "m"), default=2.0, metavar="M",
         help="metres between two of --count (default: %(default)g)")  # fmt: skip
     parser.add_argument("--replace", action="store_true", help="replace the entity with that name")
-    parser.add_argument("--drive", choices=("planar_move",), help="the drive of a robot whose file has none")
+    parser.add_argument("--drive", choices=flags.DRIVES, help=flags.DRIVE)
     parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="the folder of package NAME, for $(find NAME) and package://NAME")  # fmt: skip
     parser.add_argument("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
@@ -154,7 +154,13 @@ def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Name
         pose = Pose(
             Point(at.x + args.grid * (number % side), at.y + args.grid * (number // side), at.z), first.orientation
         )
-        name, _ = entities.spawn(bus, f"{base}{number}", candidate.text, pose)
+        try:
+            name, _ = entities.spawn(bus, f"{base}{number}", candidate.text, pose)
+        except ServiceError as error:
+            if not entities.has_no_room(error):
+                raise
+            advice = f"-x and -y choose the first place, and --grid more than {args.grid:g} m between two"
+            raise ServiceError(f"{error}; {advice}") from None
         return _spawned(name, candidate, pose)
 
     fleet = list(entities.for_each(spawn, range(args.count)))
@@ -197,22 +203,24 @@ def read(
 ) -> Candidate:
     """Read and check a file here, where its lines are known; warnings are reported. Raises RobotError."""
     from holozen.robot.loading import load, portable
+    from holozen.robot.model import takes
+    from holozen.robot.rigid import FALLS, falls_through
     from holozen.wire import robot_name
 
     model = load(path, args, packages, strict, allow_env)
     for warning in model.warnings:
-        report(f"holozen spawn: {warning}")
+        report(f"holozen spawn: warning: {warning}")
     try:
         name = robot_name(name or model.name)
     except ValueError as error:
         raise RobotError(f"{path}: {error}; give one with --name") from None
-    if not any(link.collisions for link in model.links.values()):
-        report(f"holozen spawn: {path}: has no collision shape and falls through the ground; see: holozen check {path}")
+    if falls_through(model):
+        report(f"holozen spawn: warning: {path}: {FALLS}; give a link a <collision>")
     text, _ = portable(path, args, packages, allow_env)  # its warnings are among the model's
-    if drive and model.drive is None:
-        return _driven(Candidate(name, text, model))
+    if drive and takes(model, drive):
+        return _driven(Candidate(name, text, model), drive)
     if drive:
-        report(f"holozen spawn: {path}: has a drive of its own, which is used; --drive {drive} is not")
+        report(f"holozen spawn: warning: {path}: has a drive of its own, which is used; --drive {drive} is not")
     return Candidate(name, text, model)
 
 
@@ -229,6 +237,8 @@ def put(bus: Bus, candidate: Candidate, place: Place, replace: bool, notice: flo
         # The sim checks a robot before its name, so the old one is deleted only for a valid one.
         if entities.is_taken(error) and not replace:
             raise ServiceError(f"{error}; --replace takes its place, --name gives another") from None
+        if entities.has_no_room(error):
+            raise ServiceError(f"{error}; -x and -y choose the place") from None
         if not old or not entities.is_taken(error):
             raise
         entities.delete(bus, candidate.name)
@@ -236,7 +246,7 @@ def put(bus: Bus, candidate: Candidate, place: Place, replace: bool, notice: flo
     known = {_complaint(warning) for warning in candidate.model.warnings}
     for warning in warnings:
         if _complaint(warning) not in known:
-            report(f"holozen spawn: the sim: {warning}")
+            report(f"holozen spawn: warning: the sim: {warning}")
     return _spawned(name, candidate, pose)
 
 
@@ -264,13 +274,14 @@ def _words(options: argparse.ArgumentParser, args: argparse.Namespace) -> tuple[
     return Path(files[0]), values
 
 
-def _driven(candidate: Candidate) -> Candidate:
-    """The candidate with a planar_move plugin, which drives the root unless it names a link."""
-    from holozen.robot.model import planar_drive
+def _driven(candidate: Candidate, drive: str) -> Candidate:
+    """The candidate with the plugin of a drive."""
+    from holozen.robot.model import driven
 
     end = next(end for end in ENDS if end in candidate.text)
     head, _, tail = candidate.text.rpartition(end)
-    return Candidate(candidate.name, f"{head}{ENDS[end]}{end}{tail}", planar_drive(candidate.model))
+    plugin = f'<plugin name="{drive}" filename="{PLUGINS[drive]}"/>'
+    return Candidate(candidate.name, f"{head}{ENDS[end].format(plugin)}{tail}", driven(candidate.model, drive))
 
 
 def _chosen(model: "RobotModel", place: Place) -> "Pose":

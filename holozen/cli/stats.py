@@ -167,6 +167,16 @@ def lost_words(report: Report) -> str:
     return "" if report["lost"] is None else f" lost: {report['lost']}"
 
 
+def _spread_text(report: Report) -> str:
+    """The spread of gaps or ages, in seconds."""
+    return (
+        f"\tmin: {report['min']:.4f}s max: {report['max']:.4f}s std dev: {report['std_dev']:.5f}s"
+        f" window: {report['window']}\n"
+        f"\tp50: {report['p50']:.4f}s p95: {report['p95']:.4f}s p99: {report['p99']:.4f}s"
+        f" jitter: {report['jitter']:.5f}s{lost_words(report)}"
+    )
+
+
 def hz(args: argparse.Namespace) -> int:
     """Print the average rate and the spread of the intervals between messages, once a second."""
     return watch(args, lambda _sample, now: now, lambda window: rate(list(window.times)), rate_text)
@@ -184,13 +194,7 @@ def rate(times: list[float]) -> Report:
 
 def rate_text(report: Report) -> str:
     """A report in the format of ROS 2, with an extra line."""
-    return (
-        f"average rate: {report['rate']:.3f}\n"
-        f"\tmin: {report['min']:.4f}s max: {report['max']:.4f}s std dev: {report['std_dev']:.5f}s"
-        f" window: {report['window']}\n"
-        f"\tp50: {report['p50']:.4f}s p95: {report['p95']:.4f}s p99: {report['p99']:.4f}s"
-        f" jitter: {report['jitter']:.5f}s{lost_words(report)}"
-    )
+    return f"average rate: {report['rate']:.3f}\n{_spread_text(report)}"
 
 
 def bw(args: argparse.Namespace) -> int:
@@ -334,13 +338,7 @@ def delay(args: argparse.Namespace) -> int:
 
 def delay_text(report: Report) -> str:
     """A report in the format of ROS 2, with an extra line."""
-    return (
-        f"average delay: {report['mean']:.4f}\n"
-        f"\tmin: {report['min']:.4f}s max: {report['max']:.4f}s std dev: {report['std_dev']:.5f}s"
-        f" window: {report['window']}\n"
-        f"\tp50: {report['p50']:.4f}s p95: {report['p95']:.4f}s p99: {report['p99']:.4f}s"
-        f" jitter: {report['jitter']:.5f}s{lost_words(report)}\n\tby {report['clock']}"
-    )
+    return f"average delay: {report['mean']:.4f}\n{_spread_text(report)}\n\tby {report['clock']}"
 
 
 def _arguments(parser: argparse.ArgumentParser, size: int = WINDOW) -> None:

@@ -1,4 +1,4 @@
-"""`holozen stop`: robots ignore every command and stand still until `holozen release`."""
+"""`holozen stop` and `release`: robots ignore every command and stand still until they are released."""
 
 import argparse
 import json
@@ -6,13 +6,16 @@ import time
 from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
+from holozen.cli.verb import Verb, by_name
 from holozen.console import printable, report
-from holozen.flags import Parser, number
+from holozen.flags import number
 from holozen.transport import connection
 from holozen.transport.errors import TIMEOUT, BusError
 from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
+    from holozen.messages import CommandStatus
+    from holozen.transport.pubsub import Latest
     from holozen.transport.samples import Replies
 
 TOKENS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/{verb}"
@@ -21,31 +24,13 @@ EVERY = 0.002  # s between two polls
 AGAIN = 0.5  # s without an answer until the request is repeated
 PAUSE = 0.02  # s until a refused request is repeated
 QUIET = 1.0  # s without a new robot or sim until all count as found; a busy sim is discovered late
+NAMING = 0.5  # s to learn the name of the robot at the root
 NOTICE = 2.0  # s to discover the first robot, and those named on the command line
 
 
-def main(argv: list[str]) -> int:
-    return run("stop", argv)
-
-
-def parser(verb: str = "stop") -> argparse.ArgumentParser:
-    what = {"stop": "Stop robots until `holozen release`.", "release": "Let robots drive again after `holozen stop`."}
-    parser = Parser(
-        prog=f"holozen {verb}",
-        description=what[verb],
-        epilog=f"example: holozen {verb} Fred",
-    )
-    parser.add_argument("robots", nargs="*", metavar="ROBOT", help="its name (default: all robots there are)")
-    parser.add_argument("--timeout", type=number(0.1, 1e6, "s"), default=5.0, metavar="S",
-        help="seconds to connect, and then for every robot to confirm (default: 5)")  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="one JSON object a line")
-    connection.add_arguments(parser)
-    return parser
-
-
-def run(verb: str, argv: list[str]) -> int:
+def run(args: argparse.Namespace) -> int:
     """Stop or release robots; 0 only if all of them confirmed."""
-    args = parser(verb).parse_args(argv)
+    verb = args.verb
     where = connection.from_arguments(args)
     try:
         with Bus(verb, where, patience=args.timeout) as bus:
@@ -65,8 +50,8 @@ def run(verb: str, argv: list[str]) -> int:
 class Order:
     """The request to one robot, repeated until every server of its key has confirmed: two sims may share it."""
 
-    def __init__(self, robot: str, key: str) -> None:
-        self.robot, self.key, self.confirmed = robot, key, False
+    def __init__(self, robot: str, verb: str) -> None:
+        self.robot, self.key, self.confirmed = robot, f"{robot}/{verb}".removeprefix("/"), False
         self.discovered = False  # by the token of its service; those that are named are asked without
         self.servers: set[str] = set()
         self.printed = False  # its confirmation
@@ -126,8 +111,10 @@ class Orders:
         self._wanted = {name.removeprefix("/") for name in args.robots}
         # Those that are named, or else the robot at the root, are asked before they are discovered.
         names = {name for name in self._wanted or {""} if not set(name) & set("*$?#")}
-        self._orders = {name: Order(name, f"{name}/{verb}".removeprefix("/")) for name in names}
+        self._orders = {name: Order(name, verb) for name in names}
         self.there: set[str] = set()  # robots
+        self._status: Latest[CommandStatus] | None = None  # of the robot at the root
+        self._root = ""  # the name of the robot at the root, once it is known
 
     def give(self) -> None:
         """Send the order to every robot as soon as it is discovered, and print each confirmation."""
@@ -137,23 +124,24 @@ class Orders:
             self._find()
             changed = changed if self._known() == known else now
             for order in self._orders.values():
-                if not order.look(self._bus, now):
-                    continue
-                self.there.add(order.robot)
-                if not order.printed:
+                if order.look(self._bus, now):
+                    self.there.add(order.robot)
+                named = order.robot or self._root or now - begin > max(NAMING, self._bus.took)
+                if order.confirmed and named and not order.printed:
                     order.printed = True
                     self._print(order)
+            self._find_root()
             time.sleep(EVERY)
             now = time.monotonic()
 
     def report(self) -> int:
         """Report robots that did not confirm or were not found. Returns the exit code."""
         late = [order for order in self._orders.values() if order.discovered and not order.confirmed]
-        for order in late:
+        for order in late + [order for order in self._orders.values() if order.confirmed and not order.printed]:
             self._print(order)
         missing = sorted(self._wanted - self.there)
         if missing and self.there:
-            there = ", ".join(map(_named, sorted(self.there)))
+            there = ", ".join(map(self._named, sorted(self.there)))
             report(f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there are: {there}")
         # The robot at the root answered, but without a token: there may be others that were not asked.
         hidden = not self._wanted and any(order.confirmed and not order.discovered for order in self._orders.values())
@@ -168,9 +156,21 @@ class Orders:
             robot = endpoint.key.removesuffix(self._verb).removesuffix("/")
             self.there.add(robot)
             if not self._wanted or robot in self._wanted:
-                order = self._orders.setdefault(robot, Order(robot, endpoint.key))
+                order = self._orders.setdefault(robot, Order(robot, self._verb))
                 order.discovered = True
                 order.servers.add(endpoint.session)
+
+    def _find_root(self) -> None:
+        """Learn the name of the robot at the root, which its keys do not hold; it may be one of those to reach."""
+        if self._status is None:  # only now, since the codec takes longer to load than an order takes
+            from holozen.messages import CommandStatus
+
+            self._status = self._bus.latest("cmd_vel_status", CommandStatus)
+        if not self._root and (status := self._status.read()[0]):
+            self._root = status.name
+            if self._root in self._wanted - self.there:
+                self._wanted = self._wanted - {self._root} | {""}
+                self._orders[""] = Order("", self._verb)
 
     def _known(self) -> tuple[int, int]:
         """The number of robots discovered, and of servers that the orders go to."""
@@ -186,17 +186,28 @@ class Orders:
         return quiet > max(QUIET, self._bus.took)
 
     def _print(self, order: Order) -> None:
-        name, confirmed, message = order.robot, order.confirmed, order.message
+        name, confirmed, message = self._named(order.robot), order.confirmed, order.message
         if self._args.json:
-            row = {"robot": name, "verb": self._verb, "confirmed": confirmed, "message": message}
+            row = {"robot": order.robot or self._root, "verb": self._verb, "confirmed": confirmed, "message": message}
             return print(json.dumps(row), flush=True)
         if confirmed:
             more = f": {message}" if self._verb == "release" and message else ""
-            return print(printable(f"{_named(name)} {DONE[self._verb]}{more}"), flush=True)
+            return print(printable(f"{name} {DONE[self._verb]}{more}"), flush=True)
         because = f" ({message})" if message else ""
         risk = "; it may move" if self._verb == "stop" else ""
-        return report(f"{_named(name)} did not confirm within {self._args.timeout:g} s{because}{risk}")
+        return report(f"{name} did not confirm within {self._args.timeout:g} s{because}{risk}")
+
+    def _named(self, robot: str) -> str:
+        return robot or self._root or "the robot at the root"
 
 
-def _named(robot: str) -> str:
-    return robot or "the robot at the root"
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("robots", nargs="*", metavar="ROBOT", help="its name (default: all robots there are)")
+    parser.add_argument("--timeout", type=number(0.1, 1e6, "s"), default=5.0, metavar="S",
+        help="seconds to connect, and then for every robot to confirm (default: 5)")  # fmt: skip
+
+
+VERBS = by_name(
+    Verb("stop", "Stop robots until `holozen release`.", "Fred", _arguments, run),
+    Verb("release", "Let robots drive again after `holozen stop`.", "Fred", _arguments, run),
+)

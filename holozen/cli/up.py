@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import os
 import signal
 import subprocess
 import sys
@@ -15,6 +16,8 @@ from holozen import flags
 from holozen.console import report
 from holozen.process import dies_with_parent, stop_event
 from holozen.transport import connection
+from holozen.transport.rendezvous import is_taken
+from holozen.transport.roles import ROUTER
 
 GRACE = 1.2  # s for the commanding processes to stop the robot; the sim ends after them
 SIM_GRACE = 0.5  # s
@@ -32,7 +35,8 @@ SCREEN_LEFT = "\x1b[<u\x1b[?2026l\x1b[?7h\x1b[?1004l\x1b[?2004l\x1b[?25h\x1b[?10
 def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen up",
-        description="Start the sim, the controller, the pose service, and the teleop if there is a terminal.",
+        description="Start the sim, the controller, the pose service, and the teleop if there is a terminal; with"
+        " --secure a router too, unless --connect names one.",
         epilog="example: holozen up --robot my_bot.urdf.xacro",
     )
     add = parser.add_argument
@@ -40,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
         help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root)")  # fmt: skip
     add("--world", metavar="FILE", help="an SDF file (default: gazebo.world)")
     add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
-    add("--drive", metavar="planar_move", help="the drive of a robot whose file has none")
+    add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
     add(
         "--package",
         action="append",
@@ -55,30 +59,48 @@ def parser() -> argparse.ArgumentParser:
     add("--size", metavar="M", help="the side of that shape (infinity: half its length) in m")
     add("--goals", metavar="FILE", help="goals from a file instead: x y theta a line")
     add("--laps", metavar="N", default="0", help="times round the goals; 0: for ever (default: 0)")
+    add("--view", nargs="?", type=flags.count(), const=8080, metavar="PORT",
+        help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a free one)")  # fmt: skip
+    add("--shards", type=flags.count(1), default=1, metavar="N",
+        help="as many sims, which share the robots by name (default: 1)")  # fmt: skip
     add("--no-restart", action="store_true", help="do not start a part again that died (its robots would stand)")
     connection.add_arguments(parser)
     return parser
 
 
 def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
-    where = connection.from_arguments(args).arguments()
+    options = parser()
+    args = options.parse_args(argv)
+    if args.shards > 1 and args.robot and not args.robot[1]:
+        options.error("--shards gives each robot to the shard of its name: use --robot FILE=NAME")
+    driven = args.shards == 1 or args.robot  # else there is no robot yet
+    where, router = _meeting(connection.from_arguments(args))
     stop = stop_event()
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     if not has_terminal:
         report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
     with tempfile.TemporaryFile("w+", errors="replace") as log:
-        team = Team(where, log if has_terminal else None, not args.no_restart)
+        team = Team(where.arguments(), log if has_terminal else None, not args.no_restart)
         try:
+            if router:
+                team.start("router", router)
             robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
             packages = [word for package in args.package for word in ("--package", package)]
             packages += [word for name in args.allow_env for word in ("--allow-env", name)]
-            team.start("sim", [*robot, *packages, *_flags(args, "world", "rtf", "drive")])
-            team.start("pose-service", _flags(args, "shape", "size", "goals"))
+            words = [*robot, *packages, *_flags(args, "world", "rtf", "drive")]
+            for shard in range(1, args.shards + 1):
+                if args.shards > 1:
+                    team.start(f"sim {shard}/{args.shards}", [*words, "--shard", f"{shard}/{args.shards}"])
+                else:
+                    team.start("sim", words)
             name = [args.robot[1]] if args.robot and args.robot[1] else []
-            team.start("controller", [*name, "--laps", args.laps])
-            if has_terminal:
+            if driven:
+                team.start("pose-service", _flags(args, "shape", "size", "goals"))
+                team.start("controller", [*name, "--laps", args.laps])
+            if args.view is not None:
+                team.start("view", ["--port", str(args.view)])
+            if has_terminal and driven:
                 team.start("teleop", name)
             failed = team.watch(stop)
         finally:
@@ -87,6 +109,18 @@ def main(argv: list[str]) -> int:
                 _restore(terminal)
             _report_last(log)
     return 1 if failed else 0
+
+
+def _meeting(where: connection.Connection) -> tuple[connection.Connection, list[str]]:
+    """How the parts connect, and the flags of a router of their own; none where they need none, or there is one."""
+    if not where.secure or where.connect is not None or not os.path.isdir(os.path.join(where.secure, ROUTER)):
+        return where, []
+    listen = where.listen or where.meeting_points
+    clients = where.replace(listen=None, connect=(connection.from_here(listen[0]),))
+    if is_taken(listen[0]):
+        report(f"up: something listens at {listen[0]} already; it is taken for the router")
+        return clients, []
+    return clients, where.replace(mode="router", listen=listen).arguments()
 
 
 class Team:
@@ -105,12 +139,14 @@ class Team:
         self._pause: dict[str, float] = {}  # s; of those that were started again
 
     def start(self, verb: str, words: list[str]) -> None:
-        """Start a verb. The teleop keeps the terminal; the others get no signals from it."""
+        """Start a part, called by its verb, or `sim K/N`. The teleop keeps the terminal, and the others get no signals
+        from it.
+        """
         in_terminal = verb == "teleop"
         self._words.setdefault(verb, words)
         self._started[verb] = time.monotonic()
         self._running[verb] = subprocess.Popen(
-            [sys.executable, "-m", "holozen", verb, *words, *self._where],
+            [sys.executable, "-m", "holozen", _verb(verb), *words, *([] if verb == ROUTER else self._where)],
             stdin=None if in_terminal else subprocess.DEVNULL,
             stdout=None if in_terminal else self._log,
             stderr=None if in_terminal else self._log,
@@ -127,7 +163,7 @@ class Team:
                 process = self._running.get(verb)
                 if process is None:
                     if time.monotonic() >= self._started[verb]:
-                        self.start(verb, [*self._words[verb], *STANDING.get(verb, ())])
+                        self.start(verb, [*self._words[verb], *STANDING.get(_verb(verb), ())])
                 elif (code := process.poll()) is not None and not self._ended(verb, code):
                     return code > 0
         return False
@@ -146,11 +182,11 @@ class Team:
             self._report(f"up: {verb} {_how(code)}; ending the others")
             return False
         if not self._restarts:
-            self._report(f"up: {verb} {_how(code)}; `holozen {verb}` starts it again")
+            self._report(f"up: {verb} {_how(code)}; `holozen {_again(verb)}` starts it again")
             return True
         pause = self._pause.get(verb, 0.0) if lived < SETTLED else 0.0
         self._pause[verb] = pause = min(max(PAUSES[0], 2 * pause), PAUSES[1])
-        self._report(f"up: {verb} {_how(code)}; starting it again in {pause:g} s{AFTER[verb]}")
+        self._report(f"up: {verb} {_how(code)}; starting it again in {pause:g} s{_after(verb)}")
         again = [verb]
         if verb == "pose-service" and "controller" in self._running:
             _end({"controller": self._running.pop("controller")}, GRACE)
@@ -166,18 +202,35 @@ class Team:
             report(text)
 
     def end(self) -> None:
-        """End the processes: first those that command the robot, then the sim."""
-        sim = self._running.pop("sim", None)
-        _end(self._running, GRACE)
-        _end({"sim": sim} if sim else {}, SIM_GRACE)
+        """End the processes: first those that command the robot, then the sims, then the router between them."""
+        sims = {verb: self._running.pop(verb) for verb in list(self._running) if _verb(verb) == "sim"}
+        router = {verb: self._running.pop(verb) for verb in (ROUTER,) if verb in self._running}
+        for parts, grace in ((self._running, GRACE), (sims, SIM_GRACE), (router, SIM_GRACE)):
+            _end(parts, grace)
 
 
 STANDING = {"sim": ["--stopped"], "controller": ["--held"]}
 AFTER = {
     "sim": ", its robots stopped until `holozen release`",
+    "view": "",
+    "router": "; robots stand until then",
     "controller": "; it drives after `holozen controller --resume` or the teleop's r",
     "pose-service": "; the controller drives after `holozen controller --resume` or the teleop's r",
 }
+
+
+def _verb(part: str) -> str:
+    return part.partition(" ")[0]
+
+
+def _again(part: str) -> str:
+    return part if part == _verb(part) else part.replace(" ", " --shard ")
+
+
+def _after(part: str) -> str:
+    if part == _verb(part):
+        return AFTER[part]
+    return "; the robots that were spawned in this shard are gone, those of the others go on"
 
 
 def _how(code: int) -> str:

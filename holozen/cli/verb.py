@@ -10,10 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 from holozen.flags import Parser, package
 from holozen.process import deferred_interrupt
+from holozen.suggest import suggest
 from holozen.transport import connection
 from holozen.transport.session import Opening
 
 if TYPE_CHECKING:
+    from types import ModuleType
+
     from holozen.transport.bus import Bus
     from holozen.transport.node import Node
 
@@ -119,6 +122,30 @@ class Noun:
         module = importlib.import_module(f"holozen.cli.{self.modules[name]}")
         found: Verb = module.VERBS[f"{self.name} {name}"]
         return found
+
+
+class Service(Noun):
+    """A noun that starts a service, its `module`, unless a verb follows: `holozen sim` starts one."""
+
+    def __init__(self, name: str, module: ModuleType, modules: dict[str, str]) -> None:
+        super().__init__(name, "", modules)
+        self.module = module
+
+    def main(self, argv: list[str]) -> int:
+        """Run the verb that `argv` starts with, or else the service."""
+        if argv and argv[0] in self.modules:
+            return super().main(argv)
+        if argv and argv[0][:1] != "-" and (near := suggest(argv[0], self.modules)):
+            self.parser().error(f"no verb {argv[0]!r}{near}")
+        return int(self.module.main(argv))
+
+    def parser(self) -> Any:
+        """The parser of the service."""
+        return self.module.parser()
+
+
+def no_arguments(_parser: argparse.ArgumentParser) -> None:
+    """Fill in nothing: for a Verb that has no arguments of its own."""
 
 
 def by_name(*verbs: Noun | Verb) -> dict[str, Any]:

@@ -43,7 +43,10 @@ def parser() -> argparse.ArgumentParser:
     watch = parser.add_argument_group("watch", "Expand again on every save, and respawn the robot in a running sim.")
     watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
     watch.add_argument("--name", type=flags.robot, metavar="NAME", help="the robot's name (default: as in the file)")
-    watch.add_argument("--drive", choices=("planar_move",), default="", help="the drive of a robot whose file has none")
+    watch.add_argument("--drive", choices=flags.DRIVES, default="", help=flags.DRIVE)
+    for axis in "xy":
+        watch.add_argument(f"-{axis}", type=flags.number(-1000, 1000, "m"), metavar="m",
+            help="position at its first spawn; later it stays where it is")  # fmt: skip
     connection.add_arguments(parser)
     return parser
 
@@ -102,8 +105,8 @@ def _encoded(text: str) -> bytes:
 
 
 def _check(args: argparse.Namespace) -> None:
-    if not args.watch and (args.name is not None or args.drive):
-        raise RobotError("--name and --drive are for --watch; `holozen spawn FILE` spawns once")
+    if not args.watch and (args.name is not None or args.drive or args.x is not None or args.y is not None):
+        raise RobotError("--name, --drive, -x and -y are for --watch; `holozen spawn FILE` spawns once")
     if args.output and args.output.exists() and args.file.exists() and args.output.samefile(args.file):
         raise RobotError(f"-o {args.output} is the file that is expanded; write to another one")
 
@@ -160,12 +163,13 @@ def _used(
             write(args.output, outcome.text)
             text += f", {args.output} written"
         if bus:
-            from holozen.cli.spawn import spawn_file
+            from holozen.cli.spawn import Place, spawn_file
 
-            name, drive = args.name or "", args.drive
+            name, place, drive = args.name or "", Place(args.x, args.y), args.drive
             text += (
-                f", {spawn_file(bus, args.file, name, None, True, values, packages, drive, allow_env=args.allow_env)}"
+                f", {spawn_file(bus, args.file, name, place, True, values, packages, drive, allow_env=args.allow_env)}"
             )
+            args.x = args.y = None  # from now on it is replaced where it stands
     except (RobotError, BusError) as error:
         return f"{text}, but {error}", False
     return text, True

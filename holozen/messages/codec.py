@@ -4,7 +4,7 @@ import threading
 from collections.abc import Callable
 from functools import lru_cache, partial
 from types import ModuleType
-from typing import Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
@@ -13,7 +13,10 @@ from holozen.messages import CodecError
 from holozen.messages.message import Message, listed, not_finite
 from holozen.suggest import shorten
 
-__all__ = ["WIRES", "CodecError", "convert", "decode", "encode", "encoding", "written"]
+if TYPE_CHECKING:
+    from holozen.messages.definitions import Interface
+
+__all__ = ["WIRES", "CodecError", "convert", "decode", "encode", "encoding", "form", "transcoded", "written"]
 
 M = TypeVar("M", bound=Message)
 Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
@@ -78,15 +81,15 @@ def decode(payload: bytes, encoding: str, types: tuple[type[M], ...], tolerant: 
 
     Unknown fields are refused, or ignored if `tolerant` (`wire.is_command` has the rule).
     """
-    form = _format(encoding, _is_cdr(payload))
-    makers: Makers[M] = _decoders(types, encoding, form)
+    wire = "json" if payload[:1] == b"{" and encoding in _JSON else form(payload, encoding)
+    makers: Makers[M] = _decoders(types, encoding, wire)
     try:
         return _first(makers, payload)
     except CodecError:
-        if not tolerant or form == "cdr":
+        if not tolerant or wire == "cdr":
             raise
-    plain = (msgspec.json if form == "json" else msgspec.msgpack).decode
-    return _first(tuple((kind, partial(_without_unknown, kind, plain)) for kind in types), payload)
+    parse = (msgspec.json if wire == "json" else msgspec.msgpack).decode
+    return _first(tuple((kind, partial(_without_unknown, kind, parse)) for kind in types), payload)
 
 
 def _without_unknown(kind: type[M], plain: Callable[[bytes], Any], payload: bytes) -> M:
@@ -175,6 +178,26 @@ def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
     if not found:
         raise CodecError(_short(f"not a {types[0].__name__}: its encoding names {name}"))
     return found
+
+
+def form(payload: bytes, encoding: str) -> str:
+    """The wire of a payload: "json", "msgpack" or "cdr". Raises CodecError for any other Encoding."""
+    return _format(encoding, _is_cdr(payload))
+
+
+def transcoded(interface: "Interface", payload: bytes, encoding: str) -> bytes:
+    """A message in JSON, msgpack or CDR, in CDR. Raises CodecError."""
+    from holozen.messages import cdr
+
+    wire = form(payload, encoding)
+    if wire == "cdr":
+        cdr.read(interface, payload)
+        return payload
+    try:
+        value: Any = (msgspec.json if wire == "json" else msgspec.msgpack).decode(payload)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
+        raise CodecError(_short(str(error))) from None
+    return cdr.write(interface, value)
 
 
 def _format(encoding: str, is_cdr: bool) -> str:

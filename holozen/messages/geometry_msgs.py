@@ -66,6 +66,13 @@ class TwistWithCovariance(Message):
     covariance: Covariance = field(default_factory=lambda: [0.0] * 36)
 
 
+class Wrench(Message):
+    """A force in N and a torque in N m."""
+
+    force: Vector3 = field(default_factory=Vector3)
+    torque: Vector3 = field(default_factory=Vector3)
+
+
 class Accel(Message):
     linear: Vector3 = field(default_factory=Vector3)
     angular: Vector3 = field(default_factory=Vector3)

@@ -4,8 +4,10 @@ from typing import Annotated
 
 from msgspec import Meta, field
 
-from holozen.messages.message import Message, UInt64
+from holozen.messages.geometry_msgs import Pose, Twist
+from holozen.messages.message import Message, UInt8, UInt64
 from holozen.messages.nav_msgs import Odometry
+from holozen.messages.std_msgs import Header
 
 
 class CommandSource(Message):
@@ -37,7 +39,7 @@ class CommandStatus(Message):
     (by reason; pairs in ROS) count commands since the start of the sim. `stopped` names the node that set the software
     stop (empty: none); `sources` are those with recent commands. `name` is the robot's in the sim. Commands beyond
     `max_linear` (m/s) and `max_angular` (rad/s) are clamped (0: not known); `strafes` is whether its drive can move it
-    sideways.
+    sideways. `commanded` is the velocity that it obeys, clamped; zero if none drives it.
     """
 
     obeyed: str = ""
@@ -53,6 +55,27 @@ class CommandStatus(Message):
     max_linear: float = 0.0
     max_angular: float = 0.0
     strafes: bool = True
+    commanded: Twist = field(default_factory=Twist)
+
+
+class SimulationStatus(Message):
+    """How the sim's time passes. `state` is one of simulation_interfaces/msg/SimulationState, `time` in s that of
+    `clock`, after `steps` steps of `step` seconds. Each reset begins a new `epoch`, in which the time may begin anew.
+
+    `real_time_factor` is measured over the last second, `target` is the one to keep (0: as fast as possible). A sim
+    that falls behind by more than 0.1 s does not catch up: that is one of the `overruns`, by which `lost` seconds of
+    real time were lost since the start.
+    """
+
+    state: UInt8 = 0
+    time: float = 0.0
+    steps: UInt64 = 0
+    step: float = 0.0
+    epoch: UInt64 = 0
+    real_time_factor: float = 0.0
+    target: float = 0.0
+    overruns: UInt64 = 0
+    lost: float = 0.0
 
 
 class NextGoalRequest(Message):
@@ -79,3 +102,78 @@ class GetPoseReply(Message):
 
     odom: Odometry = field(default_factory=Odometry)
     age: float = 0.0
+
+
+class SceneEntity(Message):
+    """An entity of the sim and its pose in the world. `number` is another one after every spawn, in any sim.
+
+    `command` and `odometry` are the keys of its commands and its odometry; empty if it has none. `joints` are the
+    positions of its joints, in rad or m, in the order of RobotDescriptionReply.
+    """
+
+    name: str = ""
+    number: UInt64 = 0
+    command: str = ""
+    odometry: str = ""
+    pose: Pose = field(default_factory=Pose)
+    joints: list[float] = field(default_factory=list)
+
+
+class GetSceneRequest(Message):
+    pass
+
+
+class GetSceneReply(Message):
+    """All entities of a sim, robots and others."""
+
+    entities: list[SceneEntity] = field(default_factory=list)
+
+
+class RobotDescriptionRequest(Message):
+    """Names an entity: a robot or an object."""
+
+    name: str = ""
+
+
+class RobotDescriptionReply(Message):
+    """Its URDF, with the visual meshes in it, and the `number` and the names of the `joints` of its SceneEntity."""
+
+    description: str = ""
+    number: UInt64 = 0
+    joints: list[str] = field(default_factory=list)
+
+
+class SeenEntity(Message):
+    """Where the `links` of an entity are in the world. `number` is that of SceneEntity."""
+
+    name: str = ""
+    number: UInt64 = 0
+    links: list[str] = field(default_factory=list)
+    poses: list[Pose] = field(default_factory=list)
+
+
+class Exposure(Message):
+    """A picture to be rendered: what there is to see at the time of `header`, and the camera, whose x axis at `pose` in
+    the world looks ahead.
+
+    `image`, `info` and `depth` are the keys to publish on (empty: not), with the stamp and frame of `header`. `width`
+    and `height` in pixels; `field_of_view` across the width in rad; `near` and `far` in m; `encoding` is "rgb8" or
+    "mono8"; the noise is that of a pixel from 0 to 1. `ground`: a level plane at z = 0.
+    """
+
+    header: Header = field(default_factory=Header)
+    image: str = ""
+    info: str = ""
+    depth: str = ""
+    width: UInt64 = 0
+    height: UInt64 = 0
+    field_of_view: float = 0.0
+    near: float = 0.0
+    far: float = 0.0
+    encoding: str = ""
+    noise_mean: float = 0.0
+    noise_stddev: float = 0.0
+    seed: UInt64 = 0
+    pose: Pose = field(default_factory=Pose)
+    ground: bool = False
+    entities: list[SeenEntity] = field(default_factory=list)

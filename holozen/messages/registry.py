@@ -265,8 +265,8 @@ class Registry:
 
     def _bare(self, name: str) -> str:
         same = [full for full in self.names() if full.rpartition("/")[2].lower() == name.lower()]
-        hint = f"did you mean {' or '.join(map(repr, same))}?" if same else "`holozen interface list` lists all"
-        return f"{name[:80]!r} is not a type: the package is missing; {hint}"
+        hint = f" (did you mean {' or '.join(map(repr, same))}?)" if same else "; `holozen interface list` lists all"
+        return f"{name[:80]!r} is not a type: the package is missing{hint}"
 
     def _unknown(self, name: str, package: str) -> str:
         known = [f"{package}/{each}" for each in self.places.names(package)]

@@ -9,7 +9,7 @@ from typing import ClassVar
 from msgspec import field
 
 from holozen.messages.geometry_msgs import Accel, Pose, PoseStamped, Twist, Vector3
-from holozen.messages.message import Message, UInt8
+from holozen.messages.message import Message, UInt8, UInt64
 from holozen.messages.std_msgs import Header
 
 
@@ -138,4 +138,66 @@ class SetEntityStateRequest(Message):
 
 
 class SetEntityStateReply(Message):
+    result: Result = field(default_factory=Result)
+
+
+class SimulationState(Message):
+    """Stopped is paused and reset, before the first step."""
+
+    STATE_STOPPED: ClassVar[UInt8] = 0
+    STATE_PLAYING: ClassVar[UInt8] = 1
+    STATE_PAUSED: ClassVar[UInt8] = 2
+    STATE_QUITTING: ClassVar[UInt8] = 3
+
+    state: UInt8 = 0
+
+
+class GetSimulationStateRequest(Message):
+    pass
+
+
+class GetSimulationStateReply(Message):
+    state: SimulationState = field(default_factory=SimulationState)
+    result: Result = field(default_factory=Result)
+
+
+class SetSimulationStateRequest(Message):
+    state: SimulationState = field(default_factory=SimulationState)
+
+
+class SetSimulationStateReply(Message):
+    """The result is `ALREADY_IN_TARGET_STATE` if there was nothing to do; that is no error."""
+
+    ALREADY_IN_TARGET_STATE: ClassVar[UInt8] = 101
+    STATE_TRANSITION_ERROR: ClassVar[UInt8] = 102
+    INCORRECT_TRANSITION: ClassVar[UInt8] = 103
+
+    result: Result = field(default_factory=Result)
+
+
+class StepSimulationRequest(Message):
+    """`steps` of a sim that is paused; the reply comes after the last of them."""
+
+    steps: UInt64 = 1
+
+
+class StepSimulationReply(Message):
+    result: Result = field(default_factory=Result)
+
+
+class ResetSimulationRequest(Message):
+    """`scope` is a sum of scopes: the time to zero, every entity to where it was added, no entities that were spawned.
+    With all of them, entities of the start that were deleted come back. The default is all.
+    """
+
+    SCOPE_DEFAULT: ClassVar[UInt8] = 0
+    SCOPE_TIME: ClassVar[UInt8] = 1
+    SCOPE_STATE: ClassVar[UInt8] = 2
+    SCOPE_SPAWNED: ClassVar[UInt8] = 4
+    SCOPE_ALL: ClassVar[UInt8] = 255
+
+    scope: UInt8 = 0
+
+
+class ResetSimulationReply(Message):
     result: Result = field(default_factory=Result)

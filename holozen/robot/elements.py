@@ -130,13 +130,19 @@ class Tag:
             raise RobotError(f"{self.place}: {where}: {cut(text)} has {len(values)} numbers instead of {count}")
         return tuple(values)
 
+    def _naming(self) -> str:
+        """The attribute that distinguishes the element from others of its kind."""
+        if "name" in self.attributes:
+            return "name"
+        return "reference" if self.name == "gazebo" and self.attributes.get("reference", "").strip() else ""
+
     def __str__(self) -> str:
         owner: Tag | None = self
-        while owner is not None and "name" not in owner.attributes:
+        while owner is not None and not (word := owner._naming()):
             owner = owner.parent
         if owner is None:
             return f"<{self.name[:80]}>"
-        named = f"<{owner.name[:80]} name={cut(owner.attributes['name'])}>"
+        named = f"<{owner.name[:80]} {word}={cut(owner.attributes[word])}>"
         return named if owner is self else f"<{self.name[:80]}> of {named}"
 
 
@@ -158,12 +164,12 @@ def read_xml(text: str, place: str, most: int = MOST_TEXT) -> Tag:
     """
     check_size(len(text), place, most)
     if not text.strip():
-        raise RobotError(f"{place}: the file is empty; it must contain a <robot>")
+        raise RobotError(f"{place}: the file is empty; a robot is a <robot> or an <sdf>, a world an <sdf>")
     reader = _Reader(place)
     try:
         reader.parser.Parse(text.encode("utf-8", "replace"), True)
     except expat.ExpatError as error:
-        raise reader.broken(error) from None
+        raise reader.broken(error, text) from None
     return reader.root.children[0]
 
 
@@ -283,9 +289,44 @@ class _Reader:
         line = self.parser.CurrentLineNumber
         raise RobotError(f"{self.place}, line {line}: the entity {cut(name)} is declared; write out its text instead")
 
-    def broken(self, error: expat.ExpatError) -> RobotError:
+    def broken(self, error: expat.ExpatError, text: str) -> RobotError:
         unclosed = f"; {self.open} of {self.open.place} is still open" if self.open.name else ""
-        return RobotError(f"{self.place}, line {error.lineno}: broken XML: {expat.ErrorString(error.code)}{unclosed}")
+        return RobotError(f"{self.place}, line {error.lineno}: {broken_xml(error, text, unclosed)}")
+
+
+_CASES = (
+    (re.compile("[\u2018-\u201f]"), "replace the curly quotes with straight ones"),
+    (re.compile(r"&(?!#?\w+;)"), "write & as &amp;"),
+    (re.compile(r"<!--(?:(?!-->).)*--(?!>)"), "a comment must not contain -- before its end"),
+    (re.compile(r"""\s[\w:.-]+\s*=\s*(?!["'\s])"""), 'put the value in quotes: name="value"'),
+    (re.compile(r"""<[\w:.-]+(?:\s+[\w:.-]+\s*=\s*(?:"[^"]*"|'[^']*'))*\s+([\w:.-]+)(?=\s+[\w:.-]+\s*=|\s*/?>)"""),
+     'the word {0} has no value: write {0}="...", or join it to its neighbour'),
+    (re.compile(r"""=\s*(?:"[^"]*|'[^']*)$"""), "close the quotes"),
+    (re.compile(r"""(?:"[^"]*"|'[^']*')[\w:.-]+\s*="""), "put a space between two attributes"),
+    (re.compile(r"<\s+\w|<\d"), "no space and no digit may follow <"),
+)  # fmt: skip
+
+
+def broken_xml(error: expat.ExpatError, text: str, context: str = "") -> str:
+    """The reason why a text is no XML, and after the last semicolon how to correct it: by the reason, or by the
+    reported line and the one before.
+    """
+    reason, lines = expat.ErrorString(error.code), text.splitlines()[max(0, error.lineno - 2) : error.lineno]
+    return f"broken XML: {reason}{context}; {_advice(reason, lines)}"
+
+
+def _advice(reason: str, lines: list[str]) -> str:
+    if "mismatched" in reason or "no element found" in reason:
+        return "close each element, inner ones first: </name>, or /> at the end of its tag"
+    if "declaration not at start" in reason:
+        return "nothing, not even a space, may come before <?xml"
+    if "junk after" in reason:
+        return "a file has a single <robot> or <sdf> around everything: remove what follows its end"
+    for line in reversed(lines):
+        for pattern, advice in _CASES:
+            if match := pattern.search(line):
+                return advice.format(*match.groups())
+    return 'write each element as <name attribute="value"> and close it'
 
 
 MOST_WARNINGS = 200

@@ -1,4 +1,4 @@
-"""Gazebo plugins and sensors: the drive of a robot, and what is parsed but not simulated.
+"""Gazebo plugins: the drive of a robot, and what is parsed but not simulated.
 
 A plugin is identified by its file name, or for gz-sim by its class.
 """
@@ -17,11 +17,14 @@ from holozen.robot.model import (
     Balancing,
     Differential,
     Drive,
+    Force,
     Joint,
     Link,
     Mecanum,
     Mechanism,
+    Omni,
     Planar,
+    Pushed,
     RobotModel,
     Shape,
     sides_of,
@@ -137,8 +140,19 @@ class Settings:
         key = re.sub("/+", "/", key).strip("/")
         if not _KEY.fullmatch(key):
             problem = f"makes the topic {cut(key)}; a topic has letters, digits, '_', '-' and single '/'"
-            raise self.tag(*names).wrong(problem)
+            raise (self.tag(*names) if names else self.owner).wrong(problem)
         return key
+
+    def topic_within(self, folder: str, default: str, *names: str) -> str:
+        """As `topic`, below `folder` unless it is remapped or starts with a slash."""
+        word = self.word(*names)
+        if not folder or word.startswith("/") or self.is_remapped(word or default):
+            return self.topic(default, *names)
+        return self.topic(f"{folder}/{word or default}")
+
+    def is_remapped(self, topic: str) -> bool:
+        """Whether ROS 2's `<remapping>` gives it another name."""
+        return topic in dict(self._remappings())
 
     def _found(self, names: tuple[str, ...]) -> Tag | None:
         return next((self._tags[name] for name in names if name in self._tags and self._tags[name].value()), None)
@@ -252,7 +266,7 @@ def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
     neither given nor measurable.
     """
     wheels = drive.mechanism
-    if isinstance(wheels, Planar):
+    if isinstance(wheels, Planar | Omni | Pushed):
         return drive
     left, right = sides_of(wheels)
     _check_once(left, right, plugin)
@@ -349,6 +363,14 @@ def planar_move(settings: Settings, joints: Joints, source: Source) -> Drive:
     return _ros_drive(settings, Planar(), rate, plain.covariance)
 
 
+def omni_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
+    """Ours: the robot's own wheels, with free rollers on their rims. Its tags are those of planar_move, and
+    odometry_source.
+    """
+    rate = settings.number(Drive().odometry_rate, "odometry_rate", "publish_rate", zero=False)
+    return _ros_drive(settings, Omni(_encoder(settings)), rate, Drive().covariance)
+
+
 def diff_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
     """gazebo_ros_diff_drive.cpp: one pair of wheels, possibly several in ROS 2."""
     left = wheel_joints(settings, joints, source, "left_joint", "left_joint")
@@ -391,7 +413,7 @@ def balancing(settings: Settings, joints: Joints, source: Source) -> Drive:
 
 def _ros_drive(
     settings: Settings,
-    mechanism: Planar | Differential | Balancing,
+    mechanism: Planar | Differential | Omni | Balancing,
     rate: float,
     variances: tuple[float, float, float],
 ) -> Drive:
@@ -408,8 +430,21 @@ def _ros_drive(
         publish_odom=publish,
         publish_odom_tf=settings.flag("publish_odom_tf", "publish_odometry_tf", "broadcast_transform", "broadcast_tf"),
         covariance=(x, y, yaw),
+        odometry_from_start=_from_start(settings),
+        odometry_noise=settings.number(0.0, "gaussian_noise"),
         mechanism=mechanism,
+        max_linear=settings.number(math.inf, "max_linear_velocity", zero=False),
+        max_angular=settings.number(math.inf, "max_angular_velocity", zero=False),
+        max_linear_acceleration=settings.number(math.inf, "max_linear_acceleration", zero=False),
+        max_angular_acceleration=settings.number(math.inf, "max_angular_acceleration", zero=False),
     )
+
+
+def _from_start(settings: Settings) -> bool:
+    word = settings.word("odometry_origin") or "world"
+    if word not in ("world", "start"):
+        raise settings.tag("odometry_origin").wrong(f"is {cut(word)}; it must be world or start")
+    return word == "start"
 
 
 def _differential(settings: Settings, left: tuple[str, ...], right: tuple[str, ...], encoder: bool) -> Differential:
@@ -505,6 +540,7 @@ def with_publisher(drive: Drive, settings: Settings, source: Source) -> Drive:
         odometry_topic=_gz_topic(settings, "odometry", "odom", "odom_topic"),
         odometry_frame=_frame(settings, "odom_frame") or "odom",
         odometry_rate=settings.number(RATE, "odom_publish_frequency", zero=False),
+        odometry_noise=settings.number(0.0, "gaussian_noise"),
         robot_base_frame=_frame(settings, "robot_base_frame") or drive.robot_base_frame,
         mechanism=wheels,
     )
@@ -560,7 +596,7 @@ def _limit(settings: Settings, what: str, source: Source) -> float:
     return sizes[0] if sizes else math.inf
 
 
-# Sensors, and plugins that sense without one. They are not simulated yet.
+# Plugins that sense; `sensors` reads them.
 
 
 SENSING = {
@@ -590,17 +626,47 @@ SENSING = {
 """Plugin -> the kind of sensor that it is outside a `<sensor>`."""
 
 
-def warn_sensors(robot: Tag, links: Mapping[str, object], source: Source) -> None:
-    """Warn about each `<sensor>` of a `<robot>`; `read_plugins` warns of the sensing plugins."""
-    for gazebo in robot.all("gazebo"):
-        link = gazebo.attributes.get("reference", "").strip()
-        for tag in gazebo.all("sensor") if not link or link in links else ():  # a reference to no link has its warning
-            warn_sensor(tag, source)
+# Forces. Tags and defaults are those of gazebo_ros_force.cpp in ros-simulation/gazebo_ros_pkgs, in ROS 1 (noetic) and
+# ROS 2 (galactic). One thing differs here: a force ends with the silence of its source.
 
 
-def warn_sensor(tag: Tag, source: Source) -> None:
-    """Warn about a `<sensor>` of URDF or SDF."""
-    source.warn(tag, f"({tag.attributes.get('type', '').strip()[:80] or 'unknown'}) is not simulated yet")
+FORCE = "gazebo_ros_force"
+FRAMES = {"world": False, "link": True}
+
+
+def read_forces(
+    robot: Tag, links: Mapping[str, Link], root: str, drive: Drive | None, source: Source
+) -> tuple[Drive | None, tuple[Force, ...]]:
+    """The drive of a `<robot>` or `<model>`, and its force plugins: without another drive they are its drive.
+
+    One that names no link, or pushes what a planar drive moves, causes a warning. Raises RobotError for a frame that is
+    neither world nor link.
+    """
+    plugins = [plugin for plugin in plugins_outside_sensors(robot) if kind_of(plugin) == FORCE]
+    forces = [force for plugin in plugins if (force := _force(plugin, links, source))]
+    if drive is None and forces:
+        namespace = forces[0].topic.rpartition("/")[0]
+        command, odometry = (f"{namespace}/{key}".strip("/") for key in ("cmd_vel", "odom"))
+        return Drive(command, odometry, odometry_rate=RATE, robot_base_frame=root, mechanism=Pushed()), tuple(forces)
+    if drive is not None and isinstance(drive.mechanism, Planar | Mecanum):
+        for plugin in plugins:
+            source.warn(plugin, "has no effect: its drive sets the velocity of the whole robot")
+        return drive, ()
+    return drive, tuple(forces)
+
+
+def _force(plugin: Tag, links: Mapping[str, Link], source: Source) -> Force | None:
+    settings = Settings(plugin)
+    tag = settings.tag("link_name", "body_name")
+    if tag.value() not in links:
+        near = source.suggest(tag.value(), links)
+        named = f"names the link {cut(tag.value())}, which does not exist{near}" if tag.value() else "is missing"
+        source.warn(tag, f"{named}; this force pushes nothing; links: {listed(list(links))}")
+        return None
+    frame = settings.word("force_frame") or "world"
+    if frame not in FRAMES:
+        raise settings.tag("force_frame").wrong(f"is {cut(frame)}; it must be world or link")
+    return Force(tag.value(), settings.topic(FORCE, "topic_name"), FRAMES[frame])
 
 
 # The plugins of a robot.
@@ -621,6 +687,7 @@ DRIVES: dict[str, Reader] = {
     "gz:mecanum-drive": mecanum_drive,
 }
 PUBLISHER = "gz:odometry-publisher"
+OMNI = "holozen_omni_drive"  # alone, or beside a planar_move, which drives a robot in Gazebo
 
 JOINTS = "joint_states is published anyway, and joints follow joint_command"
 STATES = "joint_states is published anyway"
@@ -644,14 +711,10 @@ INSTEAD = {
     "gz:physics": SERVER,
     "gz:user-commands": SERVER,
     "gz:scene-broadcaster": SERVER,
-    "gz:sensors": "sensors are not simulated yet",
-    "gz:imu": "sensors are not simulated yet",
-    "gz:contact": "sensors are not simulated yet",
     "roboticsgroup_gazebo_mimic_joint_plugin": "a URDF <mimic> does the same",
     "gazebo_ros_state": SERVER,
     "gazebo_ros_init": SERVER,
     "gazebo_ros_factory": SERVER,
-    "gazebo_ros_force": "nothing else applies a force",
     "gazebo_ros_tricycle_drive": WHOLE,
     "gazebo_ros_ackermann_drive": WHOLE,
     "gz:ackermann-steering": WHOLE,
@@ -664,10 +727,9 @@ INSTEAD = {
     "gazebo_ros_video": "images are not rendered",
 }
 """Plugin that drives nothing -> what replaces it."""
-KNOWN = (*DRIVES, *INSTEAD, *SENSING, PUBLISHER)
-MOVING_ELSEWHERE = frozenset(
-    {name for name, reason in INSTEAD.items() if reason in (JOINTS, WHOLE)} | {"gazebo_ros_force"}
-)
+OF_SENSORS = ("gz:sensors", "gz:imu", "gz:contact")  # without these gz-sim runs no sensor; here they all run
+KNOWN = (*DRIVES, *INSTEAD, *SENSING, *OF_SENSORS, PUBLISHER, FORCE, OMNI)
+MOVING_ELSEWHERE = frozenset(name for name, reason in INSTEAD.items() if reason in (JOINTS, WHOLE))
 """Plugins that move a robot in Gazebo, but not here."""
 
 
@@ -679,11 +741,15 @@ def read_plugins(
     `links` and `joints` are by name. Plugins inside a `<sensor>` belong to the sensor. Raises RobotError for a drive
     plugin that cannot work as written.
     """
-    drive, publishers = None, []
-    for plugin in _plugins(robot):
+    drive, publishers, wheels = None, [], None
+    for plugin in plugins_outside_sensors(robot):
         kind = kind_of(plugin)
         if kind == PUBLISHER:
             publishers.append(plugin)
+        elif kind == OMNI:
+            wheels = wheels or plugin
+        elif kind == FORCE:
+            continue  # of `read_forces`
         elif kind not in DRIVES:
             _warn_not_run(plugin, kind, source)
         elif drive is not None:
@@ -691,6 +757,11 @@ def read_plugins(
         else:
             found = DRIVES[kind](Settings(plugin), joints, source)
             drive, driver = measured(found, plugin, RobotModel("", root, links, joints, None)), plugin
+    if wheels:
+        if drive and not isinstance(drive.mechanism, Planar):
+            raise wheels.wrong(f"is a second drive, beside {cut(kind_of(driver))}; it goes with planar_move, or alone")
+        found = omni_drive(Settings(wheels), joints, source)
+        drive, driver = (replace(drive, mechanism=found.mechanism), driver) if drive else (found, wheels)
     if drive is None:
         for plugin in publishers:
             source.warn(plugin, "publishes the odometry of a drive, but there is no drive")
@@ -700,7 +771,7 @@ def read_plugins(
     return _with_known_frame(drive, driver, links, root, source)
 
 
-def _plugins(robot: Tag) -> Iterator[Tag]:
+def plugins_outside_sensors(robot: Tag) -> Iterator[Tag]:
     """Plugins outside sensors, at any depth below a `<gazebo>`, or directly below a `<model>`."""
     waiting = [tag for tag in reversed(robot.children) if tag.name in ("gazebo", "plugin")]
     while waiting:
@@ -714,9 +785,7 @@ def _plugins(robot: Tag) -> Iterator[Tag]:
 def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
     if kind in INSTEAD:
         source.warn(plugin, f"({_file(plugin)}) is not supported; {INSTEAD[kind]}")
-    elif kind in SENSING:
-        source.warn(plugin, f"({SENSING[kind]}) is not simulated yet")
-    else:
+    elif kind not in (*SENSING, *OF_SENSORS):
         near = source.suggest(kind, KNOWN, _own_name, alike=0.8) if kind else ""
         source.warn(plugin, f"({_file(plugin) or 'no filename'}) is unknown and is ignored{near}")
 
@@ -734,5 +803,6 @@ def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, Link], root
     if frame in links:
         return drive
     if frame:
-        source.warn(plugin, f"names the base frame {cut(frame)}, which is not a link; {cut(root)} is used")
+        tag = next((tag for tag in plugin.children if tag.value().strip("/") == frame), plugin)
+        source.warn(tag, f"names the base frame {cut(frame)}, which is not a link; {cut(root)} is used")
     return replace(drive, robot_base_frame=root)

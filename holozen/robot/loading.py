@@ -2,17 +2,18 @@
 
 import re
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 from pathlib import Path
 from xml.parsers import expat
 
 from holozen.robot.elements import Source, read_xml, repair_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.meshes import data_uri
+from holozen.robot.meshes import data_uri, file_uri
 from holozen.robot.model import RobotModel
 from holozen.robot.packages import is_data, resolve_uri
 from holozen.robot.sdf_models import parse_sdf
 from holozen.robot.urdf import read_robot
-from holozen.robot.xacro import expand, is_xacro, read_text
+from holozen.robot.xacro import expand, expanded, is_xacro, read_text
 from holozen.suggest import cut
 
 
@@ -26,11 +27,13 @@ def load(
     """The robot in a xacro, URDF or SDF file. `args`, `packages` and `allow_env` as for `xacro.expand`. Raises
     RobotError; with `strict` also for a missing or invalid mesh, otherwise replaced by a box with a warning.
     """
-    text, place = read_text(path), ""
-    if is_xacro(path, text):
-        # Line numbers are those of the expanded text, so messages have to mention it.
-        text, place = expand(path, args, packages, allow_env), f"{path} (as `holozen xacro` prints it)"
-    return parse(text, path, packages, place, strict)
+    text = read_text(path)
+    if not is_xacro(path, text):
+        return parse(text, path, packages, "", strict)
+    outcome = expanded(path, args, packages, allow_env)
+    # Line numbers are those of the expanded text, so messages have to mention it.
+    model = parse(outcome.text, path, packages, f"{path} (as `holozen xacro` prints it)", strict)
+    return replace(model, warnings=outcome.warnings + model.warnings)
 
 
 def parse(
@@ -54,7 +57,8 @@ def parse(
     return read_robot(tag, source)
 
 
-COLLISION = ["collision", "geometry", "mesh"]
+MESHES = {"collision": ["collision", "geometry", "mesh"], "visual": ["visual", "geometry", "mesh"]}
+MOST_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accepts MOST_TEXT in all
 
 _FILENAME = re.compile(rb"""\sfilename\s*=\s*("[^"]*"|'[^']*')""")
 
@@ -62,8 +66,9 @@ _FILENAME = re.compile(rb"""\sfilename\s*=\s*("[^"]*"|'[^']*')""")
 def portable(
     path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
 ) -> tuple[str, tuple[str, ...]]:
-    """The text of a xacro, URDF or SDF file, expanded, with the URI of every collision mesh replaced by its hull; and
-    warnings for meshes that are left unchanged. The rest of the text is unchanged.
+    """The text of a xacro, URDF or SDF file, expanded, with the URI of every collision mesh replaced by its hull, and
+    of every visual one by the file itself, up to MOST_SHOWN; and warnings for meshes that are left unchanged. The rest
+    of the text is unchanged.
 
     `args`, `packages` and `allow_env` are those of `xacro.expand`. Raises RobotError for a file that
     cannot be read or is not XML.
@@ -72,22 +77,26 @@ def portable(
     read_xml(text, str(path))  # reports broken XML with its line, and rejects entities
     data = text.encode()
     warnings: list[str] = []
-    for start, end, uri in reversed(_Meshes(data).found):  # backwards, so that earlier positions stay valid
+    room = MOST_SHOWN
+    for use, start, end, uri in reversed(_Meshes(data).found):  # backwards, so that earlier positions stay valid
         try:
-            hull = data_uri(resolve_uri(uri, path, packages))
+            file = resolve_uri(uri, path, packages)
+            sent = data_uri(file) if use == "collision" else file_uri(file)
+            if use == "visual" and (room := room - len(sent)) < 0:
+                raise RobotError(f"the visual meshes take more than {MOST_SHOWN / 1e6:g} MB compressed; simplify them")
         except RobotError as error:
-            warnings.append(f"{path}: the collision mesh {cut(uri)} is not sent: {error}")
+            warnings.append(f"{path}: the {use} mesh {cut(uri)} is not sent: {error}")
         else:
-            data = data[:start] + hull.encode() + data[end:]
+            data = data[:start] + sent.encode() + data[end:]
     return data.decode(), tuple(reversed(warnings))
 
 
 class _Meshes:
-    """The URIs of collision meshes in a text: first byte, end byte, and the URI."""
+    """The URIs of meshes in a text: their use (collision or visual), first byte, end byte, and the URI."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
-        self.found: list[tuple[int, int, str]] = []
+        self.found: list[tuple[str, int, int, str]] = []
         self._open: list[str] = []
         self._text, self._inside = "", 0
         self._parser = expat.ParserCreate("utf-8")
@@ -101,19 +110,22 @@ class _Meshes:
         self._text = ""
         at = self._parser.CurrentByteIndex
         self._inside = self.data.index(b">", at) + 1
-        if self._open[-3:] == COLLISION and "filename" in attributes:
+        if (use := self._use(self._open)) and "filename" in attributes:
             match = _FILENAME.search(self.data, at)
             assert match is not None, "expat found the attribute"
-            self._note(match.start(1) + 1, match.end(1) - 1, attributes["filename"])
+            self._note(use, match.start(1) + 1, match.end(1) - 1, attributes["filename"])
 
     def _characters(self, text: str) -> None:
         self._text += text
 
     def _end(self, name: str) -> None:
-        if self._open[-4:] == [*COLLISION, "uri"]:
-            self._note(self._inside, self._parser.CurrentByteIndex, self._text)
+        if self._open[-1] == "uri" and (use := self._use(self._open[:-1])):
+            self._note(use, self._inside, self._parser.CurrentByteIndex, self._text)
         self._open.pop()
 
-    def _note(self, start: int, end: int, uri: str) -> None:
+    def _use(self, names: list[str]) -> str:
+        return next((use for use, ends in MESHES.items() if names[-3:] == ends), "")
+
+    def _note(self, use: str, start: int, end: int, uri: str) -> None:
         if uri.strip() and not is_data(uri):
-            self.found.append((start, end, uri.strip()))
+            self.found.append((use, start, end, uri.strip()))

@@ -2,11 +2,13 @@
 
 import base64
 import binascii
+import gzip
 import io
 import os
 import re
 import stat
 import warnings
+import zlib
 from array import array
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -420,6 +422,10 @@ READERS: dict[str, tuple[Reader, int]] = {
 }
 """File name extension -> its reader, and the maximum size in bytes: what a slow machine reads in 10 s."""
 
+MOST_SHOWN = 20_000_000  # bytes of a visual mesh that is sent
+KINDS = {".dae": "vnd.collada+xml", ".obj": "obj", ".stl": "stl"}  # file name extension -> media type below model/
+
+_FILE = re.compile(r"data:model/(vnd\.collada\+xml|obj|stl)\+gzip;base64,")
 _DATA = re.compile(r"data:(model|application)/[a-z.+-]*stl[a-z.+-]*;base64,", re.IGNORECASE)
 
 
@@ -455,6 +461,38 @@ def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
     except (binascii.Error, ValueError):
         raise RobotError(f"{cut(uri)} is not valid base64") from None
     return _solid(_farthest(read_stl(io.BytesIO(data), len(data), "data: URI"), "data: URI"), scale, "data: URI")
+
+
+def file_uri(path: Path) -> str:
+    """The whole file of a mesh as text, compressed, in place of its name: what a viewer shows. Raises RobotError."""
+    return _packed(*_identity(path))
+
+
+def file_in(uri: str) -> tuple[str, bytes]:
+    """The file name extension and the content of what `file_uri` made. Raises RobotError."""
+    head = _FILE.match(uri.lstrip())
+    if head is None:
+        raise RobotError(f"{cut(uri)} holds no mesh; write data:model/stl+gzip;base64,...")
+    try:
+        unpacker = zlib.decompressobj(wbits=31)  # of gzip
+        content = unpacker.decompress(base64.b64decode(uri.lstrip()[head.end() :], validate=True), MOST_SHOWN)
+    except (binascii.Error, ValueError, zlib.error) as error:
+        raise RobotError(f"{cut(uri)} is not valid: {error}") from None
+    if unpacker.unconsumed_tail:
+        raise RobotError(f"{cut(uri)} holds more than {MOST_SHOWN / 1e6:.0f} MB")
+    return next(suffix for suffix, kind in KINDS.items() if kind == head[1]), content
+
+
+@lru_cache(maxsize=64)
+def _packed(path: str, _mtime: int, size: int) -> str:
+    kind = KINDS.get(os.path.splitext(path)[1].lower())
+    if kind is None or not 0 < size <= MOST_SHOWN:
+        raise RobotError(f"{path}: a mesh to show is a {', '.join(KINDS)} file of up to {MOST_SHOWN / 1e6:.0f} MB")
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise RobotError(f"{path}: {error.strerror}") from None
+    return f"data:model/{kind}+gzip;base64,{base64.b64encode(gzip.compress(content, mtime=0)).decode()}"
 
 
 def _identity(path: Path) -> tuple[str, int, int]:

@@ -39,8 +39,9 @@ class Shape:
     """A visual or collision shape; `pose` is its frame in the link's.
 
     `size` in metres by `kind`: "box" x, y, z; "cylinder" radius, length (along z); "sphere" radius; "plane" x, y (its
-    normal is z); "mesh" the three scale factors; "hull" nothing. `path` is a mesh's file, None if it was not found.
-    `points` in metres define a "hull" as their convex hull.
+    normal is z); "mesh" the three scale factors; "hull" nothing. `path` is a mesh's file, None if it was not found;
+    `data` is the file itself as a data: URI, if the text held it. `points` in metres define a "hull" as their convex
+    hull.
     """
 
     kind: str
@@ -49,6 +50,7 @@ class Shape:
     path: Path | None = None
     color: Color | None = None
     points: tuple[Vector, ...] = ()
+    data: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +120,23 @@ JOINT_KINDS = ("continuous", "revolute", "prismatic", "fixed", "floating", "plan
 
 
 @dataclass(frozen=True, slots=True)
+class Force:
+    """Messages on `topic` push a link, at its centre of mass; along the link's axes if `in_link`, else the world's.
+
+    The topic includes its namespace and has no leading slash.
+    """
+
+    link: str
+    topic: str
+    in_link: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Pushed:
+    """Only the forces of the model move it; cmd_vel does not."""
+
+
+@dataclass(frozen=True, slots=True)
 class Planar:
     """The whole robot moves over the plane at the commanded body-frame velocity: planar_move, VelocityControl."""
 
@@ -168,6 +187,15 @@ class Mecanum:
 
 
 @dataclass(frozen=True, slots=True)
+class Omni:
+    """Wheels with free rollers on their rims, three or more: it moves any way. They are the continuous joints with a
+    level axle and a round collision shape. `encoder` as for Differential.
+    """
+
+    encoder: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Balancing:
     """Two wheels that balance the body while it drives: wheely_boi."""
 
@@ -175,13 +203,13 @@ class Balancing:
     right: str = "jointR"
 
 
-Mechanism = Planar | Differential | Mecanum | Balancing
+Mechanism = Planar | Differential | Mecanum | Omni | Balancing | Pushed
 
 
 def sides_of(mechanism: Mechanism) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """The joints that a mechanism turns, on the left and on the right."""
     match mechanism:
-        case Planar():
+        case Planar() | Omni() | Pushed():
             return (), ()
         case Balancing():
             return (mechanism.left,), (mechanism.right,)
@@ -195,7 +223,9 @@ class Drive:
     All defaults except the timeout are those of Gazebo's planar_move.
     Topics include their namespace and have no leading slash. `odometry_rate` in Hz of sim time.
     `robot_base_frame` names a link, the child frame of odometry. `command_timeout` in seconds; -1 disables
-    it. `covariance` is the variance of x and y in m^2 and of yaw in rad^2. The limits are those of the file, in m/s,
+    it. `covariance` is the variance of x and y in m^2 and of yaw in rad^2. Odometry is the pose in the world, or
+    `odometry_from_start` that since the start; `odometry_noise` is the standard deviation of what is added to its x, y
+    and yaw and to their rates, in m, rad, m/s and rad/s. The limits are those of the file, in m/s,
     rad/s, m/s^2 and rad/s^2.
     """
 
@@ -208,6 +238,8 @@ class Drive:
     publish_odom: bool = True
     publish_odom_tf: bool = True
     covariance: tuple[float, float, float] = (1e-5, 1e-5, 1e-3)
+    odometry_from_start: bool = False
+    odometry_noise: float = 0.0
     mechanism: Mechanism = Planar()
     max_linear: float = math.inf
     max_angular: float = math.inf
@@ -215,13 +247,108 @@ class Drive:
     max_angular_acceleration: float = math.inf
 
 
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Gaussian noise, in the unit of what it is added to."""
+
+    mean: float = 0.0
+    stddev: float = 0.0
+
+
+NO_NOISE = Noise()
+
+
+@dataclass(frozen=True, slots=True)
+class Fan:
+    """`count` angles in rad, evenly from `first` to `last`."""
+
+    first: float = 0.0
+    last: float = 0.0
+    count: int = 1
+
+    @property
+    def step(self) -> float:
+        """From one to the next."""
+        return (self.last - self.first) / (self.count - 1) if self.count > 1 else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Lidar:
+    """Rays from `near` to `far` metres, at angles to the left of x and upwards. `noise` is added to the ranges.
+    `message` is "scan", "points", or "range" for the nearest of all, which is `infrared` or ultrasound.
+    """
+
+    horizontal: Fan
+    vertical: Fan
+    near: float
+    far: float
+    noise: Noise = NO_NOISE
+    message: str = "scan"
+    infrared: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """Noise of x, y, z of the rotation rate (rad/s) and of the acceleration (m/s^2). `oriented`: whether it measures
+    its orientation too.
+    """
+
+    rate: tuple[Noise, Noise, Noise] = (NO_NOISE,) * 3
+    acceleration: tuple[Noise, Noise, Noise] = (NO_NOISE,) * 3
+    oriented: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """A pinhole camera that looks along x, y to the left of its picture; `width` and `height` in pixels,
+    `field_of_view` across the width in rad, `near` and `far` in m. `encoding` is "rgb8" or "mono8"; `noise` is that of
+    a pixel from 0 to 1. Pictures, their CameraInfo and depth are published on the keys `image`, `info` and `depth`;
+    empty: not.
+    """
+
+    width: int
+    height: int
+    field_of_view: float
+    near: float
+    far: float
+    image: str
+    info: str
+    depth: str = ""
+    encoding: str = "rgb8"
+    noise: Noise = NO_NOISE
+
+
+@dataclass(frozen=True, slots=True)
+class Sensor:
+    """A sensor at `pose` on `link`. What it measures is published on `topic`, with a namespace and without a leading
+    slash, at `rate` in Hz of sim time, in `frame`: a link, or a frame of its own at `mount` on its link.
+    """
+
+    name: str
+    link: str
+    pose: Pose
+    frame: str
+    mount: Pose | None
+    topic: str
+    rate: float
+    device: Lidar | Imu | Camera
+
+    @property
+    def topics(self) -> tuple[str, ...]:
+        """All its keys."""
+        camera = self.device
+        keys = (camera.image, camera.info, camera.depth) if isinstance(camera, Camera) else ()
+        return (self.topic, *(key for key in keys if key and key != self.topic))
+
+
 HERE = Pose()
 MOST_PARTS = 1000  # links, and joints; far beyond what an engine simulates in real time
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class RobotModel:
-    """A tree of links from `root`, in file order.
+    """A tree of links from `root`, in file order. Two are equal only if they are one object, by which what is computed
+    for a model is kept for its copies in a fleet.
 
     `drive` is None for a robot without a plugin that drives it. Each of `warnings` is a line that names file, line,
     element and what was done instead. A `static` one never moves. `pose` is the one given by the file itself (SDF).
@@ -235,11 +362,21 @@ class RobotModel:
     warnings: tuple[str, ...] = ()
     static: bool = False
     pose: Pose = HERE
+    forces: tuple[Force, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
 
 
-def planar_drive(model: RobotModel) -> RobotModel:
-    """The model with planar_move on its root, for `--drive planar_move`; a model that has a drive keeps it."""
-    return model if model.drive else replace(model, drive=Drive(robot_base_frame=model.root))
+def takes(model: RobotModel, drive: str) -> bool:
+    """Whether a `--drive` is for this model: it has none, or omni wheels shall do what its planar_move does."""
+    return model.drive is None or (drive == "omni" and isinstance(model.drive.mechanism, Planar))
+
+
+def driven(model: RobotModel, drive: str) -> RobotModel:
+    """The model with the `--drive` planar_move or omni on its root; one that has another drive keeps it."""
+    if not takes(model, drive):
+        return model
+    mechanism = Omni() if drive == "omni" else Planar()
+    return replace(model, drive=replace(model.drive or Drive(robot_base_frame=model.root), mechanism=mechanism))
 
 
 STEP = 1 / 240  # s

@@ -5,6 +5,7 @@ import re
 import stat
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from functools import cache
 from itertools import islice, takewhile
 from pathlib import Path
 from urllib.parse import unquote
@@ -177,6 +178,12 @@ def _unknown(name: str, start: Path, given: Mapping[str, Path]) -> str:
     )
 
 
+def remember_folders() -> None:
+    """Look at each folder once from now on, for a process that later may not."""
+    global _children, _name_in_package_xml
+    _children, _name_in_package_xml = cache(_children), cache(_name_in_package_xml)
+
+
 # Mesh URIs -> files.
 
 
@@ -216,10 +223,10 @@ def resolve_uri(
     places = list(dict.fromkeys(_places(scheme, rest, start, given)))
     found = next((place for place in places if os.path.isfile(place)), None)
     if found is None and not scheme and _ABSOLUTE.match(rest):
-        found = find_by_name(unquote(rest), start, given)
-        if found is not None:
-            write = portable_name(found, start, given)
-            warn(f"there is no file {cut(uri, 200)}; {found}, which has the same name, is used; write {write}")
+        matches = find_by_name(unquote(rest), start, given)
+        if matches:
+            found = matches[0]
+            warn(instead_of(uri, matches, "used", portable_name(found, start, given, "package://{}")))
     if found is None:
         looked = " and ".join(cut(str(place), 300)[1:-1] for place in places)
         raise RobotError(f"no such file {cut(uri, 200)}; looked for {looked}")
@@ -298,18 +305,31 @@ def _own_folders(start: Path) -> list[Path]:
     return list(dict.fromkeys((folder, nearest_robot_folder(start) or folder)))
 
 
-def find_by_name(lost: str, start: Path, given: Mapping[str, Path] = {}) -> Path | None:
-    """A file with the name of `lost`, a path on another machine, in the packages given, in those around the robot file
-    `start`, or in its folder: the one that shares most trailing parts of the path. None if there is none.
+def find_by_name(lost: str, start: Path, given: Mapping[str, Path] = {}) -> list[Path]:
+    """The files with the name of `lost`, a path on another machine, in the packages given, in those around the robot
+    file `start`, or in its folder: first the one that shares most trailing parts of the path.
     """
     parts = re.split(r"[/\\]+", lost)
     roots = dict.fromkeys((*given.values(), *_own_folders(start), *local_packages(start).values()))
-    matches = [path for root in roots for path in _files_called(parts[-1], root)]
-    return max(matches, key=lambda path: _shared_end(path, parts), default=None)
+    matches = dict.fromkeys(Path(os.path.abspath(path)) for root in roots for path in _files_called(parts[-1], root))
+    return sorted(matches, key=lambda path: -_shared_end(path, parts))
 
 
-def portable_name(file: Path, start: Path, given: Mapping[str, Path] = {}) -> str:
-    """A portable replacement for a file's absolute path: `$(find NAME)/...`, or a path relative to `start`."""
+def instead_of(lost: str, matches: list[Path], how: str, write: str) -> str:
+    """A warning that the first of these files is used (`how`) instead of `lost`, what to write, and which others have
+    that name.
+    """
+    found, *others = matches
+    more = [f"{len(others) - 3} more"] if len(others) > 3 else []
+    also = f"; others of that name: {', '.join([*map(str, others[:3]), *more])}" if others else ""
+    return f"there is no file {cut(lost, 200)}; {found}, which has the same name, is {how}; write {write}{also}"
+
+
+def portable_name(file: Path, start: Path, given: Mapping[str, Path] = {}, package: str = "$(find {})") -> str:
+    """A portable replacement for a file's absolute path: `$(find NAME)/...`, or a path relative to `start`.
+
+    `package` is how a package's folder is written.
+    """
     packages = {name: os.path.abspath(folder) for name, folder in (local_packages(start) | dict(given)).items()}
     own = nearest_robot_folder(start)
     if own and str(own) not in packages.values():
@@ -318,7 +338,7 @@ def portable_name(file: Path, start: Path, given: Mapping[str, Path] = {}) -> st
     if not holding:
         return os.path.relpath(file, os.path.dirname(os.path.abspath(start)))
     name = max(holding, key=lambda name: len(packages[name]))
-    return f"$(find {name})/{os.path.relpath(file, packages[name])}"
+    return f"{package.format(name)}/{os.path.relpath(file, packages[name])}"
 
 
 def _files_called(name: str, root: Path) -> Iterator[Path]:

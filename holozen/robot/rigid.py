@@ -3,20 +3,37 @@
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from holozen.robot.elements import Vector
 from holozen.robot.errors import RobotError
 from holozen.robot.inertia import is_absurd, moments
-from holozen.robot.model import HERE, Inertial, Joint, Link, Pose, RobotModel, Shape, Surface, descend
+from holozen.robot.model import (
+    HERE,
+    Inertial,
+    Joint,
+    Link,
+    Mecanum,
+    Planar,
+    Pose,
+    RobotModel,
+    Shape,
+    Surface,
+    descend,
+)
 from holozen.robot.rotation import Array, matrix_of, principal, quaternion_of, rpy_of, symmetric, triple
 from holozen.robot.shapes import solid
-from holozen.rotation import XYZW, conjugate, rotate
+from holozen.rotation import XYZ, XYZW, conjugate, from_axis_angle, multiply, rotate
 from holozen.suggest import cut
 
 SMALLEST_MASS = 1e-6  # kg; an engine divides by the mass
 SMALLEST_GYRATION = 1e-3  # m; and by the moments of inertia, of which a point mass would have none
+MAX_JOINTS = 120  # of a robot with what is in its root; pybullet silently stops at 127
+MAX_SHAPES = 500  # of one entity: each that touches the ground costs the engine 50 us at every step
+FALLS = "has no collision shape and falls through the ground"
+FLEETS = 8  # models of which all copies share what was computed once
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -107,7 +124,8 @@ def link_frames(model: RobotModel) -> dict[str, Frame]:
     return frames
 
 
-def joint_axes(model: RobotModel) -> dict[str, Axis]:
+@lru_cache(FLEETS)
+def joint_axes(model: RobotModel) -> Mapping[str, Axis]:
     """Joint name -> its axis in the root frame, for the joints that turn or slide."""
     frames = link_frames(model)
     moving = [joint for joint in model.joints.values() if joint.kind in ("continuous", "revolute", "prismatic")]
@@ -117,6 +135,7 @@ def joint_axes(model: RobotModel) -> dict[str, Axis]:
     }
 
 
+@lru_cache(FLEETS)
 def lump(model: RobotModel) -> Body:
     """All links as one body, as Gazebo lumps links over fixed joints.
 
@@ -195,17 +214,73 @@ class Part:
 def assemble(model: RobotModel) -> list[Part]:
     """The parts, every parent before its children, the root's first. A joint that moves no mass is treated as fixed."""
     above = {joint.child: joint for joint in model.joints.values()}
+    tops, within = _grouped(model, above)
+    order = list(within)
+    return [_part(model, top, within, tops, order, above) for top in order]
+
+
+def in_parts(model: RobotModel) -> dict[str, tuple[int, Frame]]:
+    """Link name -> the index of its part among those of `assemble`, and its frame in that part's."""
+    _, within = _grouped(model, {joint.child: joint for joint in model.joints.values()})
+    return {link: (index, frame) for index, links in enumerate(within.values()) for link, frame in links.items()}
+
+
+def _grouped(model: RobotModel, above: dict[str, Joint]) -> tuple[dict[str, str], dict[str, dict[str, Frame]]]:
+    """The topmost link of each link's part, and for each of those the frames of its part's links."""
     moving = _moving(model, above)
-    tops: dict[str, str] = {}  # link -> the topmost link of its part
-    within: dict[str, dict[str, Frame]] = {}  # topmost link -> the frames of its part's links
+    tops: dict[str, str] = {}
+    within: dict[str, dict[str, Frame]] = {}
     for name in descend(model.root, model.joints):
         if name == model.root or name in moving:
             tops[name], within[name] = name, {name: Frame.of(HERE)}
         else:
             top = tops[name] = tops[above[name].parent]
             within[top][name] = within[top][above[name].parent] @ Frame.of(above[name].pose)
-    order = list(within)
-    return [_part(model, top, within, tops, order, above) for top in order]
+    return tops, within
+
+
+def moved_by(joint: Joint, at: XYZ, rotation: XYZW, position: float) -> tuple[XYZ, XYZW]:
+    """Where a joint's child is in its parent (m, and a rotation), from where it is at zero, at a `position`: rad, or m
+    of a prismatic joint.
+    """
+    if joint.kind == "prismatic":
+        (x, y, z), (dx, dy, dz) = at, rotate(rotation, joint.axis)
+        return (x + position * dx, y + position * dy, z + position * dz), rotation
+    return at, multiply(rotation, from_axis_angle(joint.axis, position))
+
+
+def simulated_parts(model: RobotModel) -> list[Part]:
+    """The parts of a robot that an engine can simulate. Raises RobotError for no mass, or too many joints."""
+    parts = assemble(model)
+    if parts[0].body.mass < SMALLEST_MASS and not model.static:
+        solid = next((link.name for link in model.links.values() if link.collisions), parts[0].link)
+        problem = f"{cut(model.name)} has no mass: neither {parts[0].link!r} nor what is fixed to it has any"
+        raise RobotError(f"{problem}; give {solid!r} an <inertial>")
+    if len(parts) > MAX_JOINTS:
+        problem = f"{cut(model.name)} has {len(parts) - 1} moving joints"
+        raise RobotError(f"{problem}; at most {MAX_JOINTS - 1} are simulated")
+    return parts
+
+
+def check_simulated(model: RobotModel) -> None:
+    """Raise RobotError for a robot that an engine cannot simulate: without mass, or with too many parts."""
+    check_shapes(model)
+    if model.drive and not model.static and isinstance(model.drive.mechanism, Planar | Mecanum):
+        lump(model)
+    else:
+        simulated_parts(model)
+
+
+def check_shapes(model: RobotModel) -> None:
+    """Raise RobotError for more than MAX_SHAPES collision shapes."""
+    if (shapes := sum(len(link.collisions) for link in model.links.values())) > MAX_SHAPES:
+        raise RobotError(f"{cut(model.name)} has {shapes} collision shapes; at most {MAX_SHAPES} are simulated")
+
+
+def falls_through(model: RobotModel) -> bool:
+    """Whether gravity pulls a robot that has no collision shape to stand on."""
+    links = model.links.values()
+    return not model.static and not any(link.collisions for link in links) and any(link.gravity for link in links)
 
 
 def _moving(model: RobotModel, above: dict[str, Joint]) -> set[str]:

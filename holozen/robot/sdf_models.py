@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from holozen.robot.elements import Source, Tag, Vector, read_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.gazebo_plugins import read_plugins, warn_sensor
+from holozen.robot.gazebo_plugins import read_forces, read_plugins
 from holozen.robot.model import MOST_PARTS, Joint, Limits, Link, Pose, RobotModel, descend
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import triple
@@ -26,6 +26,7 @@ from holozen.robot.sdf import (
     rolls,
     version_of,
 )
+from holozen.robot.sensors import sdf_sensors, warn_unsimulated
 from holozen.robot.urdf import check_mimics
 from holozen.suggest import cut, listed
 
@@ -383,11 +384,21 @@ def build(members: list[Member], frames: Frames) -> list[RobotModel]:
         joints += [_standing(graph, first, root, placed) for root in loose]
         loose = []
     for member in members:
-        for owner in (*member.piece.tag.all("link"), *member.piece.tag.all("joint")):
-            for sensor in owner.all("sensor"):
-                warn_sensor(sensor, member.piece.source)
+        for joint in member.piece.tag.all("joint"):
+            for sensor in joint.all("sensor"):
+                warn_unsimulated(sensor, member.piece.source)
     robots = [_robot(root, graph, links, joints, placed[root], static) for root in (first, *loose)]
-    return [_driven(members[0], robots[0]), *robots[1:]]
+    return [_sensing(robot, graph, placed) for robot in (_driven(members[0], robots[0]), *robots[1:])]
+
+
+def _sensing(robot: RobotModel, graph: JointGraph, placed: Mapping[str, Frame]) -> RobotModel:
+    """The robot with the sensors of its links."""
+    owners = (
+        (graph.local(name), (placed[name].inverse @ graph.frames.of(name)).pose, tag, member.piece.source)
+        for name, (member, tag) in graph.links.items()
+        if graph.local(name) in robot.links and tag.first("sensor")
+    )
+    return replace(robot, sensors=tuple(sdf_sensors(owners, robot.links)))
 
 
 def _static(members: list[Member]) -> bool:
@@ -450,7 +461,8 @@ def _driven(top: Member, robot: RobotModel) -> RobotModel:
     """The body with the canonical link, which has the model's name and its plugins."""
     piece = top.piece
     drive = read_plugins(piece.tag, robot.links, robot.joints, robot.root, piece.source)
-    return replace(robot, name=top.name, drive=drive)
+    drive, forces = read_forces(piece.tag, robot.links, robot.root, drive, piece.source)
+    return replace(robot, name=top.name, drive=drive, forces=forces)
 
 
 def parse_sdf(root: Tag, source: Source) -> RobotModel:

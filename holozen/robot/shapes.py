@@ -265,13 +265,13 @@ def mesh_shape(tag: Tag, uri: str, pose: Pose, use: str, source: Source, color: 
 
     A collision mesh is read, a visual one only located. A missing or invalid mesh is replaced by a box with a
     warning, or is a RobotError with `source.strict`. In text received over the network visual meshes are not even
-    looked up.
+    looked up; those that it holds are kept unread.
     """
     scale = tag.vector("scale", (1.0, 1.0, 1.0))
     if min(abs(factor) for factor in scale) < SMALLEST:
         raise tag.wrong(f"has the scale {scale}; a zero flattens the mesh (a negative scale mirrors it)")
     if use == "visual" and source.confined:
-        return Shape("mesh", scale, pose, color=color)
+        return Shape("mesh", scale, pose, color=color, data=uri.strip() if is_data(uri) else "")
     try:
         shape = _found(tag, uri, scale, pose, use, source)
     except RobotError as error:

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from holozen.robot.elements import Source, Tag, Vector
 from holozen.robot.errors import RobotError
-from holozen.robot.gazebo_plugins import Settings, read_plugins, warn_sensors
+from holozen.robot.gazebo_plugins import Settings, read_forces, read_plugins
 from holozen.robot.inertia import (
     NO_INERTIA,
     check_drive,
@@ -30,6 +30,7 @@ from holozen.robot.model import (
     Surface,
     descend,
 )
+from holozen.robot.sensors import read_sensors
 from holozen.robot.shapes import Materials, gazebo_color, needed, read_materials, read_pose, read_shape, urdf_color
 from holozen.suggest import cut, listed
 
@@ -135,7 +136,7 @@ def read_gazebo(
             dressed[name] = _dressed(dressed[name], tag, source)
         elif name not in joints:
             near = source.suggest(name, (*links, *joints))
-            problem = f"reference={cut(name)} names no link and no joint{near}; it is left out"
+            problem = f"names no link and no joint{near}; it is left out"
             source.warn(tag, f"{problem}; links: {listed(list(links))}")
     return dressed, static
 
@@ -191,9 +192,9 @@ def read_robot(robot: Tag, source: Source) -> RobotModel:
     lost = massless(links, joints, root)
     warn_massless(robot, links, joints, lost, source)
     kept, moving = without(dressed, joints, lost)
-    drive = read_plugins(robot, kept, joints, root, source)
+    drive, forces = read_forces(robot, kept, root, read_plugins(robot, kept, joints, root, source), source)
     check_drive(robot, drive, links, joints, root, lost, source)
-    warn_sensors(robot, links, source)
+    sensors = read_sensors(robot, kept, links, source)
     warn_transmissions(robot, joints, source)
     return RobotModel(
         name=robot.word("name"),
@@ -203,6 +204,8 @@ def read_robot(robot: Tag, source: Source) -> RobotModel:
         drive=drive,
         static=static or root == WORLD,
         warnings=tuple(source.warnings),
+        forces=forces,
+        sensors=tuple(sensors),
     )
 
 
@@ -227,6 +230,7 @@ def read_link(tag: Tag, source: Source, materials: Materials = {}) -> Link:
         inertial=None if inertial is None else _inertial(inertial),
         visuals=tuple(_visual(visual, source, materials) for visual in tag.all("visual")),
         collisions=tuple(read_shape(collision, source) for collision in tag.all("collision")),
+        gravity=Settings(tag).flag("gravity"),  # SDF's, which people write into a URDF too
     )
     return with_moments(link, inertial, source)
 

@@ -14,11 +14,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import IO, Any
+from xml.parsers.expat import ExpatError, ParserCreate
 
 from holozen.console import report
-from holozen.robot.elements import MOST_TEXT, check_size
+from holozen.robot.elements import MOST_TEXT, check_size, read_xml, repair_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.packages import find_package
+from holozen.robot.packages import MODEL_PATHS, find_package
 from holozen.suggest import cut
 
 # The result of an expansion, and its inputs: files, wildcards, environment variables and packages.
@@ -161,6 +162,7 @@ def _forget(place: Path) -> None:
 
 PROCESSOR_TIME = 6  # s for a whole expansion; the largest robots take 2
 STEP_TIME = 1.2  # s of CPU time for one expression or element, after which the kernel ends the process
+MOST_WORDS = 100_000  # bytes of standard error
 PATIENCE = 60.0  # s; the child's own CPU time limits end it long before, unless it sleeps
 _ROOT = str(Path(__file__).resolve().parents[2])
 # Without `site`, whose search path is passed in, startup takes half as long.
@@ -173,52 +175,97 @@ main(asked)
 """
 
 
+KEPT = ("HOME", "LD_LIBRARY_PATH", "AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", *MODEL_PATHS)  # of the environment
+MOST_OUTSIDE = 20  # robot files that are included from outside of all known folders
+
+
 def expand_in_child(
     path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str] = ()
 ) -> Outcome:
-    """Expand `path` in a process of its own. Takes 0.1 s, and terminates for any input file."""
+    """Expand `path` in a process of its own, which reads only known folders. Takes 0.1 s, and terminates for any input.
+
+    A robot file may be included from elsewhere: the process ends with its name, and starts anew with the answer whether
+    it is one.
+    """
+    outside: dict[str, bool] = {}
+    while isinstance(outcome := _expand_once(path, args, packages, allow_env, outside), str):
+        if len(outside) == MOST_OUTSIDE:
+            many = f"more than {MOST_OUTSIDE} files are included from outside of all known packages"
+            return Outcome(error=f"{path}: {many}; give the package that holds them: --package NAME=DIR")
+        outside[outcome] = is_robot_file(outcome)
+    return outcome
+
+
+def is_robot_file(path: str) -> bool:
+    """Whether a file is XML with a <robot> or <sdf> around all, without quoting from it."""
+    roots: list[str] = []
+    parser = ParserCreate()
+
+    def start(name: str, _attributes: object) -> None:
+        roots.append(name)
+        raise StopIteration
+
+    parser.StartElementHandler = start
+    with contextlib.suppress(StopIteration, ExpatError, OSError, ValueError, RobotError):
+        parser.Parse(read_text(Path(path)), True)
+    return roots[:1] in (["robot"], ["sdf"])
+
+
+def _expand_once(
+    path: Path,
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    allow_env: Collection[str],
+    outside: Mapping[str, bool],
+) -> Outcome | str:
+    """The outcome, or the file outside of all known folders about which the process asks."""
     with os.fdopen(os.memfd_create("note"), "w+b") as note:  # there may be no writable folder
         asked = {
             "path": str(path),
             "args": dict(args),
             "packages": {name: str(folder) for name, folder in packages.items()},
             "allow_env": [*allow_env],
+            "outside": outside,
+            "set": [*os.environ],
             "modules": [*map(str, sys.path), _ROOT],
             "note": note.fileno(),
         }
-        code, reply, words = _ask(json.dumps(asked).encode(), note.fileno())
+        kept = {name: os.environ[name] for name in (*KEPT, *allow_env) if name in os.environ}
+        code, reply, words = _ask(json.dumps(asked).encode(), note.fileno(), kept)
         with contextlib.suppress(ValueError):
             answer = json.loads(reply)
+            if wanted := answer.pop("wanted", ""):
+                return str(wanted)
             answer["warnings"] = tuple(answer["warnings"])
             return Outcome(**answer)
         return Outcome(error=_ended(path, code, note, words))
 
 
-def _ask(question: bytes, note: int) -> tuple[int, bytes, bytes]:
+def _ask(question: bytes, note: int, env: Mapping[str, str]) -> tuple[int, bytes, bytes]:
     """Exit code, standard output and standard error of the child."""
     words = [sys.executable, "-I", "-S", "-X", "utf8", "-c", BOOT]
-    pipe = subprocess.PIPE
-    try:
-        # A session of its own: only this process gets Ctrl-C, and it always ends the child.
-        child = subprocess.Popen(words, stdin=pipe, stdout=pipe, stderr=pipe, pass_fds=(note,), start_new_session=True)
-    except OSError as error:
-        raise RobotError(f"cannot start {sys.executable} to expand xacro: {error.strerror}") from None
-    try:
-        out, err = child.communicate(question, PATIENCE)
-    except subprocess.TimeoutExpired:
-        out, err = b"", b""
-    finally:
-        child.kill()
-        child.wait()
-        _close(child)
-    return child.returncode, out, err
-
-
-def _close(child: "subprocess.Popen[bytes]") -> None:
-    for stream in (child.stdin, child.stdout, child.stderr):
-        with contextlib.suppress(OSError):
-            if stream:
-                stream.close()
+    # Files in memory: their size has a limit, which a pipe would not have.
+    with os.fdopen(os.memfd_create("out"), "w+b") as out, os.fdopen(os.memfd_create("err"), "w+b") as err:
+        try:
+            # A session of its own: only this process gets Ctrl-C, and it always ends the child.
+            child = subprocess.Popen(
+                words, stdin=subprocess.PIPE, stdout=out, stderr=err, pass_fds=(note,), env=env, start_new_session=True
+            )
+        except OSError as error:
+            raise RobotError(f"cannot start {sys.executable} to expand xacro: {error.strerror}") from None
+        try:
+            child.communicate(question, PATIENCE)
+        except subprocess.TimeoutExpired:
+            out.truncate(0)
+        finally:
+            child.kill()
+            child.wait()
+            with contextlib.suppress(OSError):
+                if child.stdin:
+                    child.stdin.close()
+        out.seek(0)
+        err.seek(0)
+        return child.returncode, out.read(), err.read(MOST_WORDS)
 
 
 def _ended(path: Path, code: int, note: IO[bytes], words: bytes) -> str:
@@ -245,16 +292,19 @@ def _noted(path: Path, note: IO[bytes]) -> tuple[str, str]:
 # Expansion.
 
 
-_XACRO_ELEMENT = re.compile(r"<xacro:\w")
+# The namespace alone may remain after an expansion.
+_XACRO = re.compile(r"<xacro:|\$\{|\$\((?:find|arg|env|optenv|eval|cwd|dirname|anon)\b")
 _FORMAT = 1  # of a cache entry
 
 
 def expand(
     path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
 ) -> str:
-    """The URDF text of a robot file; a file without xacro is not changed. Otherwise as `expand_xacro`."""
+    """The URDF text of a robot file; a file without xacro is not changed. Otherwise as `expand_xacro`, without its
+    warnings.
+    """
     text = read_text(path)
-    return expand_xacro(path, args, packages, allow_env) if is_xacro(path, text) else text
+    return expanded(path, args, packages, allow_env).text if is_xacro(path, text) else text
 
 
 def expand_xacro(
@@ -265,16 +315,25 @@ def expand_xacro(
 
     `args` are the values of `xacro:arg`, `packages` the folders of `--package NAME=DIR`. The text is sent to any
     node that serves `spawn_entity`, so it must not leak local data: `load_yaml` reads inside known packages only, and
-    environment variables are read only if `allow_env` names them. Xacro still evaluates Python expressions: never
-    expand text received over the network. The library's warnings are printed. Raises RobotError with file, line and
+    environment variables are read only if `allow_env` names them. Xacro evaluates Python expressions, in a process
+    that the kernel keeps from other files, the network and other processes: never expand text received over the network
+    all the same. The library's warnings are printed. Raises RobotError with file, line and
     the chain of macros and includes.
     """
+    outcome = expanded(path, args, packages, allow_env)
+    for warning in outcome.warnings:
+        report(f"warning: {warning}")
+    return outcome.text
+
+
+def expanded(
+    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
+) -> Outcome:
+    """The same, with its warnings."""
     outcome = process(path, args, packages, allow_env)
     if outcome.error:
         raise RobotError(outcome.error)
-    for warning in outcome.warnings:
-        report(warning)
-    return outcome.text
+    return outcome
 
 
 def process(
@@ -315,8 +374,22 @@ def read_text(path: Path) -> str:
 
 
 def is_xacro(path: Path, text: str) -> bool:
-    """Whether a robot file has to be expanded: by its name, or because it contains xacro elements."""
-    return path.name.endswith(".xacro") or _XACRO_ELEMENT.search(text) is not None
+    """Whether a robot file has to be expanded: by its name, or because it uses xacro."""
+    return path.name.endswith(".xacro") or uses_xacro(text)
+
+
+def uses_xacro(text: str) -> bool:
+    """Whether any element uses xacro; comments do not count, and broken XML is another error."""
+    if not _XACRO.search(text):
+        return False
+    try:
+        tags = [read_xml(repair_xml(text)[0], "")]
+    except RobotError:
+        return False
+    for tag in tags:
+        tags += tag.children
+    words = (f"<{tag.name} {' '.join(tag.attributes.values())} {tag.text}" for tag in tags)
+    return any(_XACRO.search(word) for word in words)
 
 
 def _key(path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]) -> str:

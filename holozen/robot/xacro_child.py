@@ -11,27 +11,32 @@ import re
 import resource
 import signal
 import sys
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Mapping
 from contextlib import redirect_stderr, redirect_stdout, suppress
+from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 from xml.dom import expatbuilder, minidom
-from xml.parsers.expat import ErrorString, ExpatError
+from xml.parsers.expat import ExpatError
 
-from holozen.robot.elements import MOST_ELEMENTS, check_size
+from holozen.robot.elements import MOST_ELEMENTS, broken_xml, check_size
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import (
     find_by_name,
     find_named,
     find_package,
+    instead_of,
     known_folders,
     lies_in,
+    local_packages,
     portable_name,
+    remember_folders,
     without_home,
 )
-from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, unchanged
+from holozen.robot.sandbox import restrict
+from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, read_text, unchanged
 from holozen.suggest import cut, shorten, suggest
 
 # Elements annotated with file and line, in the documents that the library reads and copies.
@@ -233,6 +238,7 @@ def names(table: Any) -> list[str]:
 # The library's errors as one line.
 
 
+MOST_REPLY = 64 << 20  # bytes; a text of 4 MB takes at most 24 in JSON
 MOST_MEMORY = 512 << 20  # bytes of address space of the child
 
 
@@ -242,6 +248,9 @@ def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[st
     chain = _chain(trace.calls)
     if isinstance(cause, RobotError):
         return f"{_placed(str(cause), path, trace)}{chain}"
+    if isinstance(cause, ExpatError):
+        file = _last_file(trace)
+        return f"{Place(file, cause.lineno)}: {broken_xml(cause, _text(file), chain)}"
     args = trace.library.substitution_args_context.get("arg", {})
     hint = getattr(cause, "hint", "") or (_guessed(guesses) if isinstance(cause, OSError) else "")
     if type(cause).__name__ == "ArgException":
@@ -259,18 +268,25 @@ def _placed(message: str, path: Path, trace: Trace) -> str:
 
 
 def _where(cause: BaseException, trace: Trace) -> str:
-    file = next((str(file) for file in reversed(trace.library.filestack or [""])), "")
-    if isinstance(cause, ExpatError):
-        return str(Place(file, cause.lineno))
+    file = _last_file(trace)
     if isinstance(cause, UnicodeDecodeError):
         return file
     return str(trace.place or file)
 
 
+def _last_file(trace: Trace) -> str:
+    return next((str(file) for file in reversed(trace.library.filestack or [""])), "")
+
+
+def _text(file: str) -> str:
+    try:
+        return read_text(Path(file))
+    except RobotError:
+        return ""
+
+
 def _reason(cause: BaseException, suffix: str) -> str:
     kind = type(cause).__name__
-    if isinstance(cause, ExpatError):
-        return f"broken XML: {ErrorString(cause.code)}"
     if isinstance(cause, OSError):
         return f"{cause.strerror}: {cause.filename}"
     if isinstance(cause, UnicodeDecodeError):
@@ -309,7 +325,7 @@ def _chain(calls: list[str], most: int = 6) -> str:
 def _guessed(guesses: Mapping[str, Path]) -> str:
     """A hint for each package that was identified only by the location of the robot file."""
     return "".join(
-        f"; no package.xml says {name!r}, so {folder} was taken for it: if wrong, give --package {name}=DIR"
+        f"; no package.xml names {name!r}, so {folder} was taken for it: if wrong, give --package {name}=DIR"
         for name, folder in guesses.items()
     )
 
@@ -317,7 +333,6 @@ def _guessed(guesses: Mapping[str, Path]) -> str:
 # The expansion.
 
 
-ROBOTS = ("robot", "sdf")  # root elements of files meant to be included
 DEEPEST_CALLS = 4000  # Python frames; the library's own 1000 and what the trace adds
 MOST_WORDS = 10_000  # characters of warnings
 
@@ -329,7 +344,7 @@ def main(asked: dict[str, Any]) -> None:
     words = io.StringIO()
     with redirect_stdout(words), redirect_stderr(words):
         packages = {name: Path(folder) for name, folder in asked["packages"].items()}
-        reply = Expansion(Path(asked["path"]), packages, asked["allow_env"]).run(asked)
+        reply = Expansion(Path(asked["path"]), packages, asked).run(asked)
     reply["warnings"] = words.getvalue()[:MOST_WORDS].splitlines()
     with os.fdopen(out, "wb") as file:
         file.write(json.dumps(reply).encode())
@@ -343,6 +358,7 @@ def _limit() -> None:
     for kind, most in (
         (resource.RLIMIT_AS, MOST_MEMORY),
         (resource.RLIMIT_CPU, PROCESSOR_TIME),
+        (resource.RLIMIT_FSIZE, MOST_REPLY),
         (resource.RLIMIT_CORE, 0),
     ):
         hard = resource.getrlimit(kind)[1]
@@ -351,21 +367,32 @@ def _limit() -> None:
     sys.setrecursionlimit(DEEPEST_CALLS)
 
 
+class Outside(BaseException):
+    """A file outside of all known folders is to be included. Not an Exception, so that the library passes it on."""
+
+
 class Expansion:
     """One run of the library, with the inputs it used."""
 
-    def __init__(self, path: Path, packages: Mapping[str, Path], allow_env: Collection[str]) -> None:
-        self.path, self.packages, self.allow_env = path, packages, frozenset(allow_env)
+    def __init__(self, path: Path, packages: Mapping[str, Path], asked: Mapping[str, Any]) -> None:
+        self.path, self.packages, self.allow_env = path, packages, frozenset(asked["allow_env"])
+        self._outside: dict[str, bool] = asked["outside"]
+        self._variables: list[str] = asked["set"]
         self.inputs: Inputs = {"file": {}, "glob": {}, "env": {}, "find": {}}
         self.guesses: dict[str, Path] = {}
         self._recording = self._parsing = False
 
     def run(self, asked: Mapping[str, Any]) -> dict[str, Any]:
-        """The reply: "text" or "error", "inputs", and whether the text depends on them alone ("pure")."""
+        """The reply: "text" or "error", "inputs", and whether the text depends on them alone ("pure"); or "wanted", see
+        Outside.
+        """
         library, trace = self._library(asked["note"])
+        self._restrict()
         try:
             text = self._expanded(library, trace, asked["args"])
             reply: dict[str, Any] = {"text": text}
+        except Outside as file:
+            return {"wanted": str(file)}
         except Exception as error:  # an expression in the file may raise anything
             trace.quiet()
             reply = {"error": describe(error, trace, self.path, self.guesses)}
@@ -384,9 +411,23 @@ class Expansion:
         xacro.parse = self._parse(xacro, trace)
         setattr(xacro, "open", self._open)  # noqa: B010
         self._answer_find()
-        setattr(os, "environ", Asked(os.environ, self))  # noqa: B010
+        setattr(os, "environ", Asked({**dict.fromkeys(self._variables, ""), **os.environ}, self))  # noqa: B010
         sys.addaudithook(self._audit)
         return xacro, trace
+
+    def _restrict(self) -> None:
+        """Give up all files but those of known folders, and of Python for late imports."""
+        remember_folders()
+        robot = self.path.absolute()
+        folders = [*known_folders(self.path, self.packages), *without_home([robot.parent])]
+        names = [folder / "package.xml" for folder in local_packages(self.path).values()]
+        libraries = [Path(spec.origin) for name in ("xacro", "yaml") if (spec := find_spec(name)) and spec.origin]
+        code = [Path(os.__file__).parent, *(each.parents[1] for each in libraries)]
+        included = [path for path, allowed in self._outside.items() if allowed]
+        if lacks := restrict([str(robot), *included, *map(str, (*folders, *names, *code))]):
+            print(
+                f"this kernel lacks {lacks}: only xacro itself keeps {self.path} from files outside of known packages"
+            )
 
     def _expanded(self, library: Any, trace: Trace, args: dict[str, str]) -> str:
         self._recording = True
@@ -405,11 +446,9 @@ class Expansion:
                 filename = self._elsewhere(filename, library)
             self._parsing = True
             try:
-                document = parse(source, filename)
+                return parse(source, filename)
             finally:
                 self._parsing = False
-            self._check_include(filename, document.documentElement.tagName)
-            return document
 
         return parsed
 
@@ -417,33 +456,42 @@ class Expansion:
         """The file to include instead of one from another machine: a file of the robot with the same name, if any."""
         self.record("file", path)  # used as soon as it exists
         self._recording = False
-        found = find_by_name(path, self.path, self.packages)
-        instead = portable_name(found, self.path, self.packages) if found else ""
+        matches = find_by_name(path, self.path, self.packages)
+        instead = portable_name(matches[0], self.path, self.packages) if matches else ""
         self._recording = True
-        if found is None:
+        if not matches:
             return path
-        library.warning(
-            f"there is no file {cut(path, 200)}; {found}, which has the same name, is included; write {instead}"
-        )
-        library.filestack[-1] = str(found)  # base of relative names in it
-        return str(found)
+        library.warning(instead_of(path, matches, "included", instead))
+        library.filestack[-1] = str(matches[0])  # base of relative names in it
+        return str(matches[0])
 
     def _open(self, path: str) -> Any:
         """The library's `open`: for files parsed as XML, and for `load_yaml`, whose data goes into the text."""
-        if not (self._parsing or self._is_known(path)):
+        if self._parsing:
+            self._check_include(path)
+        elif not self._is_known(path):
             raise RobotError(
                 f"{self.path}: load_yaml reads inside known packages only, and {path} is in none of them (or hidden);"
                 " give the package that holds it: --package NAME=DIR"
             )
         return open(path)
 
-    def _check_include(self, path: str, root: str) -> None:
+    def _check_include(self, path: str) -> None:
         """A robot may be included from anywhere; other XML may be private data."""
-        if root not in ROBOTS and not self._is_known(path, self.path.absolute().parent):
+        real = os.path.realpath(path)
+        if real == os.path.realpath(self.path) or not os.path.isfile(real) or self._is_known(path, self._own_folder):
+            return
+        if real not in self._outside:
+            raise Outside(real)
+        if not self._outside[real]:
             raise RobotError(
                 f"{self.path}: {path} is outside the robot's folder and all known packages, and is not a robot file: it"
                 " is not included; give the package that holds it: --package NAME=DIR"
             )
+
+    @property
+    def _own_folder(self) -> Path:
+        return self.path.absolute().parent
 
     def _is_known(self, path: str, *more: Path) -> bool:
         recording, self._recording = self._recording, False  # the package.xml files read on the way are not inputs
@@ -493,6 +541,11 @@ class Expansion:
         if not self._recording or event not in ("open", "glob.glob"):
             return
         if event == "glob.glob":
+            if not self._is_known(os.path.dirname(re.split(r"[*?\[]", args[0])[0]) or ".", self._own_folder):
+                raise RobotError(
+                    f"{self.path}: {args[0]} is outside the robot's folder and all known packages, where wildcards are"
+                    " not expanded; give the package that holds it: --package NAME=DIR"
+                )
             self.record("glob", args[0])
         elif isinstance(args[0], (str, os.PathLike)):
             path = str(Path(args[0]))  # the library passes ./robot.xacro

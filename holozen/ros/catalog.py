@@ -103,6 +103,8 @@ MESSAGES = {
 
 ACTIONS = "there are no actions here; use a service, or a topic for the goal and one for the progress"
 COMPONENTS = "there are no components here, which are C++; start each as a Node of its own: Python scripts run"
+MOVEIT = "there is no MoveIt here"
+NAV2 = "there is no Nav2 here; `holozen controller` drives to goals"
 ROS_1 = "this belongs to ROS 1; here is ROS 2's rclpy"
 
 HINTS = {
@@ -117,6 +119,10 @@ HINTS = {
     "launch_xml": "launch files are in Python here",
     "launch_yaml": "launch files are in Python here",
     "message_filters": "keep the last message of each topic in its callback, and compare their stamps",
+    "moveit_commander": MOVEIT,
+    "moveit_configs_utils": MOVEIT,
+    "nav2_common": NAV2,
+    "nav2_simple_commander": NAV2,
     "rclpy.action": ACTIONS,
     "rclpy.lifecycle": "there are no lifecycle nodes here; use rclpy.node.Node",
     "rclpy.serialization": "holozen.messages.codec.encode and decode do this",

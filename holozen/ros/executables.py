@@ -54,7 +54,7 @@ def from_file(path: Path) -> Script:
     except OSError as error:
         raise NotFound(f"cannot read {path}: {error.strerror}") from None
     if path.suffix != ".py" and not _is_python(head):
-        raise NotFound(f"{path} is not a Python script; only those run here, with the first line #!/usr/bin/python3")
+        raise NotFound(f"{path} is no Python script: its name must end with .py, or it must begin #!/usr/bin/python3")
     path = path.absolute()
     return Script(path, path.resolve().parent)
 

@@ -66,13 +66,18 @@ def reexported(module: str) -> dict[str, str]:
 
 
 def explain(error: ModuleNotFoundError, line: str) -> str:
-    """Why the package that a line of source imports interfaces from was not found; empty for any other import.
+    """Why the package that a line of source imports interfaces from was not found, or what to do about any other module
+    that is missing; empty where the error names it itself.
 
-    While Python looks for `my_pkg` nothing says that `my_pkg.srv` is wanted, so this is known only afterwards.
+    While Python looks for `my_pkg` it is not known that `my_pkg.srv` is wanted; this is clear only afterwards.
     """
     name = error.name or ""
     wants_interfaces = re.search(rf"\b{re.escape(name)}\.(msg|srv|action)\b", line) if name.isidentifier() else None
-    return _installed[0].unknown(name) if wants_interfaces and _installed else ""
+    if wants_interfaces and _installed:
+        return _installed[0].unknown(name)
+    if error.msg != f"No module named {name!r}" or "." in name:
+        return ""
+    return f"{error.msg}; install it with pip, or give the folder of a package of yours: --package {name}=DIR"
 
 
 class _Loader:

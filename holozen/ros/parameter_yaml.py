@@ -8,9 +8,10 @@ Only lists, maps and files need the YAML library. A file names the nodes that it
 """
 
 import re
+import sys
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Any
+from contextlib import nullcontext
+from typing import Any, NamedTuple
 
 Value = bool | int | float | str | list[bool] | list[int] | list[float] | list[str]
 
@@ -119,8 +120,7 @@ KEY = "ros__parameters"
 EVERY_NODE = "/**"
 
 
-@dataclass(frozen=True, slots=True)
-class Section:
+class Section(NamedTuple):
     """The values for a node, or for all that match its wildcards: `*` is one part of a name, `**` any number."""
 
     place: str
@@ -144,9 +144,9 @@ def assigned(text: str) -> Section:
 
 
 def read(path: str) -> list[Section]:
-    """The sections of a file, those with wildcards first. Raises ValueError with one line."""
+    """The sections of a file ("-": of standard input), those with wildcards first. Raises ValueError with one line."""
     try:
-        with open(path, encoding="utf-8") as file:
+        with nullcontext(sys.stdin) if path == "-" else open(path, encoding="utf-8") as file:
             text = file.read(LARGEST + 1)
     except OSError as error:
         raise ValueError(f"cannot read {path}: {error.strerror}") from None

@@ -1,10 +1,12 @@
 """The fixtures. pytest finds them by this package's entry point; no import is needed in a test."""
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import pytest
 
+from holozen.testing.lock_step import LockStep
 from holozen.testing.process import wait_for as wait
 from holozen.testing.terminal import Terminal
 from holozen.testing.wire import Wire
@@ -24,6 +26,14 @@ def wire() -> Iterator[Wire]:
 def terminal(wire: Wire) -> Callable[..., Terminal]:
     """`terminal("teleop", "--speed", "0.3")`: a holozen verb in a pseudo-terminal, on this test's wire."""
     return wire.terminal
+
+
+@pytest.fixture
+def lock_step(wire: Wire) -> Callable[..., LockStep]:
+    """`lock_step("--robot", "my_bot.urdf.xacro")`: a paused sim on this test's wire that makes the steps that are asked
+    for; see LockStep.
+    """
+    return partial(LockStep, wire)
 
 
 @pytest.fixture

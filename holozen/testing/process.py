@@ -10,7 +10,7 @@ from typing import IO, Self, TypeVar
 
 T = TypeVar("T")
 
-EVERY = 0.005  # s between two polls
+SOON, EVERY = 0.0005, 0.005  # s between two polls, at first and later: what is there soon is not waited for long
 GRACE = 3.0  # s from SIGTERM to SIGKILL
 
 
@@ -19,12 +19,13 @@ def wait_for(condition: Callable[[], T], within: float = 10.0, what: str | Calla
 
     `what` describes the condition in the error; a function is called only then.
     """
-    deadline = time.monotonic() + within
+    deadline, pause = time.monotonic() + within, SOON
     while not (value := condition()):
         if time.monotonic() > deadline:
             words = what if isinstance(what, str) else what()
             raise AssertionError(f"waited {within:g} s in vain for {words}; the last look gave {value!r}")
-        time.sleep(EVERY)
+        time.sleep(pause)
+        pause = min(1.5 * pause, EVERY)
     return value
 
 

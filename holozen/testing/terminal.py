@@ -34,7 +34,7 @@ class Terminal:
         self._bytes = b""
         self._shown = 0  # bytes passed to the emulator
         self._emulator: Any = None
-        self._closing, self._frozen = threading.Event(), threading.Event()
+        self._closing, self._frozen, self._reading = threading.Event(), threading.Event(), threading.Lock()
         self._read_all = threading.Event()  # set once nothing more can come
         try:
             self.process = Process(
@@ -84,8 +84,10 @@ class Terminal:
         termios.tcsetwinsize(self._master, (rows, columns))
 
     def freeze(self) -> None:
-        """Hang: read no output of the process until `thaw`."""
+        """Hang: from now on, read no output of the process until `thaw`."""
         self._frozen.set()
+        with self._reading:  # what it reads just now is still received
+            pass
 
     def thaw(self) -> None:
         """Resume reading."""
@@ -157,16 +159,13 @@ class Terminal:
 
     def _read(self) -> None:
         while not self._closing.is_set():
-            if self._frozen.is_set():
+            with self._reading:
+                if not (frozen := self._frozen.is_set()) and select.select([self._master], [], [], 0.02)[0]:
+                    try:
+                        data = os.read(self._master, 65536)
+                    except OSError:  # the last process has left the terminal
+                        return self._read_all.set()
+                    self._bytes += data
+                    self.received(data)
+            if frozen:
                 self._closing.wait(0.005)
-                continue
-            if not select.select([self._master], [], [], 0.02)[0]:
-                continue
-            try:
-                data = os.read(self._master, 65536)
-            except OSError:  # the last process has left the terminal
-                self._read_all.set()
-                self._closing.wait()
-            else:
-                self._bytes += data
-                self.received(data)

@@ -15,12 +15,13 @@ from holozen.transport.graph import Definition
 from holozen.transport.node import Node
 from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, Subscription
-from holozen.transport.samples import Declared, Replies, stamps
+from holozen.transport.samples import Declared, Replies, Sample, stamps
 from holozen.transport.services import RING, ROOM, Server
 from holozen.transport.session import one_line
 
 if TYPE_CHECKING:
     from holozen.messages import Message
+    from holozen.transport.members import Verifier
 
 M = TypeVar("M", bound="Message")
 R = TypeVar("R", bound="Message")
@@ -44,36 +45,46 @@ class Bus(Node):
 
     @cached_property
     def _gets(self) -> dict[str, Gets]:
-        """By key expression, who answers gets there."""
+        """What answers gets, by key expression."""
         return {}
 
     @cached_property
     def stamp(self) -> Callable[[], bytes]:
         """Makes the attachments of our samples. From then on, readers of a stamp may ask for our clock."""
-        key = clock_key(self.id)
+        key, member = clock_key(self.id), self.member
 
         def answer(query: zenoh.Query) -> None:  # runs in Zenoh's thread, the only work done there
             with query:
-                query.reply(key, str(time.monotonic_ns()), express=True)
+                clock: str | bytes = str(time.monotonic_ns())
+                if member:
+                    clock = member.answer(self.id, bytes(query.payload or b"")[:64], str(clock))
+                query.reply(key, clock, express=True)
             self.clock_asked.set()
 
         self._keep(Declared(self.session.declare_queryable(key, answer)))
-        return stamps(self.node, self.id)
+        return stamps(self._signer, self.id)
 
-    def publisher(self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False) -> Publisher[M]:
-        """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages."""
-        from holozen import wire
+    def publisher(
+        self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False, wire: str = ""
+    ) -> Publisher[M]:
+        """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages. `wire` is another one
+        than the node's.
+        """
         from holozen.messages import codec
+        from holozen.wire import is_command
 
         with one_line(f"key {key!r}"):
             publisher = self.session.declare_publisher(
-                key, encoding=codec.encoding(self.wire, kind), priority=getattr(zenoh.Priority, priority),
-                express=wire.is_command(key, (kind,)),
+                key, encoding=codec.encoding(wire or self.wire, kind), priority=getattr(zenoh.Priority, priority),
+                express=is_command(key, (kind,)),
                 congestion_control=zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP,
             )  # fmt: skip
         number = partial(zenoh.SourceInfo, publisher.id)
         watch = partial(publisher.declare_matching_listener, zenoh.handlers.RingChannel(1))
-        writer: Publisher[M] = Publisher(publisher, self.wire, self.stamp, number, watch)
+        sign = None
+        if self.member and is_command(key, (kind,)):
+            sign = partial(self.member.attachment, key, priority)
+        writer: Publisher[M] = Publisher(publisher, wire or self.wire, self.stamp, number, watch, sign)
         self._answer_gets(writer, key)
         self._define(kind)
         # Last, so that nodes that discover it can query it at once.
@@ -103,24 +114,45 @@ class Bus(Node):
         self._keep(Definition(self.session, zenoh.handlers.RingChannel(16), kind.ROS, text))
 
     def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> Subscription[M]:
-        """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused."""
+        """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused, and in the
+        secure set-up commands without proof.
+        """
         from holozen import wire
 
         raw = self.subscribe_raw(key, depth, limit)
         raw.ends.append(self.announce("sub", kinds[0].ROS, key))
-        return Subscription(raw, kinds, tolerant=not wire.is_command(key, kinds))
+        is_command = wire.is_command(key, kinds)
+        return Subscription(raw, kinds, tolerant=not is_command, refusal=self._unproven if is_command else None)
+
+    @cached_property
+    def _unproven(self) -> Callable[[Sample], str] | None:
+        """Why a command is refused for want of proof; None outside the secure set-up."""
+        return self._verifier.refusal if self._verifier else None
+
+    @cached_property
+    def _verifier(self) -> Verifier | None:
+        """Checks the proofs of others; None outside the secure set-up."""
+        if not self._secure:
+            return None
+        from holozen.transport.members import Verifier  # loads cryptography
+
+        return Verifier(self._secure)
 
     def latest(self, key: str, kind: type[M]) -> Latest[M]:
         """The newest message on `key`, with its age. Payloads over LARGEST_STATE bytes are ignored."""
         return Latest(self.subscribe(key, kind, depth=1, limit=LARGEST_STATE))
 
-    def serve(self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R], room: int = ROOM) -> Server:
+    def serve(
+        self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R], room: int = ROOM,
+        shared: bool = False,
+    ) -> Server:  # fmt: skip
         """Answer requests on `key`. The caller runs it: `answer_pending()` in a loop, or `start()`.
 
-        At most `room` requests wait; more are refused as busy.
+        At most `room` requests wait; more are refused as busy. A request on a `shared` key goes to all of its servers;
+        those that have no part in it raise Elsewhere.
         """
         token = self.announce("srv", reply.ROS, key)
-        queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=True)
+        queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=not shared)
         server = self._keep(Server(queryable, key, request, answer, self.wire, room))
         server.ends.append(token)
         return server
@@ -139,11 +171,11 @@ class Bus(Node):
     def peer_clocks(self, has: Callable[[str], bool]) -> PeerClocks:
         """The clocks of other sessions, to measure the age of their commands. `has`: whether a session is alive."""
 
-        def ask(session: str, timeout: float) -> Replies:
+        def ask(session: str, nonce: bytes, timeout: float) -> Replies:
             # All servers are asked, since any session may serve this key.
             return self.ask(
-                clock_key(session), timeout, session, target=zenoh.QueryTarget.ALL,
+                clock_key(session), timeout, session, payload=nonce or None, target=zenoh.QueryTarget.ALL,
                 consolidation=zenoh.ConsolidationMode.NONE, priority=zenoh.Priority.REAL_TIME, express=True,
             )  # fmt: skip
 
-        return PeerClocks(ask, has)
+        return PeerClocks(ask, has, signer=self._verifier.answerer if self._verifier else None)

@@ -1,30 +1,41 @@
-"""How a process connects to others: Zenoh's own flags, environment variables that say the same, and the default.
+"""How a process connects to others: Zenoh's own flags, environment variables for the same, and the default.
 
 By default nothing leaves this machine: peers meet on loopback at the rendezvous points; no router, no multicast.
+Each domain has its own points. With `--private` they meet at Unix sockets in a folder that only their user can enter,
+with `--secure` at a router, by mutual TLS.
 """
 
 import argparse
 import json
 import os
+from typing import Any
 
 from holozen.flags import refused
 from holozen.suggest import suggest
 from holozen.transport.errors import BusError
 
-RENDEZVOUS = tuple(f"tcp/127.0.0.1:{port}" for port in (7447, 7448, 7449))
-"""Where the processes of one machine meet: Zenoh's own port, and two more in case its holder does not answer."""
+PORT = 7447  # Zenoh's own; the first of domain 0
+DOMAIN_PORTS = 10  # from the first port of a domain to that of the next
+LAST_DOMAIN = 232  # as in ROS
+RENDEZVOUS = tuple(f"tcp/127.0.0.1:{PORT + number}" for number in range(3))
+"""Where the processes of one machine meet in domain 0: Zenoh's own port, and two more in case its holder does not
+answer."""
 
+UNIX = "unixsock-stream/"  # before the path of a Unix socket
 LOOPBACK = "tcp/127.0.0.1:0"  # any free port, on loopback only
 LEASE = 1500  # ms; a silent link is closed after this (Zenoh: 10 s), and a new one with a longer round trip too
 FORBIDDEN = " (where an access control list is in force, it has to allow @holozen/**)"  # a reason to see no nodes
 CLIENT_TRY = 10.0  # s, for one attempt of a client to reach its router; a link with a delay of 0.5 s takes 3 s
+LARGEST_MESSAGE = 20_000_000  # bytes, in the secure set-up; a description with its meshes is the largest
 _RETRY = {"period_init_ms": 50, "period_max_ms": 500, "period_increase_factor": 1.5}
 
 
 class Connection:
     """Zenoh's flags, and how messages are encoded.
 
-    `listen` and `connect`: None means the loopback default, an empty tuple means no endpoint.
+    `listen` and `connect`: None means the default, an empty tuple means no endpoint. The default is loopback, or with
+    `private` the Unix sockets in that folder; each `domain` has its own. `secure`: the folder of a member, whose
+    certificate it uses.
     """
 
     def __init__(
@@ -35,9 +46,13 @@ class Connection:
         config: str | None = None,
         cfg: tuple[tuple[str, str], ...] = (),
         wire: str = "json",
+        private: str = "",
+        secure: str = "",
+        domain: int = 0,
     ) -> None:
         self.mode, self.connect, self.listen = mode, connect, listen
-        self.config, self.cfg, self.wire = config, cfg, wire
+        self.config, self.cfg, self.wire, self.private, self.secure = config, cfg, wire, private, secure
+        self.domain = domain
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Connection) and vars(self) == vars(other)
@@ -54,7 +69,22 @@ class Connection:
         """Where it looks for others, as text for messages."""
         if self.config and self.connect is None:
             return f"the endpoints of {self.config}"
-        return ", ".join(self._connect_endpoints()) or ", ".join(self._listen_endpoints())
+        return ", ".join(self.connect_endpoints) or ", ".join(self._listen_endpoints())
+
+    @property
+    def meeting_points(self) -> tuple[str, ...]:
+        """The default endpoints where processes meet."""
+        offset = DOMAIN_PORTS * self.domain
+        if self.secure:
+            return (f"tls/127.0.0.1:{PORT + offset}",)
+        if self.private:
+            return tuple(f"{UNIX}{self.private}/{offset + number}" for number in (1, 2, 3))
+        return tuple(f"tcp/127.0.0.1:{PORT + offset + number}" for number in range(3))
+
+    @property
+    def own_endpoint(self) -> str:
+        """An endpoint for one session alone: any free port of loopback, or a new socket."""
+        return f"{UNIX}{self.private}/{os.getpid()}-{os.urandom(4).hex()}" if self.private else LOOPBACK
 
     @property
     def rendezvous(self) -> tuple[str, ...]:
@@ -65,55 +95,84 @@ class Connection:
         if self.config or self.mode != "peer":
             return ()
         if self.listen is None:
-            return RENDEZVOUS
-        return tuple(one for one in self.listen if one in self._connect_endpoints()) or self.listen[:1]
+            return self.meeting_points
+        return tuple(one for one in self.listen if one in self.connect_endpoints) or self.listen[:1]
 
     def settings(self) -> dict[str, str]:
         """Zenoh configuration paths and their values as JSON5, in the order to apply them."""
-        values: dict[str, object] = {"mode": self.mode, **_ALWAYS}
+        values: dict[str, object] = {"mode": self.mode, **_ALWAYS, **_INTACT}
         if not self.config or self.connect is not None:
-            values["connect/endpoints"] = self._connect_endpoints()
+            values["connect/endpoints"] = self.connect_endpoints
         if not self.config or self.listen is not None:
             values["listen/endpoints"] = self._listen_endpoints()
         if self.config:
             # The file decides; a mode of "peer" cannot be distinguished from the default.
             values = {k: v for k, v in values.items() if k.endswith("/endpoints") or (k == "mode" and v != "peer")}
+            values |= _INTACT
         if self.mode == "client":
             # Attempts time out, so that none outlives its bus by much. After a success Zenoh reconnects for ever.
             values |= {"connect/timeout_ms": round(CLIENT_TRY * 1000), "connect/exit_on_failure": True}
+        if self.secure:
+            values |= _tls(self.secure, self.mode)
         return {path: json.dumps(value) for path, value in values.items()} | dict(self.cfg)
 
     def arguments(self) -> list[str]:
-        """The flags that give another process the same connection, whatever its environment says."""
-        flags = ["--mode", self.mode]
+        """The flags that give another process the same connection, whatever its environment."""
+        flags = ["--mode", self.mode, "--domain", str(self.domain)]
         for name, endpoints in (("--connect", self.connect), ("--listen", self.listen)):
             for endpoint in endpoints or ():
                 flags += [name, endpoint]
         flags += ["--config", self.config] if self.config else []
+        flags += ["--private"] if self.private else []
+        flags += ["--secure", self.secure] if self.secure else []
         flags += ["--wire", self.wire] if self.wire != "json" else []
         for path, value in self.cfg:
             flags += ["--cfg", f"{path}:{value}"]
         return flags
 
-    def _connect_endpoints(self) -> list[str]:
+    @property
+    def connect_endpoints(self) -> list[str]:
+        """The endpoints that it connects to, without those of a configuration file."""
         if self.connect is None:
-            return {"router": [], "client": [RENDEZVOUS[0]]}.get(self.mode, [*RENDEZVOUS])
+            return [*self.meeting_points[: {"router": 0, "client": 1}.get(self.mode)]]
         return list(self.connect)
 
     def _listen_endpoints(self) -> list[str]:
         if self.mode == "client":
             return []
         if self.mode == "router":
-            return [RENDEZVOUS[0]] if self.listen is None else list(self.listen)
-        # A peer whose endpoint is taken still needs a port where the others can reach it.
+            return [*self.meeting_points[:1]] if self.listen is None else list(self.listen)
+        # A peer whose endpoint is taken still needs one where the others can reach it.
         others = [one for one in self.listen or () if one not in self.rendezvous]
-        return [*self.rendezvous[:1], *others, LOOPBACK]
+        return [*self.rendezvous[:1], *others, self.own_endpoint]
 
 
 MODES = ("peer", "client", "router")
-VARIABLES = {name: f"HOLOZEN_{name.upper()}" for name in ("mode", "connect", "listen", "config")}
-"""Flag -> the environment variable that says the same where the flag is not given."""
+VARIABLES = {
+    name: f"HOLOZEN_{name.upper()}" for name in ("mode", "domain", "connect", "listen", "config", "private", "secure")
+}
+"""Flag -> the environment variable that is used where the flag is not given."""
 
+ROS_DOMAIN = "ROS_DOMAIN_ID"  # the domain where neither the flag nor our own variable gives one
+
+_ROLE_OF = {
+    "sim": "sim", "router": "router", "controller": "autopilot", "pose-service": "autopilot", "up": "",
+    **dict.fromkeys((
+        "teleop", "view", "stop", "release", "spawn", "delete", "param set", "param load", "xacro",
+    ), "operator"),
+    **dict.fromkeys((
+        "doctor", "graph", "list", "map", "plot", "record", "tf echo", "bag record", "node list", "node info",
+        "param list", "param get", "param describe", "param dump", "service list", "service type", "service find",
+        "service info", "topic list", "topic info", "topic type", "topic find", "topic echo", "topic hz", "topic bw",
+        "topic delay", "topic plot",
+    ), "viewer"),
+}  # fmt: skip
+"""Verb -> whose certificate it uses; others are scripts."""
+
+_INTACT: dict[str, object] = {
+    # On a busy machine Zenoh frees shared memory that a receiver still reads: payloads of some 300 KB came corrupted.
+    "transport/shared_memory/enabled": False,
+}
 _ALWAYS: dict[str, object] = {
     "scouting/multicast/enabled": False,
     "scouting/delay": 0,
@@ -129,13 +188,21 @@ _ALWAYS: dict[str, object] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add Zenoh's own flags, with the names that its other tools use."""
-    text = f"how to connect; by default peers meet on loopback at {RENDEZVOUS[0]}. Where a flag is not given, "
-    group = parser.add_argument_group("zenoh", f"{text}{', '.join(VARIABLES.values())} say the same.")
+    where = f"{RENDEZVOUS[0]}, in domain N {DOMAIN_PORTS} N ports above"
+    text = f"how to connect; by default peers meet on loopback at {where}. Where a flag is not given, "
+    group = parser.add_argument_group("zenoh", f"{text}{', '.join(VARIABLES.values())} set the same.")
     group.add_argument("--mode", choices=MODES, help="Zenoh session mode (default: peer)")
+    group.add_argument("--domain", type=domain, metavar="N",
+        help="meet only nodes of domain N, 0 to 232; 0 is the default, and ROS_DOMAIN_ID sets it too")  # fmt: skip
     for name, example in (("connect", "tcp/10.0.0.2:7447"), ("listen", "tcp/0.0.0.0:7447")):
         text = f"{name} there, such as {example}"
         group.add_argument(f"--{name}", action="append", type=endpoint, metavar="ENDPOINT", help=text)
     group.add_argument("--config", metavar="FILE", help="a Zenoh configuration file (JSON5 or YAML)")
+    group.add_argument("--private", action="store_const", const=True,
+        help="meet at Unix sockets that only you can reach, and open no port")  # fmt: skip
+    group.add_argument("--secure", nargs="?", const="", metavar="DIR",
+        help="use the certificates of `holozen secure` in this folder (default: ~/.config/holozen/secure)")  # fmt: skip
+    parser.set_defaults(role=_ROLE_OF.get(parser.prog.removeprefix("holozen "), "script"))
     group.add_argument("--wire", choices=("json", "msgpack", "cdr"), default="json", help="encoding of messages")
     group.add_argument("--cfg", action="append", type=_pair, default=[], metavar="PATH:VALUE",
         help="a single Zenoh setting")  # fmt: skip
@@ -145,7 +212,7 @@ def from_arguments(args: argparse.Namespace) -> Connection:
     """The Connection that the flags of `add_arguments` describe. Exits with code 2 for a wrong environment variable."""
     given = {name: value for name in VARIABLES if (value := getattr(args, name)) is not None}
     try:
-        return from_environment(**given, cfg=tuple(args.cfg), wire=args.wire)
+        return from_environment(args.role, **given, cfg=tuple(args.cfg), wire=args.wire)
     except BusError as error:
         from holozen.console import report
 
@@ -153,29 +220,112 @@ def from_arguments(args: argparse.Namespace) -> Connection:
         raise SystemExit(2) from None
 
 
-def from_environment(**given: object) -> Connection:
-    """The Connection of the environment variables; `given` values win. Raises BusError for a wrong variable."""
-    values = {name: _variable(name) for name in VARIABLES if name not in given} | given
-    values["mode"] = values["mode"] or "peer"
+def from_environment(role: str = "script", **given: object) -> Connection:
+    """The Connection of the environment variables; `given` values win. Raises BusError for a wrong variable.
+
+    `role`: whose certificate it uses where the folder of `secure` has those of all; empty: it uses none itself.
+    """
+    values: dict[str, Any] = {name: _variable(name) for name in VARIABLES if name not in given} | given
+    if values["secure"] is not None:
+        _check_closed(values, "--secure", ("listen", "connect"))
+        values["mode"], values["secure"] = values["mode"] or "client", _member(values["secure"], role)
+    if values["private"]:
+        from holozen.transport.private import folder
+
+        _check_closed(values, "--private", ())
+        values["private"] = folder()
+    values["mode"], values["domain"] = values["mode"] or "peer", int(values["domain"] or 0)
+    values |= {name: values[name] or "" for name in ("private", "secure")}
     for name in ("connect", "listen"):
-        values[name] = None if values[name] is None else tuple(values[name])  # type: ignore[arg-type]
-    return Connection(**values)  # type: ignore[arg-type]
+        values[name] = None if values[name] is None else tuple(values[name])
+    return Connection(**values)
+
+
+def _check_closed(values: "dict[str, Any]", flag: str, tls: tuple[str, ...]) -> None:
+    """Raise BusError if other flags or variables open what `flag` closes. `tls`: flags that give TLS endpoints."""
+    flag = f"{flag} (or {VARIABLES[flag[2:]]})"
+    for name in ("connect", "listen", "config"):
+        if values[name] is not None and name not in tls:
+            raise BusError(f"{flag} excludes --{name}: leave it out, and unset {VARIABLES[name]}")
+        for one in values[name] or ():
+            # What follows # in an endpoint would override the certificates.
+            if not one.startswith("tls/") or set(one) & set("#?;"):
+                raise BusError(f"{flag} needs endpoints such as tls/HOST:7447, not --{name} {one}")
+    for path, _ in values.get("cfg", ()):
+        if not path.startswith(("transport/link/tx/", "transport/link/rx/", "transport/unicast/")):
+            raise BusError(f"{flag} excludes --cfg {path}: leave it out")
+    if tls and (values["private"] or values["mode"] == "peer"):
+        other = "--private" if values["private"] else "--mode peer"
+        raise BusError(f"{flag} excludes {other}: all are clients of a router, `holozen router --secure`")
+
+
+def secure_folder() -> str:
+    """Where certificates are without a flag: by the environment variable, else in the user's configuration."""
+    config = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
+    return os.environ.get(VARIABLES["secure"]) or os.path.join(config, "holozen", "secure")
+
+
+def _member(given: str, role: str) -> str:
+    """The folder of a member: the one given, or that of a role below it. Raises BusError if it cannot be used."""
+    path = os.path.abspath(given or secure_folder())
+    if not os.path.exists(os.path.join(path, "cert.pem")):
+        if not os.path.isdir(path):
+            why = "there is no such folder; `holozen secure init` makes certificates"
+            raise BusError(f"--secure {path}: {why}, and what follows --secure is taken for their folder")
+        path = os.path.join(path, role)
+    if role:
+        from holozen.transport.members import load, read_members
+
+        load(path)
+        _ = role in ("sim", "router") and read_members(path)
+    return path
+
+
+def _tls(folder: str, mode: str) -> "dict[str, object]":
+    """Zenoh's settings for mutual TLS, and a router's access control. Raises BusError."""
+    tls = "transport/link/tls/"
+    way = "listen" if mode == "router" else "connect"
+    values: dict[str, object] = {
+        f"{tls}root_ca_certificate": f"{folder}/ca.pem",
+        f"{tls}{way}_certificate": f"{folder}/cert.pem",
+        f"{tls}{way}_private_key": f"{folder}/key.pem",
+        f"{tls}enable_mtls": True,
+        f"{tls}verify_name_on_connect": True,
+        f"{tls}close_link_on_expiration": True,
+        # Zenoh puts a message together before it looks at its sender's permissions.
+        "transport/link/rx/max_message_size": LARGEST_MESSAGE,
+    }
+    if mode == "router":
+        from holozen.transport.members import read_members
+        from holozen.transport.roles import access_control
+
+        roles = {name: row["role"] for name, row in read_members(folder).items()}
+        values["access_control"] = access_control(roles)
+    return values
 
 
 def _variable(name: str) -> "str | list[str] | None":
     """The value of a flag's environment variable; None if it is unset or empty. Raises BusError."""
     variable = VARIABLES[name]
+    if name == "domain" and not os.environ.get(variable, "").strip():
+        variable = ROS_DOMAIN
     text = os.environ.get(variable, "").strip()
     wrong = ""
     if not text:
         return None
     if name == "mode" and text not in MODES:
         wrong = f"{suggest(text, MODES)}; use {', '.join(MODES)}"
+    if name == "domain" and not _is_domain(text):
+        wrong = f": use a number from 0 to {LAST_DOMAIN}"
+    if name == "private" and text not in ("0", "1"):
+        wrong = ": use 1 or 0"
     if name == "config" and not os.path.isfile(text):
         wrong = ": there is no such file"
     if wrong:
         raise BusError(f"{variable}={text!r}{wrong}, or unset it")
-    if name in ("mode", "config"):
+    if name == "private" and text == "0":
+        return None
+    if name in ("mode", "domain", "config", "private", "secure"):
         return text
     endpoints = [one.strip() for one in text.split(",")]
     for one in endpoints:
@@ -189,6 +339,17 @@ def endpoint(text: str) -> str:
     if wrong := fault(text):
         raise refused(wrong)
     return text
+
+
+def domain(text: str) -> int:
+    """Parses the number of a domain, ours or ROS 2's."""
+    if not _is_domain(text):
+        raise refused(f"{text!r}: use a number from 0 to {LAST_DOMAIN}")
+    return int(text)
+
+
+def _is_domain(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) < 4 and int(text) <= LAST_DOMAIN
 
 
 def _pair(text: str) -> tuple[str, str]:
@@ -220,11 +381,23 @@ def fault(text: str) -> str:
     return ""
 
 
+def socket_path(endpoint: str) -> str:
+    """The path of a Unix socket's endpoint; empty for any other."""
+    return endpoint.removeprefix(UNIX) if endpoint.startswith(UNIX) else ""
+
+
 def address(endpoint: str) -> tuple[str, int] | None:
     """Host and port of a TCP endpoint such as tcp/127.0.0.1:7447; None for any other."""
     kind, _, place = endpoint.partition("#")[0].partition("?")[0].partition("/")
     host, _, port = place.rpartition(":")
     return (host.strip("[]"), int(port)) if kind in ("tcp", "tls") and port.isdecimal() and int(port) < 65536 else None
+
+
+def from_here(listening: str) -> str:
+    """The endpoint at which a process of this machine reaches one that listens there."""
+    kind, _, place = listening.partition("/")
+    host, _, port = place.rpartition(":")
+    return f"{kind}/127.0.0.1:{port}" if host in ("0.0.0.0", "[::]") else listening
 
 
 def covers(listening: str, endpoint: str) -> bool:

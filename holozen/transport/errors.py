@@ -19,3 +19,7 @@ class ServiceError(BusError):
 
 class NoReply(ServiceError):
     """There was no reply in time."""
+
+
+class Elsewhere(BusError):
+    """Another server of the same key replies to this request."""

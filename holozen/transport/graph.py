@@ -9,13 +9,12 @@ from __future__ import annotations
 import functools
 import json
 import os
-import threading
 import time
-from collections import Counter, deque, namedtuple
+from collections import Counter, deque
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, NamedTuple
 
-from holozen.transport.samples import Declared, source
+from holozen.transport.samples import Answers, source
 
 ALL = "@holozen/**"
 ALL_NODE_INFO = "@holozen/*/about"
@@ -24,7 +23,7 @@ MAX_GONE = 1000  # tokens kept until `left` is called; the oldest are dropped
 KINDS = ("node", "pub", "sub", "srv")
 
 
-class Endpoint(namedtuple("Endpoint", "key kind type node session")):  # all str; `typing` would take 3 ms to load
+class Endpoint(NamedTuple):
     """One node, or one of its publishers ("pub"), subscribers ("sub") or services ("srv")."""
 
     key: str
@@ -223,46 +222,27 @@ def version(package: str) -> str:
         return ""
 
 
-class Definition(Declared):
-    """Answers queries for the definition of a type from a thread of its own, until the bus is closed."""
+class Definition(Answers):
+    """Answers queries for the definition of a type."""
 
     def __init__(self, session: Any, channel: Any, type_name: str, text: str) -> None:
-        self._key, self._text = definition_key(str(session.zid()), type_name), text
-        super().__init__(queryable := session.declare_queryable(self._key, channel))
-        self._queries = queryable.handler
-        self.thread = threading.Thread(target=self._serve, daemon=True)
-        self.thread.start()
-
-    def _serve(self) -> None:
-        while True:
-            try:
-                query = self._queries.recv()
-            except Exception:  # as in NodeInfo
-                return
-            with query:
-                query.reply(self._key, self._text, encoding="text/plain")
+        key = definition_key(str(session.zid()), type_name)
+        super().__init__(
+            session.declare_queryable(key, channel), lambda query: query.reply(key, text, encoding="text/plain")
+        )
 
 
-class NodeInfo(Declared):
-    """Answers queries about this node from a thread of its own, until the bus is closed."""
+class NodeInfo(Answers):
+    """Answers queries about this node."""
 
     def __init__(self, session: Any, channel: Any, node: str, exposed: list[str]) -> None:
         self._key = node_info_key(str(session.zid()))
-        super().__init__(queryable := session.declare_queryable(self._key, channel))
-        self._queries = queryable.handler
         self._fixed = {"node": node, "host": os.uname().nodename, "pid": os.getpid(), "exposed": exposed}
-        self.thread = threading.Thread(target=self._serve, daemon=True)
-        self.thread.start()
+        super().__init__(session.declare_queryable(self._key, channel), self._reply)
 
-    def _serve(self) -> None:
-        while True:
-            try:
-                query = self._queries.recv()
-            except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
-                return
-            with query:
-                # Looked up on the first query: it takes longer than the rest of the start.
-                if "version" not in self._fixed:
-                    self._fixed |= {"version": version("holozen"), "zenoh": version("eclipse-zenoh")}
-                info = self._fixed | {"time": time.time()}
-                query.reply(self._key, json.dumps(info), encoding="application/json")
+    def _reply(self, query: Any) -> None:
+        # Looked up on the first query: it takes longer than the rest of the start.
+        if "version" not in self._fixed:
+            self._fixed |= {"version": version("holozen"), "zenoh": version("eclipse-zenoh")}
+        info = self._fixed | {"time": time.time()}
+        query.reply(self._key, json.dumps(info), encoding="application/json")

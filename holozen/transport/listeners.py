@@ -1,22 +1,26 @@
-"""Which processes of this machine listen on a TCP port, from /proc, and whether an endpoint can be reached."""
+"""Which processes of this machine listen at an endpoint, from /proc, and whether it can be reached."""
 
 import contextlib
 import os
+import pwd
 import socket
+import ssl
 import threading
 import time
 from collections.abc import Iterable
 from typing import NamedTuple
 
 from holozen.console import printable
-from holozen.transport.connection import address
+from holozen.transport.connection import address, socket_path
 
 PATIENCE = 0.4  # s to connect
+REFUSED = 1.0  # s for a router to refuse a certificate
+ACCEPTS = 0x10000  # the kernel's flag of a socket that listens
 HERE = ("127.0.0.1", "localhost", "::1", "0.0.0.0", "::")  # this machine
 
 
 class Holder(NamedTuple):
-    """A process that listens on a port. `pid` is 0 if it belongs to another user."""
+    """A process that listens at an endpoint. `pid` is 0 if it belongs to another user."""
 
     pid: int
     command: str = ""
@@ -32,16 +36,12 @@ class Holder(NamedTuple):
         """The fix if it does not answer."""
         if self.stopped:
             return f"continue it: kill -CONT {self.pid}"
-        return f"end it: kill {self.pid}" if self.pid else "ask the other user to end it"
+        return f"end it: kill {self.pid}" if self.pid else "ask the other user to end it, or choose another --domain"
 
 
-def holders(port: int, proc: str = "/proc") -> list[Holder]:
-    """The processes that listen on a port of this machine, as far as /proc lists them."""
-    sockets = set()
-    for table in ("tcp", "tcp6"):
-        with contextlib.suppress(OSError), open(f"{proc}/net/{table}") as file:
-            rows = [line.split() for line in file.readlines()[1:]]
-            sockets |= {f"socket:[{row[9]}]" for row in rows if row[3] == "0A" and row[1].endswith(f":{port:04X}")}
+def holders(endpoint: str, proc: str = "/proc") -> list[Holder]:
+    """The processes that listen at an endpoint of this machine, as far as /proc lists them."""
+    sockets = _sockets(endpoint, proc)
     found = {}
     for pid in (name for name in os.listdir(proc) if name.isdecimal() and sockets):
         with contextlib.suppress(OSError):
@@ -52,6 +52,38 @@ def holders(port: int, proc: str = "/proc") -> list[Holder]:
     return sorted({found.get(each, Holder(0)) for each in sockets})
 
 
+def shared(endpoints: Iterable[str]) -> str:
+    """A warning that another person's process listens at one of `endpoints`, to follow a node's name; empty without."""
+    for endpoint in endpoints:
+        for number in {*_sockets(endpoint, "/proc").values()} - {-1, 0, os.geteuid()}:
+            user = str(number)
+            with contextlib.suppress(KeyError):
+                user = pwd.getpwuid(number).pw_name
+            apart = "--domain N (or HOLOZEN_DOMAIN) or --private keeps you apart"
+            return f"shares {endpoint} with user {user}, so that each drives the robots of both; {apart}"
+    return ""
+
+
+def _sockets(endpoint: str, proc: str) -> dict[str, int]:
+    """The sockets that listen at an endpoint of this machine, as /proc/PID/fd names them, with their users' ids (-1 if
+    unknown).
+    """
+    place, path = address(endpoint), socket_path(endpoint)
+    if path:  # Num RefCount Protocol Flags Type St Inode Path
+        rows = _rows(f"{proc}/net/unix")
+        return {f"socket:[{row[6]}]": -1 for row in rows if row[7:] == [path] and int(row[3], 16) & ACCEPTS}
+    if not place or place[0] not in HERE:
+        return {}
+    rows = [*_rows(f"{proc}/net/tcp"), *_rows(f"{proc}/net/tcp6")]
+    return {f"socket:[{row[9]}]": int(row[7]) for row in rows if row[3] == "0A" and row[1].endswith(f":{place[1]:04X}")}
+
+
+def _rows(table: str) -> list[list[str]]:
+    with contextlib.suppress(OSError), open(table) as file:
+        return [line.split() for line in file.readlines()[1:]]
+    return []
+
+
 def _holder(pid: int, proc: str) -> Holder:
     with open(f"{proc}/{pid}/cmdline", "rb") as file, open(f"{proc}/{pid}/stat", "rb") as stat:
         program, *words = file.read(10_000).decode(errors="replace").split("\0")
@@ -60,7 +92,7 @@ def _holder(pid: int, proc: str) -> Holder:
 
 
 class Attempts:
-    """TCP connection attempts in parallel, each for at most `seconds`. Other protocols are skipped."""
+    """Connection attempts, by TCP or to Unix sockets, in parallel, each for at most `seconds`. Others are skipped."""
 
     def __init__(self, endpoints: Iterable[str], seconds: float) -> None:
         self._seconds = seconds
@@ -68,7 +100,7 @@ class Attempts:
         """Endpoint -> why the connection failed, empty if it succeeded; absent during the attempt."""
         self._threads = []
         for endpoint in endpoints:
-            if place := address(endpoint):
+            if place := socket_path(endpoint) or address(endpoint):
                 # In threads: resolving a name may take longer than the socket's timeout.
                 self._threads.append(threading.Thread(target=self._try, args=(endpoint, place), daemon=True))
                 self._threads[-1].start()
@@ -84,9 +116,14 @@ class Attempts:
             thread.join(max(0.0, deadline - time.monotonic()))
         return dict(self.reasons)
 
-    def _try(self, endpoint: str, place: tuple[str, int]) -> None:
+    def _try(self, endpoint: str, place: str | tuple[str, int]) -> None:
         try:
-            socket.create_connection(place, timeout=self._seconds).close()
+            if isinstance(place, str):
+                with socket.socket(socket.AF_UNIX) as probe:
+                    probe.settimeout(self._seconds)
+                    probe.connect(place)
+            else:
+                socket.create_connection(place, timeout=self._seconds).close()
             self.reasons[endpoint] = ""
         except (OSError, UnicodeError) as error:
             self.reasons[endpoint] = getattr(error, "strerror", None) or str(error)
@@ -113,8 +150,8 @@ def is_open(endpoint: str) -> bool:
 
 
 def reached(endpoints: Iterable[str]) -> dict[str, str]:
-    """Endpoint -> why a TCP connection to it fails, empty if it succeeds. Other protocols are skipped."""
-    endpoints = [endpoint for endpoint in endpoints if address(endpoint)]
+    """Endpoint -> why a connection to it fails, empty if it succeeds; for TCP and Unix sockets."""
+    endpoints = [endpoint for endpoint in endpoints if socket_path(endpoint) or address(endpoint)]
     return dict.fromkeys(endpoints, f"no answer within {PATIENCE:g} s") | Attempts(endpoints, PATIENCE).wait()
 
 
@@ -122,10 +159,30 @@ def unanswered(endpoints: Iterable[str], within: float) -> str:
     """Why no Zenoh node answers at `endpoints`, and what to do, in one line about the first with a known reason."""
     reasons = reached(endpoints)
     for endpoint, reason in reasons.items():
-        place = address(endpoint)
-        if place and place[0] in HERE and (here := holders(place[1])):
+        if here := holders(endpoint):
             return f"{endpoint} is held by {' and '.join(map(str, here))}, which does not answer; {here[0].fix}"
         if not reason:
             return f"{endpoint} accepts connections but does not answer as Zenoh does; check what listens there"
     where = ", ".join(endpoints)
     return f"no answer from {where} within {within:g} s; check address and network, and what listens there"
+
+
+def rejection(endpoint: str, folder: str) -> str:
+    """Why a router at a TLS endpoint and the member of a folder do not accept each other; empty if they may."""
+    host, port = address(endpoint) or ("", 0)
+    try:
+        context = ssl.create_default_context(cafile=f"{folder}/ca.pem")
+        context.load_cert_chain(f"{folder}/cert.pem", f"{folder}/key.pem")
+        with (
+            socket.create_connection((host, port), timeout=REFUSED) as plain,
+            context.wrap_socket(plain, server_hostname=host) as link,
+        ):
+            link.recv(1)  # a refusal of ours comes after the handshake; Zenoh itself waits
+    except ssl.SSLCertVerificationError as error:
+        return f"{endpoint} is no router of this authority: {error.verify_message}"
+    except ssl.SSLError as error:
+        reason = (error.reason or str(error)).lower().replace("_", " ")
+        return f"{endpoint} refuses the certificate in {folder}: {reason}"
+    except OSError:  # nothing listens there, or it waits
+        pass
+    return ""

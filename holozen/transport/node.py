@@ -9,18 +9,21 @@ import contextlib
 import re
 import threading
 from collections.abc import Callable
-from functools import partial
-from typing import Any, Self, TypeVar
+from functools import cached_property, partial
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import zenoh
 
 from holozen.console import report
 from holozen.transport import graph as graphs
-from holozen.transport.connection import Connection, from_environment
+from holozen.transport.connection import UNIX, Connection, from_environment
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Graph, NodeInfo
 from holozen.transport.samples import Declared, RawSubscriber, Replies, source
 from holozen.transport.session import CLOSE_LIMIT, Opening, linked, one_line, wait_for_threads
+
+if TYPE_CHECKING:
+    from holozen.transport.members import Member
 
 D = TypeVar("D", bound=Declared)
 
@@ -31,7 +34,7 @@ DEFINITION_WAIT = 0.5  # s for a node to answer
 class Node:
     """A node on the wire. Use it in `with`: an open session keeps a Python process from ending.
 
-    `wire` is "json" or "msgpack", by default as the connection says. `lasting` is for long-running nodes, which are
+    `wire` is "json" or "msgpack", by default that of the connection. `lasting` is for long-running nodes, which are
     listed in the graph; with `patience` and `stop` it is one of Opening. With an early Opening, the first use waits for
     it, and raises its error.
     """
@@ -49,10 +52,15 @@ class Node:
         if not isinstance(connection, Opening):
             connection = Opening(connection or from_environment(), lasting=lasting, patience=patience, stop=stop)
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
-        self._closing, self._opened = connection.closing, connection.opened
+        self._closing, self._opened, self._secure = connection.closing, connection.opened, connection.secure
         self._declared: set[Declared] = set()
         self._keeper = self._opened().keeper if lasting else None
         if lasting:
+            if taken := self._opened().taken:
+                from holozen.transport.listeners import shared
+
+                if warning := shared(taken):
+                    report(f"{node}: {warning}")
             if exposed := self.exposed():
                 from holozen.transport.listeners import exposure
 
@@ -78,7 +86,21 @@ class Node:
     @property
     def source(self) -> str:
         """The name of this node in the samples that it sends."""
-        return source(self.node, self.id)
+        return source(self._signer, self.id)
+
+    @property
+    def _signer(self) -> str:
+        """The name that stands before the session in its stamps: in the secure set-up `member/node`."""
+        return f"{self.member.name}/{self.node}" if self.member else self.node
+
+    @cached_property
+    def member(self) -> Member | None:
+        """Whose certificate it uses; None outside the secure set-up."""
+        if not self._secure:
+            return None
+        from holozen.transport.members import load  # loads cryptography
+
+        return load(self._secure)
 
     def __enter__(self) -> Self:
         return self
@@ -93,7 +115,7 @@ class Node:
 
     def exposed(self) -> list[str]:
         """The endpoints that other machines can reach without a password, a certificate or a permission."""
-        if self._opened().is_guarded or all(one.startswith("tcp/127.0.0.1:") for one in self.listens):
+        if self._opened().is_guarded or all(one.startswith(("tcp/127.0.0.1:", UNIX)) for one in self.listens):
             return []
         from holozen.transport.listeners import is_open  # loads socket
 

@@ -3,10 +3,14 @@
 The offset is the sender's clock minus ours. A round trip that began at t0, that the sender answered at s, and whose
 answer we read at t1 gives: s - t1 <= offset <= s - t0. A sample with stamp s that was read at a gives: s - a <= offset,
 since it cannot arrive before it is sent. The tightest bounds are kept, and loosened by DRIFT as they age.
+
+In the secure set-up an answer is signed, together with a number that was made for its question: a session's id is no
+proof, since anyone may open one under an id that was used before, and so make old commands look new.
 """
 
 from __future__ import annotations
 
+import os
 import time
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -30,9 +34,11 @@ def clock_key(session: str) -> str:
 
 
 class _Peer:
-    """The bounds of one session's clock. `confirmed` is when its last completed round trip began."""
+    """The bounds of one session's clock. `confirmed` is when its last completed round trip began, `member` signed its
+    answer, `nonce` the number that the next one has to sign.
+    """
 
-    __slots__ = ("asked", "commands", "confirmed", "due", "highest", "left", "lowest", "replies")
+    __slots__ = ("asked", "commands", "confirmed", "due", "highest", "left", "lowest", "member", "nonce", "replies")
 
     def __init__(self, now: float) -> None:
         self.lowest: tuple[float, float] | None = None  # a bound of the offset, and when it was found
@@ -40,6 +46,7 @@ class _Peer:
         self.confirmed = -1.0
         self.commands = False  # whether a command of it has been seen
         self.replies: Any = None
+        self.member, self.nonce = "", b""
         self.asked, self.due, self.left = 0.0, now, FIRST
 
     def at_least(self, now: float) -> float:
@@ -61,16 +68,21 @@ class _Peer:
 
 
 class PeerClocks:
-    """The clocks of the sessions that command. `ask` requests a session's clock and returns its replies, `has`
-    returns whether a session is alive.
+    """The clocks of the sessions that command. `ask` requests a session's clock, with a nonce, and returns its replies,
+    `has` returns whether a session is alive. `signer`, in the secure set-up, returns the member that signed an answer
+    of a session to a nonce; "": none that may command.
 
     No thread: `poll` is called in a loop, and never waits. All times are in seconds of this process's monotonic clock.
     """
 
     def __init__(
-        self, ask: Callable[[str, float], Any], has: Callable[[str], bool], clock: Callable[[], float] = time.monotonic
+        self,
+        ask: Callable[[str, bytes, float], Any],
+        has: Callable[[str], bool],
+        clock: Callable[[], float] = time.monotonic,
+        signer: Callable[[str, bytes, bytes], str] | None = None,
     ) -> None:
-        self._ask, self.has, self._clock = ask, has, clock
+        self._ask, self.has, self._clock, self._signer = ask, has, clock, signer
         self._peers: dict[str, _Peer] = {}
 
     def track(self, sessions: Iterable[str], now: float) -> None:
@@ -93,14 +105,18 @@ class PeerClocks:
             del self._peers[other]
         self._peers.setdefault(session, _Peer(now)).commands = True
 
-    def ages(self, session: str, sent: float, now: float) -> tuple[float, float] | None:
-        """Bounds of the age in seconds of a sample that a session sent at `sent` by its own clock.
+    def ages(self, session: str, sent: float, now: float, member: str = "") -> tuple[float, float] | None:
+        """Bounds of the age in seconds of a sample that a session sent at `sent` by its own clock. `now` may be some
+        milliseconds past: a fleet takes time to read.
 
-        None while that clock is unbounded. The sample refines the lower bound, within those of round trips.
+        None while that clock is unbounded, or in the secure set-up if another `member` than the sample's signed it. The
+        sample refines the lower bound, within those of round trips.
         """
         peer = self._peers.get(session)
-        if peer is None or peer.highest is None:
+        if peer is None or peer.highest is None or (self._signer and member != peer.member):
             return None
+        if sent - now > peer.at_least(now):  # it may have come after `now`
+            now = max(now, self._clock())
         if sent - now > peer.at_most(now) + CONTRADICTION:  # from the future: measure again
             peer.due = min(peer.due, now)
             return None
@@ -125,19 +141,20 @@ class PeerClocks:
         room = MAX_ASKED
         for session, peer in self._peers.items():
             if peer.replies is not None:
-                self._read(peer, now)
+                self._read(session, peer, now)
             if peer.replies is not None:
-                room -= now - peer.asked < SLOW  # whoever never answers keeps no place
+                room -= now - peer.asked < SLOW  # a peer that never answers keeps no place
             elif now >= peer.due:
                 due.append((not peer.commands, peer.due, session))
         for _, _, session in sorted(due)[: max(room, 0)]:
             peer = self._peers[session]
+            peer.nonce = os.urandom(16) if self._signer else b""
             peer.asked = self._clock()
-            peer.replies = self._ask(session, GIVE_UP)
+            peer.replies = self._ask(session, peer.nonce, GIVE_UP)
             peer.left = max(0, peer.left - 1)
             peer.due = now if peer.left else now + AGAIN
 
-    def _read(self, peer: _Peer, now: float) -> None:
+    def _read(self, session: str, peer: _Peer, now: float) -> None:
         try:
             reply = peer.replies.try_recv()
         except BusError:  # it timed out, or the session is gone
@@ -145,8 +162,13 @@ class PeerClocks:
             return
         if reply is None:
             return
-        peer.replies = None
         answered = _seconds(reply)
+        if self._signer and isinstance(reply, Sample):
+            if not (member := self._signer(session, peer.nonce, reply.payload)):
+                return  # the one that counts may follow
+            if member != peer.member:
+                peer.member, peer.lowest, peer.highest = member, None, None
+        peer.replies = None
         if answered is not None:
             peer.confirmed = peer.asked
             read = self._clock()
@@ -154,7 +176,6 @@ class PeerClocks:
 
 
 def _seconds(reply: Sample | bytes) -> float | None:
-    """The clock in a reply, in seconds; None for an error or a malformed one."""
-    if not isinstance(reply, Sample) or not reply.payload.isdigit() or len(reply.payload) > 20:
-        return None
-    return int(reply.payload) * 1e-9
+    """The clock in a reply, in seconds; None for an error or a malformed one. A signature may follow."""
+    clock = reply.payload.partition(b";")[0] if isinstance(reply, Sample) else b""
+    return int(clock) * 1e-9 if clock.isdigit() and len(clock) <= 20 else None

@@ -10,7 +10,7 @@ from itertools import count
 from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
 
 from holozen.transport.errors import BusError
-from holozen.transport.samples import Declared, RawSubscriber, Sample
+from holozen.transport.samples import Answers, Declared, RawSubscriber, Sample
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 M = TypeVar("M", bound="Message")
 
 GET_PATIENCE = 1.0  # s that a get waits for the next message of a publisher that sends only what is wanted
+SELDOM = 16  # messages between two looks whether the readers have left
 SLOWEST = 5.0  # s; after this long any stream is stale
 
 
@@ -25,7 +26,8 @@ class Publisher(Declared, Generic[M]):
     """Writes messages; a `get` on its key is answered with the last one, see Gets. Made by `Bus.publisher`.
 
     Each carries the attachment that `stamp` makes, with the sender and the time of sending, and a sequence number, by
-    which readers count lost samples. `number` converts it to Zenoh's SourceInfo. `watch` declares a listener of whether
+    which readers count lost samples. `number` converts it to Zenoh's SourceInfo. `sign` makes a command's attachment
+    of a stamp, the encoding and the payload. `watch` declares a listener of whether
     anyone subscribes.
     """
 
@@ -36,18 +38,19 @@ class Publisher(Declared, Generic[M]):
         stamp: Callable[[], bytes],
         number: Callable[[int], Any],
         watch: Callable[[], Any],
+        sign: Callable[[bytes, str, bytes], bytes] | None = None,
     ) -> None:
         from holozen.messages import codec
 
         super().__init__(publisher)
         self.key: Any = publisher.key_expr
         self.gets: Gets | None = None  # set by the bus
-        self._publisher, self._wire, self._stamp = publisher, wire, stamp
+        self._publisher, self._wire, self._stamp, self._sign = publisher, wire, stamp, sign
         self._written, self._named, self._encoding = codec.written, codec.encoding, publisher.encoding
         self._last: tuple[bytes, Any] | None = None  # with its Encoding
         self.numbers = map(number, count())
         self._statuses: Any = None
-        self._watch, self._is_matched = watch, False
+        self._watch, self._is_matched, self._looks = watch, False, 0
         self._next: threading.Event | None = None  # set by the next message; there once `wanted` was read
 
     @property
@@ -57,15 +60,17 @@ class Publisher(Declared, Generic[M]):
 
     @property
     def wanted(self) -> bool:
-        """Whether anyone subscribes, or a get waits. Who reads it may leave out messages that nobody wants: from then
-        on a get is answered with the next message.
+        """Whether anyone subscribes, or a get waits. The caller may leave out messages that are not wanted: from the
+        first look on, a get is answered with the next message.
         """
         if self._next is None:
             self._next = threading.Event()
             listener = self._watch()
             self.ends.append(listener)
             self._statuses = listener.handler
-        if (status := self._statuses.try_recv()) is not None:
+        # A reader that has left costs some messages that go nowhere; one that came is looked for each time.
+        self._looks += 1
+        if (not self._is_matched or self._looks % SELDOM == 0) and (status := self._statuses.try_recv()) is not None:
             self._is_matched = status.matching
         return self._is_matched or not self._next.is_set()
 
@@ -79,12 +84,15 @@ class Publisher(Declared, Generic[M]):
     def put_bytes(self, payload: bytes, encoding: str | None = None) -> None:
         """Send an encoded payload, by default in the encoding of this publisher."""
         self._last = payload, encoding or self._encoding
-        self._publisher.put(payload, encoding=encoding, attachment=self._stamp(), source_info=next(self.numbers))
-        if self._next is not None:
+        attachment = self._stamp()
+        if self._sign:
+            attachment = self._sign(attachment, str(self._last[1]), payload)
+        self._publisher.put(payload, encoding=encoding, attachment=attachment, source_info=next(self.numbers))
+        if self._next is not None and not self._next.is_set():
             self._next.set()
 
     def want(self) -> None:
-        """Let the next message be sent whoever subscribes: a get waits for it."""
+        """Let the next message be sent also without subscribers: a get waits for it."""
         if self._next is not None:
             self._next.clear()
 
@@ -103,15 +111,13 @@ class Publisher(Declared, Generic[M]):
             self.gets.remove(self)
 
 
-class Gets(Declared):
+class Gets(Answers):
     """Answers each get on a key expression with the last messages of some publishers there, from one thread."""
 
     def __init__(self, queryable: Any) -> None:
-        super().__init__(queryable)
-        self._queries, self._publishers = queryable.handler, set[Publisher[Any]]()
+        self._publishers = set[Publisher[Any]]()
         self._lock = threading.Lock()
-        self.thread = threading.Thread(target=self._answer, daemon=True)
-        self.thread.start()
+        super().__init__(queryable, self._reply)
 
     def add(self, publisher: Publisher[Any]) -> bool:
         """Answer for this publisher too; returns whether it can: it ended with the last one that was removed."""
@@ -127,20 +133,14 @@ class Gets(Declared):
             if not self._publishers:
                 self.close()
 
-    def _answer(self) -> None:
-        while True:
-            try:
-                query = self._queries.recv()
-            except Exception:  # as in RawSubscriber.recv
-                return
-            with query:
-                with self._lock:
-                    asked = [one for one in self._publishers if query.key_expr.intersects(one.key)]
-                for publisher in asked:
-                    publisher.want()
-                deadline = time.monotonic() + GET_PATIENCE
-                for publisher in asked:
-                    publisher.reply(query, deadline)
+    def _reply(self, query: Any) -> None:
+        with self._lock:
+            asked = [one for one in self._publishers if query.key_expr.intersects(one.key)]
+        for publisher in asked:
+            publisher.want()
+        deadline = time.monotonic() + GET_PATIENCE
+        for publisher in asked:
+            publisher.reply(query, deadline)
 
 
 class Received(NamedTuple, Generic[M]):
@@ -152,12 +152,20 @@ class Received(NamedTuple, Generic[M]):
 
 
 class Subscription(Generic[M]):
-    """Messages in order of arrival; if too many wait, the oldest are dropped."""
+    """Messages in order of arrival; if too many wait, the oldest are dropped. `refusal` returns why a sample is not
+    read, or "".
+    """
 
-    def __init__(self, samples: RawSubscriber, kinds: tuple[type[M], ...], tolerant: bool = False) -> None:
+    def __init__(
+        self,
+        samples: RawSubscriber,
+        kinds: tuple[type[M], ...],
+        tolerant: bool = False,
+        refusal: Callable[[Sample], str] | None = None,
+    ) -> None:
         from holozen.messages import codec
 
-        self.raw, self._kinds, self._tolerant = samples, kinds, tolerant
+        self.raw, self._kinds, self._tolerant, self._refusal = samples, kinds, tolerant, refusal
         self._decode, self._error = codec.decode, codec.CodecError
 
     def try_recv(self) -> Received[M] | None:
@@ -181,6 +189,8 @@ class Subscription(Generic[M]):
     def _received(self, sample: Sample) -> Received[M]:
         if sample.oversized:
             return Received(sample, None, f"oversized: {sample.size} bytes")
+        if self._refusal and (reason := self._refusal(sample)):
+            return Received(sample, None, reason)
         try:
             return Received(sample, self._decode(sample.payload, sample.encoding, self._kinds, self._tolerant))
         except self._error as error:

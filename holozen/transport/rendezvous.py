@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 
 from holozen.console import report
+from holozen.transport.connection import socket_path
 from holozen.transport.errors import BusError
 
 POLL = 0.2  # s between two checks of the points
@@ -59,15 +60,22 @@ def _nothing() -> None:
 
 
 def is_free(endpoint: str) -> bool:
-    """Whether a TCP endpoint such as tcp/127.0.0.1:7447 can be listened on. Makes no connection."""
+    """Whether an endpoint such as tcp/127.0.0.1:7447, or a Unix socket, can be listened on. Makes no connection."""
     return listen_error(endpoint) == ""
 
 
 def listen_error(endpoint: str) -> str:
-    """Why a TCP endpoint cannot be listened on now, as the system's text (IN_USE); empty if it can."""
+    """Why an endpoint, TCP, TLS or Unix, cannot be listened on now, in the system's words (IN_USE); else empty."""
+    if path := socket_path(endpoint):
+        from holozen.transport.private import is_locked
+
+        try:
+            return IN_USE if is_locked(path) else ""
+        except OSError as error:
+            return error.strerror or str(error)
     import socket  # takes 5 ms to load, which a verb that meets a robot does not need
 
-    host, _, port = endpoint.partition("?")[0].partition("#")[0].removeprefix("tcp/").rpartition(":")
+    host, _, port = endpoint.partition("?")[0].partition("#")[0].partition("/")[2].rpartition(":")
     with socket.socket(socket.AF_INET6 if host[:1] == "[" else socket.AF_INET) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         try:
@@ -78,7 +86,7 @@ def listen_error(endpoint: str) -> str:
 
 
 def is_taken(endpoint: str) -> bool:
-    """Whether another process holds a TCP endpoint of this machine."""
+    """Whether another process holds an endpoint of this machine."""
     return not endpoint.endswith(":0") and listen_error(endpoint) == IN_USE
 
 
@@ -96,7 +104,10 @@ def wait_for_link(
     Raises BusError if one is held and does not answer. A `lasting` process goes on without remote ones: those links
     come up later. Exits with code 0 when `stop` is set.
     """
-    near = [one for one in endpoints if one.startswith("tcp/") and one[4:].rpartition(":")[0] in LOOPBACK]
+    near = [
+        one for one in endpoints
+        if socket_path(one) or (one.startswith("tcp/") and one[4:].rpartition(":")[0] in LOOPBACK)
+    ]  # fmt: skip
     far = [one for one in endpoints if one.startswith(("tcp/", "tls/")) and one not in near]
     attempts = None
     begin = looked = reported = time.monotonic()

@@ -1,14 +1,13 @@
-"""Samples and replies as bytes: what they carry besides their payload, and who waits for them."""
+"""Samples and replies as bytes: what they carry besides their payload, and what waits for them."""
 
 from __future__ import annotations
 
 import contextlib
 import threading
 import time
-from collections import namedtuple
 from collections.abc import Callable, Iterator
 from itertools import count
-from typing import Any
+from typing import Any, NamedTuple
 
 from holozen.transport.errors import BusError
 
@@ -24,12 +23,15 @@ def source(node: str, session: str) -> str:
     return f"{node}@{session[:6]}"
 
 
-class Stamp(namedtuple("Stamp", "session number sent")):  # `typing` would take 2 ms for a first NamedTuple
-    """How a sample was sent: the session, an increasing sequence number, and the sender's clock in s (monotonic)."""
+class Stamp(NamedTuple):
+    """How a sample was sent: the session, an increasing sequence number, and the sender's clock in s (monotonic); and
+    whose certificate the sender claims, in the secure set-up.
+    """
 
     session: str
     number: int
     sent: float
+    member: str = ""
 
 
 def stamps(node: str, session: str) -> Callable[[], bytes]:
@@ -47,14 +49,15 @@ def source_in(attachment: Any) -> str:
 
 
 def _stamp_in(attachment: Any) -> Stamp | None:
-    """The stamp in an attachment; None if it is missing or malformed."""
+    """The stamp in an attachment; None if it is missing or malformed. A signature may follow, see members.py."""
     parts = bytes(attachment).split(b";") if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else []
-    if len(parts) != 3 or not all(part.isdigit() and len(part) < 20 for part in parts[1:]):
+    if len(parts) not in (3, 4) or not all(part.isdigit() and len(part) < 20 for part in parts[1:3]):
         return None
-    session = parts[0].rpartition(b"@")[2]
+    name, _, session = parts[0].rpartition(b"@")
     if not 0 < len(session) <= 32 or not session.isalnum():
         return None
-    return Stamp(session.decode(), int(parts[1]), int(parts[2]) * 1e-9)
+    member = name.partition(b"/")[0].decode(errors="replace")
+    return Stamp(session.decode(), int(parts[1]), int(parts[2]) * 1e-9, member)
 
 
 def release_memory() -> None:
@@ -86,14 +89,20 @@ class Sample:
     Most readers need only the payload, so the rest is read from Zenoh's sample on demand.
     """
 
-    __slots__ = ("_sample", "encoding", "oversized", "payload", "size")
+    __slots__ = ("_sample", "_stamp", "encoding", "oversized", "payload", "size")
 
     def __init__(self, sample: Any, limit: int = 0) -> None:
+        self._stamp: tuple[Stamp | None] | None = None  # once it was read
+        self._sample, self.encoding = sample, str(sample.encoding)
+        if not limit:
+            self.payload = bytes(sample.payload)
+            self.size, self.oversized = len(self.payload), False
+            return
         payload = sample.payload
-        self._sample, self.encoding, self.size = sample, str(sample.encoding), len(payload)
-        if limit and (named := len(sample.attachment or b"")) > MAX_ATTACHMENT_BYTES:
+        self.size = len(payload)
+        if (named := len(sample.attachment or b"")) > MAX_ATTACHMENT_BYTES:
             self.size += max(named, limit)
-        self.oversized = 0 < limit < self.size
+        self.oversized = limit < self.size
         self.payload = b"" if self.oversized else bytes(payload)
         if self.oversized and self.size > LARGE:
             release_memory()
@@ -109,6 +118,12 @@ class Sample:
         return PRIORITIES[int(self._sample.priority) - 1]
 
     @property
+    def attachment(self) -> bytes:
+        """Its attachment; empty without one, or if it is too long."""
+        attachment = self._sample.attachment
+        return bytes(attachment) if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else b""
+
+    @property
     def source(self) -> str:
         """Its sender; empty if it names none."""
         return source_in(self._sample.attachment)
@@ -116,7 +131,9 @@ class Sample:
     @property
     def stamp(self) -> Stamp | None:
         """Its stamp as claimed by the sender; None without one."""
-        return _stamp_in(self._sample.attachment)
+        if self._stamp is None:
+            self._stamp = (_stamp_in(self._sample.attachment),)
+        return self._stamp[0]
 
     @property
     def number(self) -> tuple[str, int] | None:
@@ -146,6 +163,25 @@ class Declared:
             end.undeclare()
 
 
+class Answers(Declared):
+    """Answers the queries of a queryable by `answer`, one after the other in a thread of its own, until `close`."""
+
+    def __init__(self, queryable: Any, answer: Callable[[Any], None]) -> None:
+        super().__init__(queryable)
+        self._queries, self._answer = queryable.handler, answer
+        self.thread = threading.Thread(target=self._run, daemon=True)
+        self.thread.start()
+
+    def _run(self) -> None:
+        while True:
+            try:
+                query = self._queries.recv()
+            except Exception:  # as in RawSubscriber.recv
+                return
+            with query:
+                self._answer(query)
+
+
 class RawSubscriber(Declared):
     """Raw samples; if too many wait, the oldest are dropped."""
 
@@ -172,7 +208,7 @@ class RawSubscriber(Declared):
 
 class Replies:
     """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error. With a `replier`, `try_recv`
-    skips those of any other session, by Zenoh's own id of who replied.
+    skips those of any other session, by Zenoh's own id of the replier.
     """
 
     def __init__(self, replies: Any, replier: str = "") -> None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from holozen.console import report
-from holozen.transport.errors import TIMEOUT, BusError, NoReply, ServiceError
+from holozen.transport.errors import TIMEOUT, BusError, Elsewhere, NoReply, ServiceError
 from holozen.transport.samples import Declared, Replies, Sample, release_memory, source_in
 
 if TYPE_CHECKING:
@@ -83,6 +83,7 @@ class Server(Declared):
         super().__init__(queryable)
         # Reading from the handler leaves the queryable free to be undeclared at the same time.
         self._queries = queryable.handler
+        self.listen = queryable.handler.try_recv  # Zenoh's next request or None, for `keep`
         self._waiting, self._room = Waiting(room), room
         self.caller = ""  # the claimed sender of the request that is being answered
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
@@ -90,7 +91,7 @@ class Server(Declared):
     def take_in(self, most: int = BATCH) -> int:
         """Read at most `most` requests from Zenoh's ring; returns how many wait."""
         while most > 0 and (query := self.try_recv()) is not None:
-            self._keep(query)
+            self.keep(query)
             most -= 1
         return len(self._waiting)
 
@@ -132,13 +133,19 @@ class Server(Declared):
     def _serve(self) -> None:
         while True:
             try:
-                self._keep(self.recv())
+                self.keep(self.recv())
             except BusError:
                 return
             while self.answer_pending(most=1):
                 pass
 
-    def _keep(self, query: Any) -> None:
+    @property
+    def is_waiting(self) -> bool:
+        """Whether any request that was taken in waits."""
+        return bool(self._waiting)
+
+    def keep(self, query: Any) -> None:
+        """Take in a request."""
         if not self.is_addressed(query):
             query.drop()
         elif (surplus := self._waiting.add(query)) is not None:
@@ -152,6 +159,8 @@ class Server(Declared):
                 self.reply(query, self._answer(self.read(query)))
             except ServiceError as error:
                 refuse(query, str(error), error.fields)
+            except Elsewhere:
+                pass
             except self._codec.CodecError as error:
                 refuse(query, str(error))
             except Exception as error:

@@ -16,7 +16,7 @@ import zenoh
 from holozen.background import at_once, background
 from holozen.console import report
 from holozen.transport import rendezvous
-from holozen.transport.connection import CLIENT_TRY, Connection, covers
+from holozen.transport.connection import CLIENT_TRY, Connection, covers, socket_path
 from holozen.transport.errors import BusError
 
 LAST = 1.0  # s to wait for threads at the end of the process
@@ -30,7 +30,7 @@ class Opened:
         self.session, self.took = session, took
         self.keeper: threading.Thread | None = None
         self.listens: list[str] = []  # the endpoints of this session itself
-        self.taken: list[str] = []  # the endpoints where it would have listened, but another process does
+        self.taken: list[str] = []  # the endpoints where it would have listened, but meets another process that does
         self.is_guarded = False  # whether connections need a password, a certificate or a permission
         self.point = ""  # the rendezvous point that this session itself holds
 
@@ -58,13 +58,14 @@ class Opening:
         early: bool = False,
     ) -> None:
         self.where, self.wire, self.closing = connection.where, connection.wire, threading.Event()
+        self.secure = connection.secure
         opening = partial(
             open_session, connection, lasting=lasting, stop=stop or self.closing, closing=self.closing,
             patience=None if lasting else rendezvous.PATIENCE if patience is None else patience,
         )  # fmt: skip
         try:
             self.opened = background(opening) if early else at_once(opening)
-        except BaseException:  # Ctrl-C, and nobody will close it: a thread that opens it gives up
+        except BaseException:  # Ctrl-C, and the caller will not close it: a thread that opens it gives up
             self.closing.set()
             raise
 
@@ -88,6 +89,7 @@ def open_session(
         opened.keeper = rendezvous.hold(points, closing, open_point)
     if mode == "peer":
         mine, connect = opened.listens, endpoints(config, "connect", mode)
+        opened.taken = [one for one in opened.taken if one in connect]
         others = [one for one in connect if not any(covers(listening, one) for listening in mine)]
         try:
             limit = rendezvous.PATIENCE if patience is None else patience
@@ -113,7 +115,7 @@ def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> 
         try:
             opened = Opened(zenoh.open(config))
         except zenoh.ZError as error:
-            used = next((one for one in listen if one in str(error) and "in use" in str(error)), None)
+            used = next((one for one in listen if _is_taken(one, str(error))), None)
             if mode != "peer" or not used:
                 raise BusError(opening(error, mode, connection.where, None)) from None
             listen.remove(used)
@@ -124,6 +126,11 @@ def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> 
         if opened.point:
             rendezvous.held.add(opened.point)
         return opened
+
+
+def _is_taken(endpoint: str, error: str) -> bool:
+    """Whether Zenoh's error is that another process listens at an endpoint."""
+    return (socket_path(endpoint) or endpoint) in error and ("in use" in error or "acquire lock" in error)
 
 
 def _open_client(
@@ -142,6 +149,7 @@ def _open_client(
                 if patience is not None and passed > patience:
                     raise BusError(_unreached(connection, config, patience))
                 if passed > rendezvous.NOTICE and not reported:
+                    _check_certificate(connection)
                     report(f"waiting for a Zenoh router at {connection.where}")
                     reported = True
         except BaseException:
@@ -179,6 +187,17 @@ class _Attempt:
         self.done.set()
         if self._abandoned and self.session:
             close(self.session)
+
+
+def _check_certificate(connection: Connection) -> None:
+    """Raise BusError if a router that is there and this certificate do not belong together: waiting does not help."""
+    if connection.secure:
+        from holozen.transport.listeners import rejection  # loads socket
+
+        if reason := next(
+            filter(None, (rejection(one, connection.secure) for one in connection.connect_endpoints)), ""
+        ):
+            raise BusError(reason)
 
 
 def _may_recover(error: Exception) -> bool:
@@ -268,6 +287,13 @@ def opening(error: Exception, mode: str, where: str, patience: float | None) -> 
     if text.startswith("Can not create a new TCP listener bound to "):
         endpoint, _, why = text.removeprefix("Can not create a new TCP listener bound to ").partition(": ")
         return f"cannot open Zenoh: cannot listen at {endpoint}: {_system(why)}"
+    if text.startswith("Can not create a new TLS listener on "):
+        place, _, why = text.removeprefix("Can not create a new TLS listener on ").partition(": ")
+        return f"cannot open Zenoh: cannot listen at tls/{place}: {_system(why)}"
+    if text.startswith("Can not create a new UnixSocketStream listener on "):
+        path, _, why = text.removeprefix("Can not create a new UnixSocketStream listener on ").partition(" - ")
+        held = "another process listens there" if "acquire lock" in why else why
+        return f"cannot open Zenoh: cannot listen at {path}: {held}"
     return f"cannot open Zenoh: {text}"
 
 

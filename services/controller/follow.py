@@ -7,7 +7,8 @@ from collections.abc import Callable
 
 from holozen.bus import Bus
 from holozen.limits import STOP, Planar
-from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, Twist
+from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, PoseStamped, Twist
+from holozen.messages.message import not_finite
 from holozen.transport.errors import NoReply, ServiceError
 from holozen.transport.pubsub import Publisher
 from holozen.wire import PRIORITY_OF, key_for, topic
@@ -18,7 +19,10 @@ PERIOD = 0.05  # s of the odom's clock between two commands
 PATIENCE = 0.5  # s between two attempts to reach a service
 STOP_FOR, STOP_EVERY = 1.0, 0.05  # s; how long and how often a stop is repeated
 RESTS = 0.01  # m/s and rad/s; slower than this is standing
+LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
+FRAMES = ("", "odom", "map", "world")  # of a goal: all of them mean the frame of odom
+GOAL = "a goal of goal_pose"
 RESUMES = "`holozen controller --resume` or the teleop's r resumes"
 
 
@@ -32,7 +36,7 @@ class YieldPolicy:
         self._source = source
         self._resumed: float = math.inf  # of the last status: a resume before the first is none for this controller
         self.yielded_to = yielded_to  # empty while this controller may drive
-        self.stopped = ""  # who set the software stop, while it is set
+        self.stopped = ""  # the node that set the software stop, while it is set
 
     @property
     def reason(self) -> str:
@@ -40,6 +44,15 @@ class YieldPolicy:
         if self.stopped:
             return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, and then {RESUMES}"
         return f"yields to {self.yielded_to}; {RESUMES}" if self.yielded_to else ""
+
+    def stay(self) -> None:
+        """A goal of goal_pose is reached: the robot stays until a resume, or the next of them."""
+        self.yielded_to = self.yielded_to or GOAL
+
+    def invited(self) -> None:
+        """The next goal of goal_pose has come."""
+        if self.yielded_to == GOAL:
+            self.yielded_to = ""
 
     def update(self, status: CommandStatus) -> None:
         """Apply the newest status. A restarted sim forgets which source drove; this does not."""
@@ -56,7 +69,11 @@ class YieldPolicy:
 
 
 class Follower:
-    """Drives one robot from goal to goal until `stop` is set."""
+    """Drives one robot from goal to goal until `stop` is set.
+
+    A goal on `goal_pose` comes first: the robot drives there at once and stays, until the next one or a resume. While
+    the controller yields, the newest of them waits for the resume.
+    """
 
     def __init__(
         self, bus: Bus, robot: str, gains: Gains, stop: threading.Event, report: Callable[[str], None],
@@ -69,6 +86,8 @@ class Follower:
         self._odom = bus.latest(key_for("odom", robot), Odometry)
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
+        self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
+        self._wanted: Pose | None = None  # of goal_pose, not reached yet
         self._policy = YieldPolicy(bus.source, "--held" if held else "")
         self._now: Planar = STOP
         self._yielded = False
@@ -78,8 +97,15 @@ class Follower:
         """Visit every goal of the list once. Returns the legs driven; fewer than the list if stopped before its end."""
         legs: list[Leg] = []
         while not self._stop.is_set():
+            if self._is_sent_elsewhere():
+                self._visit()
+                continue
             goal = self._ask(len(legs))
+            if self._wanted:
+                continue
             leg = goal and self._drive((goal.x_goal, goal.y_goal, goal.theta_goal))
+            if self._wanted:
+                continue
             if not goal or not leg:
                 break
             legs.append(leg)
@@ -98,9 +124,42 @@ class Follower:
             if time.monotonic() > ends or (newer and odom and odom.twist.twist.is_slow(RESTS)):
                 self._now = STOP
 
+    def _is_sent_elsewhere(self) -> bool:
+        """Whether a goal of goal_pose is to be reached; reads the newest."""
+        received = self._goals.try_recv()
+        if received is not None:
+            if reason := received.error or (received.message and self._refusal(received.message)):
+                self._report(f"goal_pose: refused: {reason}")
+            elif goal := received.message:
+                at = goal.pose.position
+                self._wanted = (at.x, at.y, goal.pose.orientation.yaw())
+                self._report(f"goal_pose: ({at.x:.2f}, {at.y:.2f}) by {received.sample.source or 'an unknown sender'}")
+                self._policy.invited()
+        return self._wanted is not None
+
+    def _refusal(self, goal: PoseStamped) -> str:
+        """Why the robot does not drive to a goal; empty if it does."""
+        odom, _ = self._odom.read()
+        frames = {*FRAMES, odom.header.frame_id if odom else ""}
+        if (frame := goal.header.frame_id) not in frames:
+            return f"its frame is {frame[:80]!r}; give it in 'odom'"
+        if bad := not_finite(goal):
+            return f"{bad} is not a finite number"
+        if max(abs(goal.pose.position.x), abs(goal.pose.position.y)) > MAX_DISTANCE:
+            return f"it is more than {MAX_DISTANCE:g} m away"
+        return ""
+
+    def _visit(self) -> None:
+        """Drive to the goal of goal_pose, and stay there."""
+        if (goal := self._wanted) and self._drive(goal) and goal is self._wanted:
+            self._wanted = None
+            self._policy.stay()
+
     def _ask(self, number: int) -> NextGoalReply | None:
-        """Goal `number` of the list; waits for the service. None when `stop` is set first."""
-        while not self._stop.is_set():
+        """Goal `number` of the list; waits for the service. None when `stop` is set or a goal of goal_pose comes
+        first.
+        """
+        while not self._stop.is_set() and not self._is_sent_elsewhere():
             try:
                 goal = self._bus.call("next_goal", NextGoalRequest(number), NextGoalReply, PATIENCE)
                 if all(abs(value) <= MAX_DISTANCE for value in (goal.x_goal, goal.y_goal, goal.theta_goal)):
@@ -116,10 +175,10 @@ class Follower:
         return None
 
     def _drive(self, goal: Pose) -> Leg | None:
-        """Drive to a goal. None when `stop` is set first."""
+        """Drive to a goal. None when `stop` is set or another goal of goal_pose comes first."""
         leg: Leg | None = None
         before = 0.0
-        while not self._stop.is_set():
+        while not self._stop.is_set() and (not self._is_sent_elsewhere() or self._wanted is goal):
             odom = self._next_odom()
             if odom is None:
                 leg = None if self._policy.yielded_to else leg  # a new leg begins where the other source left the robot

@@ -1,1 +1,1 @@
-"""cmd_vel -> odom."""
+"""cmd_vel -> odom, exposures."""

@@ -1,8 +1,13 @@
 """The simulator: robots with planar drives in a world, on Zenoh keys."""
 
 import argparse
+import contextlib
 import sys
+import threading
+import time
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from holozen import data, flags
 from holozen.bus import Bus
@@ -14,14 +19,22 @@ from holozen.transport.errors import BusError
 from holozen.transport.graph import Graph, on_key
 from holozen.wire import key_for
 
-from . import pace
+from . import pace, shard
 from .command import inputs
+
+if TYPE_CHECKING:
+    from .entities import Entities
+
+
+RIVALRY = 250  # polls, some five seconds, after which all other nodes are known on a busy machine too
+HOW = "holozen sim --join --robot FILE=NAME"
+JOIN = f"end it, or join it with named robots: {HOW}"
 
 
 def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen sim",
-        description="Simulate robots in a world.",
+        description="Simulate robots in a world. `holozen sim pause|play|step|reset` control one that runs.",
         epilog="example: holozen sim --robot my_bot.urdf.xacro=Fred",
     )
     add = parser.add_argument
@@ -31,8 +44,10 @@ def parser() -> argparse.ArgumentParser:
     add("--empty", action="store_true", help="start without robots; add them with `holozen spawn`")
     add("--join", action="store_true",
         help="start beside another sim, with named robots; those of two sims do not collide")  # fmt: skip
+    shard.add_argument(parser)
+    add("--paused", action="store_true", help="start paused, until `holozen sim play` or `step`")
     add("--stopped", action="store_true", help="start with the robots stopped, until `holozen release`")
-    add("--drive", choices=["planar_move"], help="a drive for robots whose file has none")
+    add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
     add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="where $(find NAME) is")  # fmt: skip
     add("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
@@ -42,6 +57,8 @@ def parser() -> argparse.ArgumentParser:
         type=flags.number(*pace.FACTORS),
         help="real-time factor; 0: as fast as possible (default: the world's)",
     )
+    add("--seed", type=flags.count(), default=0, metavar="N",
+        help="of the noise of sensors: the same seed gives the same values (default: 0)")  # fmt: skip
     add("--max-linear", type=flags.number(*inputs.LINEAR, "m/s"), default=inputs.MAX_LINEAR, metavar="M/S",
         help="faster commands are clamped (default: %(default)s)")  # fmt: skip
     add("--max-angular", type=flags.number(*inputs.ANGULAR, "rad/s"), default=inputs.MAX_ANGULAR, metavar="RAD/S",
@@ -51,62 +68,117 @@ def parser() -> argparse.ArgumentParser:
 
 
 def main(argv: list[str] | None = None) -> int:
-    args = parser().parse_args(argv)
+    options = parser()
+    args = options.parse_args(argv)
+    if args.shard and (args.join or any(not name for _, name in args.robot or ())):
+        options.error("--shard gives each robot to the shard of its name: use --robot FILE=NAME, and no --join")
     stop = stop_event()
     try:
         from holozen.robot.sdf_world import load_world  # loads numpy, which --help does not need
 
         spec = load_world(args.world, dict(args.package))
-        with Bus("sim", connection.from_arguments(args), lasting=True, stop=stop) as bus:
+        mine, bus = _open(args, stop)
+        with bus, contextlib.ExitStack() as ending:
             graph = bus.graph()
             # The engine is slow to load: a wrong flag is reported first.
             from holozen.transport.parameters import Parameters
 
+            from .cameras import Cameras
             from .entities import Entities
             from .io.entity_services import EntityServices
+            from .io.simulation_services import SimulationServices
             from .loop import Loop
             from .parameters import declared
             from .physics.world import World
             from .spawn import add_models, spawn_all
 
-            joins = bool(other := _other_sim(graph))
+            other = _other_sim(graph, mine)
+            joins = bool(other) or (mine is not None and mine.number != 1)
             graph.close()
-            if joins and (reason := _cannot_join(args)):
+            if other and (reason := _cannot_join(args, mine)):
                 report(f"sim: {other} simulates here already; {reason}")
                 return 1
             world = World(spec)
-            entities = Entities(bus, world, (args.max_linear, args.max_angular))
+            where = connection.from_arguments(args).arguments()
+            cameras = Cameras(
+                bus, key_for("exposures", "" if not joins else mine.node if mine else args.robot[0][1]), where
+            )
+            ending.callback(cameras.close)
+            entities = Entities(bus, world, (args.max_linear, args.max_angular), args.seed, cameras)
             add_models(entities, spec.models)
-            if args.robot or not args.empty:
-                spawn_all(entities, args)
+            if args.robot or not (args.empty or mine):
+                spawn_all(entities, args, mine)
             if args.stopped:
                 entities.stop("the start of this sim")
             for warning in spec.warnings:
-                report(f"sim: {warning}")
-            services = EntityServices(bus, entities, dict(args.package), spawns=not joins)
-            if not entities.robots:
+                report(f"sim: warning: {warning}")
+            share = shard.Share(mine, bus) if mine else None
+            services = EntityServices(bus, entities, dict(args.package), spawns=not joins or bool(mine), share=share)
+            if mine:
+                robots = "its robots do not collide with those of other shards"
+                report(f"sim: this is shard {mine}; {robots}; add some with `holozen spawn FILE`")
+            elif not entities.robots:
                 report("sim: no robot yet; add one with `holozen spawn FILE`")
+            entities.set_start()
             loop = Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services, is_clock=not joins)
-            name = key_for("sim", args.robot[0][1] if joins else "")
+            loop.answers.append(SimulationServices(bus, loop.simulation, stop.set).answer)
+            if args.paused:
+                loop.simulation.pause(time.monotonic())
+            name = mine.node if mine else key_for("sim", args.robot[0][1] if joins else "")
             loop.answers.append(Parameters(bus, name, lambda: declared(entities, loop.pace)).answer)
+            rivals = Rivals(entities, bus.id, stop)
+            if not joins and not mine:
+                loop.answers.append(rivals.answer)
             loop.run(stop)
+            if rivals.first:
+                report(f"sim: {rivals.first} simulates here too, since the same instant; {JOIN}")
+                return 1
     except (BusError, RobotError) as error:
         report(f"sim: {error}")
         return 1
     return 0
 
 
-def _other_sim(graph: Graph) -> str:
-    """The sim that serves the keys of the world already; empty if there is none."""
-    return next((end.source for end in on_key(graph.endpoints(), "clock", "pub")), "")
+class Rivals:
+    """Looks for sims that started in the same instant as this one: of all that are on the wire then, the one with the
+    lowest session id goes on. `stop` is set if that is another, the `first`.
+    """
+
+    def __init__(self, entities: "Entities", session: str, stop: threading.Event) -> None:
+        self._entities, self._session, self._stop, self._left = entities, session, stop, RIVALRY
+        self.first = ""
+
+    def answer(self) -> bool:
+        """Look, while others may not have been known when this one looked at its start."""
+        if self._left:
+            self._left -= 1
+            others = self._entities.others_on("spawn_entity", "srv")
+            if first := next((one for one in others if one.session < self._session), None):
+                self._left, self.first = 0, first.source
+                self._stop.set()
+        return False
 
 
-def _cannot_join(args: argparse.Namespace) -> str:
+def _open(args: argparse.Namespace, stop: threading.Event) -> tuple[shard.Shard | None, Bus]:
+    """The bus, and which shard this is. Raises BusError."""
+    where = connection.from_arguments(args)
+    opened = partial(Bus, connection=where, lasting=True, stop=stop)
+    return shard.claim(args.shard, where, opened) if args.shard else (None, opened("sim"))
+
+
+def _other_sim(graph: Graph, mine: shard.Shard | None) -> str:
+    """The sim that serves the keys of the world already; empty if there is none, or only other shards."""
+    clocks = on_key(graph.endpoints(), "clock", "pub")
+    return next((end.source for end in clocks if not (mine and shard.is_shard(end.node))), "")
+
+
+def _cannot_join(args: argparse.Namespace, mine: shard.Shard | None) -> str:
     """Why a sim with these flags cannot run beside another, and what to do; empty if it can."""
+    if mine:
+        return "end it, or leave out --shard"
     if args.join and args.robot and all(name for _, name in args.robot):
         return ""
-    missing = "name the robots" if args.join else "end it, or join it with named robots"
-    return f"{missing}: holozen sim --join --robot FILE=NAME"
+    return f"name the robots: {HOW}" if args.join else JOIN
 
 
 if __name__ == "__main__":

@@ -2,33 +2,41 @@
 
 import math
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
+from itertools import chain, count
 
 from holozen.bus import Bus
 from holozen.console import report
+from holozen.messages import Point, Pose, Quaternion, SeenEntity
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.errors import RobotError
-from holozen.robot.model import RobotModel
-from holozen.robot.rigid import MOVING
+from holozen.robot.model import Camera, RobotModel
+from holozen.robot.rigid import MOVING, check_shapes
 from holozen.suggest import listed
 from holozen.transport.errors import ServiceError
-from holozen.transport.graph import on_key
+from holozen.transport.graph import Endpoint, on_key
 from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name
 
+from .cameras import Cameras
+from .command.time import CommandTime
 from .io.robot_services import RobotServices
+from .io.sensor_topics import Motions, Surroundings
+from .io.wait_set import Moment, WaitSet
 from .physics.body import Body
 from .physics.engine import Rotation, Vector
 from .physics.movers import Mover, mover_for
+from .physics.sight import Sight
 from .physics.world import World
+from .posture import Motion, posture_of
 from .robot import Memory, Robot, keys_of
 
 MAX_ENTITIES = 1000  # each takes time at every step
-MAX_SHAPES = 500  # of one entity: each that touches the ground costs the engine 50 us at every step
 MAX_REASON = 300  # characters
 GRAPH_SCAN = 0.02  # s between two scans of all tokens for the senders of commands
 MAX_DISTANCE = 1e4  # m from the origin; far beyond, the engine's numbers are too coarse for contacts
 SPREAD = 0.618  # of a period between the telemetry of a robot and that of the next; the golden ratio spreads any number
+KEYS = {"clock", "simulation_status"}  # of the sim itself
 Place = tuple[Vector, Rotation]
 
 
@@ -39,24 +47,32 @@ class EntityError(ServiceError):
         super().__init__(text, result={"result": code, "error_message": text})
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class Entity:
-    """A robot or object by its name. Without a `robot` it has no keys. `prefix` goes before the keys of a robot."""
+    """A robot or object by its name. Without a `robot` it has no keys. `prefix` goes before the keys of a robot.
+    `number` distinguishes it from any other that has had its name.
+    """
 
     name: str
     model: RobotModel
     body: Body
+    place: Place  # where it was added
     robot: Robot | None = None
     prefix: str = ""
+    number: int = field(default_factory=time.time_ns)
 
 
 class Entities:
-    """The entities of one world. `limits` are the fastest commands in m/s and rad/s."""
+    """The entities of one world. `limits` are the fastest commands in m/s and rad/s, `seed` that of all noise."""
 
-    def __init__(self, bus: Bus, world: World, limits: tuple[float, float]) -> None:
+    def __init__(
+        self, bus: Bus, world: World, limits: tuple[float, float], seed: int = 0, cameras: Cameras | None = None
+    ) -> None:
         self._bus, self._world, self.limits = bus, world, limits
         self._graph = bus.graph()
         self._clocks = bus.peer_clocks(self._graph.has)
+        self.command_time = CommandTime()
+        self._first: list[Entity] = []  # those of the start
         self.max_age = COMMAND_SILENCE  # s; a command that may be older is refused, unless it is a stop
         self._seen = -1  # changes of the graph at its last scan, and the time of that
         self._seen_at = 0.0
@@ -64,6 +80,11 @@ class Entities:
         self.before: dict[str, Memory] = {}  # prefix -> held sources and software stop of the last robot there
         self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
         self.robots: list[Robot] = []
+        self._sight: Sight | None = None  # made when the first sensor looks
+        self._in_sight: dict[str, int] = {}  # number of the entity of that name
+        self._cameras = cameras
+        self._around = Surroundings(world.spec, self.look, self.seen, seed, cameras)
+        self.commands, self.requests = WaitSet(), WaitSet()  # of all robots: what moves or stops them; all else
 
     @property
     def time(self) -> float:
@@ -73,6 +94,10 @@ class Entities:
     def __iter__(self) -> Iterator[Entity]:
         return iter(self._all.values())
 
+    def has(self, name: str) -> bool:
+        """Whether there is an entity called `name`."""
+        return name in self._all
+
     def named(self, name: str) -> Entity:
         """The entity called `name`. Raises EntityError, which lists the names."""
         if name not in self._all:
@@ -81,20 +106,32 @@ class Entities:
             )
         return self._all[name]
 
-    def add(self, name: str, model: RobotModel, place: Place, prefix: str | None = None) -> Entity:
-        """Put a robot or object into the world, its root frame at `place`. Its keys are below `prefix`, by default its
-        name. Errors of the robot are reported before those of its name. Raises EntityError.
+    def add(
+        self, name: str, model: RobotModel, place: Place, prefix: str | None = None, may_overlap: bool = False
+    ) -> Entity:
+        """Put a robot or object into the world, its root frame at `place`, which no other has taken unless it
+        `may_overlap`. Its keys are below `prefix`, by default its name. That the name is taken is reported last: one
+        replaces another only when nothing else is wrong. Raises EntityError.
         """
         prefix = name if prefix is None else prefix
-        model = replace(model, drive=None) if model.static else model
+        model = replace(model, drive=None, forces=()) if model.static else model
         mover = self._mover(model, place)
         try:
-            self._check(name, prefix, model)
-            entity = Entity(name, model, mover.body, prefix=prefix)
-            if model.drive or mover.names:
+            self._check_names(name, prefix)
+            if not may_overlap:
+                self._check_place(name, model, mover.body)
+            self._check_unique(name, prefix, model)
+            entity = Entity(name, model, mover.body, place, prefix=prefix)
+            if model.drive or mover.names or model.sensors:
                 phase = len(self.robots) * SPREAD % 1.0
-                entity.robot = Robot(self._bus, name, prefix, model, mover, self.limits, self._clocks, phase)
+                entity.robot = Robot(
+                    self._bus, name, prefix, model, mover, self.limits, self._clocks, phase, self.command_time
+                )
                 entity.robot.require_age(self.max_age)
+                if self._cameras and any(isinstance(sensor.device, Camera) for sensor in model.sensors):
+                    self._cameras.start()
+                if model.sensors:
+                    entity.robot.sense(self._bus, name, self._around, phase)
         except Exception:
             mover.body.remove()
             raise
@@ -103,7 +140,23 @@ class Entities:
             self._keys |= dict.fromkeys(keys_of(model, prefix), name)
             self._remember(prefix, entity.robot)
             self.robots.append(entity.robot)
+            self.commands.add(entity.robot.command_readers)
+            self.requests.add(entity.robot.request_readers)
         return entity
+
+    def put(self, name: str, place: Place, linear: Vector, angular: Vector) -> None:
+        """Move an entity to a place that no other has taken, with its velocity and rotation rate in the world. Raises
+        EntityError, and then it stays where it is.
+        """
+        entity = self.named(name)
+        before = *entity.body.pose(), *entity.body.twist()
+        self._world.put(entity.body, place, linear, angular)
+        try:
+            self._check_place(name, entity.model, entity.body, si.Result.OPERATION_FAILED)
+        except EntityError:
+            self._world.put(entity.body, before[:2], *before[2:])
+            raise
+        self._world.put(entity.body, place, linear, angular)
 
     def limit(self, linear: float, angular: float) -> None:
         """Clamp the next commands of all robots to these limits, in m/s and rad/s."""
@@ -123,9 +176,13 @@ class Entities:
         for robot in self.robots:
             robot.require_age(limit)
 
-    def watch_senders(self, now: float) -> None:
+    def watch_senders(self, moment: Moment) -> None:
         """Stop every robot whose driver's process is gone, and measure the clocks of the others."""
-        for node in self._graph.left():
+        now = moment.now
+        left = list(self._graph.left())
+        if left:
+            self.commands.read(moment)  # their last ones
+        for node in left:
             for robot in self.robots:
                 robot.forget(node.source, node.session)
         if self._graph.changes != self._seen and now - self._seen_at > GRAPH_SCAN:
@@ -134,6 +191,10 @@ class Entities:
             self._clocks.track({session for key in keys for session in self._graph.publishers(key)}, now)
         self._clocks.poll(now)
 
+    def others_on(self, key: str, kind: str) -> list[Endpoint]:
+        """The endpoints of a kind that other nodes have on a key."""
+        return [end for end in on_key(self._graph.endpoints(), key, kind) if end.session != self._bus.id]
+
     def fail(self, robot: Robot, error: Exception) -> None:
         """Remove a robot that cannot be simulated any more, so that the others go on."""
         name = next(entity.name for entity in self if entity.robot is robot)
@@ -141,13 +202,32 @@ class Entities:
         self.remove(name)
 
     def _mover(self, model: RobotModel, place: Place) -> Mover:
-        if (shapes := sum(len(link.collisions) for link in model.links.values())) > MAX_SHAPES:
-            problem = f"{model.name[:80]!r} has {shapes} collision shapes; at most {MAX_SHAPES} are simulated"
-            raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, problem)
         try:
+            check_shapes(model)
             return mover_for(self._world, model, *place)
         except RobotError as error:
             raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
+
+    def _check_place(
+        self, name: str, model: RobotModel, body: Body, code: int = si.SpawnEntityReply.INVALID_POSE
+    ) -> None:
+        """What is placed deep inside something else is thrown away by the engine, with the other. An entity of the same
+        name does not count: it is refused by its name, or replaced.
+        """
+        if not (other := self._overlapped(name, model, body)):
+            return
+        problem = f"there is no room for {name!r} at {_at(body.pose()[0])}: it would be inside {other.name!r}"
+        free = self._world.free_place(body)
+        advice = f"the nearest free place is {_at(free)}" if free else "use another place"
+        raise EntityError(code, f"{problem}; {advice}")
+
+    def _overlapped(self, name: str, model: RobotModel, body: Body) -> Entity | None:
+        """The entity that a body is inside of, if either of them can move."""
+        if not (numbers := self._world.overlapped(body)):
+            return None
+        entities = {entity.body.number: entity for entity in self if entity.name != name}
+        found = (entities[number] for number in numbers if number in entities)
+        return next((entity for entity in found if not (entity.model.static and model.static)), None)
 
     def _remember(self, prefix: str, robot: Robot) -> None:
         """A respawned robot inherits held sources and the software stop."""
@@ -159,7 +239,7 @@ class Entities:
                 f"sim: {prefix or 'the robot'} is still stopped by {setter}, as the robot before it; `holozen release`"
             )
         while len(self.before) > MAX_ENTITIES:
-            free = (prefix for prefix, (arbiter, _) in self.before.items() if not arbiter.software_stop.setter)
+            free = (prefix for prefix, (arbiter, *_) in self.before.items() if not arbiter.software_stop.setter)
             del self.before[next(free, next(iter(self.before)))]  # a stop is forgotten last
 
     def remove(self, name: str) -> None:
@@ -168,22 +248,76 @@ class Entities:
         del self._all[name]
         if entity.robot:
             self.robots.remove(entity.robot)
+            self.commands.remove(entity.robot.command_readers)
+            self.requests.remove(entity.robot.request_readers)
             entity.robot.close()
             self._keys = {key: owner for key, owner in self._keys.items() if owner != name}
         entity.body.remove()
 
-    def free_name(self, wanted: str) -> str:
-        """`wanted`, with the first free number appended if it is taken."""
-        taken = {entity.name for entity in self} | {entity.prefix for entity in self}
-        names = (wanted, *(f"{wanted}_{number}" for number in range(1, MAX_ENTITIES + 2)))
-        return next(name for name in names if name not in taken)
+    def set_start(self) -> None:
+        """The entities that are there now are those of the start, which a reset restores."""
+        self._first = list(self)
 
-    def _check(self, name: str, prefix: str, model: RobotModel) -> None:
+    def remove_spawned(self) -> None:
+        """Remove all entities but those of the start."""
+        for entity in [entity for entity in self if entity not in self._first]:
+            self.remove(entity.name)
+
+    def rebuild(self, from_start: bool = False) -> None:
+        """Put every entity, or those of the start, into a new world, where it was added."""
+        self._world.clear()
+        before, self._all = self._all, {}
+        for index, entity in enumerate(self._first if from_start else list(before.values())):
+            if before.get(entity.name) is entity:
+                mover = self._mover(entity.model, entity.place)
+                entity.body = mover.body
+                if entity not in self._first and (other := self._overlapped(entity.name, entity.model, entity.body)):
+                    self._world.free_place(entity.body)
+                    report(f"sim: {entity.name} was added where {other.name} is now; it is put beside it")
+                self._all[entity.name] = entity
+                if entity.robot:
+                    entity.robot.rebuild(mover)
+                continue
+            try:  # it was deleted since
+                self._first[index] = self.add(entity.name, entity.model, entity.place, entity.prefix, may_overlap=True)
+            except EntityError as error:
+                report(f"sim: {entity.name} did not come back: {error}")
+        self.robots[:] = [entity.robot for entity in self if entity.robot]
+
+    def look(self) -> Sight:
+        """What sensors see now."""
+        if self._sight is None:
+            self._sight = Sight(self._world.spec.ground)
+        for name, number in list(self._in_sight.items()):
+            if name not in self._all or self._all[name].number != number:
+                self._sight.remove(name)
+                del self._in_sight[name]
+        for entity in self:
+            if entity.name not in self._in_sight:
+                self._sight.add(entity.name, entity.model)
+                self._in_sight[entity.name] = entity.number
+            if self._sight.has_moved(entity.name, pose := entity.body.pose()) or entity.robot:
+                self._sight.place(entity.name, pose, _motions(entity))
+        return self._sight
+
+    def seen(self) -> list[SeenEntity]:
+        """Where everything is, for pictures."""
+        return [_seen(entity) for entity in self]
+
+    def free_name(self, wanted: str, owns: Callable[[str], bool] | None = None) -> str:
+        """`wanted`, with the first free number appended if it is taken, among the names that this sim `owns`."""
+        taken = {entity.name for entity in self} | {entity.prefix for entity in self}
+        names = chain([wanted], (f"{wanted}_{number}" for number in count(1)))
+        return next(name for name in names if name not in taken and (owns is None or owns(name)))
+
+    def _check_names(self, name: str, prefix: str) -> None:
         for text, code in ((name, si.SpawnEntityReply.NAME_INVALID), (prefix, si.SpawnEntityReply.NAMESPACE_INVALID)):
             try:
                 robot_name(text or "root")
             except ValueError as error:
                 raise EntityError(code, str(error)[:MAX_REASON]) from None
+
+    def _check_unique(self, name: str, prefix: str, model: RobotModel) -> None:
         if name in self._all:
             there = listed(list(self._all))
             raise EntityError(
@@ -201,7 +335,7 @@ class Entities:
 
     def _check_keys(self, keys: list[str]) -> None:
         """Two robots on the same keys would each get the other's commands, and so would one on a key of the sim."""
-        taken = {row.key for row in SERVICES if row.server == "sim"} - {*RobotServices.VERBS} | {"clock"}
+        taken = {row.key for row in SERVICES if row.server == "sim"} - {*RobotServices.VERBS} | KEYS
         for key in keys:
             if keys.count(key) > 1 or key in taken:
                 raise EntityError(
@@ -215,17 +349,21 @@ class Entities:
         """Two sims on the same keys would each get the other's commands."""
         if not self._graph.publishers(key):  # nearly always, and the graph of a fleet is large
             return
-        others = on_key(self._graph.endpoints(), key, "pub")
-        for other in (other for other in others if other.session != self._bus.id):
+        for other in self.others_on(key, "pub"):
             problem = f"{key} is published by {other.node} ({other.session[:6]}) already"
             raise EntityError(
                 si.SpawnEntityReply.NAME_NOT_UNIQUE, f"{problem}; end that one, or use another name: --robot FILE=NAME"
             )
 
 
+def _at(position: Vector) -> str:
+    x, y = (round(part, 2) + 0.0 for part in position[:2])  # no -0
+    return f"x {x:g} y {y:g}"
+
+
 def has_keys(model: RobotModel) -> bool:
-    """Whether a robot has keys: one with a drive, or with moving joints."""
-    return bool(model.drive) or any(joint.kind in MOVING for joint in model.joints.values())
+    """Whether a robot has keys: one with a drive, sensors, or moving joints."""
+    return bool(model.drive or model.sensors) or any(joint.kind in MOVING for joint in model.joints.values())
 
 
 def checked_place(position: Vector, rotation: Rotation) -> Place:
@@ -241,3 +379,16 @@ def checked_place(position: Vector, rotation: Rotation) -> Place:
         )
     x, y, z, w = (part / length for part in rotation)
     return position, (x, y, z, w)
+
+
+def _motions(entity: Entity) -> Motions:
+    """How its links move; those of an object that has no joints as its root."""
+    if entity.robot:
+        return entity.robot.motions()
+    return posture_of(entity.model).motions(Motion(*entity.body.pose()))
+
+
+def _seen(entity: Entity) -> SeenEntity:
+    motions = _motions(entity)
+    poses = [Pose(Point(*at.xyz), Quaternion(*at.rotation)) for at in motions.values()]
+    return SeenEntity(entity.name, entity.number, list(motions), poses)

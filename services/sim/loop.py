@@ -1,22 +1,31 @@
-"""The loop: read commands, move, step, publish, at the pace of the clock."""
+"""The loop: read commands, move, step, publish, at the pace of the clock or as many steps as were asked for."""
 
 import math
 import threading
 import time
+from collections import deque
 
 from holozen.bus import Bus
-from holozen.messages import Clock, Time
+from holozen.console import report
+from holozen.messages import Clock, SimulationStatus, Time
 from holozen.transport.pubsub import Publisher
 
 from .entities import Entities
 from .io.entity_services import EntityServices
 from .io.topics import Schedule
+from .io.wait_set import Moment
 from .pace import Pace
 from .physics.world import World
+from .simulation import Simulation
 
 CLOCK_RATE = 50.0  # Hz of sim time
-POLL = 0.02  # s; how often requests and commands are read while no step is due
-GRAPH_POLL = 0.004  # s; how often the graph is searched for nodes that left
+STATUS_RATE = 10.0  # Hz of real time
+HELD_RATE = 20.0  # Hz of real time, at which a world that is held is published: no reader takes it for lost
+HELD_POLL = 0.002  # s; the same as POLL while it is held
+MEASURED = 1.0  # s of real time over which the real-time factor is measured
+REPORT_EVERY = 60.0  # s between two reports of overruns
+POLL = 0.02  # s; how often requests are read, and commands while no step is due
+READ_EVERY = 0.003  # s between two looks for commands and stops, and for nodes that left, however short the steps
 STALL = 0.1  # s without reading; commands may have waited this long
 DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring old commands
 
@@ -34,39 +43,106 @@ class Loop:
         self._world, self._entities, self._robots = world, entities, entities.robots
         self.pace = Pace(world.spec.step, rtf, time.monotonic())
         self.answers = [services.answer] if services else []  # called between steps
-        self._served = self.graph_polled = 0.0
+        self._served = self.polled = 0.0
         self._more_wait = False  # whether requests were left unanswered
         self._clock: Publisher[Clock] | None = bus.publisher("clock", Clock) if is_clock else None
         self._clock_due = Schedule(CLOCK_RATE)
+        self._status: Publisher[SimulationStatus] | None = None
+        if is_clock:
+            self._status = bus.publisher("simulation_status", SimulationStatus)
+        self._status_at = self._shown_at = self._reported_at = -math.inf
+        self._reported = 0  # overruns
+        self._marks: deque[tuple[float, float]] = deque()  # real and sim time of past statuses
+        self.simulation = Simulation(world, entities, self.pace, self.publish_all)
         self._last_read = self._before_stall = time.monotonic()
-        self._trusted_from = 0.0
+        self._trusted_from = self._reads_at = 0.0
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:
         """Step until `stop` is set, or for a number of `steps`."""
         pace = self.pace
         pace.set_factor(pace.rtf, time.monotonic())
         last = None if steps is None else self._world.steps + steps
+        self._reads_at = 0.0
         while not stop.is_set() and self._world.steps != last:
             now = time.monotonic()
             self._read_inputs(now)
-            if (left := pace.left(now)) > 0:
+            if now >= self._status_at:
+                self._publish_status(now)
+            if self.simulation.is_held:
+                self._hold(now, stop)
+            elif (left := pace.left(now)) > 0:
                 stop.wait(min(left, 0.0 if self._more_wait else POLL))
             else:
                 self._step(now)
                 pace.stepped(now)
 
+    def _hold(self, now: float, stop: threading.Event) -> None:
+        """Make the next step that was asked for, once all that was commanded before is read and its age known."""
+        steps = self.simulation.steps
+        if steps and steps.may_begin and not any(robot.is_waiting for robot in self._robots):
+            self._step(now)
+            self.simulation.stepped()
+        elif now >= self._shown_at:
+            self.publish_all()
+            self._shown_at = now + 1 / HELD_RATE
+        else:
+            stop.wait(HELD_POLL)
+
+    def publish_all(self) -> None:
+        """Publish the state of everything as it is now."""
+        for robot in list(self._robots):
+            try:
+                robot.publish(self._world.time, self._world.spec.step, at_once=True)
+            except (ArithmeticError, ValueError) as error:
+                self._entities.fail(robot, error)
+        if self._clock:
+            self._clock.put(Clock(Time.of(self._world.time)))
+        self._publish_status(time.monotonic())
+
+    def _publish_status(self, now: float) -> None:
+        """Publish how time passes, and report overruns."""
+        sim_time, pace, simulation = self._world.time, self.pace, self.simulation
+        if self._marks and sim_time < self._marks[-1][1]:
+            self._marks.clear()
+        self._marks.append((now, sim_time))
+        while len(self._marks) > 1 and now - self._marks[1][0] >= MEASURED:
+            self._marks.popleft()
+        since, began = self._marks[0]
+        factor = (sim_time - began) / (now - since) if now > since else 0.0
+        self._status_at = now + 1 / STATUS_RATE
+        if self._status:
+            self._status.put(
+                SimulationStatus(
+                    simulation.state, sim_time, self._world.steps, self._world.spec.step, simulation.epoch, factor,
+                    pace.rtf, pace.overruns, pace.lost,
+                )
+            )  # fmt: skip
+        if pace.overruns > self._reported and now - self._reported_at >= REPORT_EVERY:
+            report(f"sim: {pace.overruns} overruns, {pace.lost:.1f} s lost: it runs at {factor:.2f} of real time")
+            self._reported, self._reported_at = pace.overruns, now
+
     def _read_inputs(self, now: float) -> None:
+        steps = self.simulation.steps
+        is_asked = steps is not None and not steps.may_begin
+        if now < self._reads_at and not is_asked and not self._more_wait:
+            return
+        self._reads_at = now + READ_EVERY
         if now - self._last_read > STALL:
             self._before_stall, self._trusted_from = self._last_read, now + DISTRUST
         since = self._last_read if now >= self._trusted_from else self._before_stall
         self._last_read = now
-        clocks = (time.time(), self._world.time)
+        moment = Moment(now, since, (time.time(), self._world.time))
+        self._entities.commands.read(moment)
         for robot in self._robots:
-            robot.read_commands(now, clocks, since)
-        if now - self.graph_polled >= GRAPH_POLL:
-            self._entities.watch_senders(now)  # after their last commands were read
-            self.graph_polled = now
-        if now - self._served >= POLL:
+            if now >= robot.status_at:
+                robot.publish_status(now)
+        self._entities.watch_senders(moment)  # after their last commands were read
+        if is_asked or now - self.polled >= POLL:
+            self._entities.requests.read(moment._replace(since=min(since, self.polled or since)))
+            self.polled = now
+        if steps:
+            steps.may_begin = True  # all that was commanded before they were asked for is read
+        if now - self._served >= (HELD_POLL if self.simulation.is_held else POLL):
             self._more_wait = sum(answer() for answer in self.answers) > 0  # each of them answers
             self._served = -math.inf if self._more_wait else now
 
@@ -74,7 +150,7 @@ class Loop:
         world, dt = self._world, self._world.spec.step
         try:
             for robot in self._robots:
-                if robot.has_to_move(now):
+                if now > robot.arbiter.due or not robot.body.glides:  # else it continues as last commanded
                     robot.move(now, dt)
             world.step()
             sim_time = world.time

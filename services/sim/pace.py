@@ -1,7 +1,7 @@
 """Pacing: when the next step is due, on a monotonic clock and without drift."""
 
-STALL = 0.1  # s; a sim that is later than this drops the backlog instead of racing to catch up
-
+STALL = 0.1  # s; a sim that is later than this drops the backlog: an overrun
+CATCH_UP = 0.5  # of a period, at least, between two steps: what is late is made good at twice the pace, not in a burst
 FACTORS = (0.0, 1000.0)  # real-time factors that may be set
 
 
@@ -11,19 +11,22 @@ class Pace:
     def __init__(self, dt: float, rtf: float, now: float) -> None:
         self._dt = dt
         self.set_factor(rtf, now)
-        self.lost = 0.0  # s of real time given up after stalls
+        self.overruns = 0  # how often a backlog was dropped
+        self.lost = 0.0  # s of real time that was dropped with them
 
     def set_factor(self, rtf: float, now: float) -> None:
         """Run at `rtf` from `now` on."""
-        self.rtf, self._period, self._due = rtf, self._dt / rtf if rtf else 0.0, now
+        self.rtf, self._period, self._due, self._earliest = rtf, self._dt / rtf if rtf else 0.0, now, now
 
     def left(self, now: float) -> float:
         """Seconds until the next step; zero or less when it is due."""
-        return self._due - now if self._period else 0.0
+        return max(self._due, self._earliest) - now if self._period else 0.0
 
     def stepped(self, now: float) -> None:
-        """Record a step: the next is due one period after this one was due."""
+        """Record a step that began at `now`: the next is due one period after this one was due."""
         self._due += self._period
-        if now - self._due > STALL:
+        self._earliest = now + CATCH_UP * self._period
+        if self._period and now - self._due > STALL:
+            self.overruns += 1
             self.lost += now - self._due
             self._due = now

@@ -1,25 +1,32 @@
 """A robot in the world: reads commands from its keys, moves at each step, publishes its state."""
 
 import math
+from functools import partial
 
 from holozen.bus import Bus
 from holozen.messages import TFMessage, Time
-from holozen.robot.model import Balancing, Differential, RobotModel
+from holozen.robot.model import STEP, Balancing, Differential, Force, Pushed, RobotModel
+from holozen.suggest import listed
 from holozen.transport.pubsub import Publisher
 from holozen.wire import COMMAND_SILENCE, key_for
 
 from .command.arbiter import Arbiter
 from .command.freshness import Senders
-from .command.inputs import CommandStats, JointInput, TwistInput
+from .command.inputs import CommandStats, ForceInput, JointInput, TwistInput
 from .command.motion import JointMotion
+from .command.time import CommandTime
 from .io.robot_services import RobotServices
-from .io.topics import JOINT_RATE, DriveTopics, JointTopics, Schedule
-from .physics.jointed import JointedBody, Motors
+from .io.sensor_topics import Moment, Motions, SensorTopics, Surroundings
+from .io.topics import JOINT_RATE, NONE, DriveTopics, ForceTopics, JointTopics, Schedule
+from .io.wait_set import Reader
+from .physics.jointed import Forces, JointedBody, Motors
 from .physics.movers import Mover
+from .posture import Motion, posture_of
 
-POLL = 0.004  # s; a sim that runs fast does not read joint commands and requests at every step
+IDLE = 0.06  # s of sim time between two looks for readers of the joints, while there are none
 
-Memory = tuple[Arbiter, Arbiter]
+Memory = tuple[Arbiter, Arbiter, Arbiter]
+NO_DRIVE = "no drive: this robot is moved by forces, on {keys}"
 
 
 class Robot:
@@ -31,65 +38,132 @@ class Robot:
 
     def __init__(
         self, bus: Bus, name: str, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float],
-        senders: Senders, phase: float = 0.0,
+        senders: Senders, phase: float = 0.0, time: CommandTime | None = None,
     ) -> None:  # fmt: skip
-        self.mover, self._bus = mover, bus
+        self._model, self.prefix = model, prefix
+        self._embody(mover)
         drive = model.drive
         command = command_key(model, prefix)
         namespace = command.rpartition("/")[0]  # a namespace in the robot's file serves as a name
-        self.arbiter = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE)
-        self.joint_arbiter = Arbiter(COMMAND_SILENCE)
-        self._wheels, self._others = _motors(mover, model)
+        self.arbiter = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE, time)
+        self.joint_arbiter = Arbiter(COMMAND_SILENCE, time)
+        self._spare = Arbiter(COMMAND_SILENCE, time)
+        # Where forces alone move a robot, a stop on cmd_vel ends them. Elsewhere they disturb one that drives.
+        self.force_arbiter = self._spare if self.drives else self.arbiter
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", namespace), TFMessage)
-        self.prefix = prefix
-        self._input = twist_input = TwistInput(command, self.arbiter, senders, *limits, others=_aliases(model, prefix))
+        keys = _forces(model, prefix)
+        refusal = "" if self.drives else NO_DRIVE.format(keys=listed(keys))
+        self._input = twist_input = TwistInput(
+            command, self.arbiter, senders, *limits, others=_aliases(model, prefix), refusal=refusal
+        )
         self._drive = DriveTopics(bus, prefix, name, drive, twist_input, self._tf) if drive else None
+        if self._drive:
+            self._drive.start_anew(mover.moved(0.0, STEP))
         pairs = ((self._wheels, self.arbiter), (self._others, self.joint_arbiter))
+        self._obeys = any(motors for motors, _ in pairs)  # joint commands
         groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
         stats = twist_input.stats if drive else CommandStats()
         joint_input = JointInput(key_for("joint_command", namespace), senders, stats, groups, mover.names)
-        self._sifters = (twist_input.freshness, joint_input.freshness)
+        force_input = ForceInput(tuple(keys), self.force_arbiter, senders, stats)
+        self._sifters = (twist_input.freshness, joint_input.freshness, force_input.freshness)
+        self._force_topics = ForceTopics(bus, force_input)
+        self._of_members = bus.member is not None
         self._joints = JointTopics(bus, namespace, model, mover.names, prefix, joint_input, self._tf)
-        self._services = RobotServices(bus, command, self.memory, self._publish_status)
-        self._polled = self._now = 0.0  # when joint commands and requests were last read, and when commands were
-        self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
+        self._services = RobotServices(bus, command, self.memory, partial(self.publish_status, at_once=True))
         self._odom_due = Schedule(drive.odometry_rate if drive else 0.0, phase)
         self._joints_due = Schedule(JOINT_RATE, phase)
+        self._joints_at = -math.inf  # s of sim time until when no readers of the joints are looked for
         self.publishes_at = -math.inf  # s of sim time from when on `publish` has something to do
+        self._sensors: SensorTopics | None = None
+        self._posture = posture_of(model)
+
+    def sense(self, bus: Bus, name: str, around: Surroundings, phase: float) -> None:
+        """Publish what its sensors measure in a world."""
+        self._sensors = SensorTopics(bus, name, self.prefix, self._model.sensors, around, phase)
+
+    def motions(self) -> Motions:
+        """How its links move now."""
+        positions, rates = (dict(zip(self.mover.names, values, strict=True)) for values in self.mover.states()[:2])
+        return self._posture.motions(Motion(*self.body.pose(), *self.body.twist()), positions, rates)
 
     @property
     def memory(self) -> Memory:
         """Held sources and the software stop, for the robot that replaces this one."""
-        return self.arbiter, self.joint_arbiter
+        return self.arbiter, self.joint_arbiter, self._spare
 
     def inherit(self, memory: Memory) -> None:
         """Take over the held sources and the software stop of the robot that this one replaces."""
         for arbiter, other in zip(self.memory, memory, strict=True):
             arbiter.inherit(other)
 
-    def read_commands(self, now: float, clocks: tuple[float, ...], since: float) -> None:
-        """Process the commands that wait at `now` and came after `since`. `clocks`: the times that stamps may be
-        measured by. All in seconds.
-        """
-        self._now, drive = now, self._drive
-        if drive and ((first := drive.listen()) is not None or drive.is_waiting):
-            drive.read_commands(first, now, clocks, since)
-        if now - self._polled >= POLL:
-            self._joints.read_commands(now, min(since, self._polled or since))
-            self._services.answer(now)
-            if drive and now >= drive.status_at:
-                drive.publish_status(now)
-            self._polled = now
+    @property
+    def command_readers(self) -> list[Reader]:
+        """Those of what moves or stops it."""
+        drive = self._drive.readers if self._drive else []
+        joints = self._joints.readers if self._obeys else []
+        return [*drive, *self._force_topics.readers, *joints, *self._services.stop]
+
+    @property
+    def request_readers(self) -> list[Reader]:
+        """Those of its other services; joint commands, where no joint obeys any, are refused with them."""
+        return [*self._joints.readers * (not self._obeys), *self._services.others]
+
+    @property
+    def status_at(self) -> float:
+        """From when on `publish_status` has something to do, in s."""
+        return self._drive.status_at if self._drive else math.inf
+
+    def publish_status(self, now: float, at_once: bool = False) -> None:
+        """Publish the command status, when it is due at `now` (s) and wanted, or `at_once`."""
+        if self._drive:
+            self._drive.publish_status(now, at_once)
+
+    @property
+    def is_waiting(self) -> bool:
+        """Whether a command waits for its sender's clock."""
+        return any(freshness.is_waiting for freshness in self._sifters)
+
+    def rebuild(self, mover: Mover) -> None:
+        """Go on with a new body, which stands. Keys, held sources and the software stop remain."""
+        self._embody(mover)
+        if self._drive:
+            self._drive.start_anew(mover.moved(0.0, STEP))
+
+    def _embody(self, mover: Mover) -> None:
+        self.mover, self.body = mover, mover.body
+        self._wheels, self._others = _motors(mover, self._model)
+        self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
+        brakes = None if self.drives else self._others
+        forces = _forces(self._model, self.prefix)
+        self._forces = Forces(self._jointed, forces, self._model, brakes) if self._jointed and forces else None
+
+    def start_anew(self) -> None:
+        """The world was reset: only a new command moves it, and what it publishes is due at once."""
+        for arbiter in self.memory:
+            arbiter.start_anew()
+        self.publishes_at = self._joints_at = -math.inf
+        if self._sensors:
+            self._sensors.start_anew()
+
+    @property
+    def joint_names(self) -> list[str]:
+        """Its joints that move."""
+        return self._joints.names
+
+    @property
+    def joint_positions(self) -> list[float]:
+        """Where those are now, in rad or m."""
+        return self.mover.states()[0]
 
     @property
     def command_keys(self) -> tuple[str, ...]:
         """The keys of its commands."""
-        return (*self._input.keys, self._joints.command_key)
+        return (*self._input.keys, self._joints.command_key, *_forces(self._model, self.prefix))
 
     @property
     def drives(self) -> bool:
         """Whether cmd_vel moves it."""
-        return self._drive is not None
+        return self._model.drive is not None and not isinstance(self._model.drive.mechanism, Pushed)
 
     def limit(self, linear: float, angular: float) -> None:
         """Clamp the next commands to these limits, in m/s and rad/s."""
@@ -100,34 +174,32 @@ class Robot:
         for freshness in self._sifters:
             freshness.max_age = limit
 
-    def set_timeout(self, timeout: float) -> None:
-        """Stop after `timeout` seconds without a command, from now on."""
-        self.arbiter.set_timeout(timeout, self._now)
+    def set_timeout(self, timeout: float, now: float) -> None:
+        """Stop after `timeout` seconds without a command, from `now` on."""
+        self.arbiter.set_timeout(timeout, now)
 
     def forget(self, source: str, session: str) -> None:
         """Stop if `source` drives: its process, that of `session`, is gone. Its last commands are read first.
 
         A token of another session under the same name is a forgery, and changes nothing.
         """
-        self._joints.read_commands(self._now, self._polled)
         if all(freshness.is_session(source, session) for freshness in self._sifters):
             for arbiter in self.memory:
-                arbiter.forget(source)
-
-    def has_to_move(self, now: float) -> bool:
-        """Whether the next step needs `move`; else the robot goes on as it was told last."""
-        return not self.mover.body.glides or now > self.arbiter.due or not (self._drive and self._drive.is_steady)
+                arbiter.forget(source, self._of_members)
 
     def move(self, now: float, dt: float) -> None:
         """Apply the commands to the next step of `dt` seconds."""
-        if self._drive:
+        if self._drive and self.drives:
             motion = self._drive.motion(now, dt)
-            if not isinstance(motion, JointMotion):
+            if isinstance(motion, JointMotion):
+                if self._wheels:
+                    self._wheels.do(motion)
+            else:
                 if self._wheels:
                     self._wheels.forget()
                 self.mover.move(motion, dt)
-            elif self._wheels:
-                self._wheels.do(motion)
+        if self._forces:
+            self._forces.do(self.force_arbiter.pushes(now))
         if self._others:
             commanded = self.joint_arbiter.motion(now)
             self._others.do(commanded if isinstance(commanded, JointMotion) else None)
@@ -142,22 +214,30 @@ class Robot:
     def set_odometry_rate(self, rate: float) -> None:
         """Set the rate of odometry in Hz of sim time."""
         self._odom_due.set_rate(rate)
-        self.publishes_at = -math.inf
+        self.publishes_at = self._joints_at = -math.inf
 
-    def publish(self, time: float, dt: float) -> None:
-        """Publish what is due at the sim time `time`, after a step of `dt` seconds, and wanted."""
-        drive = self._drive if self._odom_due.due(time) else None
-        joints = self._joints if self._joints_due.due(time) else None
-        self.publishes_at = min(self._odom_due.next, self._joints_due.next)
-        wanted = (drive and drive.wanted) or (joints and joints.wanted)
-        if self.mover.body.glides and not wanted:
-            return  # else encoders, and the wheels for the eye, count on whoever looks
+    def publish(self, time: float, dt: float, at_once: bool = False) -> None:
+        """Publish what is due at the sim time `time`, after a step of `dt` seconds, or `at_once`, and wanted."""
+        drive = self._drive if self._odom_due.due(time) or at_once else None
+        wanted = drive.wanted if drive else NONE
+        joints = None
+        if time >= self._joints_at or at_once:
+            joints = self._joints if self._joints_due.due(time) or at_once else None
+            if joints and not joints.wanted:
+                joints, self._joints_at = None, min(self._odom_due.next, time + IDLE)
+        self.publishes_at = min(self._odom_due.next, max(self._joints_due.next, self._joints_at))
+        if self._sensors:
+            if time >= self._sensors.next and not at_once:  # while time does not pass there is nothing new to see
+                self._sensors.publish(Moment(time, round(time / dt)), self.motions)
+            self.publishes_at = min(self.publishes_at, self._sensors.next)
+        if self.body.glides and not joints and wanted == NONE:
+            return  # else encoders, and the wheels for the eye, count on observers
         stamp, moved = Time.of(time), self.mover.moved(time, dt)
-        if not math.isfinite(sum(moved[0])):  # nobody may read, and so nobody encode, what would show it
+        if not math.isfinite(sum(moved[0])):  # without a reader nothing is encoded, which would show it
             raise ValueError(f"its position became {moved[0]}")
         if drive:
-            drive.publish(stamp, moved)
-        if joints and joints.wanted:
+            drive.publish(stamp, moved, wanted)
+        if joints:
             joints.publish(stamp, self.mover.states())
 
     def close(self) -> None:
@@ -165,12 +245,11 @@ class Robot:
         if self._drive:
             self._drive.close()
         self._joints.close()
+        self._force_topics.close()
         self._services.close()
         self._tf.close()
-
-    def _publish_status(self) -> None:
-        if self._drive:
-            self._drive.publish_status(self._now, at_once=True)
+        if self._sensors:
+            self._sensors.close()
 
 
 def command_key(model: RobotModel, prefix: str) -> str:
@@ -186,7 +265,16 @@ def keys_of(model: RobotModel, prefix: str) -> list[str]:
     if model.drive:
         odometry = key_for(model.drive.odometry_topic, prefix)
         keys += [command, f"{command}_status", odometry, *_aliases(model, prefix)]
-    return keys
+    keys += [key_for(topic, prefix) for sensor in model.sensors for topic in sensor.topics]
+    return keys + list(_forces(model, prefix))
+
+
+def _forces(model: RobotModel, prefix: str) -> dict[str, list[Force]]:
+    """The forces of a robot with this `prefix`, by their keys."""
+    found: dict[str, list[Force]] = {}
+    for force in model.forces:
+        found.setdefault(key_for(force.topic, prefix), []).append(force)
+    return found
 
 
 def _aliases(model: RobotModel, prefix: str) -> tuple[str, ...]:
@@ -201,8 +289,9 @@ def _motors(mover: Mover, model: RobotModel) -> tuple[Motors | None, Motors | No
         return None, None
     mechanism = model.drive.mechanism if model.drive else None
     wheels = others = None
-    if isinstance(mechanism, Differential) and mover.wheels:
-        wheels = Motors(mover.body, mover.wheels, mechanism.torque, together=True)
+    if mover.wheels:
+        torque = mechanism.torque if isinstance(mechanism, Differential) else math.inf
+        wheels = Motors(mover.body, mover.wheels, torque, together=True)
     if free := frozenset(mover.names) - mover.wheels - mover.kept:
         others = Motors(mover.body, free)
     return wheels, others

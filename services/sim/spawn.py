@@ -6,15 +6,19 @@ from pathlib import Path
 
 from holozen import data
 from holozen.console import report
+from holozen.entities import has_no_room
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import load
-from holozen.robot.model import RobotModel, planar_drive
+from holozen.robot.model import Pushed, RobotModel, driven, takes
 from holozen.robot.rigid import PlacedShape, lowest, lump
 from holozen.rotation import from_rpy
+from holozen.suggest import listed
 from holozen.wire import key_for
 
 from .entities import Entities, EntityError
 from .physics.engine import UPRIGHT
+from .robot import command_key
+from .shard import Shard
 
 GAP = 0.5  # m between two robots at the start
 
@@ -24,24 +28,30 @@ def add_models(entities: Entities, models: tuple[RobotModel, ...]) -> None:
     for model in models:
         rotation = from_rpy(*model.pose.rpy)
         try:
-            entities.add(entities.free_name(_valid_name(model.name)), model, (model.pose.xyz, rotation))
+            entities.add(
+                entities.free_name(_valid_name(model.name)), model, (model.pose.xyz, rotation), may_overlap=True
+            )
         except EntityError as error:
             raise RobotError(f"model {model.name!r} of the world: {error}") from None
 
 
-def spawn_all(entities: Entities, args: argparse.Namespace) -> None:
-    """Add the robots of `--robot` on the ground, side by side along y, the first at the origin. Raises RobotError."""
+def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None = None) -> None:
+    """Add the robots of `--robot` on the ground, side by side along y, the first at the origin; in a shard those that
+    belong to it. Raises RobotError.
+    """
     robots: list[tuple[Path, str]] = args.robot or [(data.find("urdf", "hb_bot.urdf.xacro"), "")]
-    names = [name for _, name in robots]
-    for name in names:
-        if names.count(name) > 1:
-            raise RobotError(f"{names.count(name)} robots are called {name!r}; give each a name: --robot FILE=NAME")
+    models = [_read(path, args) for path, _ in robots]
+    # Without names, a namespace in each file is as good.
+    names = [(name, command_key(model, name)) for model, (_, name) in zip(models, robots, strict=True)]
+    for name, key in names:
+        if (same := names.count((name, key))) > 1:
+            raise RobotError(f"{same} robots are called {name!r}; give each a name: --robot FILE=NAME")
     y = 0.0
-    for number, (path, name) in enumerate(robots):
-        model = _read(path, args)
+    for number, (model, (path, name)) in enumerate(zip(models, robots, strict=True)):
         reach = max(map(_reach, lump(model).collisions), default=0.0)
         y += reach if number else 0.0
-        _add(entities, path, name, model, y)
+        if not mine or mine.owns(name):
+            _add(entities, path, name, model, y)
         y += reach + GAP
 
 
@@ -51,22 +61,27 @@ def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float)
             name or entities.free_name(_valid_name(model.name)), model, ((0.0, y, -lowest(model)), UPRIGHT), name
         )
     except EntityError as error:
-        raise RobotError(f"{path}: {error}") from None
+        advice = "; start with --empty, and `holozen spawn` it there" if has_no_room(error) else ""
+        raise RobotError(f"{path}: {error}{advice}") from None
     drive = model.drive
     assert drive is not None, "_read refuses a robot without a drive"
-    report(f"sim: {entity.name} listens on {key_for(drive.command_topic, name)}")
+    pushed = isinstance(drive.mechanism, Pushed)
+    keys = [key_for(force.topic, name) for force in model.forces] if pushed else [key_for(drive.command_topic, name)]
+    report(f"sim: {entity.name} listens on {listed(keys)}")
     for topic, known in ((drive.command_topic, "cmd_vel"), (drive.odometry_topic, "odom")):
         if topic.rpartition("/")[2] != known:
-            report(f"sim: {path}: topic {topic!r}: the teleop and the controller use {known!r}")
+            report(f"sim: warning: {path}: topic {topic!r}: the teleop and the controller use {known!r}")
 
 
 def _read(path: Path, args: argparse.Namespace) -> RobotModel:
     """Load and check a robot's file. Raises RobotError."""
     model = load(path, packages=dict(args.package), allow_env=args.allow_env)
     for warning in model.warnings:
-        report(f"sim: {warning}")
-    if model.drive is None and args.drive:
-        model = planar_drive(model)
+        report(f"sim: warning: {warning}")
+    if args.drive and not takes(model, args.drive):
+        report(f"sim: warning: {path}: has a drive of its own, which is used; --drive {args.drive} is not")
+    elif args.drive:
+        model = driven(model, args.drive)
     if model.drive is None:
         raise RobotError(f"{path}: no plugin drives it; add one, or move the whole body: --drive planar_move")
     if not lump(model).collisions:

@@ -57,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
         default=False,
         help="a line a second instead of a screen, for screen readers and logs",
     )
-    add("--script", metavar="FILE", help="drive as a script says, without a terminal; - reads standard input")
+    add("--script", metavar="FILE", help="drive by a script, without a terminal; - reads standard input")
     add("--stamped", action=argparse.BooleanOptionalAction, default=False, help="publish TwistStamped instead of Twist")
     add("--frame-id", default="", metavar="FRAME", help="frame_id of the TwistStamped")
     add("--cmd-vel", default="", metavar="KEY", type=flags.key,

@@ -4,10 +4,11 @@ import time
 from collections.abc import Sequence
 
 from holozen.bus import Bus
-from holozen.messages import TriggerReply, TriggerRequest, Twist
+from holozen.messages import CommandStatus, TriggerReply, TriggerRequest, Twist
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Graph, on_key
-from holozen.wire import robot_name
+from holozen.transport.pubsub import Latest
+from holozen.wire import key_for, robot_name
 
 from .control.layouts import FIXED
 from .control.twist_mapper import TwistMapper
@@ -34,6 +35,7 @@ class Session:
         self._robots = list(robots)
         self._first, self._command = self._robots[0] if robots else command.rpartition("/")[0], command
         self.client = self._client(self._first)
+        self._root = bus.latest("cmd_vel_status", CommandStatus) if any(robots) and not command else None
         mapper.switch(self.client.robot)
         self.graph: Graph = bus.graph()
         self.sent: Twist | None = None
@@ -82,6 +84,8 @@ class Session:
 
     def tick(self, now: float) -> None:
         """Publish what is due: a stop once a key is no longer held, else the repeated command."""
+        if self._root:
+            self._find_root(self._root)
         if self._wanted and not self.mapper.engaged:
             self._do_wanted()
         lost = self.client.lost()
@@ -154,9 +158,27 @@ class Session:
         if robot == self.client.robot:
             self.warning = "there is no other robot"
         else:
-            before, self.client, self.sent = self.client, self._client(robot), None
-            before.close()
-            self.mapper.switch(robot)
+            self._switch(robot)
+
+    def _switch(self, robot: str) -> None:
+        before, self.client, self.sent = self.client, self._client(robot), None
+        before.close()
+        self.mapper.switch(robot)
+
+    def _find_root(self, root: Latest[CommandStatus]) -> None:
+        """Take the robot at the root for one of its name, which its keys do not hold and no other robot's do."""
+        status = root.read()[0]
+        name = status.name if status else ""
+        if (
+            not name
+            or name not in self._robots
+            or self.mapper.engaged
+            or on_key(self.graph.endpoints(), key_for("cmd_vel", name), "sub")
+        ):
+            return
+        self._robots[self._robots.index(name)] = ""
+        if self.client.robot == name:
+            self._switch("")
 
     def _client(self, robot: str) -> RobotClient:
         return RobotClient(self.bus, robot, self._command if robot == self._first else "", self._stamped)

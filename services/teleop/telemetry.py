@@ -129,7 +129,7 @@ class Telemetry:
 
 
 def _unmoved(session: Session, status: CommandStatus) -> str:
-    """Why the robot moves slower than the keys say, or not at all; empty if it obeys them."""
+    """Why the robot moves slower than commanded, or not at all; empty if it obeys the keys."""
     settings, (x, y, _, turn) = session.mapper.settings, session.mapper.motion
     if y and not status.strafes:
         return "this robot cannot strafe: its drive only goes forward, backward and turns"

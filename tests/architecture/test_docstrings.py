@@ -1,4 +1,4 @@
-"""A file says what it is, and what is public says what it does."""
+"""Every file, and everything public, has a docstring."""
 
 import ast
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ FILES = sorted(path for folder in FOLDERS for path in REPO.glob(f"{folder}/**/*.
 CODE = [path for path in FILES if path.relative_to(REPO).parts[0] in ("holozen", "services")]
 Definition = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef
 
-WITHOUT_DOCSTRING = {"main", "parser"}  # the file's first line says it
+WITHOUT_DOCSTRING = {"main", "parser"}  # the file's docstring covers them
 
 
 def name(path: Path) -> str:
@@ -40,12 +40,12 @@ def is_a_message(node: Definition) -> bool:
 
 
 def is_of_a_protocol(node: Definition) -> bool:
-    """A body of `...`: who implements it says what it does."""
+    """A body of `...`: implementations have the docstring."""
     last = node.body[-1]
     return isinstance(last, ast.Expr) and isinstance(last.value, ast.Constant) and last.value.value is ...
 
 
-def test_a_file_says_what_it_is() -> None:
+def test_every_file_has_a_docstring() -> None:
     texts = {name(path): path.read_text() for path in FILES}
     assert [where for where, text in texts.items() if text and not ast.get_docstring(ast.parse(text))] == []
 

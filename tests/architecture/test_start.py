@@ -47,7 +47,7 @@ def test_a_module_loads_at_first_only_what_it_shows_help_with() -> None:
         ("holozen.cli", set()),
         ("holozen.cli.node", set()),
         ("holozen.cli.router", set()),
-        ("holozen.cli.release", set()),
+        ("holozen.cli.stop", set()),
         ("holozen.cli.param", set()),
         ("holozen.cli.service", set()),
         ("holozen.cli.topic", set()),
@@ -57,6 +57,7 @@ def test_a_module_loads_at_first_only_what_it_shows_help_with() -> None:
         ("holozen.cli.record", set()),
         ("holozen.cli.replay", set()),
         ("holozen.testing", {"subprocess", "inspect"}),
+        ("services.view.__main__", set()),
         ("services.teleop.__main__", {"asyncio", "inspect", "subprocess"}),
         ("services.sim.__main__", {"msgspec", "pathlib", "dataclasses", "inspect", "xml.etree.ElementTree"}),
     ]:

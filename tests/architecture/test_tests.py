@@ -1,6 +1,7 @@
 """Each test stands on its own: it imports no other, looks at nothing private, and runs once."""
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -48,3 +49,14 @@ def test_no_test_runs_again_after_a_failure() -> None:
         text = (REPO / name).read_text()
         for word in ("rerunfailures", "reruns", "flaky", "--last-failed", "pytest-retry"):
             assert word not in text, f"{name}: {word}"
+
+
+COUNTED = re.compile(r"= len\([\w.]+\.(messages|all)\(\)\)|(?<!self)\.(messages|all)\(\)\[\w+:")
+
+
+def test_what_is_published_from_now_on_is_known_by_its_time() -> None:
+    """A message that was sent before may arrive later: `record.from_now()` leaves it out, a count does not."""
+    for path in FILES:
+        if path.name not in (Path(__file__).name, "robots.py"):  # which have it
+            found = COUNTED.search(path.read_text())
+            assert not found, f"{path.relative_to(REPO)}: {found[0]}; use from_now()"

@@ -29,7 +29,7 @@ def writes(service: str) -> set[str]:
 
 
 MAIN = {key for folder in FOLDERS for keys in flow(folder) for key in keys}
-"""The keys that one sees in the picture of the tree; the table has more, for those who look closer."""
+"""The keys that one sees in the picture of the tree; the table has more."""
 
 
 def test_a_service_reads_what_is_left_of_its_arrow() -> None:
@@ -73,7 +73,7 @@ def test_the_table_has_a_row_for_each_key_with_its_types_ends_rate_and_rule() ->
     cells = {row[0].strip("`"): row for row in rows if row and row[0].startswith("`")}
     assert set(cells) == {row.key for row in (*wire.TOPICS, *wire.SERVICES)}
     assert cells["cmd_vel"][1:4] == [
-        "geometry_msgs/msg/Twist (TwistStamped accepted)", "teleop, controller, anyone -> sim", "20 Hz",
+        "geometry_msgs/msg/Twist (TwistStamped accepted)", "teleop, view, controller, anyone -> sim", "20 Hz",
     ]  # fmt: skip
     assert cells["clock"][2] == "sim -> anyone"
     assert cells["odom"][4] == wire.TOPICS[1].rule

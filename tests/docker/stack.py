@@ -19,16 +19,19 @@ SERVICES = ("router", "sim", "pose_service", "controller")
 
 
 class Stack:
-    """Containers and a network called `name`, the router on `port` of this machine's loopback."""
+    """Containers and a network called `name`, the router on `port` of this machine's loopback. `files` are compose
+    files besides docker-compose.yml, `env` what they need.
+    """
 
-    def __init__(self, image: str) -> None:
+    def __init__(self, image: str, *files: str, **env: str) -> None:
+        self._files = [word for file in ("docker-compose.yml", *files) for word in ("-f", str(ROOT / file))]
         self.name, self.port = f"holozen-test-{uuid4().hex[:8]}", free_port()
-        self.env = {"HOLOZEN_IMAGE": image, "HOLOZEN_PORT": str(self.port)}
+        self.env = {"HOLOZEN_IMAGE": image, "HOLOZEN_PORT": str(self.port), **env}
         self.connection = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.port}",))
 
     def words(self, *words: str) -> list[str]:
         """The words of a compose command about this stack."""
-        return ["docker-compose", "-f", str(ROOT / "docker-compose.yml"), "-p", self.name, *words]
+        return ["docker-compose", *self._files, "-p", self.name, *words]
 
     def compose(self, *words: str) -> str:
         """Run a compose command to its end; what it printed."""
@@ -60,14 +63,14 @@ class Stack:
         return {service: self.inspect(service)["State"]["Health"]["Status"] for service in SERVICES}
 
     def starts(self, *services: str) -> dict[str, str]:
-        """When each of these started, so that one sees who was started again."""
+        """When each of these started, so that a restart is seen."""
         return {service: self.inspect(service)["State"]["StartedAt"] for service in services}
 
     def logs(self, *services: str) -> str:
         return "\n".join(docker("logs", self.container(service)) for service in services or SERVICES)
 
     def complaints(self) -> list[str]:
-        """Lines of the logs that nobody wants to see."""
+        """Lines of the logs that should not be there."""
         return [line for line in self.logs().splitlines() if re.search(r"Traceback|Error|ERROR|WARN|panicked", line)]
 
     def execute(self, service: str, *words: str) -> str:

@@ -1,4 +1,4 @@
-"""docker-compose up, stop and down: who may reach what, a robot that drives its shape, a person who takes it over."""
+"""docker-compose up, stop and down: what can be reached, a robot that drives its shape, a person who takes over."""
 
 import json
 import sys
@@ -52,10 +52,10 @@ def test_only_the_router_listens(stack: Stack) -> None:
 
 def test_a_process_may_nothing_but_its_work(stack: Stack) -> None:
     for service in SERVICES:
-        told, wrote = stack.execute(service, "sh", "-c", "cat /proc/1/status; touch /tmp/x 2>&1 || true").split(
+        reported, wrote = stack.execute(service, "sh", "-c", "cat /proc/1/status; touch /tmp/x 2>&1 || true").split(
             "touch:"
         )
-        status = dict(line.split(":\t", 1) for line in told.splitlines())
+        status = dict(line.split(":\t", 1) for line in reported.splitlines())
         assert int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0, service
         assert status["NoNewPrivs"] == "1", service
         assert "0" not in status["Uid"].split(), service
@@ -87,7 +87,7 @@ def test_a_person_takes_over_from_a_terminal_and_hands_back(stack: Stack, watche
         assert terminal.process.wait(20) == 0
         assert terminal.modes() == terminal.modes_before
         assert "Traceback" not in terminal.raw
-    wait_for(lambda: not watcher.moves() and not watcher.status().obeyed, what="a robot that stands, nobody's")
+    wait_for(lambda: not watcher.moves() and not watcher.status().obeyed, what="a robot that stands without a driver")
     assert watcher.status().held
     assert stack.containers() == everybody
     holozen(stack, "controller", "--resume")
@@ -119,7 +119,7 @@ def test_a_person_attaches_and_detaches_and_the_robot_stands(stack: Stack, watch
     wait_for(lambda: watcher.driven_by("controller"), what="the controller to go on")
 
 
-def test_a_teleop_without_a_terminal_says_so(stack: Stack) -> None:
+def test_a_teleop_without_a_terminal_reports_it(stack: Stack) -> None:
     with pytest.raises(AssertionError, match=r"exit code 2\n(.*\n)*teleop: needs a terminal"):
         stack.compose("run", "--rm", "-T", "teleop")
 

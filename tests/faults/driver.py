@@ -1,9 +1,10 @@
-"""A program that drives a robot at 20 Hz until it is told to end. It prints when it begins to send each command, and
+"""A program that drives a robot at 20 Hz until its end is requested. It prints when it begins to send each command, and
 when it has (s, monotonic).
 
-python driver.py ENDPOINT
+python driver.py ENDPOINT [FOLDER]
 
-It is no lasting node, as `holozen topic pub` is none: when it dies the robot stands by the silence alone.
+It is no lasting node, as `holozen topic pub` is none: when it dies the robot stands by the silence alone. With the
+folder of a member it is a node, in the secure set-up.
 """
 
 import sys
@@ -16,9 +17,10 @@ from holozen.process import stop_event
 RATE = 20.0  # Hz
 
 
-def main(endpoint: str) -> None:
+def main(endpoint: str, secure: str = "") -> None:
     stop = stop_event()
-    with Bus("driver", Connection(mode="client", connect=(endpoint,)), stop=stop) as bus:
+    where = Connection(mode="client", connect=(endpoint,), secure=secure)
+    with Bus("driver", where, lasting=bool(secure), stop=stop) as bus:
         commands = bus.publisher("cmd_vel", Twist)
         while not stop.wait(1 / RATE):
             print("begin", time.monotonic(), flush=True)
@@ -28,4 +30,4 @@ def main(endpoint: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    main(*sys.argv[1:])

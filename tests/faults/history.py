@@ -66,14 +66,14 @@ class History:
         late = self.longest(begin)
         assert late <= COMMAND_SILENCE + STEP, f"it moved on for {late:.3f} s"
 
-    def check_mend(self, mended: float, until: float = float("inf")) -> None:
-        """A robot that stood when the link was mended moves by nothing that was sent before."""
-        before = [row for row in self.odom if row.end < mended]
+    def check_restored(self, restored: float, until: float = float("inf")) -> None:
+        """A robot that stood when the link came back moves by nothing that was sent before."""
+        before = [row for row in self.odom if row.end < restored]
         if before[-1].moves:
             return
-        first = next(iter(self.began[bisect_right(self.began, mended) :]), float("inf"))
-        late = [row.end - mended for row in self.odom if row.moves and mended < row.end < min(first, until)]
-        assert late == [], f"it moved {len(late)} times by what waited, {late[0]:.3f} s after the mend"
+        first = next(iter(self.began[bisect_right(self.began, restored) :]), float("inf"))
+        late = [row.end - restored for row in self.odom if row.moves and restored < row.end < min(first, until)]
+        assert late == [], f"it moved {len(late)} times by what waited, {late[0]:.3f} s after the link came back"
 
     def _sent(self, at: float) -> float:
         """When at the latest the last command was sent of those that may have been before `at`."""

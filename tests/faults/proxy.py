@@ -98,7 +98,7 @@ class Proxy:
                 return
             try:
                 far = socket.create_connection(self._target)
-            except OSError:  # nobody listens there: refused here too
+            except OSError:  # no listener there: refused here too
                 near.close()
                 continue
             for end in (near, far):

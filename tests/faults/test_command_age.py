@@ -21,12 +21,16 @@ from .history import STEP, History, whole_lines
 from .namespaces import NEEDS, Cable, Host, Lab
 from .proxy import Proxy
 
-pytestmark = [NEEDS, pytest.mark.alone]
+pytestmark = NEEDS
 
 HERE = Path(__file__).parent
 CLOCK = 4000  # s that the drivers' clock is ahead
 TRIALS = 34 if os.environ.get("HOLOZEN_LONG") else 1  # of each cut and fate, so some hundred of each cut
 CUTS = (0.2, 0.6, 0.9, 2.0)  # s
+DELAYS = [(0.1, True), (0.4, True), (0.6, False), (2.0, False), (0.1, True)]
+"""Delays of a link in s, one way, one after another; and whether the robot is driven over it."""
+if os.environ.get("HOLOZEN_LONG"):
+    DELAYS += [(0.2, True), (1.0, False), (0.1, True)]
 EACH_STEP = ("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}")  # odom, so that its times are close
 
 
@@ -94,22 +98,66 @@ def test_after_a_cut_nothing_that_waited_moves_the_robot(course: Course, fate: s
         elif fate == "stopped":
             driver.signal(signal.SIGSTOP)
         time.sleep(max(0.0, began + cut - time.monotonic()))
-        mended = time.monotonic()
+        restored = time.monotonic()
         course.cable.join()
         if fate == "alive":
-            course.wait_for_motion(mended)
-        course.wait_for_odom(mended + 1.0)
+            course.wait_for_motion(restored)
+        course.wait_for_odom(restored + 1.0)
         resumed = time.monotonic()
         driver.signal(signal.SIGCONT)
         driver.close()
         history = course.history()
         if cut > 0.5:
-            assert not history.moves(began + 0.55, mended), "the cut did not hit"
+            assert not history.moves(began + 0.55, restored), "the cut did not hit"
         history.check_silence(began)
-        history.check_mend(mended, resumed)
+        history.check_restored(restored, resumed)
         longest = max(longest, history.longest(began))
         course.drivers, course.observer = [], restart(course)
     print(f"{fate}: moved on for at most {longest:.3f} s after the last command was sent")
+
+
+@pytest.mark.needs("nft")
+@pytest.mark.parametrize("fate", ["alive", "killed"])
+def test_after_a_cut_that_neither_end_sees_nothing_moves_the_robot_either(course: Course, fate: str) -> None:
+    """Packets are dropped both ways: links stay half-open, and no end of a process comes through."""
+    driver = course.drive()
+    course.cable.lose(1.0)
+    began = time.monotonic()
+    time.sleep(0.58)  # TCP sends what waits again 0.2, 0.6 and 1.4 s later
+    if fate == "killed":
+        driver.kill()
+    restored = time.monotonic()
+    course.cable.lose(0.0)
+    if fate == "alive":
+        course.wait_for_motion(restored)
+    course.wait_for_odom(restored + 1.5)
+    driver.close()
+    history = course.history()
+    assert not history.moves(began + 0.55, restored), "the cut did not hit"
+    history.check_silence(began)
+    history.check_restored(restored)
+    course.drivers, course.observer = [], restart(course)
+
+
+@pytest.mark.needs("nft")
+def test_where_a_third_of_the_packets_is_lost_nothing_old_moves_the_robot(course: Course) -> None:
+    driver = course.drive()
+    began, before = time.monotonic(), sent_again(course.desk)
+    course.cable.lose(0.3)
+    wait_for(lambda: sent_again(course.desk) > before + 5, 30.0, "packets that were lost and sent again")
+    driver.kill()
+    course.cable.lose(0.0)
+    course.wait_for_odom(time.monotonic() + 1.0)
+    history = course.history()
+    history.check_silence(began)
+    assert not history.odom[-1].moves
+    course.drivers, course.observer = [], restart(course)
+
+
+def sent_again(host: Host) -> int:
+    """How many segments of TCP a host has sent again."""
+    names, values = (line.split() for line in host.proc_net("snmp") if line.startswith("Tcp:"))
+    return int(values[names.index("RetransSegs")])
 
 
 def restart(course: Course) -> Process:
@@ -146,7 +194,7 @@ def far(wire: Wire, proxy: Proxy, lab: Lab) -> Iterator[Far]:
 
 
 def test_a_link_that_becomes_slow_stops_the_robot_and_a_late_stop_is_obeyed(far: Far) -> None:
-    for delay, drives in ((0.1, True), (0.2, True), (0.4, True), (0.6, False), (1.0, False), (2.0, False), (0.1, True)):
+    for delay, drives in DELAYS:
         far.proxy.set(delay=delay)
         begin = time.monotonic() + 2 * delay + 1.5
         far.wait_for_odom(begin + 1)

@@ -1,4 +1,4 @@
-"""Whoever opens a port to the network is told so, and so is whoever looks with the doctor."""
+"""A port that is open to the network is reported at the start and by the doctor."""
 
 import json
 from pathlib import Path
@@ -22,7 +22,7 @@ def host(lab: Lab) -> Host:
 
 
 @pytest.mark.parametrize("listen", ["tcp/[::]:7447", "udp/10.99.1.1:7447"])
-def test_a_sim_that_listens_beyond_loopback_says_so(lab: Lab, host: Host, listen: str) -> None:
+def test_a_sim_that_listens_beyond_loopback_warns(lab: Lab, host: Host, listen: str) -> None:
     lab.cable(host, lab.host("desk"))
     sim = host.start(*command("sim", "--listen", listen))
     assert sim.wait_for_line("open to the network") == f"sim: listens at {listen}, {RISK}"
@@ -35,7 +35,7 @@ def test_a_hostname_is_looked_up(host: Host) -> None:
     assert not [row for row in map(json.loads, done.stdout.splitlines()) if row["check"] == "network"]
 
 
-def test_a_sim_on_loopback_says_nothing_of_the_network(host: Host) -> None:
+def test_a_sim_on_loopback_prints_no_network_warning(host: Host) -> None:
     for flags in ((), LOOPBACK):
         sim = host.start(*command("sim", *flags))
         sim.wait_for_line("listens on cmd_vel")
@@ -44,7 +44,7 @@ def test_a_sim_on_loopback_says_nothing_of_the_network(host: Host) -> None:
 
 
 @pytest.mark.parametrize("way", ["config", "cfg"])
-def test_a_router_says_where_a_configuration_has_it_listen(host: Host, tmp_path: Path, way: str) -> None:
+def test_a_router_reports_where_a_configuration_has_it_listen(host: Host, tmp_path: Path, way: str) -> None:
     path = tmp_path / "router.json5"
     path.write_text('{mode: "router", listen: {endpoints: ["tcp/127.0.0.1:7450", "tcp/0.0.0.0:7451"]}}')
     flags = ["--config", str(path)] if way == "config" else ["--cfg", 'listen/endpoints:["tcp/0.0.0.0:7451"]']
@@ -61,7 +61,7 @@ def test_zenohs_own_default_is_open(host: Host, tmp_path: Path) -> None:
     assert router.wait_for_line("open to the network") == f"router: listens at tcp/[::]:7447, {RISK}"
 
 
-def test_who_asks_for_a_password_is_not_told(host: Host, tmp_path: Path) -> None:
+def test_a_router_with_passwords_does_not_warn(host: Host, tmp_path: Path) -> None:
     (tmp_path / "users").write_text("student:secret\n")
     dictionary = f'transport/auth/usrpwd/dictionary_file:"{tmp_path / "users"}"'
     router = host.start(*command("router", "--listen", "tcp/0.0.0.0:7447", "--cfg", dictionary))

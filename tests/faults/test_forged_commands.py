@@ -1,4 +1,4 @@
-"""Commands of strangers who name themselves as they like, or mean nothing: the person who drives goes on driving."""
+"""Forged names and meaningless commands: the person who drives goes on driving."""
 
 import threading
 import time
@@ -40,13 +40,13 @@ def statuses(wire: Wire) -> Iterator["Statuses"]:
     wire.start("sim").wait_for_line("listens on cmd_vel")
     bus = wire.bus()
     longer = Parameter("command_timeout", ParameterValue.of(2.0))  # for a person's thread on a busy machine
-    told = bus.call("sim/set_parameters", SetParametersRequest([longer]), SetParametersReply)
-    assert told.results[0].successful, told
+    reported = bus.call("sim/set_parameters", SetParametersRequest([longer]), SetParametersReply)
+    assert reported.results[0].successful, reported
     yield Statuses(bus)
 
 
 class Statuses:
-    """What the sim says of who drives."""
+    """The sim's status of the drivers."""
 
     def __init__(self, bus: Bus) -> None:
         self.bus = bus

@@ -98,7 +98,7 @@ def test_a_rate_limits(link: Proxy, echo: Echo) -> None:
     assert echo.carries(bytes(300_000)) >= 0.29
 
 
-def test_a_stall_delivers_later_what_was_sent_meanwhile(link: Proxy, echo: Echo) -> None:
+def test_a_stall_delivers_later_what_was_sent_during_it(link: Proxy, echo: Echo) -> None:
     link.stall()
     echo.near.sendall(b"late")
     echo.far.settimeout(0.2)

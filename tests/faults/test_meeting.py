@@ -1,4 +1,4 @@
-"""Processes meet though links are slow, and though whoever holds the rendezvous point sleeps or is no Zenoh at all."""
+"""Processes meet over slow links, and where the holder of the rendezvous point sleeps or is not Zenoh."""
 
 import json
 import signal
@@ -7,12 +7,14 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
 from holozen.bus import Bus
+from holozen.messages import Odometry
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command, free_port
 from holozen.transport.connection import Connection
@@ -21,22 +23,30 @@ from .proxy import Proxy
 
 DELAY = 0.5  # s one way
 WITHIN = 5.0  # s to get in
+STOPPED = ("hb_bot is stopped\n", "the robot at the root is stopped\n")
+"""What `stop` prints: its name may come too late, since a robot is asked before it is discovered."""
 
 
 @pytest.mark.alone
-@pytest.mark.parametrize("mode", ["client", "peer"])
-def test_a_process_gets_in_over_a_slow_link(wire: Wire, proxy: Proxy, mode: str) -> None:
+def test_a_process_gets_in_over_a_slow_link(wire: Wire, proxy: Proxy) -> None:
     router = wire.start("router")
     router.wait_for_line("listens")
     proxy.set(delay=DELAY)
-    begin = time.monotonic()
-    with Bus("late", Connection(mode, connect=(proxy.endpoint,), listen=()), patience=WITHIN) as bus:
-        wait_for(bus.connected)
-        print(f"{mode}: {time.monotonic() - begin:.2f} s")
+
+    def gets_in(mode: str) -> None:
+        begin = time.monotonic()
+        with Bus("late", Connection(mode, connect=(proxy.endpoint,), listen=()), patience=WITHIN) as bus:
+            wait_for(bus.connected)
+            print(f"{mode}: {time.monotonic() - begin:.2f} s")
+
+    with ThreadPoolExecutor() as pool:
+        list(pool.map(gets_in, ("client", "peer")))
 
 
 @pytest.mark.parametrize("mode", ["client", "peer"])
-def test_a_verb_sees_the_nodes_over_a_slow_link_and_says_what_it_waits_for(wire: Wire, proxy: Proxy, mode: str) -> None:
+def test_a_verb_sees_the_nodes_over_a_slow_link_and_reports_what_it_waits_for(
+    wire: Wire, proxy: Proxy, mode: str
+) -> None:
     wire.start("pose-service").wait_for_line("goals")
     proxy.set(delay=DELAY)
     with Process(command("node", "list", "--mode", mode, "--connect", proxy.endpoint)) as listing:
@@ -52,7 +62,7 @@ def test_a_stop_reaches_the_robot_over_a_slow_link(wire: Wire, proxy: Proxy, mod
     proxy.set(delay=DELAY)
     with Process(command("stop", "--mode", mode, "--connect", proxy.endpoint)) as stop:
         assert stop.wait(20) == 0
-        assert stop.out == "the robot at the root is stopped\n"
+        assert stop.out in STOPPED
 
 
 @pytest.mark.parametrize(("mode", "number"), [("client", signal.SIGINT), ("peer", signal.SIGTERM)])
@@ -134,19 +144,20 @@ def test_processes_meet_though_the_holder_of_the_first_point_does_not_answer(tow
     assert (topics.returncode, topics.err) == (0, "")
     assert "odom" in topics.out.split()
     stop = town.run("stop")
-    assert (stop.returncode, stop.out) == (0, "the robot at the root is stopped\n")
+    assert stop.returncode == 0
+    assert stop.out in STOPPED
     echo = town.run("topic", "echo", "odom", "--once", "--timeout", "5")
     assert echo.returncode == 0
 
 
-def test_two_that_sleep_keep_nobody_from_meeting(town: Town) -> None:
+def test_two_sleeping_holders_keep_no_node_from_meeting(town: Town) -> None:
     town.asleep("pose-service")
     town.asleep("pose-service")
     town.start("sim").wait_for_line("listens on")
-    assert town.run("stop").out == "the robot at the root is stopped\n"
+    assert town.run("stop").out in STOPPED
 
 
-def test_who_wakes_up_meets_those_who_met_meanwhile(town: Town) -> None:
+def test_a_sleeper_that_wakes_up_meets_the_nodes_that_met_without_it(town: Town) -> None:
     sleeper = town.asleep("pose-service")
     town.start("sim").wait_for_line("listens on")
     sleeper.signal(signal.SIGCONT)
@@ -167,8 +178,14 @@ def test_a_client_that_opens_while_the_port_changes_hands_tries_again(wire: Wire
         with Process(words) as echo:
             dying.accept()[0].close()
             dying.close()
-            wire.start("sim")
-            assert echo.wait(20) == 0
+            odom = wire.bus("sim", lasting=True).publisher("odom", Odometry)  # at once: it is waited for 5 s
+
+            def has_ended() -> bool:
+                odom.put(Odometry())
+                return echo.returncode is not None
+
+            wait_for(has_ended, 20)
+            assert echo.returncode == 0, echo.err
             assert "pose:" in echo.out
 
 
@@ -212,7 +229,7 @@ def test_an_access_control_list_has_to_allow_the_tokens_of_nodes(
             sim.wait_for_line("listens on")
             listed = subprocess.run(command("topic", "list", *client), capture_output=True, text=True, timeout=30)
             stop = subprocess.run(command("stop", *client), capture_output=True, text=True, timeout=30)
-    assert stop.stdout == "the robot at the root is stopped\n"  # which is asked without its token
+    assert stop.stdout in STOPPED
     if len(allowed) > 1:
         assert "odom" in listed.stdout.split()
         assert (stop.stderr, stop.returncode) == ("", 0)

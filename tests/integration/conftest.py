@@ -34,7 +34,7 @@ def only_robot(town: Wire, sim: Process) -> Robot:
 
 @pytest.fixture
 def robot(only_robot: Robot) -> Robot:
-    """The file's robot: it stands, and whoever drove before is forgotten."""
+    """The file's robot: it stands, and its former drivers are forgotten."""
 
     def handed_over() -> bool:
         with contextlib.suppress(ServiceError):
@@ -53,13 +53,13 @@ def start_sim(wire: Wire, *flags: str) -> Process:
     return sim
 
 
-# A subscriber as Zenoh makes it by default, with a queue that blocks when it is full; nobody reads it.
+# A subscriber as Zenoh makes it by default, with a queue that blocks when it is full; it is never read.
 DEAF = """
 import sys, time, zenoh
 config = zenoh.Config()
 for path, value in (("mode", '"client"'), ("connect/endpoints", sys.argv[1]), ("scouting/multicast/enabled", "false")):
     config.insert_json5(path, value)
-session = zenoh.open(config)  # kept: one that nobody holds is closed
+session = zenoh.open(config)  # kept: one without a reference is closed
 subscriber = session.declare_subscriber(sys.argv[2])
 print("deaf", flush=True)
 time.sleep(3600)
@@ -67,20 +67,20 @@ time.sleep(3600)
 
 
 def deaf(wire: Wire, key: str) -> Process:
-    """A stranger that subscribes to a key and never reads."""
+    """A foreign node that subscribes to a key and never reads."""
     process = Process([sys.executable, "-c", DEAF, json.dumps([wire.endpoint]), key])
     process.wait_for_line("deaf")
     return process
 
 
 @pytest.fixture
-def stranger(town: Wire) -> Iterator[zenoh.Session]:
+def foreign(town: Wire) -> Iterator[zenoh.Session]:
     """A plain Zenoh session that knows nothing of holozen."""
-    with zenoh.open(stranger_config(town)) as session:
+    with zenoh.open(foreign_config(town)) as session:
         yield session
 
 
-def stranger_config(wire: Wire) -> zenoh.Config:
+def foreign_config(wire: Wire) -> zenoh.Config:
     config = zenoh.Config()
     endpoints = json.dumps([wire.endpoint])
     for path, value in (

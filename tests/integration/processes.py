@@ -4,7 +4,8 @@ import os
 import subprocess
 from pathlib import Path
 
-from holozen.bag.reader import Bag, Message
+from holozen.bag import Message
+from holozen.bag.reader import Bag
 from holozen.testing import Wire
 
 
@@ -12,9 +13,9 @@ def assert_one_line(done: subprocess.CompletedProcess[str], code: int, *parts: s
     """It failed with this code and one line that holds these parts."""
     assert done.returncode == code, done.stderr
     assert done.stdout == ""
-    said = done.stderr.splitlines()
-    assert len(said) == 1, done.stderr
-    assert all(part in said[0] for part in parts), said[0]
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1, done.stderr
+    assert all(part in lines[0] for part in parts), lines[0]
 
 
 def read(path: Path) -> list[Message]:

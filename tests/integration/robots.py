@@ -1,4 +1,4 @@
-"""A robot as a test sees it: what it tells, and a hand on its keys."""
+"""A robot as a test sees it: what it publishes, and a way to command it."""
 
 import math
 import time
@@ -20,7 +20,11 @@ Planar = tuple[float, float, float]
 
 
 class Record:
-    """Everything that came on a key since this began, in order."""
+    """Everything that came on a key since this began, in order.
+
+    What one key brings says nothing of what has come on another, and a message may come long after it was sent. So what
+    a test asks for is of after a moment by the time of its sending: all processes of a test have one clock.
+    """
 
     def __init__(self, subscription: Subscription[Any]) -> None:
         self._subscription = subscription
@@ -34,17 +38,54 @@ class Record:
             if received.message is not None:
                 self._messages.append(received.message)
             if (stamp := received.sample.stamp) and stamp.sent > began:
-                break  # a sim that goes as fast as it can may tell more than this can read
+                break  # a sim that goes as fast as it can may publish more than this can read
         return self._received
 
     def messages(self) -> list[Any]:
         self.all()
         return self._messages
 
+    def from_now(self) -> "Part":
+        """What is sent from now on."""
+        return Part(self)
+
     def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = 20.0) -> Any:
-        """The first message from now on that is as wanted; waits for it."""
-        seen = len(self.messages())
-        return wait_for(lambda: next((m for m in self.messages()[seen:] if wanted(m)), None), within, "such a message")
+        """The first message that is sent from now on and is as wanted; waits for it."""
+        return self.from_now().next(wanted, within)
+
+
+class Part:
+    """What of a record was sent after this was made."""
+
+    def __init__(self, record: Record) -> None:
+        self._record, self._seen, self._began = record, len(record.all()), time.monotonic()
+        self._found: list[Received[Any]] = []
+
+    def all(self) -> list[Received[Any]]:
+        new = self._record.all()[self._seen :]
+        self._seen += len(new)
+        self._found += [received for received in new if sent_at(received) > self._began]
+        return self._found
+
+    def messages(self) -> list[Any]:
+        return [received.message for received in self.all() if received.message is not None]
+
+    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = 20.0) -> Any:
+        """The first message that is as wanted; waits for it."""
+        looked = 0
+
+        def look() -> Any:
+            nonlocal looked
+            new = self.all()[looked:]
+            looked += len(new)
+            return next((r.message for r in new if r.message is not None and wanted(r.message)), None)
+
+        return wait_for(look, within, "such a message")
+
+
+def sent_at(received: Received[Any]) -> float:
+    """When it was sent, s as of time.monotonic; infinity for what carries no stamp."""
+    return received.sample.stamp.sent if received.sample.stamp else math.inf
 
 
 def record(bus: Bus, key: str, *kinds: type[Message]) -> Record:
@@ -65,17 +106,17 @@ class Robot:
     def wait_longer(self, seconds: float = 2.0) -> "Robot":
         """Let it stop only after so much silence: a test that measures a drive may be held up. Itself."""
         timeout = Parameter(f"{self.name}.command_timeout".lstrip("."), ParameterValue.of(seconds))
-        told = self.bus.call("sim/set_parameters", SetParametersRequest([timeout]), SetParametersReply)
-        assert told.results[0].successful, told
+        reported = self.bus.call("sim/set_parameters", SetParametersRequest([timeout]), SetParametersReply)
+        assert reported.results[0].successful, reported
         return self
 
     def newest(self) -> Odometry:
-        """An odom that was told after this call."""
+        """An odom published after this call."""
         odom: Odometry = self.odom.next()
         return odom
 
     def status(self) -> CommandStatus:
-        """A status that was told after this call."""
+        """A status published after this call."""
         status: CommandStatus = self._status.next()
         return status
 
@@ -90,21 +131,21 @@ class Robot:
     def drive(
         self, x: float = 0.0, y: float = 0.0, turn: float = 0.0, until: Callable[[Odometry], object] | None = None
     ) -> list[Odometry]:
-        """Command with every odom, until one is as wanted (default: until the robot moves so). The odoms meanwhile."""
+        """Command with every odom, until one is as wanted (default: until the robot moves so). Returns them."""
         wanted = until or (lambda odom: moves(odom, x, y, turn))
-        begin = seen = len(self.odom.messages())
+        part, seen = self.odom.from_now(), 0
         self.put(x, y, turn)
 
         def look() -> bool:
             nonlocal seen
-            new = self.odom.messages()[seen:]
+            new = part.messages()[seen:]
             seen += len(new)
             if new:
                 self.put(x, y, turn)
             return any(wanted(odom) for odom in new)
 
-        wait_for(look, 20, lambda: f"the robot to be driven as told; its status: {self.last_status()}")
-        odoms: list[Odometry] = self.odom.messages()[begin:seen]
+        wait_for(look, 20, lambda: f"the robot to be driven as commanded; its status: {self.last_status()}")
+        odoms: list[Odometry] = part.messages()[:seen]
         return odoms
 
     def stands(self) -> Odometry:
@@ -112,8 +153,8 @@ class Robot:
         odom: Odometry = self.odom.next(rests)
         return odom
 
-    def told_to_stop(self) -> None:
-        """Wait until the last thing anybody said on cmd_vel is a stop."""
+    def wait_for_stop_command(self) -> None:
+        """Wait until the last message on cmd_vel is a stop."""
 
         def stopped() -> bool:
             commands = self.commands.messages()

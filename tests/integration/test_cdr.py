@@ -1,9 +1,11 @@
-"""A whole system that writes CDR: an independent library reads what the sim tells and drives it; JSON drives it too."""
+"""A whole system that writes CDR: another library reads what the sim publishes and drives it; JSON drives it too."""
 
+import contextlib
 import math
 import re
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +13,13 @@ import pytest
 import zenoh
 from rosbags.typesys import Stores, get_typestore
 
+from holozen.bus import Bus
 from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest
-from holozen.testing import Process, Wire
+from holozen.testing import Process, Wire, wait_for
+from holozen.transport.errors import ServiceError
 from holozen.wire import TOPICS
 
-from .conftest import start_sim, stranger_config
+from .conftest import foreign_config, start_sim
 from .robots import Robot, moves
 
 REPO = Path(__file__).parents[2]
@@ -26,7 +30,7 @@ TYPES = STORE.types
 @pytest.fixture(scope="module")
 def only_robot() -> Iterator[tuple[Wire, Robot]]:
     with Wire() as wire:
-        start_sim(wire, "--wire", "cdr")
+        start_sim(wire, "--wire", "cdr", "--robot", str(REPO / "urdf" / "explorer.urdf.xacro"))
         yield wire, Robot(wire.bus())
 
 
@@ -37,8 +41,8 @@ def robot(only_robot: tuple[Wire, Robot]) -> Iterator[Robot]:
 
 
 @pytest.fixture
-def stranger(only_robot: tuple[Wire, Robot]) -> Iterator[zenoh.Session]:
-    with zenoh.open(stranger_config(only_robot[0])) as session:
+def foreign(only_robot: tuple[Wire, Robot]) -> Iterator[zenoh.Session]:
+    with zenoh.open(foreign_config(only_robot[0])) as session:
         yield session
 
 
@@ -49,12 +53,12 @@ def twist(x: float) -> bytes:
 
 
 @pytest.mark.parametrize("row", [row for row in TOPICS if "sim" in row.writers], ids=lambda row: str(row.key))
-def test_what_the_sim_tells_is_cdr_of_the_type_of_its_topic(row: Any, robot: Robot, stranger: zenoh.Session) -> None:
-    with stranger.declare_subscriber(row.key) as subscriber:
+def test_what_the_sim_publishes_is_cdr_of_the_type_of_its_topic(row: Any, robot: Robot, foreign: zenoh.Session) -> None:
+    with foreign.declare_subscriber(row.key) as subscriber:
         sample = subscriber.recv()
     assert sample
     assert str(sample.encoding) == f"application/cdr;{row.type.ROS}"
-    (reply,) = stranger.get(row.key)
+    (reply,) = foreign.get(row.key)
     assert reply.ok
     assert str(reply.ok.encoding) == str(sample.encoding)
     if row.type.ROS in TYPES:
@@ -63,11 +67,14 @@ def test_what_the_sim_tells_is_cdr_of_the_type_of_its_topic(row: Any, robot: Rob
 
 
 @pytest.mark.parametrize("encoding", ["application/cdr", "application/cdr;geometry_msgs/msg/Twist", "zenoh/bytes"])
-def test_a_command_in_cdr_drives_whatever_its_encoding_says(
-    encoding: str, robot: Robot, stranger: zenoh.Session
+def test_a_command_in_cdr_drives_whatever_its_encoding_claims(
+    encoding: str, robot: Robot, foreign: zenoh.Session
 ) -> None:
-    stranger.put("cmd_vel", twist(0.3), encoding=encoding)
-    robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
+    def driven() -> bool:
+        foreign.put("cmd_vel", twist(0.3), encoding=encoding)
+        return moves(robot.newest(), 0.3, 0, 0)
+
+    wait_for(driven)
 
 
 def test_the_examples_of_the_docs_run(only_robot: tuple[Wire, Robot], robot: Robot) -> None:
@@ -79,8 +86,7 @@ def test_the_examples_of_the_docs_run(only_robot: tuple[Wire, Robot], robot: Rob
 
 
 def test_json_still_drives(robot: Robot) -> None:
-    robot.put(0.2)
-    robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
+    robot.drive(0.2)
 
 
 @pytest.mark.parametrize(
@@ -95,10 +101,10 @@ def test_json_still_drives(robot: Robot) -> None:
     ids=str,
 )  # fmt: skip
 def test_a_bad_command_is_refused_with_its_reason(
-    payload: bytes, encoding: str, kind: str, reason: str, robot: Robot, stranger: zenoh.Session
+    payload: bytes, encoding: str, kind: str, reason: str, robot: Robot, foreign: zenoh.Session
 ) -> None:
     before = robot.status().refused.get(kind, 0)
-    stranger.put("cmd_vel", payload, encoding=encoding)
+    foreign.put("cmd_vel", payload, encoding=encoding)
     status = robot.status_when(lambda status: status.refused.get(kind, 0) > before)
     assert reason in status.last_refusal
 
@@ -109,4 +115,12 @@ def test_services_answer_in_cdr(only_robot: tuple[Wire, Robot], robot: Robot) ->
     service.wait_for_line("goals from")
     goal = wire.bus("asker", wire="cdr").call("next_goal", NextGoalRequest(0), NextGoalReply)
     assert goal == NextGoalReply(1.0, 0.0, math.pi / 2, 0)
-    assert wire.bus("json").call("get_pose", GetPoseRequest(), GetPoseReply).odom.child_frame_id == "footprint_link"
+    pose = wait_for(partial(has_pose, wire.bus("json")))
+    assert pose and pose.odom.child_frame_id == "footprint_link"
+
+
+def has_pose(bus: Bus) -> GetPoseReply | None:
+    """The pose that the pose service knows; None until it has an odom."""
+    with contextlib.suppress(ServiceError):
+        return bus.call("get_pose", GetPoseRequest(), GetPoseReply)
+    return None

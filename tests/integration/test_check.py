@@ -12,7 +12,8 @@ from holozen.testing.wire import command
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
 TYPO = """<robot name="r">
 <link name="a">
-<inertial><mass value="1"/><inertia ixx="1" iyy="1" ivz="0" izz="1"/></inertial></link></robot>"""
+<inertial><mass value="1"/><inertia ixx="1" iyy="1" ivz="0" izz="1"/></inertial>
+<collision><geometry><sphere radius="1"/></geometry></collision></link></robot>"""
 WARNS = """<robot name="r">
 <link name="a"><inertial><mass value="1"/><inertia ixx="9" iyy="9" izz="9"/></inertial>
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link></robot>"""
@@ -27,8 +28,8 @@ def test_a_good_file_is_summed_up_in_one_line(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "ok: 5 links, 3 wheels, planar_move on cmd_vel\n", "")
     assert run(str(BOT), "--json").stdout == ""
     (tmp_path / "r.urdf").write_text(WARNS.replace("9", "0.004"))
-    told = "ok: 1 link, no drive: holozen spawn --drive planar_move moves it as a whole\n"
-    assert run(str(tmp_path / "r.urdf")).stdout == told
+    expected = "ok: 1 link, no drive: holozen spawn --drive planar_move moves it as a whole\n"
+    assert run(str(tmp_path / "r.urdf")).stdout == expected
     assert run(str(data.find("urdf", "materials.xacro"))).stdout.startswith(
         "ok: no links: a file for others to include"
     )
@@ -41,7 +42,7 @@ def test_a_file_without_links_is_an_error_unless_it_is_for_others_to_include(tmp
         assert (done.returncode, done.stdout.count("error: <robot name='r'> has no <link>")) == (1, 1), done
 
 
-def test_an_error_is_told_with_its_line_and_how_to_mend_it(tmp_path: Path) -> None:
+def test_an_error_is_reported_with_its_line_and_the_fix(tmp_path: Path) -> None:
     (tmp_path / "r.urdf").write_text(TYPO)
     done = run(str(tmp_path / "r.urdf"))
     assert (done.returncode, done.stderr) == (1, "")
@@ -76,17 +77,17 @@ def test_a_task_sets_size_and_names(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "expected"),
     [
         (["--fits", "big"], "write metres as 0.4x0.2"),
         (["n=1"], "write name:=value"),
         (["--fits", "1x-1"], "write metres"),
     ],
 )
-def test_wrong_words_are_told(words: list[str], told: str) -> None:
+def test_wrong_words_are_reported(words: list[str], expected: str) -> None:
     done = run(str(BOT), *words)
     assert done.returncode == 2
-    assert told in done.stderr and "Traceback" not in done.stderr
+    assert expected in done.stderr and "Traceback" not in done.stderr
 
 
 def test_a_file_that_is_not_there_is_one_finding(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 import contextlib
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -48,7 +49,7 @@ def bad(rows: Rows, check: str) -> list[str]:
 
 @pytest.fixture
 def door(wire: Wire) -> Bus:
-    """Somebody who holds the meeting point."""
+    """A process that holds the rendezvous point."""
     return wire.bus("door", lasting=True)
 
 
@@ -65,7 +66,8 @@ def test_with_a_robot_that_drives_all_is_well(wire: Wire) -> None:
     assert "fresh on odom" in texts
     assert "and speaks Zenoh" in texts
     assert controller.returncode is None
-    assert controller.err == ""  # it drives on
+    assert "yields" not in controller.err
+    wait_for(lambda: (now := odom.read()[0]) and not now.twist.twist.is_slow(0.1), what="it to drive on")
 
 
 @pytest.mark.needs("ip", "unshare")
@@ -77,7 +79,7 @@ def test_with_no_network_and_nothing_running_all_is_well() -> None:
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_a_router_that_is_not_there_is_told(wire: Wire, mode: str) -> None:
+def test_a_missing_router_is_reported(wire: Wire, mode: str) -> None:
     code, rows = doctor(wire, "--mode", mode)
     assert code == 1
     assert bad(rows, "port") == [f"error: {wire.endpoint} cannot be reached: Connection refused"]
@@ -85,7 +87,7 @@ def test_a_router_that_is_not_there_is_told(wire: Wire, mode: str) -> None:
 
 
 @pytest.mark.parametrize("mode", ["peer", "client"])
-def test_who_holds_the_port_and_speaks_no_zenoh_is_named(wire: Wire, mode: str) -> None:
+def test_a_holder_of_the_port_that_speaks_no_zenoh_is_named(wire: Wire, mode: str) -> None:
     with Process([sys.executable, "-c", HOLD, str(wire.port)]) as holder:
         holder.wait_for_line("up")
         _, rows = doctor(wire, "--mode", mode)
@@ -94,7 +96,7 @@ def test_who_holds_the_port_and_speaks_no_zenoh_is_named(wire: Wire, mode: str) 
     assert f"kill {holder.pid}" in next(row["fix"] for row in rows if row["check"] == "port")
 
 
-def test_who_holds_the_port_and_sleeps_is_to_be_woken(wire: Wire) -> None:
+def test_a_sleeping_holder_of_the_port_is_to_be_woken(wire: Wire) -> None:
     router = wire.start("router")
     wait_for(lambda: "speaks Zenoh" in str(doctor(wire)[1]))
     router.signal(signal.SIGSTOP)
@@ -104,7 +106,7 @@ def test_who_holds_the_port_and_sleeps_is_to_be_woken(wire: Wire) -> None:
     assert f"kill -CONT {router.pid}" in str(rows)
 
 
-def test_two_sims_on_one_key_are_told_with_their_processes(wire: Wire) -> None:
+def test_two_sims_on_one_key_are_reported_with_their_processes(wire: Wire) -> None:
     sim = wire.start("sim", "--empty")
     sim.wait_for_line("no robot yet")
     clock = wire.bus("other", lasting=True).publisher("clock", Clock)  # our own sim would refuse
@@ -122,12 +124,12 @@ def test_odom_that_does_not_come_is_stale(wire: Wire, door: Bus) -> None:
     publisher = wire.bus("sim").publisher("Fred/odom", Odometry)
     code, rows = doctor(wire)
     (text,) = bad(rows, "odom")
-    assert text.startswith("error: Fred/odom is stale: nothing from sim for 1.")
+    assert re.match(r"error: Fred/odom is stale: nothing from sim for \d+\.\d s", text)
     assert code == 1
-    assert publisher.matched is False  # the doctor is gone without a trace
+    wait_for(lambda: not publisher.matched, what="the doctor to be gone without a trace")
 
 
-def test_a_stopped_robot_is_told_and_is_no_error(wire: Wire) -> None:
+def test_a_stopped_robot_is_reported_and_is_no_error(wire: Wire) -> None:
     wire.start("sim").wait_for_line("listens on")
     assert wire.run("stop").returncode == 0
     code, rows = doctor(wire)
@@ -154,7 +156,7 @@ def commanding(*buses: Bus) -> Iterator[None]:
         thread.join()
 
 
-def test_two_that_fight_for_a_robot_are_told(wire: Wire) -> None:
+def test_two_sources_that_fight_for_a_robot_are_reported(wire: Wire) -> None:
     wire.start("sim").wait_for_line("listens on")
     with commanding(wire.bus("left"), wire.bus("right")):
         (text,) = wait_for(lambda: bad(doctor(wire)[1], "cmd_vel"), within=30)
@@ -162,36 +164,38 @@ def test_two_that_fight_for_a_robot_are_told(wire: Wire) -> None:
     assert "DATA" in text and "not obeyed" in text and "right@" in text
 
 
-def stranger(wire: Wire, change: Callable[[dict[str, Any]], None]) -> tuple[Any, Any]:
-    """A node that tells of itself as `change` has it."""
-    bus = wire.bus("stranger")
-    told = {"node": "stranger", "version": graph.version("holozen"), "host": "elsewhere", "pid": 7}
+def foreign(wire: Wire, change: Callable[[dict[str, Any]], None]) -> tuple[Any, Any]:
+    """A node whose description is altered by `change`."""
+    bus = wire.bus("foreign")
+    reported = {"node": "foreign", "version": graph.version("holozen"), "host": "elsewhere", "pid": 7}
 
     def answer(query: Any) -> None:
         with query:
-            row = told | {"time": time.time()}
+            row = reported | {"time": time.time()}
             change(row)
             query.reply(graph.node_info_key(bus.id), json.dumps(row))
 
     return bus.session.declare_queryable(graph.node_info_key(bus.id), answer), bus.announce("node")
 
 
-def test_a_clock_that_is_off_is_told(wire: Wire, door: Bus) -> None:
-    held = stranger(wire, lambda row: row.__setitem__("time", row["time"] + 3))
+def test_a_clock_that_is_off_is_reported(wire: Wire, door: Bus) -> None:
+    held = foreign(wire, lambda row: row.__setitem__("time", row["time"] + 3))
     code, rows = doctor(wire)
     (text,) = bad(rows, "clock")
-    assert (code, text.startswith("error: the clock of elsewhere is +3.0"), bool(held)) == (1, True, True)
+    found = re.match(r"error: the clock of elsewhere is ([+-].+) s from ours \(give or take (.+) s\)", text)
+    assert found and code == 1 and held, text
+    assert float(found[1]) == pytest.approx(3, abs=float(found[2]) + 1e-3)
 
 
-def test_another_version_is_told(wire: Wire, door: Bus) -> None:
-    held = stranger(wire, lambda row: row.__setitem__("version", "0.0.1"))
+def test_another_version_is_reported(wire: Wire, door: Bus) -> None:
+    held = foreign(wire, lambda row: row.__setitem__("version", "0.0.1"))
     code, rows = doctor(wire)
     (text,) = bad(rows, "nodes")
-    told = f"warning: stranger (pid 7 on elsewhere) has holozen 0.0.1, this is {graph.version('holozen')}"
-    assert (code, text, bool(held)) == (0, told, True)
+    expected = f"warning: foreign (pid 7 on elsewhere) has holozen 0.0.1, this is {graph.version('holozen')}"
+    assert (code, text, bool(held)) == (0, expected, True)
 
 
-def test_a_node_that_does_not_answer_is_told(wire: Wire, door: Bus) -> None:
+def test_a_node_that_does_not_answer_is_reported(wire: Wire, door: Bus) -> None:
     bus = wire.bus("mute")
     held = (
         bus.announce("node"),
@@ -205,7 +209,7 @@ def test_a_node_that_does_not_answer_is_told(wire: Wire, door: Bus) -> None:
 
 
 @pytest.mark.parametrize(("lacks", "level"), [("pybullet", "warning"), ("zenoh", "error")])
-def test_a_wheel_that_lacks_is_told(wire: Wire, tmp_path: Path, lacks: str, level: str) -> None:
+def test_a_missing_wheel_is_reported(wire: Wire, tmp_path: Path, lacks: str, level: str) -> None:
     """A real environment without it: links to all else."""
     there = next(Path(path) for path in sys.path if path.endswith("site-packages"))
     for entry in there.iterdir():
@@ -222,13 +226,13 @@ def test_a_wheel_that_lacks_is_told(wire: Wire, tmp_path: Path, lacks: str, leve
     assert "port: " in done.stdout  # everything else is checked all the same
 
 
-def test_a_configuration_that_is_wrong_is_told_in_one_line(wire: Wire) -> None:
+def test_a_wrong_configuration_is_one_error_line(wire: Wire) -> None:
     code, rows = doctor(wire, "--config", "/nowhere.json5")
     (text,) = bad(rows, "zenoh")
     assert (code, "/nowhere.json5" in text) == (1, True)
 
 
-def test_it_ends_quietly_when_nobody_reads(wire: Wire) -> None:
+def test_it_ends_quietly_without_a_reader(wire: Wire) -> None:
     words = " ".join(command("doctor", *wire.flags))
     done = subprocess.run(
         ["bash", "-o", "pipefail", "-c", f"{words} | head -1"], capture_output=True, text=True, timeout=60
@@ -257,5 +261,5 @@ def test_variables_put_every_process_on_a_network_and_the_doctor_shows_them(wire
         for verb in ("sim", "teleop", "controller", "pose-service", "up", "stop", "doctor"):
             done = run(verb, *["--script", os.devnull][: 2 * (verb == "teleop")], HOLOZEN_MODE="klient")
             assert (done.returncode, done.stdout) == (2, ""), verb
-            assert done.stderr.startswith("holozen: HOLOZEN_MODE='klient'; did you mean 'client'?"), done.stderr
+            assert done.stderr.startswith("holozen: HOLOZEN_MODE='klient' (did you mean 'client'?)"), done.stderr
             assert done.stderr.count("\n") == 1, done.stderr

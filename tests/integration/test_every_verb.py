@@ -1,8 +1,9 @@
-"""Every verb beside what runs, beside nobody, and interrupted: no traceback, one line, the right exit code.
+"""Every verb beside what runs, alone, and interrupted: no traceback, one line, the right exit code.
 
 A test tries all verbs of its kind side by side, each as a process.
 """
 
+import itertools
 import json
 import os
 import re
@@ -23,8 +24,8 @@ from holozen.cli.spawn import Place, spawn_file
 from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command, free_port
 
-from .conftest import start_sim, stranger_config
-from .strangers import PUTS
+from .conftest import foreign_config, start_sim
+from .foreign_samples import PUTS
 from .verbs import VERBS, Row
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
@@ -41,19 +42,27 @@ Done = subprocess.CompletedProcess[str]
 T = TypeVar("T")
 
 LIVE = [name for name, row in VERBS.items() if row.live is not None]
-TEXT = [name for name in LIVE if not (VERBS[name].stranger or VERBS[name].endless)]  # the others print it there
+TEXT = [name for name in LIVE if not (VERBS[name].foreign or VERBS[name].endless)]  # the others print it there
 WRONG = [name for name, row in VERBS.items() if row.wrong]
 ON_THE_WIRE = [name for name in LIVE if VERBS[name].bus]
 SILENT = [name for name, row in VERBS.items() if row.silent]
-STRANGERS = [name for name, row in VERBS.items() if row.stranger]
+FOREIGN = [name for name, row in VERBS.items() if row.foreign]
 ENDLESS = [name for name, row in VERBS.items() if row.endless]
-OF_EACH_NOUN = list({name.partition(" ")[0]: name for name in ON_THE_WIRE}.values())
-WAITING = [name for name in ON_THE_WIRE if not VERBS[name].endless and name != "doctor"]
+
+
+def of_each_noun(names: list[str]) -> list[str]:
+    return list({name.partition(" ")[0]: name for name in names}.values())
+
+
+OF_EACH_NOUN = of_each_noun(ON_THE_WIRE)
+WAITING = of_each_noun([name for name in ON_THE_WIRE if not VERBS[name].endless and name != "doctor"])
 
 
 def words_of(verb: str) -> list[str]:
     """A verb, or the verbs of a noun."""
-    return [f"{verb} {name}" for name in cli.VERBS[verb].split(", ")] if verb in cli.NOUNS else [verb]
+    if verb in cli.NOUNS:
+        return [f"{verb} {name}" for name in cli.VERBS[verb].split(", ")]
+    return [verb, *(f"{verb} {name}" for name in cli.OF_SERVICES.get(verb, ()))]
 
 
 def test_every_verb_has_a_row() -> None:
@@ -61,10 +70,11 @@ def test_every_verb_has_a_row() -> None:
 
 
 class Town:
-    """A sim with robots, a pose service, and a stranger who talks on many keys, listens and answers."""
+    """A sim with robots, a pose service, and a foreign node that publishes on many keys, listens and answers."""
 
     def __init__(self, wire: Wire, tmp: Path) -> None:
         self.wire, self.tmp = wire, tmp
+        self._free = itertools.count(5, 2)  # m along x, where nothing is
         (tmp / "ball.urdf").write_text(BALL)
         (tmp / "odd.urdf").write_text("<robot/>")
         (tmp / "sim.yaml").write_text("sim:\n  ros__parameters:\n    max_linear: 1.5\n")
@@ -79,7 +89,8 @@ class Town:
     def words(self, name: str, words: str, n: str) -> list[str]:
         """The words of a verb, filled in."""
         files = {"bot": BOT} | {key: self.tmp / file for key, file in FILES.items()}
-        return [*name.split(), *shlex.split(words.format(n=n, id=n + "".join(name.split()), tmp=self.tmp, **files))]
+        filled = words.format(n=n, id=n + "".join(name.split()), tmp=self.tmp, free=next(self._free), **files)
+        return [*name.split(), *shlex.split(filled)]
 
 
 FILES = {"ball": "ball.urdf", "odd": "odd.urdf", "yaml": "sim.yaml", "bag": "bag.mcap"}
@@ -88,7 +99,7 @@ FILES = {"ball": "ball.urdf", "odd": "odd.urdf", "yaml": "sim.yaml", "bag": "bag
 @pytest.fixture(scope="module")
 def place(town: Wire, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Town]:
     place, done = Town(town, tmp_path_factory.mktemp("verbs")), threading.Event()
-    with zenoh.open(stranger_config(town)) as session:
+    with zenoh.open(foreign_config(town)) as session:
         heard = session.declare_subscriber("a/heard", zenoh.handlers.RingChannel(1))
         asked = session.declare_queryable("a/asked", lambda query: query.reply("a/asked", b'{"x": 1}'))
         talker = threading.Thread(target=_talk, args=(session, done))
@@ -174,7 +185,7 @@ def test_a_reader_that_is_gone_ends_it_quietly(place: Town) -> None:
         with open(writing, "wb") as gone:
             return run([*place.words(name, row.live or "", "pipe"), "--json", *flags(row, place.wire)], gone)
 
-    for name, done in tries(LIVE, attempt):
+    for name, done in tries(OF_EACH_NOUN, attempt):
         assert done.returncode == 0, f"{name}: {done.stderr}"
         assert is_clean(done.stderr) and "Broken pipe" not in done.stderr, f"{name}: {done.stderr}"
 
@@ -189,21 +200,21 @@ def test_what_is_wrong_is_one_line(place: Town) -> None:
         assert_one_line(name, done, code, part)
 
 
-def test_it_does_its_work_with_strangers(place: Town) -> None:
+def test_it_does_its_work_with_foreign_nodes(place: Town) -> None:
     def attempt(name: str) -> Done:
-        words, _ = VERBS[name].stranger or ("", "")
-        return run(place.words(name, words, "stranger") + place.wire.flags)
+        words, _ = VERBS[name].foreign or ("", "")
+        return run(place.words(name, words, "foreign") + place.wire.flags)
 
-    for name, done in tries(STRANGERS, attempt):
-        _, part = VERBS[name].stranger or ("", "")
+    for name, done in tries(FOREIGN, attempt):
+        _, part = VERBS[name].foreign or ("", "")
         assert done.returncode == 0 and is_clean(done.stderr), f"{name}: {done.stderr}"
         assert part in done.stdout, f"{name}: {done.stdout}"
 
 
-# --- beside nobody
+# --- alone
 
 
-def test_where_nobody_is_it_says_so(place: Town) -> None:
+def test_without_nodes_it_reports_that(place: Town) -> None:
     def attempt(name: str) -> Done:
         words, _, _ = VERBS[name].silent or ("", 0, "")
         with Wire() as own:
@@ -211,11 +222,11 @@ def test_where_nobody_is_it_says_so(place: Town) -> None:
 
     for name, done in tries(SILENT, attempt, MANY):
         _, code, part = VERBS[name].silent or ("", 0, "")
-        said = done.stderr.splitlines()
+        lines = done.stderr.splitlines()
         if name.endswith("record"):
-            assert said.pop(0).startswith("recording odom into ")
-        assert (done.returncode, len(said)) == (code, 1), f"{name}: {done.stderr}"
-        assert part in said[0] and is_clean(done.stderr), f"{name}: {done.stderr}"
+            assert lines.pop(0).startswith("recording odom into ")
+        assert (done.returncode, len(lines)) == (code, 1), f"{name}: {done.stderr}"
+        assert part in lines[0] and is_clean(done.stderr), f"{name}: {done.stderr}"
 
 
 def test_a_client_without_a_router_gives_up(place: Town) -> None:
@@ -257,7 +268,7 @@ def test_ctrl_c_ends_what_would_go_on(place: Town) -> None:
 
 
 def test_ctrl_c_ends_what_waits(place: Town) -> None:
-    """Interrupted while they wait for a router that takes their call and then says nothing."""
+    """Interrupted while they wait for a router that accepts their connection and stays silent: all in the same way."""
 
     def attempt(name: str) -> tuple[int, str]:
         with socket.create_server(("127.0.0.1", 0)) as mute:

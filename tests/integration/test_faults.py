@@ -33,7 +33,7 @@ def bus(town: Wire) -> Iterator[Bus]:
 
 @contextmanager
 def keeps_its_step(bus: Bus) -> Iterator[None]:
-    """The sim keeps its step meanwhile: at least seven tenths of that of another one, which has nothing to do."""
+    """The sim keeps its step during that: at least seven tenths of that of another one, which has nothing to do."""
     with Wire() as idle:
         idle.start("sim", "--empty").wait_for_line("no robot yet")
         mine, other = (each.latest("clock", Clock) for each in (bus, idle.bus()))
@@ -43,12 +43,12 @@ def keeps_its_step(bus: Bus) -> Iterator[None]:
 
 
 def newest(clock: Latest[Clock]) -> float:
-    """The sim time in seconds, as told after this call."""
+    """The sim time in seconds, as published after this call."""
     count = clock.count
     wait_for(lambda: clock.count > count + 5)
-    told = clock.read()[0]
-    assert told
-    return told.clock.seconds()
+    reported = clock.read()[0]
+    assert reported
+    return reported.clock.seconds()
 
 
 def robot(body: str) -> str:
@@ -87,19 +87,19 @@ FAULTS: dict[str, tuple[str, str]] = {
 }  # fmt: skip
 
 
-# Each is read by the verb itself; what is wrong with the others is told in the same way by the same reader.
+# Each is read by the verb itself; errors in the others are reported in the same way by the same reader.
 AT_THE_VERB = ("an unclosed tag", "macros without end", "9**9**9", "a hundred million bytes")
 
 
 @pytest.mark.parametrize("fault", AT_THE_VERB)
-def test_a_robot_that_cannot_be_is_told_in_one_line(town: Wire, bus: Bus, tmp_path: Path, fault: str) -> None:
-    text, told = FAULTS[fault]
+def test_an_impossible_robot_is_one_error_line(town: Wire, bus: Bus, tmp_path: Path, fault: str) -> None:
+    text, reported = FAULTS[fault]
     file = tmp_path / ("r.urdf.xacro" if "xmlns:xacro" in text else "r.urdf")
     file.write_text(text)
     ended = town.run("spawn", str(file), "--name", "Fred", within=LIMIT)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert ended.stderr.count("\n") == 1
-    assert str(file) in ended.stderr and told in ended.stderr
+    assert str(file) in ended.stderr and reported in ended.stderr
 
 
 def triangles(count: int, bad: float = 0.0) -> bytes:
@@ -118,20 +118,20 @@ MESHES: dict[str, tuple[Callable[[], bytes], str]] = {
 
 
 @pytest.mark.parametrize("fault", MESHES)
-def test_a_mesh_that_cannot_be_is_told_in_one_line_and_the_robot_stands_on_a_box(
+def test_an_unusable_mesh_is_one_warning_and_the_robot_stands_on_a_box(
     town: Wire, bus: Bus, tmp_path: Path, fault: str
 ) -> None:
-    make, told = MESHES[fault]
+    make, reported = MESHES[fault]
     (tmp_path / "part.stl").write_bytes(make())
     file = tmp_path / "r.urdf"
     file.write_text(robot(link("a", INERTIAL.format(1) + MESH.format("part.stl")) + DRIVE))
     ended = town.run("spawn", str(file), "--name", "Fred", within=3 * LIMIT)
     assert (ended.returncode, ended.stdout) == (0, "Fred listens on Fred/cmd_vel\n")
     lines = ended.stderr.splitlines()
-    assert len(lines) <= 1 and all("part.stl" in line and told in line for line in lines)
-    assert bool(lines) or not told
+    assert len(lines) <= 1 and all("part.stl" in line and reported in line for line in lines)
+    assert bool(lines) or not reported
     entities.delete(bus, "Fred")
-    if told:
+    if reported:
         assert town.run("spawn", str(file), "--strict", within=3 * LIMIT).returncode == 1
 
 

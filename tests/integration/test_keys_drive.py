@@ -16,7 +16,7 @@ UP = f"{ESCAPE}[A"
 
 @pytest.fixture(scope="module")
 def shared_teleop(town: Wire, only_robot: Robot) -> Iterator[Terminal]:
-    """A teleop at 0.4 m/s and 0.8 rad/s whose keys stay pressed, for the tests that only look at what a key says."""
+    """A teleop at 0.4 m/s and 0.8 rad/s whose keys stay pressed, for tests of what a key commands."""
     with town.terminal("teleop", "--speed", str(V), "--turn", str(W), "--mode", "latch") as terminal:
         terminal.wait_for_text("listening")
         yield terminal
@@ -30,18 +30,18 @@ def start_teleop(wire: Wire, *flags: str) -> Terminal:
 
 def after(commands: Record, terminal: Terminal, key: str) -> tuple[float, ...]:
     """The first command that is not a stop after the key was pressed on a robot that stands."""
-    seen = len(commands.messages())
+    part = commands.from_now()
     terminal.type(key)
-    found = wait_for(lambda: [m for m in commands.messages()[seen:] if any(planar(m))], what=f"a command of {key!r}")
-    return planar(found[0])
+    return planar(part.next(lambda command: any(planar(command))))
 
 
 def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> None:
     with start_teleop(town) as terminal:
-        start = robot.newest()
+        start, commands = robot.newest(), robot.commands.from_now()
         terminal.type("i")
         robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
-        assert {received.sample.priority for received in robot.commands.all()} == {"INTERACTIVE_HIGH"}
+        commands.next()
+        assert {received.sample.priority for received in commands.all()} == {"INTERACTIVE_HIGH"}
         end = robot.stands()
         assert place(end)[0] > place(start)[0] + 0.1
         assert place(end)[1] == pytest.approx(place(start)[1], abs=1e-3)
@@ -52,7 +52,7 @@ def test_k_and_every_unknown_key_stop_the_robot(shared_teleop: Terminal, robot: 
     after(robot.commands, shared_teleop, "i")
     robot.odom.next(lambda odom: moves(odom, V, 0, 0))
     shared_teleop.type(key)
-    robot.told_to_stop()
+    robot.wait_for_stop_command()
     robot.stands()
     if key == "\t":  # until then a key would be meant for the next robot
         shared_teleop.wait_for_text("there is no other robot")
@@ -60,16 +60,16 @@ def test_k_and_every_unknown_key_stop_the_robot(shared_teleop: Terminal, robot: 
 
 def test_without_another_key_the_robot_stops_after_the_key_timeout(town: Wire, robot: Robot) -> None:
     with start_teleop(town, "--key-timeout", "0.2") as terminal:
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
         after(robot.commands, terminal, "i")
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
         # At 20 Hz; after the default of 0.5 s it would be ten of them and more.
-        assert sum(any(planar(command)) for command in robot.commands.messages()[seen:]) <= 6
+        assert sum(any(planar(command)) for command in commands.messages()) <= 6
 
 
 def test_a_key_timeout_of_zero_drives_on(shared_teleop: Terminal, robot: Robot) -> None:
     after(robot.commands, shared_teleop, "i")
-    start = robot.newest()
+    start = robot.odom.next(lambda odom: moves(odom, V, 0, 0))
     assert distance(start, robot.pass_time(1.5)) > V * 1.4
     assert moves(robot.newest(), V, 0, 0)
     shared_teleop.type("k")
@@ -78,14 +78,15 @@ def test_a_key_timeout_of_zero_drives_on(shared_teleop: Terminal, robot: Robot) 
 def test_a_held_key_drives_on_past_the_timeout(town: Wire, robot: Robot) -> None:
     with start_teleop(town, "--key-timeout", "1") as terminal:
         after(robot.commands, terminal, "i")
-        start = time_of(robot.newest())
+        start = time_of(robot.odom.next(lambda odom: not rests(odom)))
+        odoms = robot.odom.from_now()
 
         def held_for_two_seconds() -> bool:
             terminal.type("i")
             return time_of(robot.newest()) > start + 2.0
 
         wait_for(held_for_two_seconds)
-        assert not any(rests(odom) for odom in robot.odom.messages() if time_of(odom) > start)
+        assert not any(map(rests, odoms.messages()))
 
 
 def test_a_stop_is_repeated_until_the_robot_rests_and_then_the_teleop_is_silent(town: Wire, robot: Robot) -> None:
@@ -96,30 +97,30 @@ def test_a_stop_is_repeated_until_the_robot_rests_and_then_the_teleop_is_silent(
         robot.stands()
 
         def silent() -> bool:
-            seen = len(robot.commands.messages())
+            commands = robot.commands.from_now()
             robot.pass_time(0.5)
-            return len(robot.commands.messages()) == seen
+            return commands.messages() == []
 
         wait_for(silent, what="half a second without a command")
 
 
-def test_an_idle_teleop_says_nothing(town: Wire, robot: Robot) -> None:
-    seen = len(robot.commands.messages())
+def test_an_idle_teleop_publishes_nothing(town: Wire, robot: Robot) -> None:
+    commands = robot.commands.from_now()
     with start_teleop(town) as terminal:
         terminal.type("qz")
         terminal.wait_for_text("0.495 m/s")
     robot.newest()
-    assert len(robot.commands.messages()) == seen
+    assert commands.messages() == []
 
 
-def test_a_repeat_rate_of_zero_says_a_command_once(town: Wire, robot: Robot) -> None:
+def test_a_repeat_rate_of_zero_sends_a_command_once(town: Wire, robot: Robot) -> None:
     with start_teleop(town, "--repeat-rate", "0", "--mode", "latch") as terminal:
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
         after(robot.commands, terminal, "i")
         robot.pass_time(0.4)
-        assert [planar(command) for command in robot.commands.messages()[seen:]] == [(0.5, 0, 0, 0)]
+        assert [planar(command) for command in commands.messages()] == [(0.5, 0, 0, 0)]
         terminal.type("k")
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
 
 
 def test_stamped_commands_carry_time_and_frame_and_drive_too(town: Wire, robot: Robot) -> None:
@@ -133,22 +134,22 @@ def test_stamped_commands_carry_time_and_frame_and_drive_too(town: Wire, robot: 
 
 
 def test_pasted_text_never_drives(town: Wire, robot: Robot) -> None:
-    seen = len(robot.commands.messages())
+    commands = robot.commands.from_now()
     with start_teleop(town) as terminal:
         # The w after it shows when it was read.
-        for pasted, told in (
+        for pasted, expected in (
             ("i", "0.550 m/s"),
             ("forward: i\nand I\n", "0.605 m/s"),
             (f"{UP}{UP}", "0.666 m/s"),
             ("k" * 5000 + "i", "0.732 m/s"),
         ):
             terminal.type(f"{ESCAPE}[200~{pasted}{ESCAPE}[201~w")
-            terminal.wait_for_text(told)
+            terminal.wait_for_text(expected)
     robot.newest()
-    assert len(robot.commands.messages()) == seen
+    assert commands.messages() == []
 
 
-def test_the_teleop_says_what_a_robot_cannot_do_and_the_limits_that_the_sim_has(wire: Wire) -> None:
+def test_the_teleop_shows_what_a_robot_cannot_do_and_the_limits_that_the_sim_has(wire: Wire) -> None:
     wire.start("sim", "--robot", str(URDF / "differential.urdf.xacro")).wait_for_line("listens on")
     terminal = start_teleop(wire, "--mode", "latch")
     terminal.wait_for_text("limit 5")

@@ -4,27 +4,30 @@ import math
 
 import pytest
 
-from holozen.messages import Odometry
-from holozen.testing import Wire
+from holozen.testing import LockStep, Wire
 
-from .conftest import start_sim
-from .robots import Planar, Robot, ahead, distance, moves, place, time_of
+from .robots import Planar, ahead, distance, moves, place, rests, time_of
 
 MILLIMETRE = 1e-3  # m; and rad
+STEPS = 48  # between two commands: 0.2 s
 
 
 @pytest.fixture(scope="module")
-def quick(town: Wire) -> Robot:
-    """A robot four times as fast as real time."""
-    start_sim(town, "--rtf", "4")
-    return Robot(town.bus()).wait_longer()
+def shared(town: Wire) -> LockStep:
+    return LockStep(town)
 
 
-def steady(robot: Robot, velocity: Planar, seconds: float) -> list[Odometry]:
-    """Odoms over that much sim time of driving at a velocity that does not change."""
-    begin = time_of(robot.drive(*velocity)[-1])
-    odoms = robot.drive(*velocity, until=lambda odom: time_of(odom) >= begin + seconds)
-    return [odom for odom in odoms if time_of(odom) > begin]
+@pytest.fixture
+def sim(shared: LockStep) -> LockStep:
+    """A sim with a robot that stands on its wheels, at time 1."""
+    shared.reset()
+    shared.step(240)
+    return shared
+
+
+def drive(sim: LockStep, velocity: Planar) -> None:
+    sim.drive(*velocity)
+    sim.step(STEPS)
 
 
 @pytest.mark.parametrize(
@@ -37,34 +40,34 @@ def steady(robot: Robot, velocity: Planar, seconds: float) -> list[Odometry]:
     ],
     ids=["2 m forward", "2 m aslant", "arc aslant", "fast spiral"],
 )
-def test_driving_two_metres_or_turning_ends_where_the_closed_form_says(
-    quick: Robot, velocity: Planar, seconds: float
+def test_driving_two_metres_or_turning_ends_where_the_closed_form_predicts(
+    sim: LockStep, velocity: Planar, seconds: float
 ) -> None:
-    odoms = steady(quick, velocity, seconds)
-    assert len(odoms) >= 40 * seconds
-    start = place(odoms[0])
-    for odom in odoms[1:]:
-        x, y, yaw = ahead(start, velocity, time_of(odom) - time_of(odoms[0]))
-        there = place(odom)
+    begin, start = time_of(sim.odom), place(sim.odom)
+    while time_of(sim.odom) < begin + seconds - 1e-6:
+        drive(sim, velocity)
+        x, y, yaw = ahead(start, velocity, time_of(sim.odom) - begin)
+        there = place(sim.odom)
         assert math.hypot(there[0] - x, there[1] - y) < MILLIMETRE
         assert abs(math.remainder(there[2] - yaw, math.tau)) < MILLIMETRE
-        assert moves(odom, *velocity, tolerance=MILLIMETRE)
-    quick.stop()
+        assert moves(sim.odom, *velocity, tolerance=MILLIMETRE)
 
 
-def test_forward_is_where_the_robot_looks_after_a_turn(quick: Robot) -> None:
-    quick.stop()
-    quick.drive(0, 0, 0.5, until=lambda odom: place(odom)[2] > 1.4 and place(odom)[2] < 1.7)
-    start = quick.stop()
-    end = quick.drive(0.5, until=lambda odom: distance(odom, start) > 1)[-1]
-    angle = math.atan2(place(end)[1] - place(start)[1], place(end)[0] - place(start)[0])
-    assert angle == pytest.approx(place(start)[2], abs=MILLIMETRE)
-    assert 1.3 < angle < 1.8
-    assert moves(end, 0.5, 0, 0)
+def test_forward_is_where_the_robot_looks_after_a_turn(sim: LockStep) -> None:
+    for _ in range(15):
+        drive(sim, (0.0, 0.0, 0.5))
+    start = place(sim.odom)
+    assert start[2] == pytest.approx(1.5, abs=MILLIMETRE)
+    for _ in range(10):
+        drive(sim, (0.5, 0.0, 0.0))
+    end = place(sim.odom)
+    assert math.atan2(end[1] - start[1], end[0] - start[0]) == pytest.approx(start[2], abs=MILLIMETRE)
+    assert math.dist(start[:2], end[:2]) == pytest.approx(1.0, abs=MILLIMETRE)
 
 
-def test_a_stop_is_a_stop_at_once(quick: Robot) -> None:
-    quick.drive(1.0, 1.0, 1.0)
-    quick.put()
-    stood = quick.stands()
-    assert distance(stood, quick.pass_time(1.0)) < 1e-6
+def test_a_stop_is_a_stop_at_once(sim: LockStep) -> None:
+    drive(sim, (1.0, 1.0, 1.0))
+    sim.drive()
+    stood = sim.step()
+    assert rests(stood)
+    assert distance(stood, sim.step(240)) < 1e-6

@@ -13,7 +13,7 @@ from holozen.transport.connection import Connection
 from holozen.transport.samples import Sample
 from holozen.transport.services import MAX_REQUEST_BYTES, refusal
 
-from .conftest import start_sim
+from .conftest import foreign_config, start_sim
 from .robots import URDF, record
 
 LARGE = 100_000_000  # bytes
@@ -26,8 +26,8 @@ def sim(town: Wire) -> Process:
 
 
 @pytest.fixture
-def stranger(town: Wire, sim: Process) -> Iterator[Bus]:
-    with Bus("stranger", Connection(mode="client", connect=(town.endpoint,))) as bus:
+def foreign(town: Wire, sim: Process) -> Iterator[Bus]:
+    with Bus("foreign", Connection(mode="client", connect=(town.endpoint,))) as bus:
         yield bus
 
 
@@ -43,13 +43,13 @@ def memory(process: Process) -> int:
 
 @pytest.mark.parametrize("key", ["Rover/cmd_vel", "Rover/joint_command"])
 def test_a_sim_that_got_payloads_of_100_mb_counts_them_and_is_as_small_as_before(
-    sim: Process, driver: Bus, stranger: Bus, key: str
+    sim: Process, driver: Bus, foreign: Bus, key: str
 ) -> None:
     odom, status = record(driver, "Rover/odom", Odometry), record(driver, "Rover/cmd_vel_status", CommandStatus)
     commands = driver.publisher("Rover/cmd_vel", Twist)
-    wait_for(stranger.served("spawn_entity"))
+    wait_for(foreign.served("spawn_entity"))
     before, counted, links = memory(sim), status.next().refused.get("oversized", 0), driver.session.info.peers_zid()
-    sender = stranger.session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
+    sender = foreign.session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
     payload = zenoh.ZBytes(bytes(LARGE))
     for number in range(1, 4):
         sender.put(payload)
@@ -61,14 +61,27 @@ def test_a_sim_that_got_payloads_of_100_mb_counts_them_and_is_as_small_as_before
         wait_for(is_counted, 30)
     wait_for(lambda: memory(sim) < before + NEAR, 10, lambda: f"{before} bytes; it has {memory(sim)}")
     assert driver.session.info.peers_zid() == links
-    commands.put(Twist.planar(0.1))
-    odom.next(lambda odom: odom.twist.twist.linear.x > 0.05)
+
+    def moves() -> bool:
+        commands.put(Twist.planar(0.1))
+        return bool(odom.next().twist.twist.linear.x > 0.05)
+
+    wait_for(moves)
 
 
-def test_a_request_of_100_mb_is_refused_and_takes_no_memory(sim: Process, stranger: Bus) -> None:
-    wait_for(stranger.served("spawn_entity"))
+def test_nothing_is_received_through_shared_memory(sim: Process, town: Wire) -> None:
+    """On a busy machine Zenoh frees it while it is read."""
+    with zenoh.open(foreign_config(town)) as plain:
+        sent = zenoh.ZBytes(b"x" * 300_000)
+        wait_for(lambda: list(plain.get("spawn_entity", payload=sent, timeout=1.0)))
+        maps = Path(f"/proc/{sim.pid}/maps").read_text()
+        assert [line for line in maps.splitlines() if "/dev/shm/" in line] == []
+
+
+def test_a_request_of_100_mb_is_refused_and_takes_no_memory(sim: Process, foreign: Bus) -> None:
+    wait_for(foreign.served("spawn_entity"))
     before = memory(sim)
-    (reply,) = stranger.ask("spawn_entity", 30.0, payload=zenoh.ZBytes(bytes(LARGE)))
+    (reply,) = foreign.ask("spawn_entity", 30.0, payload=zenoh.ZBytes(bytes(LARGE)))
     assert not isinstance(reply, Sample)
     assert str(refusal(reply)) == f"request of {LARGE} bytes; at most {MAX_REQUEST_BYTES} are read"
     wait_for(lambda: memory(sim) < before + NEAR, 10, lambda: f"{before} bytes; it has {memory(sim)}")

@@ -99,7 +99,7 @@ from rclpy.node import Node
 
 class Controller(Node):
     def __init__(self):
-        super().__init__('nobody')
+        super().__init__('unused')
         self.goal = self.declare_parameter('goal', 0.0).value
         self.x = None
         self.create_subscription(Odometry, '/odom', self.odom_cb, 10)

@@ -59,7 +59,7 @@ def test_others_learn_it_from_the_publisher(wire: Wire, battery: Process, tmp_pa
     assert battery.returncode is None
 
 
-def test_what_nobody_publishes_stays_unknown_in_one_line(wire: Wire) -> None:
+def test_an_unpublished_key_stays_unknown_in_one_line(wire: Wire) -> None:
     wire.bus("someone", lasting=True)
     done = wire.run("interface", "show", "cell_msgs/msg/Battery")
     assert (done.returncode, done.stdout, done.stderr.count("\n")) == (1, "", 1)

@@ -84,16 +84,16 @@ def test_what_is_no_node_keeps_the_robots_own_watchdog(town: Wire, robot: Robot)
         assert moves(robot.newest(), 0.4, 0, 0)
 
 
-def test_a_stranger_that_is_killed_stops_nobody(town: Wire, robot: Robot, robots: dict[str, Robot]) -> None:
+def test_a_foreign_node_that_is_killed_stops_no_robot(town: Wire, robot: Robot, robots: dict[str, Robot]) -> None:
     other = next(other for other in robots.values() if other is not robot)
     graph = robot.bus.graph()
     with driver(town, other) as process, driver(town, robot):
-        begin, source = len(robot.odom.messages()), other.status().obeyed
+        odoms, source = robot.odom.from_now(), other.status().obeyed
         process.kill()
-        wait_for(lambda: source in [node.source for node in graph.left()], what="the stranger's node to leave")
+        wait_for(lambda: source in [node.source for node in graph.left()], what="the foreign node to leave")
         other.stands()
         robot.pass_time(0.3)
-        assert all(moves(odom, 0.4, 0, 0) for odom in robot.odom.messages()[begin:])
+        assert all(moves(odom, 0.4, 0, 0) for odom in odoms.messages())
 
 
 def test_so_does_the_controller_stop_when_it_is_killed(town: Wire, robots: dict[str, Robot]) -> None:

@@ -68,17 +68,16 @@ def test_their_frames_carry_their_names(fred: Robot, ann: Robot) -> None:
     assert record(fred.bus, "Fred/joint_states", JointState).next().name
 
 
-def test_nobody_is_at_the_root(town: Wire, fred: Robot) -> None:
+def test_there_is_no_robot_at_the_root(town: Wire, fred: Robot) -> None:
     assert town.run("topic", "info", "cmd_vel").returncode == 1
     info = town.run("topic", "info", "Fred/cmd_vel").stdout
     assert "Type: geometry_msgs/msg/Twist\n" in info
     assert "  sim (" in info
 
 
-def test_who_overruled_fred_has_nothing_to_say_to_ann(town: Wire, fred: Robot, ann: Robot) -> None:
+def test_the_driver_of_fred_has_no_say_over_ann(town: Wire, fred: Robot, ann: Robot) -> None:
     person = Robot(town.bus("person"), "Fred", "INTERACTIVE_HIGH")
-    person.drive(0.3)
-    assert fred.status().obeyed.startswith("person@")
+    person.drive(0.3, until=lambda _: (status := fred.last_status()) and status.obeyed.startswith("person@"))
     assert ann.status().obeyed == ""
     ann.drive(0.2)
 
@@ -87,13 +86,13 @@ def test_a_teleop_with_a_name_drives_that_robot(town: Wire, fred: Robot, ann: Ro
     with town.terminal("teleop", "Ann") as terminal:
         terminal.wait_for_text("listening")
         assert "holozen teleop   Ann   Tab: Fred" in terminal.screen()
-        seen = len(fred.commands.messages())
+        commands = fred.commands.from_now()
         terminal.type("i")
         ann.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
         terminal.type("k")
         ann.stands()
-        ann.told_to_stop()
-        assert len(fred.commands.messages()) == seen
+        ann.wait_for_stop_command()
+        assert commands.messages() == []
 
 
 def test_a_wildcard_is_no_robots_name(town: Wire) -> None:
@@ -119,7 +118,7 @@ WRONG = {
 
 
 @pytest.mark.parametrize("name", WRONG)
-def test_a_sim_that_cannot_start_says_why_in_one_line(wire: Wire, tmp_path: Path, name: str) -> None:
+def test_a_sim_that_cannot_start_gives_the_reason_in_one_line(wire: Wire, tmp_path: Path, name: str) -> None:
     words, code, reason = WRONG[name]
     (tmp_path / "broken.urdf").write_text(BROKEN_XML)
     (tmp_path / "still.urdf").write_text(NO_DRIVE)
@@ -127,9 +126,9 @@ def test_a_sim_that_cannot_start_says_why_in_one_line(wire: Wire, tmp_path: Path
     done = wire.run("sim", *(word.format(**names) for word in words))
     assert done.returncode == code
     assert done.stdout == ""
-    said = done.stderr.splitlines()
-    assert len(said) == 1, done.stderr
-    assert reason.format(**names) in said[0]
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1, done.stderr
+    assert reason.format(**names) in lines[0]
 
 
 def test_a_second_sim_only_joins_with_named_robots_and_then_both_are_one_world_to_callers(wire: Wire) -> None:

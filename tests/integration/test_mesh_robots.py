@@ -37,13 +37,16 @@ def test_a_mesh_robot_stands_on_its_hull(
     assert "replaced by a box" not in sim.err
 
 
-def test_a_robot_without_its_mesh_stands_on_a_box_and_says_so(town: Wire, sim: Process, tmp_path: Path) -> None:
+def test_a_robot_without_its_mesh_stands_on_a_box_and_is_reported(town: Wire, sim: Process, tmp_path: Path) -> None:
     done = town.run("spawn", str(robot(tmp_path, '<mesh filename="gone.stl"/>')), "--name", "lost", "-x", "-5")
     # The box of 2 kg with these moments is a cube of sqrt(6 * 0.01 / 2) m.
     assert (done.returncode, done.stdout) == (0, "lost stands at -5.000 0.000 0.087\n")
     assert done.stderr.count("is replaced by a box of 0.173 x 0.173 x 0.173 m: no such file 'gone.stl'") == 2
     assert height(town, "lost") == pytest.approx(0.0866, abs=STANDS)
-    wait_for(lambda: "sim: lost: " in sim.err and "is replaced by a box of 0.173" in sim.err, what="the sim's warning")
+    wait_for(
+        lambda: "sim: warning: lost: " in sim.err and "is replaced by a box of 0.173" in sim.err,
+        what="the sim's warning",
+    )
 
 
 def test_a_place_outside_of_known_packages_is_never_opened_for_a_text_that_was_sent(town: Wire, sim: Process) -> None:

@@ -1,4 +1,4 @@
-"""What a sim tells: fields, frames, rates, and the last value for whoever asks."""
+"""What a sim publishes: fields, frames, rates, and the last value on request."""
 
 import json
 import math
@@ -13,7 +13,7 @@ from holozen.testing import Wire, wait_for
 
 from .robots import Record, Robot, moves, place, record, time_of
 
-TELLS = ("odom", "joint_states", "tf", "clock", "cmd_vel_status")
+KEYS = ("odom", "joint_states", "tf", "clock", "cmd_vel_status")
 
 # hb_bot's wheels as the lesson gives them: where they are (m), and where their axles point: along the radius.
 WHEELS = {"front_wheel_joint": (0.0, 0.68), "left_wheel_joint": (-0.58, -0.36), "right_wheel_joint": (0.58, -0.36)}
@@ -91,9 +91,9 @@ def test_the_wheels_turn_as_wheels_that_roll(
     robot: Robot, joints: Record, velocity: tuple[float, float, float]
 ) -> None:
     robot.drive(*velocity)
-    seen = len(joints.messages())
-    robot.drive(*velocity, until=lambda _: len(joints.messages()) > seen + 3)
-    first, last = joints.messages()[seen + 1 : seen + 4 : 2]
+    states = joints.from_now()
+    robot.drive(*velocity, until=lambda _: len(states.messages()) >= 3)
+    first, _, last, *_ = states.messages()
     expected = wheel_rates(*velocity)
     seconds = last.header.stamp.seconds() - first.header.stamp.seconds()
     assert dict(zip(last.name, last.velocity, strict=True)) == pytest.approx(expected, abs=1e-3)
@@ -108,7 +108,7 @@ def test_the_wheels_of_a_standing_robot_stand(robot: Robot, joints: Record) -> N
     assert state.velocity == pytest.approx([0, 0, 0], abs=1e-4)
 
 
-def test_tf_says_of_every_link_where_it_is_from_odom_on(robot: Robot, transforms: Record) -> None:
+def test_tf_places_every_link_from_odom_on(robot: Robot, transforms: Record) -> None:
     parents: dict[str, str] = {}
 
     def complete() -> bool:
@@ -145,23 +145,23 @@ def test_clock_is_sim_time(robot: Robot) -> None:
     times = [message.clock.seconds() for message in clock.messages()]
     assert all(later > earlier for earlier, later in pairwise(times))
     before = time_of(robot.newest())
-    told = clock.next().clock.seconds()
-    assert before - 0.05 <= told <= time_of(robot.newest()) + 0.05
+    reported = clock.next().clock.seconds()
+    assert before - 0.05 <= reported <= time_of(robot.newest()) + 0.05
 
 
-@pytest.mark.parametrize("key", TELLS)
-def test_a_plain_get_gives_the_last_value(robot: Robot, stranger: zenoh.Session, key: str) -> None:
-    assert last_value(stranger, key)
+@pytest.mark.parametrize("key", KEYS)
+def test_a_plain_get_gives_the_last_value(robot: Robot, foreign: zenoh.Session, key: str) -> None:
+    assert last_value(foreign, key)
 
 
-def test_the_last_value_of_odom_is_the_newest(robot: Robot, stranger: zenoh.Session) -> None:
+def test_the_last_value_of_odom_is_the_newest(robot: Robot, foreign: zenoh.Session) -> None:
     before = robot.newest().header.stamp.seconds()
-    stamp = last_value(stranger, "odom")["header"]["stamp"]
+    stamp = last_value(foreign, "odom")["header"]["stamp"]
     assert stamp["sec"] + stamp["nanosec"] * 1e-9 >= before
 
 
-def test_the_fields_are_those_of_ros(robot: Robot, stranger: zenoh.Session) -> None:
-    odom = last_value(stranger, "odom")
+def test_the_fields_are_those_of_ros(robot: Robot, foreign: zenoh.Session) -> None:
+    odom = last_value(foreign, "odom")
     assert list(odom) == ["header", "child_frame_id", "pose", "twist"]
     assert list(odom["header"]) == ["stamp", "frame_id"]
     assert list(odom["pose"]) == ["pose", "covariance"]

@@ -3,7 +3,7 @@
 import itertools
 import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
@@ -11,7 +11,8 @@ import pytest
 from holozen.bus import Bus
 from holozen.messages import NextGoalReply, NextGoalRequest, Twist
 from holozen.messages import rcl_interfaces as r
-from holozen.testing import Wire, wait_for
+from holozen.testing import LockStep, Wire, wait_for
+from holozen.transport.pubsub import Subscription
 
 from .robots import Robot, moves, rests, time_of
 
@@ -37,8 +38,8 @@ def as_it_was(robot: Robot) -> Iterator[None]:
 def test_a_lower_limit_applies_at_the_next_command(robot: Robot) -> None:
     robot.drive(x=0.5)
     assert put(robot.bus, "sim", max_linear=0.2) == []
-    robot.drive(x=0.5, until=lambda odom: moves(odom, 0.2, 0, 0))
-    assert "over the limits of 0.2 m/s" in robot.status().last_refusal
+    reason = "over the limits of 0.2 m/s"
+    robot.drive(x=0.5, until=lambda odom: moves(odom, 0.2, 0, 0) and reason in robot.last_status().last_refusal)
 
 
 def test_a_robot_that_is_not_commanded_stands_whatever_is_set(robot: Robot) -> None:
@@ -57,19 +58,20 @@ def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(robot: Robot) -
 
 def still(robot: Robot, seconds: float) -> bool:
     """Whether it rests in all odoms of the next time."""
-    seen = len(robot.odom.messages())
+    odoms = robot.odom.from_now()
     robot.pass_time(seconds)
-    return all(map(rests, robot.odom.messages()[seen:]))
+    return all(map(rests, odoms.messages()))
 
 
-@pytest.mark.alone
-def test_the_watchdog_can_be_shortened_but_not_switched_off(robot: Robot) -> None:
+def test_the_watchdog_can_be_shortened_but_not_switched_off(lock_step: Callable[..., LockStep]) -> None:
+    sim = lock_step()
     for value in (0.0, -1.0, 0.04, 3.0):
-        told = f"command_timeout: {value:g}: use a number from 0.05 to 2 s"
-        assert put(robot.bus, "sim", command_timeout=value) == [told]
-    assert put(robot.bus, "sim", command_timeout=0.1) == []
-    began = time_of(robot.drive(x=0.3)[-1])
-    assert time_of(robot.stands()) - began < 0.4  # of the sim's time; the default would take 0.5
+        reason = f"command_timeout: {value:g}: use a number from 0.05 to 2 s"
+        assert put(sim.bus, "sim", command_timeout=value) == [reason]
+    assert put(sim.bus, "sim", command_timeout=0.1) == []
+    sim.drive(x=0.3)
+    assert moves(sim.step(20), 0.3, 0, 0)
+    assert rests(sim.step(8)), "0.1 s are 24 steps"
 
 
 def test_odometry_comes_at_the_rate_that_is_set(robot: Robot) -> None:
@@ -104,26 +106,39 @@ def test_a_robot_with_a_name_has_its_own(town: Wire, robot: Robot) -> None:
     finally:
         assert town.run("delete", "Fred").returncode == 0
     assert put(robot.bus, "sim", **{"Fred.command_timeout": 1.0}) == [
-        "sim has no parameter 'Fred.command_timeout'; did you mean 'command_timeout'?"
+        "sim has no parameter 'Fred.command_timeout' (did you mean 'command_timeout'?)"
     ]
+
+
+def messages(commands: Subscription[Twist]) -> list[Twist]:
+    """All that wait."""
+    return [received.message for received in iter(commands.try_recv, None) if received.message]
 
 
 def speed(twist: Twist) -> float:
     return math.hypot(twist.linear.x, twist.linear.y)
 
 
-@pytest.mark.alone
-def test_the_controller_slows_down_at_once_and_by_its_own_acceleration(town: Wire, robot: Robot) -> None:
-    town.start("pose-service", "--size", "100").wait_for_line("goals")
-    with town.start("controller", "--max-speed", "0.6"):
-        robot.commands.next(lambda twist: speed(twist) > 0.55)
-        seen = len(robot.commands.messages())
-        assert put(robot.bus, "controller", max_speed=0.2) == []
-        robot.commands.next(lambda twist: speed(twist) < 0.201)
-        speeds = [speed(twist) for twist in robot.commands.messages()[seen:]]
-        # 1 m/s^2, for at most two periods of 0.05 s between two commands
-        assert all(before - after <= 0.101 for before, after in itertools.pairwise(speeds))
-        assert put(robot.bus, "controller", gain=99) == ["gain: 99: use a number from 0.1 to 10 1/s"]
+def test_the_controller_slows_down_at_once_and_by_its_own_acceleration(
+    wire: Wire, lock_step: Callable[..., LockStep]
+) -> None:
+    sim, speeds = lock_step(), [0.0]
+    commands = sim.bus.subscribe("cmd_vel", Twist, depth=1000)
+    wire.start("pose-service", "--size", "100").wait_for_line("goals")
+    wire.start("controller", "--max-speed", "0.6")
+
+    def drive_until(wanted: Callable[[float], bool]) -> None:
+        while not wanted(speeds[-1]):
+            speeds.extend(map(speed, messages(commands)))  # so that the next one comes of this step
+            sim.step(12)  # as long as between two commands
+            speeds.extend(map(speed, wait_for(lambda: messages(commands), 30)))
+
+    drive_until(lambda speed: speed > 0.55)
+    assert put(sim.bus, "controller", max_speed=0.2) == []
+    drive_until(lambda speed: speed < 0.201)
+    # 1 m/s^2, for at most two periods of 0.05 s between two commands
+    assert all(before - after <= 0.101 for before, after in itertools.pairwise(speeds))
+    assert put(sim.bus, "controller", gain=99) == ["gain: 99: use a number from 0.1 to 10 1/s"]
 
 
 def test_the_pose_service_hands_out_another_shape_at_once(wire: Wire) -> None:

@@ -83,7 +83,7 @@ def test_a_signal_ends_all_of_it(game: Game, number: int) -> None:
     game.terminal.process.signal(number)
     assert game.terminal.process.wait(10) == 128 + number
     wait_for(lambda: game.left() == ({}, []))
-    robot.told_to_stop()
+    robot.wait_for_stop_command()
 
 
 def test_a_closed_terminal_ends_all_of_it(game: Game) -> None:
@@ -108,7 +108,7 @@ def test_another_robot_plays_under_another_name(house: Path, wire: Wire) -> None
         game.terminal.close()
 
 
-def test_another_sim_on_the_same_wire_is_told(house: Path, wire: Wire) -> None:
+def test_another_sim_on_the_same_keys_is_reported(house: Path, wire: Wire) -> None:
     start_sim(wire)
     game = Game(house, wire)
     game.terminal.process.wait(30)
@@ -120,7 +120,7 @@ def test_another_sim_on_the_same_wire_is_told(house: Path, wire: Wire) -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "told"),
+    ("words", "expected"),
     [
         (["no/such.xacro"], "no/such.xacro"),
         (["urdf/wheely_boi.xacro", "bad name"], "bad name"),
@@ -128,16 +128,18 @@ def test_another_sim_on_the_same_wire_is_told(house: Path, wire: Wire) -> None:
     ],
     ids=str,
 )
-def test_what_is_wrong_is_told_and_nothing_is_left(house: Path, wire: Wire, words: list[str], told: str) -> None:
+def test_an_error_is_reported_and_leaves_nothing_behind(
+    house: Path, wire: Wire, words: list[str], expected: str
+) -> None:
     game = Game(house, wire, *(str(house / word) if word.startswith("urdf") else word for word in words))
     game.terminal.process.wait(30)
     assert game.terminal.process.returncode in (1, 2)
-    wait_for(lambda: told in game.terminal.raw)
+    wait_for(lambda: expected in game.terminal.raw)
     assert game.left() == ({}, [])
     game.terminal.close()
 
 
-def test_without_a_terminal_it_says_so(house: Path, temporary: Path) -> None:
+def test_without_a_terminal_it_reports_that(house: Path, temporary: Path) -> None:
     play = subprocess.run([house / "scripts" / "play"], stdin=subprocess.DEVNULL, capture_output=True, text=True)
     assert play.returncode == 2
     assert len(play.stderr.splitlines()) == 1

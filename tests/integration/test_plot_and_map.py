@@ -85,7 +85,7 @@ def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
         (("nobody.x", "--once", "-w", "0.2"), 1, "no messages on nobody; `holozen topic list` shows the topics"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(
+def test_an_error_is_reported_in_one_line(
     town: Wire, robot: Robot, words: tuple[str, ...], code: int, part: str
 ) -> None:
     done = town.run("plot", *words)
@@ -117,9 +117,9 @@ def test_the_map_shows_the_robot_and_the_goals(town: Wire, robot: Robot) -> None
     assert "hb_bot x" in lines[-1]
 
     def goals() -> int:
-        told = json.loads(town.run("map", "--json").stdout)
-        assert [one["name"] for one in told["robots"]] == ["hb_bot"]
-        assert told["objects"] == {}
-        return len(told["goals"])
+        output = json.loads(town.run("map", "--json").stdout)
+        assert [one["name"] for one in output["robots"]] == ["hb_bot"]
+        assert output["objects"] == {}
+        return len(output["goals"])
 
     wait_for(lambda: goals() == 4, what="the four corners of the square")

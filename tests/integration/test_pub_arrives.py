@@ -1,4 +1,4 @@
-"""`holozen topic pub` sees to it that what it writes arrives, is meant, and is obeyed, or says why not."""
+"""`holozen topic pub` checks that what it writes arrives, is valid and is obeyed, or reports why not."""
 
 import json
 import os
@@ -17,15 +17,15 @@ from .robots import Robot, moves
 AHEAD = '{"linear": {"x": 0.2}}'
 
 
-def test_it_says_how_many_subscribe(town: Wire, robot: Robot) -> None:
+def test_it_reports_the_number_of_subscribers(town: Wire, robot: Robot) -> None:
     """The sim, and the test that listens to commands."""
     done = town.run("topic", "pub", "cmd_vel", AHEAD, "--once")
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "2 subscribers of cmd_vel\n")
-    told = json.loads(town.run("topic", "pub", "cmd_vel", "{}", "-t", "2", "--json").stdout)
-    assert told == {"key": "cmd_vel", "type": "geometry_msgs/msg/Twist", "subscribers": 2, "published": 2}
+    output = json.loads(town.run("topic", "pub", "cmd_vel", "{}", "-t", "2", "--json").stdout)
+    assert output == {"key": "cmd_vel", "type": "geometry_msgs/msg/Twist", "subscribers": 2, "published": 2}
 
 
-def test_it_waits_for_as_many_subscribers_as_it_is_told(town: Wire, robot: Robot) -> None:
+def test_it_waits_for_as_many_subscribers_as_requested(town: Wire, robot: Robot) -> None:
     pub = town.start("topic", "pub", "cmd_vel", AHEAD, "--once", "-w", "3")
     pub.wait_for_line("waiting for 3 subscribers of cmd_vel; 2 by now")
     other = town.bus("other").subscribe("cmd_vel", Twist)
@@ -33,61 +33,63 @@ def test_it_waits_for_as_many_subscribers_as_it_is_told(town: Wire, robot: Robot
     assert other.recv().message == Twist.planar(0.2)
 
 
-def test_it_gives_up_waiting_when_it_is_told_to(town: Wire) -> None:
+def test_it_gives_up_waiting_when_asked(town: Wire) -> None:
     done = town.run("topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "-1", "-w", "1", "--max-wait", "0.1")
     assert done.returncode == 1
     assert "no subscribers of nobody" in done.stderr
 
 
-def test_fewer_subscribers_than_it_is_told_to_wait_for_are_not_enough(town: Wire, robot: Robot) -> None:
+def test_fewer_subscribers_than_requested_are_not_enough(town: Wire, robot: Robot) -> None:
     done = town.run("topic", "pub", "cmd_vel", "{}", "-1", "-w", "9", "--max-wait", "0.2")
     assert done.returncode == 1
     assert "cmd_vel: 9 subscribers did not come in time, so nothing is published" in done.stderr
 
 
-def test_it_needs_nobody_where_it_does_not_wait(town: Wire) -> None:
+def test_it_needs_no_subscriber_where_it_does_not_wait(town: Wire) -> None:
     done = town.run("topic", "pub", "nobody", "geometry_msgs/msg/Twist", AHEAD, "--once", "--no-wait")
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize(
-    ("value", "told"),
+    ("value", "expected"),
     [
-        ('{"linaer": {}}', "unknown field `linaer`; did you mean 'linear'?"),
+        ('{"linaer": {}}', "unknown field `linaer` (did you mean 'linear'?)"),
         ('{"linear": {"X": 1}}', "unknown field `X` - at `$.linear`"),
-        ('{"angular": {"zz": 1}}', "unknown field `zz` - at `$.angular`; did you mean 'z'?"),
+        ('{"angular": {"zz": 1}}', "unknown field `zz` - at `$.angular` (did you mean 'z'?)"),
         ("linear: {x: .inf}", "linear.x is not a finite number; --force sends it all the same"),
     ],
 )
-def test_a_wrong_field_is_refused_with_the_closest_name(town: Wire, value: str, told: str) -> None:
-    assert_one_line(town.run("topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", told)
+def test_a_wrong_field_is_refused_with_the_closest_name(town: Wire, value: str, expected: str) -> None:
+    assert_one_line(town.run("topic", "pub", "cmd_vel", value, "--once"), 1, "refused: ", expected)
 
 
 @pytest.mark.parametrize(
-    ("key", "value", "told"),
+    ("key", "value", "expected"),
     [
         ("cmd_vel", '{"linear": {"x": 1e308}}', "Twist.linear.x is 1e+308 m/s; at most 100"),
         ("Fred/cmd_vel", "twist: {angular: {y: -1001}}", "TwistStamped.angular.y is -1001 rad/s; at most 1000"),
         ("joint_command", "{name: [j], velocity: [2e3]}", "JointState.velocity[0] of joint 'j' is 2000; at most 1000"),
     ],
 )
-def test_what_no_robot_can_mean_is_refused_and_not_sent(wire: Wire, key: str, value: str, told: str) -> None:
+def test_what_no_robot_can_mean_is_refused_and_not_sent(wire: Wire, key: str, value: str, expected: str) -> None:
     heard = wire.bus().subscribe_raw(key)
     for often in (("--once",), ("-r", "20")):
         words = ("topic", "pub", key, value, *often)
-        assert_one_line(wire.run(*words), 1, f"{key}: refused: {told}; --force sends it all the same")
+        assert_one_line(wire.run(*words), 1, f"{key}: refused: {expected}; --force sends it all the same")
     assert heard.try_recv() is None
 
 
 def test_a_type_that_the_key_does_not_carry_is_refused(town: Wire) -> None:
     words = ("topic", "pub", "cmd_vel", "nav_msgs/msg/Odometry", "{}", "--once", "--no-wait")
-    told = "cmd_vel: its type is geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped, not nav_msgs/msg/Odometry"
-    assert_one_line(town.run(*words), 1, told)
+    expected = (
+        "cmd_vel: its type is geometry_msgs/msg/Twist or geometry_msgs/msg/TwistStamped, not nav_msgs/msg/Odometry"
+    )
+    assert_one_line(town.run(*words), 1, expected)
     assert town.run(*words, "--force").returncode == 0
 
 
 @pytest.mark.parametrize("wire_name", ["json", "msgpack"])
-def test_force_sends_what_the_sim_then_refuses_and_says_so(town: Wire, robot: Robot, wire_name: str) -> None:
+def test_force_sends_what_the_sim_then_refuses_and_reports_it(town: Wire, robot: Robot, wire_name: str) -> None:
     words = ["{linear: {x: .nan}}", "-r", "20", "--force", "--wire", wire_name]
     pub = town.start("topic", "pub", "cmd_vel", *words)
     pub.wait_for_line("not obeyed: ")
@@ -96,7 +98,7 @@ def test_force_sends_what_the_sim_then_refuses_and_says_so(town: Wire, robot: Ro
     robot.stands()
 
 
-def test_it_tells_when_another_one_drives_and_when_it_is_obeyed(town: Wire, robot: Robot) -> None:
+def test_it_reports_when_another_one_drives_and_when_it_is_obeyed(town: Wire, robot: Robot) -> None:
     first = town.start("topic", "pub", "cmd_vel", AHEAD)
     robot.odom.next(lambda odom: moves(odom, 0.2, 0, 0))
     second = town.start("topic", "pub", "cmd_vel", '{"linear": {"y": 0.1}}')
@@ -119,7 +121,7 @@ def test_a_forced_mistake_is_named_also_where_another_one_drives(town: Wire, rob
     robot.stands()
 
 
-def test_it_tells_that_the_sim_drives_slower_than_it_says(town: Wire, robot: Robot) -> None:
+def test_it_reports_that_the_sim_drives_slower_than_shown(town: Wire, robot: Robot) -> None:
     pub = town.start("topic", "pub", "cmd_vel", '{"linear": {"x": 99}}')
     assert "clamped" in pub.wait_for_line("over the limits of")
     pub.signal(signal.SIGINT)
@@ -133,7 +135,7 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
         assert pub.stdin and pub.stderr
         seen = robot.odom
 
-        def say(line: str, driven: tuple[float, ...]) -> None:
+        def type_line(line: str, driven: tuple[float, ...]) -> None:
             def driving() -> bool:
                 assert pub.stdin
                 print(line, file=pub.stdin, flush=True)
@@ -141,8 +143,8 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
 
             wait_for(driving)
 
-        say(AHEAD, (0.2, 0, 0))
-        say("linear: {y: 0.1}", (0, 0.1, 0))
+        type_line(AHEAD, (0.2, 0, 0))
+        type_line("linear: {y: 0.1}", (0, 0.1, 0))
         pub.stdin.close()
         assert pub.wait(20) == 0
     assert seen
@@ -164,7 +166,7 @@ def test_a_line_that_is_no_text_ends_it_too(wire: Wire) -> None:
     assert done.stderr.startswith(b"holozen topic pub: cmd_vel: line 2 refused: ")
 
 
-def test_any_type_is_published_as_its_fields_say(town: Wire) -> None:
+def test_any_type_is_published_with_its_fields(town: Wire) -> None:
     echo = town.start("topic", "echo", "scan", "--once", "--json")
     words = ["scan", "sensor_msgs/msg/LaserScan", "{ranges: [1, 2.5]}", "-r", "50"]
     for wire_name in ("json", "cdr"):
@@ -173,8 +175,8 @@ def test_any_type_is_published_as_its_fields_say(town: Wire) -> None:
             assert json.loads(echo.out)["ranges"] == [1.0, 2.5]
         echo = town.start("topic", "echo", "scan", "--once", "--json")
     echo.close()
-    told = "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn'; did you mean 'sensor_msgs/msg/LaserScan'?"
-    assert_one_line(town.run("topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, told)
+    expected = "holozen topic pub: scan: no type 'sensor_msgs/msg/LaserScn' (did you mean 'sensor_msgs/msg/LaserScan'?)"
+    assert_one_line(town.run("topic", "pub", "scan", "sensor_msgs/msg/LaserScn", "--once"), 1, expected)
 
 
 def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
@@ -182,12 +184,12 @@ def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
     publisher = town.bus("ours").publisher("holes", Twist)
     hz = town.start("topic", "hz", "holes", "--json")
 
-    def told() -> str:
+    def reported() -> str:
         publisher.put(Twist())
         for _ in range(5):
             next(publisher.numbers)  # as if a sample had been sent and lost
         return hz.out
 
-    wait_for(told)
+    wait_for(reported)
     report = json.loads(hz.out.splitlines()[0])
     assert report["lost"] == 5 * (report["window"] - 1)

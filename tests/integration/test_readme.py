@@ -1,4 +1,4 @@
-"""The commands of the README do what it says, as they stand there."""
+"""The commands of the README do what it promises, as they stand there."""
 
 import contextlib
 import os
@@ -22,6 +22,7 @@ LASTING = {
     "record": "messages,",
     "plot": "x: ",
     "map": "hb_bot x",
+    "view": "http://127.0.0.1:",
     "teleop": "listening sim",
     "xacro my_bot.urdf.xacro --watch": "Fred",
     "sim": "listens on cmd_vel",

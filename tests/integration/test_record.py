@@ -2,6 +2,7 @@
 
 import json
 import random
+import shlex
 import signal
 import subprocess
 import sys
@@ -16,15 +17,15 @@ from holozen.messages import Odometry, codec
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
+from .foreign_samples import PAYLOADS
 from .processes import read
 from .robots import Robot
-from .strangers import PAYLOADS
 
 BLOCK = zenoh.CongestionControl.BLOCK  # by default a burst loses some, before anybody receives it
 
 
 def info_of(path: Path, *flags: str) -> str:
-    """What `holozen bag info` says."""
+    """What `holozen bag info` prints."""
     words = command("bag", "info", str(path), *flags)
     return subprocess.run(words, capture_output=True, text=True, timeout=30, check=True).stdout
 
@@ -37,7 +38,7 @@ def listening(wire: Wire, key: str) -> zenoh.Session:
     return cast(zenoh.Session, bus.session)
 
 
-def test_strangers_payloads_are_recorded_byte_for_byte_with_their_encodings(wire: Wire, tmp_path: Path) -> None:
+def test_foreign_payloads_are_recorded_byte_for_byte_with_their_encodings(wire: Wire, tmp_path: Path) -> None:
     recorder = wire.start("record", "any/**", "-o", str(tmp_path / "a"))
     session = listening(wire, "any/thing")
     for i, (encoding, payload) in enumerate(PAYLOADS.items()):
@@ -103,11 +104,11 @@ def test_on_a_full_disk_it_ends_with_a_file_that_is_whole(tmp_path: Path) -> Non
     words = ["unshare", "-rmn", "bash", "-c", FULL, "-", str(disk), sys.executable, str(script), str(disk)]
     with Process(words) as process:
         assert process.wait(60) == 0, process.err
-    told = json.loads(process.out.splitlines()[-1])
-    assert told["code"] == 1
-    assert told["said"].count("holozen record: stopped: No space left on device") == 1
-    assert 100 < told["readable"] == told["messages"]
-    assert told["mcap"] == told["messages"], "the mcap library wants an end"
+    output = json.loads(process.out.splitlines()[-1])
+    assert output["code"] == 1
+    assert output["stderr"].count("holozen record: stopped: No space left on device") == 1
+    assert 100 < output["readable"] == output["messages"]
+    assert output["mcap"] == output["messages"], "the mcap library wants an end"
 
 
 SCRIPT = """
@@ -135,8 +136,8 @@ with Bag(path) as bag:
 with path.open("rb") as stream:
     summary = make_reader(stream).get_summary()
 last = json.loads(out.splitlines()[-1])
-told = {"code": code, "said": err, "readable": readable, "messages": last["messages"]}
-print(json.dumps(told | {"mcap": summary.statistics.message_count}))
+result = {"code": code, "stderr": err, "readable": readable, "messages": last["messages"]}
+print(json.dumps(result | {"mcap": summary.statistics.message_count}))
 """
 
 
@@ -148,7 +149,7 @@ print(json.dumps(told | {"mcap": summary.statistics.message_count}))
         (("a//b", "-o", "a"), 1, "key 'a//b'"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(
+def test_an_error_is_reported_in_one_line(
     wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], code: int, part: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -199,21 +200,17 @@ def test_without_a_clock_there_is_no_time_of_the_sim(wire: Wire, tmp_path: Path)
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("words", ["record -a --json -o a", "bag info a.mcap", "bag info a.mcap --json"])
 def test_a_reader_that_has_seen_enough_ends_it_quietly(
-    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: str
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    publisher = wire.start("topic", "pub", "tf", "{}", "-r", "100")
-    publisher.wait_for_line("no subscribers")
-    if words.startswith("bag"):
-        assert wire.run("record", "-a", "-o", "a", "--max-duration", "0.3").returncode == 0
-    flags = wire.flags if words.startswith("record") else []
-    line = " ".join([*command(*words.split()), *flags])
-    done = subprocess.run(["bash", "-c", f"{line} | head -1; exit ${{PIPESTATUS[0]}}"], capture_output=True, text=True)
-    assert done.returncode == 0
-    assert len(done.stdout.splitlines()) == 1
-    assert [line for line in done.stderr.splitlines() if not line.startswith("recording ")] == []
+    wire.start("topic", "pub", "tf", "{}", "-r", "100").wait_for_line("no subscribers")
+    for words in (["record", "-a", "--json", "-o", "a", *wire.flags], ["bag", "info", "a.mcap"],
+                  ["bag", "info", "a.mcap", "--json"]):  # fmt: skip
+        piped = f"{shlex.join(command(*words))} | head -1; exit ${{PIPESTATUS[0]}}"
+        done = subprocess.run(["bash", "-c", piped], capture_output=True, text=True)
+        assert (done.returncode, len(done.stdout.splitlines())) == (0, 1), words
+        assert [line for line in done.stderr.splitlines() if not line.startswith("recording ")] == [], words
     with Bag(tmp_path / "a.mcap") as bag:
         assert list(bag.messages())
         assert not bag.cut_off
@@ -235,7 +232,7 @@ def test_a_long_recording_is_split(wire: Wire, tmp_path: Path) -> None:
     assert all(str(path) in recorder.raw.replace("\r\n", "") for path in files)
 
 
-def test_in_a_terminal_a_line_tells_how_far_it_is(wire: Wire, tmp_path: Path) -> None:
+def test_in_a_terminal_a_line_shows_the_progress(wire: Wire, tmp_path: Path) -> None:
     terminal = wire.terminal("record", "a", "-o", str(tmp_path / "a"))
     listening(wire, "a").put("a", b"x")
     terminal.wait_for_text("1 messages")

@@ -12,9 +12,9 @@ from holozen.messages import Message, Odometry, Twist, codec
 from holozen.testing import Wire, wait_for
 from holozen.transport.samples import RawSubscriber, Sample
 
+from .foreign_samples import PAYLOADS
 from .processes import read
 from .robots import Robot, moves
-from .strangers import PAYLOADS
 
 MS = 1_000_000  # ns
 FORWARD = codec.encode(Twist.planar(x=0.2))
@@ -60,7 +60,7 @@ def test_payloads_and_encodings_are_those_of_the_bag(wire: Wire, tmp_path: Path)
     ]
 
 
-def test_what_was_recorded_is_played_to_who_records_again(wire: Wire, tmp_path: Path) -> None:
+def test_a_recording_is_played_to_a_second_recorder(wire: Wire, tmp_path: Path) -> None:
     rows = [("a", b"%d" % i, "text/plain", i) for i in range(300)]
     first = bag(tmp_path / "first.mcap", *rows)
     recorder = wire.start("record", "b", "-o", str(tmp_path / "again"))
@@ -91,7 +91,7 @@ def test_beside_a_live_robot_nothing_is_played_that_could_disturb_it(town: Wire,
     assert done.stderr == "holozen replay: cmd_vel: it moves robots; --commands plays it too\n"
 
 
-def test_a_recording_of_a_sim_that_still_runs_says_how_to_play_it(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_a_recording_of_a_running_sim_explains_how_to_play_it(town: Wire, robot: Robot, tmp_path: Path) -> None:
     path = bag(tmp_path / "a.mcap", ("odom", codec.encode(Odometry()), "application/json", 0.0))
     done = town.run("replay", path)
     advice = "nothing was played; end sim first, or play under other keys, such as --remap odom:=old/odom"
@@ -152,7 +152,7 @@ def test_a_pause_stops_the_robot(wire: Wire, tmp_path: Path) -> None:
     assert terminal.process.wait() == 0
 
 
-def test_a_loop_plays_until_it_is_told_to_end(wire: Wire, tmp_path: Path) -> None:
+def test_a_loop_plays_until_it_is_ended(wire: Wire, tmp_path: Path) -> None:
     tap = wire.bus().subscribe_raw("a")
     player = wire.start("replay", bag(tmp_path / "a.mcap", *[("a", b"x", "", i) for i in range(10)]), "--loop")
     for _ in range(31):
@@ -170,7 +170,7 @@ def test_a_loop_plays_until_it_is_told_to_end(wire: Wire, tmp_path: Path) -> Non
         (("a.mcap", "--start-offset", "9"), 1, "no message is between --start-offset and --until"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(
+def test_an_error_is_reported_in_one_line(
     wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], code: int, part: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -27,7 +27,7 @@ def pose_service(town: Wire, sim: Process) -> None:
 
 
 def test_service_list_names_every_service(town: Wire) -> None:
-    """Those of the table, and those by which each process tells its parameters."""
+    """Those of the table, and those by which each process serves its parameters."""
     services = {service.key: service.reply.ROS for service in SERVICES}
     shown = town.run("service", "list").stdout.split()
     assert {key for key in shown if not key.endswith("_parameters")} == set(services)
@@ -88,15 +88,15 @@ def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
         (["ring"], 2, "'ring'"),
     ],
 )
-def test_a_call_that_fails_says_why_in_one_line(town: Wire, words: list[str], code: int, reason: str) -> None:
+def test_a_failing_call_gives_its_reason_in_one_line(town: Wire, words: list[str], code: int, reason: str) -> None:
     assert_one_line(town.run("service", *words), code, reason)
 
 
-def test_node_list_names_who_runs(town: Wire) -> None:
+def test_node_list_names_the_running_nodes(town: Wire) -> None:
     assert town.run("node", "list").stdout.split() == ["pose_service", "sim"]
     with town.terminal("teleop") as terminal:
         terminal.wait_for_text("listening")
-        assert town.run("node", "list").stdout.split() == ["pose_service", "sim", "teleop"]
+        wait_for(lambda: town.run("node", "list").stdout.split() == ["pose_service", "sim", "teleop"])
     wait_for(lambda: town.run("node", "list").stdout.split() == ["pose_service", "sim"])
 
 
@@ -139,7 +139,7 @@ def test_a_client_that_waits_for_its_router_ends_on_a_signal(wire: Wire) -> None
         assert "Traceback" not in sim.err
 
 
-def test_a_router_whose_port_is_taken_says_so(town: Wire) -> None:
+def test_a_router_whose_port_is_taken_reports_it(town: Wire) -> None:
     done = subprocess.run(command("router", "--listen", town.endpoint), capture_output=True, text=True, timeout=30)
     assert_one_line(done, 1, "holozen router: cannot open Zenoh: ", str(town.port))
 
@@ -181,8 +181,8 @@ def test_service_type_find_and_info(town: Wire) -> None:
     lines = town.run("service", "info", "next_goal").stdout.splitlines()
     assert lines[:2] == ["Type: holozen/srv/NextGoal", "Services count: 1"]
     assert lines[2].startswith("  pose_service (")
-    told = json.loads(town.run("service", "info", "next_goal", "--json").stdout)
-    assert [server["node"] for server in told["servers"]] == ["pose_service"]
+    output = json.loads(town.run("service", "info", "next_goal", "--json").stdout)
+    assert [server["node"] for server in output["servers"]] == ["pose_service"]
 
 
 def test_service_call_again_and_again(town: Wire) -> None:
@@ -193,13 +193,13 @@ def test_service_call_again_and_again(town: Wire) -> None:
     assert set(call.out.splitlines()[:3]) == {call.out.splitlines()[0]}
 
 
-def test_node_info_tells_what_a_node_reads_writes_and_serves(town: Wire) -> None:
+def test_node_info_shows_what_a_node_reads_writes_and_serves(town: Wire) -> None:
     lines = town.run("node", "info", "sim").stdout.splitlines()
     assert lines[1:3] == ["  Subscribers:", "    cmd_vel: geometry_msgs/msg/Twist"]
     assert "    odom: nav_msgs/msg/Odometry" in lines[lines.index("  Publishers:") : lines.index("  Service Servers:")]
     assert "    resume: std_srvs/srv/Trigger" in lines[lines.index("  Service Servers:") :]
-    told = json.loads(town.run("node", "info", "/sim", "--json").stdout)
-    assert {"key": "odom", "type": "nav_msgs/msg/Odometry"} in told["publishers"]
+    output = json.loads(town.run("node", "info", "/sim", "--json").stdout)
+    assert {"key": "odom", "type": "nav_msgs/msg/Odometry"} in output["publishers"]
 
 
 def test_lists_count_and_write_json(town: Wire) -> None:
@@ -213,7 +213,7 @@ def test_lists_count_and_write_json(town: Wire) -> None:
     ]
 
 
-def test_the_graph_shows_who_writes_and_reads(town: Wire) -> None:
+def test_the_graph_shows_writers_and_readers(town: Wire, robot: Robot) -> None:
     lines = town.run("graph").stdout.splitlines()
     assert "sim -> odom -> pose_service, test" in lines
     assert "next_goal: pose_service" in lines

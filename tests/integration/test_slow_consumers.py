@@ -17,7 +17,7 @@ AT_ONCE = 2.0  # s; a publisher that waits for a slow reader waits 5
 
 @pytest.fixture
 def fast_robot(wire: Wire) -> Robot:
-    """A robot whose sim goes as fast as it can, and so tells as much as it can."""
+    """A robot whose sim goes as fast as it can, and so publishes as much as it can."""
     start_sim(wire, "--rtf", "0")
     return Robot(wire.bus())
 
@@ -31,7 +31,7 @@ def held_back(wire: Wire) -> int:
 
 @pytest.fixture
 def slow(wire: Wire, fast_robot: Robot) -> Iterator[Process]:
-    """A subscriber of odom, tf and joint_states that has been told more than it and the system's buffers can hold."""
+    """A subscriber of odom, tf and joint_states that was sent more than it and the system's buffers can hold."""
     with deaf(wire, "**") as process:
 
         def full() -> bool:

@@ -34,7 +34,7 @@ from .robots import URDF, Robot, distance, moves, rests, speeds
 PERSON, SCRIPT, AUTOPILOT = "INTERACTIVE_HIGH", "DATA", "DATA_LOW"
 BOT = URDF / "hb_bot.urdf.xacro"
 TAG = "<commandTopic>"
-# With a watchdog of a minute, who has to let go is silent as long, however slow the machine: a source that was not
+# With a watchdog of a minute, a source that has to let go is silent as long, however slow the machine: one that was not
 # scheduled for half a second has let go of the others.
 SLOW_BOT = expand(BOT).replace(TAG, f"<cmdTimeout>60</cmdTimeout>{TAG}")
 WHEELS = ["jFL", "jFR", "jBL", "jBR"]
@@ -89,7 +89,7 @@ def robots(town: Wire, sim: Process) -> dict[str, Robot]:
 
 @contextmanager
 def ready(robot: Robot) -> Iterator[Robot]:
-    """It stands, nobody is held, and who commanded it before has let go; at the end it is released."""
+    """It stands, no source is held, and former drivers have let go; at the end it is released."""
     trigger(robot, "stop")
     trigger(robot, "release")
     robot.pass_time(0.7)
@@ -110,10 +110,10 @@ def trigger(robot: Robot, verb: str) -> TriggerReply:
 
 
 def stands_for(robot: Robot, seconds: float, slow: float = SLOW) -> list[Odometry]:
-    """Let that much sim time pass; the robot may not have moved meanwhile."""
-    begin = len(robot.odom.messages())
+    """Let that much sim time pass, in which the robot may not move."""
+    part = robot.odom.from_now()
     robot.pass_time(seconds)
-    odoms: list[Odometry] = robot.odom.messages()[begin:]
+    odoms: list[Odometry] = part.messages()
     assert max(max(map(abs, speeds(odom))) for odom in odoms) < slow
     assert distance(odoms[0], odoms[-1]) < 5e-3
     return odoms
@@ -162,7 +162,7 @@ with Bus("setter", Connection(connect=(sys.argv[1],), listen=()), lasting=True) 
 """
 
 
-def test_it_outlives_who_set_it(town: Wire, fred: Robot, flood: Flood) -> None:
+def test_it_outlives_its_source(town: Wire, fred: Robot, flood: Flood) -> None:
     with Process([sys.executable, "-c", SETTER, town.endpoint]) as setter:
         setter.wait_for_line("done")
         setter.signal(signal.SIGKILL)
@@ -172,9 +172,9 @@ def test_it_outlives_who_set_it(town: Wire, fred: Robot, flood: Flood) -> None:
     assert fred.status().stopped.startswith("setter@")
 
 
-def test_any_zenoh_tool_can_set_it_and_ask_for_it(fred: Robot, stranger: zenoh.Session) -> None:
+def test_any_zenoh_tool_can_set_it_and_ask_for_it(fred: Robot, foreign: zenoh.Session) -> None:
     def get(key: str) -> dict[str, object]:
-        (reply,) = stranger.get(key)
+        (reply,) = foreign.get(key)
         assert reply.ok is not None
         value: dict[str, object] = json.loads(bytes(reply.ok.payload))
         return value
@@ -224,7 +224,7 @@ def test_a_silence_lets_go_too(fred: Robot, flood: Flood) -> None:
     fred.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
 
 
-def test_an_autopilot_also_waits_for_resume_which_is_refused_meanwhile(fred: Robot, flood: Flood) -> None:
+def test_an_autopilot_also_waits_for_resume_which_is_refused_during_the_stop(fred: Robot, flood: Flood) -> None:
     trigger(fred, "stop")
     with pytest.raises(ServiceError, match=r"^stopped: by .*; `holozen release` lets it drive again$"):
         fred.resume()

@@ -1,4 +1,4 @@
-"""However a teleop ends, the last thing it says is a stop, and the terminal is as it was."""
+"""However a teleop ends, its last command is a stop, and the terminal is as it was."""
 
 import signal
 import sys
@@ -50,7 +50,7 @@ def assert_tidy(terminal: Terminal) -> None:
     assert last["2004h"] < last["2004l"], "paste is plain again"
 
 
-def test_without_a_terminal_it_says_so_in_one_line(town: Wire) -> None:
+def test_without_a_terminal_it_reports_that_in_one_line(town: Wire) -> None:
     done = town.run("teleop")
     assert done.returncode == 2
     assert done.stdout == ""
@@ -64,19 +64,19 @@ def test_a_signal_stops_the_robot_and_leaves_the_terminal_tidy(town: Wire, robot
         terminal.process.signal(number)
         assert terminal.process.wait() == 0
         robot.stands()
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
         assert_tidy(terminal)
         assert "Traceback" not in terminal.raw
 
 
-def test_a_signal_to_an_idle_teleop_says_nothing(town: Wire, robot: Robot) -> None:
+def test_a_signal_to_an_idle_teleop_publishes_nothing(town: Wire, robot: Robot) -> None:
     with town.terminal("teleop") as terminal:
         terminal.wait_for_text("listening")
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
         terminal.process.signal(signal.SIGTERM)
         assert terminal.process.wait() == 0
         robot.newest()
-        assert len(robot.commands.messages()) == seen
+        assert commands.messages() == []
         assert_tidy(terminal)
 
 
@@ -85,7 +85,7 @@ def test_ctrl_c_stops_the_robot_and_quits(town: Wire, robot: Robot) -> None:
         terminal.type("\x03")
         assert terminal.process.wait() == 0
         robot.stands()
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
         assert_tidy(terminal)
 
 
@@ -104,7 +104,7 @@ def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> 
         terminal.hang_up()
         terminal.process.wait()
         robot.stands()
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
 
 
 @pytest.mark.parametrize(
@@ -116,19 +116,19 @@ def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> 
     ],
     ids=["picture", "tick", "key"],
 )
-def test_an_exception_stops_the_robot_and_is_told_in_one_line(
+def test_an_exception_stops_the_robot_and_is_one_error_line(
     town: Wire, robot: Robot, tmp_path: Path, statement: str
 ) -> None:
     script = tmp_path / "broken_teleop.py"
     script.write_text(BROKEN.format(root=str(ROOT), statement=statement))
     with Terminal([sys.executable, str(script), *DRIVES_ON, *town.flags]) as terminal:
         terminal.wait_for_text("listening")
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
         terminal.type("i")
         assert terminal.process.wait() == 1
         robot.stands()
-        assert any(any(planar(command)) for command in robot.commands.messages()[seen:]), "it drove"
-        robot.told_to_stop()
+        commands.next(lambda command: any(planar(command)))
+        robot.wait_for_stop_command()
         assert_tidy(terminal)
         assert "teleop: RuntimeError: broken on purpose; a stop was sent to the robot" in terminal.raw
         assert "Traceback" not in terminal.raw
@@ -139,7 +139,7 @@ def test_the_stop_arrives_though_a_subscriber_of_cmd_vel_reads_nothing(town: Wir
         terminal.process.signal(signal.SIGTERM)
         assert terminal.process.wait() == 0
         robot.stands()
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
 
 
 def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
@@ -150,13 +150,16 @@ def test_a_teleop_whose_sim_is_gone_quits_all_the_same(wire: Wire) -> None:
     terminal.wait_for_text("ODOM IS STALE")
     terminal.process.signal(signal.SIGTERM)
     assert terminal.process.wait() == 0
-    robot.told_to_stop()
-    stops = [command for command in robot.commands.messages() if not any(planar(command))]
-    assert len(stops) > 5, "without odom a stop is repeated for a second"
+
+    def stops() -> int:
+        return sum(not any(planar(command)) for command in robot.commands.messages())
+
+    wait_for(lambda: stops() > 5, what="stops, which are repeated for a second where there is no odom")
+    robot.wait_for_stop_command()
     assert_tidy(terminal)
 
 
-def test_a_teleop_alone_says_that_nobody_listens(wire: Wire) -> None:
+def test_a_teleop_alone_reports_that_it_has_no_subscriber(wire: Wire) -> None:
     terminal = wire.terminal("teleop", *DRIVES_ON)
     screen = terminal.wait_for_text("NO ODOM")
     assert "NO SUBSCRIBER on cmd_vel" in screen

@@ -1,4 +1,4 @@
-"""The fixtures that come with holozen, as the tests of somebody else's robot use them."""
+"""The fixtures that come with holozen, as other projects' tests use them."""
 
 import re
 import subprocess
@@ -14,13 +14,17 @@ def test_the_robot_drives_and_stands_in_silence(wire, wait_for):
     odom = bus.latest("odom", Odometry)
     commands = bus.publisher("cmd_vel", Twist)
     wait_for(lambda: odom.count)
-    commands.put(Twist.planar(x=0.3))
-    wait_for(lambda: odom.read()[0].twist.twist.linear.x > 0.2)
+
+    def drives():
+        commands.put(Twist.planar(x=0.3))
+        return odom.read()[0].twist.twist.linear.x > 0.2
+
+    wait_for(drives)
     wait_for(lambda: abs(odom.read()[0].twist.twist.linear.x) < 0.01)
 
 def test_a_key_drives(wire, terminal, wait_for):
     wire.start("sim").wait_for_line("listens on")
-    teleop = terminal("teleop", "--speed", "0.2")
+    teleop = terminal("teleop", "--speed", "0.2", "--mode", "latch")
     teleop.wait_for_text("listening sim")
     teleop.type("i")
     teleop.wait_for_text("+0.200 m/s")  # measured
@@ -86,7 +90,7 @@ IN_VAIN = {
 }
 
 
-def test_a_condition_that_never_comes_true_says_what_was_waited_for(tmp_path: Path) -> None:
+def test_a_condition_that_never_comes_true_names_what_was_awaited(tmp_path: Path) -> None:
     tests = [f"def test_{n}(wire, terminal, wait_for):\n    {test}\n" for n, test in enumerate(IN_VAIN)]
     done = run_pytest(tmp_path, "\n".join(tests))
     assert f"{len(IN_VAIN)} failed" in done.stdout
@@ -110,13 +114,13 @@ def test_it(wire):
     assert done.returncode == 0, done.stdout
 
 
-def test_pytest_loads_nothing_heavy_for_those_who_do_not_use_it(tmp_path: Path) -> None:
+def test_pytest_loads_nothing_heavy_without_the_fixtures(tmp_path: Path) -> None:
     heavy = ["zenoh", "msgspec", "numpy", "pybullet", "pyte"]
     done = run_pytest(tmp_path, f"import sys\ndef test_it():\n    assert not set({heavy}) & set(sys.modules)\n")
     assert done.returncode == 0, done.stdout
 
 
-def test_without_pyte_the_screen_says_what_to_install(tmp_path: Path) -> None:
+def test_without_pyte_the_screen_names_what_to_install(tmp_path: Path) -> None:
     done = run_pytest(
         tmp_path,
         """

@@ -1,4 +1,4 @@
-"""What a process writes for people holds it up nowhere, whoever does not read it."""
+"""No process is held up by output that is not read."""
 
 import fcntl
 import math
@@ -27,7 +27,7 @@ SOON = 10.0  # s; a process that waits for its reader waits for ever
 
 @pytest.fixture
 def unread() -> Iterator[int]:
-    """A pipe that nobody reads, as small as it can be."""
+    """A pipe that is never read, as small as it can be."""
     reader, writer = os.pipe()
     fcntl.fcntl(writer, fcntl.F_SETPIPE_SZ, SMALL)
     yield writer
@@ -72,7 +72,7 @@ def fill(speak: Callable[[], None], output: int) -> None:
         speak()
 
 
-def test_a_sim_goes_on_and_ends_when_nobody_reads_its_errors(wire: Wire, unread: int) -> None:
+def test_a_sim_goes_on_and_ends_with_its_stderr_unread(wire: Wire, unread: int) -> None:
     sim = wire.start("sim", stderr=unread)
     robot = Robot(wire.bus())
     fill(chatter(robot.bus, "sim", "max_linear", 3.0), unread)
@@ -90,7 +90,7 @@ def test_a_sim_goes_on_and_ends_where_ctrl_s_holds_its_terminal(wire: Wire, held
     assert sim.terminate(SOON) == 0
 
 
-def test_a_controller_drives_on_and_ends_when_nobody_reads_its_errors(wire: Wire, unread: int) -> None:
+def test_a_controller_drives_on_and_ends_with_its_stderr_unread(wire: Wire, unread: int) -> None:
     start_sim(wire)
     wire.start("pose-service")
     controller = wire.start("controller", "--laps", "0", stderr=unread)
@@ -104,7 +104,7 @@ def looks(yaw: float, odom: Odometry) -> bool:
     return abs(odom.pose.pose.orientation.yaw() - yaw) < 0.1
 
 
-def test_a_controller_drives_lap_after_lap_when_nobody_reads_its_times(wire: Wire, unread: int) -> None:
+def test_a_controller_drives_lap_after_lap_with_its_output_unread(wire: Wire, unread: int) -> None:
     os.write(unread, bytes(SMALL))
     start_sim(wire, "--rtf", "8")
     wire.start("pose-service", "--size", "0.02")
@@ -115,13 +115,13 @@ def test_a_controller_drives_lap_after_lap_when_nobody_reads_its_times(wire: Wir
     assert controller.terminate(SOON) == 0
 
 
-def test_a_pose_service_answers_and_ends_when_nobody_reads_it(wire: Wire, unread: int) -> None:
+def test_a_pose_service_answers_and_ends_with_its_output_unread(wire: Wire, unread: int) -> None:
     service = wire.start("pose-service", stderr=unread)
     fill(chatter(wire.bus(), "pose_service", "size", 1.0), unread)
     assert service.terminate(SOON) == 0
 
 
-def test_all_of_up_goes_on_and_ends_when_nobody_reads_it(wire: Wire, unread: int) -> None:
+def test_all_of_up_goes_on_and_ends_with_its_output_unread(wire: Wire, unread: int) -> None:
     up = wire.start("up", stdout=unread, stderr=unread)
     robot = Robot(wire.bus())
     fill(chatter(robot.bus, "sim", "max_linear", 3.0), unread)
@@ -161,9 +161,7 @@ except ExternalShutdownException:
 """
 
 
-def test_a_script_whose_log_nobody_reads_goes_on_and_ends_with_a_signal(
-    wire: Wire, unread: int, tmp_path: Path
-) -> None:
+def test_a_script_whose_log_is_unread_goes_on_and_ends_with_a_signal(wire: Wire, unread: int, tmp_path: Path) -> None:
     script = tmp_path / "talker.py"
     script.write_text(LOGS)
     lines = wire.bus().subscribe("lines", Point)

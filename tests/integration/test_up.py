@@ -2,6 +2,8 @@
 
 import os
 import signal
+import urllib.error
+import urllib.request
 from collections.abc import Callable
 from pathlib import Path
 
@@ -43,7 +45,7 @@ def test_a_signal_ends_all_of_it_with_a_stop_of_the_robot(wire: Wire, number: in
     up.signal(number)
     assert up.wait(AT_MOST) == 0
     assert parts_at(wire) == {}
-    robot.told_to_stop()
+    robot.wait_for_stop_command()
     assert "Traceback" not in up.err
     assert "was killed" not in up.err
 
@@ -67,7 +69,7 @@ def test_a_signal_right_at_the_start_leaves_nothing(wire: Wire) -> None:
     assert "Traceback" not in up.err
 
 
-def test_a_part_that_hangs_is_killed_and_told(wire: Wire) -> None:
+def test_a_part_that_hangs_is_killed_and_reported(wire: Wire) -> None:
     up = wire.start("up")
     os.kill(all_run(wire, PARTS)["sim"], signal.SIGSTOP)
     up.signal(signal.SIGINT)
@@ -88,15 +90,18 @@ def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> No
     robot = Robot(wire.bus())
     terminal.wait_for_text("controller@")
     all_run(wire, {"teleop", *PARTS})
-    terminal.type(",")
-    robot.odom.next(lambda odom: moves(odom, -0.5, 0, 0))
-    terminal.wait_for_text("you drive")
+
+    def shown() -> bool:
+        terminal.type(",")  # held
+        return "you drive" in terminal.screen() and moves(robot.newest(), -0.5, 0, 0)
+
+    wait_for(shown, what="a person to drive")
     terminal.type("\x03")
     assert terminal.process.wait(AT_MOST) == 0
     assert parts_at(wire) == {}
-    robot.told_to_stop()
+    robot.wait_for_stop_command()
     assert terminal.modes() == terminal.modes_before
-    assert "controller: yields to teleop@" in terminal.screen(), "what the others had to say comes at the end"
+    assert "controller: yields to teleop@" in terminal.screen(), "the lines of the others come at the end"
     assert "Traceback" not in terminal.raw
 
 
@@ -132,7 +137,7 @@ def broken_robot(folder: Path) -> str:
 
 
 @pytest.mark.parametrize("start", [Wire.start, Wire.terminal], ids=["without a terminal", "in a terminal"])
-def test_a_robot_that_is_broken_ends_all_and_says_why(
+def test_a_broken_robot_ends_all_with_the_reason(
     wire: Wire, tmp_path: Path, start: Callable[..., Process | Terminal]
 ) -> None:
     started = start(wire, "up", "--robot", broken_robot(tmp_path))
@@ -166,7 +171,7 @@ def test_a_robot_with_a_name_is_driven_by_that_name(wire: Wire) -> None:
     driven(Robot(wire.bus(), "Fred"))
 
 
-def test_a_killed_sim_is_told_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:
+def test_a_killed_sim_is_reported_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:
     up = wire.start("up", "--no-restart")
     robot = Robot(wire.bus())
     driven(robot)
@@ -194,11 +199,11 @@ def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire, part: 
     os.kill(dead := parts_at(wire)[part], signal.SIGKILL)
     up.wait_for_line(f"up: {part} was ended by signal 9; starting it again in 0.5 s{then}")
     up.wait_for_line(holds)
-    assert parts_at(wire)[part] != dead
+    wait_for(lambda: parts_at(wire).get(part, dead) != dead, what=f"another {part}")
     robot.stands()
-    seen = len(robot.odom.messages())
+    odoms = robot.odom.from_now()
     robot.pass_time(2.0)
-    assert all(map(rests, robot.odom.messages()[seen:]))
+    assert all(map(rests, odoms.messages()))
     if part == "sim":
         assert wire.run("release").returncode == 0
     wait_for(lambda: robot.resume())
@@ -213,3 +218,14 @@ def test_a_part_that_keeps_dying_is_started_less_and_less_often(wire: Wire) -> N
     for pause in ("0.5", "1", "2"):
         os.kill(all_run(wire, PARTS)["pose-service"], signal.SIGKILL)
         up.wait_for_line(f"up: pose-service was ended by signal 9; starting it again in {pause} s")
+
+
+def test_with_a_view_the_page_is_there_and_ends_with_it(wire: Wire) -> None:
+    up = wire.start("up", "--view", "0")
+    address = up.wait_for_line("http://127.0.0.1:").split()[-1]
+    with urllib.request.urlopen(address) as page:
+        assert b"viser" in page.read()
+    assert up.terminate(AT_MOST) == 0
+    assert parts_at(wire) == {}
+    with pytest.raises(urllib.error.URLError):
+        urllib.request.urlopen(address)

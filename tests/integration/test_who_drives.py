@@ -1,4 +1,4 @@
-"""A person beats a script beats the autopilot, and nobody who was overruled takes the robot back by himself."""
+"""A person beats a script beats the autopilot, and no overruled source takes the robot back by itself."""
 
 from collections.abc import Callable, Iterator
 
@@ -25,7 +25,7 @@ def hand(wire: Wire, node: str, priority: str) -> Hand:
 
 @pytest.fixture
 def patient(robot: Robot) -> Iterator[Robot]:
-    """The robot, for tests in which somebody has to stay fresh on a busy machine: it stops after SILENCE only."""
+    """The robot, for tests in which a source has to stay fresh on a busy machine: it stops after SILENCE only."""
     yield robot.wait_longer(SILENCE)
     robot.wait_longer(COMMAND_SILENCE)
 
@@ -50,20 +50,25 @@ def autopilot(town: Wire, sim: Process) -> Hand:
     return hand(town, "autopilot", AUTOPILOT)
 
 
-def drive(robot: Robot, hand: Hand, x: float, *others: tuple[Hand, float]) -> None:
-    """Command until the robot goes at `x`, while the others want something else all the time."""
+def drive(robot: Robot, hand: Hand, x: float, *others: tuple[Hand, float], obeyed: str = "") -> CommandStatus:
+    """Command until the robot goes at `x` and its status names the source `obeyed`, while the others want something
+    else all the time. The status.
+    """
 
-    def going() -> bool:
+    def going() -> CommandStatus | None:
         for other, speed in others:
             other(speed)
         hand(x)
-        return moves(robot.newest(), x, 0, 0)
+        goes, status = moves(robot.newest(), x, 0, 0), robot.last_status()
+        return status if goes and status and status.obeyed.startswith(obeyed) else None
 
-    wait_for(going, what=lambda: f"the robot to go at {x}: {robot.status()}")
+    status = wait_for(going, what=lambda: f"the robot to go at {x}: {robot.status()}")
+    assert status
+    return status
 
 
 def refused(robot: Robot, hand: Hand, reason: str) -> CommandStatus:
-    """Command until the sim says that it refused a command for this reason."""
+    """Command until the sim reports a command refused for this reason."""
     before = robot.status().refused.get(reason, 0)
 
     def counted() -> CommandStatus | None:
@@ -76,21 +81,16 @@ def refused(robot: Robot, hand: Hand, reason: str) -> CommandStatus:
 
 
 def test_teleop_controller_and_plain_put_have_these_priorities() -> None:
-    assert PRIORITY_OF == {"teleop": PERSON, "controller": AUTOPILOT}
+    assert PRIORITY_OF == {"teleop": PERSON, "view": PERSON, "controller": AUTOPILOT}
 
 
 def test_a_person_overrules_a_script_and_a_script_the_autopilot(
     robot: Robot, person: Hand, script: Hand, autopilot: Hand
 ) -> None:
-    drive(robot, autopilot, 0.1)
-    assert robot.status().obeyed.startswith("autopilot@")
-    drive(robot, script, 0.2, (autopilot, 0.1))
-    assert robot.status().obeyed.startswith("script@")
-    drive(robot, person, 0.3, (autopilot, 0.1), (script, 0.2))
-    status = robot.status()
-    assert status.obeyed.startswith("person@")
-    assert status.priority == PERSON
-    assert status.held
+    drive(robot, autopilot, 0.1, obeyed="autopilot@")
+    drive(robot, script, 0.2, (autopilot, 0.1), obeyed="script@")
+    status = drive(robot, person, 0.3, (autopilot, 0.1), (script, 0.2), obeyed="person@")
+    assert (status.priority, status.held) == (PERSON, True)
 
 
 @pytest.mark.usefixtures("patient")
@@ -98,10 +98,10 @@ def test_a_lower_one_that_begins_while_a_higher_one_drives_does_not_move_the_rob
     robot: Robot, person: Hand, script: Hand, autopilot: Hand
 ) -> None:
     drive(robot, person, 0.3)
-    begin = len(robot.odom.messages())
+    odom = robot.odom.from_now()
     drive(robot, person, 0.4, (script, -0.9), (autopilot, -0.9))
     drive(robot, person, 0.3, (script, -0.9), (autopilot, -0.9))
-    assert all(odom.twist.twist.linear.x > 0 for odom in robot.odom.messages()[begin:])
+    assert all(odom.twist.twist.linear.x > 0 for odom in odom.messages())
 
 
 @pytest.mark.parametrize("overruled", ["script", "autopilot"])
@@ -142,13 +142,16 @@ def test_a_script_that_a_person_starts_after_driving_may_drive(robot: Robot, per
 @pytest.mark.usefixtures("patient")
 def test_among_equals_the_one_that_drives_goes_on(robot: Robot, script: Hand, other_script: Hand) -> None:
     drive(robot, script, 0.2)
-    begin = len(robot.odom.messages())
-    for _ in range(10):
+    odoms, before = robot.odom.from_now(), robot.last_status().refused.get("overruled", 0)
+
+    def refused_ten_times() -> bool:
         other_script(0.9)
         script(0.2)
         robot.newest()
-    assert all(moves(odom, 0.2, 0, 0) for odom in robot.odom.messages()[begin:])
-    assert robot.status().refused["overruled"] >= 10
+        return bool(robot.last_status().refused.get("overruled", 0) >= before + 10)
+
+    wait_for(refused_ten_times)
+    assert all(moves(odom, 0.2, 0, 0) for odom in odoms.messages())
 
 
 @pytest.mark.usefixtures("patient")
@@ -191,7 +194,7 @@ def test_a_stop_of_a_person_stops_a_driving_autopilot(robot: Robot, person: Hand
     refused(robot, autopilot, "overruled")
 
 
-def test_controller_resume_tells_what_the_sim_says(town: Wire, robot: Robot, person: Hand) -> None:
+def test_controller_resume_reports_the_sims_reply(town: Wire, robot: Robot, person: Hand) -> None:
     drive(robot, person, 0.3)
     robot.stands()
     done = town.run("controller", "--resume")
@@ -199,7 +202,7 @@ def test_controller_resume_tells_what_the_sim_says(town: Wire, robot: Robot, per
     assert not robot.status().held
 
 
-def test_controller_resume_without_a_sim_says_so(wire: Wire) -> None:
+def test_controller_resume_without_a_sim_reports_it(wire: Wire) -> None:
     done = wire.run("controller", "--resume")
     assert done.returncode == 1
     assert done.stderr.startswith("controller: no reply from 'resume' within 5 s")

@@ -1,4 +1,4 @@
-"""hb_bot out of students' workspaces, spawned and driven over the wire: its plugin says how."""
+"""hb_bot out of students' workspaces, spawned and driven over the wire as its plugin has it."""
 
 import math
 from pathlib import Path

@@ -57,16 +57,16 @@ def test_it_takes_arguments_and_packages(tmp_path: Path) -> None:
         ("<robot/>", ["-o", "/nowhere/robot.urdf"], 1, "/nowhere/robot.urdf"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_line(
+def test_an_error_is_reported_in_one_line(
     tmp_path: Path, content: str | None, words: list[str], code: int, reason: str
 ) -> None:
     if content is not None:
         (tmp_path / "robot.xacro").write_text(content)
     done = xacro(str(tmp_path / "robot.xacro"), *words)
     assert (done.returncode, done.stdout) == (code, "")
-    said = done.stderr.splitlines()
-    assert len(said) == 1, done.stderr
-    assert reason in said[0]
+    lines = done.stderr.splitlines()
+    assert len(lines) == 1, done.stderr
+    assert reason in lines[0]
 
 
 def test_a_reader_that_has_seen_enough_is_no_failure() -> None:
@@ -78,16 +78,16 @@ def test_a_reader_that_has_seen_enough_is_no_failure() -> None:
 
 
 @pytest.mark.parametrize(
-    ("redirection", "told"),
+    ("redirection", "expected"),
     [
         (">/dev/full", "cannot write to standard output: No space left on device"),
         (">&-", "there is no standard output; write to a file with -o OUT"),
     ],
 )
-def test_an_output_that_takes_nothing_is_one_line(redirection: str, told: str) -> None:
+def test_an_output_that_takes_nothing_is_one_line(redirection: str, expected: str) -> None:
     words = ["sh", "-c", f'"$@" {redirection}', "sh", *command("xacro", str(BOT))]
     done = subprocess.run(words, capture_output=True, text=True, timeout=30)
-    assert (done.returncode, done.stderr) == (1, f"holozen xacro: {told}\n")
+    assert (done.returncode, done.stderr) == (1, f"holozen xacro: {expected}\n")
 
 
 @pytest.fixture
@@ -103,11 +103,11 @@ def watcher(robot: Path) -> Iterator[Process]:
     """Writes robot.urdf next to the robot on every save."""
     words = command("xacro", str(robot), "--watch", "-o", str(robot.with_name("robot.urdf")))
     with Process(words) as process:
-        said(process, 1)
+        reported(process, 1)
         yield process
 
 
-def said(process: Process, count: int) -> str:
+def reported(process: Process, count: int) -> str:
     """The newest of `count` lines that it has written."""
     wait_for(lambda: process.err.count("\n") >= count, what=lambda: f"line {count} of {process.err!r}")
     lines = process.err.splitlines()
@@ -118,35 +118,35 @@ def said(process: Process, count: int) -> str:
 def test_every_save_is_one_line_and_a_new_text(robot: Path, watcher: Process) -> None:
     text, out = robot.read_text(), robot.with_name("robot.urdf")
     good = f"{robot} expanded, {out} written"
-    assert (said(watcher, 1), out.read_text()) == (good, expand(robot))
+    assert (reported(watcher, 1), out.read_text()) == (good, expand(robot))
     robot.write_text(text.replace("</robot>", '<link name="saved"/></robot>'))
-    assert (said(watcher, 2), '"saved"' in out.read_text()) == (good, True)
+    assert (reported(watcher, 2), '"saved"' in out.read_text()) == (good, True)
     materials = robot.with_name("materials.xacro")
     materials.write_text(materials.read_text().replace("</robot>", '<link name="included"/></robot>'))
-    assert (said(watcher, 3), '"included"' in out.read_text()) == (good, True)
+    assert (reported(watcher, 3), '"included"' in out.read_text()) == (good, True)
     (robot.parent / "new").write_text(text)
     (robot.parent / "new").rename(robot)  # as many an editor saves
-    assert (said(watcher, 4), '"saved"' in out.read_text()) == (good, False)
+    assert (reported(watcher, 4), '"saved"' in out.read_text()) == (good, False)
 
 
 @pytest.mark.parametrize(
-    ("broken", "told"),
+    ("broken", "expected"),
     [
         ('<robot name="${9**9**9}"/>', "the expression '9**9**9' takes longer than"),
         (None, "No such file or directory"),
     ],
 )
-def test_what_is_wrong_is_one_line_and_mended_by_the_next_save(
-    robot: Path, watcher: Process, broken: str | None, told: str
+def test_an_error_is_one_line_and_cleared_by_the_next_good_save(
+    robot: Path, watcher: Process, broken: str | None, expected: str
 ) -> None:
     text = robot.read_text()
     if broken is None:
         robot.unlink()
     else:
         robot.write_text(broken)
-    assert told in said(watcher, 2)
+    assert expected in reported(watcher, 2)
     robot.write_text(text)
-    assert said(watcher, 3).startswith(f"{robot} expanded, ")
+    assert reported(watcher, 3).startswith(f"{robot} expanded, ")
 
 
 def test_watching_ends_in_peace(watcher: Process) -> None:
@@ -158,19 +158,19 @@ def test_watching_ends_in_peace(watcher: Process) -> None:
 def test_a_robot_is_respawned_in_a_running_sim_on_every_save(robot: Path) -> None:
     with Wire() as wire:
         sim = start_sim(wire)
-        watcher = wire.start("xacro", str(robot), "--watch", "--name", "Fred")
-        told = f"{robot} expanded, Fred listens on Fred/cmd_vel"
-        assert said(watcher, 1) == told
+        watcher = wire.start("xacro", str(robot), "--watch", "--name", "Fred", "-y", "2")
+        expected = f"{robot} expanded, Fred listens on Fred/cmd_vel"
+        assert reported(watcher, 1) == expected
         robot.write_text(robot.read_text().replace("0.28", "0.27"))
-        assert said(watcher, 2) == told
+        assert reported(watcher, 2) == expected
         wait_for(
             lambda: sim.err.count("Fred was added to the world") + sim.out.count("Fred was added to the world") == 2
         )
         assert watcher.terminate() == 0
 
 
-def test_without_a_sim_the_watcher_says_so_and_goes_on(robot: Path) -> None:
+def test_without_a_sim_the_watcher_reports_that_and_goes_on(robot: Path) -> None:
     with Wire() as wire:
         watcher = wire.start("xacro", str(robot), "--watch")
-        assert said(watcher, 1).startswith(f"{robot} expanded, but no sim answered within ")
+        assert reported(watcher, 1).startswith(f"{robot} expanded, but no sim answered within ")
         assert watcher.terminate() == 0

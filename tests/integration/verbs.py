@@ -21,8 +21,8 @@ class Row(NamedTuple):
     live: str | None = None  # words with which it does its work beside a sim, and ends; None for one that lasts
     code: int = 0  # that it ends with then
     bus: bool = True  # whether it goes on the wire
-    stranger: tuple[str, str] | None = None  # words for the keys of a plain Zenoh session, and a part of what it prints
-    silent: tuple[str, int, str] | None = None  # words where nobody is; the exit code, and a part of the one line
+    foreign: tuple[str, str] | None = None  # words for the keys of a plain Zenoh session, and a part of what it prints
+    silent: tuple[str, int, str] | None = None  # words where no nodes are; the exit code, and a part of the one line
     wrong: tuple[str, int, str] | None = None  # words that are wrong, and the same; without, only flags can be
     endless: Endless | None = None
 
@@ -34,21 +34,21 @@ def row(live: str | None, wrong: tuple[str, int, str] | None = None, **more: obj
 NO_NODE = (1, "there is no node 'sim' with parameters; no node has any; `holozen up` starts a robot")
 NO_SIM = (1, "no sim answered within 3 s; start one in another terminal: holozen sim")
 NO_KEY = (1, "unknown key 'odom': no nodes found at ")
-NO_SUCH_KEY = ("odmo", 1, "unknown key 'odmo'; did you mean 'odom'?")
+NO_SUCH_KEY = ("odmo", 1, "unknown key 'odmo' (did you mean 'odom'?)")
 NO_FILE = (1, "No such file or directory")
 NOTHING = (1, "no messages on odom within 0.2 s; no nodes found at ")
 TYPO = (1, "did you mean 'geometry_msgs/msg/Twist'?")
 STOPPED = ("--timeout 0.2", 1, "; `holozen list` shows what a sim has, --connect where to look")
-NOT_THERE = ("Nobody --timeout 0.5", 1, "there is no robot 'Nobody'; there are: ")
+NOT_THERE = ("Nobody --timeout 30", 1, "there is no robot 'Nobody'; there are: ")
 PUB = """a/heard std_msgs/msg/String '{{"data": "x"}}' --once"""
 PLOT = row(
     f"{ODOM_X} --once -w 2", ("odom", 2, "'odom': write KEY.FIELD"),
-    stranger=("a/json.speed --once -w 2", "a/json.speed: 1.5"),
+    foreign=("a/json.speed --once -w 2", "a/json.speed: 1.5"),
     silent=("odom.x --once -w 0.2", 1, "no messages on odom; no nodes found at "), endless=Endless(ODOM_X, r"x: -?\d"),
 )  # fmt: skip
 RECORD = row(
     "odom -o {tmp}/{id} --max-duration 2", ("-o {tmp}/{id}", 2, "name the keys to record, or use -a for all"),
-    stranger=("a/json a/bytes a/cdr -o {tmp}/{id} --max-duration 2", "messages, "),
+    foreign=("a/json a/bytes a/cdr -o {tmp}/{id} --max-duration 2", "messages, "),
     silent=("odom -o {tmp}/{id} --max-duration 0.2", 1, "nothing arrived, so no file is left"),
     endless=Endless("odom -o {tmp}/{id}", "messages,"),
 )  # fmt: skip
@@ -61,14 +61,26 @@ VERBS = {
     "up": row(None, ("--laps", 2, "--laps: expected one argument"), endless=Endless("", "listening")),
     "stop": row("Spare", NOT_THERE, silent=STOPPED),
     "release": row("Spare", NOT_THERE, silent=STOPPED),
-    "sim": row(None, ("--world {tmp}/none.world", *NO_FILE), endless=Endless("", "listens on")),
+    "sim": row(None, ("puase", 2, "no verb 'puase' (did you mean 'pause'?)"), endless=Endless("", "listens on")),
+    "sim pause": row(None, ("now", 2, "unexpected argument 'now'"), silent=("", *NO_SIM)),
+    "sim play": row("", ("--sped 2", 2, "no flag '--sped'"), silent=("", *NO_SIM)),
+    "sim step": row(None, ("10", 1, "the sim is playing; pause it to step: `holozen sim pause`"), silent=("", *NO_SIM)),
+    "sim reset": row("--scope time", ("--scope tim", 2, "'tim' (did you mean 'time'?)"), silent=("", *NO_SIM)),
     "teleop": row(None, ("--keys nonsense", 2, "nonsense"), endless=Endless("", "listening")),
     "controller": row(None, ("--laps x", 2, "'x': use a whole"), endless=Endless("", "waiting for goal 0")),
+    "camera": row(
+        None, ("--exposures", 2, "--exposures: expected one argument"), endless=Endless("", "renders what comes on")),
+    "view": row(None, ("--port x", 2, "'x': use a whole"), endless=Endless("--port 0", "http://127.0.0.1:")),
     "pose-service": row(None, ("--goals {tmp}/none", *NO_FILE), endless=Endless("", "4 goals from square")),
     "router": row(None, endless=Endless("", "listens at")),
+    "ros2": row(None, ("--ros-domain-id 300", 2, "use a number from 0 to 232"), endless=Endless("", "joins ROS 2")),
+    "secure init": row("--secure {tmp}/{id}", ("--days 0", 2, "use a whole number of days"), bus=False),
+    "secure add": row(None, ("viewer Bob --secure {tmp}/none", *NO_FILE), bus=False),
+    "secure revoke": row(None, ("Bob --secure {tmp}/none", *NO_FILE), bus=False),
+    "secure show": row(None, ("--secure {tmp}/none", *NO_FILE), bus=False),
     "run": row(None, ("{tmp}/none.py", 1, "none.py'")),  # what else it does is in tests/unit/ros
     "launch": row(None, ("{tmp}/none.launch.py", 1, "no launch file '")),
-    "spawn": row("{ball} --name New{n} -x 5", ("{tmp}/none.urdf", *NO_FILE), silent=("{ball}", *NO_SIM)),
+    "spawn": row("{ball} --name New{n} -x {free}", ("{tmp}/none.urdf", *NO_FILE), silent=("{ball}", *NO_SIM)),
     "delete": row("Doomed{n}", ("Nobody", 1, "there is no entity 'Nobody'"), silent=("Fred", *NO_SIM)),
     "list": row("", silent=("", *NO_SIM)),
     "xacro": row("{bot}", ("{tmp}/none.xacro", *NO_FILE), bus=False,
@@ -94,12 +106,12 @@ VERBS = {
     "service type": row("resume", ("resmue", 1, "did you mean 'resume'?"), silent=("odom", *NO_KEY)),
     "service find": row("NextGoal", ("NextGaol", 1, "of type 'NextGaol'"), silent=("x/X", 1, "types: none")),
     "service info": row("resume", ("resmue", 1, "did you mean 'resume'?"), silent=("odom", *NO_KEY)),
-    "service call": row("next_goal", ("next_goal '{{goal: 1}}'", 1, "field `goal`; did you mean 'request_goal'?"),
-        stranger=("a/asked --any", "x: 1"),
+    "service call": row("next_goal", ("next_goal '{{goal: 1}}'", 1, "field `goal` (did you mean 'request_goal'?)"),
+        foreign=("a/asked --any", "x: 1"),
         silent=("next_goal --timeout 0.2", 1, "no reply from 'next_goal' within 0.2 s at "),
         endless=Endless("next_goal -r 20", "x_goal", 130)),
     "node list": row("", silent=("", 0, "no nodes found at ")),
-    "node info": row("sim", ("smi", 1, "unknown node 'smi'; did you mean 'sim'?"), silent=("x", 1, "no nodes found")),
+    "node info": row("sim", ("smi", 1, "unknown node 'smi' (did you mean 'sim'?)"), silent=("x", 1, "no nodes found")),
     "param list": row("", ("smi", 1, "did you mean 'sim'?"), silent=("sim", *NO_NODE)),
     "param get": row("sim max_linear", ("sim max_linaer", 1, "max_linaer"), silent=("sim rate", *NO_NODE)),
     "param set": row("sim max_linear 1.5", ("sim max_linear 1e9", 1, "use a number from "),
@@ -113,7 +125,7 @@ VERBS = {
     "doctor": row(""),
     "graph": row("", silent=("", 0, "no nodes found at ")),
     "completion": row("bash", ("tcsh", 2, "'tcsh'; there are bash, zsh, fish"), bus=False),
-    "interface list": row("", ("--package a=/no/such", 1, "there is no such folder"), bus=False),
+    "interface list": row("", ("--package a=/no/such", 2, "there is no folder"), bus=False),
     "interface show": row("odom", ("geometry_msgs/msg/Twsit", *TYPO), silent=("odom", 1, "'odom' is not a type")),
     "interface proto": row(TWIST, ("geometry_msgs/msg/Twsit", *TYPO), bus=False),
     "record": RECORD,

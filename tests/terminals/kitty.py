@@ -1,4 +1,4 @@
-"""The terminal kitty on a screen that nobody sees, with keys that a test holds down."""
+"""The terminal kitty on a virtual screen, with keys that a test holds down."""
 
 import contextlib
 import json
@@ -18,12 +18,12 @@ from holozen.testing import Process, wait_for
 COLUMNS, ROWS = 100, 32
 QUICK = {"LIBGL_ALWAYS_SOFTWARE": "1", "KITTY_ENABLE_WAYLAND": "0"}
 
-# What runs in kitty in place of a shell: it starts what it is told to, and says how the terminal was left.
+# What runs in kitty in place of a shell: it starts what it is given, and reports how the terminal was left.
 SHELL = """
 import json, os, re, socket, subprocess, sys, termios, tty
-told = socket.socket(socket.AF_UNIX)
-told.connect(sys.argv[1])
-lines = told.makefile("rw")
+channel = socket.socket(socket.AF_UNIX)
+channel.connect(sys.argv[1])
+lines = channel.makefile("rw")
 
 def ask(question):
     before = termios.tcgetattr(0)
@@ -60,8 +60,8 @@ class Display:
             ["Xvfb", "-displayfd", "1", "-screen", "0", "1000x800x24", "-nolisten", "tcp"], stdout=its
         )
         os.close(its)
-        with open(ours) as told:
-            number = told.readline().strip()
+        with open(ours) as chosen:
+            number = chosen.readline().strip()
         assert number, f"Xvfb did not start: {self._server.err}"
         self.env = {"DISPLAY": f":{number}", **QUICK}
 
@@ -131,12 +131,12 @@ class Kitty:
         """Start a program in it."""
         begin = len(self.bytes())
         self._shell.sendall(f"{json.dumps(list(words))}\n".encode())
-        return Program(self, self.told()["pid"], begin)
+        return Program(self, self.reply()["pid"], begin)
 
-    def told(self) -> dict[str, Any]:
-        """What its shell says next."""
-        said: dict[str, Any] = json.loads(self._lines.readline())
-        return said
+    def reply(self) -> dict[str, Any]:
+        """The next reply of its shell."""
+        output: dict[str, Any] = json.loads(self._lines.readline())
+        return output
 
     def bytes(self, begin: int = 0) -> bytes:
         """All that was written to it, or what came after the first bytes."""
@@ -215,7 +215,7 @@ class Program:
     def ended(self) -> dict[str, Any]:
         """Wait for its end: "code", whether the "modes" are as before, and the keyboard's "flags" of both screens."""
         if self._left is None:
-            self._left = self.kitty.told()
+            self._left = self.kitty.reply()
         return self._left
 
 

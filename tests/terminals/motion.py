@@ -1,4 +1,4 @@
-"""What the robot does while somebody is at the keys."""
+"""What the robot does while an operator is at the keys."""
 
 import os
 from collections.abc import Callable
@@ -6,12 +6,12 @@ from contextlib import suppress
 from pathlib import Path
 
 from holozen.testing import wait_for
-from tests.integration.robots import Record, Robot, moves, planar
+from tests.integration.robots import Part, Record, Robot, moves, planar
 
 OFTEN = 100 if os.environ.get("HOLOZEN_LONG") else 1
 """How often a test that looks for a race runs; scripts/test --long asks for the whole hundred."""
 MISSED = ("does not answer", "answers again", "paused:")
-"""What the teleop says after a terminal, or it itself, was held up: a key that came meanwhile does not count."""
+"""The teleop's line after a terminal, or it itself, was held up: a key of that time does not count."""
 PATIENCE = 2.0  # s until a key that moved nothing may have been one of those; longer than a key is ignored
 HOLD_UP = 0.2  # s that a few processes wait for a processor together, where the machine is too busy to keep time
 
@@ -21,7 +21,7 @@ def drives(robot: Robot, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> N
 
 
 def stands(robot: Robot) -> None:
-    robot.told_to_stop()
+    robot.wait_for_stop_command()
     robot.stands()
 
 
@@ -29,7 +29,7 @@ def press_until(
     shown: Callable[[], object], press: Callable[[], object], let_go: Callable[[], object], screen: Callable[[], str]
 ) -> None:
     """Press a key, and wait for what it does. A busy machine holds a terminal up for longer than the teleop waits for
-    its answer: where the screen says so, the key is pressed anew, as by a person.
+    its answer: where the screen shows that, the key is pressed anew, as by a person.
     """
     for _ in range(5):
         press()
@@ -46,7 +46,7 @@ class Since:
     """Whether the robot has moved in a certain way since this was made."""
 
     def __init__(self, odom: Record) -> None:
-        self._odom, self._seen = odom, len(odom.messages())
+        self._odom, self._seen = odom.from_now(), 0
 
     def drove(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> bool:
         """Whether it moved so at any time; what it shows is not looked at again."""
@@ -56,15 +56,16 @@ class Since:
 
 
 def assert_nothing_moves(robot: Robot, seconds: float = 0.3) -> None:
-    """Nobody says a word on cmd_vel that moves the robot, for as long by the sim's clock."""
-    seen = len(robot.commands.messages())
+    """No command on cmd_vel moves the robot for so long by the sim's clock."""
+    commands = robot.commands.from_now()
     robot.pass_time(seconds)
-    assert_nothing_moved(robot, seen)
+    assert_nothing_moved(commands)
 
 
-def assert_nothing_moved(robot: Robot, seen: int) -> None:
-    """Nor did anybody after the first `seen` commands."""
-    assert not [command for command in robot.commands.messages()[seen:] if any(planar(command))]
+def assert_nothing_moved(commands: Part) -> None:
+    """Nor do these commands."""
+    new = [planar(command) for command in commands.messages()]
+    assert not any(map(any, new)), f"commands since then (forward, left, up, turn): {new}"
 
 
 class HeldUp:
@@ -91,15 +92,15 @@ def _waited(pid: int) -> dict[str, float]:
 
 
 def assert_drives_on(robot: Robot, motion: tuple[float, ...], again: Callable[[], object], *pids: int) -> None:
-    """It is told this motion and no other for a second. One in which these processes waited for a processor shows
+    """It gets this motion and no other for a second. One in which these processes waited for a processor shows
     nothing: the robot is made to drive `again`.
     """
     for _ in range(5):
-        seen, held_up = len(robot.commands.messages()), HeldUp(*pids)
+        commands, held_up = robot.commands.from_now(), HeldUp(*pids)
         robot.pass_time(1.0)
-        told = {planar(command) for command in robot.commands.messages()[seen:]}
-        if told == {motion}:
+        reported = {planar(command) for command in commands.messages()}
+        if reported == {motion}:
             return
-        assert held_up.seconds() > HOLD_UP, f"it was told {told} on a machine that kept time"
+        assert held_up.seconds() > HOLD_UP, f"it was commanded {reported} on a machine that kept time"
         again()
-    raise AssertionError(f"it was told {told}, five times")
+    raise AssertionError(f"it was commanded {reported}, five times")

@@ -1,4 +1,4 @@
-"""People who drive one robot each, in a terminal each, over a line that can break."""
+"""Operators that drive one robot each, in a terminal each, over a line that can break."""
 
 import contextlib
 import math
@@ -25,7 +25,7 @@ from .played import KITTY, REPEAT, Played, event
 FORWARD, BACKWARD = map(ord, "i,")
 SPEED = 0.5  # m/s
 RESTS = 1e-6  # m/s, rad/s
-RATE = 240  # Hz of sim time; every step tells how the robot moves
+RATE = 240  # Hz of sim time; every step publishes how the robot moves
 
 BOX = f"""<robot name="box">
   <link name="base_link">
@@ -43,7 +43,7 @@ BOX = f"""<robot name="box">
 
 
 class Witness:
-    """How one robot moves, as its odom tells at every step, by the sim's own clock."""
+    """How one robot moves by its odom of every step and the sim's own clock."""
 
     def __init__(self, bus: Bus, robot: str) -> None:
         self.seen: list[tuple[float, float]] = []  # time of the sim in s, the fastest of its speeds
@@ -87,7 +87,7 @@ class Witness:
 
 
 class Operator:
-    """Somebody who drives one robot, of the sim with this process id."""
+    """An operator of one robot, of the sim with this process id."""
 
     def __init__(self, wire: Wire, bus: Bus, robot: str, sim: int) -> None:
         self.robot, self.sim, self.witness = robot, sim, Witness(bus, robot)
@@ -153,8 +153,8 @@ class Operator:
         assert self.line is not None
         self.line.stall()
 
-    def mend(self) -> None:
-        """Mend the line."""
+    def restore(self) -> None:
+        """Bring the line back."""
         assert self.line is not None
         self.line.resume()
 
@@ -162,7 +162,7 @@ class Operator:
         """End the teleop, if it lives, and close the terminal."""
         if self.terminal:
             with contextlib.suppress(ProcessLookupError):
-                self.terminal.process.signal(signal.SIGKILL)  # what it says at its end is not waited for
+                self.terminal.process.signal(signal.SIGKILL)  # its last lines are not waited for
             self.terminal.close()
         if self.line:
             self.line.close()

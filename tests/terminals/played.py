@@ -62,16 +62,16 @@ class Played(Terminal):
         return {screen: flags for screen, flags in self.pushed.items() if flags}
 
     def down(self, code: int) -> None:
-        """A key goes down, as this kind of terminal tells it."""
+        """A key goes down, as this kind of terminal reports it."""
         self.type(event(code) if self.kind.keyboard else chr(code))
 
     def up(self, code: int) -> None:
-        """It goes up; only some tell it."""
+        """It goes up; only some report it."""
         if self.kind.keyboard:
             self.release(code)
 
     def press(self, code: int, modifiers: int = 0, *, shifted: int = 0, base: int = 0) -> None:
-        """A key goes down, on a terminal that was asked to tell releases."""
+        """A key goes down, on a terminal that was asked to report releases."""
         self.type(event(code, modifiers, shifted=shifted, base=base))
 
     def repeat(self, code: int, modifiers: int = 0) -> None:
@@ -126,23 +126,23 @@ class Played(Terminal):
 
     def _send(self, answers: str, keys: str) -> None:
         if self.late:
-            timer = threading.Timer(self.late, self._say, [answers, keys])
+            timer = threading.Timer(self.late, self._type, [answers, keys])
             timer.daemon = True
             timer.start()
         else:
-            self._say(answers, keys)
+            self._type(answers, keys)
 
-    def _say(self, answers: str, keys: str) -> None:
+    def _type(self, answers: str, keys: str) -> None:
         if self.apart and keys:
-            self._say(answers, "")
+            self._type(answers, "")
             time.sleep(self.apart)
-            self._say(keys, "")
+            self._type(keys, "")
         elif not self.closed:
             self.type(answers + keys)
 
 
 def event(code: int, modifiers: int = 0, kind: int = PRESS, *, shifted: int = 0, base: int = 0) -> str:
-    """A key as kitty tells it with all flags: what is not needed is left out."""
+    """A key as kitty reports it with all flags: what is not needed is left out."""
     codes = f"{code}:{shifted or ''}:{base}" if base else f"{code}:{shifted}" if shifted else f"{code}"
-    told = f":{kind}" if kind != PRESS else ""
-    return f"\x1b[{codes};{modifiers + 1}{told}u" if modifiers or told else f"\x1b[{codes}u"
+    suffix = f":{kind}" if kind != PRESS else ""
+    return f"\x1b[{codes};{modifiers + 1}{suffix}u" if modifiers or suffix else f"\x1b[{codes}u"

@@ -8,8 +8,8 @@ from holozen.testing.wire import command
 from .played import DUMB, KITTY, TMUX, XTERM, Kind, Played
 
 
-def told(wire: Wire, kind: Kind, **env: str) -> str:
-    """What the doctor says in a terminal, its lines joined."""
+def reported(wire: Wire, kind: Kind, **env: str) -> str:
+    """What the doctor prints in a terminal, its lines joined."""
     with Played(command("doctor", *wire.flags), kind, env=env) as terminal:
         assert terminal.process.wait(20) in (0, 1)
         wait_for(lambda: " odom: " in terminal.raw)
@@ -28,10 +28,10 @@ def told(wire: Wire, kind: Kind, **env: str) -> str:
     ],
     ids=["kitty", "xterm", "tmux", "dumb"],
 )
-def test_it_tells_what_the_keyboard_does(wire: Wire, kind: Kind, env: dict[str, str], text: str) -> None:
-    shown = told(wire, kind, **env)
+def test_it_shows_what_the_keyboard_does(wire: Wire, kind: Kind, env: dict[str, str], text: str) -> None:
+    shown = reported(wire, kind, **env)
     assert text in shown
 
 
 def test_an_encoding_without_pictures_is_reported(wire: Wire) -> None:
-    assert "PYTHONUTF8=1" in told(wire, XTERM, LANG="C", LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0")
+    assert "PYTHONUTF8=1" in reported(wire, XTERM, LANG="C", LC_ALL="C", PYTHONUTF8="0", PYTHONCOERCECLOCALE="0")

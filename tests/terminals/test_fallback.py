@@ -1,4 +1,4 @@
-"""Where a terminal tells no releases, a key that repeats drives without a stutter, and stops after its last repeat."""
+"""Where a terminal reports no releases, a repeating key drives without a stutter, and stops after its last repeat."""
 
 import math
 import sys
@@ -7,11 +7,15 @@ from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
+import pytest
+
 from holozen.testing import Terminal, Wire, wait_for
 from tests.integration.robots import Robot, planar
 
 from .broken import ROOT
 from .motion import Since, assert_nothing_moved
+
+pytestmark = pytest.mark.alone
 
 DELAY, INTERVAL = 0.25, 0.03  # s until a key repeats, and between its repeats
 REPEATS = 20  # more than the teleop measures the interval by
@@ -32,10 +36,10 @@ class Hold(NamedTuple):
 
 def hold(robot: Robot, terminal: Terminal) -> Hold:
     """Hold a key until it has repeated often."""
-    begin = len(robot.commands.all())
+    commands = robot.commands.from_now()
     typed = terminal.hold("i", DELAY + (REPEATS - 0.5) * INTERVAL, DELAY, INTERVAL)
-    robot.told_to_stop()
-    stamped = [(received.sample.stamp, received.message) for received in robot.commands.all()[begin:]]
+    robot.wait_for_stop_command()
+    stamped = [(received.sample.stamp, received.message) for received in commands.all()]
     moves = [stamp.sent for stamp, message in stamped if stamp and message and any(planar(message))]
     stops = [stamp.sent for stamp, message in stamped if stamp and message and not any(planar(message))]
     read = [next((at for at in moves if at >= key), math.inf) for key in typed]  # inf: a key that was not obeyed
@@ -87,17 +91,17 @@ def test_a_key_that_repeats_already_at_the_start_moves_nothing_until_it_was_let_
     script = tmp_path / "late.py"
     script.write_text(LATE.format(root=str(ROOT)))
     with Terminal([sys.executable, str(script), *town.flags]) as terminal:
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
         while "listening sim" not in terminal.screen():
             terminal.hold("i", 0.03, 0.03)
         terminal.hold("i", 0.5, 0.03, 0.03)
         robot.newest()
-        assert_nothing_moved(robot, seen)
+        assert_nothing_moved(commands)
         time.sleep(0.8)  # let go, for longer than any keyboard waits before it repeats
         since = Since(robot.odom)
         terminal.type("i")
         wait_for(lambda: since.drove(x=0.5))
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
 
 
 def test_another_key_takes_over_at_once_and_the_robot_stops_by_itself(town: Wire, robot: Robot) -> None:
@@ -108,5 +112,5 @@ def test_another_key_takes_over_at_once_and_the_robot_stops_by_itself(town: Wire
         wait_for(lambda: since.drove(x=0.5))
         terminal.type("J")
         wait_for(lambda: since.drove(y=0.5))
-        robot.told_to_stop()
+        robot.wait_for_stop_command()
         robot.stands()

@@ -25,7 +25,7 @@ from .motion import (
     stands,
 )
 
-pytestmark = pytest.mark.needs("Xvfb", "kitty", "setxkbmap", "xdotool")
+pytestmark = [pytest.mark.alone, pytest.mark.needs("Xvfb", "kitty", "setxkbmap", "xdotool")]
 
 V, W = 0.4, 0.8  # m/s, rad/s
 DIAGONAL = V / 2**0.5
@@ -178,11 +178,11 @@ def test_a_key_that_was_held_before_the_start_moves_nothing(
     for _ in range(trials(1, 5)):
         for program in programs.values():
             program.end()
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
         keys.keys("keydown", "i", "sleep", f"{REPEATS}")
         program = start()
         assert_nothing_moves(robot)
-        assert_nothing_moved(robot, seen)
+        assert_nothing_moved(commands)
         keys.keys("keyup", "i")
         drive(program, "i", x=V)
         keys.keys("keyup", "i")
@@ -245,13 +245,13 @@ def test_what_is_pasted_by_the_mouse_never_drives(
         program.end()
     kitty.run(["printf", r"\033]52;p;aWlpaQpKSg==\007"]).ended()  # iiii, a new line, JJ
     program = start()
-    seen = len(robot.commands.messages())
+    commands = robot.commands.from_now()
     keys.keys("mousemove", "--window", kitty.window, "100", "100", "click", "2")
     press_until(  # the key after it was read
         lambda: "0.440 m/s" in program.screen(), lambda: keys.keys("key", "w"), lambda: None, program.screen
     )
     robot.newest()
-    assert robot.commands.messages()[seen:] == []
+    assert commands.messages() == []
     program.end()  # with its speed
 
 
@@ -265,12 +265,12 @@ def test_a_kitty_that_hangs_stops_the_robot_and_what_it_kept_back_moves_nothing(
     try:
         stands(robot)
         keys.keys("keyup", "i", "keydown", "j", "sleep", f"{REPEATS}")
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
     finally:
         kitty.signal(signal.SIGCONT)
     program.wait_for_text("answers again")
     assert_nothing_moves(robot)
-    assert_nothing_moved(robot, seen)
+    assert_nothing_moved(commands)
     keys.keys("keyup", "j")
     drive(program, "j", turn=W)
     keys.keys("keyup", "j")

@@ -35,7 +35,7 @@ class Multiplexer:
         return Terminal([*self._tmux, "attach"], env=self.env)
 
     def shown(self) -> str:
-        """What the program shows now, whoever looks; empty if that cannot be read."""
+        """What the program shows now; empty if that cannot be read."""
         return subprocess.run([*self._tmux, "capture-pane", "-p"], capture_output=True, text=True).stdout
 
     def end(self) -> None:
@@ -87,7 +87,7 @@ def drive(window: Terminal, robot: Robot, key: str, x: float = 0.0, y: float = 0
     press_until(lambda: since.drove(x, y), lambda: window.type(key), lambda: None, window.screen)
 
 
-def test_a_latched_robot_stands_when_nobody_is_there_and_waits_for_a_key_of_who_comes_back(
+def test_a_latched_robot_stands_when_its_operator_is_lost_and_waits_for_a_new_key(
     multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot
 ) -> None:
     words = command("teleop", "--mode", "latch", "--speed", str(V), *town.flags)
@@ -114,13 +114,13 @@ def test_a_key_drives_while_it_repeats_and_a_paste_moves_nothing(
 ) -> None:
     window = windows.enter_context(multiplexer.new(command("teleop", "--speed", str(V), *town.flags)))
     window.wait_for_text("listening sim")
-    seen = len(robot.commands.messages())
+    commands = robot.commands.from_now()
     window.type("\x1b[200~iiii\x1b[201~")
     press_until(  # what follows the paste was read
         lambda: "0.360 m/s" in window.screen(), lambda: window.type("x"), lambda: None, window.screen
     )
     robot.newest()
-    assert [(r.sample.source, r.message) for r in robot.commands.all()[seen:]] == []
+    assert [(r.sample.source, r.message) for r in commands.all()] == []
     since = Since(robot.odom)
     press_until(lambda: since.drove(x=0.9 * V), lambda: window.hold("i", 0.7), lambda: None, window.screen)
     stands(robot)

@@ -81,7 +81,7 @@ def shared_terminals() -> Iterator[list[Played]]:
 
 @pytest.fixture
 def terminal(shared_terminals: list[Played], town: Wire, robot: Robot) -> Played:
-    """A terminal that tells releases, with a teleop that the tests share. No key is down."""
+    """A terminal that reports releases, with a teleop that the tests share. No key is down."""
     if not shared_terminals or shared_terminals[-1].process.returncode is not None:
         shared_terminals.append(sit_down(town, KITTY))
     shared_terminals[-1].type(FOCUS_OUT + FOCUS_IN)
@@ -100,7 +100,7 @@ def assert_a_new_press_drives(terminal: Played, robot: Robot) -> None:
     stands(robot)
 
 
-def test_where_nobody_tells_releases_a_key_drives_while_it_repeats(start: Start, robot: Robot) -> None:
+def test_in_a_terminal_without_releases_a_key_drives_while_it_repeats(start: Start, robot: Robot) -> None:
     terminal = start(CONSOLE)
     since = Since(robot.odom)
     press_until(lambda: since.drove(x=V), lambda: terminal.hold("i", 0.7), lambda: None, terminal.screen)
@@ -118,7 +118,7 @@ def test_a_repeat_without_a_press_moves_nothing(terminal: Played, robot: Robot) 
 
 
 def test_a_lost_focus_stops_until_a_new_press(terminal: Played, robot: Robot) -> None:
-    assert "\x1b[?1004h" in terminal.raw, "it asks to be told"
+    assert "\x1b[?1004h" in terminal.raw, "it asks for reports of focus"
     drive(terminal, robot, x=V)
     terminal.type(FOCUS_OUT)
     stands(robot)
@@ -205,7 +205,7 @@ def test_a_terminal_whose_answers_stop_coming_stops_the_robot(start: Start, robo
 
 
 @pytest.mark.parametrize(("kind", "mode"), [(KITTY, "hold"), (XTERM, "latch")], ids=["kitty held", "xterm latched"])
-def test_a_terminal_that_hangs_stops_the_robot_and_what_was_typed_meanwhile_moves_nothing(
+def test_a_hanging_terminal_stops_the_robot_and_keys_typed_during_it_move_nothing(
     start: Start, robot: Robot, kind: Kind, mode: str
 ) -> None:
     terminal = start(kind, "--mode", mode)
@@ -239,7 +239,7 @@ def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothin
     drive(terminal, robot, x=V)
     terminal.freeze()
     stands(robot)
-    seen = len(robot.commands.messages())
+    commands = robot.commands.from_now()
     key = event(KEY_J) if kind.keyboard else "j"
     kept = (event(KEY_I, 0, RELEASE) if kind.keyboard else "") + key, key
     terminal.kept = list(kept)
@@ -247,9 +247,9 @@ def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothin
     terminal.thaw()
     wait_for(lambda: not terminal.kept, what="two answers with keys")
     sent = terminal.hold(event(KEY_J, 0, REPEAT) if kind.keyboard else key, 0.5, 0.03, 0.03)
-    # Where only repeats are told, a key that does not come for so long was let go: a busy machine typed too late.
+    # Where only repeats are reported, a key that is silent for so long was let go: a busy machine typed too late.
     if kind.keyboard or max(b - a for a, b in pairwise([thawed, *sent])) < 0.5:
-        assert_nothing_moved(robot, seen)
+        assert_nothing_moved(commands)
     if not kind.keyboard:
         robot.pass_time(0.9)  # it was let go
     terminal.up(KEY_J)
@@ -258,7 +258,7 @@ def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothin
 
 def test_pasted_text_never_drives(start: Start, robot: Robot) -> None:
     terminal = start(KITTY)
-    seen = len(robot.commands.messages())
+    commands = robot.commands.from_now()
 
     def speed() -> str:
         """On the screen; "" where there is none."""
@@ -276,7 +276,7 @@ def test_pasted_text_never_drives(start: Start, robot: Robot) -> None:
             terminal.screen,
         )
         robot.newest()
-        assert robot.commands.messages()[seen:] == []
+        assert commands.messages() == []
 
     for pasted in ("iiii", f"{event(KEY_I)}{event(KEY_J)}", "k\r\ni\r\n", "i" * 100_000, "\x1b[200~i"):
         assert_moves_nothing(pasted)
@@ -288,12 +288,12 @@ def test_another_terminal_that_does_not_speak_kitty_takes_over(start: Start, rob
     drive(terminal, robot, x=V)
     terminal.kind = XTERM
     stands(robot)
-    terminal.type("k")  # shows that somebody is there
+    terminal.type("k")  # shows that an operator is there
     drive(terminal, robot, KEY_L, turn=-W)
     stands(robot)
 
 
-def test_a_window_of_another_size_that_tells_no_releases_is_known_at_once(start: Start, robot: Robot) -> None:
+def test_a_window_of_another_size_without_releases_is_known_at_once(start: Start, robot: Robot) -> None:
     terminal = start(KITTY)
     terminal.kind = XTERM
     terminal.resize(90, 30)
@@ -303,13 +303,13 @@ def test_a_window_of_another_size_that_tells_no_releases_is_known_at_once(start:
 
 
 def test_after_a_while_without_a_terminal_the_next_one_drives(start: Start, robot: Robot) -> None:
-    """As with `docker attach` after a detach: what was asked meanwhile, nobody answers."""
+    """As with `docker attach` after a detach: what was asked during it stays unanswered."""
     terminal = start(KITTY)
     drive(terminal, robot, x=V)
     terminal.kind = DUMB
     stands(robot)
     asked = terminal.raw.count("\x1b[c")
-    wait_for(lambda: terminal.raw.count("\x1b[c") > asked, what="a question that nobody answers")
+    wait_for(lambda: terminal.raw.count("\x1b[c") > asked, what="an unanswered question")
     terminal.pushed = {False: [], True: []}
     terminal.kind = KITTY
     terminal.resize(99, 30)
@@ -340,7 +340,7 @@ def test_suspended_it_gives_the_keyboard_back_and_takes_it_again(town: Wire, sim
 
 
 def test_after_a_sleep_of_the_computer_a_key_is_to_be_pressed_anew(town: Wire, robot: Robot, tmp_path: Path) -> None:
-    """The monotonic clock stands still meanwhile, and the release of a key may be lost."""
+    """The monotonic clock stands still during it, and the release of a key may be lost."""
     asleep = "import time; clock = time.monotonic; time.sleep(1); time.monotonic = lambda: clock() - 1"
     script = tmp_path / "sleeps.py"
     script.write_text(SCRIPT.format(root=str(ROOT), statement=asleep))
@@ -350,10 +350,10 @@ def test_after_a_sleep_of_the_computer_a_key_is_to_be_pressed_anew(town: Wire, r
         drive(terminal, robot, x=V)
         terminal.press(KEY_W)
         robot.stands()  # by the silence
-        seen = len(robot.commands.messages())
+        commands = robot.commands.from_now()
         terminal.wait_for_text("paused")
         assert_nothing_moves(robot)
-        assert_nothing_moved(robot, seen)
+        assert_nothing_moved(commands)
 
 
 @pytest.mark.parametrize("what", ["the terminal", "the teleop"])

@@ -1,4 +1,4 @@
-"""Every key of teleop_twist_keyboard, typed in a terminal, says on the wire what it says there."""
+"""Every key of teleop_twist_keyboard, typed in a terminal, commands what it commands there."""
 
 from collections.abc import Callable
 
@@ -30,7 +30,7 @@ TABLE = {
 SPEEDS = {"q": (1.1, 1.1), "z": (0.9, 0.9), "w": (1.1, 1), "x": (0.9, 1), "e": (1, 1.1), "c": (1, 0.9)}
 
 
-def test_every_key_says_what_it_says_there(town: Wire, robot: Robot) -> None:
+def test_every_key_commands_what_it_does_there(town: Wire, robot: Robot) -> None:
     limits = ("--speed-limit", str(LIMITS[0]), "--turn-limit", str(LIMITS[1]))
     with town.terminal("teleop", "--mode", "latch", "--speed", str(V), "--turn", str(W), *limits) as terminal:
         terminal.wait_for_text("listening sim")
@@ -38,21 +38,21 @@ def test_every_key_says_what_it_says_there(town: Wire, robot: Robot) -> None:
         def type_until(keys: str, shown: Callable[[], object]) -> None:
             press_until(shown, lambda: terminal.type(keys), lambda: None, terminal.screen)
 
-        def said(key: str, moves: bool = True) -> tuple[float, ...]:
+        def typed(key: str, moves: bool = True) -> tuple[float, ...]:
             """The first motion, or stop, that is commanded after this key."""
-            begin = len(robot.commands.messages())
+            commands = robot.commands.from_now()
 
             def found() -> list[tuple[float, ...]]:
-                told = map(planar, robot.commands.messages()[begin:])
-                return [command for command in told if any(command) == moves]
+                found = map(planar, commands.messages())
+                return [command for command in found if any(command) == moves]
 
             type_until(key, found)
             return found()[0]
 
-        def assert_says(key: str, speed: float, turn: float) -> None:
+        def assert_commands(key: str, speed: float, turn: float) -> None:
             x, y, z, counter_clockwise = TABLE[key]
-            said("k", moves=False)
-            assert said(key) == pytest.approx((x * speed, y * speed, z * speed, counter_clockwise * turn)), key
+            typed("k", moves=False)
+            assert typed(key) == pytest.approx((x * speed, y * speed, z * speed, counter_clockwise * turn)), key
 
         def change(keys: str, speed: float, turn: float) -> None:
             """Type the keys of speeds, which lead to these."""
@@ -61,14 +61,14 @@ def test_every_key_says_what_it_says_there(town: Wire, robot: Robot) -> None:
             )
 
         for key in TABLE:
-            assert_says(key, V, W)
+            assert_commands(key, V, W)
         speed, turn = V, W
         for key, (faster, more) in SPEEDS.items():
             speed, turn = speed * faster, turn * more
             change(key, speed, turn)
-            assert_says("u", speed, turn)  # it drives and turns
+            assert_commands("u", speed, turn)  # it drives and turns
         change("q" * 12, *LIMITS)
         for key in TABLE:
-            assert_says(key, *LIMITS)
+            assert_commands(key, *LIMITS)
         change("z", LIMITS[0] * 0.9, LIMITS[1] * 0.9)
-        assert_says("u", LIMITS[0] * 0.9, LIMITS[1] * 0.9)
+        assert_commands("u", LIMITS[0] * 0.9, LIMITS[1] * 0.9)

@@ -26,6 +26,8 @@ from .motion import HeldUp
 from .operators import BOX, Operator
 from .played import FOCUS_OUT
 
+pytestmark = pytest.mark.alone
+
 TOGETHER = 4
 BOUND = 0.5 + 1 / 240  # s
 SLACK = 0.15  # s
@@ -45,7 +47,7 @@ class Way(NamedTuple):
 
 
 class Death(NamedTuple):
-    """`seconds` of the sim's clock until the robot stood; `held_up`: s for which sim and teleop waited meanwhile for a
+    """`seconds` of the sim's clock until the robot stood; `held_up`: s of that for which sim and teleop waited for a
     processor.
     """
 
@@ -161,7 +163,7 @@ def test_a_network_that_comes_back_moves_nothing_until_a_key_is_pressed_anew(ope
         operator.cut()
         end = operator.witness.rest_after(begin)
         wait_for(lambda: operator.witness.now() > end + 1.0)  # until both ends have given the session up
-        operator.mend()
+        operator.restore()
         wait_for(lambda: operator.witness.now() > end + 2.5)
         assert not operator.witness.moved_after(end)
         operator.let_go()

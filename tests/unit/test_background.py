@@ -1,4 +1,4 @@
-"""Work goes on in a thread, and who waits for it gets its result or its error, as often as they ask."""
+"""Work goes on in a thread, and each wait for it gets its result or its error."""
 
 import signal
 import threading
@@ -17,7 +17,7 @@ def test_work_goes_on_while_its_caller_does_something_else() -> None:
 
 
 @pytest.mark.parametrize("error", [ValueError("no"), SystemExit(3), KeyboardInterrupt()])
-def test_its_error_is_for_who_waits(error: BaseException) -> None:
+def test_its_error_is_raised_in_its_waiter(error: BaseException) -> None:
     def work() -> None:
         raise error
 
@@ -27,7 +27,7 @@ def test_its_error_is_for_who_waits(error: BaseException) -> None:
             result()
 
 
-def test_who_is_interrupted_while_waiting_may_wait_again() -> None:
+def test_an_interrupted_waiter_may_wait_again() -> None:
     go = threading.Event()
     result = background(lambda: go.wait(10))
     before = signal.signal(signal.SIGINT, signal.default_int_handler)  # other tests may have left theirs

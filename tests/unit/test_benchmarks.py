@@ -1,4 +1,4 @@
-"""The benchmarks run and tell their figures. How fast anything is depends on the machine, and is not tested."""
+"""The benchmarks run and print their figures. How fast anything is depends on the machine, and is not tested."""
 
 import json
 import subprocess
@@ -9,8 +9,8 @@ ROOT = Path(__file__).resolve().parents[2]
 CASES = {
     "cli": {
         "first line, odom at 500 Hz": ["holozen", "raw zenoh", "python alone", "ratio"],
-        "topic list -t": ["holozen", "python alone", "ratio"],
-        "topic info odom": ["holozen", "python alone", "ratio"],
+        "topic list -t": ["holozen", "raw zenoh", "python alone", "ratio"],
+        "topic info odom": ["holozen", "raw zenoh", "python alone", "ratio"],
         "echo odom at 1 kHz, work": ["holozen json", "zenoh cli json", "holozen text", "ratio"],
         **{f"decode Odometry, {wire}": ["holozen", "json loads", "ratio"] for wire in ("json", "msgpack", "cdr")},
     },
@@ -40,20 +40,20 @@ CASES = {
 
 
 def run(name: str, *words: str) -> str:
-    """What a quick run prints. It starts elsewhere, as somebody would who is not at the root of the tree."""
+    """What a quick run prints. It starts in another folder than the root of the tree."""
     command = [sys.executable, str(ROOT / "benchmarks" / f"{name}.py"), "--quick", *words]
     done = subprocess.run(command, cwd="/", capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
-def test_the_table_and_the_json_tell_every_side_of_every_case(tmp_path: Path) -> None:
+def test_the_table_and_the_json_show_every_side_of_every_case(tmp_path: Path) -> None:
     for name in CASES:
         words = ["--profile"] if name == "sim_loop" else []
         lines = run(name, *words, "--json", str(tmp_path / "figures.json")).splitlines()
         for case, sides in CASES[name].items():
-            told = [line for line in lines if line.startswith(f"{case}  ")]
-            assert [line.removeprefix(case).strip().partition("  ")[0] for line in told] == sides
+            reported = [line for line in lines if line.startswith(f"{case}  ")]
+            assert [line.removeprefix(case).strip().partition("  ")[0] for line in reported] == sides
         assert any(line.startswith("aim: ") for line in lines)
         found = json.loads((tmp_path / "figures.json").read_text())
         assert found["benchmark"] == name
@@ -69,7 +69,19 @@ def test_the_table_and_the_json_tell_every_side_of_every_case(tmp_path: Path) ->
                 assert 0 <= found["profile"][part] <= found["profile"]["all of it"]
 
 
-def test_the_one_beside_ros_1_says_what_it_needs() -> None:
+def test_fidelity_compares_each_drive_with_its_command(tmp_path: Path) -> None:
+    lines = run("fidelity", "--json", str(tmp_path / "figures.json")).splitlines()
+    found = json.loads((tmp_path / "figures.json").read_text())["cases"]
+    both = {(case["drive"], case["ground"]) for case in found}
+    assert both == {(drive, ground) for drive in ("omni", "planar_move") for ground in ("floor", "ramp")}
+    assert {case["motion"] for case in found} == {"straight", "strafe", "diagonal", "spin", "arc"}
+    assert all(case["error"] < (0.5 if case["ground"] == "floor" else 10) for case in found), "it drives as commanded"
+    for drive, ground in both:
+        assert any(line.startswith(f"{drive} ") and f" {ground} " in line for line in lines)
+        assert f"{drive} on the {ground}, arc, driven and commanded:" in lines
+
+
+def test_the_one_beside_ros_1_names_its_requirements() -> None:
     words = [sys.executable, str(ROOT / "benchmarks" / "ros1.py")]
     done = subprocess.run(words, env={"PATH": "", "PYTHONPATH": str(ROOT)}, capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout) == (2, "")

@@ -1,4 +1,4 @@
-"""What is told to people is one line that their terminal survives."""
+"""A report is one line that the terminal survives."""
 
 import re
 import subprocess
@@ -10,7 +10,7 @@ import pytest
 from holozen.console import KEPT, printable, report
 
 
-def test_a_line_is_told_on_standard_error(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_is_written_to_stderr(capsys: pytest.CaptureFixture[str]) -> None:
     report("sim: ready")
     assert capsys.readouterr() == ("", "sim: ready\n")
 
@@ -20,7 +20,7 @@ def test_what_came_over_the_wire_cannot_move_the_cursor_or_start_a_line() -> Non
     assert printable("grün ▶ 10 °") == "grün ▶ 10 °"
 
 
-def test_say_tells_only_what_is_printable(capsys: pytest.CaptureFixture[str]) -> None:
+def test_report_prints_only_what_is_printable(capsys: pytest.CaptureFixture[str]) -> None:
     report("one\ntwo")
     assert capsys.readouterr().err == "one?two\n"
 
@@ -34,7 +34,7 @@ def test_a_terminal_that_is_gone_is_no_failure(monkeypatch: pytest.MonkeyPatch) 
     report("anybody?")
 
 
-def test_what_nobody_reads_is_dropped_and_counted_when_the_reader_goes_on() -> None:
+def test_unread_samples_are_dropped_and_counted_when_the_reader_goes_on() -> None:
     code = (
         "import sys\nfrom holozen.console import KEPT, drain, report\n"
         "for number in range(2000):\n report(f'{number:099}')\n"

@@ -1,4 +1,4 @@
-"""Values of flags are checked, and refused in one line that says what is allowed."""
+"""Values of flags are checked, and refused in one line that names what is allowed."""
 
 import argparse
 from collections.abc import Callable
@@ -45,9 +45,10 @@ def test_a_robot_has_a_legal_name_or_none() -> None:
     assert "'*'" in refusal(flags.robot, "*")
 
 
-def test_a_package_is_a_name_and_a_folder() -> None:
-    assert flags.package("holo=some/where") == ("holo", Path("some/where"))
-    assert flags.package("holo=~/ws")[1] == Path.home() / "ws"
+def test_a_package_is_a_name_and_a_folder(tmp_path: Path) -> None:
+    assert flags.package(f"holo={tmp_path}") == ("holo", tmp_path)
+    assert flags.package("holo=~")[1] == Path.home()
+    assert "there is no folder" in refusal(flags.package, f"holo={tmp_path / 'none'}")
     for text in ("holo", "=x", "holo=", ""):
         assert "write NAME=DIR" in refusal(flags.package, text)
 

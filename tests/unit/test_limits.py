@@ -45,7 +45,7 @@ def test_the_largest_numbers_are_clamped_too(x: float, y: float, linear: float) 
     assert math.hypot(fast[0], fast[1]) <= linear * (1 + 1e-9)
 
 
-def test_a_ramp_takes_a_step_of_the_acceleration_towards_what_is_wanted() -> None:
+def test_a_ramp_takes_a_step_of_the_acceleration_towards_its_target() -> None:
     assert ramp((1, 0, 0), (1, 2, 3), linear=4, angular=1, dt=0.1) == pytest.approx((1, 0.4, 0.1))
     assert ramp((1, 0, 1), (0, 0, 0), linear=1, angular=2, dt=0.25) == pytest.approx((0.75, 0, 0.5))
 

@@ -38,7 +38,7 @@ def test_each_line_has_a_panel_while_there_is_room() -> None:
     assert len(lines) == 24
 
 
-def test_a_line_without_points_says_so() -> None:
+def test_a_path_without_points_is_reported() -> None:
     assert panels({"x": []}, 10.0, 10.0, (80, 24))[0] == "x: no messages"
 
 

@@ -52,7 +52,7 @@ def test_the_way_it_came_is_drawn() -> None:
     assert with_it.count(" ") < without.count(" ")
 
 
-def test_the_last_row_says_how_long_a_metre_is() -> None:
+def test_the_last_row_shows_the_scale() -> None:
     plane = Plane([Robot("", 0, 0, 0)], goals=[(10, 0)], note="robot x 0.00 y 0.00")
     caption = draw(plane, SIZE)[-1]
     bar, _, rest = caption.partition("| ")

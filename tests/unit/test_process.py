@@ -54,9 +54,9 @@ def ended(code: str, *words: str) -> tuple[int, str, str]:
     return done.returncode, done.stdout, done.stderr
 
 
-@pytest.mark.parametrize(("thread", "told"), [("daemon", "what was due\n"), ("kept", "a thread\nwhat was due\n")])
-def test_a_process_leaves_when_no_thread_keeps_it(thread: str, told: str) -> None:
-    assert ended(LEAVING, thread) == (3, told, "")
+@pytest.mark.parametrize(("thread", "expected"), [("daemon", "what was due\n"), ("kept", "a thread\nwhat was due\n")])
+def test_a_process_leaves_when_no_thread_keeps_it(thread: str, expected: str) -> None:
+    assert ended(LEAVING, thread) == (3, expected, "")
 
 
 def test_the_interpreter_is_not_finalized_once_zenoh_is_there() -> None:
@@ -70,10 +70,10 @@ def test_the_interpreter_is_not_finalized_once_zenoh_is_there() -> None:
     assert ended(f"{code}ending.leave(0)") == (0, "finalized\n", "")
 
 
-def test_an_exception_that_nobody_caught_is_exit_code_1() -> None:
-    code, out, told = ended("from holozen.process import Ending\nEnding()\nimport zenoh\nprint('out')\n1 / 0")
+def test_an_uncaught_exception_is_exit_code_1() -> None:
+    code, out, reported = ended("from holozen.process import Ending\nEnding()\nimport zenoh\nprint('out')\n1 / 0")
     assert (code, out) == (1, "out\n")
-    assert told.endswith("ZeroDivisionError: division by zero\n")
+    assert reported.endswith("ZeroDivisionError: division by zero\n")
 
 
 def test_an_interrupt_ends_the_wait_for_threads() -> None:

@@ -1,4 +1,4 @@
-"""The rule of tests/conftest.py: in CI a test that did not run is a failure, and elsewhere it says why."""
+"""The rule of tests/conftest.py: in CI a test that did not run is a failure, and elsewhere it gives the reason."""
 
 import os
 import subprocess
@@ -25,7 +25,7 @@ def test_needs_what_no_package_has(): pass
 @pytest.mark.parametrize(
     ("ci", "last"), [("true", "1 failed, 1 xfailed, 3 errors"), ("false", "3 skipped, 1 xfailed, 1 error")]
 )
-def test_a_skip_says_why_and_fails_in_ci(tmp_path: Path, ci: str, last: str) -> None:
+def test_a_skip_gives_its_reason_and_fails_in_ci(tmp_path: Path, ci: str, last: str) -> None:
     """Where no command can be found, and so none can be installed."""
     for name, text in {"conftest.py": CONFTEST.read_text(), **FILES}.items():
         (tmp_path / name).write_text(text)

@@ -1,12 +1,12 @@
-"""What a message says about a misspelt name, and how short it stays."""
+"""Suggestions for misspelt names, and how short they stay."""
 
 from holozen.suggest import cut, last_part, listed, suggest
 
 
 def test_a_hint_names_what_is_there() -> None:
-    assert suggest("whel", ["arm", "wheel"]) == "; did you mean 'wheel'?"
-    assert suggest("arm", ["wheel", "left_arm_link"]) == "; did you mean 'left_arm_link'?"
-    assert suggest("odo", ["cmd_vel", "ODOM"]) == "; did you mean 'ODOM'?"
+    assert suggest("whel", ["arm", "wheel"]) == " (did you mean 'wheel'?)"
+    assert suggest("arm", ["wheel", "left_arm_link"]) == " (did you mean 'left_arm_link'?)"
+    assert suggest("odo", ["cmd_vel", "ODOM"]) == " (did you mean 'ODOM'?)"
     assert suggest("zzz", ["wheel"]) == suggest("zzz", []) == suggest("", ["wheel"]) == ""
 
 
@@ -14,7 +14,7 @@ def test_a_package_makes_types_no_more_similar() -> None:
     known = ["geometry_msgs/msg/Twist", "geometry_msgs/msg/Pose"]
     assert suggest("geometry_msgs/msg/Foo", known) != ""
     assert suggest("geometry_msgs/msg/Foo", known, last_part) == ""
-    assert suggest("geometry_msgs/msg/Twsit", known, last_part) == "; did you mean 'geometry_msgs/msg/Twist'?"
+    assert suggest("geometry_msgs/msg/Twsit", known, last_part) == " (did you mean 'geometry_msgs/msg/Twist'?)"
 
 
 def test_messages_stay_short() -> None:

@@ -55,7 +55,7 @@ def test_a_row_is_found_with_and_without_a_robots_name() -> None:
 
 def test_commands_refuse_unknown_fields_and_telemetry_ignores_them() -> None:
     strict = {row.key for row in wire.TOPICS if wire.is_command(f"Fred/{row.key}", row.types)}
-    assert strict == {"cmd_vel", "joint_command"}
+    assert strict == {"cmd_vel", "joint_command", "gazebo_ros_force", "goal_pose"}
     assert wire.is_command("drive", (Twist,))  # a plugin may name the key of its commands
     assert not wire.is_command("ground_truth", (Odometry,))
 
@@ -70,7 +70,7 @@ def test_each_topic_has_a_type_an_end_and_a_rate_that_outruns_its_silence() -> N
         assert row.type is row.types[0]
         assert row.writers or row.readers
         assert not set(row.writers) & set(row.readers)
-        assert row.rate * row.silence > 2  # one lost message is no silence
+        assert row.rate * row.silence > 2 or row.rate == row.silence == 0  # one lost message is no silence
 
 
 def test_the_rules_name_their_own_numbers() -> None:

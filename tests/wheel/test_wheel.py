@@ -1,4 +1,4 @@
-"""The wheel in clean environments: everything is in it, under one name, and each verb runs or says why not.
+"""The wheel in clean environments: everything is in it, under one name, and each verb runs or reports why not.
 
 Nothing is downloaded: what the lock file already brought is lent to the new environments by path.
 """
@@ -129,7 +129,7 @@ def test_it_is_typed(full: Path) -> None:
     assert (package / "py.typed").exists()
 
 
-def test_help_and_version_are_told_without_any_extra(bare: Path) -> None:
+def test_help_and_version_work_without_any_extra(bare: Path) -> None:
     assert "usage: holozen VERB" in good(holozen(bare), "--help")
     assert good(holozen(bare), "--version") == f"{version('holozen')}\n"
 
@@ -137,19 +137,19 @@ def test_help_and_version_are_told_without_any_extra(bare: Path) -> None:
 HELP = """
 import contextlib, io
 from holozen.cli import VERBS, main
-told = {}
+helps = {}
 for verb in VERBS:
     with contextlib.redirect_stdout(io.StringIO()) as shown, contextlib.suppress(SystemExit):
         main([verb, "--help"])
-    told[verb] = shown.getvalue()
-print(json.dumps(told))
+    helps[verb] = shown.getvalue()
+print(json.dumps(helps))
 """
 
 
 def test_every_verb_has_help_without_any_extra(bare: Path) -> None:
-    told = answer(bare, HELP)
-    assert set(told) == set(VERBS)
-    assert [verb for verb, shown in told.items() if f"usage: holozen {verb}" not in shown and verb != "xacro"] == []
+    helps = answer(bare, HELP)
+    assert set(helps) == set(VERBS)
+    assert [verb for verb, shown in helps.items() if f"usage: holozen {verb}" not in shown and verb != "xacro"] == []
 
 
 def test_data_files_are_found_inside_the_package(full: Path) -> None:
@@ -173,7 +173,7 @@ def test_the_sim_starts_from_the_wheel_and_publishes_odom(full: Path, wire: Wire
         assert sim.err == "sim: hb_bot listens on cmd_vel\n"
 
 
-def test_the_sim_without_its_extra_says_which_one(bare: Path, wire: Wire) -> None:
+def test_the_sim_without_its_extra_names_it(bare: Path, wire: Wire) -> None:
     done = run(holozen(bare), "sim", *wire.flags)
     assert (done.returncode, done.stdout) == (1, "")
     advice = r"in the checkout of holozen, run: pip install '\.\[sim\]'"
@@ -187,7 +187,7 @@ def test_the_teleop_needs_no_extra(bare: Path, wire: Wire) -> None:
         assert terminal.process.wait(20) == 0
 
 
-def test_xacro_without_its_extra_says_what_to_install(bare: Path) -> None:
+def test_xacro_without_its_extra_names_what_to_install(bare: Path) -> None:
     (robot,) = bare.glob("lib/python*/site-packages/holozen/urdf/hb_bot.urdf.xacro")
     done = run(holozen(bare), "xacro", robot)
     assert (done.returncode, done.stdout) == (1, "")
@@ -204,7 +204,7 @@ def test_what_needs_no_extra_runs_without_any(bare: Path, wire: Wire) -> None:
     assert (reply["x_goal"], reply["end_of_list"]) == (0.0, 1)
 
 
-def test_yaml_without_its_library_says_what_to_install(bare: Path, wire: Wire) -> None:
+def test_yaml_without_its_library_names_what_to_install(bare: Path, wire: Wire) -> None:
     done = run(holozen(bare), "topic", "pub", "cmd_vel", "linear: {x: 1}", *wire.flags)
     assert (done.returncode, done.stdout) == (1, "")
     assert "pip install pyyaml" in done.stderr
@@ -216,5 +216,5 @@ def test_pytest_finds_the_fixtures_by_the_entry_point(full: Path, tmp_path: Path
     test.write_text(
         "def test_mine(wire, wait_for):\n    bus = wire.bus('me', lasting=True)\n    wait_for(bus.graph().endpoints)\n"
     )
-    told = good(full / "bin" / "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", test, cwd=tmp_path)
-    assert "1 passed" in told
+    helps = good(full / "bin" / "python", "-m", "pytest", "-q", "-p", "no:cacheprovider", test, cwd=tmp_path)
+    assert "1 passed" in helps

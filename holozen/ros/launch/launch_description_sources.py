@@ -6,7 +6,7 @@ from types import ModuleType
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Text, describe, here, text
 from holozen.ros.launch.launch_description import LaunchDescription
 from holozen.ros.launch.stand_ins import gazebo_launch_file
-from holozen.suggest import suggest
+from holozen.suggest import listed, suggest
 
 __all__ = ["AnyLaunchDescriptionSource", "FrontendLaunchDescriptionSource", "PythonLaunchDescriptionSource"]
 
@@ -43,8 +43,8 @@ def read(path: Path) -> LaunchDescription:
     """The description that a launch file generates. Raises LaunchError, and what the file raises."""
     if not path.is_file():
         folder = path.parent
-        files = sorted(each.name for each in folder.iterdir() if each.is_file()) if folder.is_dir() else []
-        hint = suggest(path.name, files) or (f"; files there: {', '.join(files[:20])}" if files else "")
+        files = sorted(each.name for each in folder.glob("*.launch.py") if each.is_file()) if folder.is_dir() else []
+        hint = suggest(path.name, files) or f"; launch files there: {listed(files, 20)}"
         raise LaunchError(f"no launch file {str(path)!r}{hint}")
     if path.suffix in (".xml", ".yaml", ".yml"):
         raise LaunchError(f"{path}: launch files in XML and YAML are not supported; Python only")

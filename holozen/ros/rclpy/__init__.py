@@ -50,7 +50,7 @@ def init(
 ) -> InitContextManager:
     """Initialize rclpy. `args` is the command line with its --ros-args, by default the process's own.
 
-    SIGINT and SIGTERM end the default context unless `signal_handler_options` says otherwise. Raises RuntimeError if it
+    SIGINT and SIGTERM end the default context unless `signal_handler_options` changes that. Raises RuntimeError if it
     was initialized before.
     """
     if signal_handler_options is None:

@@ -1,6 +1,6 @@
 """Context: from `init` to `shutdown`, with the signal handlers that end it.
 
-Whatever is open in a context is closed at its end, however that happens. `connection` says where the nodes of this
+Whatever is open in a context is closed at its end, however that happens. `connection` is how the nodes of this
 process meet the others.
 """
 
@@ -20,8 +20,8 @@ from typing import Any, Protocol, Self
 from holozen.console import give_up_readers
 from holozen.ros.rclpy import arguments
 from holozen.ros.rclpy.exceptions import RCLError
-from holozen.ros.rclpy.logging import get_logger, set_logger_level, silence
-from holozen.transport.connection import Connection
+from holozen.ros.rclpy.logging import set_logger_level, silence
+from holozen.transport.connection import LAST_DOMAIN, Connection
 
 __all__ = [
     "Context", "ExternalShutdownException", "SignalHandlerOptions", "get_current_signal_handlers_options",
@@ -63,6 +63,7 @@ class Context:
         self.arguments = arguments.Arguments()
         self._lock = threading.RLock()
         self._running = self._over = False
+        self._domain_id: int | None = None
         self._interrupted = 0.0  # when a signal arrived
         self._callbacks: list[weakref.ref[Any] | Callable[[], object]] = []
         self._open: list[Closable] = []
@@ -81,8 +82,11 @@ class Context:
     ) -> None:
         """Start it. `args` is the command line with its --ros-args, by default the process's own.
 
-        Raises RuntimeError if it was started before. A `domain_id` has no effect: Zenoh's flags separate systems.
+        Its nodes are in the domain `domain_id`, by default that of `--domain` or ROS_DOMAIN_ID. Raises RuntimeError if
+        it was started before, or for a domain that does not exist.
         """
+        if domain_id is not None and not 0 <= domain_id <= LAST_DOMAIN:
+            raise RuntimeError(f"domain_id={domain_id}: use a number from 0 to {LAST_DOMAIN}")
         with self._lock:
             if self._running or self._over:
                 raise RuntimeError("Context.init() must only be called once; call rclpy.shutdown() before the next one")
@@ -95,17 +99,20 @@ class Context:
                 silence()
             for name, level in self.arguments.levels:
                 set_logger_level(name, level)
-        if domain_id:
-            text = f"domain_id={domain_id} has no effect here; use Zenoh's --connect and --listen, or namespaces"
-            get_logger("rclpy").warning(text)
+        self._domain_id = domain_id
 
     def ok(self) -> bool:
         """Whether it was initialized and not shut down."""
         return self._running
 
     def get_domain_id(self) -> int:
-        """ROS's domain; always 0."""
-        return 0
+        """The domain of its nodes."""
+        return self.connection.domain
+
+    @property
+    def connection(self) -> Connection:
+        """How its nodes connect to others."""
+        return connection if self._domain_id is None else connection.replace(domain=self._domain_id)
 
     def shutdown(self) -> None:
         """End it. Raises RuntimeError if it was not initialized, or was shut down by anything but a signal."""

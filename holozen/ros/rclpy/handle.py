@@ -4,7 +4,6 @@ import threading
 
 from holozen.bus import Bus
 from holozen.ros.catalog import HelpfulAttributes
-from holozen.ros.rclpy import context as contexts
 from holozen.ros.rclpy import names
 from holozen.ros.rclpy.arguments import Arguments
 from holozen.ros.rclpy.context import Context
@@ -27,7 +26,7 @@ class NodeHandle:
         self.namespace = arguments.namespace(names.check_namespace(namespace), node_name)
         self.full_name = names.join(self.namespace, self.name)
         self.logger = get_logger(names.key(self.full_name).replace("/", "."))
-        self.bus = Bus(names.key(self.full_name), contexts.connection, lasting=True)
+        self.bus = Bus(names.key(self.full_name), context.connection, lasting=True)
         self.is_closed = False
         self._graph: Graph | None = None
         self._graph_lock = threading.Lock()

@@ -17,7 +17,7 @@ DEEPEST = 1000  # frames from one to the root
 
 
 class TransformException(Exception):
-    """A transform is not available. The message says why."""
+    """A transform is not available. The message gives the reason."""
 
 
 class LookupException(TransformException):

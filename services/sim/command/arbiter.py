@@ -1,4 +1,7 @@
-"""Who drives: the highest Zenoh priority among the fresh commands. No clock, no socket."""
+"""Which source drives: the highest Zenoh priority among the fresh commands, unless the software stop is set.
+
+No clock, no socket.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -7,15 +10,85 @@ from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
 
-from .motion import JointMotion, Motion, is_stop
-from .software_stop import STOPPED, SoftwareStop
+from .motion import Motion, Push, Pushes, is_stop
+from .time import ROUNDING, CommandTime
 
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # no source ranks above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here down, a source waits for `resume` once a higher one has driven
 MAX_HELD = 100  # names of each rank, since they come over the wire; beyond, the whole rank is held but its driver
+MAX_SOURCES = 100  # names of each rank, since they come over the wire; those beyond share one entry
+NEVER = 1e9  # s
+STOPPED = "stopped: by {by}; `holozen release` lets it drive again"
+LET_GO = "let go first: it commanded while the robot was stopped; send a stop{or_wait}"
 LATE = "late: it waited up to {age:.1f} s for the sim"
 OVERRULED = "overruled: {driver} drives"
 HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
+
+
+class SoftwareStop:
+    """Refuses every command while it is set.
+
+    Releasing it moves nothing (as ISO 13850 asks of an emergency stop): a source that commanded during
+    the stop drives again only after it has let go: it sent a stop, or was silent for the robot's watchdog timeout, at
+    least 0.5 s. Where the watchdog is off (a `timeout` below zero), only a stop counts. A source without a record is
+    assumed to have commanded at the moment of the stop.
+    """
+
+    def __init__(self, timeout: float) -> None:
+        self.setter = ""  # the node that set it; empty while it is not set
+        self.set_timeout(timeout)
+        self._last_moves: dict[int, dict[str, float]] = {}  # rank -> source -> time of its last motion
+        self._stopped = -math.inf  # when it was set: any source may have commanded until then
+        self._others: dict[int, float] = {}  # rank -> the same for all sources beyond MAX_SOURCES
+
+    def set_timeout(self, timeout: float) -> None:
+        """Set the timeout of the watchdog."""
+        self._silence = max(timeout, COMMAND_SILENCE) if timeout >= 0 else NEVER
+
+    def set(self, by: str, driver: tuple[str, int] | None, now: float) -> None:
+        """Stop at `now`, while `driver`, a source and its rank, moves the robot. The first setter remains."""
+        if not self.setter:
+            self._last_moves = {
+                rank: {source: time for source, time in sources.items() if self.must_let_go(source, rank, now)}
+                for rank, sources in self._last_moves.items()
+            }
+            self._stopped = now
+        if driver:
+            self._note(*driver, now)
+        self.setter = self.setter or by or "an unknown caller"
+
+    def release(self) -> None:
+        """Let sources that have let go drive again."""
+        self.setter = ""
+
+    def refusal(self, source: str, rank: int, stops: bool, now: float) -> str:
+        """Why a command is refused at `now`, or ""; `stops`: whether it is a stop."""
+        waits = self.must_let_go(source, rank, now)
+        if self.setter or waits:
+            self._note(source, rank, -math.inf if stops else now)
+        if self.setter:
+            return STOPPED.format(by=self.setter)
+        or_wait = f" or be silent for {self._silence:g} s" if self._silence < NEVER else ""
+        return LET_GO.format(or_wait=or_wait) if waits and not stops else ""
+
+    def must_let_go(self, source: str, rank: int, now: float) -> bool:
+        """Whether a source still has to let go before it may drive."""
+        sources = self._last_moves.get(rank, {})
+        if source in sources:
+            return now - sources[source] <= self._silence + ROUNDING
+        return now - max(self._stopped, self._others.get(rank, -math.inf)) <= COMMAND_SILENCE + ROUNDING
+
+    def inherit(self, other: "SoftwareStop") -> None:
+        """Copy the state of another one."""
+        self.setter, self._stopped, self._others = other.setter, other._stopped, dict(other._others)
+        self._last_moves = {rank: dict(sources) for rank, sources in other._last_moves.items()}
+
+    def _note(self, source: str, rank: int, when: float) -> None:
+        sources = self._last_moves.setdefault(rank, {})
+        if source in sources or len(sources) < MAX_SOURCES:
+            sources[source] = when
+        else:
+            self._others[rank] = max(self._others.get(rank, -math.inf), when)
 
 
 @dataclass(slots=True)
@@ -63,10 +136,11 @@ class Arbiter:
     overruled, or that another one stopped, is held: it moves the robot again only after `resume`. So is every
     autopilot once a source above it drove. A source is a name with a rank, since senders choose their names freely.
     After `timeout` seconds of silence a source no longer drives; below zero it drives until another one commands. The
-    `software_stop` overrides all of them.
+    `software_stop` overrides all of them. Silence is measured by `time`; all methods take the real time.
     """
 
-    def __init__(self, timeout: float) -> None:
+    def __init__(self, timeout: float, time: CommandTime | None = None) -> None:
+        self.time = time or CommandTime()
         self.timeout, self.software_stop = timeout, SoftwareStop(timeout)
         self.resumed = 0  # how often `resume` succeeded
         self.due = -math.inf  # s; `motion` stays as it was last asked for until then, or until an event sets this back
@@ -76,20 +150,21 @@ class Arbiter:
 
     def offer(self, source: str, rank: int, motion: Motion, now: float, sent: float | None = None) -> str:
         """Consider a command at time `now`, sent at `sent` at the earliest. Returns why it is refused, or ""."""
-        sent = now if sent is None else sent
+        age, now = 0.0 if sent is None else now - sent, self.time.at(now)
         if reason := self.software_stop.refusal(source, max(rank, PERSON), is_stop(motion), now):
             return reason
-        if now - sent > COMMAND_SILENCE and not is_stop(motion):
-            return LATE.format(age=now - sent)
+        if age > COMMAND_SILENCE and not is_stop(motion):
+            return LATE.format(age=age)
+        sent = now if self.time.is_held else now - age  # while nothing moves, it does not grow old
         return self._choose(Driver(source, max(rank, PERSON), motion, sent), now)
 
     def note_refused(self, source: str, rank: int, now: float) -> None:
         """Note a command that was refused before it got here: its source has not let go of a stopped robot."""
-        self.software_stop.refusal(source, max(rank, PERSON), False, now)
+        self.software_stop.refusal(source, max(rank, PERSON), False, self.time.at(now))
 
     def _choose(self, new: Driver, now: float) -> str:
         source, rank, motion = new.source, new.rank, new.motion
-        driver = self.driver(now)
+        driver = self._driver_at(now)
         other = driver if driver and (driver.source, driver.rank) != (source, rank) else None
         stops = is_stop(motion) and driver is not None and rank <= driver.rank
         if other and rank >= other.rank and not stops and now - other.sent <= COMMAND_SILENCE:
@@ -112,8 +187,11 @@ class Arbiter:
 
     def driver(self, now: float) -> Driver | None:
         """The source that drives at `now`; None when all are silent."""
+        return self._driver_at(self.time.at(now))
+
+    def _driver_at(self, time: float) -> Driver | None:
         driver = self._driver
-        return None if driver is None or 0 <= self._patience(driver) < now - driver.sent else driver
+        return None if driver is None or 0 <= self._patience(driver) < time - driver.sent - self.time.slack else driver
 
     def moves(self, source: str, now: float) -> bool:
         """Whether a source moves the robot at `now`."""
@@ -127,12 +205,33 @@ class Arbiter:
         if driver is None:
             return STOP
         if (patience := self._patience(driver)) >= 0:
-            self.due = driver.sent + patience
+            self.due = self.time.real(driver.sent + patience)
         return driver.motion
+
+    def pushes(self, now: float) -> list[Push] | None:
+        """The forces at `now`, each until it has been silent for too long; None when no source drives."""
+        motion = self.motion(now)
+        if not isinstance(motion, Pushes):
+            return None
+        return list(motion.since(self.time.at(now) - self.time.slack - COMMAND_SILENCE))
+
+    def pushes_of(self, source: str, rank: int, now: float) -> Pushes:
+        """What a source pushes with at `now`."""
+        driver = self.driver(now)
+        is_driver = driver is not None and (driver.source, driver.rank) == (source, max(rank, PERSON))
+        return driver.motion if driver and is_driver and isinstance(driver.motion, Pushes) else Pushes(())
 
     def _patience(self, driver: Driver) -> float:
         """The silence in s after which a driver no longer drives; below zero: never."""
-        return COMMAND_SILENCE if isinstance(driver.motion, JointMotion) else self.timeout
+        return self.timeout if isinstance(driver.motion, tuple) else COMMAND_SILENCE
+
+    def start_anew(self, lasting: bool = True) -> None:
+        """Forget the driver, so that only a new command moves the robot; of drivers whose silence never ends, only if
+        `lasting`. Held sources and the software stop remain.
+        """
+        self.due = -math.inf
+        if self._driver and (lasting or self._patience(self._driver) >= 0):
+            self._drive(None)
 
     def _drive(self, driver: Driver | None) -> None:
         self._driver, self.due = driver, -math.inf
@@ -141,22 +240,23 @@ class Arbiter:
         """Set the software stop: no source drives until it is released, and no autopilot before `resume`."""
         driver = self.driver(now)
         moving = (driver.source, driver.rank) if driver and not is_stop(driver.motion) else None
-        self.software_stop.set(by, moving, now)
+        self.software_stop.set(by, moving, self.time.at(now))
         self._drive(None)
         self._highest = PERSON
 
-    def forget(self, source: str) -> None:
+    def forget(self, source: str, of_members: bool = False) -> None:
         """Stop the robot if this source drove: its process is gone.
 
-        It counts as a stop sent with its last command, so that no other source takes over any sooner.
+        It counts as a stop sent with its last command, so that no other source takes over any sooner. `of_members`: the
+        sources of commands have the name of a member before that of their node, as in the secure set-up.
         """
-        if self._driver and self._driver.source == source:
+        if self._driver and source == (self._driver.source.partition("/")[2] if of_members else self._driver.source):
             self._drive(replace(self._driver, motion=STOP))
 
     def holds(self, source: str, rank: int, now: float) -> bool:
         """Whether a source has to wait for `resume`, or has to let go, before it may drive."""
         rank = max(rank, PERSON)
-        return self._is_held(source, rank) or self.software_stop.must_let_go(source, rank, now)
+        return self._is_held(source, rank) or self.software_stop.must_let_go(source, rank, self.time.at(now))
 
     @property
     def held(self) -> bool:

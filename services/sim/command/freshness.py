@@ -1,6 +1,6 @@
 """How old a command is, and whether its sender is still alive. No clock, no socket.
 
-The time of arrival does not tell the age: TCP delivers buffered data seconds later, even for a process that has died.
+The time of arrival does not show the age: TCP delivers buffered data seconds later, even for a process that has died.
 """
 
 from __future__ import annotations
@@ -38,8 +38,10 @@ class Senders(Protocol):
         """Whether the session holds a liveliness token."""
         ...
 
-    def ages(self, session: str, sent: float, now: float) -> tuple[float, float] | None:
-        """Bounds of the age of a sample that it sent at `sent`, by its own clock; None while they are unknown."""
+    def ages(self, session: str, sent: float, now: float, member: str) -> tuple[float, float] | None:
+        """Bounds of the age of a sample that it sent at `sent`, by its own clock; None while they are unknown, or in
+        the secure set-up if the session is not of that member.
+        """
         ...
 
     def track_first(self, session: str, now: float) -> None:
@@ -56,7 +58,7 @@ class Senders(Protocol):
 
 
 class Sender(NamedTuple):
-    """Whose commands are in one order: a session, or what a sender without a stamp calls itself."""
+    """What orders commands: a session, or the name of a sender without a stamp."""
 
     session: str
     priority: str
@@ -111,22 +113,23 @@ class Freshness(Generic[M]):
         arrived = list(arrived)
         if self._waiting:
             yield from self._waited(now)
-        newest = {_sender(received): index for index, received in enumerate(arrived)}
-        for index, received in enumerate(arrived):
+        senders = [*map(_sender, arrived)]
+        newest = {sender: index for index, sender in enumerate(senders)}
+        for index, (received, sender) in enumerate(zip(arrived, senders, strict=True)):
             stamp = received.sample.stamp
-            if received.message is None or received.sample.key not in self._keys:
+            if received.message is None or sender.key not in self._keys:
                 yield Judged(received, since, 0.0, "")  # the next look refuses it
             elif self._stops(received.message):
-                self._waiting.pop(_sender(received), None)  # earlier commands are void
+                self._waiting.pop(sender, None)  # earlier commands are void
                 if stamp and self._ages(stamp, now):
-                    self._note(stamp, received)
+                    self._note(stamp, sender)
                 yield Judged(received, now if stamp else since, 0.0, "")
             elif stamp:
-                if judged := self._judge(received, stamp, now, now):
+                if judged := self._judge(received, stamp, sender, now, now):
                     yield judged
             elif any(map(self._senders.has, self._sessions(received.sample.source))):
                 yield Judged(received, since, 0.0, UNSTAMPED)
-            elif newest[_sender(received)] == index:
+            elif newest[sender] == index:
                 yield Judged(received, since, 0.0, "")
 
     def is_session(self, source: str, session: str) -> bool:
@@ -141,23 +144,22 @@ class Freshness(Generic[M]):
 
     def _ages(self, stamp: Stamp, now: float) -> tuple[float, float] | None:
         there = self._senders.has(stamp.session)
-        return self._senders.ages(stamp.session, stamp.sent, now) if there else None
+        return self._senders.ages(stamp.session, stamp.sent, now, stamp.member) if there else None
 
     def _waited(self, now: float) -> Iterator[Judged[M]]:
         waiting, self._waiting = self._waiting, {}
-        for received, came in waiting.values():
+        for sender, (received, came) in waiting.items():
             stamp = received.sample.stamp
-            if stamp and (judged := self._judge(received, stamp, came, now)):
+            if stamp and (judged := self._judge(received, stamp, sender, came, now)):
                 yield judged
 
-    def _judge(self, received: Received[M], stamp: Stamp, came: float, now: float) -> Judged[M] | None:
+    def _judge(self, received: Received[M], stamp: Stamp, sender: Sender, came: float, now: float) -> Judged[M] | None:
         """Judge a command that moves the robot; None while it waits for its sender's clock."""
-        session, sender = stamp.session, _sender(received)
-        ages = self._ages(stamp, now)
+        session, ages = stamp.session, self._ages(stamp, now)
         if ages is None:
-            return self._wait(received, stamp, came, now)
+            return self._wait(received, stamp, sender, came, now)
         before = self._newest.get(sender, (-math.inf, -1))
-        self._note(stamp, received)
+        self._note(stamp, sender)
         youngest, oldest = ages
         sent = now - oldest
         # The time counts first: a forged number lasts for the session's life, a forged time only until it has come.
@@ -174,8 +176,8 @@ class Freshness(Generic[M]):
             return Judged(received, sent, oldest, OLD.format(age=oldest, limit=self.max_age))
         return Judged(received, sent, oldest, "")
 
-    def _wait(self, received: Received[M], stamp: Stamp, came: float, now: float) -> Judged[M] | None:
-        sender, there = _sender(received), self._senders.has(stamp.session)
+    def _wait(self, received: Received[M], stamp: Stamp, sender: Sender, came: float, now: float) -> Judged[M] | None:
+        there = self._senders.has(stamp.session)
         if sender in self._waiting:
             came = min(came, self._waiting[sender][1])
         if now - came > COMMAND_SILENCE or (sender not in self._waiting and len(self._waiting) >= MAX_WAITING):
@@ -186,8 +188,7 @@ class Freshness(Generic[M]):
         self._waiting[sender] = (received, came)
         return None
 
-    def _note(self, stamp: Stamp, received: Received[M]) -> None:
-        sender = _sender(received)
+    def _note(self, stamp: Stamp, sender: Sender) -> None:
         _put(self._newest, sender, max((stamp.sent, stamp.number), self._newest.get(sender, (-math.inf, -1))))
 
 

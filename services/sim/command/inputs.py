@@ -1,4 +1,4 @@
-"""Commands on one robot's cmd_vel and joint_command: checked, limited, counted, and passed to the arbiters."""
+"""Commands on one robot's cmd_vel, joint_command and forces: checked, limited, counted, and passed to the arbiters."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable
 from typing import TypeVar
 
 from holozen.console import report
-from holozen.limits import Planar, clamp_speed
-from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped
+from holozen.limits import STOP, Planar, clamp_speed
+from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped, Wrench
 from holozen.messages.message import not_finite
 from holozen.suggest import listed
 from holozen.transport.pubsub import Received
@@ -18,7 +18,7 @@ from holozen.wire import MAX_STAMP_AGE, implausible
 
 from .arbiter import Arbiter
 from .freshness import Freshness, Judged, Senders, source_of
-from .motion import JointMotion, is_stop, motion_of
+from .motion import JointMotion, Push, Pushes, is_stop, motion_of
 
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
@@ -30,21 +30,26 @@ MARK = 0.1  # s between two samples of a count
 REPORT_EVERY = 1.0  # s
 M = TypeVar("M", bound=Message)
 
+UNPROVEN = "unproven"  # the kind of a refused command whose sender's name is not proved
+
 
 class TwistInput:
     """Checks commands and passes the valid ones to the arbiter.
 
-    Reports name the robot by `key`, its cmd_vel; `others` are additional command keys.
+    Reports name the robot by `key`, its cmd_vel; `others` are additional command keys. `refusal` says why none but a
+    stop can move the robot, if that is so.
     """
 
     def __init__(
         self, key: str, arbiter: Arbiter, senders: Senders, linear: float, angular: float,
-        report: Callable[[str], None] = report, others: tuple[str, ...] = (),
+        report: Callable[[str], None] = report, others: tuple[str, ...] = (), refusal: str = "",
     ) -> None:  # fmt: skip
         self.arbiter, self.stats, self._rates = arbiter, CommandStats(report), SourceRates()
         self.freshness: Freshness[Twist | TwistStamped] = Freshness((key, *others), senders, _stops, arbiter.moves)
-        self.keys, self.linear, self.angular = (key, *others), linear, angular
-        self.has_news = False  # whether a source came that no status has named yet
+        self.keys, self.linear, self.angular, self._refusal = (key, *others), linear, angular, refusal
+        # Whether a source came that no status has named yet, or any command in a sim that is held: its stepper waits
+        # for its command to be read.
+        self.has_news = False
 
     def take(
         self, arrived: Iterable[Received[Twist | TwistStamped]], now: float, clocks: tuple[float, ...], since: float
@@ -59,11 +64,14 @@ class TwistInput:
     def _take(self, judged: Judged[Twist | TwistStamped], now: float, clocks: tuple[float, ...]) -> None:
         received, sent, delay, refusal = judged
         rank, source = PRIORITIES.index(received.sample.priority), source_of(received)
-        self.has_news |= self._rates.record(source, rank, now, delay)
+        if not received.error.startswith(UNPROVEN):  # its source is a claim
+            self.has_news |= self._rates.record(source, rank, now, delay) or self.arbiter.time.is_held
         message = self.stats.validated(received, self.keys, now)
         if message is None:
             return None
         velocity = _velocity(message)
+        if not is_stop(velocity):
+            refusal = refusal or self._refusal
         if refusal:
             self.arbiter.note_refused(source, rank, now)
             return self._refuse(refusal.partition(":")[0], refusal, source, now)
@@ -80,7 +88,11 @@ class TwistInput:
         self.has_news = False
         driver, held = self.arbiter.driver(now), self.arbiter.holds
         obeyed = driver.source if driver else ""
+        motion = (
+            driver.motion if driver and isinstance(driver.motion, tuple) else STOP
+        )  # that of joints has no velocity
         return CommandStatus(
+            commanded=Twist.planar(*motion),
             obeyed=obeyed,
             priority=PRIORITIES[driver.rank] if driver else "",
             held=self.arbiter.held,
@@ -188,6 +200,45 @@ def _joints_stop(message: JointState) -> bool:
         return True  # it moves nothing, and is refused later
 
 
+class ForceInput:
+    """Checks the wrenches on a robot's `keys` and passes them to the arbiter, where one source gives all of them."""
+
+    def __init__(self, keys: tuple[str, ...], arbiter: Arbiter, senders: Senders, stats: CommandStats) -> None:
+        self.keys, self._arbiter, self._stats = keys, arbiter, stats
+        self.freshness: Freshness[Wrench] = Freshness(keys, senders, _pushes_nothing, arbiter.moves)
+
+    def take(self, arrived: Iterable[Received[Wrench]], now: float, since: float) -> None:
+        """Process the samples that arrived by `now` (s, monotonic), not before `since`, and those that waited."""
+        for judged in self.freshness.sift(arrived, now, since):
+            self._take(judged, now)
+
+    def _take(self, judged: Judged[Wrench], now: float) -> None:
+        received, sent, _, refusal = judged
+        message, source = self._stats.validated(received, self.keys, now), source_of(received)
+        if message is None:
+            return
+        key, rank, arbiter = received.sample.key, PRIORITIES.index(received.sample.priority), self._arbiter
+        if refusal:
+            arbiter.note_refused(source, rank, now)
+        else:
+            others = arbiter.pushes_of(source, rank, now).but(key)
+            push = Push(key, _wrench(message), arbiter.time.at(now) - (0.0 if arbiter.time.is_held else now - sent))
+            refusal = arbiter.offer(source, rank, Pushes(tuple(sorted((*others, push)))), now, sent)
+        if refusal:
+            self._stats.refuse(key, refusal.partition(":")[0], refusal, source, now)
+        else:
+            self._stats.accepted += 1
+
+
+def _wrench(message: Wrench) -> tuple[float, float, float, float, float, float]:
+    force, torque = message.force, message.torque
+    return force.x, force.y, force.z, torque.x, torque.y, torque.z
+
+
+def _pushes_nothing(message: Wrench) -> bool:
+    return not any(_wrench(message))
+
+
 class SourceRate:
     """One source: its rank, the time of its last command, and their number."""
 
@@ -270,7 +321,8 @@ def _fault(received: Received[M], keys: tuple[str, ...]) -> tuple[str, str]:
     if sample.key not in keys:
         return "wildcard", f"a command for {sample.key!r}; name one robot"
     if message is None:
-        return "oversized" if received.error.startswith("oversized") else "malformed", received.error
+        kind = received.error.partition(":")[0]
+        return kind if kind in ("oversized", UNPROVEN) else "malformed", received.error
     if bad := not_finite(message):
         return "not finite", f"{bad} is not a finite number"
     if bad := implausible(message):

@@ -1,6 +1,8 @@
-"""Commanded motions: a planar velocity, or values for joints."""
+"""Commanded motions: a planar velocity, values for joints, or forces."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from holozen.limits import STOP, Planar
 from holozen.messages import JointState
@@ -24,16 +26,46 @@ class JointMotion:
         return JointMotion(self.kind, values) if values else None
 
 
-Motion = Planar | JointMotion
+class Push(NamedTuple):
+    """The wrench of one topic, sent at `sent` (s) at the earliest: x, y, z of the force in N, then of the torque in
+    N m.
+    """
+
+    key: str
+    wrench: tuple[float, float, float, float, float, float]
+    sent: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pushes:
+    """The wrenches of one source, one for each topic."""
+
+    pushes: tuple[Push, ...]
+
+    @property
+    def stops(self) -> bool:
+        """Whether it pushes nothing."""
+        return not any(any(push.wrench) for push in self.pushes)
+
+    def since(self, time: float) -> Iterator[Push]:
+        """Those sent since `time` (s)."""
+        return (push for push in self.pushes if push.sent >= time)
+
+    def but(self, key: str) -> tuple[Push, ...]:
+        """Those of all topics but one."""
+        return tuple(push for push in self.pushes if push.key != key)
+
+
+Motion = Planar | JointMotion | Pushes
 
 
 def is_stop(motion: Motion) -> bool:
     """Whether it commands the robot to stand."""
-    return motion.stops if isinstance(motion, JointMotion) else motion == STOP
+    return motion == STOP if isinstance(motion, tuple) else motion.stops
 
 
 def motion_of(command: JointState) -> JointMotion:
-    """The motion of a command. Raises ValueError, which says what is wrong."""
+    """The motion of a command. Raises ValueError with the reason."""
     given = {"position": command.position, "velocity": command.velocity, "effort": command.effort}
     kinds = [kind for kind, values in given.items() if values]
     if len(kinds) != 1:

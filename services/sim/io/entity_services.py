@@ -4,26 +4,42 @@ import re
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from holozen.bus import Bus
 from holozen.console import report
-from holozen.messages import Header, Point, Pose, Quaternion, Time, Twist, Vector3
+from holozen.messages import (
+    GetSceneReply,
+    GetSceneRequest,
+    Header,
+    Point,
+    Pose,
+    Quaternion,
+    RobotDescriptionReply,
+    RobotDescriptionRequest,
+    SceneEntity,
+    Time,
+    Twist,
+    Vector3,
+)
 from holozen.messages import simulation_interfaces as si
 from holozen.messages.message import not_finite
-from holozen.robot.elements import read_xml, repair_xml
+from holozen.robot.description import written
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
-from holozen.transport.graph import on_key
+from holozen.robot.xacro import uses_xacro
 from holozen.transport.services import answer_in_turn
+from holozen.wire import key_for
 
-from ..entities import Entities, EntityError, Place, checked_place
+from ..entities import Entities, Entity, EntityError, Place, checked_place
 from ..physics.engine import Rotation, Vector
+from ..robot import command_key
+from ..shard import Share
 
 MAX_SPEED = 100.0  # m/s and rad/s, of a state to set
 MAX_SPAWNS = 64  # waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
-PEER_CHECK = 50  # polls, about a second, after which all other nodes are known
 REUSED = (
     2.0  # s that a model serves all requests with the same text, as of a fleet; then its meshes are looked for anew
 )
@@ -31,8 +47,6 @@ MAX_WARNINGS = 20  # about a robot's text in a reply
 MAX_TAGS = 20_000  # "<" in a text; parsing more of them would stall the steps
 WORLD = ("", "world", "odom", "map")  # frames that mean the world
 _OK = si.Result(si.Result.OK)
-# The namespace alone may remain after an expansion.
-_XACRO = re.compile(r"<xacro:|\$\{|\$\((?:find|arg|env|optenv|eval|cwd|dirname|anon)\b")
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,53 +61,67 @@ class Parsed:
 class EntityServices:
     """Answers requests about entities. `packages` are those of `--package`: the only folders whose meshes are read.
 
-    Of several sims on one wire only the first `spawns`; each answers for its own entities.
+    Of several sims on one wire only the first `spawns`, or each shard its `share`; each answers for its own entities.
     """
 
-    def __init__(self, bus: Bus, entities: Entities, packages: Mapping[str, Path], spawns: bool = True) -> None:
-        self._entities, self._packages = entities, packages
-        self._bus, self._graph, self._polls, self._spawns = bus, bus.graph(), 0, spawns
+    def __init__(
+        self,
+        bus: Bus,
+        entities: Entities,
+        packages: Mapping[str, Path],
+        spawns: bool = True,
+        share: Share | None = None,
+    ) -> None:
+        self._entities, self._packages, self._share = entities, packages, share
         self._last: Parsed | None = None
-        serve = bus.serve
+        serve = partial(bus.serve, shared=share is not None)
         self._servers = [
             serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
             serve("get_entities", si.GetEntitiesRequest, si.GetEntitiesReply, self.names),
             serve("get_entity_state", si.GetEntityStateRequest, si.GetEntityStateReply, self.state),
             serve("set_entity_state", si.SetEntityStateRequest, si.SetEntityStateReply, self.put),
         ]
+        self._servers.append(serve("get_scene", GetSceneRequest, GetSceneReply, self.scene))
+        # From a thread of its own: a text with large meshes takes longer than a step.
+        serve("robot_description", RobotDescriptionRequest, RobotDescriptionReply, self.description).start()
         if spawns:
             self._servers.append(
-                serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self.spawn, MAX_SPAWNS)
+                serve("spawn_entity", si.SpawnEntityRequest, si.SpawnEntityReply, self.spawn, room=MAX_SPAWNS)
             )
 
     def answer(self) -> bool:
         """Answer waiting requests for a short time: many at once must not stall the steps. Returns whether more may
         wait.
         """
-        more = answer_in_turn(self._servers)
-        self._polls += 1
-        if self._spawns and self._polls == PEER_CHECK:
-            self._report_other_sims()
-        return more
-
-    def _report_other_sims(self) -> None:
-        others = on_key(self._graph.endpoints(), "spawn_entity", "srv")
-        if any(other.session != self._bus.id for other in others):
-            report("sim: another sim answers spawn_entity too; robots are spawned in either of them: end one")
+        return answer_in_turn(self._servers)
 
     def spawn(self, request: si.SpawnEntityRequest) -> si.SpawnEntityReply:
         """Add a robot or object to the world."""
+        if request.name:
+            self._check_share(request.name)
         model = self._read(request)
         name = request.name or model.name
+        self._check_share(name)
         if request.allow_renaming or not request.name:
-            name = self._entities.free_name(name)
+            name = self._entities.free_name(name, self._share.mine.owns if self._share else None)
         place = _place(request.initial_pose.header, request.initial_pose.pose)
         namespace = request.entity_namespace  # a slash alone is the root
         entity = self._entities.add(name, model, place, namespace.strip("/") if namespace else None)
         for warning in model.warnings:
-            report(f"sim: {name}: {warning}")
+            report(f"sim: warning: {name}: {warning}")
         report(f"sim: {name} was added to the world")
         return si.SpawnEntityReply(si.Result(si.Result.OK, _warned(model.warnings)), entity.name)
+
+    def _named(self, name: str) -> Entity:
+        """An entity of this sim. Objects of the world file are in each shard, all else only in its own."""
+        if not self._entities.has(name):
+            self._check_share(name)
+        return self._entities.named(name)
+
+    def _check_share(self, name: str) -> None:
+        """Raise Elsewhere if the entity with this name is another shard's, EntityError if that does not run."""
+        if self._share and (problem := self._share.refusal(name)):
+            raise EntityError(si.Result.OPERATION_FAILED, problem)
 
     def _read(self, request: si.SpawnEntityRequest) -> RobotModel:
         """The robot of a request. No expression in it is evaluated, and only files of known packages are opened."""
@@ -108,7 +136,7 @@ class EntityServices:
         if text.count("<") > MAX_TAGS:
             problem = f"resource_string has more than {MAX_TAGS // 2} elements; a robot may have no more"
             raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, problem)
-        if _XACRO.search(text) and _is_xacro(text):
+        if uses_xacro(text):
             raise EntityError(
                 si.SpawnEntityReply.UNSUPPORTED_FORMAT,
                 "resource_string is xacro; expand it first: `holozen xacro FILE`",
@@ -122,6 +150,7 @@ class EntityServices:
 
     def delete(self, request: si.DeleteEntityRequest) -> si.DeleteEntityReply:
         """Remove an entity."""
+        self._named(request.entity)
         self._entities.remove(request.entity)
         report(f"sim: {request.entity} was removed from the world")
         return si.DeleteEntityReply(_OK)
@@ -138,7 +167,7 @@ class EntityServices:
 
     def state(self, request: si.GetEntityStateRequest) -> si.GetEntityStateReply:
         """The pose and velocity of an entity in the world."""
-        body = self._entities.named(request.entity).body
+        body = self._named(request.entity).body
         position, rotation = body.pose()
         linear, angular = body.twist()
         header = Header(Time.of(self._entities.time), "world")
@@ -147,10 +176,20 @@ class EntityServices:
         )
         return si.GetEntityStateReply(_OK, state=state)
 
+    def scene(self, _request: GetSceneRequest) -> GetSceneReply:
+        """All entities, their keys and poses."""
+        return GetSceneReply([_seen(entity) for entity in self._entities])
+
+    def description(self, request: RobotDescriptionRequest) -> RobotDescriptionReply:
+        """The URDF of an entity."""
+        entity = self._named(request.name)
+        joints = entity.robot.joint_names if entity.robot else []
+        return RobotDescriptionReply(written(entity.model), entity.number, joints)
+
     def put(self, request: si.SetEntityStateRequest) -> si.SetEntityStateReply:
         """Set the pose and velocity of an entity."""
-        entity, state = self._entities.named(request.entity), request.state
-        position, rotation = _place(state.header, state.pose)
+        entity, state = self._named(request.entity), request.state
+        place = _place(state.header, state.pose)
         linear, angular = _vector(state.twist.linear), _vector(state.twist.angular)
         if not_finite(state.twist) or max(map(abs, (*linear, *angular))) > MAX_SPEED:
             raise EntityError(
@@ -158,21 +197,21 @@ class EntityServices:
             )
         if entity.model.static and any((*linear, *angular)):
             raise EntityError(si.Result.OPERATION_FAILED, f"{request.entity!r} is static; its velocity cannot be set")
-        entity.body.put(position, rotation, linear, angular)
+        self._entities.put(entity.name, place, linear, angular)
         return si.SetEntityStateReply(_OK)
 
 
-def _is_xacro(text: str) -> bool:
-    """Whether any element uses xacro; comments do not count, and broken XML is another error."""
-    try:
-        root = read_xml(repair_xml(text)[0], "resource_string")
-    except RobotError:
-        return False
-    tags = [root]
-    for tag in tags:
-        tags += tag.children
-    words = (f"<{tag.name} {' '.join(tag.attributes.values())} {tag.text}" for tag in tags)
-    return any(_XACRO.search(word) for word in words)
+def _seen(entity: Entity) -> SceneEntity:
+    position, rotation = entity.body.pose()
+    drive = entity.model.drive if entity.robot else None
+    return SceneEntity(
+        entity.name,
+        entity.number,
+        command_key(entity.model, entity.prefix) if entity.robot else "",
+        key_for(drive.odometry_topic, entity.prefix) if drive else "",
+        Pose(Point(*position), Quaternion(*rotation)),
+        entity.robot.joint_positions if entity.robot else [],
+    )
 
 
 def _warned(warnings: tuple[str, ...]) -> str:

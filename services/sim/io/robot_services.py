@@ -1,15 +1,18 @@
 """The services of one robot: stop, release, resume."""
 
 from collections.abc import Callable
+from functools import partial
+from typing import Any
 
 from holozen.bus import Bus
 from holozen.console import report
 from holozen.messages import TriggerReply, TriggerRequest
 from holozen.transport.errors import ServiceError
-from holozen.transport.services import RING
+from holozen.transport.services import RING, Server
 from holozen.wire import key_for
 
 from ..command.arbiter import Arbiter
+from .wait_set import Moment, Reader
 
 MAX_REQUESTS = 16  # of one service answered per poll; a flood of them must not stall the steps
 RELEASED = (
@@ -19,13 +22,13 @@ RELEASED = (
 
 
 class RobotServices:
-    """Serves them in the namespace of the key `command`, for all `arbiters` alike. `changed` is called before a stop or
-    a release is confirmed.
+    """Serves them in the namespace of the key `command`, for all `arbiters` alike. `changed` is called with the
+    time, in s, before a stop or a release is confirmed.
     """
 
     VERBS = ("release", "resume", "stop")
 
-    def __init__(self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[], None]) -> None:
+    def __init__(self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[float], None]) -> None:
         self._arbiters, self._changed = arbiters, changed
         answers = (self._on_release, self._on_resume, self._on_stop)
         self._namespace = namespace = command.rpartition("/")[0]
@@ -33,14 +36,20 @@ class RobotServices:
             bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer)
             for verb, answer in zip(self.VERBS, answers, strict=True)
         )
-        self._in_order = (self._stop, self._release, self._resume)
+        in_order = (self._stop, self._release, self._resume)
+        readers = [Reader(server.listen, partial(self._read, server)) for server in in_order]
+        self.stop, self.others = readers[:1], readers[1:]
         self._now = 0.0
 
-    def answer(self, now: float) -> None:
-        """Answer the requests that wait at `now` (s)."""
-        self._now = now
-        if not sum(server.take_in() for server in self._in_order):  # nearly always
-            return
+    def _read(self, server: Server, request: Any, moment: Moment) -> bool:
+        """Answer `request`, the first of `server`, and those that wait at any of them; returns whether more do."""
+        self._now = moment.now
+        if request is not None:
+            server.keep(request)
+        self._answer()
+        return any(server.is_waiting for server in self._servers)
+
+    def _answer(self) -> None:
         if self._stop.take_in():  # a stop wins over requests that wait with it
             for server in (self._release, self._resume):
                 server.take_in(RING)  # now: a release that is sent once the stop is confirmed counts
@@ -83,4 +92,4 @@ class RobotServices:
 
     def _report_change(self, what: str) -> None:
         report(f"sim: {self._namespace or 'the robot'} {what}")
-        self._changed()
+        self._changed(self._now)

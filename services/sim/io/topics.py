@@ -2,6 +2,8 @@
 
 import math
 from collections.abc import Mapping
+from functools import lru_cache, partial
+from random import Random
 from typing import Any
 
 from holozen.bus import Bus
@@ -23,17 +25,20 @@ from holozen.messages import (
     TwistStamped,
     TwistWithCovariance,
     Vector3,
+    Wrench,
 )
-from holozen.robot.model import Drive, Mecanum, RobotModel
+from holozen.robot.model import Drive, Mecanum, Omni, RobotModel
 from holozen.robot.model import Planar as PlanarDrive
-from holozen.robot.rigid import Frame
-from holozen.rotation import XYZ, XYZW, from_axis_angle, multiply
+from holozen.robot.rigid import FLEETS, Frame, moved_by
+from holozen.rotation import XYZ, XYZW, conjugate, from_axis_angle, multiply, rotate
 from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
-from ..command.inputs import JointInput, TwistInput
-from ..command.motion import JointMotion
+from ..command.inputs import ForceInput, JointInput, TwistInput
+from ..command.motion import JointMotion, Pushes
+from ..physics.jointed import JointStates
 from ..physics.movers import Limited, Moved
+from .wait_set import Moment, Reader
 
 JOINT_RATE = 50.0  # Hz of sim time
 
@@ -48,6 +53,7 @@ class JointTopics:
         self._input, self._tf, self.names = twist_input, tf, names
         self._frames = JointFrames(model, key_for("", prefix))
         self._commands = bus.subscribe(twist_input.key, JointState, limit=MAX_COMMAND_BYTES)
+        self.readers = [Reader(self._commands.raw.listen, self._read)]
         self._states: Publisher[JointState] = bus.publisher(key_for("joint_states", place), JointState)
 
     @property
@@ -55,22 +61,21 @@ class JointTopics:
         """The key of joint commands."""
         return self._input.key
 
-    def read_commands(self, now: float, since: float) -> None:
-        """Process the commands that wait at `now` and came after `since`, in seconds."""
-        arrived = self._commands.waiting(self._commands.raw.listen())
-        if arrived or self._input.freshness.is_waiting:
-            self._input.take(arrived, now, since)
+    def _read(self, first: Any, moment: Moment) -> bool:
+        """Process the commands that wait, after the sample `first`; returns whether any waits for a clock."""
+        self._input.take(self._commands.waiting(first), moment.now, moment.since)
+        return self._input.freshness.is_waiting
 
     @property
     def wanted(self) -> bool:
         """Whether anyone wants what `publish` sends."""
         return self._states.wanted or self._tf.wanted
 
-    def publish(self, stamp: Time, states: tuple[list[float], list[float]]) -> None:
-        """Publish the joints' positions and rates, and the transforms of the links, to who wants them."""
-        positions, rates = states
+    def publish(self, stamp: Time, states: JointStates) -> None:
+        """Publish the joints' positions, rates and efforts, and the transforms of the links, if anyone wants them."""
+        positions, rates, efforts = states
         if self._states.wanted:
-            self._states.put(JointState(Header(stamp), self.names, positions, rates))
+            self._states.put(JointState(Header(stamp), self.names, positions, rates, efforts))
         if self._tf.wanted:
             transforms = self._frames.transforms(stamp, dict(zip(self.names, positions, strict=True)))
             self._tf.put(TFMessage(transforms))
@@ -79,6 +84,25 @@ class JointTopics:
         """Close the keys."""
         self._commands.close()
         self._states.close()
+
+
+class ForceTopics:
+    """The keys of a robot's forces."""
+
+    def __init__(self, bus: Bus, force_input: ForceInput) -> None:
+        self._input = force_input
+        self._commands = [bus.subscribe(key, Wrench, limit=MAX_COMMAND_BYTES) for key in force_input.keys]
+        self.readers = [Reader(commands.raw.listen, partial(self._read, commands)) for commands in self._commands]
+
+    def _read(self, commands: Subscription[Wrench], first: Any, moment: Moment) -> bool:
+        """Process those `commands` that wait, after the sample `first`; returns whether any waits for a clock."""
+        self._input.take(commands.waiting(first), moment.now, moment.since)
+        return self._input.freshness.is_waiting
+
+    def close(self) -> None:
+        """Close the keys."""
+        for commands in self._commands:
+            commands.close()
 
 
 UNKNOWN = 1e12  # m^2, rad^2; Gazebo's variance of what planar_move does not control
@@ -98,9 +122,9 @@ class Schedule:
         self.rate, self._count = rate, -1
 
     def due(self, time: float) -> bool:
-        """Whether a new period has begun since the last call."""
+        """Whether a new period has begun since the last call, or the clock was set back."""
         count = int(time * self.rate + self._phase + 1e-6)
-        began = count > self._count
+        began = count != self._count
         self._count = count
         return began
 
@@ -133,25 +157,35 @@ def transform(header: Header, child: str, position: XYZ, rotation: XYZW) -> Tran
 
 
 class JointFrames:
-    """The transforms of all links to their parents. `prefix` goes before each frame's name."""
+    """The transforms of all links, and of sensors with a frame of their own, to their parents. `prefix` goes before the
+    name of each frame.
+    """
 
     def __init__(self, model: RobotModel, prefix: str) -> None:
-        self._joints = [
-            (joint.name, f"{prefix}{joint.parent}", f"{prefix}{joint.child}", joint.axis, Frame.of(joint.pose))
-            for joint in model.joints.values()
-        ]
-        self._at = [(frame.xyz, frame.quaternion) for *_, frame in self._joints]
-
-    def transforms(self, stamp: Time, angles: Mapping[str, float]) -> list[TransformStamped]:
-        """The transforms at the joint `angles` (rad); a joint that is not given is at zero."""
-        return [
-            transform(
-                Header(stamp, parent), child, xyz, multiply(rotation, from_axis_angle(axis, angles.get(name, 0.0)))
-            )
-            for (name, parent, child, axis, _), (xyz, rotation) in zip(self._joints, self._at, strict=True)
+        self._joints = [(joint, f"{prefix}{joint.parent}", f"{prefix}{joint.child}") for joint in model.joints.values()]
+        self._at = _places(model)
+        mounts = {one.frame: (one.link, Frame.of(one.mount)) for one in model.sensors if one.mount}
+        self._mounts: list[Any] = [
+            (f"{prefix}{link}", f"{prefix}{frame}", at.xyz, at.quaternion) for frame, (link, at) in mounts.items()
         ]
 
+    def transforms(self, stamp: Time, positions: Mapping[str, float]) -> list[TransformStamped]:
+        """The transforms at the joint `positions` (rad; m of a prismatic joint); one that is not given is at zero."""
+        links = [
+            transform(Header(stamp, parent), child, *moved_by(joint, xyz, rotation, positions.get(joint.name, 0.0)))
+            for (joint, parent, child), (xyz, rotation) in zip(self._joints, self._at, strict=True)
+        ]
+        return links + [transform(Header(stamp, parent), *at) for parent, *at in self._mounts]
 
+
+@lru_cache(FLEETS)
+def _places(model: RobotModel) -> list[tuple[XYZ, XYZW]]:
+    """Position and rotation of each joint in its parent link."""
+    frames = [Frame.of(joint.pose) for joint in model.joints.values()]
+    return [(frame.xyz, frame.quaternion) for frame in frames]
+
+
+NONE = (False, False)
 STATUS_RATE = 10.0  # Hz of real time: people read it
 
 
@@ -161,33 +195,30 @@ class DriveTopics:
     def __init__(
         self, bus: Bus, prefix: str, name: str, drive: Drive, twist_input: TwistInput, tf: Publisher[TFMessage]
     ) -> None:
-        self._name, self._strafes = name, isinstance(drive.mechanism, PlanarDrive | Mecanum)
+        self._name, self._strafes = name, isinstance(drive.mechanism, PlanarDrive | Mecanum | Omni)
         self._drive, self._input, self._tf = drive, twist_input, tf
-        self._frames = key_for("", prefix)
+        frames = key_for("", prefix)
+        self._frame, self._base = f"{frames}{drive.odometry_frame}", f"{frames}{drive.robot_base_frame}"
         self._variances = covariance(drive)
-        self._limited = Limited(drive)
         command = twist_input.keys[0]
         self._commands: list[Subscription[Twist | TwistStamped]] = [
             bus.subscribe(key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES) for key in twist_input.keys
         ]
-        self.listen = self._commands[0].raw.listen  # a cheap look whether any command waits
-        self.is_waiting = len(self._commands) > 1  # whether to read, though nothing came on the first key
+        self.readers = [Reader(commands.raw.listen, partial(self._read, commands)) for commands in self._commands]
         self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, prefix), Odometry)
         self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
         self._status_due = Schedule(STATUS_RATE)
         self.status_at = -math.inf  # s from when on a status is due
 
-    def read_commands(self, first: Any, now: float, clocks: tuple[float, ...], since: float) -> None:
-        """Process the commands that wait at `now` and came after `since`, after the sample `first` that `listen`
-        returned. `clocks`: the times that stamps may be measured by. All in seconds.
+    def _read(self, commands: Subscription[Twist | TwistStamped], first: Any, moment: Moment) -> bool:
+        """Process those `commands` that wait, after the sample `first`; returns whether any waits for its sender's
+        clock.
         """
-        arrived = [received for commands in self._commands for received in commands.waiting(commands.raw.listen())]
-        if first is not None:
-            arrived = self._commands[0].waiting(first) + arrived
-        self._input.take(arrived, now, clocks, since)
+        now, since, clocks = moment
+        self._input.take(commands.waiting(first), now, clocks, since)
         if self._input.has_news:
             self.status_at = now
-        self.is_waiting = self._input.freshness.is_waiting or len(self._commands) > 1
+        return self._input.freshness.is_waiting
 
     def publish_status(self, now: float, at_once: bool = False) -> None:
         """Publish the command status, when it is due or names a new source, and is wanted, or `at_once`."""
@@ -200,32 +231,50 @@ class DriveTopics:
         self.status_at = self._status_due.next
 
     @property
-    def wanted(self) -> bool:
-        """Whether anyone wants what `publish` sends."""
-        return (self._drive.publish_odom and self._odom.wanted) or (self._drive.publish_odom_tf and self._tf.wanted)
+    def wanted(self) -> tuple[bool, bool]:
+        """Whether anyone wants odometry, and whether its transform."""
+        drive = self._drive
+        return drive.publish_odom and self._odom.wanted, drive.publish_odom_tf and self._tf.wanted
 
-    @property
-    def is_steady(self) -> bool:
-        """Whether `motion` remains the same while the command does."""
-        return self._limited.is_reached
+    def start_anew(self, moved: Moved) -> None:
+        """Forget its speed: its body is a new one, which stands as `moved` says."""
+        self._limited, self._start = Limited(self._drive), moved[:2]
 
     def motion(self, now: float, dt: float) -> Planar | JointMotion:
         """The commanded motion of the next step of `dt` seconds, within the limits of its file."""
         motion = self._input.arbiter.motion(now)
+        assert not isinstance(motion, Pushes), "forces are another arbiter's where a drive is"
         if isinstance(motion, JointMotion):
             self._limited(STOP, dt)
             return motion
-        return self._limited(motion, dt)
+        motion = self._limited(motion, dt)
+        if not self._limited.is_reached:
+            self._input.arbiter.due = -math.inf  # it goes on to change at the next step
+        return motion
 
-    def publish(self, stamp: Time, moved: Moved) -> None:
-        """Publish odometry to who wants it."""
-        position, rotation, velocity = moved
-        header = Header(stamp, f"{self._frames}{self._drive.odometry_frame}")
-        base = f"{self._frames}{self._drive.robot_base_frame}"
-        if self._drive.publish_odom and self._odom.wanted:
-            self._odom.put(odometry(header, base, position, rotation, velocity, self._variances))
-        if self._drive.publish_odom_tf and self._tf.wanted:
-            self._tf.put(TFMessage([transform(header, base, position, rotation)]))
+    def publish(self, stamp: Time, moved: Moved, wanted: tuple[bool, bool]) -> None:
+        """Publish odometry and its transform, where `wanted`."""
+        position, rotation, velocity = self._measured(stamp, moved)
+        header = Header(stamp, self._frame)
+        if wanted[0]:
+            self._odom.put(odometry(header, self._base, position, rotation, velocity, self._variances))
+        if wanted[1]:
+            self._tf.put(TFMessage([transform(header, self._base, position, rotation)]))
+
+    def _measured(self, stamp: Time, moved: Moved) -> Moved:
+        """The pose since the start and with noise, as the file says. The noise of a time is the same whoever reads, and
+        however often.
+        """
+        ((x, y, z), rotation, velocity), noise = moved, self._drive.odometry_noise
+        if self._drive.odometry_from_start:
+            (x0, y0, z0), back = self._start[0], conjugate(self._start[1])
+            (x, y, z), rotation = rotate(back, (x - x0, y - y0, z - z0)), multiply(back, rotation)
+        if noise:
+            random = Random(f"{self._name} {stamp.sec} {stamp.nanosec}")
+            dx, dy, turn, vx, vy, rate = (random.gauss(0.0, noise) for _ in range(6))
+            x, y, rotation = x + dx, y + dy, multiply(from_axis_angle((0.0, 0.0, 1.0), turn), rotation)
+            velocity = velocity[0] + vx, velocity[1] + vy, velocity[2] + rate
+        return (x, y, z), rotation, velocity
 
     def close(self) -> None:
         """Close the keys."""

@@ -13,11 +13,11 @@ from holozen.robot.rotation import Array
 from holozen.rotation import rotate
 from holozen.rotation import yaw as yaw_of
 
+from .dynamics import GRAVITY
 from .engine import Rotation, Vector
-from .jointed import JointedBody
+from .jointed import JointedBody, JointStates
 from .wheels import forward_sign, radius_of
 
-GRAVITY = 9.8  # m/s^2
 LEAN, LEAN_RATE, SPEED, DISTANCE, EFFORT = 0.2, 1.0, 0.1, 0.1, 0.1
 """The largest acceptable deviations in rad, rad/s, m/s, m and N m; the weights are their inverse squares (Bryson)."""
 
@@ -145,7 +145,7 @@ class BalanceMover:
         self._behind = 0.0  # rad of heading error
         self._rest()
         for name in self._sides:
-            body.release(name, friction=0.0)  # the plugin takes it away, whatever the file says
+            body.release(name, friction=0.0)  # the plugin takes it away, whatever the file has
 
     def move(self, velocity: Planar, dt: float) -> None:
         """Drive the wheels for the next step. It cannot move sideways."""
@@ -193,8 +193,8 @@ class BalanceMover:
         """The true pose."""
         return *self.body.pose(), self.body.planar()
 
-    def states(self) -> tuple[list[float], list[float]]:
-        """Positions and rates of the joints."""
+    def states(self) -> JointStates:
+        """The states of the joints."""
         return self.body.states()
 
     def _push(self, left: float, right: float) -> None:

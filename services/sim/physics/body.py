@@ -12,18 +12,20 @@ from .engine import NOTHING, Rotation, Vector, bullet
 class Body:
     """A multibody of the engine, by its root frame; the engine itself uses the centre of mass.
 
-    `weightless` is the mass in kg, by the engine's number of a link (-1: the base), that gravity does not pull.
+    `number` is the engine's. `weightless` is the mass in kg, by the engine's number of a link (-1: the base), that
+    gravity does not pull.
     """
 
     def __init__(
         self, world: int, number: int, centre: Vector, axes: Rotation, weightless: Mapping[int, float] = {}
     ) -> None:
-        self._world, self._body = world, number
+        self._world, self._body, self.number = world, number, number
         self.weightless = {link: mass for link, mass in weightless.items() if mass > 0}
         self.is_removed = False
-        self.glides = False  # whether it goes on as it was told, without being told again at each step
+        self.glides = False  # whether it keeps the velocity that was set, without being set again at each step
         self._centre = centre
         self._axes = axes
+        self._links = range(-1, bullet.getNumJoints(number, world))
         self._tilted = max(map(abs, axes[:3])) > 1e-9  # principal axes that are not the root's
         self._axes_back: Rotation = bullet.invertTransform((0, 0, 0), axes)[1]
 
@@ -43,6 +45,15 @@ class Body:
         (vx, vy, _), (_, _, turn) = self.twist()
         x, y = to_body(vx, vy, yaw(self.pose()[1]))
         return x, y, turn
+
+    def box(self) -> tuple[Vector, Vector]:
+        """The corners of the box around it in the engine, along the axes of the world."""
+        if len(self._links) == 1:
+            box: tuple[Vector, Vector] = bullet.getAABB(self._body, -1, self._world)
+            return box
+        boxes = [bullet.getAABB(self._body, link, self._world) for link in self._links]
+        low, high = (zip(*corners, strict=True) for corners in zip(*boxes, strict=True))
+        return tuple(map(min, low)), tuple(map(max, high))
 
     def put(self, position: Vector, rotation: Rotation, linear: Vector, angular: Vector) -> None:
         """Place the root frame in the world, with its velocity and rotation rate there."""

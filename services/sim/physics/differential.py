@@ -7,8 +7,8 @@ from holozen.robot.model import Differential, RobotModel
 from holozen.robot.rigid import joint_axes
 
 from .engine import Rotation, Vector
-from .jointed import JointedBody
-from .wheels import forward_sign, radius_of
+from .jointed import JointedBody, JointStates
+from .wheels import Odometer, forward_sign, radius_of
 
 SLACK = 0.1  # m/s by which a rim may lag behind its command
 
@@ -37,7 +37,7 @@ class WheelMover:
 
     def _ramped(self, wanted: tuple[float, float], most: float) -> tuple[float, float]:
         """The speeds of both sides' rims for the next step, in which they change by no more than `most`, in m/s. A stop
-        is immediate, whatever the file says.
+        is immediate, whatever the file has.
         """
         if math.isinf(most) or not any(wanted):
             return wanted
@@ -50,41 +50,24 @@ class WheelMover:
         """The true pose, or the one from wheel encoders if the file asks for that."""
         if not self._mechanism.encoder:
             return *self.body.pose(), self.body.planar()
-        positions, rates = self.body.states()
+        positions, rates, _ = self.body.states()
         angles, speeds = dict(zip(self.names, positions, strict=True)), dict(zip(self.names, rates, strict=True))
-        position, rotation = self._odometer.update(*self._sides(angles), self._separation)
-        left, right = self._sides(speeds)
-        return position, rotation, ((left + right) / 2, 0.0, (right - left) / self._separation)
+        position, rotation = self._odometer.update(self._planar(*self._sides(angles)))
+        return position, rotation, self._planar(*self._sides(speeds))
 
-    def states(self) -> tuple[list[float], list[float]]:
-        """Positions and rates of the joints."""
+    def states(self) -> JointStates:
+        """The states of the joints."""
         return self.body.states()
+
+    def _planar(self, left: float, right: float) -> Planar:
+        """The motion of the base, from those of its sides."""
+        return (left + right) / 2, 0.0, (right - left) / self._separation
 
     def _sides(self, values: dict[str, float]) -> tuple[float, float]:
         """The mean distance (m) or speed (m/s) of the left and of the right wheels."""
         sides = (self._mechanism.left, self._mechanism.right)
         left, right = (sum(self._signs[name] * values[name] for name in names) / len(names) for names in sides)
         return left * self._radius, right * self._radius
-
-
-class Odometer:
-    """Planar odometry from the distances of two sides, on exact arcs. It starts at zero."""
-
-    def __init__(self) -> None:
-        self._x = self._y = self._yaw = 0.0
-        self._seen = (0.0, 0.0)
-
-    def update(self, left: float, right: float, separation: float) -> tuple[Vector, Rotation]:
-        """The pose after the sides have rolled `left` and `right` metres in total."""
-        dl, dr = left - self._seen[0], right - self._seen[1]
-        self._seen = (left, right)
-        turn, way = (dr - dl) / separation, (dl + dr) / 2
-        # The chord of an arc of length `way`: rotated by half the turn, and shorter.
-        chord = way * (math.sin(turn / 2) / (turn / 2) if turn else 1.0)
-        self._x += chord * math.cos(self._yaw + turn / 2)
-        self._y += chord * math.sin(self._yaw + turn / 2)
-        self._yaw += turn
-        return (self._x, self._y, 0.0), (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
 
 
 def separation_of(model: RobotModel, mechanism: Differential) -> float:

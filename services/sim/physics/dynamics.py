@@ -4,17 +4,18 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
+from holozen.robot.model import GRAVITY as GRAVITY_VECTOR
 from holozen.robot.model import Surface
 from holozen.robot.rigid import Part
-from holozen.rotation import rotate
+from holozen.rotation import conjugate, rotate
 
 from .engine import Vector, bullet
 
 FRICTION = 1.0  # Gazebo's default for mu and mu2
 DRAG = 0.1  # friction of a caster whose file sets none; with more it chatters and lifts the wheels
 MAX_FRICTION = 10.0  # the engine multiplies the two surfaces'; students write 100 where they mean "does not slip"
-SIDEWAYS = 0.2  # share of it along the axles of a skid-steer, unless its file says otherwise
-GRAVITY = 9.8  # m/s^2
+SIDEWAYS = 0.2  # share of it along the axles of a skid-steer, unless its file sets it
+GRAVITY = -GRAVITY_VECTOR[2]  # m/s^2
 GENTLE = 4.0  # steps in which a contact resolves penetration, at the fastest
 SINK = 2e-4  # m that a skid-steer's tyres yield under its weight, so that all of them carry it
 RECOVERY = 0.1  # s; time constant of their rebound
@@ -34,17 +35,19 @@ def set_joint(world: int, body: int, number: int, part: Part, damping: float) ->
 
 
 def set_surface(
-    world: int, body: int, links: Iterable[int], part: Part, dt: float, load: float = 0.0, drags: bool = False
-) -> None:
+    world: int, body: int, links: Iterable[int], part: Part, dt: float, load: float = 0.0, drags: bool = False,
+    rolls: bool = False,
+) -> None:  # fmt: skip
     """Set the contact parameters of a part's shapes, those of `links`, for steps of `dt` seconds. `load` in N is the
     weight on a wheel that has to slide along its axle, else 0. `drags`: the part is a caster, or the chassis, of a
-    robot that wheels drive.
+    robot that wheels drive. `rolls`: rollers on the part's rim take the motion along its axle.
     """
     mu, across = _friction(part.surface, load > 0, DRAG if drags else FRICTION)
+    across = 0.0 if rolls else across
     settings: dict[str, Any] = {"lateralFriction": min(mu, MAX_FRICTION)}
     if part.joint and mu and across < mu:
         # The axle keeps its direction while the wheel turns, so the link's own axes suffice.
-        turns = [abs(component) for component in part.joint.axis]
+        turns = [abs(component) for component in rotate(conjugate(part.body.axes), part.joint.axis)]
         axle = turns.index(max(turns))
         settings["anisotropicFriction"] = [across / mu if index == axle else 1.0 for index in range(3)]
     if part.surface.kp and part.surface.kd:

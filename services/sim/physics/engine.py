@@ -1,13 +1,11 @@
 """pybullet, loaded without its greeting, and collision shapes that are made once and shared.
 
-Only this folder imports pybullet. Metres, kilograms, seconds; quaternions are x, y, z, w.
+Of the sim only this folder imports pybullet. Metres, kilograms, seconds; quaternions are x, y, z, w.
 """
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import Any
 
+from holozen.process import quiet
 from holozen.robot.rigid import PlacedShape
 from holozen.rotation import rotate
 
@@ -21,20 +19,7 @@ MAX_IN_ONE = 16  # pybullet's MAX_COMPOUND_COLLISION_SHAPES; it silently drops t
 NOTHING = -1  # pybullet's shape that touches nothing
 
 
-@contextmanager
-def _quiet() -> Iterator[None]:
-    """pybullet prints its build time from C while it loads; no flag stops it."""
-    saved, null = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    os.dup2(null, 2)
-    try:
-        yield
-    finally:
-        os.dup2(saved, 2)
-        os.close(saved)
-        os.close(null)
-
-
-with _quiet():
+with quiet():  # it prints its build time from C while it loads; no flag stops it
     import pybullet as bullet
 
 KINDS = {"box": bullet.GEOM_BOX, "cylinder": bullet.GEOM_CYLINDER, "sphere": bullet.GEOM_SPHERE}

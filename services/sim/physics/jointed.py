@@ -3,10 +3,11 @@
 import math
 
 from holozen.limits import clamp
-from holozen.robot.model import Joint
-from holozen.robot.rigid import Part
+from holozen.robot.model import Force, Joint, Pose, RobotModel
+from holozen.robot.rigid import Frame, Part, in_parts
+from holozen.rotation import multiply, rotate
 
-from ..command.motion import JointMotion
+from ..command.motion import JointMotion, Push
 from .body import Body, Links
 from .dynamics import damping_of, load_on, set_joint, set_surface
 from .engine import NOTHING, UPRIGHT, Rotation, Shapes, Vector, bullet
@@ -16,14 +17,17 @@ MAX_EFFORT = 1e3  # N m or N, of a joint without an effort limit
 MAX_RATE = 1e3  # rad/s or m/s
 CLOSING = 0.1  # s; time constant of a joint that moves to a position
 FOLLOWING = 0.02  # s; the same for a joint that mimics another
-MAX_JOINTS = 120  # pybullet silently stops at 127
+
+
+JointStates = tuple[list[float], list[float], list[float]]
+"""Positions, rates and efforts: rad, rad/s, N m or m, m/s, N."""
 
 
 class JointedBody(Body):
     """The parts of `assemble`, the root's first. Joints are called by their names; rad, rad/s, N m or m, m/s, N.
 
     `wheels` names the joints of the wheels that drive it. More than two have to slide along their axles, and other
-    parts slide on the ground too, unless the file sets their friction.
+    parts slide on the ground too, unless the file sets their friction. `omni` wheels have none along their axles.
     """
 
     def __init__(
@@ -35,6 +39,7 @@ class JointedBody(Body):
         rotation: Rotation = UPRIGHT,
         wheels: frozenset[str] = frozenset(),
         static: bool = False,
+        omni: bool = False,
     ) -> None:
         root, links = parts[0].body, Links(shapes.unseen)
         first, carrying = _link(links, shapes, parts)
@@ -55,11 +60,14 @@ class JointedBody(Body):
         super().__init__(world, number, root.centre, root.axes, {} if static else floating)
         self._dt: float = bullet.getPhysicsEngineParameters(world)["fixedTimeStep"]
         self._joints: dict[str, tuple[int, Joint]] = {}
+        self._numbers_of_parts = [numbers[own] for own, *_ in carrying]
+        self._efforts: dict[int, float] = {}  # what `push` applies, by the engine's number of the joint
         load = load_on(parts, len(wheels)) if len(wheels) > 2 else 0.0
         for index, (part, (own, *more)) in enumerate(zip(parts, carrying, strict=True)):
             drives = part.joint is not None and part.joint.name in wheels
             touching = [numbers[link] for link in (own, *more)]
-            set_surface(world, number, touching, part, self._dt, load if drives else 0.0, bool(wheels) and not drives)
+            weight, drags, rolls = load if drives else 0.0, bool(wheels) and not drives, omni and drives
+            set_surface(world, number, touching, part, self._dt, weight, drags, rolls)
             if part.joint or not static:
                 set_joint(world, number, numbers[own], part, damping_of(parts, index, self._dt))
             if part.joint:
@@ -76,10 +84,30 @@ class JointedBody(Body):
         for name in self.names:
             self.release(name)
 
-    def states(self) -> tuple[list[float], list[float]]:
-        """Positions and rates of the joints, in the order of `names`."""
+    def states(self) -> JointStates:
+        """The states of the joints, in the order of `names`. The effort is that of motor and friction."""
         states = bullet.getJointStates(self._body, self._numbers, self._world) if self._numbers else ()
-        return [state[0] for state in states], [state[1] for state in states]
+        efforts = [self._efforts.get(number, state[3]) for number, state in zip(self._numbers, states, strict=True)]
+        return [state[0] for state in states], [state[1] for state in states], efforts
+
+    def wrench(self, part: int, at: Frame, along: bool, force: Vector, torque: Vector) -> None:
+        """Push with a force (N) and a torque (N m) during the next step, at the point `at` of a part; along the axes of
+        that frame, or of the world. `part` is an index of `assemble`.
+        """
+        number = self._numbers_of_parts[part]
+        if number < 0:
+            place, rotation = self.pose()
+        else:
+            place, rotation = bullet.getLinkState(
+                self._body, number, computeForwardKinematics=True, physicsClientId=self._world
+            )[4:6]
+        x, y, z = rotate(rotation, at.xyz)
+        if along:
+            axes = multiply(rotation, at.quaternion)
+            force, torque = rotate(axes, force), rotate(axes, torque)
+        point = (place[0] + x, place[1] + y, place[2] + z)
+        bullet.applyExternalForce(self._body, number, force, point, bullet.WORLD_FRAME, self._world)
+        bullet.applyExternalTorque(self._body, number, torque, bullet.WORLD_FRAME, self._world)
 
     def release(self, name: str, friction: float | None = None) -> None:
         """Let a joint turn freely, against its friction (default: the file's)."""
@@ -124,6 +152,7 @@ class JointedBody(Body):
             if abs(rate) >= joint.limits.velocity and rate * effort > 0:
                 effort = 0.0
         self._motor(number, bullet.TORQUE_CONTROL, force=effort)
+        self._efforts[number] = effort
 
     def mimic(self) -> None:
         """Move mimic joints to the positions of the joints that they follow. Call it before each step."""
@@ -147,6 +176,7 @@ class JointedBody(Body):
         return min(rate, max(0.0, (limits.upper - position) / self._dt))
 
     def _motor(self, number: int, mode: int, **values: float) -> None:
+        self._efforts.pop(number, None)
         bullet.setJointMotorControl2(self._body, number, mode, physicsClientId=self._world, **values)
 
 
@@ -203,6 +233,12 @@ class Motors:
         if motion:
             self._move(motion)
 
+    def brake(self, names: frozenset[str], on: bool) -> None:
+        """Hold these joints still while they are not commanded, or let them turn freely."""
+        self._held, self._last = (self._held | names if on else self._held - names), None
+        for name in names if not on else ():
+            self._body.release(name)
+
     def forget(self) -> None:
         """Release them: something else moves them from now on."""
         self._held, self._last = frozenset(), None
@@ -215,3 +251,37 @@ class Motors:
                 self._body.turn(name, value, self._effort)
             else:
                 self._body.push(name, value, self._effort)
+
+
+class Forces:
+    """The forces of a model on its body. While no source commands them its wheels brake, where nothing else drives."""
+
+    def __init__(
+        self, body: JointedBody, forces: dict[str, list[Force]], model: RobotModel, brakes: Motors | None
+    ) -> None:
+        """`forces` are by the keys of their commands."""
+        parts = in_parts(model)
+        self._body, self._brakes = body, brakes
+        self._places: dict[str, list[tuple[int, Frame, bool]]] = {
+            key: [(*_centre(model, *parts[force.link], force.link), force.in_link) for force in same]
+            for key, same in forces.items()
+        }
+        self._turning = frozenset(joint.name for joint in model.joints.values() if joint.kind == "continuous")
+        self._rolls: bool | None = None
+
+    def do(self, pushes: list[Push] | None) -> None:
+        """Push during the next step; None: no source drives."""
+        rolls = pushes is not None
+        if self._brakes and rolls != self._rolls:
+            self._brakes.brake(self._turning & self._brakes.names, on=not rolls)
+        self._rolls = rolls
+        for key, (fx, fy, fz, *torque), _ in pushes or ():
+            for part, at, in_link in self._places[key]:
+                self._body.wrench(part, at, in_link, (fx, fy, fz), (torque[0], torque[1], torque[2]))
+
+
+def _centre(model: RobotModel, part: int, link: Frame, name: str) -> tuple[int, Frame]:
+    """A link's part, and in its frame the link's centre of mass, with the link's axes."""
+    inertial = model.links[name].inertial
+    inside = Frame.of(Pose(inertial.pose.xyz)) if inertial else Frame.of(Pose())
+    return part, link @ inside

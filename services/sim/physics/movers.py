@@ -5,14 +5,15 @@ from typing import Protocol
 
 from holozen.limits import Planar, clamp_speed, ramp
 from holozen.robot import model as drives
-from holozen.robot.model import Balancing, Differential, Drive, Mecanum, RobotModel
+from holozen.robot.model import Balancing, Differential, Drive, Mecanum, Omni, RobotModel
 from holozen.robot.rigid import lump
 
 from .balance import BalanceMover
 from .body import Body
 from .differential import WheelMover
 from .engine import UPRIGHT, Rotation, Vector
-from .jointed import JointedBody
+from .jointed import JointedBody, JointStates
+from .omni import OmniMover, omni_wheels
 from .planar import PlanarBody
 from .wheels import MecanumWheels, Wheels
 from .world import World
@@ -43,8 +44,8 @@ class Mover(Protocol):
         """The state for odometry, at sim time `time`, after a step of `dt` seconds."""
         ...
 
-    def states(self) -> tuple[list[float], list[float]]:
-        """Positions and rates of the joints."""
+    def states(self) -> JointStates:
+        """The states of the joints."""
         ...
 
 
@@ -60,14 +61,15 @@ class PlanarMover:
 
     def move(self, velocity: Planar, dt: float) -> None:
         """Set the body's velocity."""
-        if velocity != self.body.told and self.body.glides:
-            self._roll(self.body.told)
+        if velocity != self.body.commanded and self.body.glides:
+            self._roll(self.body.commanded)
         self.body.drive(velocity, dt)
 
     def moved(self, time: float, dt: float) -> Moved:
         """The true pose."""
         velocity = self.body.velocity(dt)
-        self._roll(velocity)
+        if not self.body.glides:  # else its wheels roll evenly until someone looks
+            self._roll(velocity)
         return *self.body.pose(), velocity
 
     def _roll(self, velocity: Planar) -> None:
@@ -75,9 +77,11 @@ class PlanarMover:
         self._wheels.roll(velocity, self.body.time - self._rolled)
         self._rolled = self.body.time
 
-    def states(self) -> tuple[list[float], list[float]]:
-        """Angles and rates of the wheels, as rolling without slip would turn them."""
-        return self._wheels.angles, self._wheels.rates
+    def states(self) -> JointStates:
+        """Angles and rates of the wheels, as rolling without slip would turn them; no motor has an effort."""
+        if self.body.glides:
+            self._roll(self.body.commanded)
+        return self._wheels.angles, self._wheels.rates, []
 
 
 class FreeMover:
@@ -94,8 +98,8 @@ class FreeMover:
         """The true pose."""
         return *self.body.pose(), self.body.planar()
 
-    def states(self) -> tuple[list[float], list[float]]:
-        """Positions and rates of the joints."""
+    def states(self) -> JointStates:
+        """The states of the joints."""
         return self.body.states()
 
 
@@ -130,6 +134,9 @@ def mover_for(world: World, model: RobotModel, at: Vector, rotation: Rotation = 
     if isinstance(mechanism, drives.Planar | Mecanum):
         rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
         return PlanarMover(world.add(lump(model), at, rotation), rolling)
+    if isinstance(mechanism, Omni):
+        rollers = omni_wheels(model)
+        return OmniMover(world.add_jointed(model, at, rotation, omni=rollers), model, mechanism, rollers)
     wheels = (*mechanism.left, *mechanism.right) if isinstance(mechanism, Differential) else ()
     body = world.add_jointed(model, at, rotation, frozenset(wheels))
     try:

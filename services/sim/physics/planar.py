@@ -6,32 +6,39 @@ from dataclasses import dataclass
 from holozen.kinematics import to_body, to_world, travelled
 from holozen.limits import STOP, Planar
 from holozen.robot import rigid
-from holozen.rotation import rotate, yaw
+from holozen.rotation import from_axis_angle, rotate, yaw
 
 from .body import Body, Links
+from .dynamics import GRAVITY
 from .engine import NOTHING, UPRIGHT, Rotation, Shapes, Vector, bullet
 
 HOLD_GAIN = 0.1  # share of the distance to its place that it recovers in a step
 HOLD_LIMIT = 0.005  # m; pushed farther, it holds its new place
 LOST = 0.1  # share of its speed lost in a step that means an obstacle: more than at the foot of a slope of 15 degrees
-PUSH = 3.0  # m/s^2 with which it pushes an obstacle
+PUSH = 3.0  # m/s^2 with which it pushes an obstacle at most
+TIPPING = 0.2  # rad/s; an obstacle that tips it faster takes the load, and so the grip, from its wheels
+UPRIGHT_PUSH = 0.3  # share of the push at its centre of mass that would begin to tip it
 LOOK = 12  # steps between two looks of a body around itself
+FAR = 3 * LOOK  # steps until the next look of one that glides, where nothing can come near it before
 SKIN = 0.03  # m; what is closer counts as near, however slow
 BRISK = 1.0  # m/s that parts of other robots may be faster than their bodies
+GRADE = 0.1  # m/s to a multiple of which the fastest speed is rounded up: each rise lets all bodies look anew
 SETTLED = 1e-5  # m and rad by which a body that has settled moves up or tilts between two looks
-STEADY = 1e-3  # m/s and rad/s by which it moves otherwise than it was told
+STEEP = 0.7  # of its upward axis along z; where it lies farther over, it turns about the vertical
+LANDED = 0.2  # m/s along its upward axis; with more it falls, or jumps
+STEADY = 1e-3  # m/s and rad/s of deviation from the commanded velocity
 
 
 class Field:
     """The planar bodies of a world, by the engine's numbers. `level` is the number of a level ground below them, if the
-    world has one; `steps` counts those of the world, of `step` seconds.
+    world has one; `steps` counts those of the world, of `step` seconds. `gravity` is in m/s^2.
     """
 
-    def __init__(self, world: int, step: float, level: int | None) -> None:
-        self.world, self.step, self.level = world, step, level
+    def __init__(self, world: int, step: float, level: int | None, gravity: Vector) -> None:
+        self.world, self.step, self.level, self.gravity = world, step, level, gravity
         self.steps = 0
         self.bodies: dict[int, PlanarBody] = {}
-        self._turns: list[dict[int, PlanarBody]] = [{} for _ in range(LOOK)]  # who looks around at which step
+        self._looks: dict[int, list[PlanarBody]] = {}  # step -> the bodies that look around then
         self._fastest = 0.0  # m/s
         self.others: list[Body] = []  # what moves in the engine besides
         self.gliding = 0  # how many of `bodies` do
@@ -48,28 +55,49 @@ class Field:
 
     def add(self, body: "PlanarBody") -> None:
         """Let a body look around from time to time."""
-        self.bodies[body.number] = self._turns[body.number % LOOK][body.number] = body
+        self.bodies[body.number] = body
+        self.let_look(body, LOOK)
+        self.hasten()
 
     def remove(self, body: "PlanarBody") -> None:
         """Forget a body."""
-        del self.bodies[body.number], self._turns[body.number % LOOK][body.number]
+        del self.bodies[body.number]
 
     def stepped(self) -> None:
-        """Count a step of the world, and let those bodies look around whose turn it is."""
+        """Count a step of the world, and let the bodies whose turn it is look around."""
         self.steps += 1
-        turn = self.steps % LOOK
-        if not turn:
+        if not self.steps % LOOK:
             self.others = [body for body in self.others if not body.is_removed]
             speeds = [BRISK + math.hypot(*body.twist()[0]) for body in self.others]
-            self._fastest = max((*speeds, *(body.speed for body in self.bodies.values())), default=0.0)
-        for body in list(self._turns[turn].values()):
-            body.look()
+            self._fastest = _graded(max((*speeds, *(body.speed for body in self.bodies.values())), default=0.0))
+        for body in self._looks.pop(self.steps, ()):
+            if body.looks_at == self.steps and not body.is_removed:
+                self.let_look(body, body.look())
 
-    def margin(self, speed: float) -> float:
-        """The distance in m at which a body with this speed (m/s) has to beware of others until its next look."""
-        self._fastest = max(self._fastest, speed)
+    def let_look(self, body: "PlanarBody", steps: int) -> None:
+        """Let a body look around in that many steps, LOOK or FAR, or before: each has a turn of its own in LOOK."""
+        at = self.steps + steps - (self.steps + steps - body.number) % LOOK
+        if body.looks_at != at:
+            body.looks_at = at
+            self._looks.setdefault(at, []).append(body)
+
+    def hasten(self) -> None:
+        """Let all bodies look around within LOOK steps: something may be nearer or faster than they could know."""
+        for body in self.bodies.values():
+            if body.looks_at > self.steps + LOOK:
+                self.let_look(body, LOOK)
+
+    def margin(self, speed: float, steps: int = LOOK) -> float:
+        """The distance in m at which a body with this speed (m/s) has to beware of others for that many steps."""
+        if speed > self._fastest:
+            self._fastest = _graded(speed)
+            self.hasten()
         # The others may have moved since their own last looks.
-        return SKIN + (speed + 2 * self._fastest) * LOOK * self.step
+        return SKIN + (speed + 2 * self._fastest) * steps * self.step
+
+
+def _graded(speed: float) -> float:
+    return GRADE * math.ceil(speed / GRADE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +122,7 @@ class PlanarBody(Body):
     """The drive sets its speed over ground and its turn; the engine keeps gravity, tilt and contacts. Its contacts have
     no friction: rolling wheels do not brake. At a stop it holds its place, also on a slope.
 
-    Where it has settled on level ground and nothing is near, contacts have nothing to tell: it glides, outside of the
+    Where it has settled on level ground and nothing is near, contacts change nothing: it glides, outside of the
     engine's steps and in closed form, until something comes near or it is moved by other than its drive.
     """
 
@@ -117,40 +145,49 @@ class PlanarBody(Body):
             **links.arguments,
         )
         super().__init__(world, number, body.centre, body.axes, {-1: body.weightless})
-        self.number, self._field, self._inertia = number, field, (body.mass, body.inertia)
+        self._field, self._inertia = field, (body.mass, body.inertia)
         self._may_glide = field.level is not None and not self.weightless
         self._glide: Glide | None = None
-        self._told = STOP  # the last velocity of the drive
+        self._commanded = STOP  # the last velocity of the drive
         self.speed = 0.0  # m/s that any point of it may have at that
+        self.looks_at = -1  # the step at which it looks around next
         self._stood: tuple[float, ...] = ()  # height and upward axis at the last look
         self._held: tuple[float, float] | None = None  # the place to hold
         self._driven: tuple[float, float] | None = None  # the velocity of the centre that was set for the last step
         self._is_blocked = False
-        self._links = range(-1, len(links))
         for link in self._links:
             bullet.changeDynamics(
                 number, link, lateralFriction=0, linearDamping=0, angularDamping=0, physicsClientId=world
             )
         bullet.changeDynamics(number, -1, localInertiaDiagonal=body.inertia, physicsClientId=world)
-        self._reach = math.dist(*self._box()) / 2
+        low, high = self.box()
+        self._reach = math.dist(low, high) / 2
+        x, y, z = (place + centre for place, centre in zip(at, body.centre, strict=True))
+        edge = max(0.0, min(x - low[0], high[0] - x, y - low[1], high[1] - y))  # of what it stands on
+        self._push = min(PUSH, UPRIGHT_PUSH * GRAVITY * edge / max(z - low[2], 1e-3))
         field.add(self)
 
-    def look(self) -> None:
-        """Wake whatever glides near it, and glide if nothing is near."""
+    def look(self) -> int:
+        """Wake whatever glides near it, and glide if nothing is near. Returns the steps until the next look."""
         near = self._near()
         stood, self._stood = self._stood, self._standing() if not near and not self._glide else ()
         if not near and stood and self._stood and math.dist(stood, self._stood) < SETTLED:
             self._glide_on()
+        return FAR if self._glide and not self._field.others and not self._around(FAR) else LOOK
+
+    def _around(self, steps: int) -> set[int]:
+        """What but the ground may come near it within that many steps, by boxes around each."""
+        margin = self._field.margin(self.speed, steps)
+        (x, y, z), (x2, y2, z2) = self.box()
+        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
+        found = {number for number, _ in bullet.getOverlappingObjects(low, high, self._world) or ()}
+        return found - {self.number, self._field.level}
 
     def _near(self) -> bool:
         """Whether anything but the ground is near. Then no planar body there glides any more, nor this one."""
-        if self._glide:  # the engine's body is where the last look was
-            self._place(*self.pose())
+        self.locate()
         margin = self._field.margin(self.speed)
-        (x, y, z), (x2, y2, z2) = self._box()
-        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
-        others = {number for number, _ in bullet.getOverlappingObjects(low, high, self._world) or ()}
-        others -= {self.number, self._field.level}
+        others = self._around(LOOK)
         near = [n for n in others if bullet.getClosestPoints(self.number, n, margin, physicsClientId=self._world)]
         for number in near:
             if other := self._field.bodies.get(number):
@@ -159,29 +196,25 @@ class PlanarBody(Body):
             self.wake()
         return bool(near)
 
-    def _box(self) -> tuple[Vector, Vector]:
-        """The corners of the box around it in the engine, along the axes of the world."""
-        if len(self._links) == 1:
-            box: tuple[Vector, Vector] = bullet.getAABB(self.number, -1, self._world)
-            return box
-        boxes = [bullet.getAABB(self.number, link, self._world) for link in self._links]
-        low, high = (zip(*corners, strict=True) for corners in zip(*boxes, strict=True))
-        return tuple(map(min, low)), tuple(map(max, high))
+    def locate(self) -> None:
+        """While it glides, the engine's body is where the last look was: move it to where this one is."""
+        if self._glide:
+            self._place(*self.pose())
 
     def _standing(self) -> tuple[float, ...]:
-        """Its height and its upward axis, if it only touches the level ground, does not tilt, and moves as told."""
+        """Its height and upward axis, if it only touches the level ground, does not tilt, and moves as commanded."""
         contacts = bullet.getContactPoints(self.number, physicsClientId=self._world)
         _, (rolling, pitching, _) = bullet.getBaseVelocity(self.number, self._world)
         if not self._may_glide or self._is_blocked or {contact[2] for contact in contacts} != {self._field.level}:
             return ()
-        if max(abs(rolling), abs(pitching), math.dist(self.velocity(self._field.step), self._told)) > STEADY:
+        if max(abs(rolling), abs(pitching), math.dist(self.velocity(self._field.step), self._commanded)) > STEADY:
             return ()
         (_, _, z), rotation = self.pose()
         return z, *rotate(rotation, (0.0, 0.0, 1.0))
 
     def _glide_on(self) -> None:
         """Glide from here at the drive's velocity; the engine keeps a body that neither moves nor touches anything."""
-        self._glide, self.glides = Glide(self._field.time, *self.pose(), self._told), True
+        self._glide, self.glides = Glide(self._field.time, *self.pose(), self._commanded), True
         self._field.gliding += 1
         bullet.changeDynamics(self.number, -1, mass=0, physicsClientId=self._world)
         for link in self._links:
@@ -194,12 +227,16 @@ class PlanarBody(Body):
         (position, rotation), (linear, angular) = self.pose(), self.twist()
         self._glide, self.glides = None, False
         self._field.gliding -= 1
+        if self.looks_at > self._field.steps + LOOK:
+            self._field.let_look(self, LOOK)
         mass, inertia = self._inertia
         bullet.changeDynamics(self.number, -1, mass=mass, physicsClientId=self._world)
         bullet.changeDynamics(self.number, -1, localInertiaDiagonal=inertia, physicsClientId=self._world)
         for link in self._links:
             bullet.setCollisionFilterGroupMask(self.number, link, 1, -1, physicsClientId=self._world)
-        self.put(position, rotation, linear, angular)
+        self._stood = ()
+        self._held, self._driven, self._is_blocked = None, None, False
+        super().put(position, rotation, linear, angular)
 
     def pose(self) -> tuple[Vector, Rotation]:
         """Position and rotation of the root frame in the world."""
@@ -215,8 +252,8 @@ class PlanarBody(Body):
 
     def drive(self, velocity: Planar, dt: float) -> None:
         """Set the body-frame velocity for the next step of `dt` seconds; gravity and contacts keep their effects."""
-        if velocity != self._told:
-            self._told = velocity
+        if velocity != self._commanded:
+            self._commanded = velocity
             self.speed = math.hypot(velocity[0], velocity[1]) + abs(velocity[2]) * self._reach
             self._near()
             if self._glide:
@@ -226,39 +263,52 @@ class PlanarBody(Body):
 
     def _drive(self, velocity: Planar, dt: float) -> None:
         position, rotation, centre = self._root()
-        (x, y, falling), (roll, pitch, _) = bullet.getBaseVelocity(self._body, self._world)
+        (x, y, falling), (roll, pitch, spin) = bullet.getBaseVelocity(self._body, self._world)
         if velocity == STOP:
             vx, vy = self._back(position[0] - centre[0], position[1] - centre[1], dt)
         else:
             vx, vy = to_world(velocity, yaw(rotation), dt)
             self._held = None
+        up, axis = _axes(rotation)
+        if axis is up and abs(vx * up[0] + vy * up[1] + falling * up[2]) < LANDED and not self.weightless:
+            # On a slope, gravity and contact would take it downhill within the step: its wheels hold that.
+            gravity = self._field.gravity
+            into = sum(g * u for g, u in zip(gravity, up, strict=True))
+            vx, vy = vx - (gravity[0] - into * up[0]) * dt, vy - (gravity[1] - into * up[1]) * dt
         turn = velocity[2]
-        # The centre orbits the root; evaluated at mid-step, as the heading, so that it stays on its circle.
-        cx, cy = to_world((centre[0], centre[1], turn), 0.0, dt)
-        vx, vy = vx - turn * cy, vy + turn * cx
+        ox, oy = _orbit(axis, turn, centre, dt)
+        vx, vy = vx + ox, vy + oy
+        more = turn - roll * axis[0] - pitch * axis[1] - spin * axis[2]
+        roll, pitch, spin = roll + more * axis[0], pitch + more * axis[1], spin + more * axis[2]
         if velocity == STOP:
             self._driven, self._is_blocked = None, False
         else:
-            vx, vy = self._driven = self._pushed((x, y), (vx, vy), dt)
-        bullet.resetBaseVelocity(self._body, (vx, vy, falling), (roll, pitch, turn), self._world)
+            tipping = math.hypot(roll - turn * axis[0], pitch - turn * axis[1])
+            vx, vy = self._driven = self._pushed((x, y), (vx, vy), tipping, dt)
+        bullet.resetBaseVelocity(self._body, (vx, vy, falling), (roll, pitch, spin), self._world)
 
-    def _pushed(self, now: tuple[float, float], wanted: tuple[float, float], dt: float) -> tuple[float, float]:
+    def _pushed(
+        self, now: tuple[float, float], wanted: tuple[float, float], tipping: float, dt: float
+    ) -> tuple[float, float]:
         """The velocity of the centre for the next step. An obstacle takes speed from the robot within a step; from
         then on it pushes no harder than wheels with grip could, until it regains its speed: a robot that is forced
-        against an edge would tip over it.
+        against an edge would tip over it. While it tips (rad/s), it does not push.
         """
         if self._driven is not None and math.dist(self._driven, now) > LOST * math.hypot(*self._driven):
             self._is_blocked = True
+        if self._is_blocked and tipping > TIPPING:
+            return now
         missing = math.dist(wanted, now)
-        if not self._is_blocked or missing <= PUSH * dt:
+        if not self._is_blocked or missing <= self._push * dt:
             self._is_blocked = False
             return wanted
-        share = PUSH * dt / missing
+        share = self._push * dt / missing
         return now[0] + (wanted[0] - now[0]) * share, now[1] + (wanted[1] - now[1]) * share
 
     def put(self, position: Vector, rotation: Rotation, linear: Vector, angular: Vector) -> None:
         """Place the root frame in the world, with its velocity and rotation rate there."""
         self.wake()
+        self._field.hasten()
         self._stood = ()
         self._held, self._driven, self._is_blocked = None, None, False
         super().put(position, rotation, linear, angular)
@@ -275,18 +325,20 @@ class PlanarBody(Body):
         return self._field.time
 
     @property
-    def told(self) -> Planar:
+    def commanded(self) -> Planar:
         """The velocity that the drive set last."""
-        return self._told
+        return self._commanded
 
     def velocity(self, dt: float) -> Planar:
         """The root frame's planar velocity during the last step of `dt` seconds, in the body frame."""
         if self._glide:
             return self._glide.velocity
         _, rotation, centre = self._root()
-        (vx, vy, _), (_, _, turn) = bullet.getBaseVelocity(self._body, self._world)
-        cx, cy = to_world((centre[0], centre[1], -turn), 0.0, dt)
-        x, y = to_body(vx + turn * cy, vy - turn * cx, yaw(rotation) - turn * dt / 2)
+        (vx, vy, _), (roll, pitch, spin) = bullet.getBaseVelocity(self._body, self._world)
+        _, axis = _axes(rotation)
+        turn = roll * axis[0] + pitch * axis[1] + spin * axis[2]
+        ox, oy = _orbit(axis, turn, centre, -dt)
+        x, y = to_body(vx - ox, vy - oy, yaw(rotation) - turn * dt / 2)
         return x, y, turn
 
     def remove(self) -> None:
@@ -294,3 +346,19 @@ class PlanarBody(Body):
         self.wake()
         self._field.remove(self)
         super().remove()
+
+
+def _axes(rotation: Rotation) -> tuple[Vector, Vector]:
+    """The upward axis of a body, and the one that it turns about: the same, unless it lies on its side."""
+    up = rotate(rotation, (0.0, 0.0, 1.0))
+    return up, up if up[2] > STEEP else (0.0, 0.0, 1.0)
+
+
+def _orbit(axis: Vector, turn: float, centre: Vector, dt: float) -> tuple[float, float]:
+    """The horizontal velocity of the centre, away from the root, of a body that turns about `axis`; evaluated at
+    mid-step, as the heading, so that it stays on its circle.
+    """
+    if not turn:
+        return 0.0, 0.0
+    x, y, z = rotate(from_axis_angle(axis, turn * dt / 2), centre)
+    return turn * (axis[1] * z - axis[2] * y), turn * (axis[2] * x - axis[0] * z)

@@ -1,11 +1,18 @@
-"""The joints of a planar base: they turn only visually, as wheels that roll without slipping."""
+"""Wheels: where they are on a robot, and how they turn as it moves; those of a planar base only visually."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
-from holozen.kinematics import Wheel, mecanum_rates, wheel_rate
-from holozen.limits import Planar
-from holozen.robot.model import Mecanum, RobotModel
-from holozen.robot.rigid import Axis, joint_axes
+import numpy as np
+
+from holozen.kinematics import Wheel, mecanum_rates, travelled, wheel_rate
+from holozen.limits import STOP, Planar
+from holozen.robot.model import HERE, Mecanum, RobotModel, Shape
+from holozen.robot.rigid import Axis, Part, PlacedShape, joint_axes
+from holozen.robot.rotation import quaternion_of, triple
+
+from .engine import UPRIGHT, Rotation, Vector
 
 FLAT = 0.1  # sine of the axle's angle to the ground; a steeper joint is not a wheel
 
@@ -46,6 +53,47 @@ class MecanumWheels:
         rates = {name: sign * rate for name, sign, rate in zip(self._driven, self._signs, turning, strict=True)}
         self.rates = [rates.get(name, 0.0) for name in self.names]
         self.angles = [angle + rate * dt for angle, rate in zip(self.angles, self.rates, strict=True)]
+
+
+class Odometer:
+    """Planar odometry from what wheels have rolled, on exact arcs. It starts at zero."""
+
+    def __init__(self) -> None:
+        self._x = self._y = self._yaw = 0.0
+        self._seen = STOP
+
+    def update(self, rolled: Planar) -> tuple[Vector, Rotation]:
+        """The pose after the wheels have rolled, in total: forward and left (m), counter-clockwise (rad)."""
+        x, y, turn = (now - before for now, before in zip(rolled, self._seen, strict=True))
+        self._seen = rolled
+        dx, dy = travelled((x, y, turn), self._yaw, 1.0)
+        self._x, self._y, self._yaw = self._x + dx, self._y + dy, self._yaw + turn
+        return (self._x, self._y, 0.0), (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
+
+
+def rolling_wheels(model: RobotModel) -> list[Wheel]:
+    """The wheels of a model: continuous joints with a level axle and a round collision shape."""
+    return [wheel for name, axis in joint_axes(model).items() if (wheel := _wheel(model, name, axis))]
+
+
+def on_spheres(parts: list[Part], wheels: Sequence[Wheel]) -> list[Part]:
+    """The parts with a sphere in the place of each wheel: it touches the ground at a point below the axle, as a wheel
+    with rollers on its rim does. One axis of its inertia is its axle.
+    """
+    radii = {wheel.joint: wheel.radius for wheel in wheels}
+    return [_on_sphere(part, radii[part.joint.name]) if part.joint and part.joint.name in radii else part
+            for part in parts]  # fmt: skip
+
+
+def _on_sphere(part: Part, radius: float) -> Part:
+    assert part.joint is not None, "a wheel turns on a joint"
+    body, axle = part.body, part.joint.axis
+    aside = min(((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), key=lambda axis: abs(float(np.dot(axis, axle))))
+    along = np.cross(aside, axle) / np.linalg.norm(np.cross(aside, axle))
+    axes = np.stack([along, np.array(axle), np.cross(along, axle)], axis=1)
+    inertia = triple([body.moment(triple(axis)) for axis in axes.T])
+    sphere = PlacedShape(part.link, Shape("sphere", (radius,), HERE), (0.0, 0.0, 0.0), UPRIGHT)
+    return replace(part, body=replace(body, inertia=inertia, axes=quaternion_of(axes), collisions=(sphere,)))
 
 
 def forward_sign(model: RobotModel, joint: str) -> float:

@@ -3,20 +3,24 @@
 Metres, kilograms, seconds; quaternions are x, y, z, w; positions and velocities are those of the world frame.
 """
 
+import math
+from collections.abc import Sequence
 from typing import TypeVar
 
+from holozen.kinematics import Wheel
 from holozen.robot import rigid
-from holozen.robot.errors import RobotError
 from holozen.robot.model import RobotModel, WorldSpec
-from holozen.robot.rigid import assemble
 
 from .body import Body
 from .dynamics import FRICTION
 from .engine import UPRIGHT, Rotation, Shapes, Vector, bullet
-from .jointed import MAX_JOINTS, JointedBody
-from .planar import Field, PlanarBody
+from .jointed import JointedBody
+from .planar import FAR, Field, PlanarBody
+from .wheels import on_spheres
 
 Added = TypeVar("Added", PlanarBody, JointedBody)
+OVERLAP = 0.01  # m that bodies may be in each other when they are placed; the engine throws apart what is far deeper
+RINGS = 8  # of places around a taken one, in which a free one is looked for
 
 
 class World:
@@ -24,6 +28,11 @@ class World:
 
     def __init__(self, spec: WorldSpec) -> None:
         self.spec = spec
+        self._steps_before = 0  # steps that `steps` counts besides those of the field
+        self._begin()
+
+    def _begin(self) -> None:
+        spec = self.spec
         self.id: int = bullet.connect(bullet.DIRECT)
         self._shapes = Shapes(self.id)
         self._floating: list[Body] = []
@@ -42,17 +51,29 @@ class World:
             ground = bullet.createMultiBody(0, plane, physicsClientId=self.id)
             bullet.changeDynamics(ground, -1, lateralFriction=FRICTION, physicsClientId=self.id)
             level = None if any(spec.gravity[:2]) or spec.gravity[2] >= 0 else ground
-        self._field = Field(self.id, spec.step, level)
+        self._field = Field(self.id, spec.step, level, spec.gravity)
 
     @property
     def steps(self) -> int:
-        """Steps since the start."""
-        return self._field.steps
+        """Steps since the start, or since the time was set to zero."""
+        return self._field.steps + self._steps_before
 
     @property
     def time(self) -> float:
-        """Simulated seconds since the start; from the count of steps, so that no error accumulates."""
-        return self._field.time
+        """Simulated seconds of these; from the count of steps, so that no error accumulates."""
+        return self.steps * self.spec.step
+
+    def rewind(self) -> None:
+        """Set the time to zero; nothing else changes."""
+        self._steps_before = -self._field.steps
+
+    def clear(self) -> None:
+        """Remove all bodies; the time goes on. The engine is a new one: the same bodies move in it as they did in the
+        first one, to the last bit.
+        """
+        self._steps_before = self.steps
+        self.close()
+        self._begin()
 
     def step(self) -> None:
         """Advance the world by one step."""
@@ -68,24 +89,66 @@ class World:
         return self._added(PlanarBody(self._field, self._shapes, body, at, rotation))
 
     def add_jointed(
-        self, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT, wheels: frozenset[str] = frozenset()
+        self,
+        model: RobotModel,
+        at: Vector,
+        rotation: Rotation = UPRIGHT,
+        wheels: frozenset[str] = frozenset(),
+        omni: Sequence[Wheel] = (),
     ) -> JointedBody:
-        """Add a robot with motors in its joints, or an object. `wheels` names the joints of the wheels that drive it.
-        Raises RobotError if it has too many joints, or no mass.
+        """Add a robot with motors in its joints, or an object. `wheels` names the joints of the wheels that drive it,
+        if not `omni` does. Raises RobotError if it has too many joints, or no mass.
         """
-        parts = assemble(model)
-        if parts[0].body.mass < rigid.SMALLEST_MASS and not model.static:
-            solid = next((link.name for link in model.links.values() if link.collisions), parts[0].link)
-            problem = f"{model.name[:80]!r} has no mass: neither {parts[0].link!r} nor what is fixed to it has any"
-            raise RobotError(f"{problem}; give {solid!r} an <inertial>")
-        if len(parts) > MAX_JOINTS:
-            raise RobotError(
-                f"{model.name!r} has {len(parts) - 1} moving joints; at most {MAX_JOINTS - 1} are simulated"
-            )
-        body = self._added(JointedBody(self.id, self._shapes, parts, at, rotation, wheels, model.static))
+        parts = on_spheres(rigid.simulated_parts(model), omni)
+        names = frozenset(wheel.joint for wheel in omni) or wheels
+        body = self._added(
+            JointedBody(self.id, self._shapes, parts, at, rotation, names, model.static, omni=bool(omni))
+        )
         if not model.static or len(parts) > 1:
             self._field.others.append(body)
+        self._field.hasten()
         return body
+
+    def overlapped(self, body: Body) -> list[int]:
+        """The engine's numbers of other bodies that `body` is deep in, the deepest first. Grounds do not count: what
+        is in them only rises.
+        """
+        (x, y, z), (x2, y2, z2) = body.box()
+        margin = self._field.margin(0.0, FAR)
+        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
+        depths = {}
+        for number in {number for number, _ in bullet.getOverlappingObjects(low, high, self.id) or ()} - {body.number}:
+            if other := self._field.bodies.get(number):
+                other.locate()
+            points = bullet.getClosestPoints(body.number, number, 0.0, physicsClientId=self.id)
+            depth = max((-point[8] for point in points), default=0.0)
+            if depth > OVERLAP and not self._is_plane(number):
+                depths[number] = depth
+        return sorted(depths, key=lambda number: (-depths[number], number))
+
+    def _is_plane(self, number: int) -> bool:
+        shapes = bullet.getCollisionShapeData(number, -1, physicsClientId=self.id)
+        return any(shape[2] == bullet.GEOM_PLANE for shape in shapes)
+
+    def free_place(self, body: Body) -> Vector | None:
+        """The nearest free position of its root frame on a grid around `body`, which is moved there; None if all are
+        taken.
+        """
+        ((x, y, z), rotation), (low, high) = body.pose(), body.box()
+        step = max(high[0] - low[0], high[1] - low[1], 0.1) / 2
+        grid = range(-RINGS, RINGS + 1)
+        around = sorted(((i, j) for i in grid for j in grid), key=lambda at: (math.hypot(*at), -at[0], -at[1]))
+        for i, j in around:
+            place = (round(x + i * step, 2), round(y + j * step, 2), z)
+            body.put(place, rotation, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+            if not self.overlapped(body):
+                return place
+        return None
+
+    def put(self, body: Body, place: tuple[Vector, Rotation], linear: Vector, angular: Vector) -> None:
+        """Place the root frame of a body in the world, with its velocity and rotation rate there."""
+        body.put(*place, linear, angular)
+        self._field.hasten()
 
     def _added(self, body: Added) -> Added:
         if body.weightless:

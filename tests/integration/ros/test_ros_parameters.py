@@ -104,11 +104,11 @@ def test_they_are_read_and_set(run: Run, robot: Robot) -> None:
         ("speed", "1", "speed takes DOUBLE, and 1 is INTEGER; write 1.0"),
         ("goals", "[1, 2]", "goals takes DOUBLE_ARRAY, and [1, 2] is INTEGER_ARRAY"),
         ("shape", "circle", "shapes are square and hexagon"),
-        ("sped", "1.0", "lab/tom has no parameter 'sped'; did you mean 'speed'?"),
+        ("sped", "1.0", "lab/tom has no parameter 'sped' (did you mean 'speed'?)"),
         ("use_sim_time", "maybe", "use_sim_time takes BOOL, and 'maybe' is STRING"),
     ],
 )
-def test_what_the_node_refuses_is_told(run: Run, robot: Robot, name: str, value: str, reason: str) -> None:
+def test_what_the_node_refuses_is_reported(run: Run, robot: Robot, name: str, value: str, reason: str) -> None:
     assert run("set", "lab/tom", name, value) == (1, "", f"holozen param set: setting parameter failed: {reason}\n")
     assert robot.values("speed", "goals", "shape", "use_sim_time") == [0.5, [1.0, 2.0], "square", False]
 
@@ -159,7 +159,7 @@ def _named(value: Any) -> Any:
 
 def test_what_is_asked_wrongly_is_refused_and_the_node_spins_on(wire: Wire, run: Run, robot: Robot) -> None:
     assert run("get", "lab/tom", "sped") == (
-        1, "", "holozen param get: lab/tom has no parameter 'sped'; did you mean 'speed'?\n",
+        1, "", "holozen param get: lab/tom has no parameter 'sped' (did you mean 'speed'?)\n",
     )  # fmt: skip
     caller = wire.bus("caller")
     with pytest.raises(ServiceError, match=f"at most {MOST}"):

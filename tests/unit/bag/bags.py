@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
+from holozen.bag import Message as Found
 from holozen.bag.formats import format_of
 from holozen.bag.reader import Bag
-from holozen.bag.reader import Message as Found
 from holozen.bag.writer import BagWriter
 from holozen.messages import Message, Odometry, Twist
 from holozen.messages.codec import encode

@@ -1,4 +1,4 @@
-"""`holozen bag`: info and plot, in text and JSON, and what they say of wrong files."""
+"""`holozen bag`: info and plot, in text and JSON, and their errors for wrong files."""
 
 import json
 import sys
@@ -11,7 +11,7 @@ from holozen.cli import main
 from .bags import a_bag
 
 
-def test_info_is_told_for_people_and_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_info_is_shown_for_people_and_for_programs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = str(a_bag(tmp_path / "a.mcap"))
     assert main(["bag", "info", path]) == 0
     assert "31 messages in 2.00 s" in capsys.readouterr().out
@@ -21,7 +21,7 @@ def test_info_is_told_for_people_and_for_programs(tmp_path: Path, capsys: pytest
     assert [topic["messages"] for topic in first["topics"]] == [10, 1, 20]
 
 
-def test_plot_says_what_it_drew(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_plot_reports_what_it_drew(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     path = a_bag(tmp_path / "a.mcap")
     assert main(["bag", "plot", str(path)]) == 0
     assert capsys.readouterr().out == f"{tmp_path / 'a.png'}: odom (20 messages), cmd_vel (10 messages)\n"
@@ -40,7 +40,7 @@ def test_a_wrong_file_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[
         assert why in line
 
 
-def test_a_missing_library_is_told_with_what_to_do(
+def test_a_missing_library_is_reported_with_what_to_do(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = a_bag(tmp_path / "a.mcap")

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from holozen.bag import BagError
+from holozen.bag import BagError, Channel, Message
 from holozen.bag.drawing import MOST, Track, draw, tracks
-from holozen.bag.reader import Channel, Message
 from holozen.messages import Odometry, Twist, TwistStamped
 from holozen.messages.codec import encode
 
@@ -64,11 +63,11 @@ def test_a_bag_is_drawn_as_png_and_svg(tmp_path: Path) -> None:
         ("a.png", ["Fred/odom"], "has no odometry on Fred/odom; on: odom"),
     ],
 )
-def test_what_cannot_be_drawn_is_told(tmp_path: Path, target: str, keys: list[str] | None, why: str) -> None:
+def test_what_cannot_be_drawn_is_reported(tmp_path: Path, target: str, keys: list[str] | None, why: str) -> None:
     with pytest.raises(BagError, match=why):
         draw(a_bag(tmp_path / "a.mcap"), tmp_path / target, keys)
 
 
-def test_a_bag_without_odometry_says_so(tmp_path: Path) -> None:
+def test_a_bag_without_odometry_is_reported(tmp_path: Path) -> None:
     with pytest.raises(BagError, match="has no odometry to draw"):
         draw(a_bag(tmp_path / "a.mcap", count=0), tmp_path / "a.png")

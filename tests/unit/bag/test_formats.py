@@ -13,8 +13,8 @@ from holozen.messages.codec import encode
 TWISTS = (Twist, TwistStamped)
 
 
-def test_a_payload_is_told_by_what_it_is() -> None:
-    for payload, encoding, types, told in [
+def test_a_payload_is_described_by_its_content() -> None:
+    for payload, encoding, types, expected in [
         (encode(Twist()), "application/json", TWISTS, ("json", "geometry_msgs/msg/Twist", "jsonschema")),
         (encode(TwistStamped()), "application/json", TWISTS, ("json", "geometry_msgs/msg/TwistStamped", "jsonschema")),
         (b'{"linear": {"x": 1}}', "zenoh/bytes", TWISTS, ("json", "geometry_msgs/msg/Twist", "jsonschema")),
@@ -31,7 +31,7 @@ def test_a_payload_is_told_by_what_it_is() -> None:
         (b"[" * 100_000, "application/json", (), ("application/json", "", "")),
     ]:
         form, message = format_of(payload, encoding, types)
-        assert (form.encoding, form.schema, form.schema_encoding) == told
+        assert (form.encoding, form.schema, form.schema_encoding) == expected
         assert form.zenoh_encoding == encoding
         assert (message is None) == (form.schema == "")
 

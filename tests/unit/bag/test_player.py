@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.bag import BagError
+from holozen.bag import BagError, Channel, Message
 from holozen.bag.player import LOOK, PAUSE, STEP, Pace, Plan, Player, meaning, plan
-from holozen.bag.reader import Channel, Message
 from holozen.transport.graph import Endpoint
 
 A = Channel("a", "", "", "")
@@ -120,7 +119,7 @@ def test_keys_are_looked_at_also_when_every_message_is_late() -> None:
 
 
 def test_space_pauses_and_the_right_arrow_steps() -> None:
-    for pressed, told in [
+    for pressed, expected in [
         (b" ", PAUSE),
         (b"s", STEP),
         (b"\x1b[C", STEP),
@@ -129,7 +128,7 @@ def test_space_pauses_and_the_right_arrow_steps() -> None:
         (b"\x1b[A", ""),
         (b"", ""),
     ]:
-        assert meaning(pressed) == told
+        assert meaning(pressed) == expected
 
 
 TWIST, ODOMETRY = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry"
@@ -147,7 +146,7 @@ def keys(made: Plan) -> dict[str, str]:
     return {channel.key: key for channel, key in made.targets.items()}
 
 
-def test_all_but_commands_is_played_where_nobody_else_is() -> None:
+def test_all_but_commands_is_played_where_no_other_publisher_is() -> None:
     made = plan([ODOM, TF, CMD], [])
     assert keys(made) == {"odom": "odom", "tf": "tf"}
     assert made.left_out == {"cmd_vel": "it moves robots; --commands plays it too"}
@@ -178,7 +177,7 @@ def test_a_command_stays_one_under_another_name() -> None:
         plan([CMD], [], remap={"cmd_vel": "old/speed"})
 
 
-def test_a_key_that_somebody_publishes_is_left_out_and_can_be_played_elsewhere() -> None:
+def test_a_key_with_a_publisher_is_left_out_and_can_be_played_elsewhere() -> None:
     made = plan([ODOM, TF], SIM)
     assert keys(made) == {"tf": "tf"}
     assert made.left_out == {"odom": "sim publishes it now; --remap odom:=NEW plays it elsewhere"}
@@ -205,7 +204,7 @@ def test_topics_choose_by_key_expression() -> None:
 
 
 @pytest.mark.parametrize("wrong", [{"topics": ["odm"]}, {"remap": {"odm": "b"}}])
-def test_a_key_that_is_not_in_the_bag_is_told_with_those_that_are(wrong: dict) -> None:  # type: ignore[type-arg]
+def test_a_key_that_is_not_in_the_bag_is_reported_with_the_recorded_ones(wrong: dict) -> None:  # type: ignore[type-arg]
     with pytest.raises(BagError, match="there is no 'odm' in the bag; it has odom, tf"):
         plan([ODOM, TF], [], **wrong)
 

@@ -14,9 +14,10 @@ from hypothesis import strategies as st
 from mcap.writer import MCAP0_MAGIC as MAGIC
 from mcap.writer import CompressionType, Writer
 
-from holozen.bag import BagError
+from holozen.bag import BagError, Channel, Message
 from holozen.bag.formats import format_of
-from holozen.bag.reader import LARGEST, Bag, Channel, Message, Stream, Summary, summarize
+from holozen.bag.mcap_file import LARGEST
+from holozen.bag.reader import Bag, Stream, Summary, summarize
 from holozen.bag.writer import BagWriter
 
 from .bags import SECOND, START, a_bag, read
@@ -81,7 +82,7 @@ def test_a_whole_file_is_not_cut_off(good: bytes, file: Path) -> None:
 
 
 @given(st.data())
-def test_a_file_with_a_wrong_byte_is_read_or_told_in_one_line(good: bytes, file: Path, data: st.DataObject) -> None:
+def test_a_file_with_a_wrong_byte_is_read_or_is_one_error_line(good: bytes, file: Path, data: st.DataObject) -> None:
     broken = bytearray(good)
     for _ in range(data.draw(st.integers(1, 3))):
         broken[data.draw(st.integers(len(MAGIC), len(good) - 1))] = data.draw(st.integers(0, 255))
@@ -104,7 +105,7 @@ def test_every_compression_of_the_mcap_library_is_read(compression: CompressionT
     file.write_bytes(stream.getvalue())
     found = read(file)
     assert [(m.at, m.payload) for m in found] == [(i, b"%d" % i * 20) for i in range(1000)]
-    assert found[0].channel == ("odom", "application/cdr", "cdr", "nav_msgs/msg/Odometry")
+    assert found[0].channel == ("odom", "application/cdr;nav_msgs/msg/Odometry", "cdr", "nav_msgs/msg/Odometry")
 
 
 def test_a_file_without_chunks_is_read(file: Path) -> None:
@@ -112,7 +113,7 @@ def test_a_file_without_chunks_is_read(file: Path) -> None:
     assert [(m.channel.key, m.at, m.payload) for m in read(file)] == [("a", 7, b"{}")]
 
 
-def test_what_is_wrong_with_a_file_is_told_in_one_line(file: Path) -> None:
+def test_a_wrong_file_is_one_error_line(file: Path) -> None:
     for content, part in [
         (b"", "is not an MCAP file: it is empty"),
         (b"hello, I am a text", "is not an MCAP file"),
@@ -131,7 +132,7 @@ def test_what_is_wrong_with_a_file_is_told_in_one_line(file: Path) -> None:
 
 @pytest.mark.parametrize("compression", ["zstd", "lz4"])
 def test_a_few_bytes_do_not_become_all_of_memory(compression: str, file: Path) -> None:
-    """A chunk that unpacks to 64 MB and says that it has 100 bytes is not unpacked."""
+    """A chunk that unpacks to 64 MB and claims to have 100 bytes is not unpacked."""
     pack = {"zstd": zstandard.compress, "lz4": lz4.frame.compress}[compression]
     bomb = pack(bytes(64 << 20))
     assert len(bomb) < 1 << 20
@@ -144,7 +145,7 @@ def test_a_few_bytes_do_not_become_all_of_memory(compression: str, file: Path) -
     assert "does not have the size it claims" in line
 
 
-def test_a_record_that_says_to_be_huge_is_not_read(file: Path) -> None:
+def test_a_record_that_claims_to_be_huge_is_not_read(file: Path) -> None:
     with file.open("wb") as stream:
         stream.write(MAGIC + struct.pack("<BQ", 0x06, LARGEST + 1))
         stream.truncate(LARGEST + 100)  # a hole: it takes no room on the disk
@@ -158,8 +159,8 @@ def test_a_checksum_that_is_right_is_no_trouble(file: Path) -> None:
     assert [m.payload for m in read(file)] == [b"{}"]
 
 
-def test_a_file_that_is_not_there_or_is_a_folder_is_told(tmp_path: Path) -> None:
-    for path, why in ((tmp_path / "none.mcap", "No such file"), (tmp_path, "Is a directory")):
+def test_a_missing_file_or_a_folder_is_reported(tmp_path: Path) -> None:
+    for path, why in ((tmp_path / "none.mcap", "No such file"), (tmp_path, "is a folder without .mcap or .db3 files")):
         with pytest.raises(BagError, match=why):
             Bag(path)
 
@@ -209,7 +210,7 @@ def test_the_lines_for_people_name_key_type_and_rate(tmp_path: Path) -> None:
     assert first.split()[:5] == ["cmd_vel", "geometry_msgs/msg/Twist", "application/json", "10", "0"]
 
 
-def test_an_empty_bag_and_a_time_no_calendar_has_are_told_too() -> None:
+def test_an_empty_bag_and_a_time_no_calendar_has_are_described_too() -> None:
     assert Summary("a", 10).lines() == ["a: 10 bytes, 0 messages in 0.00 s"]
     late = Stream(Channel("a", "", "", ""))
     late.see(Message(late.channel, 2**64 - 1, b"x"))

@@ -107,7 +107,7 @@ def test_a_tap_that_was_full_is_counted(monkeypatch: pytest.MonkeyPatch) -> None
 MS = 1_000_000
 
 
-def test_nobody_knows_the_time_before_the_first_tick() -> None:
+def test_there_is_no_time_before_the_first_tick() -> None:
     assert SimTime().of(5) is None
 
 

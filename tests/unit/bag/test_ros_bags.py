@@ -67,7 +67,7 @@ def test_the_schema_names_each_part_once() -> None:
     assert msg_schema("no_such/msg/Type") == b""
 
 
-def test_a_strangers_cdr_has_a_schema_if_its_encoding_names_a_type(tmp_path: Path) -> None:
+def test_foreign_cdr_has_a_schema_if_its_encoding_names_a_type(tmp_path: Path) -> None:
     payload = codec.encode(Twist(), "cdr")
     form, _ = format_of(payload, "application/cdr;geometry_msgs/msg/Vector3", ())
     assert (form.schema, form.schema_encoding) == ("geometry_msgs/msg/Vector3", "ros2msg")

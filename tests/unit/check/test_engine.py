@@ -10,6 +10,7 @@ from holozen.check.report import check
 from holozen.check.rules_xml import PLUGIN, URDF
 from tests.unit.check.conftest import Findings
 
+BALL = '<collision><geometry><sphere radius="1"/></geometry></collision>'
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
 WHEELS = (
     '<xacro:property name="mass" value="0.1"/>\n'
@@ -22,7 +23,7 @@ WHEELS = (
     "</xacro:macro>\n"
 )
 USE = (
-    '<link name="base"/>\n'
+    f'<link name="base">{BALL}</link>\n'
     '<xacro:part name="a"><origin xyz="0 0 1" ryp="0 0 0"/></xacro:part>\n'
     '<xacro:part name="b"><origin xyz="0 0 2"/></xacro:part>\n'
     "</robot>"
@@ -67,7 +68,7 @@ def test_properties_and_macros_that_nothing_uses(findings: Findings) -> None:
 
 def test_what_xacro_warns_of_is_a_finding(findings: Findings) -> None:
     text = HEAD + '<xacro:property name="z" valeu="2" value="1"/><link name="a${z}"><inertial><mass value="1"/>'
-    found = findings(text + '<inertia ixx="1" iyy="1" izz="1"/></inertial></link></robot>', "r.xacro")
+    found = findings(text + f'<inertia ixx="1" iyy="1" izz="1"/></inertial>{BALL}</link></robot>', "r.xacro")
     assert [finding.rule for finding in found] == ["load-note"]
     assert "valeu" in found[0].problem
 
@@ -99,7 +100,7 @@ def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
             ('<robot name="r">\n<link name=a/>\n</robot>', 2, "in quotes"),
             ('<robot name="r">\n<link name="a>\n</link></robot>', 3, "close the quotes"),
             ('<robot name="r">\n<link name="a">\n</robot>', 3, "close each element"),
-            ('<robot name="r"/>\n<link name="a"/>', 2, "a single <robot> around everything"),
+            ('<robot name="r"/>\n<link name="a"/>', 2, "a single <robot> or <sdf> around everything: remove"),
             ('<robot name="r">\n<link name="a & b"/></robot>', 2, "&amp;"),
             ('<robot name="r">\n<link name=\u201ca\u201d/></robot>', 2, "straight"),
             ('<robot name="r">\n<!-- a -- b -->\n</robot>', 2, "a comment"),

@@ -8,10 +8,12 @@ import pytest
 
 from holozen.check.engine import Requirements
 from holozen.check.report import RULES, check
+from holozen.robot.loading import load
 from tests.unit.check.conftest import HERE, Findings
 
 Rules = Callable[..., list[str]]
 
+HEAVY = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
 ARM_LIMIT = '<limit lower="-1" upper="1" effort="5" velocity="2"/>'
 LEFT = '<parent link="base"/><child link="left_wheel"/><origin xyz="0.05 0.12 0"/><axis xyz="0 1 0"/>'
 RIGHT = '<parent link="base"/><child link="right_wheel"/><origin xyz="0.05 -0.12 0"/><axis xyz="0 1 0"/>'
@@ -21,6 +23,8 @@ FRAME = "<robotBaseFrame>footprint</robotBaseFrame>"
 BODY = '<collision><origin xyz="0 0 0.02"/><geometry><box size="0.3 0.2 0.1"/>'
 SWAPPED = "<leftJoint>right_joint</leftJoint><rightJoint>left_joint<"
 PLUGIN = '<plugin name="drive" filename="libgazebo_ros_diff_drive.so">'
+
+FRAME_ONLY = '<inertial><mass value="0"/></inertial>'
 
 BROKEN = [
     # rule, what is in the good robot, what is there instead, what the finding speaks of
@@ -43,6 +47,9 @@ BROKEN = [
     ("ignored", '<sphere radius="0.015"/></geometry>', '<sphere radius="0.015"/></geometry><surface/>', "<mu1>"),
     ("ignored", '<link name="arm">', '<link name="arm"><pose>0 0 1 0 0 0</pose>', "<origin"),
     ("ignored", ARM_LIMIT, ARM_LIMIT + '<joint_properties damping="1"/>', "<dynamics"),
+    ("ignored", "</robot>", "<unheard_of/></robot>", "<unheard_of> in <robot name='good'> is not read"),
+    ("ignored", '<link name="arm">', '<link name="arm"><foo>1</foo>', "collision, gravity, inertial, visual"),
+    ("floating", '<link name="base">', '<link name="base"><gravity>false</gravity>', "link 'base'"),
     ("ignored", "</robot>", '<plugin name="x" filename="libx.so"/></robot>', "into a <gazebo>"),
     ("wheel-load", BODY, BODY.replace("0.02", "0"), "'base' is as low as the wheels"),
     ("wheel-side", "<leftJoint>left_joint</leftJoint><rightJoint>right_joint<", SWAPPED, "'left_joint' (a right joint"),
@@ -69,6 +76,7 @@ BROKEN = [
     ("degrees", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 0.05" rpy="0 0 90"/>', "looks like degrees"),
     ("no-inertia", "<inertial>" + BASE + "</inertial>", "", "'base'"),
     ("massless", '<mass value="2"/>', '<mass value="0"/>', "0 kg"),
+    ("massless", '<link name="footprint"/>', '<link name="footprint">' + FRAME_ONLY + "</link>", "only a frame"),
     ("massless", BASE, '<mass value="2"/><inertia ixx="0" iyy="0" izz="0"/>', "is zero"),
     ("mass", '<mass value="2"/>', '<mass value="-2"/>', "-2 kg"),
     ("mass", '<mass value="2"/>', "", "no <mass>"),
@@ -83,13 +91,12 @@ BROKEN = [
     ("floating", "</robot>", '<gazebo reference="arm"><turnGravityOff>1</turnGravityOff></gazebo></robot>', "'arm'"),
     ("wheel-axis", LEFT, LEFT.replace("0 1 0", "1 0 0"), "turns about (1 0 0)"),
     ("wheel-height", LEFT, LEFT.replace("0.12 0", "0.12 0.02"), "20 mm above the other wheels"),
-    ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.3 0.02 0.05"/>', "the robot stands on"),
+    ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.26 0.02 0.05"/>', "the robot stands on"),
     ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_dif_drive", "libgazebo_ros_diff_drive.so"),
     ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "is ignored"),
     ("plugin-link", FRAME, "<robotBaseFrame>chasis</robotBaseFrame>", "names no link"),
     ("plugin-joint", "<leftJoint>left_joint", "<leftJoint>left_jiont", "'left_joint'"),
     ("two-drives", PLUGIN, '<plugin name="a" filename="libgazebo_ros_planar_move.so"/>' + PLUGIN, "keep one"),
-    ("no-drive", "gazebo_ros_diff_drive", "gazebo_ros_camera", "no drive plugin"),
 ]  # fmt: skip
 
 
@@ -114,23 +121,16 @@ ROS2_CONTROL = (
 FINE = [
     # what is in the good robot, and what may as well be there
     ("</robot>", '<gazebo reference="ball"><gravity>false</gravity></gazebo></robot>'),
-    (PLUGIN, '<plugin name="x" filename="libgazebo_ros_force.so"><bodyName>base</bodyName></plugin>' + PLUGIN),
-    # Parameters of a plugin that is unknown here may have any name.
-    (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><max_x_velocity>1</max_x_velocity></plugin>' + PLUGIN),
-    (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><some_joint>left_jiont</some_joint></plugin>' + PLUGIN),
     ("</robot>", BLUE + BLUE.replace("blue", "green") + "</robot>"),
     ("</robot>", TRANSMISSION + "</robot>"),
     ("</robot>", FORK + "</robot>"),
-    ("</robot>", '<ns:extension xmlns:ns="x" raduis="1"/><unheard_of/></robot>'),
+    ("</robot>", '<ns:extension xmlns:ns="x" raduis="1"/></robot>'),
     ("<mu1>1.0</mu1>", "<mu>1.0</mu><legacyModeNS>true</legacyModeNS><verbose>true</verbose>"),
     ('<sphere radius="0.015"/>', '<sphere radius="0.012"/>'),  # leans back on its ball
     ('<sphere radius="0.015"/>', '<sphere radius="0.03"/>'),  # and forward
     ('<mass value="0.01"/><inertia ixx="1e-6"', '<mass value="0.01"/><inertia ixx="1.001e-6"'),
-    (FRAME, "<robotBaseFrame>/robot/footprint</robotBaseFrame><frameName>map</frameName>"),
+    (FRAME, FRAME + "<frameName>map</frameName>"),
     (FRAME, FRAME + "<legacyModeNS>true</legacyModeNS>"),
-    (PLUGIN, '<plugin name="x" filename="libgazebo_ros_p3d.so"/>' + PLUGIN),
-    (PLUGIN, '<plugin name="x" filename="libhector_gazebo_ros_gps.so"/>' + PLUGIN),
-    ('<link name="footprint"/>', '<link name="footprint"><inertial><mass value="0"/></inertial></link>'),
     (LEFT, LEFT.replace("0.12", "0.11")),  # reaches into the body, and out of it
     ('<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 0.05" rpy="0 0 5"/>'),
     (BASE, BASE.replace('izz="0.024"', 'izz="0.0261"')),  # a figure too few
@@ -141,10 +141,67 @@ FINE = [
 ]
 
 
+SPAWN_WARNS = [
+    # what is in the good robot, and what spawn warns of, which no rule finds
+    (PLUGIN, '<plugin name="x" filename="libgazebo_ros_harness.so"><bodyName>base</bodyName></plugin>' + PLUGIN),
+    # Parameters of a plugin that is unknown here may have any name.
+    (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><max_x_velocity>1</max_x_velocity></plugin>' + PLUGIN),
+    (PLUGIN, '<plugin name="x" filename="libgazebo_my.so"><some_joint>left_jiont</some_joint></plugin>' + PLUGIN),
+    (PLUGIN, '<plugin name="x" filename="libgazebo_ros_p3d.so"/>' + PLUGIN),
+    (PLUGIN, '<plugin name="x" filename="libhector_gazebo_ros_gps.so"/>' + PLUGIN),
+    (FRAME, "<robotBaseFrame>/robot/footprint</robotBaseFrame>"),
+    ('<inertia ixx="1e-6"', '<inertia ixx="1e-9"'),
+    ("</robot>", '<transmission name="t"><joint name="lost"/></transmission></robot>'),
+]
+
+
+def test_what_spawn_warns_of_is_reported_in_the_same_words(good: str, findings: Findings, tmp_path: Path) -> None:
+    for old, new in SPAWN_WARNS:
+        assert good.count(old) > 0
+        found = [finding for finding in findings(good.replace(old, new, 1)) if finding.rule == "load-note"]
+        words = [f"{finding.place.file}, line {finding.place.line}: {finding.problem}" for finding in found]
+        assert tuple(words) == load(tmp_path / "robot.urdf").warnings != ()
+
+
+def test_a_finding_about_one_element_does_not_hide_what_spawn_finds_in_another(good: str, findings: Findings) -> None:
+    plugin = '<plugin name="x" filename="libgazebo_ros_p3d.so"><bodyName>bsae</bodyName></plugin>' + PLUGIN
+    found = {finding.rule: finding.problem for finding in findings(good.replace(PLUGIN, plugin))}
+    assert list(found) == ["plugin-link", "load-note"]
+    assert found["load-note"].endswith("is not supported; odom and tf are published anyway")
+
+
+WEIGHTLESS = '<inertial><mass value="0"/><inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"/></inertial>'
+
+
+@pytest.mark.parametrize("drive", ["", '<gazebo><plugin name="d" filename="libgazebo_ros_planar_move.so"/></gazebo>'])
+def test_a_robot_that_the_sim_refuses_is_an_error(drive: str, findings: Findings) -> None:
+    box = '<collision><geometry><box size=".2 .2 .2"/></geometry></collision>'
+    found = findings(f'<robot name="r"><link name="base">{WEIGHTLESS}{box}</link>{drive}</robot>')
+    (error,) = [finding for finding in found if finding.severity == "error"]
+    assert error.rule == "load" and "mass" in error.problem and "give" in error.problem
+    crowded = f'<robot name="r"><link name="base">{HEAVY}{box * 501}</link>{drive}</robot>'
+    assert "'r' has 501 collision shapes; at most 500" in findings(crowded)[0].problem
+
+
+def test_a_robot_without_a_collision_shape_falls(findings: Findings) -> None:
+    text = f'<robot name="r"><link name="base">{HEAVY}</link></robot>'
+    (finding,) = findings(text)
+    assert (finding.rule, finding.severity) == ("no-collision", "warning")
+    assert finding.problem == "<robot name='r'> has no collision shape and falls through the ground"
+    light = text.replace("</robot>", '<gazebo reference="base"><gravity>false</gravity></gazebo></robot>')
+    assert [finding.rule for finding in findings(light)] == ["floating"]
+
+
 def test_what_is_no_mistake_is_not_reported(good: str, findings: Findings) -> None:
     for old, new in FINE:
         assert good.count(old) > 0
         assert findings(good.replace(old, new, 1)) == []
+
+
+def test_wheels_and_plugins_but_no_drive(good: str, findings: Findings) -> None:
+    found = {finding.rule: finding.problem for finding in findings(good.replace("ros_diff_drive", "ros_camera"))}
+    assert sorted(found) == ["load-note", "no-drive"]
+    assert "no drive plugin" in found["no-drive"] and "(camera) is not simulated" in found["load-note"]
 
 
 def test_a_mere_description_needs_no_drive(good: str, findings: Findings) -> None:
@@ -163,8 +220,8 @@ def test_ros2_control_alone_drives_nothing_here(instead: str, good: str, finding
 
 
 def test_an_arm_needs_no_drive(findings: Findings) -> None:
-    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>'
-    assert findings(f'<robot name="r"><link name="a">{inertial}</link>{ROS2_CONTROL}</robot>') == []
+    shape = '<collision><geometry><sphere radius="1"/></geometry></collision>'
+    assert findings(f'<robot name="r"><link name="a">{HEAVY}{shape}</link>{ROS2_CONTROL}</robot>') == []
 
 
 def test_the_settings_of_a_file_for_others_to_include_are_not_lost(rules: Rules) -> None:
@@ -285,7 +342,7 @@ def test_a_skid_steer_may_be_given_a_wider_base(good: str, rules: Rules) -> None
 def test_every_rule_is_tried(request: pytest.FixtureRequest) -> None:
     elsewhere = {
         "macro-twice", "unused", "wheel-collision", "mesh", "mesh-path", "mesh-empty", "mesh-unit", "fits",
-        "require-file", "require", "overlap",
+        "require-file", "require", "overlap", "no-collision", "no-drive",
     }  # fmt: skip
     assert {rule for rule, *_ in BROKEN} | elsewhere == {rule.name for rule in RULES}
 
@@ -296,14 +353,14 @@ def test_the_files_of_the_lessons_are_silent() -> None:
     assert [str(finding) for path in files if path.is_file() for finding in check(path)[0]] == []
 
 
-def test_a_wanted_size_is_measured(good: str, findings: Findings) -> None:
+def test_a_requested_size_is_measured(good: str, findings: Findings) -> None:
     assert findings(good, requirements=Requirements((0.31, 0.28, 0.34))) == []
     (finding,) = findings(good, requirements=Requirements((0.4, 0.2)))
     assert finding.rule == "fits"
     assert "0.3 x 0.27 x 0.32 m" in finding.problem and "width (y) 0.27 m is too much" in finding.problem
 
 
-def test_names_are_wanted_by_a_file(good: str, findings: Findings, tmp_path: Path) -> None:
+def test_names_are_required_by_a_file(good: str, findings: Findings, tmp_path: Path) -> None:
     lines = [
         "# the homework",
         "link base",
@@ -316,7 +373,7 @@ def test_names_are_wanted_by_a_file(good: str, findings: Findings, tmp_path: Pat
     message = [(finding.rule, finding.place.line, finding.problem) for finding in found]
     assert [line for rule, line, _ in message if rule == "require-file"] == [6, 7, 8]
     assert [problem for rule, _, problem in message if rule == "require"] == [
-        "there is no link 'bsae'; did you mean 'base'?",
+        "there is no link 'bsae' (did you mean 'base'?)",
         "joint 'left_joint' is continuous, not prismatic",
     ]
 

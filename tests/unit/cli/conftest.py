@@ -1,4 +1,4 @@
-"""A sim that only keeps what it is told."""
+"""A sim that only keeps what it receives."""
 
 from collections.abc import Callable
 from typing import TypeVar

@@ -1,4 +1,4 @@
-"""`service call`: a type that is given is looked up, and what the server says decides the rest."""
+"""`service call`: a type that is given is looked up, and the server's reply decides the rest."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -56,7 +56,7 @@ def test_the_type_of_a_package_with_the_same_fields_calls_our_service(
     assert (code, "did you mean 'request_goal'?" in err, err.count("\n")) == (1, True, 1)
 
 
-def test_a_package_that_is_not_found_calls_a_service_of_the_same_name_and_says_so(
+def test_a_package_that_is_not_found_calls_a_service_of_the_same_name_and_reports_it(
     wire: Wire, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     serves(wire)
@@ -69,19 +69,19 @@ def test_a_package_that_is_not_found_calls_a_service_of_the_same_name_and_says_s
 
 
 @pytest.mark.parametrize(
-    ("kind", "told"),
+    ("kind", "expected"),
     [
         ("std_srvs/srv/Trigger", "next_goal: its type is holozen/srv/NextGoal, not std_srvs/srv/Trigger\n"),
-        ("std_srvs/srv/Triger", "no type 'std_srvs/srv/Triger'; did you mean 'std_srvs/srv/Trigger'?"),
+        ("std_srvs/srv/Triger", "no type 'std_srvs/srv/Triger' (did you mean 'std_srvs/srv/Trigger'?)"),
         ("hb_interface/srv/GetPose", "give its folder: --package hb_interface=DIR; its type is holozen/srv/NextGoal\n"),
         ("geometry_msgs/msg/Twist", "next_goal: geometry_msgs/msg/Twist is a message; "),
     ],
 )
-def test_a_type_that_it_does_not_have_is_one_line(wire: Wire, run: Run, kind: str, told: str) -> None:
+def test_a_type_that_it_does_not_have_is_one_line(wire: Wire, run: Run, kind: str, expected: str) -> None:
     serves(wire)
     code, out, err = run("service", "call", "next_goal", kind, "{}")
     assert (code, out, err.count("\n")) == (1, "", 1)
-    assert told in err
+    assert expected in err
 
 
 @pytest.mark.parametrize("key", ["next_goal", "my_goal"])
@@ -106,6 +106,6 @@ def test_a_value_on_standard_input_is_read_once(
     assert run("service", "call", "next_goal", "-")[:2] == (0, "count: 5\n")
 
 
-def test_an_unknown_key_is_told_with_the_nearest_service(wire: Wire, run: Run) -> None:
+def test_an_unknown_key_is_reported_with_the_closest_service(wire: Wire, run: Run) -> None:
     serves(wire)
-    assert "'nextgoal' has no known type; did you mean 'next_goal'?" in run("service", "call", "nextgoal")[2]
+    assert "'nextgoal' has no known type (did you mean 'next_goal'?)" in run("service", "call", "nextgoal")[2]

@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 
 from holozen import cli
-from holozen.cli.verb import Noun
+from holozen.cli.verb import Noun, Service
 from holozen.transport.errors import BusError
 
 
 @pytest.mark.parametrize("flag", ["-h", "--help"])
 def test_help_lists_every_verb(flag: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([flag]) == 0
-    told = capsys.readouterr().out
-    assert all(f"\n  {verb} " in told for verb in cli.VERBS)
+    reported = capsys.readouterr().out
+    assert all(f"\n  {verb} " in reported for verb in cli.VERBS)
 
 
 def test_no_verb_shows_the_help_and_is_wrong_usage(capsys: pytest.CaptureFixture[str]) -> None:
@@ -34,24 +34,23 @@ def test_the_version_is_the_one_that_is_installed(flag: str, capsys: pytest.Capt
 
 def test_an_unknown_verb_is_one_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["drive"]) == 2
-    out, told = capsys.readouterr()
+    out, err = capsys.readouterr()
     assert out == ""
-    assert told == "holozen: no verb 'drive'; `holozen --help` lists the verbs\n"
+    assert err == "holozen: no verb 'drive'; `holozen --help` lists the verbs\n"
 
 
 def test_an_unknown_verb_gets_the_nearest_or_what_there_is_instead(capsys: pytest.CaptureFixture[str]) -> None:
     for word, hint in [
-        ("topics", "did you mean 'topic'?"),
-        ("view", "`holozen map` draws robots"),
-        ("rviz2", "`holozen map` draws robots"),
-        ("action", "there are no actions here"),
-        ("pkg", "`--package NAME=DIR`"),
-        ("tf2_echo", "write `holozen tf echo SOURCE TARGET`"),
+        ("topics", " (did you mean 'topic'?)"),
+        ("rviz2", "; `holozen view` shows robots in a browser"),
+        ("action", "; there are no actions here"),
+        ("pkg", "; `--package NAME=DIR`"),
+        ("tf2_echo", "; write `holozen tf echo SOURCE TARGET`"),
     ]:
         assert cli.main([word]) == 2
-        told = capsys.readouterr().err
-        assert told.startswith(f"holozen: no verb {word!r}; {hint}")
-        assert (told.count("\n"), len(told) < 160) == (1, True)
+        message = capsys.readouterr().err
+        assert message.startswith(f"holozen: no verb {word!r}{hint}")
+        assert (message.count("\n"), len(message) < 160) == (1, True)
 
 
 def test_what_there_is_instead_of_a_verb_is_there() -> None:
@@ -60,7 +59,7 @@ def test_what_there_is_instead_of_a_verb_is_there() -> None:
             assert verb in cli.VERBS
 
 
-NOUNS = ("topic", "service", "node", "param", "tf", "interface", "bag")
+NOUNS = ("secure", "topic", "service", "node", "param", "tf", "interface", "bag")
 
 
 def test_every_verb_has_help(capsys: pytest.CaptureFixture[str]) -> None:
@@ -68,9 +67,9 @@ def test_every_verb_has_help(capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(SystemExit) as end:
             cli.main([verb, "--help"])
         assert end.value.code == 0
-        told = capsys.readouterr().out
-        assert told.startswith(f"usage: holozen {verb} ")
-        assert verb in NOUNS or "example: " in " ".join(told.split())
+        reported = capsys.readouterr().out
+        assert reported.startswith(f"usage: holozen {verb} ")
+        assert verb in NOUNS or "example: " in " ".join(reported.split())
 
 
 def test_a_verb_that_starts_others_explains_its_own_flags() -> None:
@@ -155,7 +154,9 @@ def test_output_into_a_full_disk_is_one_line(words: str) -> None:
 
 @pytest.mark.parametrize("verb", cli.SERVICES)
 def test_a_service_is_found_in_the_tree(verb: str) -> None:
-    assert cli.command(verb).__name__ == f"services.{cli.SERVICES[verb]}.__main__"
+    command = cli.command(verb)
+    module = command.module if isinstance(command, Service) else command
+    assert module.__name__ == f"services.{cli.SERVICES[verb]}.__main__"
 
 
 @pytest.mark.parametrize("words", ["param load sim -", "topic pub cmd_vel -", "teleop --script -", "teleop"])

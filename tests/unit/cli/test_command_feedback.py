@@ -13,7 +13,7 @@ ME = "topic_pub@a1b2c3"
 TELEOP = "teleop@d4e5f6"
 
 
-def test_the_reason_is_what_the_sim_says() -> None:
+def test_the_reason_is_the_sims() -> None:
     for status, why in [
         (CommandStatus(), None),
         (CommandStatus(obeyed=ME), ""),
@@ -46,18 +46,18 @@ def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus]) -> str:
 
     with ThreadPoolExecutor() as pool:
         answered = pool.submit(answer)
-        code, _, told = run("topic", "pub", "cmd_vel", "{}", "--once")
+        code, _, err = run("topic", "pub", "cmd_vel", "{}", "--once")
         answered.result(10)
     assert code == 0
-    return told
+    return err
 
 
 def test_a_single_command_that_is_obeyed_is_not_called_refused(wire: Wire, run: Run) -> None:
     """It was, by a status that the sim had sent before the command came."""
-    told = once(wire, run, lambda source: CommandStatus(source, sources=[CommandSource(source, obeyed=True)]))
-    assert "obeyed" not in told
+    reported = once(wire, run, lambda source: CommandStatus(source, sources=[CommandSource(source, obeyed=True)]))
+    assert "obeyed" not in reported
 
 
 def test_a_single_command_that_is_not_obeyed_is_reported(wire: Wire, run: Run) -> None:
-    told = once(wire, run, lambda source: CommandStatus(TELEOP, sources=[CommandSource(source)]))
-    assert told.splitlines()[-1] == f"not obeyed: {TELEOP} drives"
+    reported = once(wire, run, lambda source: CommandStatus(TELEOP, sources=[CommandSource(source)]))
+    assert reported.splitlines()[-1] == f"not obeyed: {TELEOP} drives"

@@ -34,7 +34,7 @@ def complete(wire: Wire, capsys: pytest.CaptureFixture[str]) -> Complete:
 
 @pytest.fixture
 def fred(wire: Wire) -> Iterator[Bus]:
-    """A node that tells Fred's odom, reads his commands and serves next_goal."""
+    """A node that publishes Fred's odom, reads his commands and serves next_goal."""
     bus = wire.bus("sim", lasting=True)
     bus.publisher("Fred/odom", Odometry)
     bus.subscribe("Fred/cmd_vel", Twist)
@@ -87,7 +87,7 @@ def test_what_is_there_is_completed(complete: Complete, fred: Bus) -> None:
         assert complete(*words.split(" ")) == found
 
 
-def test_where_nobody_is_nothing_is_offered_or_said(complete: Complete) -> None:
+def test_without_nodes_nothing_is_offered_or_printed(complete: Complete) -> None:
     assert complete("topic", "echo", HERE, "") == []
 
 

@@ -31,9 +31,9 @@ def test_as_json_they_are_names_and_poses(sim: FakeSim, run: Run) -> None:
     assert entity["pose"] == {"position": {"x": 1, "y": 0, "z": 0}, "orientation": {"x": 0, "y": 0, "z": 0, "w": 1}}
 
 
-def test_an_empty_world_says_how_to_fill_it(sim: FakeSim, run: Run) -> None:
-    told = "the world is empty; holozen spawn FILE --name NAME puts a robot there\n"
-    assert run("list") == (0, "", told)
+def test_an_empty_world_explains_how_to_fill_it(sim: FakeSim, run: Run) -> None:
+    expected = "the world is empty; holozen spawn FILE --name NAME puts a robot there\n"
+    assert run("list") == (0, "", expected)
 
 
 def test_one_that_goes_while_it_is_listed_is_left_out(sim: FakeSim, run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -56,11 +56,11 @@ def test_several_are_deleted(sim: FakeSim, run: Run) -> None:
     assert list(sim.entities) == ["Bob"]
 
 
-def test_an_unknown_one_is_told_in_the_sim_s_words_and_the_others_go(sim: FakeSim, run: Run) -> None:
+def test_an_unknown_one_is_reported_with_the_sims_reason_and_the_others_go(sim: FakeSim, run: Run) -> None:
     sim.put("Fred")
     sim.put("Bob")
-    told = "holozen delete: there is no entity 'nobody'; there are Fred, Bob\n"
-    assert run("delete", "nobody", "Bob") == (1, "Bob is deleted\n", told)
+    expected = "holozen delete: there is no entity 'nobody'; there are Fred, Bob\n"
+    assert run("delete", "nobody", "Bob") == (1, "Bob is deleted\n", expected)
 
 
 def test_deleted_ones_are_an_object_a_line_as_json(sim: FakeSim, run: Run) -> None:
@@ -77,12 +77,12 @@ def test_deleted_ones_are_an_object_a_line_as_json(sim: FakeSim, run: Run) -> No
 @pytest.mark.parametrize("name", ["*", "a/b", "", "9"])
 def test_an_illegal_name_is_wrong_usage_and_asks_nothing(sim: FakeSim, run: Run, name: str) -> None:
     sim.put("Fred")
-    code, _, told = run("delete", "Fred", name)
-    assert code == 2 and f"robot name {name!r}: use a letter" in told
+    code, _, err = run("delete", "Fred", name)
+    assert code == 2 and f"robot name {name!r}: use a letter" in err
     assert sim.log == []
 
 
-def test_what_lies_on_its_side_is_told_so(sim: FakeSim, run: Run) -> None:
+def test_what_lies_on_its_side_is_reported(sim: FakeSim, run: Run) -> None:
     sim.put("Fred", q=Quaternion(math.sqrt(0.5), 0, 0, math.sqrt(0.5)))
     sim.put("Ann", q=Quaternion(0.01, 0, 0, 1))
     ann, fred = run("list")[1].splitlines()

@@ -16,7 +16,7 @@ def test_a_row_has_three_cells() -> None:
 
 def test_a_verb_has_help_with_an_example_and_writes_json() -> None:
     for noun, verb in VERBS:
-        told = cli.command(noun).verb(verb).parser().format_help()
-        assert told.startswith(f"usage: holozen {noun} {verb} ")
-        assert f"example: holozen {noun} {verb}" in told
-        assert "--json" in told
+        reported = cli.command(noun).verb(verb).parser().format_help()
+        assert reported.startswith(f"usage: holozen {noun} {verb} ")
+        assert f"example: holozen {noun} {verb}" in reported
+        assert "--json" in reported

@@ -127,9 +127,9 @@ def test_what_is_no_path_is_refused() -> None:
             path(text)
 
 
-def test_a_field_that_is_not_there_is_told_with_those_that_are() -> None:
-    for text, told in [
-        ("linaer.x", "no field 'linaer'; did you mean 'linear'?; there are linear, name"),
+def test_a_missing_field_is_reported_with_the_existing_ones() -> None:
+    for text, expected in [
+        ("linaer.x", "no field 'linaer' (did you mean 'linear'?); there are linear, name"),
         ("linear.z", "no field 'z'; there are x, y"),
         ("name.a", "no field 'a' in a list; write [0]"),
         ("name[2]", "no [2]; the list has 2 values"),
@@ -137,4 +137,4 @@ def test_a_field_that_is_not_there_is_told_with_those_that_are() -> None:
     ]:
         with pytest.raises(LookupError) as error:
             pick(MESSAGE, path(text))
-        assert error.value.args[0].startswith(told)
+        assert error.value.args[0].startswith(expected)

@@ -1,4 +1,4 @@
-"""Rates, sizes and delays are what arrivals, sizes and stamps say, with what was lost on the way."""
+"""Rates, sizes and delays follow from arrivals, sizes and stamps, with what was lost on the way."""
 
 import random
 import statistics
@@ -21,16 +21,16 @@ from holozen.cli.stats import (
 from holozen.transport.samples import Sample
 
 
-def test_a_rate_is_told_with_its_gaps() -> None:
-    told = rate([10.0, 10.1, 10.3])
-    assert told["rate"] == pytest.approx(1 / 0.15)
-    assert (told["min"], told["max"], told["jitter"]) == pytest.approx((0.1, 0.2, 0.1))
-    assert rate_text(told | {"lost": 2}).splitlines() == [
+def test_a_rate_is_reported_with_its_gaps() -> None:
+    reported = rate([10.0, 10.1, 10.3])
+    assert reported["rate"] == pytest.approx(1 / 0.15)
+    assert (reported["min"], reported["max"], reported["jitter"]) == pytest.approx((0.1, 0.2, 0.1))
+    assert rate_text(reported | {"lost": 2}).splitlines() == [
         "average rate: 6.667",
         "\tmin: 0.1000s max: 0.2000s std dev: 0.05000s window: 3",
         "\tp50: 0.1000s p95: 0.2000s p99: 0.2000s jitter: 0.10000s lost: 2",
     ]
-    assert "lost" not in rate_text(told | {"lost": None})
+    assert "lost" not in rate_text(reported | {"lost": None})
 
 
 def test_arrivals_at_one_instant_divide_by_nothing_and_one_is_no_rate() -> None:
@@ -38,12 +38,12 @@ def test_arrivals_at_one_instant_divide_by_nothing_and_one_is_no_rate() -> None:
     assert rate([1.0]) == rate([]) == {}
 
 
-def test_a_spread_is_what_the_standard_library_says() -> None:
+def test_a_spread_equals_that_of_the_standard_library() -> None:
     values = [random.Random(7).gauss(5, 2) for _ in range(1000)]
-    told = spread(values)
-    assert told["mean"] == pytest.approx(statistics.fmean(values))
-    assert told["std_dev"] == pytest.approx(statistics.pstdev(values))
-    assert (told["min"], told["max"]) == (min(values), max(values))
+    reported = spread(values)
+    assert reported["mean"] == pytest.approx(statistics.fmean(values))
+    assert reported["std_dev"] == pytest.approx(statistics.pstdev(values))
+    assert (reported["min"], reported["max"]) == (min(values), max(values))
 
 
 def test_a_percentile_is_the_nearest_rank() -> None:
@@ -81,22 +81,22 @@ def window(*sizes: int) -> Window:
 
 
 def test_a_bandwidth_is_the_bytes_of_all_but_the_first_over_their_time() -> None:
-    told = bandwidth(window(1000, 100, 300))
-    assert told["bytes_per_second"] == 200.0
-    assert (told["min"], told["max"], told["window"]) == (100, 1000, 3)
+    reported = bandwidth(window(1000, 100, 300))
+    assert reported["bytes_per_second"] == 200.0
+    assert (reported["min"], reported["max"], reported["window"]) == (100, 1000, 3)
     assert bandwidth(window(1000)) == {}
 
 
-def test_a_window_counts_what_is_missing_if_it_is_told_numbers() -> None:
+def test_a_window_counts_lost_messages_by_their_numbers() -> None:
     assert window(1, 1, 1).lost() == 2
     silent = Window(10)
     silent.add(Numbered(1), 0.0, 1.0)
     assert silent.lost() is None
 
 
-def test_bytes_are_told_in_an_easy_unit() -> None:
-    for count, told in [(0, "0 B"), (999, "999 B"), (1000, "1.00 KB"), (2_500_000, "2.50 MB"), (5e9, "5.00 GB")]:
-        assert size(count) == told
+def test_bytes_are_shown_in_a_readable_unit() -> None:
+    for count, expected in [(0, "0 B"), (999, "999 B"), (1000, "1.00 KB"), (2_500_000, "2.50 MB"), (5e9, "5.00 GB")]:
+        assert size(count) == expected
 
 
 def test_the_sims_time_goes_on_between_two_messages_at_the_sims_pace() -> None:

@@ -1,4 +1,4 @@
-"""`topic info` of a robot's command key tells who is obeyed, held and stopped; of others what the wire tells."""
+"""`topic info` of a command key shows the sources obeyed, held and stopped; of others the endpoints."""
 
 import json
 import threading
@@ -27,16 +27,18 @@ def teleop(wire: Wire) -> Bus:
     return bus
 
 
-def tell(sim: Bus, status: CommandStatus) -> None:
+def publish(sim: Bus, status: CommandStatus) -> None:
     sim.publisher("Fred/cmd_vel_status", CommandStatus).put(status)
 
 
-def test_each_source_is_told_with_its_priority_rate_and_whether_it_is_obeyed(sim: Bus, teleop: Bus, run: Run) -> None:
+def test_each_source_is_reported_with_its_priority_rate_and_whether_it_is_obeyed(
+    sim: Bus, teleop: Bus, run: Run
+) -> None:
     sources = [
         CommandSource(teleop.source, "INTERACTIVE_HIGH", 20.0, obeyed=True),
         CommandSource("anonymous (DATA)", "DATA", 49.96, held=True),
     ]
-    tell(sim, CommandStatus(obeyed=teleop.source, priority="INTERACTIVE_HIGH", held=True, sources=sources))
+    publish(sim, CommandStatus(obeyed=teleop.source, priority="INTERACTIVE_HIGH", held=True, sources=sources))
     assert run("topic", "info", "Fred/cmd_vel")[1].splitlines() == [
         "Type: geometry_msgs/msg/Twist",
         "Publisher count: 2",
@@ -46,16 +48,16 @@ def test_each_source_is_told_with_its_priority_rate_and_whether_it_is_obeyed(sim
         f"  sim ({sim.id[:6]})",
         f"Obeyed: {teleop.source}; sources below a person are held until `resume`",
     ]
-    told = json.loads(run("topic", "info", "Fred/cmd_vel", "--json")[1])
-    assert [(row["source"], row["obeyed"], row["held"]) for row in told["publishers"]] == [
+    output = json.loads(run("topic", "info", "Fred/cmd_vel", "--json")[1])
+    assert [(row["source"], row["obeyed"], row["held"]) for row in output["publishers"]] == [
         (teleop.source, True, False),
         ("anonymous (DATA)", False, True),
     ]
-    assert told["status"]["obeyed"] == teleop.source
+    assert output["status"]["obeyed"] == teleop.source
 
 
-def test_a_software_stop_is_told_with_who_set_it(sim: Bus, run: Run) -> None:
-    tell(sim, CommandStatus(stopped="stop@a1b2c3"))
+def test_a_software_stop_is_reported_with_its_source(sim: Bus, run: Run) -> None:
+    publish(sim, CommandStatus(stopped="stop@a1b2c3"))
     assert run("topic", "info", "Fred/cmd_vel")[1].splitlines()[-1] == "Obeyed: none; stopped by stop@a1b2c3"
 
 
@@ -72,7 +74,7 @@ def test_a_status_that_is_none_is_passed_over(sim: Bus, run: Run, wrong: bytes) 
     assert (code, out.splitlines()[0]) == (0, "Type: geometry_msgs/msg/Twist")
 
 
-def test_verbose_tells_priority_encoding_and_delivery(wire: Wire, run: Run) -> None:
+def test_verbose_shows_priority_encoding_and_delivery(wire: Wire, run: Run) -> None:
     publisher = wire.bus("sim").publisher("odom", Odometry, priority="DATA_LOW")
     done = threading.Event()
 

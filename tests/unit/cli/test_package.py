@@ -17,7 +17,7 @@ TYPE = "my_if/msg/Thing"
 
 @pytest.fixture
 def thing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The flag that says where the package lies, which nobody finds by himself."""
+    """The flag that gives the folder of the package, which cannot be found without it."""
     (tmp_path / "far" / "away" / "msg").mkdir(parents=True)
     (tmp_path / "far" / "away" / "msg" / "Thing.msg").write_text("float64 width\nstring name\n")
     monkeypatch.chdir(tmp_path)
@@ -26,10 +26,10 @@ def thing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 @pytest.fixture
 def written(wire: Wire, thing: str) -> Iterator[None]:
-    """A stranger who writes CDR on `thing`, again and again."""
+    """A foreign node that writes CDR on `thing`, again and again."""
     name, _, folder = thing.partition("=")
     payload = cdr.write(Registry({name: folder}).find(TYPE), {"width": 1.5, "name": "box"})
-    session, done = wire.bus("stranger").session, threading.Event()
+    session, done = wire.bus("foreign").session, threading.Event()
 
     def write() -> None:
         while not done.wait(0.01):
@@ -44,8 +44,8 @@ def written(wire: Wire, thing: str) -> Iterator[None]:
 def test_echo_reads_the_bytes_of_a_package_that_is_given(run: Run, written: None, thing: str) -> None:
     assert "; give its folder: --package my_if=DIR" in run("topic", "echo", "thing", "--once")[2]
     for words in ([], [TYPE]):
-        told = run("topic", "echo", "thing", *words, "--once", "--package", thing)
-        assert told == (0, "width: 1.5\nname: box\n---\n", "")
+        reported = run("topic", "echo", "thing", *words, "--once", "--package", thing)
+        assert reported == (0, "width: 1.5\nname: box\n---\n", "")
 
 
 def test_plot_draws_them(run: Run, written: None, thing: str) -> None:
@@ -62,7 +62,7 @@ def test_pub_checks_the_fields_of_a_package_that_is_given(run: Run, wire: Wire, 
     assert tap.recv().payload == b'{"width": 2.0, "name": ""}'
 
 
-def test_pub_takes_the_type_of_who_reads_the_key(run: Run, wire: Wire, thing: str) -> None:
+def test_pub_takes_the_type_of_the_subscribers(run: Run, wire: Wire, thing: str) -> None:
     reader = wire.bus("reader")
     tap = reader.subscribe_raw("thing")
     tap.ends.append(reader.announce("sub", TYPE, "thing"))

@@ -59,12 +59,12 @@ def test_list_names_them_below_each_node(run: Run, node: Node, wire: Wire) -> No
     assert rows[1] == {"node": "sim", "name": "speed", "type": "double"}
 
 
-def test_list_with_nobody_there_says_so(run: Run, wire: Wire) -> None:
+def test_list_without_nodes_reports_it(run: Run, wire: Wire) -> None:
     wire.bus("somebody_without_any")
     assert run("list") == (0, "", "no parameters: no node has any; `holozen up` starts a robot\n")
 
 
-def test_get_tells_type_and_value(run: Run, node: Node) -> None:
+def test_get_shows_type_and_value(run: Run, node: Node) -> None:
     assert run("get", "/sim", "speed") == (0, "Double value is: 1.0\n", "")
     assert run("get", "sim", "shape") == (0, "String value is: square\n", "")
     assert run("get", "sim", "shape", "--hide-type") == (0, "square\n", "")
@@ -80,29 +80,29 @@ def test_set_sets_one_or_several(run: Run, node: Node) -> None:
     assert node.values == {"speed": 2.0, "shape": "hexagon"}
 
 
-def test_set_tells_in_one_line_why_not_and_what_is_allowed(run: Run, node: Node) -> None:
-    for words, told in [
+def test_set_reports_in_one_line_the_reason_and_what_is_allowed(run: Run, node: Node) -> None:
+    for words, expected in [
         (("speed", "9"), "speed: 9: use a number from 0.1 to 2 m/s"),
         (("speed", "nan"), "speed: 'nan': use a number from 0.1 to 2 m/s"),
         (("speed", "1e999"), "speed: '1e999': use a number from 0.1 to 2 m/s"),
         (("speed", "true"), "speed: True: use a number from 0.1 to 2 m/s"),
         (("speed", ""), "speed: '': use a number from 0.1 to 2 m/s"),
         (("speed", "99999999999999999999"), "speed: 1e+20: use a number from 0.1 to 2 m/s"),
-        (("sped", "1"), "sim has no parameter 'sped'; did you mean 'speed'?"),
+        (("sped", "1"), "sim has no parameter 'sped' (did you mean 'speed'?)"),
     ]:
-        assert run("set", "sim", *words) == (1, "", f"holozen param set: setting parameter failed: {told}\n")
+        assert run("set", "sim", *words) == (1, "", f"holozen param set: setting parameter failed: {expected}\n")
         code, out, err = run("set", "sim", *words, "--json")
         assert (code, err) == (1, "")
-        assert (json.loads(out)["successful"], json.loads(out)["reason"]) == (False, told)
+        assert (json.loads(out)["successful"], json.loads(out)["reason"]) == (False, expected)
         assert node.values["speed"] == 1.0
 
 
-def test_a_text_that_is_not_unicode_is_told_in_one_line(run: Run, node: Node) -> None:
+def test_a_text_that_is_not_unicode_is_one_error_line(run: Run, node: Node) -> None:
     code, out, err = run("set", "sim", "shape", "\udcff")
     assert (code, out, len(err.splitlines())) == (1, "", 1)
 
 
-def test_of_several_only_the_wrong_ones_are_told(run: Run, node: Node) -> None:
+def test_of_several_only_the_wrong_ones_are_reported(run: Run, node: Node) -> None:
     assert run("set", "sim", "shape", "hexagon", "speed", "9") == (
         1, "", "holozen param set: setting parameter speed failed: speed: 9: use a number from 0.1 to 2 m/s\n"
         "holozen param set: none of the 2 was set\n",
@@ -126,7 +126,7 @@ def test_wrong_usage_is_one_line(run: Run, capsys: pytest.CaptureFixture[str], w
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 
-def test_describe_tells_what_is_allowed(run: Run, node: Node) -> None:
+def test_describe_shows_what_is_allowed(run: Run, node: Node) -> None:
     code, out, _ = run("describe", "sim", "speed", "shape")
     assert code == 0
     assert out.splitlines() == [
@@ -158,14 +158,14 @@ def test_load_sets_nothing_of_a_file_with_a_mistake(run: Run, node: Node, tmp_pa
     file.write_text("/sim:\n  ros__parameters:\n    shape: hexagon\n    sped: 1.0\n")
     code, _, err = run("load", "sim", str(file))
     assert (code, node.values["shape"]) == (1, "square")
-    assert "parameter sped failed: sim has no parameter 'sped'; did you mean 'speed'?" in err
+    assert "parameter sped failed: sim has no parameter 'sped' (did you mean 'speed'?)" in err
 
 
 @pytest.mark.parametrize("verb", ["get", "set", "describe"])
-def test_an_unknown_node_is_told_with_the_closest_one(run: Run, node: Node, verb: str) -> None:
+def test_an_unknown_node_is_reported_with_the_closest_one(run: Run, node: Node, verb: str) -> None:
     words = ("smi", "speed") + (("1",) if verb == "set" else ())
     assert run(verb, *words) == (
-        1, "", f"holozen param {verb}: there is no node 'smi' with parameters; did you mean 'sim'?\n"
+        1, "", f"holozen param {verb}: there is no node 'smi' with parameters (did you mean 'sim'?)\n"
     )  # fmt: skip
 
 
@@ -180,8 +180,8 @@ def test_two_nodes_of_the_same_name_are_not_asked(run: Run, node: Node, wire: Wi
     assert "only one of them is shown" in err
 
 
-def test_a_node_that_does_not_answer_is_told(run: Run, wire: Wire) -> None:
-    Parameters(wire.bus("sim"), "sim", lambda: [])  # nobody calls `answer`
+def test_a_node_that_does_not_answer_is_reported(run: Run, wire: Wire) -> None:
+    Parameters(wire.bus("sim"), "sim", lambda: [])  # `answer` is never called
     code, _, err = run("get", "sim", "speed", "--timeout", "0.2")
     assert code == 1
     assert err.startswith("holozen param get: no reply from 'sim/get_parameters' within 0.2 s")

@@ -1,4 +1,4 @@
-"""What a person wrote becomes a message, or one line that says why not."""
+"""What a person wrote becomes a message, or one error line with the reason."""
 
 import builtins
 import io
@@ -74,7 +74,7 @@ def test_too_much_on_standard_input_is_refused(monkeypatch: pytest.MonkeyPatch) 
     assert refusal("-") == "the value is longer than 1000000 bytes"
 
 
-def test_yaml_without_its_library_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_yaml_without_its_library_names_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
     real = builtins.__import__
 
     def without_yaml(name: str, *rest: Any) -> Any:

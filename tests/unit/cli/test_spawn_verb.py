@@ -63,15 +63,15 @@ def test_without_a_name_it_has_that_of_its_file(sim: FakeSim, run: Run, tmp_path
     assert list(sim.entities) == ["ball"]
 
 
-def test_as_json_it_tells_name_key_and_pose(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+def test_as_json_it_has_name_key_and_pose(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     listening, standing = (run("spawn", file, "--json", "-x", "1")[1] for file in (HB_BOT, ball(tmp_path)))
-    told = json.loads(listening)
-    assert (told["name"], told["key"], told["hint"]) == ("hb_bot", "hb_bot/cmd_vel", "")
-    assert (told["pose"]["position"]["x"], json.loads(standing)["key"]) == (1.0, "")
+    output = json.loads(listening)
+    assert (output["name"], output["key"], output["hint"]) == ("hb_bot", "hb_bot/cmd_vel", "")
+    assert (output["pose"]["position"]["x"], json.loads(standing)["key"]) == (1.0, "")
     assert listening.count("\n") == standing.count("\n") == 1
 
 
-def test_it_goes_where_it_is_told(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+def test_it_goes_where_it_is_commanded(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     code, out, _ = run("spawn", ball(tmp_path), "-x", "1", "-y", "-2", "-z", "-0.5", "-Y", "1.5")
     assert (code, out) == (0, "ball stands at 1.000 -2.000 -0.500\n")
     assert place(sim, "ball") == pytest.approx((1, -2, -0.5, 1.5))
@@ -79,7 +79,7 @@ def test_it_goes_where_it_is_told(sim: FakeSim, run: Run, tmp_path: Path) -> Non
     assert place(sim, "b") == pytest.approx((-0.001, -0.5, 0, 0))
 
 
-def test_an_object_of_an_sdf_file_goes_where_its_file_says(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+def test_an_object_of_an_sdf_file_goes_where_its_file_places_it(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     path = tmp_path / "crate.sdf"
     box = '<collision name="c"><geometry><box><size>1 1 1</size></box></geometry></collision>'
     link = f'<link name="a"><inertial><mass>1</mass></inertial>{box}</link>'
@@ -121,6 +121,16 @@ def test_values_of_xacro_args_may_stand_anywhere(sim: FakeSim, run: Run, tmp_pat
     assert {pose(sim, name).position.z for name in "abc"} == {2}
 
 
+@pytest.mark.parametrize("gravity", ["true", "false"])
+def test_a_body_without_collision_shape_falls_only_by_gravity(
+    sim: FakeSim, run: Run, tmp_path: Path, gravity: str
+) -> None:
+    path = tmp_path / "ghost.urdf"
+    tag = f'<gazebo reference="w"><gravity>{gravity}</gravity></gazebo>'
+    path.write_text(f'<robot name="ghost">{MASSIVE}{tag}</robot>')
+    assert ("falls through the ground" in run("spawn", path)[2]) == (gravity == "true")
+
+
 def test_a_robot_without_a_drive_gets_one_when_asked(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     assert run("spawn", ball(tmp_path), "--drive", "planar_move") == (0, "ball listens on ball/cmd_vel\n", "")
     drive = parse(sim.entities["ball"].resource_string, Path("/elsewhere")).drive
@@ -128,9 +138,11 @@ def test_a_robot_without_a_drive_gets_one_when_asked(sim: FakeSim, run: Run, tmp
 
 
 def test_a_robot_with_a_drive_keeps_it(sim: FakeSim, run: Run) -> None:
-    code, out, told = run("spawn", HB_BOT, "--name", "Fred", "--drive", "planar_move")
+    code, out, err = run("spawn", HB_BOT, "--name", "Fred", "--drive", "planar_move")
     assert (code, out) == (0, "Fred listens on Fred/cmd_vel\n")
-    assert told == f"holozen spawn: {HB_BOT}: has a drive of its own, which is used; --drive planar_move is not\n"
+    assert (
+        err == f"holozen spawn: warning: {HB_BOT}: has a drive of its own, which is used; --drive planar_move is not\n"
+    )
     assert sim.entities["Fred"].resource_string.count("planar_move") == parse_count(HB_BOT)
 
 
@@ -152,55 +164,63 @@ LOST = '<link name="l"><collision><geometry><mesh filename="gone.stl"/></geometr
 LOST += '<joint name="j" type="fixed"><parent link="b&amp;c"/><child link="l"/></joint>'
 
 
-def test_warnings_are_told_here_once_with_their_line_and_are_errors_in_strict(
+def test_warnings_are_reported_here_once_with_their_line_and_are_errors_in_strict(
     sim: FakeSim, run: Run, tmp_path: Path
 ) -> None:
     path = ball(tmp_path, more=LOST)
-    code, _, told = run("spawn", path)
+    code, _, err = run("spawn", path)
     assert code == 0
-    assert told.startswith(f"holozen spawn: {path}, line 1: <mesh> of <link name='l'> (collision) is replaced by a box")
-    assert told.count("\n") == told.count("gone.stl': ") + 1 == 1
-    code, _, told = run("spawn", path, "--name", "b", "--strict")
-    assert code == 1 and told.startswith(
+    assert err.startswith(
+        f"holozen spawn: warning: {path}, line 1: <mesh> of <link name='l'> (collision) is replaced by a box"
+    )
+    assert err.count("\n") == err.count("gone.stl': ") + 1 == 1
+    code, _, err = run("spawn", path, "--name", "b", "--strict")
+    assert code == 1 and err.startswith(
         f"holozen spawn: {path}, line 1: <mesh> of <link name='l'> (collision): no such"
     )
     assert list(sim.entities) == ["ball"]
 
 
-def test_a_wrong_file_is_told_and_nothing_is_asked(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+def test_a_wrong_file_is_reported_and_no_request_is_sent(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     (tmp_path / "broken.urdf").write_text("<robot>\n<link")
     sim.put("Fred")
-    for name, told in (("gone.urdf", "No such file"), ("broken.urdf", "line 2: broken XML"), (".", "Is a directory")):
-        code, out, said = run("spawn", tmp_path / name, "--name", "Fred", "--replace")
-        assert (code, out, said.count("\n")) == (1, "", 1)
-        assert said.startswith(f"holozen spawn: {tmp_path}") and told in said
+    for name, expected in (
+        ("gone.urdf", "No such file"),
+        ("broken.urdf", "line 2: broken XML"),
+        (".", "Is a directory"),
+    ):
+        code, out, err = run("spawn", tmp_path / name, "--name", "Fred", "--replace")
+        assert (code, out, err.count("\n")) == (1, "", 1)
+        assert err.startswith(f"holozen spawn: {tmp_path}") and expected in err
     assert sim.log == []
 
 
 def test_an_illegal_name_is_refused(sim: FakeSim, run: Run, tmp_path: Path) -> None:
-    code, _, told = run("spawn", HB_BOT, "--name", "a/b")
-    assert code == 2 and "robot name 'a/b': use a letter" in told
-    code, _, told = run("spawn", ball(tmp_path, name="my robot"))
+    code, _, err = run("spawn", HB_BOT, "--name", "a/b")
+    assert code == 2 and "robot name 'a/b': use a letter" in err
+    code, _, err = run("spawn", ball(tmp_path, name="my robot"))
     assert code == 1
-    assert told.startswith(f"holozen spawn: {tmp_path}/ball.urdf: robot name 'my robot': use a letter")
-    assert told.endswith("; give one with --name\n")
+    assert err.startswith(f"holozen spawn: {tmp_path}/ball.urdf: robot name 'my robot': use a letter")
+    assert err.endswith("; give one with --name\n")
 
 
 @pytest.mark.parametrize(
     "words", [(), ("a.urdf", "b.urdf"), ("a:=1",), ("a.urdf", "-x", "far"), ("a.urdf", "-z", "nan")]
 )
-def test_words_that_say_nothing_are_wrong_usage(run: Run, words: tuple[str, ...]) -> None:
-    code, out, told = run("spawn", *words)
-    assert (code, out, told.count("\n")) == (2, "", 1) and told.startswith("holozen spawn: ")
+def test_words_without_meaning_are_wrong_usage(run: Run, words: tuple[str, ...]) -> None:
+    code, out, err = run("spawn", *words)
+    assert (code, out, err.count("\n")) == (2, "", 1) and err.startswith("holozen spawn: ")
 
 
-def test_what_the_sim_refuses_is_told_in_its_own_words(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+def test_what_the_sim_refuses_is_reported_with_its_reason(sim: FakeSim, run: Run, tmp_path: Path) -> None:
     sim.put("ball")
-    told = "there is an entity 'ball' already; --replace takes its place, --name gives another"
-    assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {told}\n")
+    expected = "there is an entity 'ball' already; --replace takes its place, --name gives another"
+    assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {expected}\n")
 
 
-def test_a_robot_with_wheels_and_no_drive_is_told_how_to_move_it(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+def test_a_robot_with_wheels_and_no_drive_is_reported_with_how_to_move_it(
+    sim: FakeSim, run: Run, tmp_path: Path
+) -> None:
     joint = '<joint name="j" type="continuous"><parent link="b&amp;c"/><child link="w"/></joint>'
     path = ball(tmp_path, more=MASSIVE + joint)
     assert "nothing drives it: spawn it with --drive planar_move" in run("spawn", path)[1]
@@ -209,17 +229,17 @@ def test_a_robot_with_wheels_and_no_drive_is_told_how_to_move_it(sim: FakeSim, r
 
 @pytest.mark.parametrize("flag", ["-R", "-P", "-Y"])
 def test_angles_in_degrees_are_refused(run: Run, tmp_path: Path, flag: str) -> None:
-    code, _, said = run("spawn", ball(tmp_path), flag, "90")
-    assert (code, "use a number from -6.2832 to 6.2832 rad" in said) == (2, True)
+    code, _, err = run("spawn", ball(tmp_path), flag, "90")
+    assert (code, "use a number from -6.2832 to 6.2832 rad" in err) == (2, True)
 
 
-def test_without_a_sim_it_says_how_to_start_one(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_a_sim_it_explains_how_to_start_one(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("holozen.entities.NOTICE", 0.2)
-    told = "no sim answered within 0.2 s; start one in another terminal: holozen sim"
-    assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {told}\n")
-    assert run("spawn", ball(tmp_path), "-timeout", "0.1")[2] == f"holozen spawn: {told.replace('0.2', '0.1')}\n"
-    assert run("list") == (1, "", f"holozen list: {told}\n")
-    assert run("delete", "Fred", "Bob") == (1, "", f"holozen delete: {told}\n")
+    expected = "no sim answered within 0.2 s; start one in another terminal: holozen sim"
+    assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {expected}\n")
+    assert run("spawn", ball(tmp_path), "-timeout", "0.1")[2] == f"holozen spawn: {expected.replace('0.2', '0.1')}\n"
+    assert run("list") == (1, "", f"holozen list: {expected}\n")
+    assert run("delete", "Fred", "Bob") == (1, "", f"holozen delete: {expected}\n")
 
 
 def test_replaced_it_keeps_its_place(sim: FakeSim, run: Run, tmp_path: Path) -> None:
@@ -265,8 +285,10 @@ def test_what_the_sim_replaced_is_printed_and_what_was_known_before_is_not(
     code, out, err = run("spawn", ball(tmp_path, more=gone + joint))
     assert (code, out) == (0, "ball stands at 0.000 0.000 0.500\n")
     first, second = err.splitlines()
-    assert first.startswith(f"holozen spawn: {tmp_path}/ball.urdf, line 1: <mesh> of <link name='m'> (collision) is")
-    assert second == f"holozen spawn: the sim: {replaced.format('n')}"
+    assert first.startswith(
+        f"holozen spawn: warning: {tmp_path}/ball.urdf, line 1: <mesh> of <link name='m'> (collision) is"
+    )
+    assert second == f"holozen spawn: warning: the sim: {replaced.format('n')}"
 
 
 def test_from_python_a_file_is_spawned_and_replaced(sim: FakeSim, wire: Wire, tmp_path: Path) -> None:

@@ -1,17 +1,18 @@
-"""`holozen stop` and `holozen release` reach every robot there is, and say so only when it confirmed."""
+"""`holozen stop` and `holozen release` reach every robot there is, and report only what was confirmed."""
 
 import json
 import os
 import socket
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 
 import pytest
 
 from holozen import cli
 from holozen.bus import Bus
 from holozen.cli import stop as stop_module
-from holozen.messages import TriggerReply, TriggerRequest
+from holozen.messages import CommandStatus, TriggerReply, TriggerRequest
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import Server
@@ -21,12 +22,12 @@ Run = Callable[..., tuple[int, str, str]]
 
 
 class Robots:
-    """Robots that only remember that they were called; `refusals` are what they say before they obey."""
+    """Robots that only remember that they were called; `refusals` are their replies before they obey."""
 
     def __init__(self, wire: Wire) -> None:
         self.wire, self.refusals = wire, list[str]()
-        self.told = set[tuple[str, str]]()  # keys, and the sims whose they are
-        self.first_told = threading.Event()
+        self.called = set[tuple[str, str]]()  # keys, and the sims whose they are
+        self.first_called = threading.Event()
         self._servers = list[Server]()
 
     def add(self, *keys: str, wire: str = "json", hangs: bool = False) -> Bus:
@@ -43,8 +44,8 @@ class Robots:
         def answer(_request: TriggerRequest) -> TriggerReply:
             if self.refusals:
                 raise ServiceError(self.refusals.pop())
-            self.told.add((key, sim))
-            self.first_told.set()
+            self.called.add((key, sim))
+            self.first_called.set()
             return TriggerReply(True, "whatever")
 
         return answer
@@ -55,7 +56,25 @@ class Robots:
             server.ends.pop().undeclare()
 
     def keys(self) -> set[str]:
-        return {key for key, _ in self.told}
+        return {key for key, _ in self.called}
+
+
+@contextmanager
+def repeated(bus: Bus, status: CommandStatus) -> Iterator[None]:
+    """The status of the robot at the root, published all the time."""
+    publisher, end = bus.publisher("cmd_vel_status", CommandStatus), threading.Event()
+
+    def publish() -> None:
+        while not end.wait(0.02):
+            publisher.put(status)
+
+    thread = threading.Thread(target=publish)
+    thread.start()
+    try:
+        yield
+    finally:
+        end.set()
+        thread.join()
 
 
 @pytest.fixture
@@ -80,14 +99,16 @@ def test_those_that_are_named_are_stopped_and_no_other(robots: Robots, run: Run)
     assert robots.keys() == {"Ann/stop", "Fred/stop"}
 
 
-@pytest.mark.parametrize(("name", "told"), [("Fred", {"Fred/stop"}), ("", {"Ann/stop", "Fred/stop"})])
-def test_one_that_is_met_later_than_others_is_stopped_too(robots: Robots, run: Run, name: str, told: set[str]) -> None:
+@pytest.mark.parametrize(("name", "expected"), [("Fred", {"Fred/stop"}), ("", {"Ann/stop", "Fred/stop"})])
+def test_one_that_is_met_later_than_others_is_stopped_too(
+    robots: Robots, run: Run, name: str, expected: set[str]
+) -> None:
     robots.add("Ann/stop")
     late = threading.Timer(0.6, robots.add, ["Fred/stop"])
     late.start()
     try:
         assert run("stop", *[name] * bool(name))[0] == 0
-        assert robots.keys() == told
+        assert robots.keys() == expected
     finally:
         late.join()
 
@@ -99,8 +120,8 @@ def test_a_robot_whose_token_is_lost_among_forged_ones_is_stopped(
     key = key_for("stop", place)
     robots.add(key)
     robots.drop_tokens()
-    stranger = robots.wire.bus("stranger")
-    _forged = [stranger.announce("srv", TriggerReply.ROS, f"forged{number}/stop") for number in range(100)]
+    foreign = robots.wire.bus("foreign")
+    _forged = [foreign.announce("srv", TriggerReply.ROS, f"forged{number}/stop") for number in range(100)]
     assert f"{place or 'the robot at the root'} is stopped" in run("stop", *names, "--timeout", "2")[1].splitlines()
     assert robots.keys() == {key}
 
@@ -115,7 +136,7 @@ def test_it_looks_for_robots_until_its_timeout(robots: Robots, run: Run, monkeyp
     late.join()
 
 
-def test_release_says_what_the_sim_says(robots: Robots, run: Run) -> None:
+def test_release_reports_the_sims_reply(robots: Robots, run: Run) -> None:
     robots.add("Fred/stop", "Fred/release")
     assert run("release") == (0, "Fred is released: whatever\n", "")
     assert robots.keys() == {"Fred/release"}
@@ -125,11 +146,22 @@ def test_as_json_it_is_one_object_a_robot(robots: Robots, run: Run) -> None:
     robots.add("stop", "Fred/stop")
     code, out, err = run("stop", "--json")
     rows = sorted((json.loads(line) for line in out.splitlines()), key=lambda row: row["robot"])
-    told = [{"robot": name, "verb": "stop", "confirmed": True, "message": "whatever"} for name in ("", "Fred")]
-    assert (code, rows, err) == (0, told, "")
+    reported = [{"robot": name, "verb": "stop", "confirmed": True, "message": "whatever"} for name in ("", "Fred")]
+    assert (code, rows, err) == (0, reported, "")
 
 
-def test_one_that_does_not_answer_holds_up_no_other_and_is_told(robots: Robots, run: Run) -> None:
+def test_the_robot_at_the_root_goes_by_its_name(robots: Robots, run: Run) -> None:
+    with repeated(robots.add("stop", "Fred/stop"), CommandStatus(name="hb_bot")):
+        for name, key in (("hb_bot", "stop"), ("Fred", "Fred/stop")):
+            robots.called.clear()
+            assert run("stop", name) == (0, f"{name} is stopped\n", "")
+            assert robots.keys() == {key}
+        assert sorted(run("stop")[1].splitlines()) == ["Fred is stopped", "hb_bot is stopped"]
+        assert {json.loads(line)["robot"] for line in run("stop", "--json")[1].splitlines()} == {"Fred", "hb_bot"}
+        assert run("stop", "bot")[2] == "holozen stop: there is no robot 'bot'; there are: hb_bot, Fred\n"
+
+
+def test_one_that_does_not_answer_holds_up_no_other_and_is_reported(robots: Robots, run: Run) -> None:
     robots.add("Ann/stop", hangs=True)
     robots.add("Fred/stop")
     code, out, err = run("stop", "--timeout", "0.8")
@@ -143,26 +175,26 @@ def test_where_two_sims_serve_one_robot_both_have_to_confirm(robots: Robots, run
     robots.add("Fred/stop")
     robots.add("Fred/stop")
     assert run("stop") == (0, "Fred is stopped\n", "")
-    assert len(robots.told) >= 2  # on a busy machine they are asked again
+    assert len(robots.called) >= 2  # on a busy machine they are asked again
     robots.add("Fred/stop", hangs=True)
     wait_for(lambda: run("stop", "--timeout", "0.8")[0] == 1, 30)  # on a busy machine it may be met too late
 
 
 @pytest.mark.parametrize("names", [(), ("Fred",)], ids=["all", "named"])
-def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_told_too(
+def test_a_sim_that_is_met_after_another_confirmed_the_same_robot_is_asked_too(
     robots: Robots, run: Run, names: tuple[str, ...]
 ) -> None:
     robots.add("Fred/stop")
 
     def add() -> None:
-        robots.first_told.wait()
+        robots.first_called.wait()
         robots.add("Fred/stop")
 
     late = threading.Thread(target=add)
     late.start()
     assert run("stop", *names) == (0, "Fred is stopped\n", "")
     late.join()
-    assert len(robots.told) == 2
+    assert len(robots.called) == 2
 
 
 def test_a_robot_that_refuses_is_asked_again(robots: Robots, run: Run) -> None:
@@ -170,8 +202,8 @@ def test_a_robot_that_refuses_is_asked_again(robots: Robots, run: Run) -> None:
     robots.add("Fred/stop")
     assert run("stop") == (0, "Fred is stopped\n", "")
     robots.refusals += ["never"] * 10_000
-    told = "Fred did not confirm within 0.3 s (never); it may move\n"
-    assert run("stop", "--timeout", "0.3") == (1, "", told)
+    expected = "Fred did not confirm within 0.3 s (never); it may move\n"
+    assert run("stop", "--timeout", "0.3") == (1, "", expected)
 
 
 @pytest.mark.parametrize("payload", [b"[]", b"{", b'{"success": 1, "message": ""}', b"\xff"])
@@ -194,13 +226,13 @@ def test_a_name_that_does_not_exist_names_those_that_do(
 ) -> None:
     monkeypatch.setattr(stop_module, "NOTICE", 0.5)
     robots.add("Fred/stop", "stop")
-    told = f"holozen stop: there is no robot {name!r}; there are: the robot at the root, Fred\n"
-    assert run("stop", name) == (1, "", told)
-    assert robots.told == set()
+    expected = f"holozen stop: there is no robot {name!r}; there are: the robot at the root, Fred\n"
+    assert run("stop", name) == (1, "", expected)
+    assert robots.called == set()
     assert run("stop", name, "Fred")[:2] == (1, "Fred is stopped\n")
 
 
-def test_without_a_robot_it_says_so(robots: Robots, run: Run) -> None:
+def test_without_a_robot_it_reports_that(robots: Robots, run: Run) -> None:
     code, out, err = run("stop", "--timeout", "0.1")
     assert (code, out) == (1, "")
     assert err.startswith(f"holozen stop: no nodes found at {robots.wire.endpoint}; ")
@@ -210,7 +242,7 @@ def test_without_a_robot_it_says_so(robots: Robots, run: Run) -> None:
     assert err.startswith("holozen release: no robot was found (where an access control list is in force, ")
 
 
-def test_without_a_router_it_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_router_it_reports_that(capsys: pytest.CaptureFixture[str]) -> None:
     code = cli.main(["stop", "--mode", "client", "--connect", "tcp/127.0.0.1:1", "--timeout", "0.1"])
     out, err = capsys.readouterr()
     assert (code, out, err.count("\n")) == (1, "", 1)

@@ -41,7 +41,7 @@ def test_a_pose_is_given_through_the_frames_between(frames: Frames) -> None:
 
 def test_what_cannot_be_given_is_one_line_with_the_reason(frames: Frames) -> None:
     for source, target, reason in [
-        ("odom", "ldiar", "no frame 'ldiar'; did you mean 'lidar'?; frames: base_link, dock, lidar, map, odom"),
+        ("odom", "ldiar", "no frame 'ldiar' (did you mean 'lidar'?); frames: base_link, dock, lidar, map, odom"),
         ("odom", "dock", "nothing connects 'odom' and 'dock': their roots are 'odom' and 'map'"),
     ]:
         with pytest.raises(LookupError) as error:

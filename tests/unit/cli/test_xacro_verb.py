@@ -34,8 +34,8 @@ def test_arguments_and_an_output_file_are_taken(file: Path, capsys: pytest.Captu
 
 def test_as_json_it_is_one_object(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["xacro", str(file), "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["file"], parse(told["urdf"], file).root) == (str(file), "base_link")
+    shown = json.loads(capsys.readouterr().out)
+    assert (shown["file"], parse(shown["urdf"], file).root) == (str(file), "base_link")
     out = file.with_name("robot.urdf")
     assert main(["xacro", str(file), "-o", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == {"file": str(file), "output": str(out)}
@@ -43,12 +43,12 @@ def test_as_json_it_is_one_object(file: Path, capsys: pytest.CaptureFixture[str]
 
 
 def test_what_fails_is_one_line(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for words, told in [
+    for words, expected in [
         (["no/such.xacro"], "holozen xacro: no/such.xacro: "),
         (["."], "holozen xacro: .: Is a directory\n"),
         (["FILE", "-o", "."], "holozen xacro: cannot write .: Is a directory\n"),
         (["FILE", "-o", "FILE"], "holozen xacro: -o "),
-        (["FILE", "--name", "Fred"], "holozen xacro: --name and --drive are for --watch; "),
+        (["FILE", "--name", "Fred"], "holozen xacro: --name, --drive, -x and -y are for --watch; "),
         (["FILE", "name=Fred"], "holozen xacro: 'name=Fred': write name:=value\n"),
         (["FILE", ":=Fred"], "holozen xacro: ':=Fred': write name:=value\n"),
         (
@@ -59,7 +59,7 @@ def test_what_fails_is_one_line(file: Path, capsys: pytest.CaptureFixture[str]) 
         assert main(["xacro", *(str(file) if word == "FILE" else word for word in words)]) == 1
         out, err = capsys.readouterr()
         assert out == ""
-        assert err.startswith(told)
+        assert err.startswith(expected)
         assert err.count("\n") == 1
 
 
@@ -70,19 +70,27 @@ def test_values_may_stand_on_both_sides_of_the_flags(file: Path, capsys: pytest.
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "expected"),
     [
-        (b"", "robot.xacro, line 1: broken XML: no element found"),
+        (
+            b"",
+            "robot.xacro, line 1: broken XML: no element found; "
+            "close each element, inner ones first: </name>, or /> at the end of its tag",
+        ),
         (b"\x7fELF\xff\x00", "robot.xacro: byte 4 is not UTF-8 text; save the file as UTF-8"),
-        (b"\x00\x00", "robot.xacro, line 1: broken XML: not well-formed (invalid token)"),
+        (
+            b"\x00\x00",
+            "robot.xacro, line 1: broken XML: not well-formed (invalid token); "
+            'write each element as <name attribute="value"> and close it',
+        ),
     ],
 )
 def test_a_file_of_something_else_is_one_line(
-    file: Path, content: bytes, told: str, capsys: pytest.CaptureFixture[str]
+    file: Path, content: bytes, expected: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file.write_bytes(content)
     assert main(["xacro", str(file)]) == 1
-    assert capsys.readouterr() == ("", f"holozen xacro: {file.parent}/{told}\n")
+    assert capsys.readouterr() == ("", f"holozen xacro: {file.parent}/{expected}\n")
 
 
 def test_a_plain_urdf_goes_through_the_library_too(file: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -18,6 +18,7 @@ from holozen.messages import (
     Odometry,
     Point,
     Pose,
+    PoseStamped,
     PoseWithCovariance,
     Quaternion,
     Time,
@@ -49,7 +50,7 @@ class Robot:
         self._time = 0.0
 
     def status(self, **fields: object) -> bool:
-        """Report who drives; whether anyone listens."""
+        """Publish a status of the driver; whether there is a reader."""
         self._status.put(CommandStatus(**fields))  # type: ignore[arg-type]
         return self._status.matched
 
@@ -76,12 +77,12 @@ class Robot:
 
 
 class Case:
-    """A follower, its robot, what it said, and how to run it in a thread."""
+    """A follower, its robot, its reports, and how to run it in a thread."""
 
     def __init__(self, wire: Wire, pool: ThreadPoolExecutor, end: threading.Event) -> None:
-        self.robot, self.stop, self.said = Robot(wire.bus("sim")), threading.Event(), list[str]()
+        self.robot, self.stop, self.reports = Robot(wire.bus("sim")), threading.Event(), list[str]()
         self.bus = wire.bus("controller")
-        self.follower = Follower(self.bus, "", QUICK, self.stop, self.said.append)
+        self.follower = Follower(self.bus, "", QUICK, self.stop, self.reports.append)
         self._pool = pool
         pool.submit(self.robot.live, end)
         self.robot.moving.set()
@@ -90,7 +91,7 @@ class Case:
         return self._pool.submit(self.follower.lap)
 
     def goals(self, last: int = len(GOALS) - 1, fail: Callable[[int], str] = lambda _: "") -> None:
-        """Serve GOALS; `fail` may say why a goal is refused."""
+        """Serve GOALS; `fail` may give a reason to refuse a goal."""
 
         def next_goal(request: NextGoalRequest) -> NextGoalReply:
             if reason := fail(request.request_goal):
@@ -129,34 +130,34 @@ def test_commands_have_the_priority_of_an_autopilot(case: Case) -> None:
     assert samples.recv().priority == "DATA_LOW"
 
 
-def test_it_waits_for_the_service_and_says_so_once(case: Case) -> None:
+def test_it_waits_for_the_service_and_reports_it_once(case: Case) -> None:
     lap = case.lap()
-    wait_for(lambda: case.said)
-    assert "waiting for goal 0: no reply from 'next_goal' within 0.5 s" in case.said[0]
+    wait_for(lambda: case.reports)
+    assert "waiting for goal 0: no reply from 'next_goal' within 0.5 s" in case.reports[0]
     case.goals()
     assert len(lap.result(30)) == 2
-    assert case.said[1:] == ["continues"]
+    assert case.reports[1:] == ["continues"]
 
 
 def test_a_first_goal_that_is_refused_is_asked_for_again(case: Case) -> None:
     reasons = iter(["the list is being read"])
     case.goals(fail=lambda _: next(reasons, ""))
     assert len(case.lap().result(30)) == 2
-    assert case.said == ["goal 0: the list is being read", "continues"]
+    assert case.reports == ["goal 0: the list is being read", "continues"]
 
 
 def test_a_list_that_got_shorter_ends_the_lap(case: Case) -> None:
     case.goals(last=99, fail=lambda number: "the list holds goals 0 to 0" if number else "")
     assert [leg.goal for leg in case.lap().result(30)] == GOALS[:1]
-    assert case.said == ["goal 1: the list holds goals 0 to 0"]
+    assert case.reports == ["goal 1: the list holds goals 0 to 0"]
 
 
-def test_without_odom_it_says_so_and_moves_nothing(case: Case) -> None:
+def test_without_odom_it_reports_that_and_moves_nothing(case: Case) -> None:
     case.robot.moving.clear()
     case.goals()
     lap = case.lap()
-    wait_for(lambda: case.said)
-    assert case.said == ["waiting for odom: it is stale, or none was received"]
+    wait_for(lambda: case.reports)
+    assert case.reports == ["waiting for odom: it is stale, or none was received"]
     assert case.robot.commands.try_recv() is None
     case.robot.moving.set()
     assert len(lap.result(30)) == 2
@@ -167,7 +168,7 @@ def test_when_odom_goes_stale_it_stops_the_robot_once(case: Case) -> None:
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
     case.robot.moving.clear()
-    wait_for(lambda: "waiting for odom: it is stale, or none was received" in case.said)
+    wait_for(lambda: "waiting for odom: it is stale, or none was received" in case.reports)
     *_, last = [received.message for received in iter(case.robot.commands.try_recv, None)]
     assert last == Twist()
     case.robot.moving.set()
@@ -178,12 +179,12 @@ def test_it_yields_to_any_other_driver_and_sends_not_even_a_stop(case: Case) -> 
     wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.follower.status.count)
     case.goals()
     lap = case.lap()
-    wait_for(lambda: case.said)
-    assert "yields to teleop@9; `holozen controller --resume` or the teleop's r resumes" in case.said
+    wait_for(lambda: case.reports)
+    assert "yields to teleop@9; `holozen controller --resume` or the teleop's r resumes" in case.reports
     assert case.robot.heard == []
     case.robot.status(resumed=1)
     assert len(lap.result(30)) == 2
-    assert "continues" in case.said
+    assert "continues" in case.reports
 
 
 def test_a_stopped_robot_is_not_commanded_and_after_the_resume_it_begins_with_a_stop(case: Case) -> None:
@@ -191,9 +192,9 @@ def test_a_stopped_robot_is_not_commanded_and_after_the_resume_it_begins_with_a_
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
-    wait_for(lambda: case.robot.status(stopped="stop@9", held=True) and case.said)
-    assert case.said[-1].startswith("yields: the robot is stopped by stop@9; `holozen release` ends that")
-    wait_for(lambda: case.robot.status(held=True) and case.said[-1].startswith("yields to the stop by stop@9; "))
+    wait_for(lambda: case.robot.status(stopped="stop@9", held=True) and case.reports)
+    assert case.reports[-1].startswith("yields: the robot is stopped by stop@9; `holozen release` ends that")
+    wait_for(lambda: case.robot.status(held=True) and case.reports[-1].startswith("yields to the stop by stop@9; "))
     before = len(case.robot.heard)
     case.robot.status(resumed=1)
     assert len(lap.result(30)) == 2
@@ -207,8 +208,8 @@ def test_a_controller_that_drives_lets_go_without_a_word_when_another_takes_over
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
     case.robot.slips.set()
-    wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.said)
-    assert case.said[-1].startswith("yields to teleop@9; ")
+    wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.reports)
+    assert case.reports[-1].startswith("yields to teleop@9; ")
     case.stop.set()
     assert len(lap.result(30)) < 2
     case.follower.halt()
@@ -221,8 +222,8 @@ def test_a_goal_beyond_any_floor_is_not_driven_to(case: Case) -> None:
 
     case.robot.bus.serve("next_goal", NextGoalRequest, NextGoalReply, next_goal).start()
     lap = case.lap()
-    wait_for(lambda: case.said)
-    assert case.said == ["goal 0 is more than 1e+06 m away; waiting for another"]
+    wait_for(lambda: case.reports)
+    assert case.reports == ["goal 0 is more than 1e+06 m away; waiting for another"]
     case.stop.set()
     assert lap.result(30) == []
     assert case.robot.heard == []
@@ -232,8 +233,8 @@ def test_a_pose_beyond_any_floor_is_not_believed(case: Case) -> None:
     case.robot.pose = (-2e6, 0.0, 0.0)
     case.goals()
     lap = case.lap()
-    wait_for(lambda: case.said)
-    assert case.said == ["waiting for odom: its pose is more than 1e+06 m away"]
+    wait_for(lambda: case.reports)
+    assert case.reports == ["waiting for odom: its pose is more than 1e+06 m away"]
     assert case.robot.heard == []
     case.robot.pose = (0.0, 0.0, 0.0)
     assert len(lap.result(30)) == 2
@@ -261,3 +262,52 @@ def test_asked_to_stop_it_ends_its_lap_and_halts_the_robot(case: Case) -> None:
     stops = case.robot.heard.count(Twist())
     case.follower.halt()
     assert case.robot.heard.count(Twist()) == stops
+
+
+def send(case: Case, x: float, y: float, frame: str = "odom") -> None:
+    goals = case.robot.bus.publisher("goal_pose", PoseStamped)
+    wait_for(lambda: goals.matched)
+    goals.put(PoseStamped(Header(frame_id=frame), Pose(Point(x, y))))
+
+
+def test_a_goal_of_goal_pose_comes_before_the_list_and_the_robot_stays_until_a_resume(case: Case) -> None:
+    case.goals()
+    wait_for(lambda: case.robot.status() and case.follower.status.count)
+    send(case, -0.4, 0.3)
+    lap = case.lap()
+    wait_for(
+        lambda: "yields to a goal of goal_pose; `holozen controller --resume` or the teleop's r resumes" in case.reports
+    )
+    assert any(line.startswith("goal_pose: (-0.40, 0.30) by sim@") for line in case.reports)
+    assert case.robot.pose == pytest.approx((-0.4, 0.3, 0.0), abs=0.03)
+    send(case, -0.4, -0.3)
+    wait_for(lambda: case.reports[-1].startswith("yields") and case.robot.pose[1] < -0.25, what="the next goal")
+    case.robot.status(resumed=1)
+    assert [leg.goal for leg in lap.result(30)] == GOALS
+
+
+def test_a_goal_of_goal_pose_waits_while_another_drives(case: Case) -> None:
+    case.goals()
+    wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.follower.status.count)
+    lap = case.lap()
+    wait_for(lambda: case.reports)
+    send(case, -0.4, 0.3)
+    wait_for(lambda: case.reports[-1].startswith("goal_pose: "))
+    assert case.robot.heard == []
+    case.robot.status(resumed=1)
+    wait_for(lambda: case.reports[-1].startswith("yields to a goal of goal_pose"))
+    assert case.robot.pose == pytest.approx((-0.4, 0.3, 0.0), abs=0.03)
+    case.robot.status(resumed=2)
+    assert len(lap.result(30)) == 2
+
+
+@pytest.mark.parametrize(
+    ("x", "frame", "reason"),
+    [(1.0, "camera", "its frame is 'camera'; give it in 'odom'"), (2e6, "odom", "it is more than 1e+06 m away")],
+)
+def test_a_goal_that_cannot_be_meant_is_refused(case: Case, x: float, frame: str, reason: str) -> None:
+    case.goals()
+    lap = case.lap()
+    send(case, x, 0.0, frame)
+    wait_for(lambda: f"goal_pose: refused: {reason}" in case.reports)
+    assert [leg.goal for leg in lap.result(30)] == GOALS

@@ -66,13 +66,13 @@ def test_an_old_resume_is_none(policy: YieldPolicy) -> None:
     assert policy.yielded_to == PERSON
 
 
-def test_a_person_who_drives_right_after_the_resume_is_yielded_to(policy: YieldPolicy) -> None:
+def test_a_person_driving_right_after_the_resume_is_yielded_to(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(obeyed=PERSON, held=True))
     policy.update(CommandStatus(obeyed=PERSON, held=True, resumed=1))
     assert policy.yielded_to == PERSON
 
 
-def test_a_sim_that_was_started_again_forgets_who_drove_but_the_controller_does_not(policy: YieldPolicy) -> None:
+def test_a_restarted_sim_forgets_the_driver_but_the_controller_does_not(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(resumed=2))
     policy.update(CommandStatus(obeyed=PERSON, held=True, resumed=2))
     policy.update(CommandStatus(resumed=0))
@@ -81,7 +81,7 @@ def test_a_sim_that_was_started_again_forgets_who_drove_but_the_controller_does_
     assert policy.yielded_to == ""
 
 
-def test_it_yields_to_a_software_stop_and_says_what_frees_the_robot(policy: YieldPolicy) -> None:
+def test_it_yields_to_a_software_stop_and_reports_what_frees_the_robot(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(obeyed=ME))
     assert policy.reason == ""
     policy.update(CommandStatus(held=True, stopped="stop@3"))

@@ -9,7 +9,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from holozen.messages.definitions import Field, Interface
 
 
-class Stranger:
+class Rosbags:
     """rosbags, with values as plain dicts. Types that it does not have are taught to it as text."""
 
     def __init__(self) -> None:
@@ -52,9 +52,9 @@ class Stranger:
         return np.array(value, dtype={"byte": "uint8", "char": "uint8"}.get(field.type, field.type))
 
     def _plain(self, interface: Interface, message: Any) -> dict[str, Any]:
-        return {field.name: self._told(field, getattr(message, field.name)) for field in interface.fields}
+        return {field.name: self._plain_value(field, getattr(message, field.name)) for field in interface.fields}
 
-    def _told(self, field: Field, value: Any) -> Any:
+    def _plain_value(self, field: Field, value: Any) -> Any:
         if field.nested:
             many = [self._plain(field.nested, each) for each in (value if field.array else [value])]
             return many if field.array else many[0]
@@ -62,5 +62,5 @@ class Stranger:
 
 
 @pytest.fixture(scope="module")
-def stranger() -> Stranger:
-    return Stranger()
+def rosbags() -> Rosbags:
+    return Rosbags()

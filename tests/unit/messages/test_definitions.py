@@ -73,7 +73,7 @@ def test_a_constant_is_read() -> None:
         assert section(line) == Section((), (constant,))
 
 
-def test_comments_blank_lines_and_line_ends_say_nothing() -> None:
+def test_comments_blank_lines_and_line_ends_are_ignored() -> None:
     assert section("# all\r\n\r\n   # of it\nbool a # isn't\r\n\tbool b\n") == Section(
         (Field("a", "bool"), Field("b", "bool")), ()
     )
@@ -85,7 +85,7 @@ def test_a_service_has_two_sections() -> None:
     assert parse("---", "X.srv", resolve) == [Section((), ())] * 2
 
 
-def test_a_wrong_line_is_told_with_file_and_line() -> None:
+def test_a_wrong_line_is_reported_with_file_and_line() -> None:
     for line, reason in [
         ("float64", "'float64' is not a field; write TYPE NAME, TYPE NAME DEFAULT or TYPE NAME=VALUE"),
         ("float64 2x", "'float64 2x' is not a field"),
@@ -198,11 +198,11 @@ def test_pairs_may_be_written_as_a_mapping() -> None:
     )
 
 
-def test_what_does_not_fit_is_told_with_its_path() -> None:
+def test_what_does_not_fit_is_reported_with_its_path() -> None:
     rows: list[tuple[Any, str]] = [
         ([], "t/msg/All: [] is not a mapping of fields"),
         (None, "t/msg/All: None is not a mapping of fields"),
-        ({"txet": ""}, "t/msg/All has no field 'txet'; did you mean 'text'?"),
+        ({"txet": ""}, "t/msg/All has no field 'txet' (did you mean 'text'?)"),
         ({"at": {"z": 1}}, "t/msg/Point has no field 'at.z'; it has x, y"),
         ({1: 2}, "t/msg/All has no field '1'"),
         ({"on": 1}, "on: 1 is not a valid bool"),

@@ -1,4 +1,4 @@
-"""Types are found by name, in our tables and in packages; a wrong name is told with the closest right one."""
+"""Types are found by name, in our tables and in packages; a wrong name is reported with the closest right one."""
 
 from pathlib import Path
 
@@ -105,14 +105,14 @@ def test_a_package_that_is_given_comes_before_ours(lesson: Path) -> None:
     assert Registry({"geometry_msgs": lesson}).find("geometry_msgs/msg/Twist").fields == (Field("mine", "bool"),)
 
 
-def test_a_wrong_name_is_told_with_the_closest(lesson: Path) -> None:
+def test_a_wrong_name_is_reported_with_the_closest(lesson: Path) -> None:
     for name, reason in [
-        ("geometry_msgs/msg/Twsit", "no type 'geometry_msgs/msg/Twsit'; did you mean 'geometry_msgs/msg/Twist'?"),
-        ("geometry_msgs/msg/TWIST", "; did you mean 'geometry_msgs/msg/Twist'?"),
+        ("geometry_msgs/msg/Twsit", "no type 'geometry_msgs/msg/Twsit' (did you mean 'geometry_msgs/msg/Twist'?)"),
+        ("geometry_msgs/msg/TWIST", " (did you mean 'geometry_msgs/msg/Twist'?)"),
         ("rosgraph_msgs/msg/Zzzzz", "; known: rosgraph_msgs/msg/Clock"),
-        ("geometry_msg/msg/Twist", "no package 'geometry_msg' with interfaces; did you mean 'geometry_msgs'?"),
+        ("geometry_msg/msg/Twist", "no package 'geometry_msg' with interfaces (did you mean 'geometry_msgs'?)"),
         ("lesson/srv/NextGoal", "; give its folder: --package lesson=DIR"),
-        ("Twist", "'Twist' is not a type: the package is missing; did you mean 'geometry_msgs/msg/Twist'?"),
+        ("Twist", "'Twist' is not a type: the package is missing (did you mean 'geometry_msgs/msg/Twist'?)"),
         ("Zwist", "the package is missing; `holozen interface list` lists all"),
         ("a/msg/../B", "'a/msg/../B' is not a type; write PACKAGE/msg/NAME"),
         ("../a/b", "is not a type"),
@@ -125,27 +125,27 @@ def test_a_wrong_name_is_told_with_the_closest(lesson: Path) -> None:
 
 def test_a_wrong_name_is_looked_up_once(lesson: Path) -> None:
     registry = Registry({"lesson": lesson})
-    told = refusal(registry, "lesson/msg/New")
+    message = refusal(registry, "lesson/msg/New")
     (lesson / "msg" / "New.msg").write_text("bool a\n")
-    assert refusal(registry, "lesson/msg/New") == told
+    assert refusal(registry, "lesson/msg/New") == message
     assert Registry({"lesson": lesson}).find("lesson/msg/New").fields == (Field("a", "bool"),)
 
 
 def test_an_error_names_some_of_many_types(lesson: Path) -> None:
     for number in range(30):
         (lesson / "msg" / f"Many{number:02}.msg").touch()
-    told = refusal(Registry({"lesson": lesson}), "lesson/msg/Zzz")
-    assert "; known: lesson/msg/Many00, " in told
-    assert told.endswith("lesson/msg/Many19 and 13 more")
+    message = refusal(Registry({"lesson": lesson}), "lesson/msg/Zzz")
+    assert "; known: lesson/msg/Many00, " in message
+    assert message.endswith("lesson/msg/Many19 and 13 more")
 
 
-def test_a_wrong_line_of_a_nested_type_is_told_where_it_is(lesson: Path) -> None:
+def test_a_wrong_line_of_a_nested_type_is_reported_with_its_place(lesson: Path) -> None:
     (lesson / "msg" / "Spot.msg").write_text("# a spot\nflot64 x\n")
-    told = refusal(Registry({"lesson": lesson}), "lesson/msg/Where")
-    assert told.startswith(f"{lesson}/msg/Spot.msg:2: no type 'lesson/msg/flot64'")
+    message = refusal(Registry({"lesson": lesson}), "lesson/msg/Where")
+    assert message.startswith(f"{lesson}/msg/Spot.msg:2: no type 'lesson/msg/flot64'")
 
 
-def test_what_is_no_definition_is_told_with_its_file(lesson: Path) -> None:
+def test_what_is_no_definition_is_reported_with_its_file(lesson: Path) -> None:
     for file, text, reason in [
         ("msg/Spot.msg", "Spot other", "lesson/msg/Spot contains itself: lesson/msg/Spot > lesson/msg/Spot"),
         ("msg/Spot.msg", "Where other", "contains itself"),
@@ -172,7 +172,7 @@ def test_types_that_are_nested_too_deeply_are_refused(lesson: Path) -> None:
     assert "nested more than 50 deep" in refusal(Registry({"lesson": lesson}), "lesson/msg/T299")
 
 
-def test_files_that_cannot_be_read_are_told(lesson: Path) -> None:
+def test_unreadable_files_are_reported(lesson: Path) -> None:
     import os
 
     (lesson / "msg" / "Latin.msg").write_bytes(b"string a \xff\n")

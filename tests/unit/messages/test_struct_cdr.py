@@ -1,4 +1,4 @@
-"""Our own messages as CDR have the exact types of ROS, and what does not fit them is told by field."""
+"""Our own messages as CDR have the exact types of ROS, and what does not fit them is reported by field."""
 
 import math
 from typing import Any
@@ -11,7 +11,7 @@ from holozen.messages import cdr, struct_cdr
 from holozen.messages import simulation_interfaces as s
 from holozen.messages.codec import WIRES, CodecError, decode, encode, encoding
 from holozen.messages.message import not_finite
-from tests.unit.messages.conftest import Stranger
+from tests.unit.messages.conftest import Rosbags
 
 TF = m.TFMessage(
     [m.TransformStamped(m.Header(m.Time(1, 2), "odom"), "base"), m.TransformStamped(child_frame_id="wheel")]
@@ -26,22 +26,22 @@ MESSAGES: list[m.Message] = [
 ]  # fmt: skip
 
 
-def test_another_library_reads_and_writes_our_messages(stranger: Stranger) -> None:
+def test_another_library_reads_and_writes_our_messages(rosbags: Rosbags) -> None:
     for message in MESSAGES:
         interface, value = struct_cdr.interface(type(message)), msgspec.to_builtins(message)
         payload = encode(message, "cdr")
-        assert payload == stranger.write(interface, value) == cdr.write(interface, value)
-        assert stranger.read(interface, payload) == value
+        assert payload == rosbags.write(interface, value) == cdr.write(interface, value)
+        assert rosbags.read(interface, payload) == value
         for little_endian in (True, False):
-            theirs = stranger.write(interface, value, little_endian)
+            theirs = rosbags.write(interface, value, little_endian)
             assert decode(theirs, "application/cdr", (type(message),)) == message
 
 
-def test_counts_by_reason_are_pairs(stranger: Stranger) -> None:
+def test_counts_by_reason_are_pairs(rosbags: Rosbags) -> None:
     status = m.CommandStatus(obeyed="teleop", refused={"late": 3, "malformed": 2**63}, sources=[m.CommandSource("a")])
     payload = encode(status, "cdr")
-    told = stranger.read(struct_cdr.interface(m.CommandStatus), payload)
-    assert told["refused"] == [{"reason": "late", "count": 3}, {"reason": "malformed", "count": 2**63}]
+    reported = rosbags.read(struct_cdr.interface(m.CommandStatus), payload)
+    assert reported["refused"] == [{"reason": "late", "count": 3}, {"reason": "malformed", "count": 2**63}]
     assert decode(payload, "application/cdr", (m.CommandStatus,)) == status
 
 
@@ -67,15 +67,15 @@ def test_another_type_with_the_same_layout_is_refused_by_its_name() -> None:
         decode(accel, "application/cdr;geometry_msgs/msg/Accel", (m.Twist, m.TwistStamped))
 
 
-def test_a_schema_that_names_no_type_says_nothing() -> None:
+def test_a_schema_that_names_no_type_is_ignored() -> None:
     for schema in ["", ";", ";Twist", ";a b c", ";" + "x" * 5000]:
         assert decode(encode(m.Twist.planar(1), "cdr"), f"application/cdr{schema}", (m.Twist,)) == m.Twist.planar(1)
 
 
-@pytest.mark.parametrize("said", ["", "zenoh/bytes"])
-def test_cdr_that_does_not_say_so_is_seen(said: str) -> None:
+@pytest.mark.parametrize("expected", ["", "zenoh/bytes"])
+def test_cdr_without_its_encoding_is_recognised(expected: str) -> None:
     """Bridges to ROS 2 give their samples no Encoding."""
-    assert decode(encode(m.Twist.planar(1), "cdr"), said, (m.Twist,)) == m.Twist.planar(1)
+    assert decode(encode(m.Twist.planar(1), "cdr"), expected, (m.Twist,)) == m.Twist.planar(1)
 
 
 def test_numbers_within_a_field_are_held_to_its_range() -> None:
@@ -84,7 +84,7 @@ def test_numbers_within_a_field_are_held_to_its_range() -> None:
         decode(payload, "application/cdr", (m.Clock,))
 
 
-def test_a_nan_in_cdr_reaches_the_reader_who_has_to_look() -> None:
+def test_a_nan_in_cdr_reaches_the_reader_which_must_check_for_it() -> None:
     payload = cdr.write(struct_cdr.interface(m.Twist), {"linear": {"x": math.nan}})
     assert not_finite(decode(payload, "application/cdr", (m.Twist,))) == "linear.x"
 
@@ -100,7 +100,7 @@ def test_large_numbers_are_finite_even_where_their_sum_is_not() -> None:
     assert decode(encode(state, "cdr"), "application/cdr", (m.JointState,)) == state
 
 
-def test_a_value_that_does_not_fit_is_told_with_its_field() -> None:
+def test_a_value_that_does_not_fit_is_reported_with_its_field() -> None:
     for message, reason in [
         (m.NextGoalRequest(2**63), "NextGoalRequest: request_goal: 9223372036854775808 is not a valid int64"),
         (m.Twist(m.Vector3(x="fast")), "Twist: linear.x: 'fast' is not a valid float64"),  # type: ignore[arg-type]

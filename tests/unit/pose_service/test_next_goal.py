@@ -14,13 +14,13 @@ def test_a_goal_is_handed_out_by_its_number() -> None:
     assert next_goal(GOALS, NextGoalRequest(1)) == NextGoalReply(4.0, 5.0, 6.0, 0)
 
 
-def test_the_last_one_says_so() -> None:
+def test_the_last_one_is_marked() -> None:
     assert next_goal(GOALS, NextGoalRequest(2)) == NextGoalReply(7.0, 8.0, 9.0, 1)
     assert next_goal(GOALS[:1], NextGoalRequest(0)).end_of_list == 1
 
 
 @pytest.mark.parametrize("number", [-1, 3, 2**63 - 1, -(2**63)])
-def test_past_either_end_is_an_error_that_says_what_there_is(number: int) -> None:
+def test_past_either_end_is_an_error_with_the_valid_range(number: int) -> None:
     with pytest.raises(ServiceError) as error:
         next_goal(GOALS, NextGoalRequest(number))
     assert str(error.value) == f"goal {number}: the list holds goals 0 to 2"

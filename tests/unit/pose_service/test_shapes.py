@@ -1,4 +1,4 @@
-"""Shapes are closed tours with the sizes they say; a file of goals is read or refused with its line."""
+"""Shapes are closed tours of the given sizes; a file of goals is read or refused with its line."""
 
 import math
 from itertools import pairwise
@@ -42,7 +42,7 @@ def test_a_polygon_has_its_corners_and_its_sides(name: str, count: int) -> None:
     assert sides(goals) == pytest.approx(expected)
 
 
-def test_a_shape_is_as_wide_and_high_as_it_says() -> None:
+def test_a_shape_is_as_wide_and_high_as_its_parameters() -> None:
     rows = [("square", 2, 2), ("triangle", 2, math.sqrt(3)), ("rectangle", 2, 1), ("hexagon", 4, 2 * math.sqrt(3)),
      ("infinity", 4, 2)]  # fmt: skip
     for name, width, height in rows:

@@ -72,8 +72,8 @@ def test_more_warnings_than_anyone_reads_are_cut() -> None:
 
 def test_the_nearest_name_is_reported_whatever_its_case() -> None:
     source = Source(Path("r.urdf"), {})
-    assert source.suggest("chasis", ["wheel", "chassis"]) == "; did you mean 'chassis'?"
-    assert source.suggest("WHEEL", ["wheel", "chassis"]) == "; did you mean 'wheel'?"
+    assert source.suggest("chasis", ["wheel", "chassis"]) == " (did you mean 'chassis'?)"
+    assert source.suggest("WHEEL", ["wheel", "chassis"]) == " (did you mean 'wheel'?)"
     assert source.suggest("xyz", ["wheel", "chassis"]) == ""
 
 
@@ -82,16 +82,16 @@ def test_what_names_have_in_common_makes_them_no_nearer() -> None:
         return kind.removeprefix("gazebo_ros_")
 
     source, known = Source(Path("r.urdf"), {}), ["gazebo_ros_imu", "gazebo_ros_planar_move"]
-    assert source.suggest("gazebo_ros_foo", known) == "; did you mean 'gazebo_ros_imu'?"
+    assert source.suggest("gazebo_ros_foo", known) == " (did you mean 'gazebo_ros_imu'?)"
     assert source.suggest("gazebo_ros_foo", known, own_name, alike=0.8) == ""
     found = source.suggest("gazebo_ros_planarmove", known, own_name, alike=0.8)
-    assert found == "; did you mean 'gazebo_ros_planar_move'?"
+    assert found == " (did you mean 'gazebo_ros_planar_move'?)"
 
 
 def test_guessing_ends_in_a_file_of_nothing_but_mistakes() -> None:
     source = Source(Path("r.urdf"), {})
     message = [source.suggest("whel", ["wheel"]) for _ in range(MOST_GUESSES + 1)]
-    assert message == ["; did you mean 'wheel'?"] * MOST_GUESSES + [""]
+    assert message == [" (did you mean 'wheel'?)"] * MOST_GUESSES + [""]
 
 
 HEADER = '<?xml version="1.0"?>'

@@ -89,7 +89,7 @@ def test_spellings_that_people_use_are_understood() -> None:
         assert drive(tags) == expected
 
 
-def test_of_two_equal_tags_the_first_counts_and_an_empty_one_says_nothing() -> None:
+def test_of_two_equal_tags_the_first_counts_and_an_empty_one_has_no_effect() -> None:
     tags = "<odometryRate>30</odometryRate><odometryRate>40</odometryRate><odometryFrame> </odometryFrame>"
     assert (drive(tags).odometry_rate, drive(tags).odometry_frame) == (30, "odom")
 
@@ -102,7 +102,9 @@ def test_a_negative_timeout_switches_the_watchdog_off() -> None:
 def test_a_base_frame_that_is_no_link_is_reported_and_the_root_is_taken() -> None:
     model = robot(plugin("<robotBaseFrame>chasis</robotBaseFrame>"))
     assert model.drive is not None and model.drive.robot_base_frame == "base"
-    message = "<plugin name='drive'> names the base frame 'chasis', which is not a link; 'base' is used"
+    message = (
+        "<robotBaseFrame> of <plugin name='drive'> names the base frame 'chasis', which is not a link; 'base' is used"
+    )
     assert model.warnings == (f"{ORIGIN}, line 3: {message}",)
 
 
@@ -114,13 +116,12 @@ def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it() ->
         ),
         ("libgazebo_ros_joint_state_publisher.so", "is not supported; joint_states is published anyway"),
         ("libgazebo_ros_p3d.so", "is not supported; odom and tf are published anyway"),
-        ("gz-sim-sensors-system", "is not supported; sensors are not simulated yet"),
+        ("gz-sim-physics-system", "is not supported; the sim does this itself"),
         (
             "libgz_ros2_control-system.so",
             "is not supported; joint_states is published anyway, and joints follow joint_command",
         ),
-        ("libgazebo_ros_force.so", "is not supported; nothing else applies a force"),
-        ("libgazebo_ros_planarmove.so", "is unknown and is ignored; did you mean 'gazebo_ros_planar_move'?"),
+        ("libgazebo_ros_planarmove.so", "is unknown and is ignored (did you mean 'gazebo_ros_planar_move'?)"),
         ("libsomething_else.so", "is unknown and is ignored"),
         ("libgazebo_ros_magic_wand.so", "is unknown and is ignored"),
         ("libmecanum.so", "is unknown and is ignored"),

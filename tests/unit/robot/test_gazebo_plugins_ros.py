@@ -209,7 +209,7 @@ def test_a_mistake_is_refused_with_the_tag_and_what_there_is() -> None:
         ("<leftJoint>fl</leftJoint>", "<plugin name='p'> has no <right_joint>; joints"),
         (
             "<leftJoint>FL</leftJoint><rightJoint>fr</rightJoint>",
-            "<leftJoint> of <plugin name='p'> names the joint 'FL', which does not exist; did you mean 'fl'?; "
+            "<leftJoint> of <plugin name='p'> names the joint 'FL', which does not exist (did you mean 'fl'?); "
             "joints: fl, fr, rl, rr, stiff",
         ),
         (

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import load, parse, portable
 from holozen.robot.meshes import hull
-from holozen.robot.model import Drive, Inertial, Limits, Link, Pose, RobotModel, Shape, planar_drive
+from holozen.robot.model import Drive, Inertial, Limits, Link, Omni, Pose, RobotModel, Shape, driven
 from tests.students import MIXED, ROS_1, ROS_2, hb_bot, workspace
 
 REPO = Path(__file__).parents[3]
@@ -258,7 +258,7 @@ def test_a_long_value_is_cut_and_an_error_outside_all_elements_stands_alone() ->
     assert f"value: '{'9' * 79}x' is not a finite number" in refusal(inertial(mass="9" * 79 + "x"))
     with pytest.raises(RobotError) as error:
         parse("just text", ORIGIN)
-    assert str(error.value) == f"{ORIGIN}, line 1: broken XML: syntax error"
+    assert str(error.value).startswith(f"{ORIGIN}, line 1: broken XML: syntax error; write each element as")
 
 
 def test_a_mass_of_zero_is_reported() -> None:
@@ -330,9 +330,12 @@ def test_dynamics_of_a_joint_are_read() -> None:
 
 
 def test_a_robot_without_drive_gets_planar_move_on_its_root_and_one_with_a_drive_keeps_it() -> None:
-    model = planar_drive(robot('<link name="a"/>'))
+    model = driven(robot('<link name="a"/>'), "planar_move")
     assert model.drive == Drive(robot_base_frame="a")
-    assert planar_drive(model) is model
+    assert driven(model, "planar_move") is model
+    omni = driven(model, "omni").drive
+    assert omni == Drive(robot_base_frame="a", mechanism=Omni())
+    assert driven(driven(model, "omni"), "omni").drive == omni
 
 
 def test_an_sdf_text_is_read_as_one() -> None:
@@ -441,9 +444,15 @@ def sent(folder: Path, text: str, name: str = "robot.urdf") -> tuple[str, tuple[
     return portable(folder / name, packages={"p": folder})
 
 
-def test_only_the_uris_of_collision_meshes_are_replaced(folder: Path) -> None:
+def without_files(text: str, uri: str) -> str:
+    """The text with its whole files replaced by a URI again."""
+    return re.sub(r"data:model/stl\+gzip;base64,[\w+/=]+", uri, text)
+
+
+def test_only_the_uris_of_meshes_are_replaced(folder: Path) -> None:
     text, warnings = sent(folder, URDF % "box.stl")
     assert warnings == ()
+    text = without_files(text, "box.stl")
     assert len(DATA.findall(text)) == 2
     first, second = DATA.finditer(text)
     assert (
@@ -465,7 +474,7 @@ def test_elsewhere_it_has_the_hulls_that_it_has_here(folder: Path) -> None:
 def test_an_sdf_file_is_sent_with_its_hulls_too(folder: Path) -> None:
     text, warnings = sent(folder, SDF, "model.sdf")
     assert warnings == ()
-    assert re.sub(DATA, " model://p/box.stl ", text) == SDF
+    assert re.sub(DATA, " model://p/box.stl ", without_files(text, "box.stl")) == SDF
     (shape,) = parse(text, ELSEWHERE, confined=True).links["a"].collisions
     assert set(shape.points) == set(hull(folder / "box.stl", (2, 2, 2)))
 
@@ -564,19 +573,19 @@ def test_a_file_saved_on_windows_loads_as_well(home: Path, ends: str, mark: str)
     [
         (
             {"frame": "chasis"},
-            "<plugin name='object_controller'> names the base frame 'chasis', which is not a link; "
+            "<robotBaseFrame> of <plugin name='object_controller'> names the base frame 'chasis', which is not a link; "
             "'footprint_link' is used",
         ),
         (
             {"extra": '<gazebo reference="chasis"><mu1>1</mu1></gazebo>'},
-            "<gazebo> of <robot name='hb_bot'> reference='chasis' names no link and no joint; "
-            "did you mean 'chassis'?; it is left out; "
+            "<gazebo reference='chasis'> names no link and no joint "
+            "(did you mean 'chassis'?); it is left out; "
             "links: chassis, footprint_link, front, left, right",
         ),
         (
             {"extra": '<gazebo reference="chassis"><material>Gazebo/Organe</material></gazebo>'},
-            "<material> of <robot name='hb_bot'> names the colour 'Gazebo/Organe', which Gazebo does not have; "
-            "did you mean 'Gazebo/Orange'?",
+            "<material> of <gazebo reference='chassis'> names the colour 'Gazebo/Organe', which Gazebo does not have "
+            "(did you mean 'Gazebo/Orange'?)",
         ),
         (
             {"extra": '<gazebo><plugin name="c" filename="libgazebo_ros_control.so"/></gazebo>'},
@@ -584,12 +593,12 @@ def test_a_file_saved_on_windows_loads_as_well(home: Path, ends: str, mark: str)
             "joint_states is published anyway, and joints follow joint_command",
         ),
         (
-            {"extra": '<gazebo reference="chassis"><sensor type="camera" name="eye"/></gazebo>'},
-            "<sensor name='eye'> (camera) is not simulated yet",
+            {"extra": '<gazebo reference="chassis"><sensor type="gps" name="eye"/></gazebo>'},
+            "<sensor name='eye'> (gps) is not simulated",
         ),
         (
             {"extra": '<transmission name="t"><joint name="font_joint"/></transmission>'},
-            "<transmission name='t'> names the joint 'font_joint', which does not exist; did you mean 'front_joint'?; "
+            "<transmission name='t'> names the joint 'font_joint', which does not exist (did you mean 'front_joint'?); "
             "it is left out",
         ),
         (
@@ -619,3 +628,28 @@ def test_a_second_plugin_of_the_lesson_is_reported(home: Path) -> None:
     assert model.drive == DRIVE
     (warning,) = model.warnings
     assert warning.endswith("<plugin name='object_controller'> is a second drive; only the first one drives")
+
+
+def test_a_plain_file_whose_elements_use_xacro_is_expanded_as_by_ros_and_a_comment_is_not_xacro(tmp_path: Path) -> None:
+    """As ROS's launch files do, whatever its name is; so the sim, `spawn` and `check` read the same robot."""
+    path = tmp_path / "robot.urdf"
+    path.write_text('<robot name="r${1+1}"><!-- ${foo} --><link name="a"/></robot>')
+    assert load(path).name == "r2"
+    path.write_text('<robot name="r"><!-- ${foo} --><link name="a"/></robot>')
+    assert load(path).name == "r"
+    path.write_text('<robot name="${foo}"><link name="a"/></robot>')
+    with pytest.raises(RobotError, match="'foo' is not defined"):
+        load(path)
+
+
+def test_a_warning_of_the_expansion_is_one_of_the_models(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "colours.xacro").write_text("<robot/>")
+    path = tmp_path / "robot.xacro"
+    path.write_text(
+        '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><xacro:include filename="/other/colours.xacro"/>'
+        '<link name="a"/></robot>'
+    )
+    (warning,) = load(path).warnings
+    portable(path)
+    assert "there is no file '/other/colours.xacro'" in warning
+    assert capsys.readouterr().err == "", "its caller prints it, once"

@@ -56,7 +56,7 @@ def test_anything_else_is_reported_and_left_out() -> None:
 
 @pytest.mark.parametrize("word", ["Black", "Gazebo/black", "gazebo/Blck", "BLACK"])
 def test_a_misspelt_name_of_gazebo_is_met_with_the_nearest(word: str) -> None:
-    assert nearest_gazebo(word, source()) == "; did you mean 'Gazebo/Black'?"
+    assert nearest_gazebo(word, source()) == " (did you mean 'Gazebo/Black'?)"
 
 
 ORIGIN = Path("somewhere/robot.urdf")
@@ -99,7 +99,7 @@ def test_an_undefined_material_causes_a_warning_with_the_nearest_one() -> None:
     model = robot('<material name="blak"/>', around=f'<material name="black">{RED}</material>')
     assert colors(model) == [None]
     assert message(model) == [
-        "2: <material name='blak'> has no colour, neither here nor in <robot>; did you mean 'black'?"
+        "2: <material name='blak'> has no colour, neither here nor in <robot> (did you mean 'black'?)"
     ]
 
 
@@ -146,11 +146,11 @@ def test_a_colour_that_gazebo_does_not_know_is_reported_and_urdfs_stays() -> Non
     model = robot(f'<material name="x">{RED}</material>', around=gazebo)
     assert colors(model) == [(1, 0, 0, 1)]
     assert message(model) == [
-        "3: <material> of <robot name='r'> names the colour 'Gazebo/Gren', which Gazebo does not have; "
-        "did you mean 'Gazebo/Green'?"
+        "3: <material> of <gazebo reference='a'> names the colour 'Gazebo/Gren', which Gazebo does not have "
+        "(did you mean 'Gazebo/Green'?)"
     ]
 
 
-def test_an_empty_material_of_gazebo_says_nothing() -> None:
+def test_an_empty_material_of_gazebo_has_no_effect() -> None:
     model = robot(f'<material name="x">{RED}</material>', around='<gazebo reference="a"><material/></gazebo>')
     assert (colors(model), model.warnings) == ([(1, 0, 0, 1)], ())

@@ -156,7 +156,7 @@ def test_a_file_that_may_not_be_read_is_reported(cube: Path, monkeypatch: pytest
     def refuse(*_words: object) -> None:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("builtins.open", refuse)  # root, as whom many tests run, may read everything
+    monkeypatch.setattr("builtins.open", refuse)  # many tests run as root, which may read everything
     assert refusal(cube) == f"{cube}: Permission denied"
 
 

@@ -132,8 +132,8 @@ def test_a_missing_package_is_named_with_those_found_and_the_places_searched(
     searched = ("opt/ament", "opt/ros", "src/holo", "src", "")
     assert str(error.value) == (
         f"{start}: there is no package 'hollo'; packages found: from_ros, given, holo, wheels; looked in"
-        f" {', '.join(str(home / folder) for folder in searched)}; give its folder: --package hollo=DIR;"
-        " did you mean 'holo'?"
+        f" {', '.join(str(home / folder) for folder in searched)}; give its folder: --package hollo=DIR"
+        " (did you mean 'holo'?)"
     )
 
 
@@ -302,7 +302,7 @@ def test_a_model_is_found_beside_the_folders_that_the_robot_lies_in(
 def test_what_was_taken_for_another_file_is_reported(start: Path, home: Path) -> None:
     message: list[str] = []
     found = resolve_uri("/home/asha/wheel.stl", start, warn=message.append)
-    write = "$(find wheels)/meshes/wheel.stl"
+    write = "package://wheels/meshes/wheel.stl"
     assert message == [
         f"there is no file '/home/asha/wheel.stl'; {found}, which has the same name, is used; write {write}"
     ]

@@ -40,7 +40,7 @@ def tensor_of_points(masses: Array, points: Array) -> Array:
 
 
 def inertial_of_points(masses: Array, points: Array, rpy: tuple[float, float, float]) -> Inertial:
-    """What a file would say of a link made of these points, with its inertial frame turned by `rpy`."""
+    """The inertial element of a link made of these points, with its frame turned by `rpy`."""
     turn = matrix_of(rpy)
     inertia = turn.T @ tensor_of_points(masses, points) @ turn
     centre = masses @ points / masses.sum()

@@ -98,7 +98,7 @@ def test_the_parts_weigh_what_the_robot_does() -> None:
     assert sum(part.body.mass for part in assemble(model)) == pytest.approx(lump(model).mass)
 
 
-def test_a_part_touches_as_its_link_that_says_how() -> None:
+def test_a_part_touches_as_its_link_defines() -> None:
     smooth, rough = Surface(mu1=0.1), Surface(mu1=2.0)
     links = [link("base"), link("sensor", 0.1, rough, touches=False), link("skin", 0.1, smooth)]
     joints = [joint(f"f{name}", "base", name, "fixed") for name in ("sensor", "skin")]

@@ -50,7 +50,7 @@ def test_the_lowest_of_all_shapes_counts() -> None:
     assert lowest(model(Shape("sphere", (0.5,), Pose()), low, Shape("plane", (1, 1), Pose()))) == -2.5
 
 
-def test_a_mesh_is_as_low_as_its_file_says(tmp_path: Path) -> None:
+def test_a_mesh_is_as_low_as_its_file_has_it(tmp_path: Path) -> None:
     trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
     assert lowest(model(Shape("mesh", (1, 1, 2), Pose(), tmp_path / "box.stl"))) == pytest.approx(-2)
 

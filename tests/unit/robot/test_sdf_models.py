@@ -56,7 +56,7 @@ def test_what_an_inertial_leaves_out_is_1() -> None:
     assert only_link("<inertial/>").inertial == Inertial(Pose(), 1.0, (1, 0, 0, 1, 0, 1))
 
 
-def test_a_link_without_inertial_has_gazebos_and_says_so() -> None:
+def test_a_link_without_inertial_has_gazebos_and_is_reported() -> None:
     robot = model(BARE)
     assert robot.links["a"].inertial == Inertial(Pose(), 1.0, (1, 0, 0, 1, 0, 1))
     assert robot.warnings == (
@@ -105,7 +105,7 @@ def test_collisions_with_different_surfaces_are_reported() -> None:
     )
 
 
-def test_self_collision_is_the_models_unless_the_link_says_otherwise() -> None:
+def test_self_collision_is_the_models_unless_the_link_overrides_it() -> None:
     inside = f'<self_collide>1</self_collide>{A}<link name="b">{MASS}<self_collide>0</self_collide></link>'
     joint = '<joint name="j" type="fixed"><parent>a</parent><child>b</child></joint>'
     links = model(inside + joint).links
@@ -222,7 +222,7 @@ def test_links_that_no_joint_holds_are_bodies_of_their_own() -> None:
     ]
 
 
-def test_the_canonical_link_says_which_body_has_the_models_name() -> None:
+def test_the_canonical_link_decides_which_body_has_the_models_name() -> None:
     models = read(f'<model name="m" canonical_link="b">{A}{B}</model>')
     assert [(part.name, part.root) for part in models] == [("m", "b"), ("m_a", "a")]
 
@@ -249,17 +249,17 @@ def test_plugins_directly_in_the_model_drive_it() -> None:
     assert drive == Drive(robot_base_frame="a")
 
 
-def test_a_warning_says_that_a_sensor_is_not_simulated() -> None:
-    robot = model(f'<link name="a">{MASS}<sensor name="s" type="imu"><update_rate>50</update_rate></sensor></link>')
-    assert robot.warnings == ("a.sdf, line 3: <sensor name='s'> (imu) is not simulated yet",)
+def test_a_warning_names_a_sensor_that_is_not_simulated() -> None:
+    robot = model(f'<link name="a">{MASS}<sensor name="s" type="gps"><update_rate>50</update_rate></sensor></link>')
+    assert robot.warnings == ("a.sdf, line 3: <sensor name='s'> (gps) is not simulated",)
 
 
 def test_misspelt_elements_are_reported_once_with_the_nearest_name() -> None:
     link = '<link name="{}"><inertal/><a:own/></link>'
     robot = model(f"<static>1</static>{link.format('a')}{link.format('b')}<my:thing/>".replace("a:own", "my:own"))
     assert robot.warnings == (
-        "a.sdf, line 3: <inertal> of <link name='a'> is not an SDF child of <link> and is ignored;"
-        " did you mean 'inertial'?",
+        "a.sdf, line 3: <inertal> of <link name='a'> is not an SDF child of <link> and is ignored"
+        " (did you mean 'inertial'?)",
     )
 
 

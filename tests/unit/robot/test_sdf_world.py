@@ -53,7 +53,7 @@ def test_the_worlds_of_the_tree_have_sun_ground_and_the_engines_step(name: str) 
     assert bool(spec.models) == (name == "arena")
 
 
-def test_a_world_that_says_nothing_has_the_defaults_and_no_ground(path: Path) -> None:
+def test_an_empty_world_element_has_the_defaults_and_no_ground(path: Path) -> None:
     assert loaded(path, "", name="") == WorldSpec("default", STEP, GRAVITY, 1.0, False, ())
 
 
@@ -180,7 +180,7 @@ def test_what_is_not_simulated_or_unknown_is_reported(path: Path) -> None:
     spec = loaded(path, "<actor/>\n<modle/>\n<modle/>")
     assert [warning.removeprefix(f"{path}, ") for warning in spec.warnings] == [
         "line 2: <actor> of <world name='w'> is not simulated and is left out",
-        "line 3: <modle> of <world name='w'> is not an SDF child of <world> and is ignored; did you mean 'model'?",
+        "line 3: <modle> of <world name='w'> is not an SDF child of <world> and is ignored (did you mean 'model'?)",
     ]
 
 
@@ -213,11 +213,15 @@ def test_a_factor_of_zero_is_as_fast_as_it_goes(path: Path) -> None:
     assert physics(path, "real_time_factor", "0").rtf == 0
 
 
+def test_an_ampersand_in_a_world_is_named(path: Path) -> None:
+    assert refusal(path, b"<sdf>\n<a>x & y</a></sdf>").endswith("; write & as &amp;")
+
+
 def test_a_file_that_is_no_world_is_named_with_the_reason(path: Path) -> None:
     rows = [
         (b"<sdf>\n<world>\n</sdf>", ", line 3: broken XML: mismatched tag; <world> of "),
         (b"<sdf>\n<world>\n", ", line 3: broken XML: no element found; <world> of "),
-        (b"", ": the file is empty"),
+        (b"", ": the file is empty; a robot is a <robot> or an <sdf>, a world an <sdf>"),
         (b"\0", ", line 1: broken XML: "),
         (b"<sdf>&evil;</sdf>", ", line 1: broken XML: undefined entity"),
         (b"<sdf>\xff</sdf>", ": byte 5 is not UTF-8 text; save the file as UTF-8"),

@@ -82,7 +82,7 @@ def test_a_visual_mesh_is_found_but_not_read(source: Source, home: Path) -> None
     assert source.warnings == []
 
 
-def test_another_file_with_the_name_is_taken_with_a_warning_that_says_which(source: Source, home: Path) -> None:
+def test_another_file_with_the_name_is_taken_with_a_warning_that_names_it(source: Source, home: Path) -> None:
     assert shape(source, "/home/asha/ws/box.stl").path == home / "box.stl"
     (warning,) = source.warnings
     message = f"(collision): there is no file '/home/asha/ws/box.stl'; {home}/box.stl, which has the same name, is used"

@@ -62,6 +62,16 @@ def test_several_elements_for_one_link_add_up_and_the_last_wins() -> None:
     assert model.links["b"].gravity is False
 
 
+@pytest.mark.parametrize("word", ["false", "0"])
+def test_gravity_in_a_link_is_honoured_and_a_gazebo_element_overrides_it(word: str) -> None:
+    light = f'<link name="c"><gravity>{word}</gravity></link>'
+    joint = '<joint name="jc" type="fixed"><parent link="a"/><child link="c"/></joint>'
+    assert robot(light + joint).links["c"].gravity is False
+    assert robot(light + joint, on("c", "<gravity>true</gravity>")).links["c"].gravity is True
+    with pytest.raises(RobotError, match="<gravity> of <link name='c'> is 'flase'; it must be true or false"):
+        robot(light.replace(word, "flase") + joint)
+
+
 def test_a_reference_to_a_joint_is_no_mistake() -> None:
     assert robot(on("j", "<implicitSpringDamper>1</implicitSpringDamper>")).warnings == ()
 
@@ -69,12 +79,12 @@ def test_a_reference_to_a_joint_is_no_mistake() -> None:
 def test_a_reference_to_nothing_is_reported_with_the_nearest_name() -> None:
     model = robot("\n", on("bb", "<mu1>1</mu1>"))
     assert model.warnings == (
-        f"{ORIGIN}, line 4: <gazebo> of <robot name='r'> reference='bb' names no link and no joint; "
-        "did you mean 'b'?; it is left out; links: a, b",
+        f"{ORIGIN}, line 4: <gazebo reference='bb'> names no link and no joint "
+        "(did you mean 'b'?); it is left out; links: a, b",
     )
 
 
-def test_a_robot_is_static_when_the_file_says_so() -> None:
+def test_a_robot_is_static_when_its_file_declares_it() -> None:
     assert robot(
         "<gazebo><static>true</static></gazebo><gazebo><plugin filename='libgazebo_ros_planar_move.so'/></gazebo>"
     ).static
@@ -88,7 +98,7 @@ def test_a_robot_whose_root_is_the_world_is_static() -> None:
 
 def test_a_value_that_cannot_be_is_refused_with_its_line() -> None:
     for tags, message in [
-        ("<mu1>-1</mu1>", "<mu1> of <robot name='r'> is '-1'; it must be a number not below 0"),
+        ("<mu1>-1</mu1>", "<mu1> of <gazebo reference='b'> is '-1'; it must be a number not below 0"),
         ("<mu2>abc</mu2>", "is 'abc'; it must be a number not below 0"),
         ("<kp>nan</kp>", "is 'nan'"),
         ("<kp>1e300</kp>", "is '1e300'; it must be at most 1e+18"),

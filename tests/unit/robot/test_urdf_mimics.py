@@ -48,8 +48,8 @@ def test_a_joint_may_follow_one_that_follows_another() -> None:
         ),
         (
             {"wheel": "", "b": "wheell"},
-            "line 3: <mimic> of <joint name='b'> follows the joint 'wheell', which does not exist; "
-            "did you mean 'wheel'?; joints: b, wheel",
+            "line 3: <mimic> of <joint name='b'> follows the joint 'wheell', which does not exist "
+            "(did you mean 'wheel'?); joints: b, wheel",
         ),
     ],
 )

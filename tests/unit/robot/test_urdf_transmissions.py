@@ -24,7 +24,7 @@ def test_a_transmission_in_either_spelling_is_accepted() -> None:
 
 def test_one_of_no_joint_causes_a_warning() -> None:
     assert warnings('<transmission name="t"><joint name="whel"/></transmission>\n<transmission name="u"/>') == (
-        f"{ORIGIN}, line 3: <transmission name='t'> names the joint 'whel', which does not exist; "
-        "did you mean 'wheel'?; it is left out",
+        f"{ORIGIN}, line 3: <transmission name='t'> names the joint 'whel', which does not exist "
+        "(did you mean 'wheel'?); it is left out",
         f"{ORIGIN}, line 4: <transmission name='u'> names no joint; it is left out",
     )

@@ -1,4 +1,4 @@
-"""xacro files are expanded without ROS, and every failure is one line that says where."""
+"""xacro files are expanded without ROS, and every failure is one line with its place."""
 
 import sys
 from pathlib import Path
@@ -7,7 +7,7 @@ import pytest
 import xacro as library
 
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand, expand_xacro
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 
@@ -17,6 +17,9 @@ def folder(home: Path) -> Path:
     """A repository cloned as `clone`, without package.xml."""
     (home / "clone" / "urdf").mkdir(parents=True)
     return home / "clone" / "urdf"
+
+
+CLOSE = "close each element, inner ones first: </name>, or /> at the end of its tag"
 
 
 def write(folder: Path, body: str, name: str = "robot.urdf.xacro") -> Path:
@@ -75,18 +78,18 @@ def test_an_include_of_another_machine_is_found_by_its_name(
     assert f"line 2: No such file or directory: {lost}" in failure(path)
     (folder / "parts").mkdir()
     found = write(folder / "parts", '<xacro:include filename="rim.xacro"/>', "wheel.xacro")
-    write(folder, "<wrong/>", "wheel.xacro")  # less of the path's end is the same
+    other = write(folder, "<wrong/>", "wheel.xacro")  # less of the path's end is the same
     write(folder / "parts", "<rim/>", "rim.xacro")
     for _ in range(2):  # the second text comes from the cache
-        assert "<rim/>" in expand(path)
+        assert "<rim/>" in expand_xacro(path)
         assert capsys.readouterr().err == (
-            f"{path}, line 2: there is no file '{lost}'; {found}, which has the same name, is included;"
-            " write $(find clone)/urdf/parts/wheel.xacro\n"
+            f"warning: {path}, line 2: there is no file '{lost}'; {found}, which has the same name, is included;"
+            f" write $(find clone)/urdf/parts/wheel.xacro; others of that name: {other}\n"
         )
     (home / "clone" / "package.xml").write_text("<package><name>holo</name></package>")
     found.touch()
     found.write_text(found.read_text() + "\n")
-    expand(path)
+    expand_xacro(path)
     assert "write $(find holo)/urdf/parts/wheel.xacro" in capsys.readouterr().err
 
 
@@ -123,13 +126,19 @@ def test_an_unknown_package_is_reported_with_the_way_out(home: Path, folder: Pat
 
 def test_broken_xml_is_reported_with_its_line(folder: Path) -> None:
     path = write(folder, "<link>\n<joint>\n</link>")
-    assert failure(path) == f"{path}, line 4: broken XML: mismatched tag"
+    assert failure(path) == f"{path}, line 4: broken XML: mismatched tag; {CLOSE}"
+
+
+def test_a_double_dash_in_a_comment_is_named(folder: Path) -> None:
+    path = write(folder, "<!-- a -- b -->")
+    assert "; a comment must not contain -- before its end" in failure(path)
 
 
 def test_broken_xml_in_an_include_is_reported_with_that_file_and_its_line(folder: Path) -> None:
     inner = write(folder, "<link", "inner.xacro")
     path = write(folder, '<xacro:include filename="inner.xacro"/>')
-    assert failure(path) == f"{inner}, line 3: broken XML: not well-formed (invalid token) (included at {path}, line 2)"
+    problem = "broken XML: not well-formed (invalid token)"
+    assert failure(path).startswith(f"{inner}, line 3: {problem} (included at {path}, line 2); write each element as ")
 
 
 def test_a_bad_expression_is_reported_with_the_chain_of_macros_and_includes(folder: Path) -> None:
@@ -139,16 +148,16 @@ def test_a_bad_expression_is_reported_with_the_chain_of_macros_and_includes(fold
     inner = write(folder, f'{width}{wheel}{rim}\n\n<xacro:wheel r="2"/>', "wheels.xacro")
     path = write(folder, '<xacro:include filename="wheels.xacro"/>')
     assert failure(path) == (
-        f"{inner}, line 4: name 'widht' is not defined when evaluating expression 'r * widht'; did you mean 'width'?"
+        f"{inner}, line 4: name 'widht' is not defined when evaluating expression 'r * widht' (did you mean 'width'?)"
         f" (in macro 'rim' called at {inner}, line 3, in macro 'wheel' called at {inner}, line 6,"
         f" included at {path}, line 2)"
     )
 
 
-def test_a_missing_include_under_a_guessed_package_says_what_was_guessed(folder: Path) -> None:
+def test_a_missing_include_under_a_guessed_package_names_the_guess(folder: Path) -> None:
     message = failure(write(folder, '<xacro:include filename="$(find other)/urdf/gone.xacro"/>'))
     assert f"No such file or directory: {folder.parent}/urdf/gone.xacro" in message
-    assert f"no package.xml says 'other', so {folder.parent} was taken for it" in message
+    assert f"no package.xml names 'other', so {folder.parent} was taken for it" in message
     assert message.endswith("--package other=DIR")
 
 
@@ -178,13 +187,13 @@ def test_a_misspelt_name_is_reported_with_one_that_looks_alike(folder: Path) -> 
     for body, message in [
         (
             '<xacro:macro name="wheel"><a/></xacro:macro><xacro:wheell/>',
-            "unknown macro name: xacro:wheell; did you mean 'wheel'?",
+            "unknown macro name: xacro:wheell (did you mean 'wheel'?)",
         ),
-        ('<xacro:property name="width" value="1"/><l n="${widht}"/>', "'widht'; did you mean 'width'?"),
-        ('<xacro:arg name="side" default="1"/><l n="$(arg sied)"/>', "default in <xacro:arg>; did you mean 'side'?"),
+        ('<xacro:property name="width" value="1"/><l n="${widht}"/>', "'widht' (did you mean 'width'?)"),
+        ('<xacro:arg name="side" default="1"/><l n="$(arg sied)"/>', "default in <xacro:arg> (did you mean 'side'?)"),
         (
             '<xacro:macro name="m" params="radius *b"><a/></xacro:macro><xacro:m raduis="1"/>',
-            "Invalid parameter \"raduis\"; did you mean 'radius'?",
+            "Invalid parameter \"raduis\" (did you mean 'radius'?)",
         ),
         (
             '<xacro:macro name="m" params="radius *b"><a/></xacro:macro><xacro:m/>',
@@ -236,4 +245,4 @@ def test_a_file_that_cannot_be_read_is_reported(folder: Path) -> None:
     (folder / "latin.urdf").write_bytes(b"<robot>\xe9</robot>")
     assert failure(folder / "latin.urdf") == f"{folder}/latin.urdf: byte 7 is not UTF-8 text; save the file as UTF-8"
     (folder / "empty.xacro").touch()
-    assert failure(folder / "empty.xacro") == f"{folder}/empty.xacro, line 1: broken XML: no element found"
+    assert failure(folder / "empty.xacro") == f"{folder}/empty.xacro, line 1: broken XML: no element found; {CLOSE}"

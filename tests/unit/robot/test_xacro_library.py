@@ -135,4 +135,4 @@ def test_a_warning_of_the_library_is_one_line_with_its_place(folder: Path, capsy
     path.write_text(f"{HEAD}\n{BODIES['redefined symbols']}</robot>")
     for _ in range(2):  # the second text comes from the cache
         expand_xacro(path)
-        assert capsys.readouterr().err == f"{path}, line 2: redefining global symbol: max\n"
+        assert capsys.readouterr().err == f"warning: {path}, line 2: redefining global symbol: max\n"

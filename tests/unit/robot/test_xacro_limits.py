@@ -1,4 +1,4 @@
-"""No file hangs or fills the machine: each runaway ends in one line that says where, at what, and what is allowed."""
+"""No file hangs or fills the machine: each runaway ends in one line with the place, the cause and the limit."""
 
 import os
 from collections.abc import Callable
@@ -72,9 +72,9 @@ def test_a_step_that_takes_too_long_ends_in_a_line(folder: Path, monkeypatch: py
 
 
 def check(folder: Path, body: str, line: int, expected: str) -> None:
-    said = failure(folder, body)
-    assert said.startswith(f"robot.xacro, line {line}: ")
-    assert any(words in said for words in expected.split("|"))
+    reported = failure(folder, body)
+    assert reported.startswith(f"robot.xacro, line {line}: ")
+    assert any(words in reported for words in expected.split("|"))
 
 
 def test_a_runaway_ends_in_a_line(folder: Path) -> None:
@@ -97,8 +97,8 @@ def test_a_runaway_ends_in_a_line(folder: Path) -> None:
     ['<!ENTITY x "lol">', '<!ENTITY x SYSTEM "file:///etc/passwd">', '<!ENTITY % x SYSTEM "file:///etc/passwd"> %x;'],
 )
 def test_entities_are_refused(folder: Path, declared: str) -> None:
-    said = failure(folder, "<l>&x;</l>", f"<!DOCTYPE robot [\n{declared}]>{HEAD}")
-    assert said == "robot.xacro, line 2: the entity 'x' is declared; write out its text instead"
+    reported = failure(folder, "<l>&x;</l>", f"<!DOCTYPE robot [\n{declared}]>{HEAD}")
+    assert reported == "robot.xacro, line 2: the entity 'x' is declared; write out its text instead"
 
 
 def test_a_file_of_100_mb_is_refused_unread(folder: Path) -> None:
@@ -108,9 +108,9 @@ def test_a_file_of_100_mb_is_refused_unread(folder: Path) -> None:
     with pytest.raises(RobotError, match=r"big\.xacro: the file contains 100\.0 MB of XML; .* at most 4 MB"):
         expand(big)
     for body in ('<xacro:include filename="big.xacro"/>', "<l n=\"${xacro.load_yaml('big.xacro')}\"/>"):
-        said = failure(folder, body)
-        assert "big.xacro: the file contains 100.0 MB" in said
-        assert f"{folder}/robot.xacro, line 2)" in said
+        reported = failure(folder, body)
+        assert "big.xacro: the file contains 100.0 MB" in reported
+        assert f"{folder}/robot.xacro, line 2)" in reported
 
 
 def test_what_is_no_file_is_not_waited_for(folder: Path) -> None:

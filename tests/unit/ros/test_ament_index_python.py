@@ -30,13 +30,13 @@ def test_what_package_gives_comes_first(my_bot: Path, home: Path) -> None:
     assert ament.get_package_share_path("my_bot") == home
 
 
-def test_a_repository_that_says_no_name_is_taken_for_any(home: Path, write: Write) -> None:
+def test_a_repository_without_a_package_name_serves_for_any(home: Path, write: Write) -> None:
     write("urdf/hb_bot.urdf.xacro")
     packages.use({})
     assert ament.get_package_share_path("holo") == home
 
 
-def test_a_wrong_name_is_not_that_of_a_repository_that_says_none(my_bot: Path, write: Write) -> None:
+def test_a_wrong_name_does_not_match_a_repository_without_one(my_bot: Path, write: Write) -> None:
     write("urdf/hb_bot.urdf.xacro")
     packages.use({})
     with pytest.raises(ament.PackageNotFoundError, match="did you mean 'my_bot'"):
@@ -44,7 +44,7 @@ def test_a_wrong_name_is_not_that_of_a_repository_that_says_none(my_bot: Path, w
     assert ament.get_package_share_path("holo") != my_bot
 
 
-def test_an_unknown_package_is_an_error_that_says_how_to_mend_it(my_bot: Path, write: Write) -> None:
+def test_an_unknown_package_is_an_error_with_the_fix(my_bot: Path, write: Write) -> None:
     write("src/my_bot/urdf/a.urdf")
     packages.use({}, my_bot)
     with pytest.raises(ament.PackageNotFoundError) as error:

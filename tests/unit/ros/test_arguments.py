@@ -115,7 +115,7 @@ def test_what_cannot_be_read_is_reported_in_one_line() -> None:
 
 
 def test_an_unknown_flag_is_reported_with_the_nearest() -> None:
-    with pytest.raises(UnknownROSArgsError, match="'--params'; did you mean '--param"):
+    with pytest.raises(UnknownROSArgsError, match=r"'--params' \(did you mean '--param"):
         parse("--ros-args", "--params", "x")
     with pytest.raises(UnknownROSArgsError, match="end the ROS arguments with --"):
         parse("--ros-args", "goal.txt")

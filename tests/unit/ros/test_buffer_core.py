@@ -1,4 +1,4 @@
-"""The tree of frames: what is asked comes from what came, or an exception says why not."""
+"""The tree of frames: lookups follow from the transforms received, or an exception gives the reason."""
 
 import math
 
@@ -75,7 +75,7 @@ def test_outside_of_what_is_known_nothing_is_guessed(frames, when, side):
 
 
 def test_an_unknown_frame_is_reported_with_the_nearest(frames):
-    with pytest.raises(LookupException, match="the source frame 'bass' does not exist; did you mean 'base'"):
+    with pytest.raises(LookupException, match=r"the source frame 'bass' does not exist \(did you mean 'base'"):
         frames.lookup("odom", "bass")
     with pytest.raises(LookupException, match="the target frame 'odom' does not exist; no frames so far"):
         BufferCore().lookup("odom", "base")

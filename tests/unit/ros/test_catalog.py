@@ -39,7 +39,7 @@ def lacks(something: Any, name: str) -> str:
 def test_the_nearest_name_and_the_page_are_reported() -> None:
     for kind in OBJECTS:
         something, name, nearest = OBJECTS[kind]
-        message = f"{kind!r} object has no attribute {name!r}; did you mean {nearest!r}?; what {kind} has here: {PAGE}"
+        message = f"{kind!r} object has no attribute {name!r} (did you mean {nearest!r}?); what {kind} has here: {PAGE}"
         assert lacks(something, name) == message
         assert lacks(something, "zzz") == f"{kind!r} object has no attribute 'zzz'; what {kind} has here: {PAGE}"
         assert lacks(something, "_zzz") == f"{kind!r} object has no attribute '_zzz'"
@@ -51,7 +51,7 @@ def test_an_error_names_the_scripts_own_subclass_of_node(ros: Wire) -> None:
 
     robot = Robot("robot")
     assert lacks(robot, "create_subscriber").startswith(
-        "'Robot' object has no attribute 'create_subscriber'; did you mean 'create_subscription'?; what Node has here"
+        "'Robot' object has no attribute 'create_subscriber' (did you mean 'create_subscription'?); what Node has here"
     )
     assert lacks(robot, "handle").endswith(f"; see {PAGE}")
 

@@ -89,15 +89,15 @@ def test_done_callbacks_run_in_spin(ros: Wire, spin_for: Spin) -> None:
     assert threads == [threading.main_thread()]
 
 
-def test_the_service_is_waited_for_also_a_strangers(ros: Wire) -> None:
+def test_the_service_is_waited_for_also_a_foreign_one(ros: Wire) -> None:
     client = rclpy.create_node("tom").create_client(Trigger, "go")
     assert not client.service_is_ready()
     assert not client.wait_for_service(timeout_sec=0.02)
     assert not client.wait_for_service(0)
-    stranger = ros.bus("stranger").session.declare_queryable("go", lambda query: query.drop())
+    foreign = ros.bus("foreign").session.declare_queryable("go", lambda query: query.drop())
     assert client.wait_for_service(timeout_sec=10)
     assert client.service_is_ready()
-    stranger.undeclare()
+    foreign.undeclare()
     wait_for(lambda: not client.service_is_ready())
 
 

@@ -82,7 +82,7 @@ def test_simulated_time_begins_at_zero_and_is_what_was_given() -> None:
         clock.set_ros_time_override(Time())
 
 
-def test_it_says_how_long_a_time_is_away() -> None:
+def test_wait_seconds_is_the_time_left_where_that_is_known() -> None:
     clock = simulated(1.0)
     assert clock.wait_seconds(at(1).nanoseconds) == 0.0
     assert clock.wait_seconds(at(2).nanoseconds) is None, "the speed of simulated time is unknown"

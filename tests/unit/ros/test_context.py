@@ -101,12 +101,14 @@ def test_a_block_begins_and_ends_it() -> None:
         context.shutdown()
 
 
-def test_a_domain_id_causes_a_warning_that_it_has_no_effect(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_domain_id_is_that_of_its_nodes() -> None:
     context = Context()
     context.init([], domain_id=7)
     context.shutdown()
-    assert "domain_id=7 has no effect here" in capfd.readouterr().err
-    assert context.get_domain_id() == 0
+    assert context.get_domain_id() == 7
+    assert context.connection.meeting_points[0] == "tcp/127.0.0.1:7517"
+    with pytest.raises(RuntimeError, match="domain_id=233: use a number from 0 to 232"):
+        Context().init([], domain_id=233)
 
 
 def test_the_default_context_is_another_after_its_end() -> None:

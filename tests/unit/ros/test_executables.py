@@ -25,7 +25,7 @@ def test_a_script_without_ending_has_to_be_executable_and_python(my_bot: Path, w
     path.chmod(0o755)
     assert find("my_bot", "drive").path == path
     path.write_text("\x7fELF\0")
-    with pytest.raises(NotFound, match="drive is not a Python script; only those run here"):
+    with pytest.raises(NotFound, match="drive is no Python script: its name must end"):
         find("my_bot", "drive")
 
 
@@ -107,18 +107,18 @@ def test_an_unknown_executable_is_reported_with_all_there_are(my_bot: Path, writ
     write("src/my_bot/my_bot/__init__.py")
     with pytest.raises(NotFound) as error:
         find("my_bot", "servce_node.py")
-    message = f"no executable 'servce_node.py'; did you mean 'service_node.py'?; executables in {my_bot}: "
+    message = f"no executable 'servce_node.py' (did you mean 'service_node.py'?); executables in {my_bot}: "
     assert str(error.value).endswith(f"{message}drive, pose, service_node.py, shape")
     with pytest.raises(NotFound, match=r"^give an executable; executables in"):
         find("my_bot", "")
 
 
 def test_an_unknown_package_is_reported_with_those_around(my_bot: Path) -> None:
-    with pytest.raises(NotFound, match=r"no package 'my_boot' around .*; did you mean 'my_bot'\?; .* --package"):
+    with pytest.raises(NotFound, match=r"no package 'my_boot' around .* \(did you mean 'my_bot'\?\); .* --package"):
         find("my_boot", "controller.py")
 
 
-def test_a_folder_that_says_no_name_is_no_package_to_be_run(home: Path, write: Write) -> None:
+def test_a_folder_without_a_package_name_cannot_be_run(home: Path, write: Write) -> None:
     write("urdf/hb_bot.urdf.xacro")
     path = write("scripts/controller.py")
     packages.use({})
@@ -147,7 +147,7 @@ def test_a_package_in_a_repository_of_packages_is_found(my_bot: Path, write: Wri
 
 def test_a_file_that_is_not_there_is_reported_with_its_neighbours(write: Write) -> None:
     path = write("scripts/controller.py")
-    with pytest.raises(NotFound, match=r"no file '.*/controler.py'; did you mean 'controller.py'\?"):
+    with pytest.raises(NotFound, match=r"no file '.*/controler.py' \(did you mean 'controller.py'\?\)"):
         from_file(path.with_name("controler.py"))
     with pytest.raises(NotFound, match=r"Python files there: controller\.py"):
         from_file(path.with_name("x.py"))

@@ -116,7 +116,7 @@ def test_no_executor_without_a_running_context() -> None:
         SingleThreadedExecutor(context=Context())
 
 
-def test_several_nodes_and_what_they_get_or_lose_meanwhile(ros: Wire, spin_for: Spin) -> None:
+def test_several_nodes_and_what_they_gain_or_lose_over_time(ros: Wire, spin_for: Spin) -> None:
     first, second, got = rclpy.create_node("first"), rclpy.create_node("second"), list[str]()
     first.create_timer(0.001, lambda: got.append("first"))
     spin_for(lambda: got, first, second)

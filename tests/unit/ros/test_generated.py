@@ -1,4 +1,4 @@
-"""Generated classes take, hold and say what ROS's do."""
+"""Generated classes take, hold and print what ROS's do."""
 
 import array
 import copy
@@ -90,7 +90,7 @@ def test_fields_are_given_by_their_names_only() -> None:
     with pytest.raises(TypeError, match=r"^geometry_msgs\.msg\.Twist takes its fields by name: Twist\(linear=..., ang"):
         TWIST(VECTOR())
     with pytest.raises(
-        AssertionError, match=r"geometry_msgs\.msg\.Twist has no field 'linaer'; did you mean 'linear'\?$"
+        AssertionError, match=r"geometry_msgs\.msg\.Twist has no field 'linaer' \(did you mean 'linear'\?\)$"
     ):
         TWIST(linaer=VECTOR())
     with pytest.raises(AttributeError, match=r"^geometry_msgs\.msg\.Vector3 has no field 'q'; it has x, y, z$"):

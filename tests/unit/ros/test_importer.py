@@ -179,14 +179,15 @@ def test_an_unknown_package_is_reported_with_the_nearest_and_the_folders_searche
         return tracebacks.import_error_line(error.value)
 
     assert line("from my_pgk.srv import NextGoal") == (
-        f"{script}:1: no package 'my_pgk' with .msg or .srv files; did you mean 'my_pkg'?; searched AMENT_PREFIX_PATH, "
-        f"ROS_PACKAGE_PATH and the package.xml files around {package}, {Path.cwd()}; "
+        f"{script}:1: no package 'my_pgk' with .msg or .srv files (did you mean 'my_pkg'?); searched "
+        f"AMENT_PREFIX_PATH, ROS_PACKAGE_PATH and the package.xml files around {package}, {Path.cwd()}; "
         "to give its folder: --package my_pgk=DIR"
     )
     assert "did you mean 'std_msgs'?" in line("import std_mgs.msg")
     assert "did you mean 'geometry_msgs'?" in line("import geometri_msgs")
     assert "--package zebra=DIR" in line("from zebra.msg import X")
-    assert line("import zebra") == f"{script}:1: No module named 'zebra'"
+    hint = "install it with pip, or give the folder of a package of yours: --package zebra=DIR"
+    assert line("import zebra") == f"{script}:1: No module named 'zebra'; {hint}"
 
 
 def test_a_given_folder_that_is_none_is_reported(tmp_path: Path) -> None:
@@ -198,7 +199,7 @@ def test_a_given_folder_that_is_none_is_reported(tmp_path: Path) -> None:
 def test_an_unknown_type_is_reported_with_the_nearest(package: Path) -> None:
     importer.install({"my_pkg": package})
     assert refused("from geometry_msgs.msg import Twsit") == (
-        "no type 'geometry_msgs/msg/Twsit'; did you mean 'geometry_msgs/msg/Twist'?"
+        "no type 'geometry_msgs/msg/Twsit' (did you mean 'geometry_msgs/msg/Twist'?)"
     )  # fmt: skip
     assert "did you mean 'my_pkg/srv/NextGoal'?" in refused("from my_pkg.srv import NextGaol")
     assert "did you mean 'geometry_msgs/msg/Twist'?" in refused(
@@ -263,7 +264,7 @@ def test_an_import_of_a_type_from_its_package_is_answered_with_its_module() -> N
 def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     importer.install()
     page = "; see docs/coming-from-ros.md"
-    expected = f"rclpy.pretend has no 'Thign' here; did you mean 'Thing'?{page}"
+    expected = f"rclpy.pretend has no 'Thign' here (did you mean 'Thing'?){page}"
     assert refused("from rclpy.pretend import Thign") == expected
     assert refused("import rclpy.pretend\nrclpy.pretend.Thign", AttributeError) == expected
     assert refused("from rclpy.pretend import hidden") == f"rclpy.pretend has no 'hidden' here{page}"

@@ -84,7 +84,7 @@ def test_a_name_that_is_no_text_is_a_type_error() -> None:
             check(5)
 
 
-def test_a_rule_names_what_becomes_what_and_for_whom() -> None:
+def test_a_rule_maps_a_name_for_a_node() -> None:
     assert names.remap("cmd_vel:=turtle") == names.Remap("cmd_vel", "turtle")
     assert names.remap("tom:cmd_vel:=/turtle") == names.Remap("cmd_vel", "/turtle", "tom")
     assert names.remap("__name:=anna") == names.Remap("__node", "anna")
@@ -98,7 +98,7 @@ def test_a_wrong_rule_is_refused() -> None:
             names.remap(text)
 
 
-def test_a_rule_is_for_topics_and_services_unless_it_says() -> None:
+def test_a_rule_is_for_topics_and_services_by_default() -> None:
     both, topics = names.remap("add:=sum"), names.remap("rostopic://add:=sum")
     assert both.renames("/ns/add", "tom", "/ns", "topic")
     assert both.renames("/ns/add", "tom", "/ns", "service")

@@ -1,4 +1,4 @@
-"""What a script sends with a NaN or an infinity goes out as CDR, which has them, and says so; all else as ever."""
+"""What a script sends with a NaN or an infinity goes out as CDR, which has them; all else as ever."""
 
 import math
 from collections.abc import Callable

@@ -52,7 +52,7 @@ def test_parameters_are_nested_by_dots(file: Path) -> None:
     assert given(file, text, "/tom") == {"pid.p": 1.0, "pid.i": 2, "words": ["a", "b"]}
 
 
-def test_an_empty_file_says_nothing(file: Path) -> None:
+def test_an_empty_file_has_no_findings(file: Path) -> None:
     assert given(file, "", "/tom") == {}
     assert given(file, "tom:\n  ros__parameters:\n", "/tom") == {}
 
@@ -93,7 +93,9 @@ def test_a_file_that_is_no_text_is_reported(file: Path) -> None:
         arguments.parse(["--ros-args", "--params-file", str(file)])
 
 
-def test_words_need_no_yaml_library_and_lists_say_that_they_do(monkeypatch: pytest.MonkeyPatch, file: Path) -> None:
+def test_scalars_need_no_yaml_library_and_lists_report_that_they_do(
+    monkeypatch: pytest.MonkeyPatch, file: Path
+) -> None:
     monkeypatch.setitem(sys.modules, "yaml", None)
     assert parameter_yaml.assigned("x:=1.5").values == {"x": 1.5}
     assert parameter_yaml.assigned("x:=/dev/ttyUSB0").values == {"x": "/dev/ttyUSB0"}

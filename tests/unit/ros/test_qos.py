@@ -25,10 +25,10 @@ def test_a_depth_is_enough() -> None:
     assert profile.deadline == Duration()
 
 
-@pytest.mark.parametrize("said", [{}, {"reliability": 1}, {"history": HistoryPolicy.KEEP_LAST}])
-def test_a_profile_that_says_too_little_is_refused(said: dict[str, Any]) -> None:
+@pytest.mark.parametrize("expected", [{}, {"reliability": 1}, {"history": HistoryPolicy.KEEP_LAST}])
+def test_an_incomplete_profile_is_refused(expected: dict[str, Any]) -> None:
     with pytest.raises(InvalidQoSProfileException, match="give its depth"):
-        QoSProfile(**said)
+        QoSProfile(**expected)
 
 
 def test_a_wrong_argument_is_reported() -> None:
@@ -40,9 +40,9 @@ def test_a_wrong_argument_is_reported() -> None:
         ({"deadline": 5}, "deadline: 5 is a int; use a Duration"),
         ({"avoid_ros_namespace_conventions": 1}, "use a bool"),
     ]
-    for said, message in rows:
+    for reported, message in rows:
         with pytest.raises(AssertionError, match=message):
-            QoSProfile(**{"depth": 1, **said})
+            QoSProfile(**{"depth": 1, **reported})
 
 
 def test_numbers_are_policies_and_fields_can_be_changed() -> None:

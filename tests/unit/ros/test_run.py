@@ -144,6 +144,25 @@ def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> 
         assert done.stderr.startswith("holozen run: ")
 
 
+def test_a_flag_of_ours_behind_the_script_is_checked_unless_the_script_has_it(run: Run, write: Write) -> None:
+    write("a.py", "import sys; print(sys.argv[1:])")
+    for value in ("hb", "hb=/nope"):
+        done = run("a.py", "--package", value)
+        assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+        assert done.stderr.startswith(f"holozen run: argument --package: '{value}'")
+    write("b.py", "import sys; print(sys.argv[1:])  # --package")
+    assert run("b.py", "--package", "hb").stdout == "['--package', 'hb']\n"
+
+
+def test_a_module_that_is_not_here_is_reported_with_what_to_do(run: Run, write: Write) -> None:
+    for name, hint in [
+        ("nav2_common.launch", "there is no Nav2 here"),
+        ("somebodys", "install it with pip, or give the folder of a package of yours: --package somebodys=DIR"),
+    ]:
+        write("a.py", f"import {name}")
+        assert hint in run("a.py").stderr.splitlines()[-1]
+
+
 def test_where_ros_is_sourced_it_refuses_unless_forced(run: Run, write: Write) -> None:
     write("a.py", "import rclpy; print(rclpy.init.__module__)")
     done = run("a.py", ROS_DISTRO="humble")
@@ -226,8 +245,8 @@ rclpy.init()
 node = rclpy.create_node("a")
 thread = threading.Thread(target=rclpy.spin, args=(node,), daemon=True)
 thread.start()
-print("spins")
 try:
+    print("spins")
     thread.join()
 except KeyboardInterrupt:
     node.destroy_node()

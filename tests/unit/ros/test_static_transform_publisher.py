@@ -29,11 +29,11 @@ def test_the_words_are_a_transform() -> None:
     [
         ("1 2 3", "are required: --frame-id, --child-frame-id"),
         ("a 2 3 0 0 0 map odom", "argument --x: invalid float value: 'a'"),
-        ("--frame-id map --child-frame-id odom --yow 1", "no flag '--yow'; did you mean '--yaw'?"),
+        ("--frame-id map --child-frame-id odom --yow 1", "no flag '--yow' (did you mean '--yaw'?)"),
     ],
 )
 def test_wrong_words_are_one_line(words: str, expected: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as end:
         read(words.split())
-    said = capsys.readouterr().err
-    assert (end.value.code, said.count("\n"), expected in said) == (2, 1, True)
+    message = capsys.readouterr().err
+    assert (end.value.code, message.count("\n"), expected in message) == (2, 1, True)

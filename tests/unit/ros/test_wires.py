@@ -15,7 +15,7 @@ from holozen.messages.definitions import Field, Interface, completed, prototype
 from holozen.messages.message import listed
 from holozen.messages.registry import Registry
 from holozen.ros import generated
-from tests.unit.messages.conftest import Stranger
+from tests.unit.messages.conftest import Rosbags
 from tests.unit.messages.strategies import elements, values
 
 REGISTRY = Registry()
@@ -37,8 +37,8 @@ OURS: list[m.Message] = [
 
 
 @pytest.fixture(scope="module")
-def stranger() -> Stranger:
-    return Stranger()
+def rosbags() -> Rosbags:
+    return Rosbags()
 
 
 def test_the_tables_hold_the_packages_of_the_lessons() -> None:
@@ -77,11 +77,13 @@ def test_a_generated_message_and_ours_are_the_same_bytes() -> None:
             assert decode(encode(read, wire), encoding(wire, kind), (type(message),)) == message
 
 
-def test_every_type_is_made_and_any_value_of_it_is_the_same_bytes_as_another_librarys(stranger: Stranger) -> None:
+def test_every_type_is_made_and_any_value_of_it_is_the_same_bytes_as_another_librarys(
+    rosbags: Rosbags,
+) -> None:
     def agree(interface: Interface, value: dict[str, Any]) -> None:
         message = filled(interface, value)
         assert repr(plain(message)) == repr(completed(interface, value))
-        assert encode(message, "cdr") == stranger.write(interface, value), interface.name
+        assert encode(message, "cdr") == rosbags.write(interface, value), interface.name
         survived(message)
 
     for name in MESSAGES:
@@ -92,7 +94,7 @@ def test_every_type_is_made_and_any_value_of_it_is_the_same_bytes_as_another_lib
         for wire in WIRES:
             payload = encode(message, wire)
             assert decode(payload, encoding(wire, kind), (kind,)) == message, f"{name} as {wire}"
-            assert wire != "cdr" or payload == stranger.write(interface, prototype(interface)), name
+            assert wire != "cdr" or payload == rosbags.write(interface, prototype(interface)), name
         settings(max_examples=2)(given(st.just(interface), values(interface))(agree))()
 
 
@@ -123,7 +125,7 @@ def test_what_a_field_takes_is_written_and_read() -> None:
         settings(max_examples=15)(given(st.builds(kind, some=every))(survived))()
 
 
-def test_what_was_put_into_a_list_is_written_as_its_field_says() -> None:
+def test_what_was_put_into_a_list_is_written_as_its_field_type() -> None:
     rows: list[tuple[str, Any, Any]] = [
         ("byte", [b"\x07"], [7]),
         ("string", [type("Text", (str,), {})("x")], ["x"]),

@@ -29,7 +29,7 @@ class FakeSenders:
     def has(self, session: str) -> bool:
         return session in self.there
 
-    def ages(self, session: str, sent: float, now: float) -> tuple[float, float] | None:
+    def ages(self, session: str, sent: float, now: float, _member: str) -> tuple[float, float] | None:
         age = now - (sent - self.offset)
         return (max(0.0, age - self.error), age + self.error) if session in self.known else None
 

@@ -1,4 +1,4 @@
-"""Who drives: each rule of the wire's priorities as a sentence, and all of them against any sequence of commands."""
+"""The arbiter: each rule of the wire's priorities as a sentence, and all of them against any sequence of commands."""
 
 import math
 
@@ -33,7 +33,7 @@ def test_an_autopilot_is_what_sends_with_low_priority() -> None:
     assert AUTOPILOT == CONTROLLER
 
 
-def test_nobody_stands_above_a_person(arbiter: Arbiter) -> None:
+def test_no_source_outranks_a_person(arbiter: Arbiter) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
     assert arbiter.offer("hurry", PRIORITIES.index("REAL_TIME"), LEFT, 1.1) == "overruled: teleop drives"
     assert arbiter.offer("hurry", PRIORITIES.index("REAL_TIME"), LEFT, 2.0) == ""
@@ -60,7 +60,7 @@ def test_a_longer_watchdog_does_not_wake_a_command_that_was_over(arbiter: Arbite
     assert (arbiter.motion(3.9), arbiter.motion(4.1)) == (FORWARD, STOP)
 
 
-def test_a_shorter_watchdog_stops_a_robot_that_was_not_told_to_go_on(arbiter: Arbiter) -> None:
+def test_a_shorter_watchdog_stops_a_robot_without_fresh_commands(arbiter: Arbiter) -> None:
     arbiter.offer("script", SCRIPT, FORWARD, 1.0)
     arbiter.set_timeout(0.1, now=1.05)
     assert (arbiter.motion(1.09), arbiter.motion(1.11)) == (FORWARD, STOP)
@@ -190,7 +190,7 @@ def test_a_source_below_the_autopilot_neither_drives_nor_makes_it_yield(arbiter:
     assert not arbiter.held
 
 
-def test_after_resume_whoever_was_held_drives_again(arbiter: Arbiter) -> None:
+def test_after_resume_a_held_source_drives_again(arbiter: Arbiter) -> None:
     arbiter.offer("script", SCRIPT, FORWARD, 1.0)
     arbiter.offer("teleop", PERSON, STOP, 1.1)
     assert arbiter.resume(1.2) == ""
@@ -244,7 +244,9 @@ class TestWithoutATimeout:
         assert arbiter.offer("teleop", PERSON, LEFT, 2.0) == ""
         assert arbiter.motion(2.0) == LEFT
 
-    def test_a_person_is_not_locked_out_by_who_took_the_robot_while_they_were_silent(self, arbiter: Arbiter) -> None:
+    def test_a_person_is_not_locked_out_by_another_source_that_drove_during_their_silence(
+        self, arbiter: Arbiter
+    ) -> None:
         arbiter.offer("teleop", PERSON, STOP, 1.0)
         assert arbiter.offer("script", SCRIPT, FORWARD, 9.0) == ""
         assert arbiter.offer("teleop", PERSON, STOP, 9.1) == ""
@@ -363,13 +365,13 @@ class TestLostOperator:
         arbiter.forget("teleop")
         assert arbiter.motion(1.0) == arbiter.motion(1e6) == STOP
 
-    def test_the_loss_of_a_stranger_changes_nothing(self, arbiter: Arbiter) -> None:
-        arbiter.forget("stranger")
+    def test_the_loss_of_a_foreign_node_changes_nothing(self, arbiter: Arbiter) -> None:
+        arbiter.forget("foreign")
         arbiter.offer("teleop", PERSON, FORWARD, 1.0)
-        arbiter.forget("stranger")
+        arbiter.forget("foreign")
         assert arbiter.motion(1.1) == FORWARD
 
-    def test_nobody_else_gets_the_robot_any_sooner_for_it(self, arbiter: Arbiter) -> None:
+    def test_no_other_source_gets_the_robot_any_sooner_for_it(self, arbiter: Arbiter) -> None:
         """A name can be forged: what a loss does may only stop the robot."""
         arbiter.offer("first", SCRIPT, FORWARD, 1.0)
         arbiter.forget("first")
@@ -391,7 +393,7 @@ class TestLostOperator:
 
 
 @pytest.mark.parametrize(("rank", "holds"), [(SCRIPT, False), (CONTROLLER, True)])
-def test_one_knows_who_has_to_wait(arbiter: Arbiter, rank: int, holds: bool) -> None:
+def test_a_source_that_has_to_wait_is_held(arbiter: Arbiter, rank: int, holds: bool) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
     assert arbiter.holds("me", rank, 9.0) == holds
     arbiter.stop("ann@1", 10.0)
@@ -412,7 +414,7 @@ class Robot(RuleBasedStateMachine):
         self.arbiter = Arbiter(self.timeout)
         self.now = 0.0
         self.heard = dict.fromkeys(SOURCES, -1000000000.0)  # when each was last obeyed
-        self.said: dict[str, Planar] = {}  # and what it had said
+        self.commanded: dict[str, Planar] = {}  # and what it had commanded
         self.lost: set[str] = set()  # sources that were overruled by a higher one since the last resume
 
     @rule(seconds=st.sampled_from([0.05, 0.3, 0.5, 0.500001, 10.0]))
@@ -433,7 +435,7 @@ class Robot(RuleBasedStateMachine):
             assert after is not None
             assert (after.source, after.motion, after.sent) == (source, velocity, self.now)
             assert source not in self.lost or velocity == STOP
-            self.heard[source], self.said[source] = self.now, velocity
+            self.heard[source], self.commanded[source] = self.now, velocity
         else:
             assert after == before
         if before and before.source != source:
@@ -479,7 +481,7 @@ class Robot(RuleBasedStateMachine):
         self.arbiter.forget(source)
         after = self.arbiter.driver(self.now)
         if before and before.source == source:
-            self.said[source] = STOP
+            self.commanded[source] = STOP
         assert (before and before.source) == (after and after.source)
 
     @invariant()
@@ -493,11 +495,11 @@ class Robot(RuleBasedStateMachine):
             assert self.arbiter.motion(self.now) == STOP
         else:
             assert driver.rank == SOURCES[driver.source]
-            assert self.arbiter.motion(self.now) == self.said[driver.source]
+            assert self.arbiter.motion(self.now) == self.commanded[driver.source]
             assert driver.source not in self.lost or driver.motion == STOP
 
     @invariant()
-    def nobody_drives_after_the_timeout(self) -> None:
+    def no_source_drives_after_the_timeout(self) -> None:
         driver = self.arbiter.driver(self.now)
         assert driver is None or self.now - self.heard[driver.source] <= self.timeout
 

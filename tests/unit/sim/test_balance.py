@@ -212,7 +212,7 @@ def test_what_cannot_balance_is_refused(ground: World, spoil: Callable[[str], st
 
 
 @pytest.mark.parametrize("before", [(0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, 1.0)])
-def test_told_to_stand_it_does_not_hunt(ground: World, before: tuple[float, float, float]) -> None:
+def test_commanded_to_stand_it_does_not_hunt(ground: World, before: tuple[float, float, float]) -> None:
     model = load(FILE)
     mover = mover_for(ground, model, (0, 0, -lowest(model)))
     rates = []

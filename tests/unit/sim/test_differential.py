@@ -14,14 +14,19 @@ from holozen.robot.loading import load
 from holozen.robot.model import Differential, RobotModel
 from holozen.robot.rigid import lowest
 from holozen.rotation import yaw as yaw_of
-from services.sim.physics.differential import Odometer, WheelMover, separation_of
+from services.sim.physics.differential import WheelMover, separation_of
 from services.sim.physics.movers import mover_for
+from services.sim.physics.wheels import Odometer
 from services.sim.physics.world import World
 
 URDF = Path(__file__).parents[3] / "urdf"
 TWO = load(URDF / "differential.urdf.xacro")
 FOUR = load(URDF / "rover.urdf.xacro")
 DT = 1 / 240
+
+
+def rolled(left: float, right: float, separation: float) -> Planar:
+    return (left + right) / 2, 0.0, (right - left) / separation
 
 
 def with_wheels(model: RobotModel, **changes: Any) -> RobotModel:
@@ -68,7 +73,7 @@ class Driven:
 
 @pytest.mark.parametrize("model", [TWO, FOUR], ids=["two wheels", "four wheels"])
 @pytest.mark.parametrize("speed", [0.5, -0.5, 1.0])
-def test_straight_on_it_goes_as_far_as_told(ground: World, model: RobotModel, speed: float) -> None:
+def test_straight_on_it_goes_as_far_as_commanded(ground: World, model: RobotModel, speed: float) -> None:
     robot = Driven(ground, model)
     start = robot.drive(1, (speed, 0, 0))
     end = robot.drive(2, (speed, 0, 0))
@@ -84,7 +89,7 @@ def test_forward_is_forward_whichever_way_an_axis_points(ground: World, name: st
 
 
 @pytest.mark.parametrize("turn", [0.5, -1.0, 3.0])
-def test_two_wheels_turn_as_fast_as_told(ground: World, turn: float) -> None:
+def test_two_wheels_turn_as_fast_as_commanded(ground: World, turn: float) -> None:
     robot = Driven(ground, TWO)
     robot.drive(1, (0, 0, turn))
     begin = robot.turned
@@ -93,7 +98,7 @@ def test_two_wheels_turn_as_fast_as_told(ground: World, turn: float) -> None:
 
 
 @pytest.mark.parametrize("velocity", [(0, 0, 0.2), (0, 0, 0.5), (0, 0, -1), (0, 0, 2), (0, 0, 4), (0.4, 0, 1)], ids=str)
-def test_four_wheels_turn_at_nearly_the_rate_that_is_told(ground: World, velocity: Planar) -> None:
+def test_four_wheels_turn_at_nearly_the_commanded_rate(ground: World, velocity: Planar) -> None:
     robot = Driven(ground, FOUR)
     start = robot.drive(1, velocity)
     begin = robot.turned
@@ -152,7 +157,7 @@ def test_what_the_file_does_not_measure_is_measured(ground: World) -> None:
     assert robot.mover.body.planar()[0::2] == pytest.approx((0.5, 0.5), abs=0.01)
 
 
-def test_encoders_tell_what_wheels_roll_and_the_world_what_is(ground: World) -> None:
+def test_encoders_measure_what_wheels_roll_and_the_world_what_is(ground: World) -> None:
     robot = Driven(ground, TWO)
     for velocity in ((0.5, 0, 0), (0.5, 0, 0.8), (0, 0, -1), (-0.3, 0, 0.2)):
         robot.drive(1.5, velocity)
@@ -179,14 +184,14 @@ def test_against_a_wall_encoders_go_on_and_the_world_does_not(ground: World) -> 
 @given(st.floats(-2, 2), st.floats(-2, 2), st.integers(1, 50))
 def test_an_arc_ends_at_the_same_place_in_one_look_or_in_many(left: float, right: float, looks: int) -> None:
     once, often = Odometer(), Odometer()
-    one = once.update(left, right, 0.3)
+    one = once.update(rolled(left, right, 0.3))
     for look in range(1, looks + 1):
-        many = often.update(left * look / looks, right * look / looks, 0.3)
+        many = often.update(rolled(left * look / looks, right * look / looks, 0.3))
     assert many[0] == pytest.approx(one[0], abs=1e-9)
     assert abs(sum(a * b for a, b in zip(many[1], one[1], strict=True))) == pytest.approx(1)
 
 
 def test_an_arc_is_a_circle_about_a_point_beside() -> None:
     # A quarter to the left on a radius of 1 m, the wheels 0.2 m apart.
-    (x, y, _), rotation = Odometer().update(0.9 * math.pi / 2, 1.1 * math.pi / 2, 0.2)
+    (x, y, _), rotation = Odometer().update(rolled(0.9 * math.pi / 2, 1.1 * math.pi / 2, 0.2))
     assert (x, y, yaw_of(rotation)) == pytest.approx((1, 1, math.pi / 2))

@@ -21,7 +21,7 @@ def wheel(damping: float, base: float = 1e6, inertia: float = 1e-3) -> list[Part
     return assemble(parse(f'<robot name="r">{text}</robot>', Path("r.urdf")))
 
 
-def test_a_light_damping_is_what_the_file_says() -> None:
+def test_a_light_damping_is_that_of_the_file() -> None:
     assert damping_of(wheel(1e-5), 1, DT) == pytest.approx(1e-5, rel=1e-4)
 
 

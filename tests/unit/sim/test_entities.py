@@ -35,6 +35,7 @@ from services.sim.entities import Entities, Entity
 from services.sim.io.entity_services import EntityServices
 from services.sim.loop import Loop
 from services.sim.physics.engine import UPRIGHT, bullet
+from services.sim.physics.planar import PlanarBody
 from services.sim.physics.world import World
 
 REPO = Path(__file__).parents[3]
@@ -60,9 +61,9 @@ class Town:
         self.loop = Loop(self.bus, world, self.entities, 0.0, self.services)
         wait_for(self.client.connected)
 
-    def spawn(self, name: str = "Fred", text: str = HB_BOT, z: float = 0.0, **fields: object) -> Entity:
+    def spawn(self, name: str = "Fred", text: str = HB_BOT, z: float = 0.0, x: float = 0.0, **fields: object) -> Entity:
         """Put one in without the wire."""
-        request = si.SpawnEntityRequest(name=name, resource_string=text, initial_pose=at(0, 0, z), **fields)  # type: ignore[arg-type]
+        request = si.SpawnEntityRequest(name=name, resource_string=text, initial_pose=at(x, 0, z), **fields)  # type: ignore[arg-type]
         return self.entities.named(self.services.spawn(request).entity_name)
 
     def refusal(self, ask: Callable[[], object]) -> tuple[int, str]:
@@ -72,6 +73,10 @@ class Town:
         result = error.value.fields["result"]
         assert isinstance(result, dict) and result["error_message"] == str(error.value)
         return result["result"], str(error.value)
+
+    def wait_for_keys(self, *keys: str) -> None:
+        """Wait until the sim is on them."""
+        wait_for(lambda: set(keys) <= self.tokens(), what=lambda: f"{keys} among {self.tokens()}")
 
     def tokens(self) -> set[str]:
         """The keys that the sim stands on."""
@@ -93,38 +98,40 @@ def town(wire: Wire, world: World) -> Town:
     return Town(wire, world)
 
 
-def test_a_robot_is_put_where_the_request_says_and_has_keys_by_its_name(town: Town) -> None:
+def test_a_robot_is_put_where_the_request_places_it_and_has_keys_by_its_name(town: Town) -> None:
     turned = Quaternion(0, 0, math.sqrt(0.5), math.sqrt(0.5))
     request = si.SpawnEntityRequest("Fred", resource_string=HB_BOT, initial_pose=at(1, 2, 0.5, "world", turned))
     assert town.services.spawn(request).entity_name == "Fred"
     position, rotation = town.entities.named("Fred").body.pose()
     assert position == pytest.approx((1, 2, 0.5), abs=1e-6)
     assert rotation == pytest.approx((0, 0, math.sqrt(0.5), math.sqrt(0.5)), abs=1e-6)
-    assert {"Fred/cmd_vel", "Fred/odom", "Fred/joint_states", "Fred/tf", "Fred/resume"} <= town.tokens()
+    town.wait_for_keys("Fred/cmd_vel", "Fred/odom", "Fred/joint_states", "Fred/tf", "Fred/resume")
 
 
 def test_a_namespace_in_the_request_is_where_the_keys_are(town: Town) -> None:
     town.spawn("Fred", entity_namespace="lab")
-    assert {"lab/cmd_vel", "lab/odom"} <= town.tokens()
-    assert town.refusal(lambda: town.spawn("Ann", entity_namespace="lab"))[0] == si.SpawnEntityReply.NAME_NOT_UNIQUE
+    town.wait_for_keys("lab/cmd_vel", "lab/odom")
+    assert (
+        town.refusal(lambda: town.spawn("Ann", x=5, entity_namespace="lab"))[0] == si.SpawnEntityReply.NAME_NOT_UNIQUE
+    )
     assert town.refusal(lambda: town.spawn("Ann", entity_namespace="a/*"))[0] == si.SpawnEntityReply.NAMESPACE_INVALID
 
 
 def test_a_slash_as_namespace_is_the_root(town: Town) -> None:
     assert town.spawn("Fred", entity_namespace="/").name == "Fred"
-    assert {"cmd_vel", "odom"} <= town.tokens()
+    town.wait_for_keys("cmd_vel", "odom")
 
 
-def test_two_robots_never_share_a_key_whatever_their_files_say(town: Town) -> None:
+def test_two_robots_never_share_a_key_whatever_their_files_contain(town: Town) -> None:
     tag = "<commandTopic>cmd_vel</commandTopic>"
     town.spawn("Ann")
     inside = HB_BOT.replace(tag, f"<robotNamespace>Ann</robotNamespace>{tag}")
     assert inside != HB_BOT
     town.entities.add("root", parse(inside, Path("r")), ((5, 0, 0), UPRIGHT), "lab")
-    told = "lab/Ann/cmd_vel is the key of 'root'; use another name"
+    expected = "lab/Ann/cmd_vel is the key of 'root'; use another name"
     other = parse(inside.replace(">Ann<", ">lab/Ann<"), Path("r"))
     found = town.refusal(lambda: town.entities.add("third", other, ((9, 0, 0), UPRIGHT), ""))
-    assert found == (si.SpawnEntityReply.NAME_NOT_UNIQUE, told)
+    assert found == (si.SpawnEntityReply.NAME_NOT_UNIQUE, expected)
 
 
 def test_a_robot_without_a_drive_is_an_object_without_keys(town: Town) -> None:
@@ -158,9 +165,11 @@ def test_a_reply_holds_what_was_replaced_in_the_text(town: Town) -> None:
         "resource_string, line 1: <mesh> of <link name='a'> (collision) is replaced by a box of "
     )
     many = BALL.replace("</link>", f"{mesh * 30}</link>")
-    told = town.services.spawn(si.SpawnEntityRequest("Ann", resource_string=many)).result.error_message.splitlines()
-    assert (len(told), told[-1]) == (21, "and 10 more warnings")
-    assert town.services.spawn(si.SpawnEntityRequest("Bob", resource_string=BALL)).result.error_message == ""
+    request = si.SpawnEntityRequest("Ann", resource_string=many, initial_pose=at(5, 0, 0))
+    lines = town.services.spawn(request).result.error_message.splitlines()
+    assert (len(lines), lines[-1]) == (21, "and 10 more warnings")
+    request = si.SpawnEntityRequest("Bob", resource_string=BALL, initial_pose=at(9, 0, 0))
+    assert town.services.spawn(request).result.error_message == ""
 
 
 def test_a_name_is_made_where_none_is_given_or_renaming_is_allowed(town: Town) -> None:
@@ -203,12 +212,73 @@ REFUSED: dict[str, tuple[dict[str, object], int, str]] = {
 @pytest.mark.parametrize("fault", REFUSED)
 def test_a_request_that_is_wrong_is_refused_with_a_code_and_changes_nothing(town: Town, fault: str) -> None:
     town.spawn("Fred")
-    fields, code, told = REFUSED[fault]
+    fields, code, reported = REFUSED[fault]
     request = si.SpawnEntityRequest(**({"name": "Ann", "resource_string": HB_BOT} | fields))  # type: ignore[arg-type]
     found, reason = town.refusal(lambda: town.services.spawn(request))
-    assert (found, told in reason, reason.isprintable()) == (code, True, True), reason
+    assert (found, reported in reason, reason.isprintable()) == (code, True, True), reason
     assert [entity.name for entity in town.entities] == ["Fred"]
     assert len(town.entities.robots) == 1
+
+
+def test_nothing_is_put_deep_inside_something_else(town: Town) -> None:
+    """The engine throws both of them metres into the air."""
+    fred = town.spawn("Fred")
+    town.spawn("crate", BOX, x=-5, z=0.5)
+    code, told = town.refusal(lambda: town.spawn("Ann", x=0.6))
+    assert (code, told) == (
+        si.SpawnEntityReply.INVALID_POSE,
+        "there is no room for 'Ann' at x 0.6 y 0: it would be inside 'Fred'; the nearest free place is x 1.31 y 0.71",
+    )
+    assert "inside 'crate'" in town.refusal(lambda: town.spawn("ball", BALL, x=-5.3, z=0.5))[1]
+    town.loop.run(steps(), 120)
+    assert math.hypot(*fred.body.pose()[0]) < 0.1
+    assert [entity.name for entity in town.entities] == ["Fred", "crate"]
+    town.services.spawn(si.SpawnEntityRequest("Ann", resource_string=HB_BOT, initial_pose=at(1.31, 0.71, 0)))
+
+
+def test_what_touches_another_or_the_ground_has_room(town: Town) -> None:
+    town.spawn("low", BOX, z=0.5)
+    town.spawn("high", BOX, z=1.5)
+    town.spawn("sunk", BALL, x=5, z=0.1)
+
+
+def test_an_entity_is_not_moved_into_another(town: Town) -> None:
+    fred, ann = town.spawn("Fred"), town.spawn("Ann", x=5)
+    town.loop.run(steps(), 120)
+    before = ann.body.pose()
+
+    def move(x: float) -> object:
+        return town.services.put(si.SetEntityStateRequest("Ann", si.EntityState(pose=at(x, 0, 0).pose)))
+
+    code, told = town.refusal(lambda: move(0.5))
+    assert code == si.Result.OPERATION_FAILED and "no room for 'Ann' at x 0.5 y 0" in told
+    assert ann.body.pose()[0] == pytest.approx(before[0], abs=1e-6)
+    town.loop.run(steps(), 120)
+    assert max(math.dist(ann.body.pose()[0], before[0]), math.hypot(*fred.body.pose()[0])) < 0.1
+    move(5.1)  # through its own place
+
+
+def test_a_place_is_taken_by_a_robot_that_came_there_by_itself(town: Town) -> None:
+    fred = town.spawn("Fred")
+    assert isinstance(fred.body, PlanarBody)
+    for _ in range(480):
+        fred.body.drive((5.0, 0.0, 0.0), 1 / 240)
+        town.loop.run(steps(), 1)
+    assert fred.body.glides, "then the engine's body is not where the robot is"
+    x = fred.body.pose()[0][0]
+    town.spawn("Ann")
+    assert "inside 'Fred'" in town.refusal(lambda: town.spawn("Bob", x=x + 1.3))[1]
+
+
+def test_a_reset_puts_no_two_robots_into_one_place(town: Town, capsys: pytest.CaptureFixture[str]) -> None:
+    fred = town.spawn("Fred")
+    town.entities.set_start()
+    town.services.put(si.SetEntityStateRequest("Fred", si.EntityState(pose=at(5, 0, 0).pose)))
+    ann = town.spawn("Ann")
+    town.loop.simulation.reset(si.ResetSimulationRequest.SCOPE_STATE, time.monotonic())
+    assert "sim: Ann was added where Fred is now; it is put beside it" in capsys.readouterr().err
+    town.loop.run(steps(), 120)
+    assert math.hypot(*fred.body.pose()[0]) < 0.1 and 1.4 < math.hypot(*ann.body.pose()[0]) < 3.0
 
 
 def test_an_error_reply_carries_the_result_of_the_ros_service(wire: Wire, town: Town) -> None:
@@ -228,8 +298,8 @@ def test_an_error_reply_carries_the_result_of_the_ros_service(wire: Wire, town: 
             queries = ask()
             return None
 
-    told = json.loads(bytes(wait_for(reply).err.payload))
-    assert told == {"error": NOT_THERE, "result": {"result": si.Result.NOT_FOUND, "error_message": NOT_THERE}}
+    output = json.loads(bytes(wait_for(reply).err.payload))
+    assert output == {"error": NOT_THERE, "result": {"result": si.Result.NOT_FOUND, "error_message": NOT_THERE}}
 
 
 def test_what_is_deleted_leaves_no_key_and_no_token_and_its_name_is_free(town: Town) -> None:
@@ -253,8 +323,8 @@ def test_a_deleted_robot_is_out_of_the_way_of_others(town: Town) -> None:
 
 
 def test_entities_are_listed_and_filtered_by_a_simple_pattern(town: Town) -> None:
-    for name in ("ball_a", "ball_b", "crate"):
-        town.spawn(name, BALL, z=len(name))
+    for x, name in enumerate(("ball_a", "ball_b", "crate")):
+        town.spawn(name, BALL, z=1.0, x=x)
 
     def listed(pattern: str) -> list[str]:
         return town.services.names(si.GetEntitiesRequest(si.EntityFilters(pattern))).entities
@@ -336,8 +406,8 @@ def test_a_robot_that_cannot_be_leaves_nothing_in_the_world(town: Town, world: W
     """wheely_boi upside down: its plugin refuses it after the engine has it."""
     text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
     town.spawn("ball", BALL, z=1.0)
-    code, told = town.refusal(lambda: town.spawn("Fred", text, z=0.3))
-    assert (code, "cannot balance" in told) == (si.SpawnEntityReply.RESOURCE_PARSE_ERROR, True)
+    code, reported = town.refusal(lambda: town.spawn("Fred", text, z=0.3))
+    assert (code, "cannot balance" in reported) == (si.SpawnEntityReply.RESOURCE_PARSE_ERROR, True)
     assert bullet.getNumBodies(world.id) == 2  # the ground and the ball
 
 
@@ -383,8 +453,9 @@ def test_an_arm_can_be_stopped_too(town: Town, capsys: pytest.CaptureFixture[str
     town.spawn("arm", ARM, z=0.05)
     (robot,) = town.entities.robots
     commands = town.client.publisher("arm/joint_command", JointState)
-    wait_for(lambda: commands.matched)
-    asked = town.client.session.get("arm/stop")
+    stop = town.client.session.declare_querier("arm/stop")
+    wait_for(lambda: commands.matched and stop.matching_status.matching)
+    asked = stop.get()
 
     def refused() -> bool:
         commands.put(JointState(name=["j"], velocity=[1.0]))
@@ -399,9 +470,8 @@ def test_an_arm_can_be_stopped_too(town: Town, capsys: pytest.CaptureFixture[str
 
 def test_a_robot_with_joints_and_no_drive_has_a_resume_of_its_own(town: Town) -> None:
     town.spawn("arm", ARM, z=0.05)
-    keys = {"arm/resume", "arm/stop", "arm/release", "arm/joint_command", "arm/joint_states"}
-    wait_for(lambda: keys <= town.tokens())
-    other = town.refusal(lambda: town.spawn("second", ARM, entity_namespace="arm"))
+    town.wait_for_keys("arm/resume", "arm/stop", "arm/release", "arm/joint_command", "arm/joint_states")
+    other = town.refusal(lambda: town.spawn("second", ARM, x=5, entity_namespace="arm"))
     assert other[0] == si.SpawnEntityReply.NAME_NOT_UNIQUE
 
 
@@ -419,17 +489,17 @@ def test_a_static_robot_is_never_driven(town: Town) -> None:
 def test_a_robots_file_puts_nothing_on_a_key_that_is_taken(town: Town, tag: str) -> None:
     text = HB_BOT.replace("<commandTopic>cmd_vel<", f"<commandTopic>/{tag}<")
     model = parse(text, Path("r"))
-    code, told = town.refusal(lambda: town.entities.add("Fred", model, ((0, 0, 0), UPRIGHT), ""))
-    assert (code, repr(tag) in told) == (si.SpawnEntityReply.NAMESPACE_INVALID, True)
+    code, reported = town.refusal(lambda: town.entities.add("Fred", model, ((0, 0, 0), UPRIGHT), ""))
+    assert (code, repr(tag) in reported) == (si.SpawnEntityReply.NAMESPACE_INVALID, True)
 
 
 def test_a_robot_that_moves_to_nowhere_is_taken_out_and_the_others_go_on(
     town: Town, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     town.spawn("Fred")
-    ann = town.spawn("Ann", entity_namespace="ann")
+    ann = town.spawn("Ann", x=5, entity_namespace="ann")
     (fred, _) = town.entities.robots
-    town.loop.run(steps(), 6)  # the first messages are always sent; those that follow, which nobody reads, are not
+    town.loop.run(steps(), 6)  # the first messages are always sent; those that follow, without a reader, are not
     lost = ((math.nan, 0.0, 0.0), UPRIGHT, (0.0, 0.0, 0.0))
     monkeypatch.setattr(fred.mover, "moved", lambda time, dt: lost)
     town.loop.run(steps(), 24)

@@ -109,8 +109,8 @@ def test_a_node_of_another_session_is_no_driver_that_left(robot: Robot) -> None:
 
 def test_a_sender_that_goes_on_and_whose_clock_stays_unknown_is_refused_and_asked_first(robot: Robot) -> None:
     robot.senders.known.clear()
-    told = [kind for step in range(20) for kind in robot.hear(10 + step * 0.05, robot.sent(step, 10 + step * 0.05))]
-    assert told == ["unknown clock"]
+    reported = [kind for step in range(20) for kind in robot.hear(10 + step * 0.05, robot.sent(step, 10 + step * 0.05))]
+    assert reported == ["unknown clock"]
     assert set(robot.senders.tracked) == {"aa"}
 
 

@@ -15,7 +15,8 @@ from holozen.robot.rigid import lump
 from holozen.robot.sdf_world import load_world
 from holozen.rotation import from_rpy
 from services.sim.physics.body import Body
-from services.sim.physics.planar import PlanarBody
+from services.sim.physics.engine import UPRIGHT
+from services.sim.physics.planar import FAR, PlanarBody
 from services.sim.physics.world import World
 
 REPO = Path(__file__).parents[3]
@@ -121,7 +122,7 @@ def test_it_takes_the_same_way_as_with_contacts_throughout(name: str) -> None:
         assert glided
 
 
-def test_it_goes_on_as_it_was_told_without_being_told_again(ground: World) -> None:
+def test_it_keeps_its_motion_without_a_new_command(ground: World) -> None:
     base = settled(ground)
     base.drive((0.5, 0, 0), DT)
     for _ in range(240):
@@ -170,6 +171,23 @@ def test_it_glides_no_longer_where_something_is_put_beside_it_until_it_left(grou
     for _ in run(ground, 2, (base, (-0.5, 0, 0))):
         pass
     assert base.glides
+
+
+def test_a_wall_that_is_put_in_its_way_stops_it_wherever_it_is_between_two_looks(ground: World) -> None:
+    base, wall = put(ground), crate(ground, "0.2 4 1", 1.5, 0, 0.5)
+    for _ in run(ground, 3, (base, (0.5, 0, 0))):
+        pass
+    reach, away = 1.5 - base.pose()[0][0], ((20.0, 0.0, 0.5), UPRIGHT)
+    for phase in range(0, FAR, 5):
+        ground.put(wall, away, (0, 0, 0), (0, 0, 0))
+        base.put((0, 0, REST), UPRIGHT, (0, 0, 0), (0, 0, 0))
+        for _ in run(ground, 1 + phase * DT, (base, (0.5, 0, 0))):
+            pass
+        assert base.glides
+        (x, y, _), _ = base.pose()
+        ground.put(wall, ((x + reach + 0.05, y, 0.5), UPRIGHT), (0, 0, 0), (0, 0, 0))
+        for _ in run(ground, 0.5, (base, (0.5, 0, 0))):
+            assert base.pose()[0][0] < x + 0.055, phase
 
 
 def test_nothing_glides_where_there_is_no_ground(air: World) -> None:

@@ -21,9 +21,9 @@ class Judge:
     """The TwistInput of one robot, and its reports."""
 
     def __init__(self) -> None:
-        self.told: list[str] = []
+        self.reports: list[str] = []
         self.twist_input = TwistInput(
-            "Fred/cmd_vel", Arbiter(0.5), FakeSenders(), linear=2.0, angular=3.0, report=self.told.append
+            "Fred/cmd_vel", Arbiter(0.5), FakeSenders(), linear=2.0, angular=3.0, report=self.reports.append
         )
 
     def take(
@@ -50,7 +50,7 @@ def test_a_good_command_drives_and_is_counted(judge: Judge) -> None:
     assert judge.motion() == (1, -0.5, 2)
     status = judge.twist_input.status(10.0)
     assert (status.obeyed, status.priority, status.accepted) == ("teleop@9", "INTERACTIVE_HIGH", 1)
-    assert (status.refused, status.last_refusal, judge.told) == ({}, "", [])
+    assert (status.refused, status.last_refusal, judge.reports) == ({}, "", [])
 
 
 def test_the_status_of_a_silent_robot_names_no_driver(judge: Judge) -> None:
@@ -72,7 +72,7 @@ def test_a_faster_command_is_clamped_in_its_direction_and_reported(judge: Judge)
     assert judge.motion() == pytest.approx((1.2, 1.6, -3))
     status = judge.twist_input.status(10.0)
     assert (status.accepted, status.refused) == (1, {"clamped": 1})
-    assert judge.told == [
+    assert judge.reports == [
         "Fred/cmd_vel: from me@1: over the limits of 2 m/s and 3 rad/s, clamped: (30, 40, -50)"
     ]  # fmt: skip
 
@@ -90,7 +90,7 @@ def test_a_number_that_is_not_finite_never_drives(
     assert judge.motion() == STOP
     assert judge.twist_input.status(10.0).refused == {"not finite": 1}
     path = f"{part}.{axis}" if kind is Twist else f"twist.{part}.{axis}"
-    assert judge.told == [f"Fred/cmd_vel: from me@1: {path} is not a finite number"]
+    assert judge.reports == [f"Fred/cmd_vel: from me@1: {path} is not a finite number"]
 
 
 @pytest.mark.parametrize(
@@ -115,11 +115,11 @@ def test_a_stamp_may_be_off_by_half_a_second_by_the_clock_it_is_nearest_to(
     judge.take(stamped(stamp))
     if age:
         assert judge.motion() == STOP
-        assert judge.told == [f"Fred/cmd_vel: from me@1: stamp is {age} s old; at most {MAX_STAMP_AGE} s"]
+        assert judge.reports == [f"Fred/cmd_vel: from me@1: stamp is {age} s old; at most {MAX_STAMP_AGE} s"]
         assert judge.twist_input.status(10.0).refused == {"stale": 1}
     else:
         assert judge.motion() == (1, 0, 0)
-        assert judge.told == []
+        assert judge.reports == []
 
 
 def test_a_stamp_makes_a_command_older_but_never_younger(judge: Judge) -> None:
@@ -136,7 +136,7 @@ def test_a_command_that_may_have_waited_too_long_is_refused_but_a_stop_is_not(ju
     assert judge.motion() == (1, 0, 0)
     judge.take(Twist.planar(2), waited=0.6)
     assert judge.motion() == (1, 0, 0)
-    assert judge.told == ["Fred/cmd_vel: from me@1: late: it waited up to 0.6 s for the sim"]
+    assert judge.reports == ["Fred/cmd_vel: from me@1: late: it waited up to 0.6 s for the sim"]
     judge.take(Twist(), waited=math.inf)
     assert judge.motion() == STOP
     assert judge.twist_input.status(10.0).refused == {"late": 1}
@@ -147,7 +147,7 @@ def test_a_command_for_every_robot_is_for_none(judge: Judge, key: str) -> None:
     judge.take(Twist.planar(1), key=key)
     assert judge.motion() == STOP
     assert judge.twist_input.status(10.0).refused == {"wildcard": 1}
-    assert judge.told == [f"Fred/cmd_vel: from me@1: a command for {key!r}; name one robot"]
+    assert judge.reports == [f"Fred/cmd_vel: from me@1: a command for {key!r}; name one robot"]
 
 
 def test_no_stamp_is_a_fresh_one(judge: Judge) -> None:
@@ -189,7 +189,7 @@ def test_while_it_is_stopped_every_command_is_refused_and_counted(judge: Judge) 
     status = judge.twist_input.status(10.0)
     assert (status.stopped, status.obeyed, status.held) == ("ann@1", "", True)
     assert status.refused == {"stopped": 3}
-    assert judge.told == ["Fred/cmd_vel: from me@1: stopped: by ann@1; `holozen release` lets it drive again"]
+    assert judge.reports == ["Fred/cmd_vel: from me@1: stopped: by ann@1; `holozen release` lets it drive again"]
     assert judge.motion() == STOP
 
 
@@ -199,7 +199,7 @@ def test_a_stop_is_obeyed_whatever_its_stamp(judge: Judge, seconds: float) -> No
     judge.take(stamped(seconds, 0.0), priority="INTERACTIVE_HIGH", source="ann@1")
     assert judge.motion() == STOP
     judge.take(Twist.planar(1), now=10.1, priority="INTERACTIVE_HIGH")
-    assert judge.motion(10.1) == STOP, "who was stopped waits"
+    assert judge.motion(10.1) == STOP, "a stopped source waits"
 
 
 @pytest.mark.parametrize("kind", ["late", "stale"])
@@ -218,12 +218,12 @@ def test_a_source_on_a_bad_link_that_commands_has_not_let_go(judge: Judge, kind:
 def test_refusals_are_reported_once_a_second_with_the_number_of_the_others(judge: Judge) -> None:
     for now in (1.0, 1.2, 1.4, 1.0 + REPORT_EVERY, 2.1):
         judge.take(None, now, error="not a Twist")
-    assert judge.told == [
+    assert judge.reports == [
         "Fred/cmd_vel: from me@1: not a Twist",
         "Fred/cmd_vel: from me@1: not a Twist (and 2 more)",
     ]
     judge.take(None, now=3.5, error="not a Twist")
-    assert judge.told[2] == "Fred/cmd_vel: from me@1: not a Twist (and 1 more)"
+    assert judge.reports[2] == "Fred/cmd_vel: from me@1: not a Twist (and 1 more)"
     assert judge.twist_input.status(3.5).refused == {"malformed": 6}
 
 

@@ -59,7 +59,7 @@ def run(world: World, seconds: float) -> None:
 
 
 def state(body: JointedBody, name: str = "j") -> tuple[float, float]:
-    positions, rates = body.states()
+    positions, rates, _ = body.states()
     return positions[body.names.index(name)], rates[body.names.index(name)]
 
 

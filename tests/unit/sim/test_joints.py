@@ -88,7 +88,7 @@ def test_what_was_never_commanded_is_left_alone(space: World) -> None:
     assert bench.rates()["jFR"] == pytest.approx(2)
 
 
-def test_a_message_becomes_the_motion_that_it_says(space: World) -> None:
+def test_a_message_becomes_the_motion_that_it_commands(space: World) -> None:
     bench = Bench(space)
     bench.do(motion_of(JointState(name=["jBL"], velocity=[-2.0])), 1)
     assert bench.rates()["jBL"] == pytest.approx(-2)

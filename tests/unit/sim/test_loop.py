@@ -21,6 +21,7 @@ from holozen.messages import (
     CommandStatus,
     JointState,
     Odometry,
+    SimulationStatus,
     TFMessage,
     TriggerReply,
     TriggerRequest,
@@ -99,13 +100,13 @@ def test_a_run_ends_after_its_steps_or_when_it_is_stopped(sim: Sim) -> None:
 def test_odometry_comes_at_its_rate_of_sim_time_with_the_frames_of_the_robot(sim: Sim) -> None:
     odom = sim.bus.subscribe("Fred/odom", Odometry, depth=1000)
     sim.run(480)
-    told = sim.all(odom)
-    assert len(told) == 2 * DRIVE.odometry_rate + 1
-    stamps = [message.header.stamp.seconds() for message in told]
+    reported = sim.all(odom)
+    assert len(reported) == 2 * DRIVE.odometry_rate + 1
+    stamps = [message.header.stamp.seconds() for message in reported]
     assert stamps[-1] == pytest.approx(2.0)
     assert all(later - earlier <= 1 / 50 + 1 / 240 + 1e-9 for earlier, later in pairwise(stamps))
-    assert (told[0].header.frame_id, told[0].child_frame_id) == ("Fred/odom", "Fred/footprint_link")
-    assert told[-1].pose.pose.position.z == pytest.approx(-0.04, abs=1e-3)
+    assert (reported[0].header.frame_id, reported[0].child_frame_id) == ("Fred/odom", "Fred/footprint_link")
+    assert reported[-1].pose.pose.position.z == pytest.approx(-0.04, abs=1e-3)
 
 
 def test_a_command_moves_the_robot_and_its_joints_and_shows_in_the_status(sim: Sim) -> None:
@@ -177,8 +178,8 @@ def test_what_is_wrong_never_reaches_the_engine_and_is_counted(wire: Wire, world
     }
 
     def refused(kind: str) -> int:
-        told = status.read()[0]
-        return told.refused.get(kind, 0) if told else 0
+        reported = status.read()[0]
+        return reported.refused.get(kind, 0) if reported else 0
 
     with sim.running():
         wait_for(lambda: commands.matched)
@@ -196,10 +197,10 @@ def test_the_priority_is_read_off_the_sample(wire: Wire, world: World) -> None:
     with sim.running():
         wait_for(lambda: commands.matched)
         commands.put(Twist.planar(0.1))
-        wait_for(lambda: (told := status.read()[0]) and told.obeyed)
-    told = status.read()[0]
-    assert told is not None
-    assert (told.obeyed, told.priority, told.held) == (me.source, "DATA_LOW", False)
+        wait_for(lambda: (reported := status.read()[0]) and reported.obeyed)
+    reported = status.read()[0]
+    assert reported is not None
+    assert (reported.obeyed, reported.priority, reported.held) == (me.source, "DATA_LOW", False)
 
 
 def test_resume_is_a_service_between_the_steps(wire: Wire, world: World) -> None:
@@ -220,9 +221,9 @@ def test_stop_and_release_are_services_and_published_at_once(wire: Wire, world: 
         for verb, setter in (("stop", me.source), ("stop", me.source), ("release", ""), ("release", "")):
             assert me.call(f"Fred/{verb}", TriggerRequest(), TriggerReply).success
             assert sim.arbiter.software_stop.setter == sim.robot.joint_arbiter.software_stop.setter == setter
-            told = [received.message for received in iter(status.try_recv, None) if received.message]
-            if told:  # a change is told before it is confirmed, the rest when it is due
-                assert told[-1].stopped == setter
+            reported = [received.message for received in iter(status.try_recv, None) if received.message]
+            if reported:  # a change is published before it is confirmed, the rest when it is due
+                assert reported[-1].stopped == setter
             (answer,) = [reply.ok for reply in me.session.get("Fred/cmd_vel_status")]
             assert json.loads(bytes(answer.payload))["stopped"] == setter
 
@@ -251,7 +252,6 @@ def test_a_node_that_leaves_stops_the_robot_that_it_drove_and_no_other(clock: li
     token.undeclare()
 
     def stands() -> bool:
-        sim.loop.graph_polled = 0.0
         sim.run(1)
         return fred.arbiter.motion(clock[0]) == STOP
 
@@ -278,12 +278,12 @@ def test_commands_that_waited_through_a_stall_are_refused(clock: list[float], si
         assert (driver is None or driver.motion != (pause, 0, 0)) == refused, pause
     clock[0] += 1
     sim.run(1)
-    told = [received.message for received in iter(status.try_recv, None) if received.message]
-    assert told[-1].refused == {"late": 2}
+    reported = [received.message for received in iter(status.try_recv, None) if received.message]
+    assert reported[-1].refused == {"late": 2}
 
 
 def test_a_new_source_is_in_a_status_at_once(clock: list[float], sim: Sim) -> None:
-    """Whoever publishes one command waits for that. Too little time passes here for a status to be due."""
+    """A publisher of one command waits for that. Too little time passes here for a status to be due."""
     status = sim.bus.subscribe("Fred/cmd_vel_status", CommandStatus)
     sim.run(1)
     assert [received.message for received in iter(status.try_recv, None)], "the first is due at once"
@@ -291,8 +291,8 @@ def test_a_new_source_is_in_a_status_at_once(clock: list[float], sim: Sim) -> No
         sim.bus.session.put("Fred/cmd_vel", encode(Twist()), attachment=f"{name}@abc")
         clock[0] += POLL
         sim.run(1)
-        told = [received.message for received in iter(status.try_recv, None) if received.message]
-        assert [f"{name}@abc" in [each.source for each in one.sources] for one in told] == [True] * is_new
+        reported = [received.message for received in iter(status.try_recv, None) if received.message]
+        assert [f"{name}@abc" in [each.source for each in one.sources] for one in reported] == [True] * is_new
 
 
 def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: Sim) -> None:
@@ -301,6 +301,19 @@ def test_a_stop_that_waited_through_a_stall_is_obeyed(clock: list[float], sim: S
     sim.arbiter.offer(sim.bus.source, 4, FORWARD, clock[0])
     clock[0] += 60
     commands.put(Twist())
+    sim.run(1)
+    assert sim.arbiter.motion(clock[0]) == STOP
+
+
+def test_a_flood_of_commands_at_one_robot_pushes_out_no_stop_of_another(clock: list[float], sim: Sim) -> None:
+    sim.entities.add("Ann", MODEL, ((3, 0, 0), UPRIGHT))
+    flood: Publisher[Twist] = sim.bus.publisher("Ann/cmd_vel", Twist)
+    commands: Publisher[Twist] = sim.bus.publisher("Fred/cmd_vel", Twist)
+    sim.arbiter.timeout = -1
+    sim.arbiter.offer(sim.bus.source, 4, FORWARD, clock[0])
+    commands.put(Twist())
+    for _ in range(5000):
+        flood.put(Twist.planar(0.5))
     sim.run(1)
     assert sim.arbiter.motion(clock[0]) == STOP
 
@@ -330,7 +343,7 @@ def test_the_first_and_the_300th_robot_stand_when_their_drivers_fall_silent_and_
     assert not any(speeds())
     me = wire.bus("me")
     for robot, name in ((first, "Fred"), (last, "bot299")):
-        robot.set_timeout(-1.0)
+        robot.set_timeout(-1.0, clock[0])
         robot.arbiter.offer("me", 4, FORWARD, clock[0])
         assert sum(map(bool, speeds())) == 1
         with ThreadPoolExecutor() as pool:
@@ -342,11 +355,31 @@ def test_the_first_and_the_300th_robot_stand_when_their_drivers_fall_silent_and_
         assert not any(speeds())
 
 
-def test_a_changed_timeout_counts_for_who_drives_already(clock: list[float], sim: Sim) -> None:
+def test_a_changed_timeout_applies_to_the_current_driver(clock: list[float], sim: Sim) -> None:
     sim.run(240)
     sim.arbiter.offer("me", 4, FORWARD, clock[0])
     sim.run(1)
-    sim.robot.set_timeout(0.1)
+    sim.robot.set_timeout(0.1, clock[0])
     clock[0] += 0.11
     sim.run(1)
     assert sim.robot.mover.body.twist()[0] == (0, 0, 0)
+
+
+def test_a_stall_is_an_overrun_in_the_status(clock: list[float], wire: Wire, world: World) -> None:
+    sim = Sim(wire, world, rtf=1.0)
+    status = sim.bus.subscribe("simulation_status", SimulationStatus)
+
+    def reported() -> SimulationStatus | None:
+        clock[0] += 0.004
+        new = [received.message for received in iter(status.try_recv, None)]
+        return new[-1] if new and new[-1] and new[-1].overruns else None
+
+    with sim.running():
+        wait_for(lambda: world.steps)
+        before = world.steps
+        clock[0] += 1.0
+        newest = wait_for(reported)
+    assert newest
+    assert newest.overruns == 1 and newest.lost == pytest.approx(1.0, abs=0.2)
+    assert newest.steps - before < 0.2 * 240, "no burst followed"
+    assert newest.real_time_factor < 0.3

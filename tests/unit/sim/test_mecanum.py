@@ -52,8 +52,8 @@ def test_a_wheel_with_its_axis_the_other_way_turns_the_other_way() -> None:
 
 
 def test_what_the_file_does_not_measure_is_measured() -> None:
-    told, measured = wheels(), wheels(separation=0.0, wheelbase=0.0, radius=0.0)
-    assert rates(told, (0.5, -0.2, 2)) == pytest.approx(rates(measured, (0.5, -0.2, 2)))
+    reported, measured = wheels(), wheels(separation=0.0, wheelbase=0.0, radius=0.0)
+    assert rates(reported, (0.5, -0.2, 2)) == pytest.approx(rates(measured, (0.5, -0.2, 2)))
 
 
 def test_angles_add_up_what_was_rolled() -> None:

@@ -33,21 +33,26 @@ def test_an_hour_of_steps_takes_an_hour() -> None:
     assert pace.lost == 0
 
 
-def test_a_short_delay_is_made_good() -> None:
-    pace = Pace(0.01, 1.0, now=0.0)
-    pace.stepped(0.05)
-    assert pace.left(0.05) == pytest.approx(-0.04)
-    assert pace.lost == 0
+def test_a_short_delay_is_made_good_at_twice_the_pace_and_not_in_a_burst() -> None:
+    pace, now, steps = Pace(0.01, 1.0, now=0.0), 0.05, 0
+    while pace.left(now) <= 0.005 + 1e-9:
+        now += max(pace.left(now), 0.0)
+        pace.stepped(now)
+        steps += 1
+    assert steps == 11 and now == pytest.approx(0.1)
+    assert (pace.overruns, pace.lost) == (0, 0)
 
 
 def test_after_a_stall_the_steps_go_on_from_now() -> None:
     pace = Pace(0.01, 1.0, now=0.0)
     stalled = 0.01 + STALL + 1.0
     pace.stepped(stalled)
-    assert pace.left(stalled) == 0
-    assert pace.lost == pytest.approx(STALL + 1.0)
-    pace.stepped(stalled)
-    assert pace.left(stalled) == pytest.approx(0.01)
+    assert pace.overruns == 1 and pace.lost == pytest.approx(STALL + 1.0)
+    for _ in range(10):
+        stalled += pace.left(stalled)
+        pace.stepped(stalled)
+    assert stalled == pytest.approx(0.01 + STALL + 1.0 + 9 * 0.01)
+    assert pace.overruns == 1
 
 
 def test_a_factor_of_zero_never_waits() -> None:

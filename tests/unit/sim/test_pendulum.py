@@ -5,7 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from services.sim.physics.balance import GRAVITY, Pendulum, gains
+from services.sim.physics.balance import Pendulum, gains
+from services.sim.physics.dynamics import GRAVITY
 
 WHEELY = Pendulum(
     body_mass=0.18,

@@ -74,10 +74,10 @@ def test_odometry_is_the_world_pose_and_the_body_velocity_with_both_covariances(
 
 
 def test_a_transform_gives_the_child_in_the_header_frame() -> None:
-    told = transform(Header(Time(1), "odom"), "base", (1, 2, 3), (0, 0, 1, 0))
-    assert (told.header.frame_id, told.child_frame_id) == ("odom", "base")
-    assert (told.transform.translation.x, told.transform.translation.z) == (1, 3)
-    assert told.transform.rotation == Quaternion(0, 0, 1, 0)
+    reported = transform(Header(Time(1), "odom"), "base", (1, 2, 3), (0, 0, 1, 0))
+    assert (reported.header.frame_id, reported.child_frame_id) == ("odom", "base")
+    assert (reported.transform.translation.x, reported.transform.translation.z) == (1, 3)
+    assert reported.transform.rotation == Quaternion(0, 0, 1, 0)
 
 
 def matrix(q: Quaternion) -> Array:
@@ -94,21 +94,30 @@ def test_a_joint_turns_its_child_about_its_axis_in_the_parents_frame(
     x, y, z = (a / length for a in axis) if length > 1e-3 else (0.0, 0.6, 0.8)
     joint = Joint("j", "continuous", "a", "b", Pose((1, 2, 3), rpy), (x, y, z), Limits())
     model = RobotModel("r", "a", {n: Link(n, None, (), ()) for n in "ab"}, {"j": joint}, None, ())
-    (told,) = JointFrames(model, "").transforms(Time(), {"j": angle})
+    (reported,) = JointFrames(model, "").transforms(Time(), {"j": angle})
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     about = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross  # Rodrigues
-    assert matrix(told.transform.rotation) == pytest.approx(matrix_of(rpy) @ about, abs=1e-9)
-    assert (told.transform.translation.x, told.transform.translation.y) == (1, 2)
+    assert matrix(reported.transform.rotation) == pytest.approx(matrix_of(rpy) @ about, abs=1e-9)
+    assert (reported.transform.translation.x, reported.transform.translation.y) == (1, 2)
+
+
+def test_a_prismatic_joint_slides_its_child_along_its_axis_in_the_parents_frame() -> None:
+    joint = Joint("j", "prismatic", "a", "b", Pose((1, 2, 3), (0, 0, math.pi / 2)), (1, 0, 0), Limits())
+    model = RobotModel("r", "a", {n: Link(n, None, (), ()) for n in "ab"}, {"j": joint}, None, ())
+    (found,) = JointFrames(model, "").transforms(Time(), {"j": 0.5})
+    at = found.transform.translation
+    assert (at.x, at.y, at.z) == pytest.approx((1, 2.5, 3))
+    assert found.transform.rotation.yaw() == pytest.approx(math.pi / 2)
 
 
 def test_every_joint_of_the_robot_has_a_transform_with_its_prefix() -> None:
-    told = JointFrames(HB_BOT, "Fred/").transforms(Time(7), {})
-    assert {(t.header.frame_id, t.child_frame_id) for t in told} == {
+    reported = JointFrames(HB_BOT, "Fred/").transforms(Time(7), {})
+    assert {(t.header.frame_id, t.child_frame_id) for t in reported} == {
         ("Fred/footprint_link", "Fred/base_link"),
         *(("Fred/base_link", f"Fred/{name}_wheel_link") for name in ("front", "left", "right")),
     }
-    assert all(t.header.stamp == Time(7) for t in told)
-    at = {t.child_frame_id: t.transform for t in told}["Fred/left_wheel_link"]
+    assert all(t.header.stamp == Time(7) for t in reported)
+    at = {t.child_frame_id: t.transform for t in reported}["Fred/left_wheel_link"]
     *_, z, w = quaternion_of(matrix_of((0, 0, math.atan2(0.58, -0.36))))
     assert (at.rotation.z, at.rotation.w) == pytest.approx((z, w))
     assert (at.translation.x, at.translation.y, at.translation.z) == (-0.58, -0.36, 0.18)

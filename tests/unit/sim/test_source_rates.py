@@ -10,7 +10,7 @@ def rates() -> SourceRates:
     return SourceRates()
 
 
-def told(rates: SourceRates, now: float) -> dict[str, float]:
+def reported(rates: SourceRates, now: float) -> dict[str, float]:
     return {source: rate for source, _, rate, _ in rates.recent(now)}
 
 
@@ -24,21 +24,21 @@ def test_the_rate_is_that_of_the_last_second_or_so_however_often_one_looks(
         now = count / hertz
         rates.record("me", 4, now)
         if now >= due:
-            shown, due = told(rates, now)["me"], due + looks
+            shown, due = reported(rates, now)["me"], due + looks
     assert shown == pytest.approx(hertz, rel=0.1, abs=1.0)
 
 
 def test_one_command_is_one_hertz_and_soon_none(rates: SourceRates) -> None:
     rates.record("me", 4, 10.0)
-    assert told(rates, 10.0)["me"] == 1
-    assert told(rates, 10.9)["me"] == 1
-    assert told(rates, 12.5)["me"] < 0.5
+    assert reported(rates, 10.0)["me"] == 1
+    assert reported(rates, 10.9)["me"] == 1
+    assert reported(rates, 12.5)["me"] < 0.5
 
 
 def test_a_source_that_is_silent_for_some_seconds_is_forgotten(rates: SourceRates) -> None:
     rates.record("me", 4, 10.0)
-    assert "me" in told(rates, 10.0 + RECENT)
-    assert told(rates, 10.01 + RECENT) == {}
+    assert "me" in reported(rates, 10.0 + RECENT)
+    assert reported(rates, 10.01 + RECENT) == {}
 
 
 def test_the_strongest_come_first(rates: SourceRates) -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from holozen.bus import Bus
 from holozen.robot.errors import RobotError
-from holozen.robot.model import WorldSpec
+from holozen.robot.model import Balancing, WorldSpec
 from holozen.testing import Wire, wait_for
 from services.sim.entities import Entities, Entity
 from services.sim.physics.world import World
@@ -85,9 +85,9 @@ def test_the_plugins_tags_name_the_topics(
     tags = "<commandTopic>go</commandTopic><odometryTopic>where</odometryTopic>"
     spawn(bus, world, wanted((file(tmp_path, LINK.format(BALL) + DRIVE.format(tags)), "Fred")))
     assert {"Fred/go", "Fred/where", "Fred/go_status"} <= keys(bus)
-    told = capsys.readouterr().err
-    assert f"sim: {tmp_path}/robot.urdf: topic 'go': the teleop and the controller use 'cmd_vel'\n" in told
-    assert f"sim: {tmp_path}/robot.urdf: topic 'where': the teleop and the controller use 'odom'\n" in told
+    message = capsys.readouterr().err
+    assert f"sim: warning: {tmp_path}/robot.urdf: topic 'go': the teleop and the controller use 'cmd_vel'\n" in message
+    assert f"sim: warning: {tmp_path}/robot.urdf: topic 'where': the teleop and the controller use 'odom'\n" in message
 
 
 def test_a_namespace_in_the_file_is_as_good_as_a_name(bus: Bus, world: World, tmp_path: Path) -> None:
@@ -101,10 +101,10 @@ def test_a_second_sim_of_the_same_robot_is_refused(wire: Wire, bus: Bus, world: 
     spawn(first, world, wanted((HB_BOT, "Fred")))
     wait_for(bus.connected)
     wait_for(bus.graph().endpoints)
-    told = rf": Fred/odom is published by first_sim \({first.id[:6]}\) already; end that one, or use another name"
+    reported = rf": Fred/odom is published by first_sim \({first.id[:6]}\) already; end that one, or use another name"
 
     def refused() -> bool:
-        with closing(World(WorldSpec())) as second, pytest.raises(RobotError, match=told):
+        with closing(World(WorldSpec())) as second, pytest.raises(RobotError, match=reported):
             spawn(bus, second, wanted((HB_BOT, "Fred")))
         return True
 
@@ -114,20 +114,20 @@ def test_a_second_sim_of_the_same_robot_is_refused(wire: Wire, bus: Bus, world: 
 
 
 @pytest.mark.parametrize(
-    ("robots", "told"),
+    ("robots", "expected"),
     [
         (["Fred", "Fred"], "2 robots are called 'Fred'; give each a name: --robot FILE=NAME"),
         (["", "Ann", ""], "2 robots are called ''; give each a name: --robot FILE=NAME"),
     ],
 )
-def test_two_robots_of_one_name_are_refused(bus: Bus, world: World, robots: list[str], told: str) -> None:
+def test_two_robots_of_one_name_are_refused(bus: Bus, world: World, robots: list[str], expected: str) -> None:
     with pytest.raises(RobotError) as error:
         spawn(bus, world, wanted(*((HB_BOT, name) for name in robots)))
-    assert str(error.value) == told
+    assert str(error.value) == expected
 
 
 @pytest.mark.parametrize(
-    ("body", "told"),
+    ("body", "expected"),
     [
         (LINK.format(BALL), "no plugin drives it; add one, or move the whole body: --drive planar_move"),
         (
@@ -138,12 +138,12 @@ def test_two_robots_of_one_name_are_refused(bus: Bus, world: World, robots: list
     ids=["no drive", "no collision"],
 )
 def test_a_robot_that_cannot_be_simulated_is_refused_with_its_file(
-    bus: Bus, world: World, tmp_path: Path, body: str, told: str
+    bus: Bus, world: World, tmp_path: Path, body: str, expected: str
 ) -> None:
     path = file(tmp_path, body)
     with pytest.raises(RobotError) as error:
         spawn(bus, world, wanted((path, "")))
-    assert str(error.value) == f"{path}: {told}"
+    assert str(error.value) == f"{path}: {expected}"
 
 
 def test_a_missing_collision_mesh_is_reported_and_a_box_carries_the_robot(
@@ -174,3 +174,11 @@ def test_a_robot_without_a_drive_gets_a_planar_drive_on_request(bus: Bus, world:
     (entity,) = spawn(bus, world, wanted((file(tmp_path, LINK.format(BALL)), "Fred"), drive="planar_move"))
     assert entity.model.drive is not None
     assert "Fred/cmd_vel" in keys(bus)
+
+
+def test_a_robot_with_another_drive_keeps_it_which_is_reported(
+    bus: Bus, world: World, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (entity,) = spawn(bus, world, wanted((HB_BOT.with_name("wheely_boi.xacro"), "Fred"), drive="omni"))
+    assert entity.model.drive and isinstance(entity.model.drive.mechanism, Balancing)
+    assert "has a drive of its own, which is used; --drive omni is not" in capsys.readouterr().err

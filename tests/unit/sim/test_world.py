@@ -279,6 +279,7 @@ BUMP = (
     '<sdf version="1.7"><model name="bump"><static>true</static><link name="l"><collision name="c"><geometry><box>'
     "<size>0.2 {} {}</size></box></geometry></collision></link></model></sdf>"
 )
+TALL_BOX = body(shape("box", (0.2, 0.2, 0.6), 0.3), centre=(0, 0, 0.3), inertia=(0.033, 0.033, 0.0067))
 UPRIGHT_BOX = body(shape("box", (0.3, 0.3, 0.2), 0.1), inertia=(0.01, 0.01, 0.01))
 
 
@@ -298,10 +299,10 @@ def steepest(world: World, base: PlanarBody, velocity: Planar, seconds: float) -
 
 
 def test_a_robot_that_meets_a_low_edge_climbs_it_or_stands(world: World) -> None:
-    for robot in (HB_BOT, UPRIGHT_BOX):
+    for robot in (HB_BOT, UPRIGHT_BOX, TALL_BOX):
         for width, height in ((0.1, 0.02), (3, 0.02), (3, 0.01)):
             for heading in (0.0, 0.4, math.pi / 3):
-                start = -1.5 if robot is UPRIGHT_BOX else -2.0
+                start = -2.0 if robot is HB_BOT else -1.5
                 base = world.add(robot, (start, 0, -0.04 * (robot is HB_BOT)), from_rpy(0, 0, heading))
                 run(world, (base, STOP), seconds=0.5)
                 bump = world.add_jointed(parse(BUMP.format(width, height), Path("b")), (0, 0, height / 2))
@@ -326,3 +327,48 @@ def test_a_robot_that_meets_the_side_of_the_ramp_stays_upright() -> None:
             base = world.add(HB_BOT, (1.2, y, -0.04))
             run(world, (base, STOP), seconds=0.5)
             assert steepest(world, base, (0.5, 0, 0), 5) < 20, y
+
+
+def obstacle(world: World, size: str, at: Vector) -> None:
+    text = f'<collision><geometry><box size="{size}"/></geometry></collision>'
+    text = f'<robot name="b"><link name="b">{text}</link><gazebo><static>true</static></gazebo></robot>'
+    world.add_jointed(parse(text, Path("b.urdf")), at)
+
+
+@pytest.mark.parametrize("speed", [2.0, 5.0])
+def test_a_thin_wall_stops_a_robot_at_any_speed(world: World, speed: float) -> None:
+    obstacle(world, "0.02 6 0.5", (2, 0, 0.25))
+    robot = world.add(HB_BOT, (0, 0, 0))
+    run(world, (robot, (speed, 0, 0)), seconds=3)
+    (x, _, z), rotation = robot.pose()
+    assert 1.2 < x < 1.35, "its right wheel is at the wall"
+    assert z == pytest.approx(-0.04, abs=0.005) and rotate(rotation, (0, 0, 1))[2] > 0.999
+
+
+def test_a_robot_that_drives_over_an_edge_falls_and_drives_on(world: World) -> None:
+    obstacle(world, "3 3 0.3", (0, 0, 0.15))
+    robot = world.add(HB_BOT, (0, 0, 0.3))
+    run(world, (robot, (0.5, 0, 0)), seconds=1)
+    assert robot.pose()[0][2] == pytest.approx(0.26, abs=0.005), "it stands on top"
+    run(world, (robot, (0.5, 0, 0)), seconds=5)
+    assert robot.pose()[0][2] < 0.1 and robot.pose()[0][0] > 1.5
+
+
+@pytest.mark.parametrize("velocity", [(0, 0, 0.8), (0, 0.3, 0), (0, 0, 0)], ids=["spin", "strafe", "stop"])
+def test_a_slope_moves_no_robot_that_drives_or_stands_on_it(velocity: Planar) -> None:
+    slope = math.radians(5)
+    normal, tilt = (-math.sin(slope), 0.0, math.cos(slope)), from_rpy(0, -slope, 0)
+    plane = "<collision><geometry><plane><normal>{} {} {}</normal></plane></geometry></collision>".format(*normal)
+    spec = WorldSpec(ground=False)
+    with closing(World(spec)) as world:
+        text = f"<sdf version='1.6'><model name='m'><static>true</static><link name='l'>{plane}</link></model></sdf>"
+        world.add_jointed(parse(text, Path("m.sdf")), (0, 0, 0))
+        robot = world.add(HB_BOT, rotate(tilt, (0, 0, -0.04)), tilt)
+        run(world, (robot, STOP), seconds=1)
+        (x, y, z), _ = robot.pose()
+        for _ in range(20):
+            run(world, (robot, velocity), seconds=0.1)
+            x, y = (x, y) if velocity[2] else (x + velocity[0] * 0.1, y + velocity[1] * 0.1)
+            assert robot.pose()[0] == pytest.approx((x, y, z), abs=1e-4 if velocity == STOP else 1e-3)
+            assert rotate(robot.pose()[1], (0, 0, 1)) == pytest.approx(normal, abs=1e-4), "it stays flat"
+        assert robot.velocity(DT) == pytest.approx(velocity, abs=5e-3)

@@ -29,7 +29,7 @@ def test_a_wrong_name_is_refused() -> None:
         ("ctrl+X", "is not a key: write 'ctrl+x'"),
         ("ctrl+i", "is 'tab' to a terminal"),
         ("ctrl+m", "is 'enter' to a terminal"),
-        ("lef", "is not a key: write one character, or a name; did you mean 'left'?"),
+        ("lef", "is not a key: write one character, or a name (did you mean 'left'?)"),
         ("meta+x", "is not a key: write one character, or a name; use up, down"),
         ("ctrl+", "is not a key: write one character, or a name"),
         ("", "is empty"),

@@ -203,7 +203,7 @@ def test_a_flood_does_not_hold_the_mapper_and_nothing_of_it_is_lost(device: Reco
         assert joystick.read() + joystick.read() == ["resume"]
 
 
-def test_a_pad_that_is_unplugged_rests_and_says_so(device: Recorded) -> None:
+def test_an_unplugged_pad_rests_and_is_reported(device: Recorded) -> None:
     with Joystick(device, "/dev/input/event7") as joystick:
         device.play((EV_KEY, BTN_TL, 1), (EV_ABS, ABS_Y, -32768), REPORT)
         joystick.read()
@@ -277,8 +277,8 @@ def test_a_folder_without_gamepads_is_reported_in_one_line(tmp_path: Path, monke
 
 
 @contextlib.contextmanager
-def nobody() -> Iterator[None]:
-    """As a user who may not read everything, which root may."""
+def unprivileged() -> Iterator[None]:
+    """Without root's permission to read everything."""
     before = os.geteuid()
     os.seteuid(before or 65534)
     try:
@@ -292,7 +292,10 @@ def test_devices_that_may_not_be_read_are_reported(monkeypatch: pytest.MonkeyPat
         os.chmod(folder, 0o755)
         Path(folder, "event0").touch(0)
         monkeypatch.setattr(gamepad, "FOLDER", folder)
-        with nobody(), pytest.raises(JoystickError, match=r"event0: no permission; join the group .* input "):
+        with unprivileged(), pytest.raises(JoystickError, match=r"event0: no permission; join the group .* input "):
             Joystick.open(f"{folder}/event0")
-        with nobody(), pytest.raises(JoystickError, match=r"1 of 1 devices in .* may not be read; join the group"):
+        with (
+            unprivileged(),
+            pytest.raises(JoystickError, match=r"1 of 1 devices in .* may not be read"),
+        ):
             Joystick.open("")

@@ -1,4 +1,4 @@
-"""A layout that people write is read as it says, or refused in one line that names the file and the place."""
+"""A user's layout file is read, or refused in one line that names the file and the place."""
 
 import os
 from pathlib import Path
@@ -43,7 +43,7 @@ def refusal(folder: Path, text: str) -> str:
     return str(error.value).removeprefix(file)
 
 
-def test_a_file_says_what_its_keys_mean(tmp_path: Path) -> None:
+def test_a_file_maps_keys_to_motions(tmp_path: Path) -> None:
     layout = load(written(tmp_path, GOOD))
     assert (layout.name, layout.positional) == ("my keys", True)
     assert layout.moves == {
@@ -64,7 +64,7 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path) -> None:
     rows = [
         ("", ': [moves] has no key, so nothing would drive; write lines such as w = "forward"'),
         ("[moves]", ': [moves] has no key, so nothing would drive; write lines such as w = "forward"'),
-        ('[move]\nw = "forward"', ": 'move' is unknown; did you mean 'moves'?"),
+        ('[move]\nw = "forward"', ": 'move' is unknown (did you mean 'moves'?)"),
         ("xyz = 1", ": 'xyz' is unknown; use name, positional, moves, speeds, actions"),
         ("name = 1", ": name is 1; write up to 40 letters in quotes"),
         ('name = ""', ": name is ''; write up to 40 letters in quotes"),
@@ -72,17 +72,17 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path) -> None:
         ('positional = "yes"', ": positional is 'yes'; write true or false"),
         ("moves = 1", ": moves is 1; write a section [moves] of lines"),
         ("[[moves]]", ": moves is [{}]; write a section [moves] of lines"),
-        ('[moves]\nw = "forwards"', ": [moves] 'w' = 'forwards': 'forwards' is not a motion; did you mean 'forward'?"),
+        ('[moves]\nw = "forwards"', ": [moves] 'w' = 'forwards': 'forwards' is not a motion (did you mean 'forward'?)"),
         ('[moves]\nw = "turn_left"',
-         ": [moves] 'w' = 'turn_left': 'turn_left' is not a motion; did you mean 'turn-left'?"),
-        ('[moves]\nw = "Up"', ": [moves] 'w' = 'Up': 'Up' is not a motion; did you mean 'up'?"),
+         ": [moves] 'w' = 'turn_left': 'turn_left' is not a motion (did you mean 'turn-left'?)"),
+        ('[moves]\nw = "Up"', ": [moves] 'w' = 'Up': 'Up' is not a motion (did you mean 'up'?)"),
         ('[moves]\nw = ""', f": [moves] 'w' = '': '' is not a motion; use {', '.join(MOTIONS)}"),
         ('[moves]\nw = "forward+back"', ": [moves] 'w' = 'forward+back': 'back' is there already, or its opposite"),
         ('[moves]\nw = "left+left"', ": [moves] 'w' = 'left+left': 'left' is there already, or its opposite"),
         ("[moves]\nw = 1", ": [moves] 'w' = 1; put key and meaning in quotes"),
         ('[moves]\nw.x = "back"', ": [moves] 'w' = {'x': 'back'}; put key and meaning in quotes"),
         ('[moves]\nup = "back"\nlft = "left"',
-         ": [moves] 'lft' is not a key: write one character, or a name; did you mean 'left'?"),
+         ": [moves] 'lft' is not a key: write one character, or a name (did you mean 'left'?)"),
         ('[moves]\n"shift+w" = "back"', ": [moves] 'shift+w' is not a key: write what it types, such as 'W'"),
         ('[moves]\nspace = "back"', ": [moves] 'space' is fixed: it means stop in every layout"),
         ('[moves]\n" " = "back"', ": [moves] ' ' is fixed: it means stop in every layout"),
@@ -97,8 +97,8 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path) -> None:
                                      "write both, speed or turn and up to 90 %, such as 'both +10%'"),
         ('[speeds]\na = "both +91%"', ": [speeds] 'a' = 'both +91%': "
                                       "write both, speed or turn and up to 90 %, such as 'both +10%'"),
-        ('[speeds]\na = "trun +10%"', ": [speeds] 'a' = 'trun +10%': 'trun' is unknown; did you mean 'turn'?"),
-        ('[actions]\na = "resum"', ": [actions] 'a' = 'resum': is unknown; did you mean 'resume'?"),
+        ('[speeds]\na = "trun +10%"', ": [speeds] 'a' = 'trun +10%': 'trun' is unknown (did you mean 'turn'?)"),
+        ('[actions]\na = "resum"', ": [actions] 'a' = 'resum': is unknown (did you mean 'resume'?)"),
     ]  # fmt: skip
     for text, words in rows:
         assert refusal(tmp_path, text) == words

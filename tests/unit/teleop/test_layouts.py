@@ -179,4 +179,4 @@ def test_layouts_are_loaded_by_name() -> None:
 def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:
     with pytest.raises(LayoutError) as error:
         load("wsad")
-    assert str(error.value) == "wsad: no such file, and no such layout; did you mean 'wasd'?"
+    assert str(error.value) == "wsad: no such file, and no such layout (did you mean 'wasd'?)"

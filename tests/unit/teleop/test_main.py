@@ -8,7 +8,7 @@ from services.teleop.__main__ import latches, main, parser
 from services.teleop.settings import parse
 
 
-def test_keys_latch_only_where_nothing_nearer_says_hold(tmp_path: Path) -> None:
+def test_keys_latch_unless_a_closer_setting_is_hold(tmp_path: Path) -> None:
     for text, words, latch in [
         ("", [], False),
         ("", ["--mode", "client"], False),

@@ -7,7 +7,7 @@ import pytest
 from services.teleop.input.terminal_liveness import attached
 
 
-def test_elsewhere_somebody_is_always_there() -> None:
+def test_outside_a_multiplexer_an_operator_is_always_present() -> None:
     assert attached({})()
     assert attached({"TMUX": "/no/such/socket,1,0"})()
 

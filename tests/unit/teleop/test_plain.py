@@ -1,4 +1,4 @@
-"""One line says all that the screen does."""
+"""One line holds all that the screen shows."""
 
 from dataclasses import replace
 
@@ -29,7 +29,7 @@ def test_alarms_come_first() -> None:
     assert plain_line(State()).startswith("NO SUBSCRIBER on cmd_vel; NO ODOM: nothing was heard from a robot; ")
 
 
-def test_what_is_not_known_is_said() -> None:
+def test_unknown_values_are_shown_as_unknown() -> None:
     message = plain_line(replace(GOOD, stale=True, command=None))
     assert "command silent; measured unknown;" in message
     assert "+0.471" not in message

@@ -50,7 +50,7 @@ def test_the_words_of_ros_2_become_flags() -> None:
 
 def test_what_cannot_be_followed_is_named_in_one_line() -> None:
     for words, line in [
-        ("_sped:=1", "_sped:=1: there is no parameter 'sped'; did you mean 'speed'?"),
+        ("_sped:=1", "_sped:=1: there is no parameter 'sped' (did you mean 'speed'?)"),
         ("_stamped:=perhaps", "_stamped:=perhaps: write true or false"),
         ("speed:=0.9", "speed:=0.9: is a remap in ROS; write _speed:=0.9, or --speed 0.9"),
         ("odom:=/Fred/odom", "odom:=/Fred/odom: there is nothing to remap but cmd_vel"),

@@ -16,7 +16,7 @@ from services.teleop.control.twist_mapper import Settings, TwistMapper
 from services.teleop.script import ScriptError, Step
 from services.teleop.session import Session
 
-FORWARD, STRAFE, STOP = Twist.planar(0.5), Twist.planar(0, 0.5), Twist()
+FORWARD, STRAFE, STOP, END = Twist.planar(0.5), Twist.planar(0, 0.5), Twist(), Twist.planar(-1.0)
 
 
 def parse(text: str) -> list[Step]:
@@ -75,16 +75,25 @@ def session(wire: Wire, commands: Subscription[Twist]) -> Session:
 
 
 def heard(commands: Subscription[Twist]) -> list[Twist | None]:
-    """What was said, without repetitions."""
-    said = [received.message for received in iter(commands.try_recv, None)]
-    return [message for number, message in enumerate(said) if number == 0 or said[number - 1] != message]
+    """The commands so far, without repetitions."""
+    return without_repetitions([received.message for received in iter(commands.try_recv, None)])
+
+
+def all_commands(session: Session, commands: Subscription[Twist]) -> list[Twist | None]:
+    """All commands of the session, without repetitions: a mark sent now arrives last."""
+    session.client.put(END)
+    return without_repetitions(list(iter(lambda: commands.recv().message, END)))
+
+
+def without_repetitions(messages: list[Twist | None]) -> list[Twist | None]:
+    return [message for number, message in enumerate(messages) if number == 0 or messages[number - 1] != message]
 
 
 def test_a_script_is_driven_as_written_and_ends_in_a_stop(session: Session, commands: Subscription[Twist]) -> None:
     assert script.run(parse("100ms i\n100ms J\nq\n50ms i\nstop"), session, threading.Event()) == ""
     session.halt()
     wait_for(lambda: not session.mapper.engaged)
-    expected = heard(commands)
+    expected = all_commands(session, commands)
     assert expected[0] == FORWARD
     assert [message for message in expected if message != STOP] == [FORWARD, STRAFE, Twist.planar(0.55)]
     assert expected[-1] == STOP
@@ -95,10 +104,10 @@ def test_a_script_that_is_ended_releases_its_keys(session: Session, commands: Su
     stop.set()
     assert script.run(parse("60s i"), session, stop) == "ended by a signal"
     session.halt()
-    assert heard(commands)[-1] == STOP
+    assert all_commands(session, commands)[-1] == STOP
 
 
-def test_a_script_that_somebody_stopped_breaks_off(wire: Wire, session: Session, commands: Subscription[Twist]) -> None:
+def test_a_stopped_script_breaks_off(wire: Wire, session: Session, commands: Subscription[Twist]) -> None:
     """The robot obeys no source then, and stands."""
     status = wire.bus("sim").publisher("cmd_vel_status", CommandStatus)
     wait_for(lambda: status.matched)

@@ -81,7 +81,7 @@ def see(session: Session, robot: Robot, x: float, y: float = 0.0, turn: float = 
     wait_for(lambda: session.client.odom.count > before)
 
 
-def tell_place(session: Session, robot: Robot, stamp: float, x: float) -> None:
+def publish_place(session: Session, robot: Robot, stamp: float, x: float) -> None:
     """Have the robot publish its pose at a time, and the session look at it."""
     odom, before = Odometry(), session.client.odom.count
     odom.header.stamp, odom.pose.pose.position.x = Time.of(stamp), x
@@ -228,7 +228,7 @@ def telemetry_of() -> Iterator[Callable[[Session], Callable[[], State]]]:
         telemetry.close()
 
 
-def test_the_state_shows_the_robot_and_who_drives_it(
+def test_the_state_shows_the_robot_and_its_driver(
     wire: Wire, robot: Robot, telemetry_of: Callable[[Session], Callable[[], State]]
 ) -> None:
     session = session_of(wire, robot)
@@ -241,7 +241,7 @@ def test_the_state_shows_the_robot_and_who_drives_it(
     assert (state().stopped, state().sources[0].name, state().sources[0].rate) == ("stop@2", "me", 20.0)
     see(session, robot, 0.25)
     assert state().measured == (0.25, 0, 0)
-    wait_for(lambda: state().stale)  # the robot says no more
+    wait_for(lambda: state().stale)  # the robot publishes no more
     press(session, "l")
     assert state().command == (0, 0, -1)
 
@@ -322,7 +322,7 @@ def test_another_key_takes_the_resume_back(wire: Wire, robot: Robot, resume: lis
     assert session.sent == Twist.planar(0.5)
 
 
-def test_without_a_sim_the_resume_key_says_so(wire: Wire, robot: Robot) -> None:
+def test_without_a_sim_the_resume_key_reports_that(wire: Wire, robot: Robot) -> None:
     session = session_of(wire, robot)
     press(session, "r")
     expected = tick(session, lambda: session.warning)
@@ -350,11 +350,11 @@ def test_a_robot_that_began_anew_stands_until_a_key_is_pressed_anew(
 ) -> None:
     session = session_of(wire, robot)
     wait_for(lambda: robot.odom.matched)
-    tell_place(session, robot, 5.0, 0.0)
+    publish_place(session, robot, 5.0, 0.0)
     press(session, "i")
-    tell_place(session, robot, 5.1, 0.05)
+    publish_place(session, robot, 5.1, 0.05)
     assert any(session.mapper.motion)
-    tell_place(session, robot, stamp, x)
+    publish_place(session, robot, stamp, x)
     assert not any(session.mapper.motion)
     assert session.warning == RESET
     press(session, "J")
@@ -371,7 +371,7 @@ def test_a_lost_focus_and_unknown_keys_are_a_stop(wire: Wire, robot: Robot, even
 
 
 @pytest.mark.parametrize("event", [Focus(True), Focus(False), Answer("alive")])
-def test_what_is_no_key_says_nothing_while_idle(wire: Wire, robot: Robot, event: Focus | Answer) -> None:
+def test_an_unmapped_key_publishes_nothing_while_idle(wire: Wire, robot: Robot, event: Focus | Answer) -> None:
     session = session_of(wire, robot)
     session.take(event, time.monotonic())
     press(session, "i")
@@ -433,7 +433,7 @@ def test_a_robot_that_cannot_be_driven_leaves_the_one_before(wire: Wire, robot: 
     assert robot.commands.recv().message == Twist.planar(0.5)
 
 
-def test_tab_without_another_robot_says_so(wire: Wire, robot: Robot) -> None:
+def test_tab_without_another_robot_reports_it(wire: Wire, robot: Robot) -> None:
     session = session_of(wire, robot)
     press(session, "tab")
     assert tick(session, lambda: session.warning) == "there is no other robot"
@@ -447,6 +447,23 @@ def test_a_robot_may_listen_on_a_key_of_its_own(wire: Wire) -> None:
     press(session, "i")
     assert commands.recv().message == Twist.planar(0.5)
     assert (session.client.status_key, session.client.beside("resume")) == ("base/my_vel_status", "base/resume")
+
+
+@pytest.mark.parametrize("key", ["cmd_vel", "hb_bot/cmd_vel"])
+def test_the_robot_at_the_root_goes_by_its_name_unless_another_has_it(wire: Wire, key: str) -> None:
+    bus = wire.bus("sim")
+    commands, status = bus.subscribe(key, Twist), bus.publisher("cmd_vel_status", CommandStatus)
+    session = Session(wire.bus("teleop"), ["hb_bot"], TwistMapper(Settings(), TTK), None)
+    wait_for(lambda: [end for end in session.graph.endpoints() if end.key == key])
+    seen = session.bus.latest("cmd_vel_status", CommandStatus)
+
+    def look() -> bool:
+        status.put(CommandStatus(name="hb_bot"))
+        return seen.count > 10
+
+    tick(session, look)
+    press(session, "i")
+    assert commands.recv().message == Twist.planar(0.5)
 
 
 def test_tab_comes_back_to_a_key_of_its_own(wire: Wire) -> None:

@@ -36,12 +36,12 @@ def up(mapper: TwistMapper, key: str, now: float = 1.0) -> str:
     return mapper.take(Key(key, key, "release", key.lower()), now)
 
 
-def says(mapper: TwistMapper, now: float, rests: bool = False) -> Twist | None:
+def commanded(mapper: TwistMapper, now: float, rests: bool = False) -> Twist | None:
     return mapper.command(now, rests)
 
 
 def test_an_idle_mapper_is_silent(mapper: TwistMapper) -> None:
-    assert says(mapper, 0.0) is None
+    assert commanded(mapper, 0.0) is None
     assert not mapper.engaged
 
 
@@ -49,21 +49,21 @@ def test_an_idle_mapper_is_silent(mapper: TwistMapper) -> None:
 def test_a_key_drives_at_the_speeds(mapper: TwistMapper, key: str) -> None:
     typed(mapper, key, 1.0)
     x, y, z, turn = MOVES[key]
-    assert says(mapper, 1.0) == Twist(Vector3(x * 0.5, y * 0.5, z * 0.5), Vector3(0, 0, turn * 1.0))
+    assert commanded(mapper, 1.0) == Twist(Vector3(x * 0.5, y * 0.5, z * 0.5), Vector3(0, 0, turn * 1.0))
     assert mapper.engaged
 
 
 def test_another_key_replaces_the_first(mapper: TwistMapper) -> None:
     typed(mapper, "i", 1.0)
     typed(mapper, "J", 1.1)
-    assert says(mapper, 1.1) == Twist.planar(0, 0.5, 0)
+    assert commanded(mapper, 1.1) == Twist.planar(0, 0.5, 0)
 
 
 @pytest.mark.parametrize("key", ["k", "K", "space", "5", "s", "ctrl+d", "escape", "é", "unknown"])
 def test_any_other_key_stops_the_robot(mapper: TwistMapper, key: str) -> None:
     typed(mapper, "i", 1.0)
     typed(mapper, key, 1.1)
-    assert says(mapper, 1.1) == Twist()
+    assert commanded(mapper, 1.1) == Twist()
 
 
 def test_a_key_drives_again_at_once_after_a_stop_key() -> None:
@@ -71,49 +71,49 @@ def test_a_key_drives_again_at_once_after_a_stop_key() -> None:
     typed(mapper, "i", 1.0)
     typed(mapper, "k", 1.2)
     typed(mapper, "i", 1.5)
-    assert says(mapper, 1.5) == Twist.planar(0.5)
+    assert commanded(mapper, 1.5) == Twist.planar(0.5)
 
 
-def test_any_other_key_stops_a_robot_that_somebody_else_drives(mapper: TwistMapper) -> None:
+def test_any_other_key_stops_a_robot_that_another_source_drives(mapper: TwistMapper) -> None:
     typed(mapper, "k", 1.0)
-    assert says(mapper, 1.0) == Twist()
+    assert commanded(mapper, 1.0) == Twist()
 
 
 def test_without_a_key_for_the_timeout_the_robot_stops(mapper: TwistMapper) -> None:
     typed(mapper, "i", 1.0)
     assert not mapper.expire(1.499)
-    assert says(mapper, 1.499) == Twist.planar(0.5)
+    assert commanded(mapper, 1.499) == Twist.planar(0.5)
     assert mapper.expire(1.5)
     assert not mapper.expire(1.6)  # it just happened, and does not again
-    assert says(mapper, 1.6) == Twist()
+    assert commanded(mapper, 1.6) == Twist()
 
 
 def test_a_command_never_outlives_the_timeout_even_without_a_tick(mapper: TwistMapper) -> None:
     typed(mapper, "i", 1.0)
-    assert says(mapper, 5.0) == Twist()
+    assert commanded(mapper, 5.0) == Twist()
 
 
 def test_a_repeated_key_keeps_the_robot_going(mapper: TwistMapper) -> None:
     for now in (1.0, 1.4, 1.8):
         typed(mapper, "i", now)
-    assert says(mapper, 2.2) == Twist.planar(0.5)
+    assert commanded(mapper, 2.2) == Twist.planar(0.5)
 
 
 def test_a_speed_key_does_not_prolong_a_typed_key(mapper: TwistMapper) -> None:
     """The terminal repeats the speed key from then on: whether the other is still held cannot be known."""
     typed(mapper, "i", 1.0)
     typed(mapper, "w", 1.4)
-    assert says(mapper, 1.45) == Twist.planar(0.55)
-    assert says(mapper, 1.5) == Twist()
+    assert commanded(mapper, 1.45) == Twist.planar(0.55)
+    assert commanded(mapper, 1.5) == Twist()
 
 
 def test_a_timeout_of_zero_drives_on_until_another_key() -> None:
     mapper = TwistMapper(Settings(mode=LATCH), TTK)
     typed(mapper, "i", 1.0)
     assert not mapper.expire(1e6)
-    assert says(mapper, 1e6) == Twist.planar(0.5)
+    assert commanded(mapper, 1e6) == Twist.planar(0.5)
     typed(mapper, "k", 1e6)
-    assert says(mapper, 1e6) == Twist()
+    assert commanded(mapper, 1e6) == Twist()
 
 
 def test_a_stop_is_repeated_until_the_robot_rests_and_then_there_is_silence(mapper: TwistMapper) -> None:
@@ -121,10 +121,10 @@ def test_a_stop_is_repeated_until_the_robot_rests_and_then_there_is_silence(mapp
     mapper.stop(1.1)
     assert mapper.stopping_since() == 1.1
     for now in (1.1, 1.3, 1.6):
-        assert says(mapper, now) == Twist()
+        assert commanded(mapper, now) == Twist()
     assert mapper.engaged
-    assert says(mapper, 1.7, rests=True) is None
-    assert says(mapper, 1.8) is None
+    assert commanded(mapper, 1.7, rests=True) is None
+    assert commanded(mapper, 1.8) is None
     assert not mapper.engaged
     assert mapper.stopping_since() is None
 
@@ -132,14 +132,14 @@ def test_a_stop_is_repeated_until_the_robot_rests_and_then_there_is_silence(mapp
 def test_a_stop_is_given_up_after_a_second(mapper: TwistMapper) -> None:
     typed(mapper, "i", 1.0)
     mapper.stop(1.1)
-    assert says(mapper, 1.1 + STOP_FOR) == Twist()
-    assert says(mapper, 1.1 + STOP_FOR + 1e-6) is None
+    assert commanded(mapper, 1.1 + STOP_FOR) == Twist()
+    assert commanded(mapper, 1.1 + STOP_FOR + 1e-6) is None
     assert STOP_FOR == 1.0
 
 
 def test_a_robot_that_rests_is_driven_all_the_same(mapper: TwistMapper) -> None:
     typed(mapper, "i", 1.0)
-    assert says(mapper, 1.0, rests=True) == Twist.planar(0.5)
+    assert commanded(mapper, 1.0, rests=True) == Twist.planar(0.5)
 
 
 def test_a_key_during_a_stop_drives_at_once(mapper: TwistMapper) -> None:
@@ -147,7 +147,7 @@ def test_a_key_during_a_stop_drives_at_once(mapper: TwistMapper) -> None:
     typed(mapper, "k", 1.1)
     typed(mapper, "j", 1.2)
     assert mapper.stopping_since() is None
-    assert says(mapper, 1.2, rests=True) == Twist.planar(turn=1.0)
+    assert commanded(mapper, 1.2, rests=True) == Twist.planar(turn=1.0)
 
 
 @pytest.mark.parametrize("key", SPEEDS)
@@ -156,14 +156,14 @@ def test_a_speed_key_changes_the_speeds_and_moves_nothing(mapper: TwistMapper, k
     speed, turn = SPEEDS[key]
     assert mapper.settings.speed == pytest.approx(0.5 * speed)
     assert mapper.settings.turn == pytest.approx(1.0 * turn)
-    assert says(mapper, 1.0) is None
+    assert commanded(mapper, 1.0) is None
     assert not mapper.engaged
 
 
 def test_a_speed_key_takes_effect_while_driving(mapper: TwistMapper) -> None:
     typed(mapper, "u", 1.0)
     typed(mapper, "q", 1.1)
-    assert says(mapper, 1.1) == Twist.planar(0.55, 0, 1.1)
+    assert commanded(mapper, 1.1) == Twist.planar(0.55, 0, 1.1)
 
 
 def test_the_limits_hold_from_the_start_and_whatever_is_pressed() -> None:
@@ -189,24 +189,24 @@ def test_whatever_is_pressed_the_limits_and_the_timeout_hold(
     now = 0.0
     for key, pause in pressed:
         typed(mapper, key, now)
-        twist = says(mapper, now)
+        twist = commanded(mapper, now)
         if twist:
             assert max(abs(twist.linear.x), abs(twist.linear.y), abs(twist.linear.z)) <= speed_limit
             assert abs(twist.angular.z) <= turn_limit
         now += pause
-        later = says(mapper, now)
+        later = commanded(mapper, now)
         assert pause < 0.5 or later is None or later.is_slow()
-    assert says(mapper, now + 0.5) in (None, Twist())
-    assert says(mapper, now + 0.75 + STOP_FOR) is None
+    assert commanded(mapper, now + 0.5) in (None, Twist())
+    assert commanded(mapper, now + 0.75 + STOP_FOR) is None
     assert not mapper.engaged
 
 
 def test_held_keys_drive_until_they_are_released() -> None:
     mapper = TwistMapper(HELD, TTK)
     down(mapper, "i")
-    assert says(mapper, 1e6) == Twist.planar(0.5)
+    assert commanded(mapper, 1e6) == Twist.planar(0.5)
     up(mapper, "i", 1e6)
-    assert says(mapper, 1e6) == Twist()
+    assert commanded(mapper, 1e6) == Twist()
 
 
 def test_held_keys_combine_and_a_diagonal_is_no_faster() -> None:
@@ -214,35 +214,35 @@ def test_held_keys_combine_and_a_diagonal_is_no_faster() -> None:
     down(mapper, "i")
     down(mapper, "J")
     down(mapper, "l")
-    assert says(mapper, 1.0) == Twist.planar(0.5 / math.sqrt(2), 0.5 / math.sqrt(2), -1.0)
+    assert commanded(mapper, 1.0) == Twist.planar(0.5 / math.sqrt(2), 0.5 / math.sqrt(2), -1.0)
     up(mapper, "i")
-    assert says(mapper, 1.0) == Twist.planar(0.0, 0.5, -1.0)
+    assert commanded(mapper, 1.0) == Twist.planar(0.0, 0.5, -1.0)
     assert mapper.stopping_since() is None
     up(mapper, "l")
     up(mapper, "J")
-    assert says(mapper, 1.0) == Twist()
+    assert commanded(mapper, 1.0) == Twist()
 
 
 def test_opposite_keys_cancel_and_that_is_a_stop() -> None:
     mapper = TwistMapper(HELD, TTK)
     down(mapper, "i")
     down(mapper, ",")
-    assert says(mapper, 1.0) == Twist()
+    assert commanded(mapper, 1.0) == Twist()
     up(mapper, ",")
-    assert says(mapper, 1.0) == Twist.planar(0.5)
+    assert commanded(mapper, 1.0) == Twist.planar(0.5)
 
 
 def test_a_repeat_of_a_key_that_is_not_held_moves_nothing() -> None:
     mapper = TwistMapper(HELD, TTK)
     mapper.take(Key("i", "i", "repeat", "i"), 1.0)
-    assert says(mapper, 1.0) is None
+    assert commanded(mapper, 1.0) is None
 
 
 def test_an_unknown_key_lets_go_of_all_that_are_held() -> None:
     mapper = TwistMapper(HELD, TTK)
     for key in ("i", "J", "k"):
         down(mapper, key)
-    assert says(mapper, 1.0) == Twist()
+    assert commanded(mapper, 1.0) == Twist()
     up(mapper, "k")
     mapper.take(Key("i", "i", "repeat", "i"), 1.1)
     assert not any(mapper.motion)
@@ -251,11 +251,11 @@ def test_an_unknown_key_lets_go_of_all_that_are_held() -> None:
 def test_the_dead_man_has_to_be_held_too() -> None:
     mapper = TwistMapper(replace(HELD, deadman=True), TTK)
     down(mapper, "i")
-    assert says(mapper, 1.0) is None
+    assert commanded(mapper, 1.0) is None
     down(mapper, "space")
-    assert says(mapper, 1.0) == Twist.planar(0.5)
+    assert commanded(mapper, 1.0) == Twist.planar(0.5)
     up(mapper, "space")
-    assert says(mapper, 1.0) == Twist()
+    assert commanded(mapper, 1.0) == Twist()
 
 
 @given(st.lists(st.tuples(st.booleans(), st.sampled_from([*MOVES, *SPEEDS, "k", "space", "tab"])), max_size=30))
@@ -263,7 +263,7 @@ def test_the_dead_man_is_never_forgotten(events: list[tuple[bool, str]]) -> None
     mapper = TwistMapper(replace(HELD, deadman=True), TTK)
     for is_down, key in events:
         (down if is_down else up)(mapper, key)
-        command = says(mapper, 1.0)
+        command = commanded(mapper, 1.0)
         assert "space" in mapper.key_state.keys or command in (None, Twist())
 
 
@@ -272,7 +272,7 @@ def test_no_chord_is_faster_than_the_fastest_key(events: list[tuple[bool, str]])
     mapper = TwistMapper(HELD, TTK)
     for is_down, key in events:
         (down if is_down else up)(mapper, key)
-        command = says(mapper, 1.0) or Twist()
+        command = commanded(mapper, 1.0) or Twist()
         assert math.hypot(command.linear.x, command.linear.y) <= 0.5 * math.sqrt(2) + 1e-9
         assert len(mapper.key_state.keys) < 2 or math.hypot(command.linear.x, command.linear.y) <= 0.5 + 1e-9
         assert abs(command.angular.z) <= 1.0
@@ -281,14 +281,14 @@ def test_no_chord_is_faster_than_the_fastest_key(events: list[tuple[bool, str]])
 def test_a_joystick_drives_where_no_key_does() -> None:
     mapper = TwistMapper(HELD, TTK)
     mapper.steer((0.5, -0.25, 1.0), 1.0)
-    assert says(mapper, 1.0) == Twist.planar(0.25, -0.125, 1.0)
+    assert commanded(mapper, 1.0) == Twist.planar(0.25, -0.125, 1.0)
     down(mapper, "i")
-    assert says(mapper, 1.0) == Twist.planar(0.5)
+    assert commanded(mapper, 1.0) == Twist.planar(0.5)
     down(mapper, "k")
-    assert says(mapper, 1.0) == Twist()
+    assert commanded(mapper, 1.0) == Twist()
     mapper.steer((0.5, 0.0, 0.0), 1.1)
     mapper.steer((0.0, 0.0, 0.0), 1.2)
-    assert says(mapper, 1.2) == Twist()
+    assert commanded(mapper, 1.2) == Twist()
 
 
 def test_a_key_that_no_longer_counts_leaves_the_robot_to_the_joystick() -> None:
@@ -297,7 +297,7 @@ def test_a_key_that_no_longer_counts_leaves_the_robot_to_the_joystick() -> None:
     typed(mapper, "J", 1.0)
     assert mapper.expire(1.5)
     assert mapper.stopping_since() is None
-    assert says(mapper, 1.5) == Twist.planar(0.25)
+    assert commanded(mapper, 1.5) == Twist.planar(0.25)
 
 
 def test_each_robot_keeps_its_speeds() -> None:

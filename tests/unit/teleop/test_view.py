@@ -1,4 +1,4 @@
-"""What a person sees at 80x24, 120x40, 40x12 and smaller: velocities, who drives, and an alarm for each problem."""
+"""The screen at 80x24, 120x40, 40x12 and smaller: velocities, the driver, and an alarm for each problem."""
 
 import math
 import unicodedata
@@ -94,7 +94,7 @@ def test_alarms_share_a_line_before_one_is_lost() -> None:
     assert loud(BROKEN, (80, 3)) == ["STOPPED + NO SUBSCRIBER + ODOM IS STALE + dead man"]
 
 
-def test_before_anything_was_heard_it_says_so() -> None:
+def test_before_any_sample_the_alarms_are_shown() -> None:
     assert loud(State(keys=["i forward"]), (80, 24)) == [
         "NO SUBSCRIBER on cmd_vel",
         "NO ODOM: nothing was heard from a robot",
@@ -128,7 +128,7 @@ def test_speeds_that_are_not_known_are_not_shown() -> None:
         assert "+0.47" not in shown
 
 
-def test_a_silent_teleop_says_so_and_a_stop_is_shown_as_zeros() -> None:
+def test_a_silent_teleop_is_shown_as_silent_and_a_stop_as_zeros() -> None:
     silent, stop = replace(GOOD, command=None), replace(GOOD, command=(0.0, -0.0, -0.0001))
     assert "command: silent" in text(silent)
     assert "go silent" in text(silent, (20, 5))
@@ -204,7 +204,7 @@ def test_each_publisher_is_named_with_its_priority_its_rate_and_what_becomes_of_
     assert "script@6" in text(more, (120, 40))
 
 
-def test_the_driver_is_named_and_is_a_warning_where_somebody_else_has_the_robot() -> None:
+def test_the_driver_is_named_and_is_a_warning_where_another_source_has_the_robot() -> None:
     other = replace(GOOD, obeyed="teleop@2b3c4d")
     assert styles(other, "teleop@2b3c4d drives, not you") == {"warning"}
     assert "not you" not in text(replace(other, command=None))
@@ -246,7 +246,7 @@ def test_a_line_of_help_that_is_as_wide_as_the_screen_is_whole() -> None:
     assert f" {line}" in rows(replace(GOOD, keys=[line]), (41, 30))
 
 
-def test_where_keys_find_no_room_it_says_how_to_see_them() -> None:
+def test_keys_without_room_are_shown_with_how_to_see_them() -> None:
     assert " ? shows all keys" in text(replace(GOOD, keys=TABLE))
     assert "ctrl+c" not in text(replace(GOOD, keys=TABLE))
 
@@ -259,7 +259,7 @@ def test_the_page_of_help_shows_the_layout_and_keeps_alarms_and_speeds(size: tup
     assert "+0.50 +0.25 -1.00" in shown
 
 
-def test_a_long_layout_takes_more_columns_and_says_what_is_missing() -> None:
+def test_a_long_layout_takes_more_columns_and_shows_what_is_cut() -> None:
     long = replace(GOOD, help=True, keys=[f"{n:02}".ljust(38) + "." for n in range(50)])
     assert rows(long, (120, 24))[3] == f" 00{'.':>37} 20{'.':>37} 40{'.':>37}"
     assert rows(long, (119, 24))[3] == f" 00{'.':>37} 20{'.':>37}"
@@ -358,12 +358,12 @@ def test_any_state_fits_a_terminal_of_any_size(state: State, columns: int, rows:
 @given(states(), st.sampled_from(SIZES))
 def test_no_alarm_is_ever_lost(state: State, size: tuple[int, int]) -> None:
     alarms = [part for line in render(state, *size) for style, part in line if style == "alarm"]
-    said = "\n".join(alarms)
-    assert ("STOPPED" in said) == bool(state.stopped)
-    assert ("NO SUBSCRIBER" in said) == (not state.listeners)
-    assert ("NO ODOM" in said) == (not math.isfinite(state.odom_age))
-    assert ("ODOM IS STALE" in said) == (math.isfinite(state.odom_age) and state.stale)
-    assert ("dead man: hold space" in said) == (state.deadman and not state.deadman_held)
+    expected = "\n".join(alarms)
+    assert ("STOPPED" in expected) == bool(state.stopped)
+    assert ("NO SUBSCRIBER" in expected) == (not state.listeners)
+    assert ("NO ODOM" in expected) == (not math.isfinite(state.odom_age))
+    assert ("ODOM IS STALE" in expected) == (math.isfinite(state.odom_age) and state.stale)
+    assert ("dead man: hold space" in expected) == (state.deadman and not state.deadman_held)
     assert {len(line) for line in alarms} <= {size[0]}
 
 

@@ -9,11 +9,11 @@ from holozen.testing import Terminal, wait_for
 
 SAYS_ITS_SIZE = """
 import os, signal
-def say(*_):
+def report(*_):
     columns, rows = os.get_terminal_size()
     print(f"{columns} by {rows}", flush=True)
-signal.signal(signal.SIGWINCH, say)
-say()
+signal.signal(signal.SIGWINCH, report)
+report()
 while True:
     signal.pause()
 """

@@ -1,4 +1,4 @@
-"""Real sessions on loopback: what is said arrives, what is wrong is one line, and everything ends."""
+"""Real sessions on loopback: messages arrive, errors are one line, and everything ends."""
 
 import os
 import threading
@@ -48,10 +48,10 @@ def pair(wire: Wire) -> tuple[Bus, Bus]:
 def refusal(use: Callable[[], object]) -> str:
     with pytest.raises(BusError) as error:
         use()
-    told = str(error.value)
-    assert told.isprintable()
-    assert ".rs" not in told
-    return told
+    message = str(error.value)
+    assert message.isprintable()
+    assert ".rs" not in message
+    return message
 
 
 def after_all(writer: Bus, reader: Bus) -> Callable[[], object]:
@@ -65,7 +65,7 @@ def after_all(writer: Bus, reader: Bus) -> Callable[[], object]:
     return lambda: wait_for(partial(arrived, b"%d" % next(numbers)))
 
 
-def test_alone_nobody_is_connected(wire: Wire) -> None:
+def test_alone_it_has_no_peers(wire: Wire) -> None:
     assert not wire.bus().connected()
 
 
@@ -206,7 +206,7 @@ def test_a_service_that_is_not_there_is_named_with_the_time_it_had(wire: Wire) -
 def test_a_service_that_is_there_but_silent_is_no_refusal(pair: tuple[Bus, Bus]) -> None:
     """The controller asks a service again that did not answer, and gives up at one that refused."""
     server, caller = pair
-    server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())  # and nobody looks
+    server.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())  # and requests are never read
     with pytest.raises(NoReply, match=r"within 0\.1 s"):
         caller.call("resume", TriggerRequest(), TriggerReply, timeout=0.1)
 
@@ -218,7 +218,7 @@ def test_a_reply_that_is_none_is_an_error_of_the_service(wire: Wire) -> None:
         bus.call("next_goal", NextGoalRequest(), NextGoalReply)
 
 
-def test_the_graph_shows_who_reads_writes_and_serves(pair: tuple[Bus, Bus]) -> None:
+def test_the_graph_shows_readers_writers_and_servers(pair: tuple[Bus, Bus]) -> None:
     writer, reader = pair
     writer.publisher("Fred/odom", Odometry)
     writer.serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply())
@@ -234,7 +234,7 @@ def test_the_graph_shows_who_reads_writes_and_serves(pair: tuple[Bus, Bus]) -> N
     wait_for(lambda: {endpoint.node for endpoint in graph.endpoints()} == {"second"})
 
 
-def test_who_left_is_gone_even_where_its_link_survives(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_node_that_left_is_gone_even_where_its_link_survives(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
     """As Zenoh lets a link survive that is opened while the session is closed."""
     leaver, watcher = wire.bus("sim", lasting=True), wire.bus("watcher")
     leaver.publisher("odom", Odometry)
@@ -273,7 +273,7 @@ def test_one_look_at_the_graph_leaves_nothing_declared(wire: Wire) -> None:
 
 
 def test_an_echo_that_looks_types_up_leaves_nothing_declared(wire: Wire) -> None:
-    """It looked once for each key of which nobody told the type, and every look stayed declared."""
+    """It looked once for each key of unknown type, and every look stayed declared."""
     with Watched(wire) as bus:
         tap, reader = bus.subscribe_raw("**"), Reader()
         for number in range(2):
@@ -302,7 +302,7 @@ def test_when_the_holder_of_the_point_goes_another_opens_it_and_late_joiners_get
     late = wire.bus("late")
     wait_for(late.connected)
     heir.close()
-    wait_for(lambda: is_free(wire.endpoint))  # whoever has left holds no point
+    wait_for(lambda: is_free(wire.endpoint))  # a closed session holds no point
 
 
 def test_what_does_not_run_long_leaves_the_point_shut(wire: Wire) -> None:
@@ -338,7 +338,7 @@ def test_a_bus_listens_on_loopback_only(wire: Wire) -> None:
 
 
 @pytest.mark.parametrize(
-    ("connection", "told"),
+    ("connection", "expected"),
     [
         (Connection(config="no/such.json5"), "Zenoh configuration no/such.json5: No such file or directory"),
         (Connection(connect=("nonsense",)), 'Zenoh setting connect/endpoints:["nonsense"]: '),
@@ -349,9 +349,9 @@ def test_a_bus_listens_on_loopback_only(wire: Wire) -> None:
         (Connection("client", connect=()), "cannot open Zenoh: a client needs --connect ENDPOINT"),
     ],
 )
-def test_a_wrong_connection_is_one_line(wire: Wire, connection: Connection, told: str) -> None:
+def test_a_wrong_connection_is_one_line(wire: Wire, connection: Connection, expected: str) -> None:
     listening = connection.replace(listen=connection.listen or (wire.endpoint,))
-    assert refusal(lambda: Bus("test", listening, patience=0)).startswith(told)
+    assert refusal(lambda: Bus("test", listening, patience=0)).startswith(expected)
 
 
 @pytest.mark.parametrize("text", ["{mode: ", "{nosuch: 1}", "{mode: 'king'}"])
@@ -370,11 +370,11 @@ def test_a_configuration_file_is_read(wire: Wire, tmp_path: Path) -> None:
 
 
 def test_a_client_without_its_router_gives_up_after_its_patience(wire: Wire) -> None:
-    told = refusal(lambda: Bus("test", Connection("client", connect=(wire.endpoint,)), patience=0))
-    assert told == f"cannot open Zenoh: no router answers at {wire.endpoint}; `holozen router` runs one"
+    message = refusal(lambda: Bus("test", Connection("client", connect=(wire.endpoint,)), patience=0))
+    assert message == f"cannot open Zenoh: no router answers at {wire.endpoint}; `holozen router` runs one"
 
 
-def test_a_client_that_waits_ends_in_peace_when_it_is_told_to(wire: Wire) -> None:
+def test_a_waiting_client_ends_cleanly_when_asked(wire: Wire) -> None:
     stop = threading.Event()
     stop.set()
     with pytest.raises(SystemExit) as end:
@@ -382,7 +382,7 @@ def test_a_client_that_waits_ends_in_peace_when_it_is_told_to(wire: Wire) -> Non
     assert end.value.code == 0
 
 
-def test_a_client_waits_for_its_router_and_says_so(wire: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_client_waits_for_its_router_and_reports_it(wire: Wire, capsys: pytest.CaptureFixture[str]) -> None:
     with ThreadPoolExecutor() as pool:
         client = pool.submit(Bus, "client", Connection("client", connect=(wire.endpoint,)))
         wait_for(lambda: wire.endpoint in capsys.readouterr().err)
@@ -390,7 +390,7 @@ def test_a_client_waits_for_its_router_and_says_so(wire: Wire, capsys: pytest.Ca
             wait_for(bus.connected)
 
 
-def test_an_early_bus_opens_meanwhile_and_its_first_use_waits(wire: Wire) -> None:
+def test_an_early_bus_opens_in_the_background_and_its_first_use_waits(wire: Wire) -> None:
     with Bus("early", Opening(wire.connection, early=True)) as early, wire.bus("other") as other:
         odom = early.subscribe("odom", Odometry)
         publisher = other.publisher("odom", Odometry)
@@ -400,7 +400,7 @@ def test_an_early_bus_opens_meanwhile_and_its_first_use_waits(wire: Wire) -> Non
         assert early.source.startswith("early@")
 
 
-def test_an_early_bus_that_cannot_open_says_so_at_its_first_use_and_closes(wire: Wire) -> None:
+def test_an_early_bus_that_cannot_open_reports_it_at_its_first_use_and_closes(wire: Wire) -> None:
     nowhere = Connection("client", connect=(wire.endpoint,))
     with Bus("early", Opening(nowhere, patience=0.1, early=True)) as bus:
         for _ in range(2):

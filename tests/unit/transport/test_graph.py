@@ -67,7 +67,7 @@ def test_a_token_of_an_unknown_kind_is_none() -> None:
 
 @given(st.lists(st.sampled_from(["a", "b", "ab", "*", "**"]), min_size=1, max_size=5),
        st.lists(st.sampled_from(["a", "b", "ab"]), min_size=1, max_size=5))  # fmt: skip
-def test_a_key_expression_includes_what_zenoh_says(expression: list[str], key: list[str]) -> None:
+def test_a_key_expression_includes_what_zenoh_includes(expression: list[str], key: list[str]) -> None:
     pattern, name = canonical(expression), "/".join(key)
     assert includes(pattern, name) == zenoh.KeyExpr(pattern).includes(zenoh.KeyExpr(name))
 
@@ -87,9 +87,9 @@ def graph_of(*changes: tuple[str, bool]) -> Graph:
 
 def test_endpoints_come_and_go_with_their_tokens_sorted_by_key() -> None:
     clock = ODOM._replace(key="clock")
-    told = [(token(e), True) for e in (ODOM, SIM, clock, ODOM)]
-    assert graph_of(*told).endpoints() == [SIM, clock, ODOM]
-    assert graph_of(*told, (token(ODOM), False), ("@holozen/x", True)).endpoints() == [SIM, clock]
+    expected = [(token(e), True) for e in (ODOM, SIM, clock, ODOM)]
+    assert graph_of(*expected).endpoints() == [SIM, clock, ODOM]
+    assert graph_of(*expected, (token(ODOM), False), ("@holozen/x", True)).endpoints() == [SIM, clock]
     assert graph_of((token(ODOM), False), (token(ODOM), True)).endpoints() == [ODOM]
 
 
@@ -118,11 +118,11 @@ def test_a_settled_graph_knows_what_came_late() -> None:
     assert graph.settled(lambda: connected.popleft()) == [SIM, ODOM]
 
 
-def test_nobody_there_is_an_empty_graph_after_the_patience() -> None:
+def test_without_nodes_the_graph_is_empty_after_the_patience() -> None:
     assert graph_of().settled(lambda: False, patience=0.01) == []
 
 
-def test_the_nodes_that_left_are_told_once_by_the_names_of_their_samples() -> None:
+def test_the_nodes_that_left_are_reported_once_by_the_names_of_their_samples() -> None:
     teleop = SIM._replace(node="teleop", session="0123456789")
     came = [(token(e), True) for e in (SIM, teleop, ODOM)]
     graph = graph_of(*came, (token(teleop), False), (token(ODOM), False), ("@holozen/x", False))
@@ -131,20 +131,20 @@ def test_the_nodes_that_left_are_told_once_by_the_names_of_their_samples() -> No
     assert graph.endpoints() == [SIM]
 
 
-def test_a_graph_that_nobody_asks_who_left_stays_small() -> None:
+def test_a_graph_that_is_never_asked_for_departures_stays_small() -> None:
     graph = graph_of(*((f"@holozen/{number}/sim/node", False) for number in range(MAX_GONE + 5)))
     assert graph.endpoints() == []
     assert len(graph.left()) == MAX_GONE
 
 
-def test_a_graph_is_settled_only_after_all_who_are_met_have_told_theirs() -> None:
+def test_a_graph_is_settled_only_after_all_known_peers_have_declared_theirs() -> None:
     changes: deque[tuple[str, bool]] = deque()
     graph = Graph(lambda: changes.popleft() if changes else None, lambda: changes.append((token(ODOM), True)))
     assert graph.settled(lambda: True, quiet=0.0) == [ODOM]
 
 
-def test_who_is_met_and_has_told_nothing_yet_is_waited_for_longer() -> None:
-    """The one of us who is met second, and comes when the first has been quiet for long enough."""
+def test_a_peer_that_has_declared_nothing_yet_is_waited_for_longer() -> None:
+    """The second of our nodes to be met, when the first has been quiet for long enough."""
     late = ODOM._replace(session="b2")
     looks = iter([*[None] * 30, (token(late), True)])
     changes = deque([(token(ODOM), True)])
@@ -160,7 +160,7 @@ def test_where_the_first_link_took_long_so_may_the_next() -> None:
     assert graph.settled(lambda: True) == [ODOM, late]
 
 
-def test_tokens_of_strangers_are_ignored() -> None:
+def test_foreign_tokens_are_ignored() -> None:
     odd = ("@holozen", "@holozen/x", "@holozen/x/y", "x", "@holozen/a/b/pub/z", "@holozen///", "@holozen/a/b/node/c")
     graph = graph_of(*((key, True) for key in odd), (token(ODOM), True), *((key, False) for key in odd))
     assert graph.endpoints() == [ODOM]

@@ -21,7 +21,7 @@ time.sleep(999)
 
 @pytest.fixture
 def listener() -> Iterator[Process]:
-    """A process that listens and says where."""
+    """A process that listens and reports where."""
     with Process([sys.executable, "-c", LISTEN, "--mark"]) as process:
         wait_for(lambda: process.out.strip())
         yield process
@@ -29,22 +29,22 @@ def listener() -> Iterator[Process]:
 
 def test_the_process_that_holds_a_port_is_named_also_when_it_is_stopped(listener: Process) -> None:
     port = int(listener.out)
-    (holder,) = holders(port)
+    (holder,) = holders(f"tcp/127.0.0.1:{port}")
     assert (holder.pid, holder.stopped, holder.fix) == (listener.pid, False, f"end it: kill {listener.pid}")
     assert f"(pid {listener.pid})" in str(holder)
     listener.signal(signal.SIGSTOP)
-    (holder,) = wait_for(lambda: [holder for holder in holders(port) if holder.stopped])
+    (holder,) = wait_for(lambda: [holder for holder in holders(f"tcp/127.0.0.1:{port}") if holder.stopped])
     assert "stopped as by Ctrl-Z" in str(holder)
     assert holder.fix == f"continue it: kill -CONT {listener.pid}"
     listener.kill()
-    assert holders(port) == []
+    assert holders(f"tcp/127.0.0.1:{port}") == []
 
 
 def test_the_process_of_another_user_is_not_named(listener: Process, tmp_path: Path) -> None:
     (tmp_path / "net").mkdir()
     for table in ("tcp", "tcp6"):
         (tmp_path / "net" / table).write_text(Path(f"/proc/net/{table}").read_text())
-    assert holders(int(listener.out), str(tmp_path)) == [Holder(0)]
+    assert holders(f"tcp/127.0.0.1:{int(listener.out)}", str(tmp_path)) == [Holder(0)]
     assert str(Holder(0)) == "a process of another user"
 
 

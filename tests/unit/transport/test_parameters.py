@@ -18,9 +18,9 @@ class Node:
 
     def __init__(self, wire: Wire, form: str = "msgpack") -> None:
         self.values: dict[str, Any] = {"speed": 1.0, "Fred.timeout": -1.0, "shape": "square"}
-        self.told: list[str] = []
+        self.reports: list[str] = []
         served = wire.bus("node", wire=form)
-        Parameters(served, "node", self.declared, self.told.append).start()
+        Parameters(served, "node", self.declared, self.reports.append).start()
         self.caller: Bus = wire.bus("caller", wire=form)
 
     def declared(self) -> list[Parameter]:
@@ -42,7 +42,7 @@ class Node:
     def refused(self, name: str, value: r.ParameterValue) -> str:
         before = dict(self.values)
         ((successful, reason),) = self.set((name, value))
-        assert (successful, self.values, self.told) == (False, before, [])
+        assert (successful, self.values, self.reports) == (False, before, [])
         return reason
 
 
@@ -89,16 +89,16 @@ def test_they_are_described_with_what_they_take(node: Node) -> None:
 @pytest.mark.parametrize("key", ["get_parameters", "describe_parameters"])
 def test_an_unknown_name_is_refused_with_the_closest_one(node: Node, key: str) -> None:
     request = {"get_parameters": r.GetParametersRequest, "describe_parameters": r.DescribeParametersRequest}[key]
-    with pytest.raises(ServiceError, match=r"^node has no parameter 'sped'; did you mean 'speed'\?$"):
+    with pytest.raises(ServiceError, match=r"^node has no parameter 'sped' \(did you mean 'speed'\?\)$"):
         node.caller.call(f"node/{key}", request(["speed", "sped"]), r.GetParametersReply)
     with pytest.raises(ServiceError, match=r"'zzz'; it has speed, Fred.timeout, shape, file$"):
         node.caller.call(f"node/{key}", request(["zzz"]), r.GetParametersReply)
 
 
-def test_a_value_is_set_and_told_with_who_did_it(node: Node) -> None:
+def test_a_value_is_set_and_reported_with_its_caller(node: Node) -> None:
     assert node.set(("speed", of(0.5))) == [(True, "")]
     assert node.values["speed"] == 0.5
-    assert node.told == [f"node: speed is 0.5 m/s (was 1), set by {node.caller.source}"]
+    assert node.reports == [f"node: speed is 0.5 m/s (was 1), set by {node.caller.source}"]
 
 
 @pytest.mark.parametrize("form", WIRES)
@@ -124,7 +124,7 @@ def test_a_request_is_done_as_a_whole_or_not_at_all(node: Node) -> None:
     assert node.set(("shape", of("hexagon")), ("speed", of(3.0))) == [
         (False, ELSE), (False, "speed: 3: use a number from 0.1 to 2 m/s"),
     ]  # fmt: skip
-    assert (node.values["shape"], node.told) == ("square", [])
+    assert (node.values["shape"], node.reports) == ("square", [])
     assert node.set(("shape", of("hexagon")), ("speed", of(1.5))) == [(True, ""), (True, "")]
     assert (node.values["shape"], node.values["speed"]) == ("hexagon", 1.5)
 
@@ -141,7 +141,7 @@ def test_what_a_parameter_does_not_take_is_refused(node: Node) -> None:
         ("shape", of("circle"), "shape: 'circle': use one of square, hexagon"),
         ("shape", of(4), "shape: 4: use one of square, hexagon"),
         ("file", of("other.txt"), "file: it is read-only"),
-        ("sped", of(1.0), "node has no parameter 'sped'; did you mean 'speed'?"),
+        ("sped", of(1.0), "node has no parameter 'sped' (did you mean 'speed'?)"),
         ("shape", of("x" * 500), f"shape: '{'x' * 76}...: use one of square, hexagon"),
     ]:
         assert node.refused(name, value) == reason
@@ -149,7 +149,7 @@ def test_what_a_parameter_does_not_take_is_refused(node: Node) -> None:
 
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 def test_what_is_no_finite_number_never_gets_in(node: Node, value: float) -> None:
-    """Our own codec refuses it already; a stranger's may not."""
+    """Our own codec refuses it already; a foreign one may not."""
     parameter = next(parameter for parameter in node.declared() if parameter.name == "speed")
     with pytest.raises(ValueError, match="use a number from"):
         parameter.checked(value)
@@ -157,7 +157,7 @@ def test_what_is_no_finite_number_never_gets_in(node: Node, value: float) -> Non
 
 def test_what_it_has_already_may_be_set_although_it_is_out_of_range(node: Node) -> None:
     assert node.set(("Fred.timeout", of(-1.0)), ("file", of("goals.txt"))) == [(True, ""), (True, "")]
-    assert node.told == []
+    assert node.reports == []
     assert node.refused("Fred.timeout", of(-2.0)) == "Fred.timeout: -2: use a number from 0.1 to 2 s"
 
 

@@ -28,7 +28,7 @@ class Link:
         self.clocks = PeerClocks(self.ask, lambda session: self.alive or session != "aa", lambda: self.now)
         self.clocks.track(["aa"], self.now)
 
-    def ask(self, _session: str, _timeout: float) -> "Reply":
+    def ask(self, _session: str, _nonce: bytes, _timeout: float) -> "Reply":
         self.asked += 1
         return Reply(self, self.now)
 
@@ -90,7 +90,7 @@ def test_a_fast_sample_refines_the_lower_bound_and_no_sample_the_upper_one() -> 
     assert link.ages(0.3) == pytest.approx((0.299, 0.6), abs=0.01)
 
 
-def test_a_sample_from_the_future_says_nothing_and_asks_for_another_round_trip() -> None:
+def test_a_sample_from_the_future_proves_nothing_and_asks_for_another_round_trip() -> None:
     link = Link()
     link.run(2.0)
     before, asked = link.ages(0.1), link.asked
@@ -98,6 +98,15 @@ def test_a_sample_from_the_future_says_nothing_and_asks_for_another_round_trip()
     assert link.ages(0.1) == before
     link.run(0.01)
     assert link.asked > asked
+
+
+def test_a_sample_that_comes_while_others_are_read_has_an_age() -> None:
+    link = Link()
+    link.run(2.0)
+    began = link.now
+    link.now += 0.01
+    assert link.clocks.ages("aa", link.now + link.offset, began) == pytest.approx((0.0, 0.0), abs=0.005)
+    assert link.ages(0.0) == pytest.approx((0.0, 0.0), abs=0.005)
 
 
 def test_a_clock_that_jumped_is_measured_anew() -> None:
@@ -117,7 +126,7 @@ def test_a_sender_that_is_asked_to_hurry_is_asked_at_once() -> None:
     assert link.clocks.answered("aa") >= before
 
 
-def test_who_left_is_forgotten_and_a_flood_is_bounded() -> None:
+def test_a_source_that_left_is_forgotten_and_a_flood_is_bounded() -> None:
     link = Link()
     link.run(0.1)
     link.clocks.track((f"forged{number}" for number in range(1000)), link.now)
@@ -146,18 +155,18 @@ def wire() -> Iterator[Wire]:
         yield wire
 
 
-def test_the_answer_of_a_stranger_does_not_count(wire: Wire) -> None:
-    robot, driver, stranger = wire.bus("robot"), wire.bus("driver"), wire.bus("stranger")
+def test_the_answer_of_a_foreign_node_does_not_count(wire: Wire) -> None:
+    robot, driver, foreign = wire.bus("robot"), wire.bus("driver"), wire.bus("foreign")
     sent, key = driver.stamp().split(b";")[2], clock_key(driver.id)
 
     def lie(query: zenoh.Query) -> None:
         with query:
             query.reply(key, str(time.monotonic_ns() + 10**12))
 
-    lies = stranger.session.declare_queryable(key, lie, complete=True)
+    lies = foreign.session.declare_queryable(key, lie, complete=True)
     querier = robot.session.declare_querier(key)
     wait_for(lambda: querier.matching_status.matching)
-    wait_for(lambda: any(reply.replier_id.zid == stranger.session.zid() for reply in querier.get()))
+    wait_for(lambda: any(reply.replier_id.zid == foreign.session.zid() for reply in querier.get()))
     clocks = robot.peer_clocks(lambda _: True)
 
     def known() -> tuple[float, float] | None:

@@ -1,4 +1,4 @@
-"""A publisher writes messages, and gives the last one to whoever asks."""
+"""A publisher writes messages, and answers a get with the last one."""
 
 import math
 import os
@@ -36,7 +36,7 @@ def test_what_is_put_arrives_with_encoding_priority_and_source(wire: Wire, name:
     assert writer.source.startswith("writer@")
 
 
-def test_nobody_matches_until_somebody_subscribes(wire: Wire) -> None:
+def test_nothing_matches_until_there_is_a_subscriber(wire: Wire) -> None:
     publisher: Publisher[Twist] = wire.bus("writer").publisher("cmd_vel", Twist)
     assert not publisher.matched
     reader = wire.bus("reader").subscribe("cmd_vel", Twist)
@@ -54,7 +54,7 @@ def test_a_get_is_answered_with_the_last_message(wire: Wire, capfd: pytest.Captu
     ((payload, encoding),) = wait_for(lambda: last(reader, "odom"))
     assert b'"second"' in payload
     assert encoding == "application/json"
-    assert capfd.readouterr().err == ""  # Zenoh's own thread tells there what went wrong
+    assert capfd.readouterr().err == ""  # Zenoh's own thread would report errors there
 
 
 def test_a_number_that_is_not_finite_is_neither_sent_nor_remembered(wire: Wire) -> None:
@@ -92,9 +92,9 @@ def test_samples_are_numbered_by_their_publisher(wire: Wire) -> None:
         publisher.put(Twist())
     bus.session.put("plain", b"{}")
     numbers = [tap.recv().number for _ in range(5)]
-    told = [number for number in numbers if number]
-    assert [number for _, number in told] == [0, 1, 0, 2]
-    assert told[0][0] == told[1][0] == told[3][0] != told[2][0]
+    reported = [number for number in numbers if number]
+    assert [number for _, number in reported] == [0, 1, 0, 2]
+    assert reported[0][0] == reported[1][0] == reported[3][0] != reported[2][0]
     assert numbers[4] is None
 
 
@@ -106,7 +106,7 @@ from holozen.transport.connection import Connection
 with Bus("holder", Connection(connect=(sys.argv[1],), listen=(sys.argv[1],))) as bus:
     odom, commands = bus.publisher("odom", Odometry), bus.subscribe_raw("cmd_vel", 10)
     print("ready", flush=True)
-    ctypes.PyDLL(None).read(0, ctypes.create_string_buffer(1), 1)  # no other thread of Python runs meanwhile
+    ctypes.PyDLL(None).read(0, ctypes.create_string_buffer(1), 1)  # no other thread of Python runs during it
     print("awake", flush=True)
     signal.pause()
 """

@@ -25,7 +25,7 @@ def endpoint_of(listener: socket.socket) -> str:
     return f"tcp/127.0.0.1:{listener.getsockname()[1]}"
 
 
-def test_an_endpoint_is_free_when_nobody_listens_there(listener: socket.socket) -> None:
+def test_an_endpoint_without_a_listener_is_free(listener: socket.socket) -> None:
     endpoint = endpoint_of(listener)
     assert not rendezvous.is_free(endpoint)
     listener.close()
@@ -99,7 +99,7 @@ def test_a_point_that_another_was_faster_to_open_is_looked_at_again(points: Poin
     wait_for(lambda: len(points.tries) > 2)
 
 
-def test_who_holds_a_later_point_moves_to_an_earlier_one_when_that_is_free(
+def test_the_holder_of_a_later_point_moves_to_an_earlier_one_when_that_is_free(
     listener: socket.socket, points: Points, keep: Keep
 ) -> None:
     first, later = endpoint_of(listener), free_endpoint()
@@ -125,7 +125,7 @@ def test_a_process_holds_one_point_and_leaves_the_others_to_others(points: Point
 
 @pytest.fixture
 def silent() -> Iterator[str]:
-    """An endpoint where connections are accepted, by the kernel, and nobody ever answers."""
+    """An endpoint where the kernel accepts connections and no process ever answers."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         yield endpoint_of(server)
 
@@ -133,7 +133,7 @@ def silent() -> Iterator[str]:
 NEVER = threading.Event()
 
 
-def test_where_nobody_is_there_is_nobody_to_wait_for() -> None:
+def test_without_subscribers_there_is_nothing_to_wait_for() -> None:
     for lasting in (False, True):
         rendezvous.wait_for_link(lambda: False, [free_endpoint()], lasting, 60, NEVER)
     rendezvous.wait_for_link(lambda: False, [], False, 60, NEVER)
@@ -158,7 +158,7 @@ def test_a_holder_that_goes_is_not_waited_for(silent: str, listener: socket.sock
     rendezvous.wait_for_link(lambda: False, [endpoint_of(listener)], False, 60, NEVER)
 
 
-def test_who_is_told_to_end_waits_no_longer(silent: str) -> None:
+def test_a_waiter_that_is_asked_to_end_waits_no_longer(silent: str) -> None:
     stop = threading.Event()
     stop.set()
     with pytest.raises(SystemExit) as end:

@@ -1,4 +1,4 @@
-"""Requests are typed, and every failure is a reply that says why."""
+"""Requests are typed, and every failure is a reply with the reason."""
 
 from collections import Counter
 from collections.abc import Callable
@@ -59,7 +59,7 @@ def test_a_refusal_arrives_in_the_words_of_the_service(caller: Bus) -> None:
         caller.call("next_goal", NextGoalRequest(-1), NextGoalReply)
 
 
-def test_a_handler_that_breaks_tells_its_own_log_and_not_the_caller(
+def test_an_exception_in_a_handler_is_logged_and_does_not_reach_the_caller(
     caller: Bus, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(ServiceError, match=r"^next_goal: internal error, see the server's log$"):
@@ -69,7 +69,7 @@ def test_a_handler_that_breaks_tells_its_own_log_and_not_the_caller(
 
 
 @pytest.mark.parametrize(
-    ("payload", "encoding", "told"),
+    ("payload", "encoding", "expected"),
     [
         (b'{"request_gaol": 1}', "application/json", "contains unknown field `request_gaol`"),
         (b"[]", "application/json", "not a NextGoalRequest: Expected `object`, got `array`"),
@@ -77,9 +77,9 @@ def test_a_handler_that_breaks_tells_its_own_log_and_not_the_caller(
     ],
 )
 def test_a_request_that_is_none_is_refused_with_the_reason(
-    caller: Bus, payload: bytes, encoding: str, told: str
+    caller: Bus, payload: bytes, encoding: str, expected: str
 ) -> None:
-    assert told in failure(caller, payload, encoding)
+    assert expected in failure(caller, payload, encoding)
 
 
 def test_a_request_that_is_too_large_is_not_read(caller: Bus) -> None:
@@ -102,7 +102,7 @@ def test_a_get_without_payload_asks_by_its_parameters(caller: Bus) -> None:
     assert "unknown field `gaol`" in selected(caller, "next_goal?gaol=4")
 
 
-def test_a_look_around_by_a_wildcard_asks_nobody_to_do_anything(wire: Wire) -> None:
+def test_a_wildcard_query_asks_for_no_action(wire: Wire) -> None:
     asked = []
 
     def resume(request: TriggerRequest) -> TriggerReply:
@@ -152,7 +152,7 @@ def test_a_closed_server_answers_no_more(wire: Wire) -> None:
     assert server.answer_pending() == 0
 
 
-def test_the_reason_of_ours_and_of_strangers_is_shown() -> None:
+def test_the_reason_is_shown_for_our_nodes_and_for_foreign_ones() -> None:
     for payload, text in [
         (b'{"error": "no such goal"}', "no such goal"),
         (b'{"error": 7}', "7"),
@@ -167,7 +167,7 @@ def test_the_reason_of_ours_and_of_strangers_is_shown() -> None:
         assert str(refusal(payload)) == text
 
 
-def test_a_server_knows_who_says_to_call(wire: Wire) -> None:
+def test_a_server_knows_its_caller(wire: Wire) -> None:
     callers = list[str]()
 
     def answer(_request: TriggerRequest) -> TriggerReply:
@@ -211,7 +211,7 @@ def test_each_of_a_thousand_requests_at_once_gets_an_answer_or_the_word_busy(wir
     assert outcomes["answered"] >= 100
 
 
-def test_who_asks_a_lot_keeps_nobody_else_waiting(wire: Wire) -> None:
+def test_a_caller_with_many_requests_delays_no_other(wire: Wire) -> None:
     callers = list[str]()
 
     def answer(_request: TriggerRequest) -> TriggerReply:
@@ -240,7 +240,7 @@ def test_a_call_asks_a_busy_service_again(wire: Wire) -> None:
         assert answered_while(server, lambda: list(pool.map(ask, callers))) == [TriggerReply()] * 8
 
 
-def test_a_service_that_stays_busy_is_an_error_that_says_so(wire: Wire) -> None:
+def test_a_service_that_stays_busy_is_an_error_with_that_reason(wire: Wire) -> None:
     server = wire.bus("server").serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(), room=0)
     caller = wire.bus("caller")
     with ThreadPoolExecutor() as pool:

@@ -74,7 +74,9 @@ def test_any_of_the_kinds_is_read(stream: Stream) -> None:
     ],
     ids=lambda value: str(value)[:20],
 )
-def test_a_sample_that_is_no_message_says_why(stream: Stream, payload: bytes, encoding: str, reason: str) -> None:
+def test_a_sample_that_is_no_message_gives_the_reason(
+    stream: Stream, payload: bytes, encoding: str, reason: str
+) -> None:
     stream.add(payload, encoding)
     received = Subscription(stream.tap, (Twist,)).recv()
     assert received.message is None
@@ -82,13 +84,13 @@ def test_a_sample_that_is_no_message_says_why(stream: Stream, payload: bytes, en
     assert len(received.sample.payload) < 65_536
 
 
-def test_a_sample_tells_its_key_priority_source_and_size(stream: Stream) -> None:
+def test_a_sample_shows_its_key_priority_source_and_size(stream: Stream) -> None:
     stream.add(b"{}")
     sample = stream.tap.recv()
     assert (sample.key, sample.priority, sample.source, sample.size) == ("cmd_vel", "DATA", "me@1", 2)
 
 
-def test_a_closed_stream_raises_to_who_waits(stream: Stream) -> None:
+def test_a_closed_stream_raises_in_its_waiter(stream: Stream) -> None:
     subscription = Subscription(stream.tap, (Twist,))
     subscription.close()
     with pytest.raises(BusError):

@@ -18,14 +18,14 @@ print("waited", flush=True)
 """
 
 
-def told(seconds: float) -> list[str]:
+def reported(seconds: float) -> list[str]:
     words = [sys.executable, "-c", ENDS.format(seconds=seconds)]
     return subprocess.run(words, capture_output=True, text=True, check=True, timeout=60).stdout.split()
 
 
-def test_who_is_late_may_leave_before_the_process_ends() -> None:
-    assert told(0.2) == ["waited", "left"]
+def test_a_late_thread_may_leave_before_the_process_ends() -> None:
+    assert reported(0.2) == ["waited", "left"]
 
 
-def test_who_hangs_does_not_keep_the_process() -> None:
-    assert told(3600) == ["waited"]
+def test_a_hanging_thread_does_not_keep_the_process() -> None:
+    assert reported(3600) == ["waited"]

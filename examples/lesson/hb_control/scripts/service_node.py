@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Chooses a shape, tells its name on /shape, and hands out its corners one by one."""
+"""Chooses a shape, publishes its name on /shape, and hands out its corners one by one."""
 
 import math
 import random

@@ -28,7 +28,7 @@ class Kept:
         self.postponed: list[Any] = []
 
     def follow(self, entities: Any) -> None:
-        """Do what the entities say, each with the scope that it has."""
+        """Execute the entities, each with the scope that it has."""
         scope = self.context.scope
         for entity in entities:
             self.context.scope = scope

@@ -18,46 +18,46 @@ from holozen.ros.launch_ros import Node
 from ..conftest import Write
 from .conftest import Follow
 
-WHO = LaunchConfiguration("who")
-SAY = a.LogInfo(msg=["I am ", WHO])
+ROBOT = LaunchConfiguration("robot")
+GREETING = a.LogInfo(msg=["I am ", ROBOT])
 
 
-def said(capsys: pytest.CaptureFixture[str]) -> list[str]:
+def reported(capsys: pytest.CaptureFixture[str]) -> list[str]:
     return capsys.readouterr().err.splitlines()
 
 
 def test_an_argument_has_the_value_given_or_its_default(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
-    declared = a.DeclareLaunchArgument("who", default_value=["no", "body"], description="a name")
-    follow([declared, SAY])
-    follow([declared, SAY], who="Fred")
-    assert said(capsys) == ["I am nobody", "I am Fred"]
+    declared = a.DeclareLaunchArgument("robot", default_value=["no", "body"], description="a name")
+    follow([declared, GREETING])
+    follow([declared, GREETING], robot="Fred")
+    assert reported(capsys) == ["I am nobody", "I am Fred"]
 
 
 @pytest.mark.parametrize(
     ("declared", "message"),
     [
         (a.DeclareLaunchArgument("which"), "launch argument 'which' has no value; give which:=VALUE"),
-        (a.DeclareLaunchArgument("who", choices=["Ann", "Bob"]), "who:=Fred: it must be one of Ann, Bob"),
+        (a.DeclareLaunchArgument("robot", choices=["Ann", "Bob"]), "robot:=Fred: it must be one of Ann, Bob"),
     ],
 )
 def test_an_argument_without_a_good_value_is_reported(follow: Follow, declared: Any, message: str) -> None:
     with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
-        follow([declared], who="Fred")
+        follow([declared], robot="Fred")
 
 
 def test_values_and_the_environment_can_be_set(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
     kept = follow([
-        a.SetLaunchConfiguration("who", "Ann"), SAY, a.UnsetLaunchConfiguration("who"),
-        a.SetEnvironmentVariable("WHO", "Ann"), a.AppendEnvironmentVariable("WHO", "Bob"),
-        a.AppendEnvironmentVariable("WHO", "Eve", prepend=True), a.LogInfo(msg=EnvironmentVariable("WHO")),
-        a.ExecuteProcess(cmd=["true"], additional_env={"MORE": "1"}), a.UnsetEnvironmentVariable("WHO"),
+        a.SetLaunchConfiguration("robot", "Ann"), GREETING, a.UnsetLaunchConfiguration("robot"),
+        a.SetEnvironmentVariable("ROBOT", "Ann"), a.AppendEnvironmentVariable("ROBOT", "Bob"),
+        a.AppendEnvironmentVariable("ROBOT", "Eve", prepend=True), a.LogInfo(msg=EnvironmentVariable("ROBOT")),
+        a.ExecuteProcess(cmd=["true"], additional_env={"MORE": "1"}), a.UnsetEnvironmentVariable("ROBOT"),
         a.ExecuteProcess(cmd=["true"], env={"ALONE": "1"}),
     ])  # fmt: skip
-    assert said(capsys) == ["I am Ann", "Eve:Ann:Bob"]
+    assert reported(capsys) == ["I am Ann", "Eve:Ann:Bob"]
     first, second = (program.environment for program in kept.programs)
-    assert (first["WHO"], first["MORE"], first["PATH"]) == ("Eve:Ann:Bob", "1", os.environ["PATH"])
+    assert (first["ROBOT"], first["MORE"], first["PATH"]) == ("Eve:Ann:Bob", "1", os.environ["PATH"])
     assert second == {"ALONE": "1"}
-    assert "WHO" not in os.environ
+    assert "ROBOT" not in os.environ
 
 
 def test_a_launch_file_is_included_with_values(
@@ -68,15 +68,15 @@ from holozen.ros.launch.actions import DeclareLaunchArgument, LogInfo
 from holozen.ros.launch import LaunchDescription
 from holozen.ros.launch.substitutions import LaunchConfiguration, ThisLaunchFileDir
 def generate_launch_description():
-    who = DeclareLaunchArgument("who", default_value="nobody")
-    return LaunchDescription([who, LogInfo(msg=[ThisLaunchFileDir(), " ", LaunchConfiguration("who")])])
+    robot = DeclareLaunchArgument("robot", default_value="none")
+    return LaunchDescription([robot, LogInfo(msg=[ThisLaunchFileDir(), " ", LaunchConfiguration("robot")])])
 """
     path = write("other/b.launch.py", text)
     source = PythonLaunchDescriptionSource(str(path))
-    include = a.IncludeLaunchDescription(source, launch_arguments={"who": ["Fr", "ed"]}.items())
+    include = a.IncludeLaunchDescription(source, launch_arguments={"robot": ["Fr", "ed"]}.items())
     kept = follow([include, a.LogInfo(msg=ThisLaunchFileDir())])
-    assert said(capsys) == [f"{path.parent} Fred", str(kept.context.file.parent)]
-    assert kept.context.launch_configurations["who"] == "Fred"  # as in ROS, where includes are not scoped
+    assert reported(capsys) == [f"{path.parent} Fred", str(kept.context.file.parent)]
+    assert kept.context.launch_configurations["robot"] == "Fred"  # as in ROS, where includes are not scoped
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def generate_launch_description():
         ("b.launch.txt", "", "only launch files in Python are supported"),
         ("b.launch.py", "x = 1", "has no function generate_launch_description"),
         ("b.launch.py", "def generate_launch_description(): return 7", r"returned 7, not a LaunchDescription"),
-        ("c.launch.py", "", r"no launch file '.*/b.launch.py'; did you mean 'c.launch.py'"),
+        ("c.launch.py", "", r"no launch file '.*/b.launch.py' \(did you mean 'c.launch.py'"),
     ],
 )
 def test_a_file_that_cannot_be_included_is_reported(
@@ -111,16 +111,16 @@ def generate_launch_description():
 
 def test_a_function_is_called_and_what_it_returns_is_done(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
     def choose(context: Any, *args: str, again: str) -> Any:
-        name = WHO.perform(context)
-        assert context.perform_substitution(WHO) == context.launch_configurations["who"] == name
+        name = ROBOT.perform(context)
+        assert context.perform_substitution(ROBOT) == context.launch_configurations["robot"] == name
         return [a.LogInfo(msg=f"{name} {args} {again}")] if name == "Fred" else None
 
     def actions() -> list[Any]:
         return [a.OpaqueFunction(function=choose, args=["x"], kwargs={"again": "y"})]
 
-    follow(actions(), who="Fred")
-    follow(actions(), who="Ann")
-    assert said(capsys) == ["Fred ('x',) y"]
+    follow(actions(), robot="Fred")
+    follow(actions(), robot="Ann")
+    assert reported(capsys) == ["Fred ('x',) y"]
 
 
 @pytest.mark.parametrize("function", [lambda _context: [7], lambda _context: 7])
@@ -130,9 +130,9 @@ def test_a_function_that_returns_no_actions_is_reported(follow: Follow, function
 
 
 def test_timers_and_handlers_are_kept_for_later(follow: Follow) -> None:
-    timer, handler = a.TimerAction(period=WHO, actions=[SAY]), OnShutdown(on_shutdown=[SAY])
-    kept = follow([timer, a.RegisterEventHandler(handler), a.TimerAction(period=1, actions=[])], who="2.5")
-    assert (kept.timers[0], kept.handlers) == ((2.5, [SAY]), [handler])
+    timer, handler = a.TimerAction(period=ROBOT, actions=[GREETING]), OnShutdown(on_shutdown=[GREETING])
+    kept = follow([timer, a.RegisterEventHandler(handler), a.TimerAction(period=1, actions=[])], robot="2.5")
+    assert (kept.timers[0], kept.handlers) == ((2.5, [GREETING]), [handler])
     timer.cancel()
     assert [seconds for seconds, _ in kept.timers] == [1.0]
     assert follow([a.RegisterEventHandler(handler), a.UnregisterEventHandler(handler)]).handlers == []
@@ -147,14 +147,14 @@ def test_a_handler_answers_for_its_own_action(follow: Follow) -> None:
     mine, other = a.ExecuteProcess(cmd=["true"]), a.ExecuteProcess(cmd=["true"])
     context = follow([]).context
     ended, started = ProcessExited(mine, "true-1", 3), ProcessStarted(mine, "true-1")
-    assert list(OnProcessExit(target_action=mine, on_exit=[SAY]).handle(ended, context)) == [SAY]
-    assert list(OnProcessExit(target_action=mine, on_exit=SAY).handle(started, context)) == []
-    assert list(OnProcessStart(target_action=other, on_start=[SAY]).handle(started, context)) == []
-    assert list(OnProcessStart(on_start=[SAY]).handle(started, context)) == [SAY]
-    said: list[Any] = []
-    OnProcessExit(on_exit=lambda event, _context: said.append(event.returncode)).handle(ended, context)
-    OnProcessExit(target_action=lambda action: action is other, on_exit=[SAY])
-    assert said == [3]
+    assert list(OnProcessExit(target_action=mine, on_exit=[GREETING]).handle(ended, context)) == [GREETING]
+    assert list(OnProcessExit(target_action=mine, on_exit=GREETING).handle(started, context)) == []
+    assert list(OnProcessStart(target_action=other, on_start=[GREETING]).handle(started, context)) == []
+    assert list(OnProcessStart(on_start=[GREETING]).handle(started, context)) == [GREETING]
+    reported: list[Any] = []
+    OnProcessExit(on_exit=lambda event, _context: reported.append(event.returncode)).handle(ended, context)
+    OnProcessExit(target_action=lambda action: action is other, on_exit=[GREETING])
+    assert reported == [3]
 
 
 def test_scripts_of_python_and_verbs_of_ros2_are_ours(follow: Follow, write: Write) -> None:
@@ -175,7 +175,9 @@ def test_scripts_of_python_and_verbs_of_ros2_are_ours(follow: Follow, write: Wri
 def test_a_verb_of_ros2_that_is_not_ours_is_left_out(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
     action = a.ExecuteProcess(cmd=["ros2", "control", "load_controller", "arm"])
     assert follow([action]).left == [(action, True)]
-    assert said(capsys) == ["launch: `ros2 control load_controller arm` is left out: there is no verb 'control' here"]
+    assert reported(capsys) == [
+        "launch: `ros2 control load_controller arm` is left out: there is no verb 'control' here"
+    ]
 
 
 def test_a_line_for_the_shell_may_be_ours_too(follow: Follow) -> None:
@@ -193,7 +195,7 @@ def test_a_terminal_is_left_out_with_what_to_run_in_one(follow: Follow, capsys: 
         a.ExecuteProcess(cmd=["xterm", "-e", "ros2", "run", "my_bot", "teleop.py"]), Node(prefix="xterm -e", **script),
     ])  # fmt: skip
     assert kept.programs == []
-    assert said(capsys) == [
+    assert reported(capsys) == [
         "launch: xterm is left out: run this in another terminal: holozen run my_bot teleop.py",
         "launch: my_bot teleop.py is left out: run it in another terminal: holozen run my_bot teleop.py",
     ]
@@ -201,11 +203,11 @@ def test_a_terminal_is_left_out_with_what_to_run_in_one(follow: Follow, capsys: 
 
 def test_other_programs_are_started_as_they_are(follow: Follow) -> None:
     kept = follow([
-        a.ExecuteProcess(cmd=["echo", WHO], name="say"), a.ExecuteProcess(cmd=["echo", WHO, "|", "cat"], shell=True),
+        a.ExecuteProcess(cmd=["echo", ROBOT], name="hi"), a.ExecuteProcess(cmd=["echo", ROBOT, "|", "cat"], shell=True),
         a.ExecuteProcess(cmd=["sleep", "1"], respawn=True, respawn_delay=2),
-    ], who="Fred")  # fmt: skip
+    ], robot="Fred")  # fmt: skip
     first, second, third = kept.programs
-    assert (list(first.words), first.name, first.shell) == (["echo", "Fred"], "say", False)
+    assert (list(first.words), first.name, first.shell) == (["echo", "Fred"], "hi", False)
     assert (list(second.words), second.shell) == (["echo Fred | cat"], True)
     assert third.respawn == 2.0
 
@@ -216,7 +218,7 @@ def test_what_is_written_wrong_is_reported_with_its_place() -> None:
             lambda: a.ExecuteProcess(cmd="echo a"),
             "cmd='echo a' is one text; write a list of words",
         ),
-        (lambda: a.LogInfo(msg="", mesg=""), "LogInfo has no argument 'mesg'; did you mean 'msg'"),
+        (lambda: a.LogInfo(msg="", mesg=""), r"LogInfo has no argument 'mesg' \(did you mean 'msg'"),
         (lambda: LaunchDescription(["x"]), "'x' is not an action; write Node"),
         (lambda: a.GroupAction([None]), "None is not an action"),
         (lambda: a.OpaqueFunction(function="f"), "function='f' is not a function"),

@@ -87,11 +87,11 @@ def test_gazebo_as_a_program_is_the_sim(follow: Follow, command: list[str], worl
 @pytest.mark.parametrize(
     ("package", "name", "message"),
     [
-        ("gazebo_ros", "gazeb.launch.py", "has no 'launch/gazeb.launch.py'; did you mean 'gazebo.launch.py'"),
+        ("gazebo_ros", "gazeb.launch.py", r"has no 'launch/gazeb.launch.py' \(did you mean 'gazebo.launch.py'"),
         (
             "ros_gz_sim",
             "ros_gz_spawn_model.launch.py",
-            "has no 'launch/ros_gz_spawn_model.launch.py'; did you mean 'gz_sim",
+            r"has no 'launch/ros_gz_spawn_model.launch.py' \(did you mean 'gz_sim",
         ),
         ("nav2_bringup", "x.launch.py", "no package 'nav2_bringup'"),
     ],
@@ -136,10 +136,10 @@ def test_what_the_launch_lets_a_file_read_the_spawner_may_read(follow: Follow, w
 def test_topic_robot_description_is_what_robot_state_publisher_has(follow: Follow, write: Write, first: bool) -> None:
     """Whichever of the two comes first in the launch file."""
     path = write("src/my_bot/urdf/r.urdf.xacro", ROBOT)
-    robot = ParameterValue(Command(["xacro ", str(path), " who:=", LaunchConfiguration("who")]), value_type=str)
+    robot = ParameterValue(Command(["xacro ", str(path), " robot:=", LaunchConfiguration("robot")]), value_type=str)
     actions = [publisher(robot), spawn("-topic", "robot_description", "-entity", "r")]
-    kept = follow(actions if first else actions[::-1], who="me")
-    assert kept.words()[:5] == ["spawn", "--name", "r", str(path), "who:=me"]
+    kept = follow(actions if first else actions[::-1], robot="me")
+    assert kept.words()[:5] == ["spawn", "--name", "r", str(path), "robot:=me"]
 
 
 def test_a_text_that_no_file_holds_is_written_into_one(follow: Follow) -> None:
@@ -191,7 +191,7 @@ def test_a_robot_that_cannot_be_found_is_one_line(follow: Follow) -> None:
         ),
         (["-param", "robot"], "-param robot: this Node has no parameter 'robot'"),
         (["-entity", "r"], "give -file FILE or -topic robot_description"),
-        (["-enttiy", "r"], "unknown flag '-enttiy' to spawn a robot; did you mean '-entity'"),
+        (["-enttiy", "r"], r"unknown flag '-enttiy' to spawn a robot \(did you mean '-entity'"),
         (["-database", "r"], "unknown flag '-database' to spawn a robot"),
         (["-file"], "-file needs a value"),
     ]:

@@ -102,7 +102,7 @@ def test_show_args_lists_the_arguments_and_starts_nothing(launch: Launch, write:
 
 def test_a_value_that_nothing_uses_is_reported(launch: Launch, write: Write) -> None:
     write("a.launch.py", described(*ARGUMENTS))
-    message = "holozen launch: a.launch.py does not use 'kpp'; did you mean 'kp'?\n"
+    message = "holozen launch: a.launch.py does not use 'kpp' (did you mean 'kp'?)\n"
     assert (launch("a.launch.py", "kpp:=3").stderr) == message
 
 
@@ -118,7 +118,7 @@ def test_a_value_that_nothing_uses_is_reported_while_the_launch_goes_on(
 ) -> None:
     write("a.launch.py", described(*ARGUMENTS, *actions))
     with Process(line(wire, "a.launch.py", "kpp:=3"), env=environment()) as going:
-        assert going.wait_for_line("does not use 'kpp'; did you mean 'kp'?")
+        assert going.wait_for_line("does not use 'kpp' (did you mean 'kp'?)")
         going.signal(signal.SIGINT)
         assert going.wait() == 0
     assert going.err.count("kpp") == 1
@@ -156,7 +156,7 @@ def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> No
         ),
         (
             described("Node(package='my_bot', executable='x', nam='y')"),
-            "a.launch.py:8: Node has no argument 'nam'; did",
+            "a.launch.py:8: Node has no argument 'nam' (did",
         ),
         (
             described("Node(package='my_bot', node_executable='x')"),
@@ -256,7 +256,7 @@ def test_a_static_transform_is_published(wire: Wire, write: Write, my_bot: Path)
     write("a.launch.py", described(f"Node(package='tf2_ros', executable='static_transform_publisher', {words})"))
     with Process(line(wire, "a.launch.py"), env=environment()):
         bus = wire.bus()
-        (message,) = wait_for(lambda: list(bus.ask("tf_static", 5.0)), within=20)  # by who comes late
+        (message,) = wait_for(lambda: list(bus.ask("tf_static", 5.0)), within=20)  # by a late node
         assert isinstance(message, Sample)
         (transform,) = decode(message.payload, message.encoding, (TFMessage,)).transforms
         assert (transform.header.frame_id, transform.child_frame_id) == ("map", "odom")

@@ -97,7 +97,7 @@ def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
         ({"parameters": [{"a": ParameterValue("x", value_type=int)}]}, "the parameter is 'x', not a int"),
         ({"arguments": "-x 1"}, "arguments='-x 1' is one text; write a list of words"),
         ({"condition": "true"}, "condition='true' is not a condition"),
-        ({"paramters": []}, "Node has no argument 'paramters'; did you mean 'parameters'"),
+        ({"paramters": []}, r"Node has no argument 'paramters' \(did you mean 'parameters'"),
         ({"cwd": "nowhere"}, "cwd='nowhere' is not a folder"),
         ({"respawn": "often"}, "respawn is 'often'; it must be true or false"),
     ]
@@ -112,7 +112,7 @@ def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
         (
             "my_bot",
             "controler.py",
-            r"package 'my_bot' has no executable 'controler.py'; did you mean 'controller.py'\?",
+            r"package 'my_bot' has no executable 'controler.py' \(did you mean 'controller.py'\?\)",
         ),
         ("my_boot", "controller.py", "no package 'my_boot' around "),
         ("nav2_bringup", "bt_navigator", "no package 'nav2_bringup' around "),

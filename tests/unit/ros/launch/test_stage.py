@@ -64,7 +64,7 @@ def test_bytes_that_are_no_text_come_as_they_are(capfdbinary: pytest.CaptureFixt
 
 
 def test_what_is_set_comes_to_the_process(play: Play, tmp_path: Path) -> None:
-    _, out, _ = play(a.SetEnvironmentVariable("WHO", "Fred"), sh("echo $WHO $PWD; cat", cwd=str(tmp_path)))
+    _, out, _ = play(a.SetEnvironmentVariable("ROBOT", "Fred"), sh("echo $ROBOT $PWD; cat", cwd=str(tmp_path)))
     assert out == [f"[p-1] Fred {tmp_path}"]  # and its standard input is empty
 
 
@@ -123,15 +123,15 @@ def test_a_timer_waits_and_may_be_cancelled(play: Play) -> None:
 
 
 def test_a_timer_in_a_group_has_the_values_of_the_group(play: Play) -> None:
-    who = a.SetLaunchConfiguration("who", "Fred")
-    later = a.TimerAction(period=0.01, actions=[a.LogInfo(msg=[_who()])])
-    assert play(a.GroupAction([who, later]), a.SetLaunchConfiguration("who", "Ann"))[2] == ["Fred"]
+    robot = a.SetLaunchConfiguration("robot", "Fred")
+    later = a.TimerAction(period=0.01, actions=[a.LogInfo(msg=[_robot()])])
+    assert play(a.GroupAction([robot, later]), a.SetLaunchConfiguration("robot", "Ann"))[2] == ["Fred"]
 
 
-def _who() -> Any:
+def _robot() -> Any:
     from holozen.ros.launch.substitutions import LaunchConfiguration
 
-    return LaunchConfiguration("who")
+    return LaunchConfiguration("robot")
 
 
 def test_respawn_starts_it_again(play: Play, tmp_path: Path) -> None:

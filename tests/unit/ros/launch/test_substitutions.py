@@ -65,10 +65,10 @@ def test_what_gives_no_text_is_reported_with_its_place(context: LaunchContext) -
     for substitution, message in [
         (
             s.LaunchConfiguration("valu"),
-            "launch argument 'valu' is not declared before it is used; did you mean 'value'",
+            r"launch argument 'valu' is not declared before it is used \(did you mean 'value'",
         ),
         (s.EnvironmentVariable("NOT_SET"), "the environment variable 'NOT_SET' is not set"),
-        (s.FindPackageShare("my_boot"), "no package 'my_boot' around .*; did you mean 'my_bot'"),
+        (s.FindPackageShare("my_boot"), r"no package 'my_boot' around .* \(did you mean 'my_bot'"),
         (s.ExecutableInPackage("a.py", "my_bot"), "package 'my_bot' has no executable 'a.py'"),
         (s.FindExecutable(name="no_such_program"), "no program 'no_such_program' on the PATH"),
         (s.PythonExpression(["1 / 0"]), "PythonExpression '1 / 0': ZeroDivisionError: division by zero"),
@@ -92,22 +92,22 @@ def test_what_gives_no_text_is_reported_with_its_place(context: LaunchContext) -
 
 
 XACRO = """<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">
-<xacro:arg name="who" default="nobody"/><link name="$(arg who)"/></robot>"""
+<xacro:arg name="robot" default="none"/><link name="$(arg robot)"/></robot>"""
 
 
 @pytest.mark.parametrize("start", ["xacro ", "ros2 run xacro xacro --inorder ", "python3 -m xacro "])
 def test_xacro_is_expanded_here(context: LaunchContext, write: Write, start: str) -> None:
     write("my bot.xacro", XACRO)
-    found = text(context, s.Command([start, "'my bot.xacro'", " who:=", VALUE]))
+    found = text(context, s.Command([start, "'my bot.xacro'", " robot:=", VALUE]))
     assert '<link name="7"/>' in found
-    assert context.origins[found.strip()] == ["my bot.xacro", "who:=7"]
+    assert context.origins[found.strip()] == ["my bot.xacro", "robot:=7"]
 
 
 def test_xacro_reads_an_environment_variable_only_if_the_launch_allows_it(
     context: LaunchContext, write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("TOKEN", "secret")
-    write("bot.xacro", XACRO.replace("$(arg who)", "$(env TOKEN)"))
+    write("bot.xacro", XACRO.replace("$(arg robot)", "$(env TOKEN)"))
     with pytest.raises(LaunchError, match="--allow-env TOKEN"):
         text(context, s.Command("xacro bot.xacro"))
     context.allow_env = ["TOKEN"]
@@ -135,7 +135,7 @@ def test_an_action_is_done_if_its_condition_holds(follow: Follow, capsys: pytest
         assert capsys.readouterr().err == ("done\n" if holds else "")
 
 
-def test_a_condition_that_says_neither_is_reported_with_its_place(follow: Follow) -> None:
+def test_a_condition_that_is_neither_is_reported_with_its_place(follow: Follow) -> None:
     with pytest.raises(LaunchError, match=rf"{__file__}:\d+: the condition is 'perhaps'; it must be true or false"):
         follow(
             [DeclareLaunchArgument("gui"), LogInfo(msg="", condition=c.IfCondition(VALUE))], gui="1", value="perhaps"

@@ -1,0 +1,381 @@
+"""Sensors: the `<sensor>` elements of Gazebo classic and gz-sim, and plugins that sense without one.
+
+Tags and defaults are those of sdformat's sensor.sdf and of gazebo_ros_pkgs (gazebo_ros_{laser,ray_sensor,imu,
+imu_sensor,range,camera}.cpp) in ROS 1 (noetic) and ROS 2 (galactic). Two things differ here: a sensor publishes
+its ROS message whether it has a plugin or not, and one without an update rate has that of RATES.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
+
+from holozen.robot.elements import Source, Tag, number
+from holozen.robot.errors import RobotError
+from holozen.robot.gazebo_plugins import SENSING, Settings, kind_of, plugins_outside_sensors
+from holozen.robot.model import (
+    HERE,
+    NO_NOISE,
+    Camera,
+    Fan,
+    Imu,
+    Lidar,
+    Link,
+    Noise,
+    Pose,
+    Sensor,
+)
+from holozen.robot.rigid import Frame
+from holozen.suggest import cut
+
+MOST_RAYS = 10_000  # of one sensor
+MOST_PIXELS = 2_100_000  # of one camera: full HD
+MOST_SENSORS = 100  # of one robot
+FASTEST = 1000.0  # Hz
+OPTICAL = (-math.pi / 2, 0.0, -math.pi / 2)  # rpy of a camera's optical frame (REP 103): x right, y down, z forward
+SONAR_RAYS = 5  # across and up a sonar's cone
+
+RAYS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
+CAMERAS = ("camera", "depth", "depth_camera", "rgbd_camera", "rgbd")
+SIMULATED = (*RAYS, "sonar", "imu", *CAMERAS)
+RATES = {"scan": 10.0, "points": 10.0, "range": 10.0, "imu": 100.0, "camera": 10.0}  # Hz
+
+
+def read_sensors(robot: Tag, links: Mapping[str, Link], names: Iterable[str], source: Source) -> list[Sensor]:
+    """The sensors of a `<robot>`. `links` are those that are simulated, `names` all that the file has. What cannot be
+    simulated causes a warning that names it, and is left out.
+    """
+    reading = _Reading(links, source)
+    for gazebo in robot.all("gazebo"):
+        link = gazebo.attributes.get("reference", "").strip()
+        if not link or link in names:  # a reference to no link has its warning
+            for tag in gazebo.all("sensor"):
+                reading.take(tag, link)
+    for plugin in plugins_outside_sensors(robot):
+        if kind_of(plugin) in SENSING:
+            reading.take_plugin(plugin)
+    return reading.found
+
+
+def sdf_sensors(owners: Iterable[tuple[str, Pose, Tag, Source]], links: Mapping[str, Link]) -> list[Sensor]:
+    """The same for SDF: the sensors in the `<link>` elements that have these names and poses in our `links`."""
+    reading = None
+    for name, pose, owner, source in owners:
+        for tag in owner.all("sensor"):
+            reading = reading or _Reading(links, source)
+            reading.take(tag, name, pose, source)
+    return reading.found if reading else []
+
+
+def warn_unsimulated(tag: Tag, source: Source) -> None:
+    """Warn about a `<sensor>` of a type that is not simulated."""
+    kind = tag.attributes.get("type", "").strip()
+    near = source.suggest(kind, SIMULATED) if kind else ""
+    source.warn(tag, f"({kind[:80] or 'unknown'}) is not simulated{near}")
+
+
+class _Reading:
+    """The sensors found so far."""
+
+    def __init__(self, links: Mapping[str, Link], source: Source) -> None:
+        self._links, self._source, self._at = links, source, HERE
+        self.found: list[Sensor] = []
+        self._topics: set[str] = set()
+
+    def take(self, tag: Tag, link: str, at: Pose = HERE, source: Source | None = None) -> None:
+        """Add a `<sensor>` of the link `link`, whose element has the frame `at` in it."""
+        self._source, self._at = source or self._source, at
+        kind = tag.attributes.get("type", "").strip()
+        if kind not in SIMULATED:
+            warn_unsimulated(tag, self._source)
+        elif link not in self._links:
+            where = f"on {cut(link)}, which is not simulated" if link else "on no link"
+            self._source.warn(tag, f'({kind}) is {where}; write it into <gazebo reference="LINK">')
+        else:
+            self._try(tag, lambda: self._sensors(tag, link, kind))
+
+    def take_plugin(self, plugin: Tag) -> None:
+        """Add a plugin that senses without a `<sensor>`."""
+        kind = SENSING[kind_of(plugin)]
+        if kind == "imu":
+            self._try(plugin, lambda: [self._lone_imu(plugin)])
+        else:
+            near = "; write it into a <sensor>" if kind in SIMULATED else ""
+            self._source.warn(plugin, f"({kind}) is not simulated{near}")
+
+    def _try(self, tag: Tag, read: Callable[[], Iterable[Sensor]]) -> None:
+        try:
+            for sensor in read():
+                self._add(sensor, tag)
+        except RobotError as error:
+            self._source.warnings.append(f"{error}; {tag} is left out")
+
+    def _add(self, sensor: Sensor, tag: Tag) -> None:
+        if len(self.found) == MOST_SENSORS:
+            raise tag.wrong(f"is one of more than {MOST_SENSORS} sensors")
+        if taken := self._topics.intersection(sensor.topics):
+            self._source.warn(tag, f"publishes on {min(taken)!r} as another sensor does; it is left out")
+            return
+        self._topics.update(sensor.topics)
+        self.found.append(sensor)
+
+    def _sensors(self, tag: Tag, link: str, kind: str) -> Iterator[Sensor]:
+        plugin = next((each for each in tag.all("plugin") if kind_of(each) in SENSING), None)
+        for other in tag.all("plugin"):
+            if other is not plugin:
+                self._source.warn(other, f"is not supported in a <sensor>; {tag} publishes its ROS message anyway")
+        about = _About(tag, plugin, kind)
+        for unkept in ("distortion", "lens"):
+            for child in (part for owner in tag.all("camera") for part in owner.all(unkept)):
+                if any(number(value.value()) for value in child.children):
+                    self._source.warn(child, "is ignored; pictures have no distortion")
+        for name in ("bias_mean", "bias_stddev", "dynamic_bias_stddev"):
+            for child in tag.below(name):
+                if number(child.value()):
+                    self._source.warn(child, "is ignored; noise has no bias")
+        devices = _devices(about)
+        pose, frame, mount = self._placed(about, link)
+        for topic, device in devices:
+            yield Sensor(about.name, link, pose, frame, mount, topic, about.rate(_rate_of(device)), device)
+
+    def _placed(self, about: "_About", link: str) -> tuple[Pose, str, Pose | None]:
+        """The pose of a sensor on a link, the frame of what it publishes, and where that is if it is no link: one that
+        is tagged so, or that of a sensor that is not where its link is.
+        """
+        pose = _pose(about)
+        if self._at != HERE:
+            pose = (Frame.of(self._at) @ Frame.of(pose)).pose
+        tagged = about.plugin.frame("frame_name", "frame_id") or about.own.frame(
+            "gz_frame_id", "ignition_frame_id", "optical_frame_id"
+        )
+        tagged = tagged.rpartition("/")[2]
+        if tagged in self._links or (not tagged and pose == HERE):
+            return pose, tagged or link, None
+        if about.kind in CAMERAS and "optical" in tagged:
+            return pose, tagged, (Frame.of(pose) @ Frame.of(Pose(rpy=OPTICAL))).pose
+        return pose, tagged or (about.name if about.name not in self._links else f"{link}_{about.name}"), pose
+
+    def _lone_imu(self, plugin: Tag) -> Sensor:
+        """gazebo_ros_imu.cpp, with its link in a tag."""
+        settings = Settings(plugin)
+        link = settings.frame("body_name")
+        if link not in self._links:
+            known = self._source.suggest(link, self._links)
+            raise settings.tag("body_name").wrong(f"is {cut(link)}, which names no link{known}")
+        noise = Noise(stddev=settings.number(0.0, "gaussian_noise"))
+        name = plugin.attributes.get("name", "").strip() or "imu"
+        rate = settings.number(0.0, "update_rate", most=FASTEST) or RATES["imu"]
+        return Sensor(
+            name, link, HERE, link, None, settings.topic("imu", "topic_name"), rate, Imu((noise,) * 3, (noise,) * 3)
+        )
+
+
+class _About:
+    """A `<sensor>` of a `kind`, with the settings of its plugin, which may be missing."""
+
+    def __init__(self, tag: Tag, plugin: Tag | None, kind: str) -> None:
+        self.tag, self.kind, self.own = tag, kind, Settings(tag)
+        self.plugin = Settings(plugin or tag.empty("plugin"))
+        self.plugin_kind = kind_of(plugin) if plugin else ""
+        self.plugin_name = plugin.attributes.get("name", "").strip() if plugin else ""
+        self.name = tag.attributes.get("name", "").strip() or kind
+
+    def inside(self, *path: str) -> Settings:
+        """The settings of an element some levels below; an empty one where it is missing."""
+        tag = self.tag
+        for names in path:
+            tag = next((child for name in names.split() if (child := tag.first(name))), None) or tag.empty(names)
+        return Settings(tag)
+
+    def rate(self, default: float) -> float:
+        """Hz."""
+        rate = self.own.number(0.0, "update_rate", most=FASTEST)
+        return rate or self.plugin.number(0.0, "update_rate", "update_rate_hz", most=FASTEST) or default
+
+    def topic(self, default: str, *names: str) -> str:
+        """The key: of the plugin, of ROS 2's `~/out`, or of gz-sim's `<topic>`."""
+        if self.plugin_kind in ("gazebo_ros_ray_sensor", "gazebo_ros_imu_sensor") and not self.plugin.word(*names):
+            if self.plugin.is_remapped("out"):
+                return self.plugin.topic("out")
+            if self.plugin_kind == "gazebo_ros_ray_sensor" or self.plugin.owner.first("ros"):
+                return self.plugin.topic(f"{self.plugin_name or self.name}/out")
+        return self.plugin.topic(default, *names) if self.plugin_kind else self.own.topic(default, "topic")
+
+
+def _devices(about: _About) -> list[tuple[str, Lidar | Imu | Camera]]:
+    """What a sensor consists of, each with its key."""
+    if about.kind == "imu":
+        return [(about.topic("imu", "topic_name"), _imu(about))]
+    if about.kind in CAMERAS:
+        camera = _camera(about)
+        return [(camera.image or camera.depth, camera)]
+    lidar = _sonar(about) if about.kind == "sonar" else _lidar(about)
+    topic = about.topic(lidar.message, "topic_name")
+    if lidar.vertical.count > 1 and not about.plugin_kind and about.kind != "sonar":  # gz-sim publishes both
+        return [(topic, lidar), (f"{topic}/points", replace(lidar, message="points"))]
+    return [(topic, lidar)]
+
+
+def _rate_of(device: Lidar | Imu | Camera) -> float:
+    return RATES[device.message if isinstance(device, Lidar) else ("imu" if isinstance(device, Imu) else "camera")]
+
+
+def _pose(about: _About) -> Pose:
+    tag = about.tag.first("pose")
+    if tag is None or not tag.value():
+        return HERE
+    if relative := tag.attributes.get("relative_to", "").strip():
+        raise tag.wrong(f"is relative to {cut(relative)}; write it relative to its link")
+    x, y, z, *rpy = tag.content(6)
+    return Pose((x, y, z), (rpy[0], rpy[1], rpy[2]))
+
+
+# Lidars and what measures a distance.
+
+
+def _lidar(about: _About) -> Lidar:
+    limits = about.inside("ray lidar", "range")
+    near = limits.number(0.0, "min")
+    far = limits.number(math.nan, "max", zero=False) if limits.word("max") else math.nan
+    if math.isnan(far):
+        raise about.tag.wrong("has no <range> with a <max>, in metres")
+    if far <= near:
+        raise limits.owner.wrong(f"has min {near:g} and max {far:g}; the first is to be less")
+    horizontal, vertical = (_fan(about.inside("ray lidar", "scan", name)) for name in ("horizontal", "vertical"))
+    if horizontal.count * vertical.count > MOST_RAYS:
+        raise about.tag.wrong(f"has {horizontal.count * vertical.count} rays; at most {MOST_RAYS} are simulated")
+    noise = _noise(about.inside("ray lidar", "noise")) or _plugin_noise(about)
+    radiation = about.plugin.word("radiation", "radiation_type").lower()
+    return Lidar(horizontal, vertical, near, far, noise, _message(about, vertical), radiation != "ultrasound")
+
+
+def _message(about: _About, vertical: Fan) -> str:
+    match about.plugin_kind:
+        case "gazebo_ros_range" | "hector_gazebo_ros_sonar":
+            return "range"
+        case "gazebo_ros_block_laser" | "gazebo_ros_velodyne_laser":
+            return "points"
+        case "gazebo_ros_ray_sensor":
+            word = about.plugin.word("output_type").rpartition("/")[2] or "PointCloud2"
+            kinds = {"LaserScan": "scan", "PointCloud2": "points", "Range": "range"}
+            if word not in kinds:
+                problem = f"is {cut(word)}; sensor_msgs/{', sensor_msgs/'.join(kinds)} are supported"
+                raise about.plugin.tag("output_type").wrong(problem)
+            return kinds[word]
+    return "scan"
+
+
+def _sonar(about: _About) -> Lidar:
+    """`<sonar>`: a cone along x with a radius at its end."""
+    sonar = about.inside("sonar")
+    near, far = sonar.number(0.0, "min"), sonar.number(5.0, "max", zero=False)
+    if far <= near:
+        raise sonar.owner.wrong(f"has min {near:g} and max {far:g}; the first is to be less")
+    half = math.atan(sonar.number(0.5, "radius") / far)
+    fan = Fan(-half, half, SONAR_RAYS)
+    return Lidar(fan, fan, near, far, _plugin_noise(about), "range", infrared=False)
+
+
+def _fan(settings: Settings) -> Fan:
+    if not settings.owner.children:
+        return Fan()
+    samples = settings.number(1.0, "samples", zero=False) * settings.number(1.0, "resolution", zero=False)
+    first, last = (_angle(settings, name) for name in ("min_angle", "max_angle"))
+    if last < first:
+        raise settings.owner.wrong(f"has min_angle {first:g} and max_angle {last:g}; the first is to be less")
+    count = max(1, round(samples))
+    return Fan(first, last, count) if count > 1 else Fan((first + last) / 2, (first + last) / 2)
+
+
+def _angle(settings: Settings, name: str) -> float:
+    word = settings.word(name)
+    value = number(word) if word else 0.0
+    if value is None or abs(value) > 2 * math.pi + 0.01:
+        raise settings.tag(name).wrong(f"is {cut(word)}; it must be an angle in radians")
+    return value
+
+
+# Noise.
+
+
+def _noise(settings: Settings) -> Noise | None:
+    """An SDF `<noise>`; None without one. Raises RobotError."""
+    if not settings.owner.children:
+        return None
+    sort = (settings.owner.attributes.get("type", "").strip() or settings.word("type") or "none").lower()
+    if sort == "none":
+        return NO_NOISE
+    if not sort.startswith("gaussian"):
+        raise settings.owner.wrong(f"has the type {cut(sort)}; gaussian and none are supported")
+    word = settings.word("mean")
+    mean = number(word) if word else 0.0
+    if mean is None:
+        raise settings.tag("mean").wrong(f"is {cut(word)}; it must be a number")
+    return Noise(mean, settings.number(0.0, "stddev"))
+
+
+def _plugin_noise(about: _About) -> Noise:
+    return Noise(stddev=about.plugin.number(0.0, "gaussian_noise"))
+
+
+def _imu(about: _About) -> Imu:
+    plain = _plugin_noise(about)
+    old = {name: _noise_in(about.inside("imu", "noise", name)) for name in ("rate", "accel")}
+    values = []
+    for name, short in (("angular_velocity", "rate"), ("linear_acceleration", "accel")):
+        x, y, z = (_noise(about.inside("imu", name, axis, "noise")) or old[short] or plain for axis in "xyz")
+        values.append((x, y, z))
+    return Imu(values[0], values[1], about.inside("imu").flag("enable_orientation"))
+
+
+def _noise_in(settings: Settings) -> Noise | None:
+    """`<rate>` or `<accel>` of SDF 1.4, whose type is in the element around it."""
+    return Noise(0.0, settings.number(0.0, "stddev")) if settings.owner.children else None
+
+
+# Cameras.
+
+
+def _camera(about: _About) -> Camera:
+    tag = about.inside("camera")
+    image, clip = about.inside("camera", "image"), about.inside("camera", "clip")
+    width, height = (
+        round(image.number(size, name, zero=False)) for name, size in (("width", 320.0), ("height", 240.0))
+    )
+    if not (0 < width * height <= MOST_PIXELS):
+        raise image.owner.wrong(f"has {width} x {height} pixels; from 1 to {MOST_PIXELS} are rendered")
+    field_of_view = tag.number(1.047, "horizontal_fov", zero=False)
+    if not 0.01 <= field_of_view <= 3.0:
+        raise tag.tag("horizontal_fov").wrong(f"is {field_of_view:g}; use 0.01 to 3 rad")
+    near, far = clip.number(0.1, "near", zero=False), clip.number(100.0, "far", zero=False)
+    if far <= near:
+        raise clip.owner.wrong(f"has near {near:g} and far {far:g}; the first is to be less")
+    noise = _noise(about.inside("camera", "noise")) or NO_NOISE
+    picture, info, depth = _camera_topics(about)
+    mono = image.word("format").upper() in ("L8", "L_INT8", "GRAY8")
+    encoding = "mono8" if mono else "rgb8"
+    return Camera(width, height, field_of_view, near, far, picture, info, depth, encoding, noise)
+
+
+def _camera_topics(about: _About) -> tuple[str, str, str]:
+    """The keys of pictures, of their CameraInfo, and of depth."""
+    sees_depth = about.kind != "camera"
+    if not about.plugin_kind:  # gz-sim
+        topic = about.own.topic(f"{about.name}/image_raw", "topic")
+        place = topic.rpartition("/")[0]
+        info = f"{place}/camera_info".strip("/")
+        if about.kind == "depth_camera":
+            return "", info, topic
+        if sees_depth and about.own.word("topic"):  # its name is that of a folder
+            return f"{topic}/image", f"{topic}/camera_info", f"{topic}/depth_image"
+        return topic, info, f"{place}/depth_image".strip("/") if sees_depth else ""
+    plugin = about.plugin
+    name = plugin.word("camera_name").strip("/") or (about.name if plugin.owner.first("ros") else "")
+    image, info, depth = (
+        plugin.topic_within(name, *names)
+        for names in (
+            ("image_raw", "image_topic_name"),
+            ("camera_info", "camera_info_topic_name"),
+            ("depth/image_raw", "depth_image_topic_name"),
+        )
+    )
+    return image, info, depth if sees_depth else ""

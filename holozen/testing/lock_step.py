@@ -1,0 +1,107 @@
+"""A sim in lock-step with a test: its time passes only when the test steps it."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from holozen.testing.process import wait_for
+from holozen.testing.wire import Wire
+
+if TYPE_CHECKING:
+    from holozen.messages import CommandStatus, Odometry, SimulationStatus
+    from holozen.transport.pubsub import Subscription
+
+UNSURE = ("late", "old", "unknown clock", "gone")  # refusals of commands that were held up on their way
+PATIENCE = 60.0  # s for steps, or for a sim to start
+
+
+class LockStep:
+    """A paused sim on a test's wire, and one of its robots, by name; `flags` are those of `holozen sim`.
+
+    A step is the world's, 1/240 s by default. What a command does in a number of steps, to the last bit, depends on no
+    computer's speed. Other processes may take part: they read and command as always. `odom` and `status` are the
+    newest.
+    """
+
+    def __init__(self, wire: Wire, *flags: str, robot: str = "") -> None:
+        from holozen.messages import CommandStatus, Odometry, SimulationStatus, Twist
+        from holozen.wire import key_for
+
+        self.process = wire.start("sim", "--paused", *flags)
+        self.bus = wire.bus("lock_step")
+        self._times = self.bus.subscribe("simulation_status", SimulationStatus)
+        self._odoms = self.bus.subscribe(key_for("odom", robot), Odometry)
+        self._statuses = self.bus.subscribe(key_for("cmd_vel_status", robot), CommandStatus)
+        self._commands = self.bus.publisher(key_for("cmd_vel", robot), Twist)
+        self.status: SimulationStatus
+        self.odom: Odometry
+        self._obeyed: CommandStatus = wait_for(lambda: _newest(self._statuses), PATIENCE, "a robot")
+        self._read(lambda _: True)
+
+    def step(self, steps: int = 1) -> "Odometry":
+        """Let the sim make steps; returns the odom of the last one."""
+        from holozen.messages import simulation_interfaces as si
+
+        before = self.status
+        self.bus.call("step_simulation", si.StepSimulationRequest(steps), si.StepSimulationReply, PATIENCE)
+        return self._read(lambda now: (now.epoch, now.steps) == (before.epoch, before.steps + steps))
+
+    def reset(self, scope: int = 0) -> "Odometry":
+        """Begin anew, or reset what a `scope` of ResetSimulationRequest names; returns the first odom."""
+        from holozen.messages import simulation_interfaces as si
+
+        before = self.status
+        self.bus.call("reset_simulation", si.ResetSimulationRequest(scope), si.ResetSimulationReply, PATIENCE)
+        return self._read(lambda now: now.epoch == before.epoch + 1)
+
+    def drive(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
+        """Send a command (m/s and rad/s in the body frame), and wait until the robot has it, which obeys from the next
+        step on. AssertionError if it is refused.
+        """
+        from holozen.messages import Twist
+
+        wait_for(lambda: self._commands.matched, PATIENCE, "a robot that listens")
+        refusal = UNSURE[0]
+        while refusal.startswith(UNSURE):
+            accepted, count = self._obeyed.accepted, _count(self._obeyed)
+            self._commands.put(Twist.planar(x, y, turn))
+            wait_for(partial(self._is_read, count), PATIENCE, "the robot to read its command")
+            if self._obeyed.accepted > accepted:
+                return
+            if _count(self._obeyed) > count:
+                refusal = self._obeyed.last_refusal.removeprefix(f"{self.bus.source}: ")
+        raise AssertionError(f"the command was refused: {refusal}")
+
+    def _is_read(self, before: int) -> bool:
+        """Whether the newest command status counts more commands than before, or is that of another robot."""
+        self._obeyed = _newest(self._statuses) or self._obeyed
+        return _count(self._obeyed) != before
+
+    def _read(self, wanted: "Callable[[SimulationStatus], bool]") -> "Odometry":
+        """Wait for a status as wanted, and for the odom of its time."""
+        from holozen.messages import Time
+
+        def is_wanted() -> bool:
+            if new := _newest(self._times):
+                self.status = new
+            return bool(new) and wanted(new)
+
+        def is_published() -> bool:
+            if new := _newest(self._odoms):
+                self.odom = new
+            return bool(new) and new.header.stamp == Time.of(self.status.time)
+
+        wait_for(is_wanted, PATIENCE, "the sim's status")
+        wait_for(is_published, PATIENCE, "odom")
+        return self.odom
+
+
+def _count(status: "CommandStatus") -> int:
+    """The commands that were read."""
+    return status.accepted + sum(status.refused.values())
+
+
+def _newest(subscription: "Subscription[Any]") -> Any:
+    """The newest message that waits, or None."""
+    messages = [received.message for received in iter(subscription.try_recv, None) if received.message]
+    return messages[-1] if messages else None

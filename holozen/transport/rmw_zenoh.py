@@ -1,0 +1,124 @@
+"""The form that rmw_zenoh gives to ROS 2 on Zenoh: keys, liveliness tokens, attachments (design.md of ros2/rmw_zenoh).
+
+Data travels on `domain/topic/type/hash`, a service's requests on the same with its own type. Each node and endpoint
+holds a liveliness token. Each sample, request and reply carries an attachment. In a token `%` stands for `/`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import struct
+from typing import NamedTuple
+
+TOPIC = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+"""What a topic or a service may be called, without the slash at its beginning."""
+QOS = "::,10:,:,:,,"  # ROS 2's default: reliable, volatile, the last 10
+LATCHED_QOS = ":1:,1:,:,:,,"  # transient local, the last one
+KINDS = {"MP": "pub", "MS": "sub", "SS": "srv"}
+_CODES = {kind: code for code, kind in KINDS.items()}
+_ATTACHMENT = struct.Struct("<qqB16s")
+_TYPE = re.compile(r"([A-Za-z]\w*)::(msg|srv)::dds_::([A-Za-z]\w*)_")
+
+
+class Endpoint(NamedTuple):
+    """A publisher ("pub"), subscriber ("sub") or service ("srv") of a ROS node.
+
+    `topic` has no slash at its beginning, `type` is the ROS name, such as `std_msgs/msg/String`.
+    """
+
+    kind: str
+    topic: str
+    type: str
+    hash: str
+    node: str = ""
+    session: str = ""
+    number: int = 0  # within its session
+    latched: bool = False
+
+    def key(self, domain: int) -> str:
+        """The key of its samples or requests."""
+        return f"{domain}/{self.topic}/{dds_type(self.type)}/{self.hash}"
+
+    def token(self, domain: int, node_number: int) -> str:
+        """The key of its liveliness token; `node_number` is that of its node."""
+        start = f"@ros2_lv/{domain}/{self.session}/{node_number}/{self.number}/{_CODES[self.kind]}/%/%/{self.node}"
+        qos = LATCHED_QOS if self.latched else QOS
+        return f"{start}/{_mangled(self.topic)}/{dds_type(self.type)}/{self.hash}/{qos}"
+
+
+def node_token(domain: int, session: str, number: int, node: str) -> str:
+    """The key of a node's liveliness token."""
+    return f"@ros2_lv/{domain}/{session}/{number}/{number}/NN/%/%/{node}"
+
+
+def parse(token: str) -> Endpoint | None:
+    """The endpoint that a token names; None for that of a node, and for one that is malformed."""
+    parts = token.split("/")
+    if len(parts) != 13 or parts[0] != "@ros2_lv" or parts[5] not in KINDS or not parts[4].isdecimal():
+        return None
+    _, _, session, _, number, kind, _, space, node, topic, dds, hashed, qos = parts
+    found, topic = _TYPE.fullmatch(dds), topic.replace("%", "/").lstrip("/")
+    if not found or not TOPIC.fullmatch(topic):
+        return None
+    name = f"{space.replace('%', '/')}/{node}".strip("/").replace("//", "/")
+    latched = qos.split(":")[1:2] == ["1"]
+    return Endpoint(KINDS[kind], topic, "/".join(found.groups()), hashed, name, session, int(number), latched)
+
+
+def dds_type(name: str) -> str:
+    """How a key writes a type: `std_msgs::msg::dds_::String_`."""
+    package, kind, last = name.split("/")
+    return f"{package}::{kind}::dds_::{last}_"
+
+
+def _mangled(name: str) -> str:
+    return "%" + name.replace("/", "%")
+
+
+class Attachment(NamedTuple):
+    """What a sample, a request or a reply carries: its sequence number, when it was sent (ns since 1970, by the
+    sender's clock), and the 16 bytes that name its sender (its gid). A reply repeats number and gid of its request.
+    """
+
+    number: int
+    sent: int
+    gid: bytes
+
+    def packed(self) -> bytes:
+        """Its bytes."""
+        return _ATTACHMENT.pack(self.number, self.sent, len(self.gid), self.gid)
+
+
+def attachment(payload: bytes) -> Attachment | None:
+    """The attachment in `payload`; None if it has another form."""
+    if len(payload) != _ATTACHMENT.size:
+        return None
+    number, sent, length, gid = _ATTACHMENT.unpack(payload)
+    return Attachment(number, sent, gid) if length == len(gid) else None
+
+
+def gid(token: str) -> bytes:
+    """A gid for the endpoint with this token."""
+    return hashlib.sha256(token.encode()).digest()[:16]
+
+
+class Ages:
+    """How old the samples of one publisher are. It needs no clock in common: the fastest sample so far counts as new.
+
+    A sample that waited in a buffer since the link was cut is found old; a delay that all have is not.
+    """
+
+    def __init__(self) -> None:
+        self._offset: float | None = None  # s; the least difference of arrival and sending
+        self._last = (-1, 0.0)
+
+    def of(self, stamp: Attachment, now: float) -> float:
+        """The age in s of a sample that is read at `now`, s of our monotonic clock."""
+        sent = stamp.sent / 1e9
+        number, before = self._last
+        if stamp.number > number and sent < before:  # the sender's clock was set back
+            self._offset = None
+        self._last = (stamp.number, sent)
+        self._offset = now - sent if self._offset is None else min(self._offset, now - sent)
+        return now - sent - self._offset

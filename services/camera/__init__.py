@@ -1,0 +1,1 @@
+"""exposures -> image_raw, camera_info."""

@@ -1,0 +1,48 @@
+"""The camera: renders what robots see, in a process of its own, since a picture takes longer than a step."""
+
+import argparse
+import os
+import sys
+
+from holozen import flags
+from holozen.bus import Bus
+from holozen.console import report
+from holozen.messages import Exposure
+from holozen.process import stop_event
+from holozen.transport import connection
+from holozen.transport.errors import BusError
+
+NICE = 10  # the sim goes first
+LARGEST = 4_000_000  # bytes of an exposure
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = flags.Parser(
+        prog="holozen camera",
+        description="Render what the cameras of robots see. The sim starts it with the first robot that has a camera.",
+        epilog="example: holozen camera --exposures exposures",
+    )
+    parser.add_argument("--exposures", default="exposures", metavar="KEY", help="of one sim (default: %(default)s)")
+    connection.add_arguments(parser)
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    args = parser().parse_args(argv)
+    stop = stop_event()
+    os.nice(NICE)
+    try:
+        from .studio import Studio  # loads numpy and the engine, which --help does not need
+
+        with Bus("camera", connection.from_arguments(args), lasting=True, stop=stop) as bus:
+            report(f"camera: renders what comes on {args.exposures}")
+            exposures = bus.subscribe(args.exposures, Exposure, depth=64, limit=LARGEST)
+            Studio(bus, exposures).run(stop)
+    except BusError as error:
+        report(f"camera: {error}")
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,137 @@
+"""What a camera sees: the visual shapes of all entities, drawn by pybullet's TinyRenderer without a graphics card."""
+
+import math
+import tempfile
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from holozen.messages import Exposure
+from holozen.messages import Pose as PoseMessage
+from holozen.process import quiet
+from holozen.robot.description import Appearance
+from holozen.robot.errors import RobotError
+from holozen.robot.meshes import file_in
+from holozen.robot.model import Pose, Shape
+from holozen.robot.rigid import Frame
+from holozen.rotation import XYZ, XYZW, rotate
+
+Bytes = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float32]
+GREY = (0.7, 0.7, 0.7, 1.0)  # Gazebo's, of what has no colour
+GROUND = (0.6, 0.6, 0.6, 1.0)
+WIDE, THICK = 200.0, 0.02  # m; of the ground
+MISSED = 0.9999  # of the depth buffer: nothing there
+
+
+with quiet():  # it prints its build time from C while it loads; no flag stops it
+    import pybullet as bullet
+
+
+class Picture(NamedTuple):
+    """Colours (height, width, 3), and the depth (height, width) along the view in m, infinite where nothing is."""
+
+    colors: Bytes
+    depth: Floats
+
+
+class Renderer:
+    """A scene of its own, in which the entities stand where an exposure says."""
+
+    def __init__(self) -> None:
+        self._world: int = bullet.connect(bullet.DIRECT)
+        self._bodies: dict[str, tuple[int, dict[str, list[int]]]] = {}  # number and, by link, bodies of each entity
+        self._ground = -1
+
+    def knows(self, name: str, number: int) -> bool:
+        """Whether it has the looks of an entity."""
+        return name in self._bodies and self._bodies[name][0] == number
+
+    def add(self, name: str, number: int, looks: Appearance) -> None:
+        """Add an entity, or replace the one that had its name."""
+        self.remove(name)
+        links = {link.name: [body for shape in link.visuals for body in self._made(shape)] for link in looks.links}
+        self._bodies[name] = number, links
+
+    def remove(self, name: str) -> None:
+        """Remove an entity, if it is there."""
+        _, links = self._bodies.pop(name, (0, {}))
+        for bodies in links.values():
+            for body in bodies:
+                bullet.removeBody(body, self._world)
+
+    def render(self, exposure: Exposure) -> Picture:
+        """The picture of an exposure."""
+        self._place(exposure)
+        camera, (x, y, z), turned = exposure, *_at(exposure.pose)
+        ahead, up = rotate(turned, (1.0, 0.0, 0.0)), rotate(turned, (0.0, 0.0, 1.0))
+        view = bullet.computeViewMatrix((x, y, z), (x + ahead[0], y + ahead[1], z + ahead[2]), up)
+        across = math.tan(camera.field_of_view / 2)
+        high = 2 * math.atan(across * camera.height / camera.width)
+        near, far = camera.near, camera.far
+        projection = bullet.computeProjectionMatrixFOV(math.degrees(high), camera.width / camera.height, near, far)
+        _, _, rgba, depth, _ = bullet.getCameraImage(
+            camera.width, camera.height, view, projection, shadow=0, renderer=bullet.ER_TINY_RENDERER,
+            flags=bullet.ER_NO_SEGMENTATION_MASK, physicsClientId=self._world,
+        )  # fmt: skip
+        size = camera.height, camera.width
+        buffer = np.asarray(depth, np.float32).reshape(size)
+        metres = np.where(buffer < MISSED, far * near / (far - (far - near) * buffer), np.inf).astype(np.float32)
+        return Picture(np.asarray(rgba, np.uint8).reshape(*size, 4)[..., :3], metres)
+
+    def _place(self, exposure: Exposure) -> None:
+        if exposure.ground and self._ground < 0:
+            shape = Shape("box", (WIDE, WIDE, THICK), Pose((0.0, 0.0, -THICK / 2)), color=GROUND)
+            (self._ground,) = self._made(shape)
+        there = {entity.name for entity in exposure.entities}
+        for name in [name for name in self._bodies if name not in there]:
+            self.remove(name)
+        for entity in exposure.entities:
+            _, links = self._bodies.get(entity.name, (0, {}))
+            for link, pose in zip(entity.links, entity.poses, strict=True):
+                for body in links.get(link, ()):
+                    bullet.resetBasePositionAndOrientation(body, *_at(pose), self._world)
+
+    def _made(self, shape: Shape) -> list[int]:
+        """The body of a shape in the frame of its link; none for one that cannot be drawn."""
+        try:
+            visual = self._visual(shape)
+        except (bullet.error, RobotError):
+            return []
+        return [bullet.createMultiBody(0, -1, visual, physicsClientId=self._world)] if visual >= 0 else []
+
+    def _visual(self, shape: Shape) -> int:
+        frame = Frame.of(shape.pose)
+        common = {
+            "rgbaColor": shape.color or GREY, "visualFramePosition": frame.xyz,
+            "visualFrameOrientation": frame.quaternion, "physicsClientId": self._world,
+        }  # fmt: skip
+        match shape.kind:
+            case "box":
+                return int(bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=[e / 2 for e in shape.size], **common))
+            case "cylinder":
+                radius, length = shape.size
+                return int(bullet.createVisualShape(bullet.GEOM_CYLINDER, radius=radius, length=length, **common))
+            case "sphere":
+                return int(bullet.createVisualShape(bullet.GEOM_SPHERE, radius=shape.size[0], **common))
+            case "mesh" if shape.data:
+                suffix, content = file_in(shape.data)
+                with tempfile.NamedTemporaryFile(suffix=suffix) as file:
+                    file.write(content)
+                    file.flush()
+                    return int(
+                        bullet.createVisualShape(
+                            bullet.GEOM_MESH, fileName=file.name, meshScale=list(shape.size), **common
+                        )
+                    )
+        return -1
+
+    def close(self) -> None:
+        """Free the engine."""
+        bullet.disconnect(self._world)
+
+
+def _at(pose: PoseMessage) -> tuple[XYZ, XYZW]:
+    p, q = pose.position, pose.orientation
+    return (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)

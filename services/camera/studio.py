@@ -1,0 +1,118 @@
+"""All cameras of a sim: exposures in, pictures out."""
+
+import math
+import threading
+import time
+import zlib
+from array import array
+
+import numpy as np
+
+from holozen.bus import Bus, Publisher, Subscription
+from holozen.console import report
+from holozen.messages import CameraInfo, Exposure, Header, Image, RobotDescriptionReply, RobotDescriptionRequest
+from holozen.robot.description import read
+from holozen.robot.errors import RobotError
+from holozen.transport.errors import ServiceError
+
+from .renderer import Bytes, Floats, Renderer
+
+POLL = 0.005  # s between two looks for exposures
+PATIENCE = 5.0  # s for the looks of an entity
+
+
+class Studio:
+    """All cameras of a sim. Of exposures that came during a picture only the newest of each camera is rendered."""
+
+    def __init__(self, bus: Bus, exposures: Subscription[Exposure]) -> None:
+        self._bus, self._exposures, self._renderer = bus, exposures, Renderer()
+        self._cameras: dict[str, Camera] = {}
+        self._missing: dict[int, float] = {}  # number of an entity without looks: when they were asked for, in s
+
+    def run(self, stop: threading.Event) -> None:
+        """Render until `stop` is set."""
+        while not stop.is_set():
+            waiting = [received.message for received in iter(self._exposures.try_recv, None) if received.message]
+            for exposure in {exposure.image or exposure.depth: exposure for exposure in waiting}.values():
+                self._take(exposure)
+            if not waiting:
+                stop.wait(POLL)
+
+    def _take(self, exposure: Exposure) -> None:
+        name = exposure.image or exposure.depth
+        if name not in self._cameras:
+            self._cameras[name] = Camera(self._bus, exposure)
+        camera = self._cameras[name]
+        if camera.wanted:
+            self._learn(exposure)
+            camera.publish(exposure, self._renderer)
+
+    def _learn(self, exposure: Exposure) -> None:
+        """Ask for the looks of entities that are new."""
+        for entity in exposure.entities:
+            asked = self._missing.get(entity.number, -math.inf)
+            if self._renderer.knows(entity.name, entity.number) or time.monotonic() - asked < PATIENCE:
+                continue
+            self._missing[entity.number] = time.monotonic()
+            try:
+                request = RobotDescriptionRequest(entity.name)
+                for reply in self._bus.call_all("robot_description", request, RobotDescriptionReply, PATIENCE):
+                    if reply.number == entity.number:
+                        self._renderer.add(entity.name, entity.number, read(reply.description))
+            except (ServiceError, RobotError) as error:
+                report(f"camera: {entity.name} cannot be seen: {error}")
+
+
+class Camera:
+    """The keys of a camera. They are CDR on every wire: a picture in JSON would take a second."""
+
+    def __init__(self, bus: Bus, first: Exposure) -> None:
+        self._image: Publisher[Image] | None = bus.publisher(first.image, Image, wire="cdr") if first.image else None
+        self._depth: Publisher[Image] | None = bus.publisher(first.depth, Image, wire="cdr") if first.depth else None
+        self._info: Publisher[CameraInfo] = bus.publisher(first.info, CameraInfo)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anyone wants what `publish` sends."""
+        wanted = [one.wanted for one in (self._image, self._depth, self._info) if one]
+        return any(wanted)
+
+    def publish(self, exposure: Exposure, renderer: Renderer) -> None:
+        """Render and publish a picture."""
+        if self._image or self._depth:
+            colors, depth = renderer.render(exposure)
+            if self._image:
+                self._image.put(_image(exposure, _with_noise(exposure, colors)))
+            if self._depth:
+                self._depth.put(_image(exposure, depth))
+        self._info.put(info(exposure))
+
+
+def info(exposure: Exposure) -> CameraInfo:
+    """Of a pinhole camera without distortion."""
+    width, height = exposure.width, exposure.height
+    focal = width / 2 / math.tan(exposure.field_of_view / 2)
+    k = [focal, 0.0, width / 2, 0.0, focal, height / 2, 0.0, 0.0, 1.0]
+    r = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
+    p = [focal, 0.0, width / 2, 0.0, 0.0, focal, height / 2, 0.0, 0.0, 0.0, 1.0, 0.0]
+    return CameraInfo(exposure.header, height, width, "plumb_bob", [0.0] * 5, k, r, p)
+
+
+def _image(exposure: Exposure, pixels: Bytes | Floats) -> Image:
+    height, width = pixels.shape[:2]
+    encoding = "32FC1" if pixels.dtype == np.float32 else exposure.encoding
+    if encoding == "mono8":  # ITU-R BT.601
+        pixels = (pixels @ np.array([0.299, 0.587, 0.114])).round().astype(np.uint8)
+    data = pixels.tobytes()
+    header = Header(exposure.header.stamp, exposure.header.frame_id)
+    return Image(header, height, width, encoding, 0, len(data) // height, array("B", data))
+
+
+def _with_noise(exposure: Exposure, colors: Bytes) -> Bytes:
+    if not (exposure.noise_mean or exposure.noise_stddev):
+        return colors
+    stamp = exposure.header.stamp
+    seed = (exposure.seed, zlib.crc32(exposure.image.encode()), stamp.sec, stamp.nanosec)
+    noise = np.random.default_rng(seed).standard_normal(colors.shape, np.float32)
+    noisy = colors + 255 * (exposure.noise_mean + exposure.noise_stddev * noise)
+    return noisy.round().clip(0, 255).astype(np.uint8)

@@ -1,0 +1,60 @@
+"""The process that renders what cameras see, and what the sim sends to it."""
+
+import subprocess
+import sys
+
+from holozen.bus import Bus, Publisher
+from holozen.console import report
+from holozen.messages import Exposure
+from holozen.process import dies_with_parent
+
+GRACE = 1.0  # s for it to end
+
+
+class Cameras:
+    """Of a sim; the first camera starts the process. `key` is that of exposures, unlike that of any other sim; `where`
+    are the flags of its connection.
+    """
+
+    def __init__(self, bus: Bus, key: str, where: list[str]) -> None:
+        self._bus, self._key, self._where = bus, key, where
+        self._publisher: Publisher[Exposure] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        """Start the process unless it runs."""
+        self._publisher = self._publisher or self._bus.publisher(self._key, Exposure)
+        if self._process is None:
+            words = ["camera", "--exposures", self._key, *self._where]
+            self._process = subprocess.Popen(
+                [sys.executable, "-m", "holozen", *words],
+                stdin=subprocess.DEVNULL,
+                start_new_session=True,
+                preexec_fn=dies_with_parent(),
+            )
+
+    @property
+    def wanted(self) -> bool:
+        """Whether exposures are read. Reports once that the process ended."""
+        if self._process and (code := self._process.poll()) is not None:
+            self._process = None
+            again = f"`holozen camera --exposures {self._key}` starts it again"
+            report(f"sim: the camera ended with exit code {code}, so there are no pictures; {again}")
+        return self._publisher is not None and self._publisher.wanted
+
+    def expose(self, exposure: Exposure) -> None:
+        """Have a picture rendered."""
+        if self._publisher:
+            self._publisher.put(exposure)
+
+    def close(self) -> None:
+        """End the process."""
+        if self._process is None:
+            return
+        self._process.terminate()
+        try:
+            self._process.wait(GRACE)
+        except subprocess.TimeoutExpired:
+            report(f"sim: the camera did not end within {GRACE:g} s and was killed")
+            self._process.kill()
+            self._process.wait()

@@ -1,0 +1,93 @@
+"""The services of simulation_interfaces that play, pause, step and reset the simulation."""
+
+import time
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+from holozen.bus import Bus
+from holozen.console import report
+from holozen.messages import simulation_interfaces as si
+from holozen.messages.codec import CodecError
+from holozen.messages.simulation_interfaces import SimulationState as State
+from holozen.transport.errors import ServiceError
+from holozen.transport.services import answer_in_turn, refuse
+
+from ..entities import EntityError
+from ..simulation import NAMES, Simulation
+
+_OK = si.Result(si.Result.OK)
+
+
+class SimulationServices:
+    """Answers requests about the time of the world. `end` ends the sim."""
+
+    def __init__(self, bus: Bus, simulation: Simulation, end: Callable[[], None]) -> None:
+        self._simulation, self._end = simulation, end
+        self._steps = bus.serve("step_simulation", si.StepSimulationRequest, si.StepSimulationReply, _not_now)
+        self._setter = bus.serve(
+            "set_simulation_state", si.SetSimulationStateRequest, si.SetSimulationStateReply, self.set_state
+        )
+        self._servers = [
+            bus.serve("get_simulation_state", si.GetSimulationStateRequest, si.GetSimulationStateReply, self.state),
+            self._setter,
+            bus.serve("reset_simulation", si.ResetSimulationRequest, si.ResetSimulationReply, self.reset),
+        ]
+
+    def answer(self) -> bool:
+        """Answer waiting requests for a short time. Returns whether more may wait."""
+        while not self._simulation.steps and (query := self._steps.try_recv()) is not None:
+            self._step(query)
+        return answer_in_turn(self._servers)
+
+    def state(self, _request: si.GetSimulationStateRequest) -> si.GetSimulationStateReply:
+        """The state of the sim."""
+        return si.GetSimulationStateReply(State(self._simulation.state), _OK)
+
+    def set_state(self, request: si.SetSimulationStateRequest) -> si.SetSimulationStateReply:
+        """Change the state of the sim."""
+        wanted, now = request.state.state, time.monotonic()
+        if wanted == State.STATE_QUITTING:
+            self._end()
+        elif wanted not in NAMES:
+            problem = f"state {wanted}: use 0 (stopped), 1 (playing), 2 (paused) or 3 (quitting)"
+            raise EntityError(si.Result.FEATURE_UNSUPPORTED, problem)
+        elif wanted == self._simulation.state and not self._simulation.steps:
+            problem = f"the sim is {NAMES[wanted]} already"
+            return si.SetSimulationStateReply(si.Result(si.SetSimulationStateReply.ALREADY_IN_TARGET_STATE, problem))
+        else:
+            {
+                State.STATE_STOPPED: self._simulation.stop,
+                State.STATE_PLAYING: self._simulation.play,
+                State.STATE_PAUSED: self._simulation.pause,
+            }[wanted](now)
+        report(f"sim: it is {NAMES.get(wanted, 'ended')} by {self._setter.caller or 'an unknown caller'}")
+        return si.SetSimulationStateReply(_OK)
+
+    def reset(self, request: si.ResetSimulationRequest) -> si.ResetSimulationReply:
+        """Reset the sim."""
+        self._simulation.reset(request.scope, time.monotonic())
+        return si.ResetSimulationReply(_OK)
+
+    def _step(self, query: Any) -> None:
+        """Begin the steps of a request, which is answered after them."""
+        if not self._steps.is_addressed(query):
+            query.drop()
+            return
+        try:
+            self._simulation.step(self._steps.read(query).steps, partial(self._stepped, query))
+        except (ServiceError, CodecError) as error:
+            with query:
+                refuse(query, str(error), getattr(error, "fields", {}))
+
+    def _stepped(self, query: Any, reason: str) -> None:
+        with query:
+            if reason:
+                failed = EntityError(si.Result.OPERATION_FAILED, reason)
+                refuse(query, str(failed), failed.fields)
+            else:
+                self._steps.reply(query, si.StepSimulationReply(_OK))
+
+
+def _not_now(_request: si.StepSimulationRequest) -> si.StepSimulationReply:
+    raise AssertionError("step_simulation is answered after its steps")

@@ -1,0 +1,135 @@
+"""Shards: several sims on one bus that share the robots by name, each on a core or a machine of its own.
+
+Each robot belongs to one shard by a hash of its name, so that two shards never hold the same name. A shard announces
+itself as a node such as `sim_2_of_3`.
+"""
+
+import argparse
+import re
+import time
+import zlib
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass
+
+from holozen.bus import Bus
+from holozen.flags import refused
+from holozen.transport.connection import Connection
+from holozen.transport.errors import BusError, Elsewhere
+from holozen.transport.graph import Endpoint
+from holozen.transport.node import Node
+
+MOST = 64  # shards
+AUTO = 0  # the number of a shard that takes any that is free
+TRIES = 20  # of a shard that shares its number with others that start at the same time
+SCAN = 1.0  # s between two scans of all tokens for other shards
+_NODE = re.compile(r"sim_(\d{1,2})_of_(\d{1,2})")
+
+
+@dataclass(frozen=True, slots=True)
+class Shard:
+    """One of `count` sims; `number` is from 1 to `count`."""
+
+    number: int
+    count: int
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    @property
+    def node(self) -> str:
+        """The name of its node."""
+        return f"sim_{self.number}_of_{self.count}"
+
+    def owner(self, name: str) -> "Shard":
+        """The shard that holds the entity with a name."""
+        return Shard(zlib.crc32(name.encode()) % self.count + 1, self.count)
+
+    def owns(self, name: str) -> bool:
+        """Whether it is the one that holds the entity with a name."""
+        return self.owner(name) == self
+
+
+def shard(text: str) -> Shard:
+    """The value of `--shard`, for argparse."""
+    number, _, count = text.partition("/")
+    if (number != "auto" and not number.isdecimal()) or not count.isdecimal():
+        raise refused(f"{text!r} is no shard; give K/N, such as 1/3, or auto/3 for a number that is free")
+    made = Shard(AUTO if number == "auto" else int(number), int(count))
+    if not 1 <= made.count <= MOST or not (number == "auto" or 1 <= made.number <= made.count):
+        raise refused(f"{text!r}: give K/N with K from 1 to N and N up to {MOST}")
+    return made
+
+
+def shards_of(endpoints: Iterable[Endpoint]) -> dict[Shard, list[str]]:
+    """The shards among all nodes, and the sessions of each."""
+    found: dict[Shard, list[str]] = {}
+    for end in endpoints:
+        if end.kind == "node" and (match := _NODE.fullmatch(end.node)):
+            found.setdefault(Shard(int(match[1]), int(match[2])), []).append(end.session)
+    return found
+
+
+def is_shard(node: str) -> bool:
+    """Whether a node's name is that of a shard."""
+    return bool(_NODE.fullmatch(node))
+
+
+def claim(wanted: Shard, connection: Connection, open_bus: Callable[[str], Bus]) -> tuple[Shard, Bus]:
+    """Take a number, and open the bus as the node of that name. Raises BusError if it is taken, or none is free."""
+    for _ in range(TRIES):
+        with Node("sim", connection) as node:
+            mine = _free(wanted, shards_of(node.endpoints()))
+        bus = open_bus(mine.node)
+        try:
+            rivals = shards_of(bus.endpoints()).get(mine, [])
+        except BaseException:
+            bus.close()
+            raise
+        if min([bus.id, *rivals]) == bus.id:
+            return mine, bus
+        bus.close()
+        if wanted.number != AUTO:
+            raise BusError(f"shard {mine} runs already ({min(rivals)[:6]}); take another: --shard auto/{mine.count}")
+    raise BusError(f"no shard of {wanted.count} was to be had in {TRIES} tries; start this one again")
+
+
+def _free(wanted: Shard, running: Collection[Shard]) -> Shard:
+    if other := next((one for one in running if one.count != wanted.count), None):
+        raise BusError(f"shard {other} runs here: all shards have the same N; use --shard auto/{other.count}")
+    if wanted.number == AUTO:
+        free = (Shard(number, wanted.count) for number in range(1, wanted.count + 1))
+        if not (mine := next((one for one in free if one not in running), None)):
+            raise BusError(f"all {wanted.count} shards run already; end them all before you start more of them")
+        return mine
+    if wanted in running:
+        raise BusError(f"shard {wanted} runs already; take another: --shard auto/{wanted.count}")
+    return wanted
+
+
+class Share:
+    """The part of the entities that belongs to this shard."""
+
+    def __init__(self, mine: Shard, bus: Bus) -> None:
+        self.mine, self._bus = mine, bus
+        self._graph = bus.graph("@holozen/*/*/node")
+        self._running: Collection[Shard] = ()
+        self._scanned = -SCAN
+
+    def refusal(self, name: str) -> str:
+        """Empty for the name of an entity that belongs here, else why no shard has it. Raises Elsewhere if the shard
+        that it belongs to runs.
+        """
+        owner = self.mine.owner(name)
+        if owner == self.mine:
+            return ""
+        if (now := time.monotonic()) - self._scanned >= SCAN or owner not in self._running:
+            self._running, self._scanned = shards_of(self._graph.endpoints()), now
+        if owner in self._running:
+            raise Elsewhere
+        return f"{name[:80]!r} belongs to shard {owner}, which does not run; start it: holozen sim --shard {owner}"
+
+
+def add_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the flag `--shard`."""
+    parser.add_argument("--shard", type=shard, metavar="K/N",
+        help="be the K-th of N sims that share the robots by name; auto/N: any that is free")  # fmt: skip

@@ -1,0 +1,151 @@
+"""The view: robots and their world in a browser, and a pad to drive them."""
+
+import argparse
+import contextlib
+import io
+import secrets
+import socket
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+from holozen import flags
+from holozen.bus import Bus
+from holozen.console import report
+from holozen.process import stop_event
+from holozen.transport import connection
+from holozen.transport.errors import BusError
+
+if TYPE_CHECKING:
+    import viser
+
+    from .guard import Guard
+
+PORT = 8080
+LOOPBACK = ("localhost", "::1")
+
+
+def parser() -> argparse.ArgumentParser:
+    parser = flags.Parser(
+        prog="holozen view",
+        description="Show the robots and their world in a browser, and drive them from there.",
+        epilog="example: holozen view --port 8081",
+    )
+    add = parser.add_argument
+    add("--host", default="127.0.0.1", metavar="ADDRESS",
+        help="where to listen; beyond this machine its address has a token (default: %(default)s)")  # fmt: skip
+    add("--port", type=flags.count(), default=PORT, metavar="N", help="0: a free one (default: %(default)s)")
+    add("--token", default="", metavar="WORD", help="the token of the page's address (default: a random one)")
+    add("--look-only", action="store_true", help="a page that drives, adds and deletes nothing")
+    connection.add_arguments(parser)
+    return parser
+
+
+def main(argv: list[str] | None = None) -> int:
+    args = parser().parse_args(argv)
+    is_local = args.host in LOOPBACK or args.host.startswith("127.")
+    token = args.token or ("" if is_local else secrets.token_urlsafe(16))
+    stop = stop_event()
+    try:
+        _check_port(args.host, args.port)
+        from .guard import Guard
+
+        guard = Guard(token)
+        with Bus("view", connection.from_arguments(args), lasting=True, stop=stop) as bus:
+            server = _serve(args.host, args.port, guard)
+            try:
+                for line in _addresses(args, server.get_port(), token, is_local):
+                    report(f"view: {line}")
+                _show(bus, server, guard, args.look_only, stop)
+            finally:
+                with contextlib.redirect_stdout(io.StringIO()):
+                    server.stop()
+    except (BusError, OSError) as error:
+        report(f"view: {error}")
+        return 1
+    return 0
+
+
+def _addresses(args: argparse.Namespace, port: int, token: str, is_local: bool) -> Iterator[str]:
+    """Where the page is, and what that exposes."""
+    host = f"[{args.host}]" if ":" in args.host else args.host
+    if not is_local:
+        may = "see" if args.look_only else "see and drive"
+        yield f"port {port} of {args.host} is open to the network; anyone with this address may {may} the robots:"
+        host = host if args.host not in ("0.0.0.0", "::") else socket.gethostname()
+    yield f"http://{host}:{port}/{token and f'?token={token}'}"
+
+
+def _check_port(host: str, port: int) -> None:
+    """Raise OSError if it cannot be listened on; viser would silently take the next one."""
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    with socket.socket(family) as probe:
+        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            probe.bind((host, port))
+        except (OSError, OverflowError) as error:
+            reason = getattr(error, "strerror", None) or error
+            raise OSError(f"cannot listen on {host} port {port}: {reason}; --port 0 takes a free one") from None
+
+
+def _serve(host: str, port: int, guard: "Guard") -> "viser.ViserServer":
+    """viser's server, guarded."""
+    import viser
+
+    class Server(viser.ViserServer):
+        def request_share_url(self, verbose: bool = True) -> None:
+            """Nothing: any page could ask for it, and it would open the robots to the internet."""
+
+    with contextlib.redirect_stdout(io.StringIO()), guard.guarding():
+        server = Server(host, port, label="holozen", verbose=False)
+    if not guard.installed or (port and server.get_port() != port):
+        server.stop()
+        raise OSError(
+            f"viser {viser.__version__} did not let itself be guarded on port {port}; install the version locked"
+        )
+    server.gui.configure_theme(show_logo=False, show_share_button=False)
+    return server
+
+
+def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", looks: bool, stop: threading.Event) -> None:
+    import asyncio
+
+    from .drive import Drivers
+    from .page import Page
+    from .scene import News, Scene
+
+    # A page may close while it is written to.
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
+    scene, drivers = Scene(server, bus), Drivers(bus)
+    pages: dict[int, Page] = {}
+
+    # All that writes to pages runs in the server's event loop: from other threads viser's buffers are not safe.
+    async def opened(client: "viser.ClientHandle") -> None:
+        pages[client.client_id] = Page(client, bus, scene, drivers, guard, looks)
+
+    async def closed(client: "viser.ClientHandle") -> None:
+        drivers.close(client.client_id)
+        pages.pop(client.client_id, None)
+
+    async def draw(now: float, news: News) -> None:
+        scene.draw(now, news, {page.robot: driver for page in pages.values() if (driver := page.driver)})
+        for page in pages.values():
+            page.update(now)
+
+    server.on_client_connect(opened)
+    server.on_client_disconnect(closed)
+    try:
+        while not stop.is_set():
+            now = time.monotonic()
+            asyncio.run_coroutine_threadsafe(draw(now, scene.ask()), server.get_event_loop()).result()
+            stop.wait(max(0.0, scene.frame - (time.monotonic() - now)))
+    finally:
+        drivers.halt()
+        scene.close()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,156 @@
+"""Robots that pages drive: their pads, and the commands and goals that follow from those."""
+
+import math
+import threading
+import time
+from collections.abc import Callable
+from functools import cached_property
+from typing import TypeVar
+
+from holozen.bus import Bus, Publisher
+from holozen.limits import Planar
+from holozen.messages import CommandStatus, Header, Odometry, Point, Pose, PoseStamped, SceneEntity, Twist
+from holozen.rotation import Transform
+from holozen.wire import COMMAND_SILENCE, PRIORITY_OF, key_for, topic
+
+from .pad import Pad
+
+T = TypeVar("T")
+
+TICK = 0.02  # s
+REPEAT = 0.05  # s
+LOST = 0.4  # s without odom once there was some, so as not to drive blind
+RESTS = 0.01  # m/s and rad/s; slower counts as at rest
+NEAR = 0.2  # m and of a quaternion; odometry that is so near the true pose is the true pose, at another moment
+SPEED, TURN = 0.5, 1.0  # m/s and rad/s at first, as in teleop_twist_keyboard
+
+
+class Driver:
+    """One robot, by the keys of its commands and its odometry."""
+
+    def __init__(self, bus: Bus, command: str, odometry: str) -> None:
+        row = topic("odom")
+        assert row is not None
+        self.namespace, self._silence = command.rpartition("/")[0], row.silence
+        self._bus, self._command = bus, command
+        self._odom = bus.latest(odometry, Odometry)
+        self._status = bus.latest(f"{command}_status", CommandStatus)
+        self._pad, self._lock = Pad(), threading.Lock()
+        self._speeds = (SPEED, TURN)
+        self._sent: Planar | None = None
+        self._sent_at = -math.inf
+
+    @cached_property
+    def _commands(self) -> Publisher[Twist]:
+        """Declared with the first command: an observer is no publisher."""
+        return self._bus.publisher(self._command, Twist, PRIORITY_OF["view"])
+
+    def use(self, act: Callable[[Pad, float], T], speeds: tuple[float, float] | None = None) -> T:
+        """Do something with its pad, at the present time; returns what that does. `speeds` in m/s and rad/s."""
+        with self._lock:
+            self._speeds = speeds or self._speeds
+            return act(self._pad, time.monotonic())
+
+    def publish(self) -> bool:
+        """Publish what is due; returns whether the pad is in use."""
+        with self._lock:
+            now = time.monotonic()
+            odom, age = self._odom.read()
+            if odom is not None and age > max(LOST, self._odom.patience(self._silence)):
+                self._pad.stop(now)
+            since = self._pad.stopping_since(now)
+            rests = since is not None and odom is not None and now - age > since and odom.twist.twist.is_slow(RESTS)
+            motion = self._pad.command(now, rests)
+            if motion is not None and (motion != self._sent or now - self._sent_at >= REPEAT):
+                x, y, turn = motion
+                speed, rate = self._speeds
+                self._commands.put(Twist.planar(speed * x, speed * y, rate * turn))
+                self._sent_at = now
+            self._sent = motion
+            return motion is not None
+
+    def status(self) -> CommandStatus:
+        """The sim's last command status; empty if it is outdated."""
+        status, age = self._status.read()
+        return status if status and age < 1.0 else CommandStatus()
+
+    def measured(self) -> Planar | None:
+        """Its measured velocity in m/s and rad/s, in the body frame; None if not known."""
+        odom, age = self._odom.read()
+        if odom is None or age > COMMAND_SILENCE:
+            return None
+        twist = odom.twist.twist
+        return twist.linear.x, twist.linear.y, twist.angular.z
+
+    @cached_property
+    def _goals(self) -> Publisher[PoseStamped]:
+        return self._bus.publisher(key_for("goal_pose", self.namespace), PoseStamped)
+
+    def send_to(self, x: float, y: float, true_pose: Pose) -> str:
+        """Ask its controller to drive to a point of the world, in m; the robot keeps its heading. Returns what came of
+        it. `true_pose` is the robot's in the world, now.
+        """
+        odom, age = self._odom.read()
+        if odom is None or age > COMMAND_SILENCE:
+            return "it has no odometry now"
+        if not self._goals.matched:
+            return f"no controller is there for it; start one: holozen controller {self.namespace} --laps 0"
+        goal = in_odometry((x, y, true_pose.position.z), true_pose, odom.pose.pose)
+        frame = odom.header.frame_id
+        self._goals.put(PoseStamped(Header(frame_id=frame), Pose(Point(*goal), odom.pose.pose.orientation)))
+        return f"goal {x:.2f} {y:.2f}" + ("; the controller waits for Resume" if self.status().held else "")
+
+
+class Drivers:
+    """The drivers of all robots that were chosen in a page, and the thread that publishes for them."""
+
+    def __init__(self, bus: Bus) -> None:
+        self._bus, self._stop = bus, threading.Event()
+        self._all: dict[tuple[str, str], Driver] = {}
+        self._lock = threading.Lock()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def of(self, entity: SceneEntity) -> Driver:
+        """The driver of a robot that takes commands."""
+        keys = entity.command, entity.odometry or key_for("odom", entity.command.rpartition("/")[0])
+        with self._lock:
+            if keys not in self._all:
+                self._all[keys] = Driver(self._bus, *keys)
+            return self._all[keys]
+
+    def close(self, page: int) -> None:
+        """A page is gone: what it drives stops."""
+        with self._lock:
+            for driver in self._all.values():
+                driver.use(lambda pad, now: pad.close(page, now))
+
+    def halt(self) -> None:
+        """Stop what is driven from here, until odom shows rest, at most a second."""
+        self._stop.set()
+        self._thread.join()
+        for driver in self._all.values():
+            driver.use(lambda pad, now: pad.stop(now))
+        while sum(driver.publish() for driver in self._all.values()):  # each of them publishes
+            time.sleep(TICK)
+
+    def _run(self) -> None:
+        while not self._stop.wait(TICK):
+            with self._lock:
+                drivers = list(self._all.values())
+            for driver in drivers:
+                driver.publish()
+
+
+def in_odometry(point: tuple[float, float, float], true_pose: Pose, odometry: Pose) -> tuple[float, float, float]:
+    """A point of the world, in m, in the frame of a robot's odometry, which may have begun elsewhere, and drift."""
+    true, measured = _transform(true_pose), _transform(odometry)
+    parts = zip(true.translation + true.rotation, measured.translation + measured.rotation, strict=True)
+    if max(abs(a - b) for a, b in parts) < NEAR:
+        return point
+    return (measured @ true.inverse()).apply(point)
+
+
+def _transform(pose: Pose) -> Transform:
+    p, q = pose.position, pose.orientation
+    return Transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))

@@ -1,0 +1,129 @@
+"""Access to the page, and the age limit of what a page sends.
+
+viser's server checks neither: it answers every web site that a browser shows, and takes what waited in a buffer for
+new. So each connection of it is made by this module.
+"""
+
+import asyncio
+import contextlib
+import hmac
+import http
+import logging
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from functools import partial
+from http.cookies import SimpleCookie
+from typing import Any
+from urllib.parse import parse_qs, urlsplit
+
+import websockets.asyncio.server as websockets
+from websockets.exceptions import ConnectionClosed
+from websockets.frames import DATA_OPCODES, Frame, Opcode
+from websockets.http11 import Request, Response
+
+PING_EVERY = 0.05  # s
+MAX_AGE = 0.3  # s; a held button that may be older moves nothing
+MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage")  # in viser's messages that may move a robot
+LOOPBACK = ("localhost", "127.0.0.1", "::1")
+
+
+class Guard:
+    """Refuses requests without `token` (if it is not empty), from another web site's page, and for another host."""
+
+    def __init__(self, token: str) -> None:
+        self._token = token
+        self.installed = False
+        self.late_at = -1e9  # s, monotonic; when the last message came too late to move a robot
+
+    def refusal(self, request: Request) -> str:
+        """Why a request is refused; empty if it is not."""
+        host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
+        if not self._token and urlsplit(f"//{host}").hostname not in LOOPBACK:
+            # Else a web site whose name leads to 127.0.0.1 could read and send what it likes.
+            return f"{host!r} is not this machine; open http://127.0.0.1 with the port that `holozen view` printed"
+        if origin is not None and urlsplit(origin).netloc != host:
+            return f"a page of {origin} may not connect here"
+        if self._token and not any(hmac.compare_digest(self._token.encode(), one.encode()) for one in _tokens(request)):
+            return "the address needs the token that `holozen view` printed: ?token=..."
+        return ""
+
+    @contextlib.contextmanager
+    def guarding(self) -> Iterator[None]:
+        """Servers that are made in this block are guarded."""
+        real = websockets.serve
+        websockets.serve = partial(self._serve, real)  # type: ignore[misc, assignment]
+        try:
+            yield
+        finally:
+            websockets.serve = real  # type: ignore[misc]
+
+    def _serve(
+        self, real: Callable[..., Any], handler: Callable[[Any], Awaitable[None]], *place: Any,
+        process_request: Callable[[Any, Request], Response | None], **options: Any,
+    ) -> Any:  # fmt: skip
+        def check(connection: Any, request: Request) -> Response | None:
+            if reason := self.refusal(request):
+                return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")  # type: ignore[no-any-return]
+            response: Response | None = process_request(connection, request)
+            if response is not None:
+                response.headers["Referrer-Policy"] = "no-referrer"
+                response.headers["X-Frame-Options"] = "DENY"
+                if self._token:  # for the web socket, whose address the page makes without it
+                    cookie = f"{_cookie(request)}={self._token}; HttpOnly; SameSite=Strict; Path=/"
+                    response.headers["Set-Cookie"] = cookie
+            return response
+
+        async def timed(connection: "TimedConnection") -> None:
+            pinging = asyncio.create_task(connection.ping_often())
+            try:
+                await handler(connection)
+            finally:
+                pinging.cancel()
+
+        self.installed = True
+        quiet = logging.getLogger("holozen.view")  # each refused request would be a traceback
+        quiet.setLevel(logging.CRITICAL)
+        make = partial(TimedConnection, self)
+        return real(timed, *place, process_request=check, create_connection=make, logger=quiet, **options)
+
+
+class TimedConnection(websockets.ServerConnection):
+    """A connection that knows how old at most a message is: a browser answers pings in the order of what it sends, so
+    a message is younger than the last ping that was answered before it came.
+    """
+
+    def __init__(self, guard: Guard, *parts: Any, **options: Any) -> None:
+        super().__init__(*parts, **options)
+        self._guard, self._answered = guard, time.monotonic()
+
+    async def ping_often(self) -> None:
+        """Ping for as long as the connection lasts."""
+        with contextlib.suppress(ConnectionClosed):
+            while True:
+                await self.ping(b"%x" % time.monotonic_ns())
+                await asyncio.sleep(PING_EVERY)
+
+    def process_event(self, event: Any) -> None:
+        """Take a frame; one that moves a robot and came late is dropped."""
+        now = time.monotonic()
+        if isinstance(event, Frame):
+            if event.opcode is Opcode.PONG and bytes(event.data) in self.pending_pings:
+                with contextlib.suppress(ValueError):  # the library's own pings hold no time
+                    self._answered = max(self._answered, int(bytes(event.data), 16) * 1e-9)
+            if event.opcode in DATA_OPCODES and now - self._answered > MAX_AGE:
+                data = bytes(event.data)
+                if any(name in data for name in MOVING):
+                    self._guard.late_at = now
+                    return
+        super().process_event(event)
+
+
+def _cookie(request: Request) -> str:
+    """Cookies of a host are shared by all its ports."""
+    return f"holozen_view_{urlsplit('//' + request.headers.get('Host', '')).port or 80}"
+
+
+def _tokens(request: Request) -> list[str]:
+    given = parse_qs(urlsplit(request.path).query).get("token", [])
+    cookie = SimpleCookie(request.headers.get("Cookie", "")).get(_cookie(request))
+    return [*given, *([cookie.value] if cookie else [])]

@@ -1,0 +1,109 @@
+"""Visual shapes -> triangles with one colour, as a browser draws them."""
+
+import io
+import math
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import collada
+import numpy as np
+import numpy.typing as npt
+import trimesh
+
+from holozen.robot.description import Appearance, read
+from holozen.robot.errors import RobotError
+from holozen.robot.meshes import UP, file_in
+from holozen.robot.model import Pose, Shape
+
+RGB = tuple[int, int, int]
+PLAIN = (0.7, 0.7, 0.7, 1.0)  # Gazebo's grey, for what has no colour
+ORANGE = (1.0, 0.55, 0.0, 1.0)
+FINEST = 200_000  # triangles of a shape; a phone draws no more of them well
+
+
+class Part(NamedTuple):
+    """Vertices (n, 3) in metres in the shape's frame, triangles (m, 3) of their indexes, and a colour."""
+
+    vertices: npt.NDArray[np.float32]
+    faces: npt.NDArray[np.uint32]
+    color: RGB
+    opacity: float
+
+
+Parts = list[tuple[Pose, Part]]
+"""The parts of a link, each with the pose of its shape in the link."""
+
+
+@lru_cache(maxsize=64)
+def appearance(text: str) -> tuple[Appearance, list[Parts]]:
+    """A description's links and joints, and the parts of each link; robots of one text share them. Raises RobotError.
+
+    A mesh that cannot be read is not shown.
+    """
+    found = read(text)
+    return found, [[(shape.pose, part) for shape in link.visuals for part in _readable(shape)] for link in found.links]
+
+
+def _readable(shape: Shape) -> list[Part]:
+    try:
+        return list(_parts(shape))
+    except (RobotError, ValueError, TypeError, KeyError, IndexError, AttributeError, collada.common.DaeError):
+        return []  # libraries that read files raise what they come across
+
+
+def arrow() -> Parts:
+    """An arrow along x, for a robot that has no description."""
+    shaft = Shape("box", (0.3, 0.1, 0.06), Pose((-0.05, 0.0, 0.03)))
+    head = Shape("cone", (0.12, 0.2), Pose((0.1, 0.0, 0.03), (0.0, math.pi / 2, 0.0)))
+    return [(shape.pose, _part(_solid(shape), ORANGE)) for shape in (shaft, head)]
+
+
+def _parts(shape: Shape) -> Iterator[Part]:
+    color = shape.color
+    if shape.kind != "mesh":
+        yield _part(_solid(shape), color or PLAIN)
+    elif shape.data:
+        suffix, content = file_in(shape.data)
+        for vertices, faces, own in _dae(content) if suffix == ".dae" else _other(content, suffix):
+            if np.isfinite(vertices).all() and 0 < len(faces) <= FINEST:
+                yield _part((vertices * shape.size, faces), color or own)
+
+
+def _part(mesh: tuple[Any, Any], color: tuple[float, ...]) -> Part:
+    red, green, blue, alpha = color
+    rgb = (round(255 * red), round(255 * green), round(255 * blue))
+    return Part(np.asarray(mesh[0], np.float32), np.asarray(mesh[1], np.uint32), rgb, alpha)
+
+
+def _solid(shape: Shape) -> tuple[Any, Any]:
+    match shape.kind:
+        case "box":
+            solid = trimesh.creation.box(shape.size)
+        case "cylinder":
+            solid = trimesh.creation.cylinder(shape.size[0], shape.size[1], sections=32)
+        case "cone":
+            solid = trimesh.creation.cone(shape.size[0], shape.size[1])
+        case _:
+            solid = trimesh.creation.icosphere(subdivisions=3, radius=shape.size[0])
+    return solid.vertices, solid.faces
+
+
+def _other(content: bytes, suffix: str) -> Iterator[tuple[Any, Any, tuple[float, ...]]]:
+    mesh = trimesh.load_mesh(io.BytesIO(content), file_type=suffix[1:])
+    yield mesh.vertices, mesh.faces, PLAIN
+
+
+def _dae(content: bytes) -> Iterator[tuple[Any, Any, tuple[float, ...]]]:
+    """The triangles of each material in metres, z up, with its diffuse colour. Textures are not shown."""
+    scene = collada.Collada(io.BytesIO(content), ignore=[collada.common.DaeError])
+    turned = (scene.assetInfo.unitmeter or 1.0) * np.array(UP[scene.assetInfo.upaxis or "Y_UP"], float)
+    for geometry in scene.scene.objects("geometry"):
+        for primitive in geometry.primitives():
+            if hasattr(primitive, "triangleset"):
+                primitive = primitive.triangleset()
+            if isinstance(primitive, collada.triangleset.BoundTriangleSet):
+                effect = getattr(primitive.material, "effect", None)
+                diffuse = getattr(effect, "diffuse", None)
+                color = tuple(map(float, diffuse)) if isinstance(diffuse, tuple) and len(diffuse) == 4 else PLAIN
+                yield primitive.vertex @ turned.T, primitive.vertex_index, color

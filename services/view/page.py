@@ -1,0 +1,192 @@
+"""The panel of one page: which robot, the camera, and the pad."""
+
+import math
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import viser
+
+from holozen.bus import Bus
+from holozen.messages import TriggerReply, TriggerRequest
+from holozen.robot.errors import RobotError
+from holozen.transport.errors import BusError, ServiceError
+from holozen.wire import key_for
+
+from .drive import SPEED, TURN, Driver, Drivers
+from .guard import Guard
+from .pad import DIRECTIONS
+from .scene import FRAME, LOOK_AT, Scene, Shown
+from .world import WorldTab
+
+HOLD_RATE = 10.0  # Hz; of the reports of a held button; at 20 those of a second one would be swallowed
+NONE = "(no robot)"
+ABOVE = 6.0  # m; the height of the top view
+PAD_WIDTH = 240  # CSS pixels
+FEW = 0.7  # of the frames; fewer are reported
+LATE = 2.0  # s that a late message is reported
+TIMEOUT = 2.0  # s for stop and release
+SLOW_LINK = "the link to this page is too slow to drive"
+
+
+class Page:
+    """What one browser shows beside the scene. With `looks` it has nothing that changes the world."""
+
+    def __init__(
+        self, client: viser.ClientHandle, bus: Bus, scene: Scene, drivers: Drivers, guard: Guard, looks: bool
+    ) -> None:
+        self._client, self._bus, self._scene, self._drivers, self._guard = client, bus, scene, drivers, guard
+        self._names: list[str] = []
+        self.robot = ""  # the one that is chosen
+        self._number = 0  # of the robot's entity
+        self._said = self._shown = ""
+        self._buttons: dict[str, viser.GuiButtonHandle] = {}
+        self._driven: set[Driver] = set()  # by this page
+        self._followed: tuple[float, float, float] | None = None
+        self._world: WorldTab | None = None
+        add = client.gui
+        self._choice = add.add_dropdown("Robot", (NONE,))
+        self._choice.on_update(lambda _: self._choose())
+        self._status = add.add_markdown("")
+        if looks:
+            self._add_camera()
+        else:
+            self._add_pad()
+
+    def update(self, now: float) -> None:
+        """Show the robots that there are, and what the chosen one does. `now` in s (monotonic)."""
+        names = self._scene.robots()
+        if names != self._names:
+            self._names = names
+            self._choice.options = tuple(names) or (NONE,)
+            if self.robot not in names:
+                self._choice.value = names[0] if names else NONE  # type: ignore[misc]
+            self._choose()
+        shown = self._shown_robot()
+        if shown and shown.entity.number != self._number:  # another robot of the name, which was not chosen
+            self._number = shown.entity.number
+            if driver := self.driver:
+                driver.use(lambda pad, now: pad.stop(now))
+        for driver in list(self._driven):
+            self._replace_buttons(driver)
+        self._move_camera()
+        if self._world:
+            self._world.update()
+        text = self._text(now)
+        if text != self._shown:
+            self._shown = self._status.content = text
+
+    def _text(self, now: float) -> str:
+        driver = self.driver
+        if driver is None:
+            return "no robot is there; `holozen up` starts one"
+        status, speed = driver.status(), driver.measured()
+        lines = [f"{math.hypot(*speed[:2]):.2f} m/s, {speed[2]:+.2f} rad/s" if speed else "no odometry"]
+        if status.stopped:
+            lines.append(f"**stopped by {status.stopped}**, until it is released")
+        else:
+            lines.append(f"driven by {status.obeyed}" if status.obeyed else "not driven")
+        if self._scene.rate < FEW / FRAME:
+            lines.append(f"{self._scene.rate:.0f} frames a second")
+        lines.append(f"**{SLOW_LINK}**" if now - self._guard.late_at < LATE else f"*{self._said or 'ready'}*")
+        return "  \n".join(line.replace("`", "") for line in lines)
+
+    @property
+    def driver(self) -> Driver | None:
+        """What drives the chosen robot; None if that takes no commands."""
+        shown = self._shown_robot()
+        return self._drivers.of(shown.entity) if shown and shown.entity.command else None
+
+    def _shown_robot(self) -> Shown | None:
+        return self._scene.shown.get(self.robot)
+
+    def _choose(self) -> None:
+        before, self.robot = self.robot, str(self._choice.value)
+        if before != self.robot:
+            self._said, self._followed = "", None
+
+    def _add_pad(self) -> None:
+        add = self._client.gui
+        self._speed = add.add_slider("Speed, m/s", 0.1, 2.0, 0.1, SPEED)
+        self._turn = add.add_slider("Turn, rad/s", 0.1, 3.0, 0.1, TURN)
+        add.add_button("Stop", color="red").on_click(lambda _: self._call("stop"))
+        after = add.add_button_group("", ("Release", "Resume"), hint="end a stop; let overruled sources drive again")
+        after.on_click(lambda _: self._call(after.value.lower()))
+        # The pad has its own panel: of what one panel reports within 50 ms, viser's page sends only the last. Held
+        # buttons beside it would swallow a click on Stop, or the choice of another robot.
+        panel = add.add_panel()
+        self._pad = panel.add_tab("Drive")
+        panel.float(x=15, y=-15, width=PAD_WIDTH)
+        panel.expand()  # on a phone it would be closed
+        for button in DIRECTIONS:
+            self._add_button(button)
+        with panel.add_tab("World"):
+            self._add_camera()
+            self._world = WorldTab(
+                self._client, self._bus, self._scene, self._try, self._shown_robot, lambda: self.driver
+            )
+
+    def _add_camera(self) -> None:
+        self._follow = self._client.gui.add_checkbox("Follow", False)
+        self._client.gui.add_button("Top view").on_click(lambda _: self._look_down())
+
+    def _add_button(self, button: str, order: float | None = None) -> None:
+        hint = "moves the robot while it is held"
+        with self._pad:
+            handle = self._client.gui.add_button(button.capitalize(), hint=hint, order=order)
+        self._buttons[button] = handle
+        # Coroutines: they run in the order of the messages, and not in threads.
+        handle.on_hold(partial(self._on_hold, button), callback_hz=HOLD_RATE)
+        handle.on_click(partial(self._on_release, button))
+
+    def _replace_buttons(self, driver: Driver) -> None:
+        """What the page does not report any more it may still hold; it cannot hold a button that is not there."""
+        page = self._client.client_id
+        for button in driver.use(lambda pad, now: pad.worn(page, now)):
+            old = self._buttons[button]
+            self._add_button(button, old.order)
+            old.remove()
+            driver.use(lambda pad, now, button=button: pad.renew(page, button))  # type: ignore[misc]
+
+    async def _on_hold(self, button: str, _event: Any) -> None:
+        if driver := self.driver:
+            self._driven.add(driver)
+            page, speeds = self._client.client_id, (float(self._speed.value), float(self._turn.value))
+            self._said = driver.use(lambda pad, now: pad.hold(page, button, now), speeds)
+
+    async def _on_release(self, button: str, _event: Any) -> None:
+        for driver in list(self._driven):
+            driver.use(lambda pad, now: pad.release(self._client.client_id, button, now))
+
+    def _call(self, verb: str) -> None:
+        if driver := self.driver:
+            if verb == "stop":
+                driver.use(lambda pad, now: pad.stop(now))
+            key = key_for(verb, driver.namespace)
+            self._try(lambda: self._bus.call(key, TriggerRequest(), TriggerReply, TIMEOUT).message)
+
+    def _try(self, act: Callable[[], str]) -> None:
+        try:
+            self._said = act()
+        except (ServiceError, RobotError, BusError) as error:
+            self._said = str(error)
+
+    def _move_camera(self) -> None:
+        shown = self._scene.shown.get(self.robot)
+        if not self._follow.value or shown is None:
+            self._followed = None
+            return
+        before, self._followed = self._followed, shown.position
+        camera = self._client.camera
+        if before is None:
+            camera.look_at = shown.position
+        elif before != shown.position:
+            camera.position = camera.position + [a - b for a, b in zip(shown.position, before, strict=True)]
+
+    def _look_down(self) -> None:
+        shown = self._scene.shown.get(self.robot)
+        x, y, _ = shown.position if shown else LOOK_AT
+        with self._client.atomic():
+            self._client.camera.up_direction = (0.0, 0.0, 1.0)
+            self._client.camera.position = (x - 0.01, y, ABOVE)  # straight down, no direction would be up
+            self._client.camera.look_at = (x, y, 0.0)

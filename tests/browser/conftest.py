@@ -1,0 +1,43 @@
+"""One sim, one view and one Chromium for the tests of a file."""
+
+import shutil
+from collections.abc import Iterator
+
+import pytest
+from playwright.sync_api import Browser, sync_playwright
+
+from holozen.testing import Process, Wire
+
+SOFTWARE_WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+
+TOKEN = "sesame"
+
+
+@pytest.fixture(scope="module")
+def town() -> Iterator[Wire]:
+    """A wire for all tests of a file."""
+    with Wire() as wire:
+        yield wire
+
+
+@pytest.fixture(scope="module")
+def view(town: Wire) -> str:
+    """The address of a view's page, with its token."""
+    return address(town.start("view", "--port", "0", "--token", TOKEN))
+
+
+def address(view: Process) -> str:
+    """The address that a view prints."""
+    view.wait_for_line("http://")
+    return next(word for word in view.err.split() if word.startswith("http://"))
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Browser]:
+    path = shutil.which("chromium")
+    assert path, "the mark `needs` has installed it"
+    with sync_playwright() as playwright:
+        # A container's root has no sandbox; only our own page is opened.
+        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox", *SOFTWARE_WEBGL])
+        yield browser
+        browser.close()

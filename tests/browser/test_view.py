@@ -1,0 +1,380 @@
+"""The page of `holozen view` in a real browser: what it shows, and that its pad is a dead-man."""
+
+import io
+import math
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, Page
+
+from holozen import entities
+from holozen.bus import Bus
+from holozen.messages import Odometry, Point, Pose, SimulationStatus
+from holozen.messages.simulation_interfaces import (
+    EntityState,
+    SetEntityStateReply,
+    SetEntityStateRequest,
+    SimulationState,
+)
+from holozen.testing import Process, Wire, wait_for
+from holozen.transport.pubsub import Latest
+from services.view.scene import EYE, FIELD, LOOK_AT
+
+from .conftest import TOKEN
+
+pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
+
+SIZE = {"width": 960, "height": 320}  # pixels; a software renderer takes its time for each
+FREE = (np.arange(SIZE["width"]) > 320) & (np.arange(SIZE["width"]) < 620)  # columns without panel and notices
+COARSE = 0.2  # of the pixels that a page draws which is not looked at
+DECK = 0.295  # m; the height of hb_bot's orange deck
+NEAR = 14  # pixels between the middle of what is seen of the deck, and the robot's
+MOST = 0.5 * 0.5 + 0.05  # m; what a robot at 0.5 m/s goes in the 0.5 s that a stop may take, and a little
+TWO_FRAMES = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+PHONE = {"width": 390, "height": 844}
+
+
+@pytest.fixture(scope="module")
+def bus(town: Wire) -> Bus:
+    return town.bus()
+
+
+@pytest.fixture(scope="module")
+def odom(bus: Bus, sim: Process) -> Latest[Odometry]:
+    latest = bus.latest("odom", Odometry)
+    wait_for(lambda: latest.count, what="odom")
+    return latest
+
+
+@pytest.fixture(scope="module")
+def sim(town: Wire) -> Process:
+    sim = town.start("sim")
+    sim.wait_for_line("listens on")
+    return sim
+
+
+Open = Callable[..., Page]
+
+
+@pytest.fixture(scope="module")
+def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
+    """Opens pages, as a phone or not, once they show a robot. None fetches anything from elsewhere, or has an error."""
+    faults: list[str] = []
+    contexts = []
+    own = view.partition("?")[0]
+    own_socket = own.replace("http", "ws", 1)
+
+    def page(**options: Any) -> Page:
+        contexts.append(context := chromium.new_context(**{"viewport": SIZE, **options}))
+        page = context.new_page()
+        page.on("console", lambda reported: faults.append(reported.text) if reported.type == "error" else None)
+        page.on("pageerror", lambda error: faults.append(str(error)))
+        page.on("request", lambda sent: None if own in sent.url else faults.append(sent.url))
+        page.on("websocket", lambda made: None if made.url.startswith(own_socket) else faults.append(made.url))
+        page.goto(view)
+        notice = page.get_by_text("Software WebGL")  # it would cover the pad
+        notice.locator("xpath=../..").get_by_role("button").click()
+        page.get_by_text("not driven").or_(page.get_by_text("driven by")).first.wait_for()
+        return page
+
+    yield page
+    for context in contexts:
+        context.close()
+    assert faults == []
+
+
+@pytest.fixture(scope="module")
+def page(opened: Open) -> Page:
+    """A page for all tests; they leave it with no button held."""
+    return opened()
+
+
+def place(odom: Latest[Odometry]) -> tuple[float, float]:
+    message = odom.read()[0]
+    assert message is not None
+    return message.pose.pose.position.x, message.pose.pose.position.y
+
+
+def speed(odom: Latest[Odometry]) -> float:
+    message, age = odom.read()
+    assert message is not None
+    assert age < 5, "the sim is there"
+    return math.hypot(message.twist.twist.linear.x, message.twist.twist.linear.y)
+
+
+def pixel(x: float, y: float, z: float) -> tuple[float, float]:
+    """Where a point of the world is in the picture, from where a page that was just opened looks."""
+    eye, forward = np.array(EYE), np.array(LOOK_AT) - np.array(EYE)
+    forward = forward / np.linalg.norm(forward)
+    right = np.cross(forward, (0, 0, 1))
+    right /= np.linalg.norm(right)
+    away = np.array((x, y, z)) - eye
+    scale = SIZE["height"] / 2 / math.tan(FIELD / 2) / (away @ forward)
+    return SIZE["width"] / 2 + scale * (away @ right), SIZE["height"] / 2 - scale * (away @ np.cross(right, forward))
+
+
+def colored(page: Page, color: Callable[[Any, Any, Any], Any]) -> list[tuple[int, int]]:
+    """The pixels x, y of a colour."""
+    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    red, green, blue = np.asarray(picture, float).transpose(2, 0, 1)
+    rows, columns = np.nonzero(color(red, green, blue) & FREE)
+    return list(zip(columns.tolist(), rows.tolist(), strict=True))
+
+
+def deck(page: Page) -> tuple[float, float] | None:
+    """The middle of the orange pixels, if there are some."""
+    found = colored(page, lambda r, g, b: (r > 150) & (r - b > 70) & (r - g > 25) & (g - b > 25))
+    return tuple(np.mean(found, axis=0).tolist()) if len(found) > 60 else None
+
+
+def shows_it_at(page: Page, x: float, y: float) -> bool:
+    middle = deck(page)
+    return middle is not None and math.dist(middle, pixel(x, y, DECK)) < NEAR
+
+
+def hold(page: Page, button: str, moves: Callable[[], bool]) -> None:
+    """Hold a button until it `moves` the robot; again if the browser was too slow to keep it held, as on a busy
+    machine.
+    """
+
+    def tried() -> bool:
+        press(page, button)
+        return is_soon(moves)
+
+    wait_for(tried, 20, f"{button} to move the robot")
+
+
+def press(page: Page, button: str) -> None:
+    page.mouse.up()
+    handle = page.get_by_role("button", name=button, exact=True)
+    handle.scroll_into_view_if_needed()
+    box = handle.bounding_box()
+    assert box
+    page.mouse.move(box["x"] + 20, box["y"] + box["height"] / 2)
+    page.mouse.down()
+
+
+def is_soon(condition: Callable[[], bool]) -> bool:
+    try:
+        return wait_for(condition, 1.5)
+    except AssertionError:
+        return False
+
+
+def stands_near(odom: Latest[Odometry], before: tuple[float, float]) -> None:
+    """It comes to rest within 0.5 s, by the way that it goes."""
+    wait_for(lambda: speed(odom) < 0.01, what="the robot to stand")
+    assert math.dist(place(odom), before) < MOST
+
+
+def test_the_robot_is_where_its_odometry_places_it_in_its_colours_and_moves_when_driven(
+    page: Page, odom: Latest[Odometry]
+) -> None:
+    wait_for(lambda: shows_it_at(page, *place(odom)), what="the robot in the picture")
+    start = place(odom)
+    assert not colored(page, measured)
+    hold(page, "Left", lambda: math.dist(place(odom), start) > 0.2 and bool(colored(page, measured)))
+    page.mouse.up()
+    stands_near(odom, place(odom))
+    wait_for(lambda: shows_it_at(page, *place(odom)), what="the robot where it is now")
+    wait_for(lambda: not colored(page, measured), what="no arrow of a robot that stands")
+    assert colored(page, lambda r, g, b: (r - g > 90) & (b - g > 60)), "its trail"
+
+
+def measured(red: Any, green: Any, blue: Any) -> Any:
+    """The arrow of the velocity by odometry."""
+    return (green - red > 60) & (green - blue > 60)
+
+
+def test_a_page_that_hung_stops_the_robot_and_does_not_go_on_by_itself(page: Page, odom: Latest[Odometry]) -> None:
+    hold(page, "Turn left", lambda: turns(odom))
+    page.evaluate("{const start = Date.now(); while (Date.now() - start < 800);}")  # as a phone that sleeps
+    wait_for(lambda: not turns(odom), what="the robot to stand")
+    page.get_by_text("not driven").wait_for()
+    seen = odom.count
+    assert odom.wait(seen + 25, 5) and not turns(odom), "half a second later, with the button still held"
+    page.mouse.up()
+    hold(page, "Turn right", lambda: turns(odom))
+    page.mouse.up()
+    wait_for(lambda: not turns(odom), what="the robot to stand")
+
+
+def turns(odom: Latest[Odometry]) -> bool:
+    message = odom.read()[0]
+    return message is not None and abs(message.twist.twist.angular.z) > 0.05
+
+
+def test_a_thumb_drives_on_the_screen_of_a_phone(opened: Open, odom: Latest[Odometry]) -> None:
+    page = opened(viewport=PHONE, is_mobile=True, has_touch=True, device_scale_factor=COARSE)
+    button = page.get_by_role("button", name="Right", exact=True)
+
+    def within_reach() -> Any:  # without scrolling, once the panel has slid up
+        box = button.bounding_box()
+        return box if box and box["y"] + box["height"] < PHONE["height"] else None
+
+    box = wait_for(within_reach, what="the pad")
+    thumb = {"x": box["x"] + 30, "y": box["y"] + box["height"] / 2}
+    touch = page.context.new_cdp_session(page)
+    touch.send("Input.dispatchTouchEvent", {"type": "touchStart", "touchPoints": [thumb]})
+    wait_for(lambda: speed(odom) > 0.4, what="the robot to drive")
+    touch.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+    stands_near(odom, place(odom))
+    page.close()
+
+
+def test_a_second_page_shows_the_driver_stops_it_drives_itself_and_stops_when_it_is_closed(
+    page: Page, opened: Open, odom: Latest[Odometry]
+) -> None:
+    other = opened(device_scale_factor=COARSE)
+
+    def refused() -> bool:
+        other.mouse.up()
+        hold(page, "Forward", lambda: speed(odom) > 0.4)  # again if it was let go of, as on a busy machine
+        if not is_soon(other.get_by_text("driven by view@").is_visible):
+            return False
+        press(other, "Backward")
+        shown = is_soon(other.get_by_text("another page drives this robot").is_visible)
+        message = odom.read()[0]
+        return bool(shown and message and message.twist.twist.linear.x > 0.4)
+
+    wait_for(refused, 20, "the other page to be refused while the robot drives on")
+    other.mouse.up()
+    other.get_by_role("button", name="Stop", exact=True).click()
+    page.get_by_text("stopped by view@").first.wait_for()
+    stands_near(odom, place(odom))
+    page.mouse.up()
+    other.get_by_role("button", name="Release", exact=True).click()
+    page.get_by_text("not driven").wait_for()
+    hold(other, "Backward", lambda: speed(odom) > 0.4)
+    other.close()
+    stands_near(odom, place(odom))
+
+
+def test_stop_counts_while_a_button_of_the_same_page_is_held(page: Page, odom: Latest[Odometry]) -> None:
+    for _ in range(5):  # viser's page may swallow one of two reports
+        hold(page, "Turn left", lambda: turns(odom))
+        page.get_by_role("button", name="Stop", exact=True).dispatch_event("click")  # as another finger does
+        page.get_by_text("stopped by view@").first.wait_for()
+        page.mouse.up()
+        page.get_by_role("button", name="Release", exact=True).click()
+        page.get_by_text("not driven").wait_for()
+
+
+def test_what_is_spawned_and_deleted_by_its_buttons_comes_and_goes(page: Page, bus: Bus) -> None:
+    def blue() -> int:
+        return len(colored(page, lambda r, g, b: (b - r > 60) & (b > 90) & (r < 120)))
+
+    before = blue()
+    page.get_by_role("tab", name="World").click()
+    choose(page, "Model", "mecanum")
+    page.get_by_role("button", name="Spawn", exact=True).click()
+    wait_for(lambda: "mecanum1" in entities.names(bus), what="the robot in the sim")
+    wait_for(lambda: blue() > before + 50, what="a blue robot")
+    choose(page, "Robot", "mecanum1")
+    page.get_by_role("button", name="Delete the robot").click()
+    wait_for(lambda: "mecanum1" not in entities.names(bus), what="it to be deleted")
+    wait_for(lambda: blue() < before + 25, what="it to be gone")
+    assert "hb_bot" in entities.names(bus)
+
+
+def choose(page: Page, label: str, value: str) -> None:
+    page.get_by_text(label, exact=True).locator("xpath=following::input[1]").click()
+    page.get_by_role("option", name=value, exact=True).click()
+
+
+def test_the_sim_is_paused_stepped_played_and_reset_by_its_buttons(
+    page: Page, bus: Bus, odom: Latest[Odometry]
+) -> None:
+    latest = bus.latest("simulation_status", SimulationStatus)
+
+    def status() -> SimulationStatus:
+        found = latest.read()[0]
+        return found or SimulationStatus()
+
+    def click(name: str) -> None:
+        page.get_by_role("button", name=name, exact=True).click()
+
+    page.get_by_role("tab", name="World").click()
+    click("Pause")
+    wait_for(lambda: status().state == SimulationState.STATE_PAUSED, what="a paused sim")
+    steps, epoch = status().steps, status().epoch
+    click("Step")
+    wait_for(lambda: status().steps == steps + 24, what="its steps")
+    click("Play")
+    wait_for(lambda: status().state == SimulationState.STATE_PLAYING, what="a sim that plays")
+    click("Reset")
+    wait_for(lambda: status().epoch > epoch, what="a new epoch")
+    wait_for(lambda: math.hypot(*place(odom)) < 0.01, what="the robot at the start")
+
+
+def test_a_robot_is_moved_by_its_handles(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
+    page.get_by_role("tab", name="World").click()
+    page.get_by_text("Move by handles").click()
+    x, y = place(odom)
+
+    def moved() -> bool:
+        for ahead, act in ((0.96, page.mouse.down), (1.1, str), (1.3, str), (1.6, page.mouse.up)):
+            page.mouse.move(*pixel(x + ahead, y, 0.0))
+            page.evaluate(TWO_FRAMES)  # the page looks where the pointer is once in a frame
+            act()
+        return is_soon(lambda: place(odom)[0] > x + 0.2)
+
+    wait_for(moved, what="the robot to be moved")
+    page.get_by_text("Move by handles").click()
+
+
+def test_a_goal_that_is_set_by_a_click_on_the_ground_is_reached(
+    page: Page, town: Wire, bus: Bus, odom: Latest[Odometry]
+) -> None:
+    controller = town.start("controller", "--laps", "0")
+    wait_for(lambda: any(one.node == "controller" and one.kind == "sub" for one in bus.endpoints()))
+    page.get_by_role("tab", name="World").click()
+    page.get_by_role("button", name="Set a goal").click()
+    page.get_by_text("click on the ground").wait_for()
+    page.mouse.click(*pixel(0.2, -0.5, 0.0))
+    page.get_by_text("goal 0.2").wait_for()
+    controller.wait_for_line("goal_pose: (0.2")
+    page.get_by_role("button", name="Resume", exact=True).click()  # others drove the robot before
+    wait_for(lambda: math.dist(place(odom), (0.2, -0.5)) < 0.04 and speed(odom) < 0.01, 20, "the robot at the goal")
+    controller.terminate()
+
+
+def test_it_is_grey_when_the_sim_is_killed_and_comes_back_with_it(page: Page, town: Wire, sim: Process) -> None:
+    wait_for(lambda: deck(page), what="an orange robot")
+    sim.kill()
+    wait_for(lambda: deck(page) is None, what="a grey robot")
+    town.start("sim").wait_for_line("listens on")
+    wait_for(lambda: shows_it_at(page, 0.0, 0.0), what="an orange robot at the start")
+
+
+def test_the_camera_follows_and_looks_down(page: Page, bus: Bus) -> None:
+    middle = (SIZE["width"] / 2, SIZE["height"] / 2)
+
+    def in_the_middle() -> bool:
+        found = deck(page)
+        return found is not None and math.dist(found, middle) < 2 * NEAR
+
+    page.get_by_role("tab", name="World").click()
+    page.get_by_text("Follow").click()
+    for x in (1.0, 3.0):
+        request = SetEntityStateRequest("hb_bot", EntityState(pose=Pose(Point(x, 2.0, -0.04))))
+        bus.call("set_entity_state", request, SetEntityStateReply)
+        wait_for(in_the_middle, what=f"the robot at {x} in the middle")
+    page.get_by_text("Follow").click()
+    page.get_by_role("button", name="Top view").click()
+    wait_for(in_the_middle, what="the robot from above in the middle")
+
+
+def test_a_page_needs_the_token(chromium: Browser, page: Page, view: str) -> None:
+    assert page.url == view, "it was let in"
+    without, _, token = view.partition("?")
+    assert token == f"token={TOKEN}"
+    context = chromium.new_context()
+    other = context.new_page()
+    refused = other.goto(without)
+    assert refused is not None and refused.status == 403
+    assert "the address needs the token" in other.content()
+    context.close()

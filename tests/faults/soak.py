@@ -1,0 +1,241 @@
+"""Drives, spawns, deletes, cuts, kills, stops and reconnects at random, and checks the whole history afterwards.
+
+python -m tests.faults.soak MINUTES [SEED]
+
+The link between drivers and sim is the tests' proxy. Figures are those of the sim's process.
+"""
+
+import contextlib
+import os
+import random
+import signal
+import statistics
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple
+
+import zenoh
+
+from holozen.messages import TriggerReply, TriggerRequest
+from holozen.messages import simulation_interfaces as si
+from holozen.testing import Process, Wire
+from holozen.transport.errors import BusError, ServiceError
+
+from .history import STEP, History, whole_lines
+from .proxy import Proxy
+
+HERE = Path(__file__).parent
+EVERY = 5.0  # s between two figures
+MOST = 10  # spawned robots
+BOT = """<robot name="bot"><link name="base"><inertial><mass value="1"/>
+<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+<gazebo><plugin name="drive" filename="libgazebo_ros_planar_move.so"/></gazebo></robot>"""
+WRONG = (
+    b"", b"\x00" * 1000, b'{"linear": {"x": NaN}}', b'{"linear": {"x": 1e308}}', b'{"linear": {"x": 5', b"[" * 60_000,
+    b'{"speed": 1}', b"9" * 70_000, b'{"linear": {"x": "fast"}}',
+)  # fmt: skip
+"""Commands that move nothing, and stop nothing either."""
+
+
+class Figures(NamedTuple):
+    """Of a process: memory in MB, threads, descriptors."""
+
+    at: float
+    memory: float
+    threads: float
+    descriptors: float
+
+    @classmethod
+    def of(cls, pid: int) -> "Figures":
+        lines = Path(f"/proc/{pid}/status").read_text().splitlines()
+        rows = dict(line.split(":", 1) for line in lines)
+        memory, threads = int(rows["VmRSS"].split()[0]) / 1024, int(rows["Threads"])
+        return cls(time.monotonic(), memory, threads, len(os.listdir(f"/proc/{pid}/fd")))
+
+
+class Soak:
+    """One run: what was done, and what was found wrong."""
+
+    def __init__(self, wire: Wire, proxy: Proxy, seed: int) -> None:
+        self.random, self._wire, self._proxy = random.Random(seed), wire, proxy
+        self.sim = wire.start("sim")
+        self.sim.wait_for_line("listens on cmd_vel", 60)
+        assert wire.run("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}").returncode == 0
+        self._bus = wire.bus("soak")
+        self.observer = Process([sys.executable, str(HERE / "observer.py"), wire.endpoint])
+        self.drivers: list[Process] = []
+        self.names: list[str] = []
+        self.restored: list[float] = []  # when a cut ended
+        self.stopped: list[tuple[float, float]] = []  # from the reply of a stop to the release
+        self.figures: list[Figures] = []
+        self.done: Counter[str] = Counter()
+        self.wrong: list[str] = []
+
+    def run(self, seconds: float) -> None:
+        acts: list[Callable[[], None]] = [
+            self.drive, self.drive, self.drive, self.kill, self.suspend, self.stall, self.lose, self.reset, self.delay,
+            self.stop, self.spawn, self.spawn, self.delete, self.malform, self.look,
+        ]  # fmt: skip
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            if not self.figures or time.monotonic() - self.figures[-1].at > EVERY:
+                self.figures.append(Figures.of(self.sim.pid))
+            act = self.random.choice(acts)
+            self.done[act.__name__] += 1
+            act()
+            time.sleep(self.random.uniform(0.05, 0.4))
+        for driver in self.drivers:
+            driver.close()
+        time.sleep(1.0)  # in which it has to stand
+        self.observer.close()
+
+    @property
+    def _alive(self) -> list[Process]:
+        return [driver for driver in self.drivers if driver.returncode is None]
+
+    def drive(self) -> None:
+        if len(self._alive) < 2:
+            self.drivers.append(Process([sys.executable, str(HERE / "driver.py"), self._proxy.endpoint]))
+            time.sleep(self.random.uniform(0.5, 2.0))
+
+    def kill(self) -> None:
+        for driver in self._alive:
+            driver.signal(self.random.choice([signal.SIGKILL, signal.SIGTERM, signal.SIGINT]))
+            driver.close()
+
+    def suspend(self) -> None:
+        for driver in self._alive[:1]:
+            driver.signal(signal.SIGSTOP)
+            time.sleep(self.random.uniform(0.1, 1.5))
+            driver.signal(signal.SIGCONT)
+
+    def stall(self) -> None:
+        self._proxy.stall()
+        time.sleep(self.random.uniform(0.1, 1.5))
+        self.restored.append(time.monotonic())
+        self._proxy.resume()
+
+    def lose(self) -> None:
+        """Half-open connections: what was sent is lost, and so is all that follows on them."""
+        self._proxy.set(lost=True)
+        time.sleep(self.random.uniform(0.1, 1.0))
+        self.restored.append(time.monotonic())
+        self._proxy.set(lost=False)
+
+    def reset(self) -> None:
+        self.restored.append(time.monotonic())
+        self._proxy.reset()
+
+    def delay(self) -> None:
+        self._proxy.set(delay=self.random.uniform(0.0, 0.8), jitter=0.1)
+        time.sleep(self.random.uniform(0.2, 1.0))
+        self._proxy.set(delay=0.0, jitter=0.0)
+
+    def stop(self) -> None:
+        """Afterwards only a driver that has let go may drive, so these end."""
+        self._bus.call("stop", TriggerRequest(), TriggerReply)
+        since = time.monotonic()
+        time.sleep(self.random.uniform(0.1, 1.0))
+        self.stopped.append((since, time.monotonic()))
+        self.kill()
+        self._bus.call("release", TriggerRequest(), TriggerReply)
+        with contextlib.suppress(ServiceError):  # someone drives
+            self._bus.call("resume", TriggerRequest(), TriggerReply)
+
+    def spawn(self) -> None:
+        if len(self.names) >= MOST:
+            return self.delete()
+        name = f"bot{self.done.total()}"
+        x, y = (self.random.uniform(20, 60) for _ in "xy")
+        request = si.SpawnEntityRequest(name, resource_string=BOT)
+        request.initial_pose.pose.position.x, request.initial_pose.pose.position.y = x, y
+        self._bus.call("spawn_entity", request, si.SpawnEntityReply, 20.0)
+        self.names.append(name)
+
+    def delete(self) -> None:
+        if self.names:
+            name = self.names.pop(self.random.randrange(len(self.names)))
+            self._bus.call("delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, 20.0)
+
+    def malform(self) -> None:
+        for payload in self.random.choices(WRONG, k=5):
+            self._bus.session.put("cmd_vel", payload, priority=zenoh.Priority.REAL_TIME)
+
+    def look(self) -> None:
+        """Each request was applied once: what was spawned is there, what was deleted is not."""
+        found = self._bus.call("get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, 20.0).entities
+        robots = [name for name in found if name.startswith("bot")]
+        if sorted(robots) != sorted(self.names):
+            self.wrong.append(f"there are {robots}, and should be {self.names}")
+        reader = self._bus.subscribe_raw("**")
+        list(self._bus.session.get("odom", timeout=5))
+        reader.close()
+
+    def check(self) -> History:
+        """Compare all that was sent with all that moved."""
+        history = History.of(self.drivers, self.observer, 0.0)
+        checks: list[Callable[[], None]] = [
+            history.check_silence,
+            *(partial(history.check_restored, at) for at in self.restored),
+        ]
+        for check in checks:
+            try:
+                check()
+            except AssertionError as error:
+                self.wrong.append(str(error))
+        for since, until in self.stopped:
+            if rows := history.moves(since + STEP, until):
+                self.wrong.append(f"it moved {len(rows)} times while it was stopped")
+        times = [float(line.split()[0]) for line in whole_lines(self.observer)]
+        if not any(row.moves for row in history.odom):
+            self.wrong.append("it never moved: nothing was tried")
+        if self.sim.returncode is not None or len(times) < 2:
+            self.wrong.append(f"the sim ended with code {self.sim.returncode}")
+        if "Traceback" in self.sim.err:
+            self.wrong.append("the sim wrote a traceback")
+        return history
+
+    def growth(self) -> tuple[float, float, float]:
+        """MB an hour, and the change of threads and descriptors, from the second quarter to the last."""
+        quarter = max(1, len(self.figures) // 4)
+        early, late = self.figures[quarter : 2 * quarter] or self.figures, self.figures[-quarter:]
+        parts = [Figures(*map(statistics.median, zip(*part, strict=True))) for part in (early, late)]
+        at, memory, threads, descriptors = (after - before for before, after in zip(*parts, strict=True))
+        return 3600 * memory / max(at, 1.0), threads, descriptors
+
+
+def soak(minutes: float, seed: int) -> tuple[Soak, History]:
+    with Wire() as wire, Proxy(wire.port) as proxy:
+        run = Soak(wire, proxy, seed)
+        try:
+            run.run(60 * minutes)
+        except (BusError, ServiceError) as error:
+            run.wrong.append(f"a request was neither granted nor refused: {error}")
+        finally:
+            for process in (*run.drivers, run.observer):
+                process.close()
+        return run, run.check()
+
+
+def main(minutes: float, seed: int) -> int:
+    print(f"seed {seed}", flush=True)
+    run, history = soak(minutes, seed)
+    moved = sum(row.end - row.begin for row in history.odom if row.moves)
+    print(", ".join(f"{count} {name}" for name, count in sorted(run.done.items())))
+    print(f"{len(history.began)} commands, {len(history.odom)} odom; it moved for {moved:.0f} s")
+    print(f"it moved on after the last command for at most {history.longest():.3f} s")
+    first, last, (memory, threads, descriptors) = run.figures[0], run.figures[-1], run.growth()
+    print(f"memory {first.memory:.1f} to {last.memory:.1f} MB ({memory:+.1f} MB/h from the second quarter on), "
+          f"threads {first.threads} to {last.threads} ({threads:+g}), "
+          f"descriptors {first.descriptors} to {last.descriptors} ({descriptors:+g})")  # fmt: skip
+    print(f"{len(run.wrong)} violations", *run.wrong[:20], sep="\n")
+    return 1 if run.wrong else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(float(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else random.randrange(10**6)))

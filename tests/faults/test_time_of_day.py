@@ -1,0 +1,90 @@
+"""The time of day may jump by an hour while a robot is driven: nothing that is safe depends on it."""
+
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from holozen import data
+from holozen.bus import Bus
+from holozen.robot.xacro import expand
+from holozen.testing import Process, Wire, wait_for
+from holozen.transport.graph import ALL_NODE_INFO
+
+from .history import STEP, History
+
+pytestmark = pytest.mark.needs("faketime")
+
+HERE = Path(__file__).parent
+HOUR = 3600.0
+
+
+class Clock:
+    """The time of day of one process, by Debian's faketime; its monotonic clock stays."""
+
+    def __init__(self, file: Path) -> None:
+        self._file = file
+        self.set(0.0)
+        asked = subprocess.run(
+            ["faketime", "-m", "-f", "+0", "sh", "-c", "echo $LD_PRELOAD"], capture_output=True, text=True
+        )
+        self.env = {
+            "LD_PRELOAD": asked.stdout.strip(), "FAKETIME_TIMESTAMP_FILE": str(file), "FAKETIME_NO_CACHE": "1",
+            "FAKETIME_DONT_FAKE_MONOTONIC": "1",
+        }  # fmt: skip
+
+    def set(self, ahead: float) -> None:
+        """Be so many seconds ahead of this machine's."""
+        new = self._file.with_suffix(".new")
+        new.write_text(f"{ahead:+.0f}\n")
+        new.replace(self._file)
+
+
+@pytest.fixture
+def clock(tmp_path: Path) -> Clock:
+    return Clock(tmp_path / "clock")
+
+
+@pytest.fixture
+def observer(wire: Wire, clock: Clock, tmp_path: Path) -> Iterator[Process]:
+    # Under faketime Python's time.sleep fails, which the sim calls only while a xacro file is expanded.
+    robot = tmp_path / "hb_bot.urdf"
+    robot.write_text(expand(data.find("urdf", "hb_bot.urdf.xacro")))
+    wire.start("sim", "--robot", str(robot), env=clock.env).wait_for_line("listens on cmd_vel", 60)
+    assert wire.run("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}").returncode == 0
+    with Process([sys.executable, str(HERE / "observer.py"), wire.endpoint]) as observer:
+        yield observer
+
+
+def ahead(bus: Bus) -> float:
+    """By how much the sim's time of day is ahead."""
+    for reply in bus.ask_all(ALL_NODE_INFO, 5.0):
+        if not isinstance(reply, bytes) and (about := json.loads(reply.payload))["node"] == "sim":
+            return float(about["time"]) - time.time()
+    return 0.0
+
+
+def test_a_robot_is_driven_on_and_stopped_in_time_though_the_time_of_day_jumps(
+    wire: Wire, clock: Clock, observer: Process
+) -> None:
+    bus, words = wire.bus(), [sys.executable, str(HERE / "driver.py"), wire.endpoint]
+    with Process(words) as driver:
+
+        def history() -> History:
+            return History.of([driver], observer, 0.0)
+
+        for jump in (HOUR, -HOUR, 0.0):
+            clock.set(jump)
+            wait_for(lambda jump=jump: abs(ahead(bus) - jump) < 60, what="the jump to hit")  # type: ignore[misc]
+            since = time.monotonic()
+            wait_for(lambda since=since: history().moves(since), 20, "a robot that moves")  # type: ignore[misc]
+        clock.set(HOUR)
+        driver.kill()
+        killed = time.monotonic()
+        wait_for(lambda: (odom := history().odom) and odom[-1].end > killed + 1, 20, "odom")
+        history().check_silence()
+        assert not history().odom[-1].moves

@@ -1,0 +1,126 @@
+"""Pictures of a camera: what stands where, at which time, in a process of its own."""
+
+import math
+import os
+import signal
+import struct
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from holozen import entities
+from holozen.messages import CameraInfo, Image, Pose
+from holozen.messages.geometry_msgs import Point
+from holozen.testing import LockStep, Wire, wait_for
+
+WIDTH, HEIGHT, ACROSS = 160, 120, 1.2  # pixels, rad
+FOCAL = WIDTH / 2 / math.tan(ACROSS / 2)
+HIGH = 0.5  # m; of the camera
+EDGE = 0.4  # m; of a red cube
+ROBOT = f"""<robot name="bot"><link name="base"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 0.05"/><geometry><box size="0.4 0.4 0.1"/></geometry></collision></link>
+<link name="eye"/><joint name="up" type="fixed">
+<origin xyz="0 0 {HIGH}"/><parent link="base"/><child link="eye"/></joint>
+<gazebo reference="eye"><sensor type="depth" name="cam"><update_rate>10</update_rate><camera>
+<horizontal_fov>{ACROSS}</horizontal_fov><image><width>{WIDTH}</width><height>{HEIGHT}</height></image>
+<clip><near>0.05</near><far>20</far></clip></camera>
+<plugin name="p" filename="libgazebo_ros_camera.so">
+<cameraName>cam</cameraName><frameName>eye_optical</frameName></plugin>
+</sensor></gazebo>
+<gazebo><plugin name="drive" filename="libgazebo_ros_planar_move.so"><robotBaseFrame>base</robotBaseFrame></plugin>
+</gazebo></robot>"""
+CUBE = f"""<robot name="cube"><link name="cube"><visual><geometry><box size="{EDGE} {EDGE} {EDGE}"/></geometry>
+<material name="red"><color rgba="1 0 0 1"/></material></visual></link><gazebo><static>true</static></gazebo></robot>"""
+
+
+class Eye:
+    """The camera's keys, in a paused sim."""
+
+    def __init__(self, sim: LockStep) -> None:
+        self.sim = sim
+        self._read: dict[str, Any] = {
+            key: sim.bus.subscribe(f"cam/{key}", kind, depth=100, limit=1_000_000)
+            for key, kind in (("image_raw", Image), ("depth/image_raw", Image), ("camera_info", CameraInfo))
+        }
+        self._newest: dict[str, Any] = {}
+
+    def see(self) -> dict[str, Any]:
+        """Picture, depth and info of one moment after this call."""
+        began = self.sim.status.time
+
+        def has_come() -> bool:
+            self.sim.step(24)
+            for key, subscription in self._read.items():
+                for received in iter(subscription.try_recv, None):
+                    self._newest[key] = received.message
+            stamps = [message.header.stamp.seconds() for message in self._newest.values()]
+            return len(stamps) == 3 and min(stamps) == max(stamps) > began + 0.1
+
+        wait_for(has_come, 60.0, "a picture")
+        return self._newest
+
+
+@pytest.fixture(scope="module")
+def eye(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Eye]:
+    path = tmp_path_factory.mktemp("robot") / "bot.urdf"
+    path.write_text(ROBOT)
+    with Wire() as wire:
+        yield Eye(LockStep(wire, "--robot", str(path)))
+
+
+def red(picture: Image) -> list[tuple[int, int]]:
+    """Columns and rows of the red pixels."""
+    data = bytes(picture.data)
+    found = []
+    for place in range(0, len(data), 3):
+        r, g, b = data[place : place + 3]
+        if r > 60 and g < r / 2 and b < r / 2:
+            found.append((place // 3 % WIDTH, place // 3 // WIDTH))
+    return found
+
+
+def test_a_red_cube_is_where_geometry_puts_it(eye: Eye) -> None:
+    assert red(eye.see()["image_raw"]) == []
+    entities.spawn(eye.sim.bus, "cube", CUBE, Pose(Point(2.0, 0.5, HIGH)))
+    seen = eye.see()
+    picture, depth, info = seen["image_raw"], seen["depth/image_raw"], seen["camera_info"]
+    assert (picture.width, picture.height, picture.encoding, picture.step) == (WIDTH, HEIGHT, "rgb8", 3 * WIDTH)
+    assert picture.header.frame_id == info.header.frame_id == "eye_optical"
+    assert info.k == pytest.approx([FOCAL, 0, WIDTH / 2, 0, FOCAL, HEIGHT / 2, 0, 0, 1])
+    columns, rows = zip(*red(picture), strict=True)
+    near, back = 2.0 - EDGE / 2, 2.0 + EDGE / 2  # m to its faces; of the right one one sees the inner side
+    assert min(columns) == pytest.approx(WIDTH / 2 - FOCAL * (0.5 + EDGE / 2) / near, abs=1.5)
+    assert max(columns) + 1 == pytest.approx(WIDTH / 2 - FOCAL * (0.5 - EDGE / 2) / back, abs=1.5)
+    assert min(rows) == pytest.approx(HEIGHT / 2 - FOCAL * EDGE / 2 / near, abs=1.5)
+    assert max(rows) + 1 == pytest.approx(HEIGHT / 2 + FOCAL * EDGE / 2 / near, abs=1.5)
+    row = struct.unpack_from(f"<{WIDTH}f", bytes(depth.data), HEIGHT // 2 * depth.step)
+    assert depth.encoding == "32FC1"
+    assert row[round(WIDTH / 2 - FOCAL * 0.5 / near)] == pytest.approx(near, abs=0.01)
+    assert row[-1] == math.inf, "it looks past the cube at the sky"
+
+
+def test_the_camera_moves_with_its_robot_and_forgets_what_is_gone(eye: Eye) -> None:
+    if "cube" not in entities.names(eye.sim.bus):
+        entities.spawn(eye.sim.bus, "cube", CUBE, Pose(Point(2.0, 0.5, HIGH)))
+    before = len(red(eye.see()["image_raw"]))
+    eye.sim.drive(x=1.0)
+    eye.sim.step(110)
+    eye.sim.drive()
+    assert len(red(eye.see()["image_raw"])) > 1.3 * before
+    entities.delete(eye.sim.bus, "cube")
+    assert red(eye.see()["image_raw"]) == []
+
+
+def test_the_end_of_the_camera_is_reported(eye: Eye) -> None:
+    process = eye.sim.process
+    (camera,) = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    os.kill(int(camera), signal.SIGKILL)
+
+    def is_reported() -> bool:
+        eye.sim.step(24)
+        return "the camera ended with exit code -9, so there are no pictures" in process.err
+
+    wait_for(is_reported)

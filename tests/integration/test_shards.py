@@ -1,0 +1,113 @@
+"""Several sims on one bus share the robots by name."""
+
+import os
+import re
+import signal
+
+import pytest
+
+from holozen import data
+from holozen.testing import Process, Wire, wait_for
+
+from .processes import assert_one_line, parts_at
+from .robots import Robot
+
+BOT = data.find("urdf", "hb_bot.urdf.xacro")
+OF_FIRST, OF_SECOND = "bot4", "bot0"  # of two shards
+
+
+@pytest.fixture(scope="module")
+def shards(town: Wire) -> tuple[Process, Process]:
+    """Two shards with a fleet of six."""
+    first, second = town.start("sim", "--shard", "1/2"), town.start("sim", "--shard", "2/2")
+    for shard in (first, second):
+        shard.wait_for_line("this is shard")
+    done = town.run("spawn", str(BOT), "--count", "6", "--grid", "2")
+    assert done.stdout == "bot0 .. bot5 listen on bot0/cmd_vel .. bot5/cmd_vel\n", done.stderr
+    return first, second
+
+
+def names(wire: Wire) -> list[str]:
+    return [line.split()[0] for line in wire.run("list").stdout.splitlines()]
+
+
+def test_each_robot_is_in_one_shard_and_all_are_one_world_to_callers(
+    town: Wire, shards: tuple[Process, Process]
+) -> None:
+    listed = town.run("list")
+    assert [line.split()[0] for line in listed.stdout.splitlines()] == [f"bot{number}" for number in range(6)]
+    assert listed.stderr == "they are in 2 sims; robots of different sims do not collide\n"
+    first, second = shards
+    for name, here, there in ((OF_FIRST, first, second), (OF_SECOND, second, first)):
+        here.wait_for_line(f"sim: {name} was added to the world")
+        assert name not in there.err
+    done = town.run("spawn", str(BOT), "--name", OF_SECOND, "-x", "20")
+    assert_one_line(done, 1, f"holozen spawn: there is an entity '{OF_SECOND}' already")
+    assert "duplicates" not in town.run("doctor").stdout
+
+
+def test_robots_of_all_shards_drive_and_are_stopped_paused_and_reset(
+    town: Wire, shards: tuple[Process, Process]
+) -> None:
+    robots = [Robot(town.bus(), name) for name in (OF_FIRST, OF_SECOND)]
+    for robot in robots:
+        robot.drive(0.3)
+    assert sorted(town.run("stop").stdout.splitlines()) == [f"bot{number} is stopped" for number in range(6)]
+    for robot in robots:
+        robot.stands()
+    assert town.run("release").returncode == 0
+    assert town.run("sim", "pause").stdout == "paused\n"
+    for shard in shards:
+        shard.wait_for_line("it is paused")
+    assert town.run("sim", "play").stdout == "playing\n"
+    assert town.run("sim", "reset").returncode == 0
+    for shard in shards:
+        shard.wait_for_line("it was reset")
+    assert names(town) == []
+
+
+REFUSED = {
+    "a number that runs": ("1/2", 1, "sim: shard 1/2 runs already; take another: --shard auto/2"),
+    "another count": ("1/3", 1, "sim: shard 1/2 runs here: all shards have the same N; use --shard auto/2"),
+    "none is free": ("auto/2", 1, "sim: all 2 shards run already; end them all before you start more of them"),
+    "beyond the count": ("3/2", 2, "holozen sim: argument --shard: '3/2': give K/N with K from 1 to N and N up to 64"),
+    "no number": ("x", 2, "holozen sim: argument --shard: 'x' is no shard; give K/N, such as 1/3, or auto/3"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_a_shard_that_cannot_be_is_refused(town: Wire, shards: tuple[Process, Process], name: str) -> None:
+    shard, code, reason = REFUSED[name]
+    done = town.run("sim", "--shard", shard)
+    assert done.returncode == code and reason in done.stderr, done.stderr
+    assert all(process.returncode is None for process in shards)
+
+
+def test_a_shard_that_is_killed_takes_its_own_robots_alone_and_comes_back_without_them(wire: Wire) -> None:
+    up = wire.start("up", "--shards", "2")
+    wait_for(lambda: up.err.count("this is shard") == 2, 30)
+    for name in (OF_FIRST, OF_SECOND):
+        done = wire.run("spawn", str(BOT), "--name", name, "-x", name[-1])
+        assert done.returncode == 0, done.stderr
+    os.kill(parts_at(wire)["sim"], signal.SIGKILL)
+    line = up.wait_for_line("starting it again in 0.5 s; the robots that were spawned in this shard are gone")
+    number = re.search(r"up: sim (\d)/2 was ended by signal 9", line)
+    assert number, line
+    gone, left = (OF_FIRST, OF_SECOND) if number[1] == "1" else (OF_SECOND, OF_FIRST)
+    Robot(wire.bus(), left).drive(0.3)
+    wait_for(lambda: up.err.count("this is shard") == 3, 30)
+    assert names(wire) == [left]
+    assert wire.run("spawn", str(BOT), "--name", gone, "-x", gone[-1]).returncode == 0
+    assert names(wire) == sorted([gone, left])
+
+
+def test_the_name_of_a_robot_whose_shard_does_not_run_is_refused_until_a_sim_takes_that_number(wire: Wire) -> None:
+    first = wire.start("sim", "--shard", "auto/2")
+    first.wait_for_line("this is shard 1/2")
+    done = wire.run("spawn", str(BOT), "--name", OF_SECOND)
+    assert_one_line(
+        done, 1, f"holozen spawn: '{OF_SECOND}' belongs to shard 2/2, which does not run; start it: holozen sim --shard"
+    )
+    second = wire.start("sim", "--shard", "auto/2", "--robot", f"{BOT}={OF_FIRST}", "--robot", f"{BOT}={OF_SECOND}")
+    second.wait_for_line("this is shard 2/2")
+    assert names(wire) == [OF_SECOND]

@@ -1,0 +1,87 @@
+"""Nodes of zenoh-ros2-sdk, an implementation of rmw_zenoh's protocol that shares no code with ours."""
+
+import contextlib
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from holozen.messages.definitions import whole_text
+from holozen.messages.registry import Registry
+from holozen.testing import Wire
+
+HASHES = {
+    "std_msgs/msg/String": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
+    "geometry_msgs/msg/Twist": "RIHS01_9c45bf16fe0983d80e3cfe750d6835843d265a9a6c46bd2e609fcddde6fb8d2a",
+    "nav_msgs/msg/Odometry": "RIHS01_3cc97dc7fb7502f8714462c526d369e35b603cfc34d946e3f2eda2766dfec6e0",
+    "tf2_msgs/msg/TFMessage": "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
+    "std_srvs/srv/Trigger": "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
+    "example_interfaces/srv/AddTwoInts": "RIHS01_e118de6bf5eeb66a2491b5bda11202e7b68f198d6f67922cf30364858239c81a",
+}
+"""Hashes that other programs print: those of rmw_zenoh's design.md, and of programs that were tried with ROS 2."""
+
+
+class Theirs:
+    """Publishers, subscribers and clients of ROS 2 nodes, on a wire."""
+
+    def __init__(self, wire: Wire) -> None:
+        self._wire, self._ends = wire, contextlib.ExitStack()
+
+    def _made(self, kind: str, *words: Any, **more: Any) -> Any:
+        import zenoh_ros2_sdk  # type: ignore[import-untyped]
+
+        made = getattr(zenoh_ros2_sdk, kind)(*words, router_port=self._wire.port, type_hash=HASHES[words[1]], **more)
+        self._ends.callback(made.close)
+        return made
+
+    def publisher(self, topic: str, kind: str, node: str = "talker") -> Any:
+        """A publisher: `publish(field=value, ...)`."""
+        return self._made("ROS2Publisher", topic, kind, msg_definition=definition(kind), node_name=node)
+
+    def subscriber(self, topic: str, kind: str, callback: Callable[[Any], None], **more: Any) -> Any:
+        """A subscriber that calls `callback` with each message."""
+        return self._made("ROS2Subscriber", topic, kind, callback, msg_definition=definition(kind), **more)
+
+    def trigger(self, name: str) -> Any:
+        """A client of a service with the type Trigger: `call()`."""
+        texts = {"request_definition": "", "response_definition": "bool success\nstring message"}
+        return self._made("ROS2ServiceClient", name, "std_srvs/srv/Trigger", timeout=10.0, **texts)
+
+    def type(self, name: str) -> Any:
+        """The class of a message type that a publisher or subscriber uses."""
+        from zenoh_ros2_sdk import ZenohSession
+
+        return ZenohSession.get_instance("127.0.0.1", self._wire.port).store.types[name]
+
+    def topics(self) -> dict[str, list[str]]:
+        """What `ros2 topic list -t` shows: topics and their types."""
+        from zenoh_ros2_sdk import get_topic_names_and_types
+
+        return dict(get_topic_names_and_types(router_port=self._wire.port, timeout=1.0))
+
+    def close(self) -> None:
+        """End all of them."""
+        from zenoh_ros2_sdk import ZenohSession
+
+        self._ends.close()
+        ZenohSession.get_instance("127.0.0.1", self._wire.port).close()
+
+
+def definition(name: str) -> str:
+    """The definition of a type, with those that it is made of."""
+    return whole_text(Registry().find(name))
+
+
+@pytest.fixture
+def theirs(wire: Wire) -> Iterator[Theirs]:
+    """ROS 2 nodes on this test's wire, at a router."""
+    wire.start("router").wait_for_line("listens at")  # as rmw_zenohd, without which its nodes do not meet
+    made = Theirs(wire)
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def published() -> dict[str, str]:
+    """Published hashes of types."""
+    return HASHES

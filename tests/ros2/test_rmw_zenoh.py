@@ -1,0 +1,211 @@
+"""`holozen ros2`, with nodes of zenoh-ros2-sdk as the other side."""
+
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+
+from holozen.messages import CommandStatus, Odometry, TFMessage, TransformStamped, Twist, codec
+from holozen.testing import Wire, wait_for
+from holozen.transport import rmw_zenoh as rmw
+from holozen.transport.rmw_zenoh import Ages, Attachment
+
+if TYPE_CHECKING:
+    from .conftest import Theirs
+
+TWIST, ODOM = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry"
+
+
+def joined(wire: Wire) -> Any:
+    process = wire.start("ros2")
+    process.wait_for_line("joins ROS 2's domain 0")
+    return process
+
+
+def test_a_ros_node_sees_reads_drives_and_stops_our_robot(wire: Wire, theirs: "Theirs") -> None:
+    wire.start("sim").wait_for_line("listens on cmd_vel", 60)
+    joined(wire)
+    odom: list[Any] = []
+    theirs.subscriber("/odom", ODOM, odom.append)
+    wait_for(lambda: odom, what="odometry")
+    expected = {
+        "/odom": [ODOM],
+        "/tf": ["tf2_msgs/msg/TFMessage"],
+        "/cmd_vel": [TWIST],
+        "/clock": ["rosgraph_msgs/msg/Clock"],
+    }
+    wait_for(lambda: theirs.topics().items() >= expected.items(), what=lambda: f"our topics in {theirs.topics()}")
+
+    status = wire.bus().latest("cmd_vel_status", CommandStatus)
+    commands = theirs.publisher("/cmd_vel", TWIST, "their_teleop")
+    vector = theirs.type("geometry_msgs/msg/Vector3")
+    forward = {"linear": vector(x=0.3, y=0.0, z=0.0), "angular": vector(x=0.0, y=0.0, z=0.0)}
+
+    def drives(what: Any) -> bool:
+        commands.publish(**forward)
+        return bool(what())
+
+    wait_for(lambda: drives(lambda: odom[-1].twist.twist.linear.x > 0.25), what="the robot to drive")
+
+    def obeyed() -> bool:
+        found = status.read()[0]
+        return found is not None and found.obeyed.startswith("ros2/their_teleop@") and found.priority == "DATA"
+
+    wait_for(lambda: drives(obeyed), what=lambda: f"it to be obeyed: {status.read()[0]}")
+    assert "1 publisher" in next(
+        line for line in wire.run("topic", "list", "-v").stdout.splitlines() if "cmd_vel " in line
+    )
+    wait_for(lambda: abs(odom[-1].twist.twist.linear.x) < 0.01, what="the watchdog to stop it")
+
+    stop = theirs.trigger("/stop")
+    assert [stop.call().success, stop.call().success] == [True, True]
+    begin = len(odom)
+    wait_for(lambda: drives(lambda: len(odom) > begin + 50), 20, "a second of odometry")
+    assert abs(odom[-1].twist.twist.linear.x) < 0.01
+
+
+def test_their_topics_are_listed_and_read_here(wire: Wire, theirs: "Theirs") -> None:
+    joined(wire)
+    chatter = theirs.publisher("/chatter", "std_msgs/msg/String")
+    wait_for(lambda: " * chatter [std_msgs/msg/String]" in wire.run("topic", "list", "-v").stdout)
+    echo = wire.start("topic", "echo", "chatter")
+
+    def heard() -> bool:
+        chatter.publish(data="grüße")
+        return "data: grüße" in echo.out
+
+    wait_for(heard)
+
+
+def test_a_latched_topic_reaches_a_late_subscriber(wire: Wire, theirs: "Theirs") -> None:
+    from zenoh_ros2_sdk.qos import QosDurability, QosProfile  # type: ignore[import-untyped]
+
+    static = wire.bus("statics").publisher("tf_static", TFMessage)
+    static.put(TFMessage([TransformStamped(child_frame_id="scanner")]))
+    joined(wire)
+    wait_for(lambda: "/tf_static" in theirs.topics())
+    found: list[Any] = []
+
+    def got() -> bool:
+        qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+        theirs.subscriber("/tf_static", "tf2_msgs/msg/TFMessage", found.append, qos=qos)
+        return bool(found)
+
+    wait_for(got, 20)
+    assert found[0].transforms[0].child_frame_id == "scanner"
+
+
+def test_beside_our_robot_no_odometry_of_theirs_comes_in(wire: Wire, theirs: "Theirs") -> None:
+    gateway = joined(wire)
+    ours = wire.bus("sim").publisher("odom", Odometry)
+    theirs.publisher("/odom", ODOM, "their_robot")
+    reader = wire.bus("reader").latest("odom", Odometry)
+    gateway.wait_for_line("ros2: /odom is not carried: sim publishes odom here")
+    ours.put(Odometry(child_frame_id="ours"))
+    wait_for(lambda: reader.count == 1)
+
+
+def test_a_command_that_waited_on_its_way_is_left_out(wire: Wire, theirs: "Theirs") -> None:
+    gateway = joined(wire)
+    reader = wire.bus().subscribe("cmd_vel", Twist)
+    commands = theirs.publisher("/cmd_vel", TWIST)
+    now = time.time()
+
+    def heard(number: int, sent: float, x: float) -> bool:
+        commands.pub.put(codec.encode(Twist.planar(x=x), "cdr"), attachment=sample(number, sent).packed())
+        return reader.try_recv() is not None
+
+    wait_for(lambda: heard(1, now, 0.1))
+    heard(1, now - 1.0, 0.2)
+    gateway.wait_for_line("ros2: /cmd_vel is not carried: a command was under way for more than 0.5 s")
+    wait_for(lambda: heard(2, time.time(), 0.3))
+    later = [received.message.linear.x for received in iter(reader.try_recv, None) if received.message]
+    assert 0.2 not in later
+
+
+def test_a_second_one_ends(wire: Wire) -> None:
+    processes = [joined(wire), wire.start("ros2")]
+    wait_for(lambda: any(process.returncode is not None for process in processes))
+    (ended,) = (process for process in processes if process.returncode is not None)
+    assert ended.returncode == 1
+    assert "another `holozen ros2` runs here" in ended.err.splitlines()[-1]
+
+
+def test_nothing_goes_round_between_the_two_sides(wire: Wire, theirs: "Theirs") -> None:
+    """A topic that both sides write and read."""
+    joined(wire)
+    there: list[Any] = []
+    here = wire.bus("here")
+    ours = here.publisher("go", Twist)
+    reader = here.subscribe("go", Twist)
+    theirs.subscriber("/go", TWIST, there.append)
+    publisher = theirs.publisher("/go", TWIST)
+    vector = theirs.type("geometry_msgs/msg/Vector3")
+
+    def both() -> bool:
+        ours.put(Twist.planar(x=1.0))
+        publisher.publish(linear=vector(x=2.0, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0))
+        seen.extend(received.message.linear.x for received in iter(reader.try_recv, None) if received.message)
+        return 2.0 in seen and any(message.linear.x == 1.0 for message in there)
+
+    seen: list[float] = []
+    wait_for(both)
+    sent = 1000.0  # a mark of which each side gets one
+    ours.put(Twist.planar(x=sent))
+    ours.put(Twist.planar(x=sent + 1))
+    wait_for(lambda: any(message.linear.x == sent + 1 for message in there))
+    assert [message.linear.x for message in there].count(sent) == 1
+    seen.extend(received.message.linear.x for received in iter(reader.try_recv, None) if received.message)
+    assert seen.count(sent) == 1
+
+
+def sample(number: int, sent: float) -> Attachment:
+    return Attachment(number, round(sent * 1e9), bytes(16))
+
+
+def test_age_needs_no_clock_in_common_and_finds_what_waited() -> None:
+    ages = Ages()
+    assert ages.of(sample(1, 1_700_000_000.0), 50.0) == 0.0
+    assert ages.of(sample(2, 1_700_000_000.1), 50.1) == pytest.approx(0.0, abs=1e-6)
+    assert ages.of(sample(3, 1_700_000_000.2), 51.0) == pytest.approx(0.8, abs=1e-6)
+    assert ages.of(sample(4, 1_700_000_001.1), 51.1) == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_sender_whose_clock_was_set_back_is_not_old_for_ever() -> None:
+    ages = Ages()
+    ages.of(sample(1, 2000.0), 50.0)
+    assert ages.of(sample(2, 1000.0), 50.1) == 0.0
+
+
+@pytest.mark.parametrize("wrong", [b"", bytes(32), bytes(34), bytes(16) + b"\x0f" + bytes(16)])
+def test_another_attachment_is_none(wrong: bytes) -> None:
+    assert rmw.attachment(wrong) is None
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        "@ros2_lv/0/a/0/0/NN/%/%/talker",
+        "@ros2_lv/0/a/0/x/MP/%/%/talker/%chatter/std_msgs::msg::dds_::String_/RIHS01_0/::,10:,:,:,,",
+        "@ros2_lv/0/a/0/1/XX/%/%/talker/%chatter/std_msgs::msg::dds_::String_/RIHS01_0/::,10:,:,:,,",
+        "@ros2_lv/0/a/0/1/MP/%/%/talker/%**/std_msgs::msg::dds_::String_/RIHS01_0/::,10:,:,:,,",
+        "@ros2_lv/0/a/0/1/MP/%/%/talker/%chatter/String/RIHS01_0/::,10:,:,:,,",
+        "@ros2_lv/0",
+    ],
+)
+def test_a_token_that_names_no_endpoint_is_none(wrong: str) -> None:
+    assert rmw.parse(wrong) is None
+
+
+def test_a_token_is_that_of_the_design() -> None:
+    """The example of rmw_zenoh's design.md, its service too."""
+    token = (
+        "@ros2_lv/2/aac3178e146ba6f1fc6e6a4085e77f21/0/10/MP/%/%/talker"
+        "/%robot1%chatter/std_msgs::msg::dds_::String_/RIHS01_df/::,10:,:,:,,"
+    )
+    endpoint = rmw.parse(token)
+    assert endpoint == rmw.Endpoint(
+        "pub", "robot1/chatter", "std_msgs/msg/String", "RIHS01_df", "talker", "aac3178e146ba6f1fc6e6a4085e77f21", 10
+    )
+    assert endpoint.token(2, 0) == token
+    assert endpoint.key(2) == "2/robot1/chatter/std_msgs::msg::dds_::String_/RIHS01_df"

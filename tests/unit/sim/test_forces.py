@@ -1,0 +1,179 @@
+"""A force plugin's wrench: Newton's laws at the centre of mass of its link, along the axes of its frame."""
+
+import math
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from holozen.messages import Vector3, Wrench
+from holozen.robot.loading import parse
+from holozen.robot.model import Force, Pushed
+from holozen.robot.rotation import matrix_of
+from holozen.rotation import from_rpy
+from services.sim.command.arbiter import Arbiter
+from services.sim.command.inputs import CommandStats, ForceInput
+from services.sim.command.motion import Push
+from services.sim.physics.jointed import Forces, Motors
+from services.sim.physics.world import World
+from tests.unit.sim.fakes import FakeSenders, received
+
+TOP_FILE = Path("top.urdf")
+HAND = (0.3, -0.2, 0.5)  # the frame of the link that is fixed to the base
+INERTIA = '<inertia ixx="0.1" iyy="0.2" izz="0.3" ixy="0" ixz="0" iyz="0"/>'
+TOP = f"""<robot name="top"><link name="base"><inertial><mass value="2"/>{INERTIA}</inertial></link>
+<joint name="holds" type="fixed"><origin xyz="0 1 0" rpy="{HAND[0]} {HAND[1]} {HAND[2]}"/>
+<parent link="base"/><child link="hand"/></joint><link name="hand"/>"""
+WHEEL = f"""<joint name="axle" type="continuous"><origin xyz="0 1 0"/><parent link="base"/><child link="wheel"/>
+<axis xyz="0 1 0"/></joint><link name="wheel"><inertial><mass value="1"/>{INERTIA}</inertial></link>"""
+TILT = (0.4, -0.7, 1.1)  # of the base in the world
+
+
+def plugin(tags: str) -> str:
+    return f'<gazebo><plugin name="p" filename="libgazebo_ros_force.so">{tags}</plugin></gazebo>'
+
+
+def forces(tags: str, more: str = "") -> tuple[Force, ...]:
+    return parse(f"{TOP}{more}{plugin(tags)}</robot>", TOP_FILE).forces
+
+
+@pytest.mark.parametrize(("frame", "link"), [*product(("world", "link"), ("base", "hand"))])
+def test_a_wrench_moves_a_free_body_by_newton_and_euler(space: World, frame: str, link: str) -> None:
+    model = parse(
+        f"{TOP}{plugin(f'<link_name>{link}</link_name><force_frame>{frame}</force_frame>')}</robot>", TOP_FILE
+    )
+    body = space.add_jointed(model, (0, 0, 0), from_rpy(*TILT))
+    force, torque = np.array([1.0, 2.0, -3.0]), np.array([-0.5, 0.2, 0.4])
+    Forces(body, {"k": list(model.forces)}, model, None).do([Push("k", (*force, *torque), 0.0)])
+    space.step()
+    base = matrix_of(TILT)
+    axes = np.eye(3) if frame == "world" else base @ (matrix_of(HAND) if link == "hand" else np.eye(3))
+    arm = base @ np.array([0.0, 1.0, 0.0]) if link == "hand" else np.zeros(3)
+    pushed, turned = axes @ force, axes @ torque + np.cross(arm, axes @ force)
+    linear, angular = body.twist()
+    dt = space.spec.step
+    assert linear == pytest.approx(pushed / 2 * dt, abs=1e-9)
+    assert angular == pytest.approx(base @ np.diag([10, 5, 10 / 3]) @ base.T @ turned * dt, abs=1e-9)
+
+
+def test_a_torque_on_a_wheel_turns_it_against_its_base(space: World) -> None:
+    model = parse(f"{TOP}{WHEEL}{plugin('<link_name>wheel</link_name>')}</robot>", TOP_FILE)
+    body = space.add_jointed(model, (0, 0, 0))
+    Forces(body, {"k": list(model.forces)}, model, None).do([Push("k", (0, 0, 0, 0, 1.0, 0), 0.0)])
+    space.step()
+    _, (rate,), _ = body.states()
+    assert rate == pytest.approx(1 / 0.2 * space.spec.step, rel=1e-3)
+    assert body.twist()[1] == pytest.approx((0, 0, 0), abs=1e-6)
+
+
+def test_without_a_source_its_wheels_brake_and_with_one_they_turn_freely(space: World) -> None:
+    model = parse(f"{TOP}{WHEEL}{plugin('<link_name>wheel</link_name>')}</robot>", TOP_FILE)
+    body = space.add_jointed(model, (0, 0, 0))
+    motors = Motors(body, frozenset(body.names))
+    drive = Forces(body, {"k": list(model.forces)}, model, motors)
+
+    def rate(pushes: list[Push] | None, steps: int = 60) -> float:
+        for _ in range(steps):
+            drive.do(pushes)
+            motors.do(None)
+            space.step()
+        return body.states()[1][0]
+
+    assert rate([Push("k", (0, 0, 0, 0, 0.2, 0), 0.0)]) == pytest.approx(0.25, rel=1e-2)
+    assert rate([]) == pytest.approx(0.25, rel=1e-2), "zero is no brake"
+    assert rate(None) == pytest.approx(0, abs=1e-6)
+    assert rate([Push("k", (0, 0, 0, 0, 0.2, 0), 0.0)]) == pytest.approx(0.25, rel=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("tags", "topic", "in_link"),
+    [
+        ("<bodyName>hand</bodyName><topicName>push</topicName>", "push", False),
+        ("<bodyName>hand</bodyName><robotNamespace>/a</robotNamespace>", "a/gazebo_ros_force", False),
+        ("<ros><namespace>/a/b</namespace><remapping>gazebo_ros_force:=push</remapping></ros>"
+         "<link_name>hand</link_name><force_frame>link</force_frame>", "a/b/push", True),
+    ],
+    ids=["ROS 1", "its namespace", "ROS 2"],
+)  # fmt: skip
+def test_the_tags_of_both_ros_give_link_topic_and_frame(tags: str, topic: str, in_link: bool) -> None:
+    model = parse(f"{TOP}{plugin(tags)}</robot>", TOP_FILE)
+    assert model.forces == (Force("hand", topic, in_link),)
+    assert model.drive and model.drive.mechanism == Pushed() and model.warnings == ()
+    assert model.drive.odometry_topic == f"{topic.rpartition('/')[0]}/odom".strip("/")
+
+
+def test_a_force_that_cannot_push_is_reported() -> None:
+    model = parse(f"{TOP}{plugin('<link_name>hnad</link_name>')}{plugin('')}</robot>", TOP_FILE)
+    assert model.forces == () and model.drive is None
+    first, second = model.warnings
+    assert "names the link 'hnad', which does not exist (did you mean 'hand'?); this force pushes nothing" in first
+    assert "<link_name> of <plugin name='p'> is missing; this force pushes nothing; links: base, hand" in second
+    planar = '<gazebo><plugin name="d" filename="libgazebo_ros_planar_move.so"/></gazebo>'
+    model = parse(f"{TOP}{planar}{plugin('<link_name>hand</link_name>')}</robot>", TOP_FILE)
+    assert model.forces == () and "has no effect: its drive sets the velocity" in model.warnings[0]
+
+
+class Topics:
+    """Two force topics of a robot, and their arbiter."""
+
+    def __init__(self) -> None:
+        self.arbiter, self.stats = Arbiter(0.5), CommandStats(lambda _: None)
+        self._input = ForceInput(("left", "right"), self.arbiter, FakeSenders(), self.stats)
+
+    def take(self, key: str, x: float, now: float, source: str = "me@1", priority: str = "DATA") -> None:
+        message = Wrench(Vector3(x))
+        self._input.take([received(message, source, priority, key)], now, now)
+
+    def pushes(self, now: float) -> dict[str, float] | None:
+        pushes = self.arbiter.pushes(now)
+        return None if pushes is None else {push.key: push.wrench[0] for push in pushes}
+
+
+@pytest.fixture
+def topics() -> Topics:
+    return Topics()
+
+
+def test_one_source_pushes_on_all_topics_and_each_ends_with_its_own_silence(topics: Topics) -> None:
+    topics.take("right", 2.0, 10.0)
+    topics.take("left", 1.0, 10.3)
+    assert topics.pushes(10.4) == {"left": 1.0, "right": 2.0}
+    assert topics.pushes(10.6) == {"left": 1.0}
+    assert topics.pushes(10.9) is None
+
+
+def test_a_person_takes_all_topics_from_a_script(topics: Topics) -> None:
+    topics.take("left", 1.0, 10.0)
+    topics.take("right", 2.0, 10.1, "person@2", "INTERACTIVE_HIGH")
+    topics.take("left", 1.0, 10.2)
+    assert topics.pushes(10.3) == {"right": 2.0}
+    assert "overruled" in topics.stats.last
+
+
+def test_a_zero_from_an_equal_stops_all_topics(topics: Topics) -> None:
+    topics.take("left", 1.0, 10.0)
+    topics.take("right", 0.0, 10.1, "other@2")
+    topics.take("left", 1.0, 10.2)
+    assert topics.pushes(10.3) == {"right": 0.0}
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, 1e5])
+def test_what_is_no_plausible_force_is_refused(topics: Topics, bad: float) -> None:
+    topics.take("left", 1.0, 10.0)
+    topics.take("left", bad, 10.1)
+    assert topics.pushes(10.2) == {"left": 1.0}
+    assert sum(topics.stats.refused.values()) == 1 and "force.x is" in topics.stats.last
+
+
+def test_a_software_stop_ends_all_forces_until_the_source_has_let_go(topics: Topics) -> None:
+    topics.take("left", 1.0, 10.0)
+    topics.arbiter.stop("me", 10.1)
+    topics.take("left", 1.0, 10.2)
+    assert topics.pushes(10.2) is None and topics.stats.last.startswith("me@1: stopped")
+    topics.arbiter.software_stop.release()
+    topics.take("left", 1.0, 10.3)
+    assert topics.pushes(10.3) is None and topics.stats.last.startswith("me@1: let go first")
+    topics.take("left", 0.0, 10.4)
+    topics.take("left", 1.0, 10.5)
+    assert topics.pushes(10.5) == {"left": 1.0}
