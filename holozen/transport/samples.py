@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -66,20 +65,29 @@ def release_memory() -> None:
     It came in fragments, some of which lie between memory in use.
     """
     global _trimmer
-    if _trimmer is None or not _trimmer.is_alive():
-        _trimmer = threading.Timer(TRIM_AFTER, _trim)
-        _trimmer.daemon = True
+    _refused.set()
+    if _trimmer is None or not _trimmer.is_alive():  # none, or a forked process, which has no threads
+        _trimmer = threading.Thread(target=_trim, name="trim", daemon=True)
         _trimmer.start()
 
 
-_trimmer: threading.Timer | None = None
+_refused = threading.Event()
+_trimmer: threading.Thread | None = None
 
 
 def _trim() -> None:
+    """Trim a second after each refusal, those during a trim included; at most once a second."""
     import ctypes
 
-    with contextlib.suppress(OSError, AttributeError):  # not in every C library
-        ctypes.CDLL(None).malloc_trim(0)
+    try:
+        trim = ctypes.CDLL(None).malloc_trim
+    except (OSError, AttributeError):  # not in every C library
+        return
+    while True:
+        _refused.wait()
+        _refused.clear()
+        time.sleep(TRIM_AFTER)
+        trim(0)
 
 
 class Sample:
