@@ -140,7 +140,11 @@ class Bus(Node):
 
     def latest(self, key: str, kind: type[M]) -> Latest[M]:
         """The newest message on `key`, with its age. Payloads over LARGEST_STATE bytes are ignored."""
-        return Latest(self.subscribe(key, kind, depth=1, limit=LARGEST_STATE))
+        return Latest(self.state(key, kind))
+
+    def state(self, key: str, kind: type[M]) -> Subscription[M]:
+        """A reader of the newest message on `key`, as `latest` has."""
+        return self.subscribe(key, kind, depth=1, limit=LARGEST_STATE)
 
     def serve(
         self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R], room: int = ROOM,

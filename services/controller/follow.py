@@ -9,16 +9,16 @@ from holozen.bus import Bus
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, PoseStamped, Twist
 from holozen.messages.message import not_finite
+from holozen.odometry import OdometryFeedback
 from holozen.transport.errors import NoReply, ServiceError
 from holozen.transport.pubsub import Publisher
-from holozen.wire import PRIORITY_OF, key_for, topic
+from holozen.wire import PRIORITY_OF, key_for
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
 
 PERIOD = 0.05  # s of the odom's clock between two commands
 PATIENCE = 0.5  # s between two attempts to reach a service
 STOP_FOR, STOP_EVERY = 1.0, 0.05  # s; how long and how often a stop is repeated
-RESTS = 0.01  # m/s and rad/s; slower than this is standing
 LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
 FRAMES = ("", "odom", "map", "world")  # of a goal: all of them mean the frame of odom
@@ -79,11 +79,9 @@ class Follower:
         self, bus: Bus, robot: str, gains: Gains, stop: threading.Event, report: Callable[[str], None],
         held: bool = False,
     ) -> None:  # fmt: skip
-        row = topic("odom")
-        assert row is not None
-        self._bus, self._stop, self._report, self._silence = bus, stop, report, row.silence
+        self._bus, self._stop, self._report = bus, stop, report
         self.gains = gains  # may be replaced while it drives
-        self._odom = bus.latest(key_for("odom", robot), Odometry)
+        self._odom = OdometryFeedback(bus, key_for("odom", robot))
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
@@ -117,11 +115,10 @@ class Follower:
         """Stop the robot if this controller moves it: zeros until odom shows rest, for at most a second."""
         ends = time.monotonic() + STOP_FOR
         while self._now != STOP:
-            count = self._odom.count
+            count, since = self._odom.count, time.monotonic()
             self._commands.put(Twist())
-            newer = self._odom.wait(count, STOP_EVERY)
-            odom = self._odom.read()[0]
-            if time.monotonic() > ends or (newer and odom and odom.twist.twist.is_slow(RESTS)):
+            self._odom.wait(count, STOP_EVERY)
+            if time.monotonic() > ends or self._odom.rests(since):
                 self._now = STOP
 
     def _is_sent_elsewhere(self) -> bool:
@@ -199,7 +196,7 @@ class Follower:
     def _next_odom(self) -> Odometry | None:
         """The next odom, if this controller may act on it; else None, and this controller sends no commands."""
         count = self._odom.count
-        fresh = self._odom.wait(count, self._odom.patience(self._silence))
+        fresh = self._odom.wait(count, self._odom.stale_after)
         odom, _ = self._odom.read()
         status, _ = self.status.read()
         if status:

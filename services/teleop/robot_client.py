@@ -4,12 +4,11 @@ import math
 import time
 
 from holozen.bus import Bus
-from holozen.messages import CommandStatus, Header, Odometry, Time, Twist, TwistStamped
+from holozen.messages import CommandStatus, Header, Time, Twist, TwistStamped
+from holozen.odometry import LOST, OdometryFeedback
 from holozen.transport.pubsub import Publisher
-from holozen.wire import PRIORITY_OF, key_for, topic
+from holozen.wire import PRIORITY_OF, key_for
 
-RESTS = 0.01  # m/s and rad/s; slower counts as at rest
-LOST = 0.4  # s without odom once there was some, so as not to drive blind. Less than the sim's command timeout
 JUMP = 0.5  # m between two polls beyond what motion explains
 
 
@@ -17,13 +16,11 @@ class RobotClient:
     """A robot to drive. `command` is its command key, its other keys are siblings of that; `stamped` as for Session."""
 
     def __init__(self, bus: Bus, robot: str, command: str, stamped: str | None) -> None:
-        row = topic("odom")
-        assert row is not None
         self.robot, self.key = robot, command or key_for("cmd_vel", robot)
-        self._stamped, self._silence = stamped, row.silence
+        self._stamped = stamped
         kind: type[Twist] | type[TwistStamped] = Twist if stamped is None else TwistStamped
         self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self.key, kind, PRIORITY_OF["teleop"])
-        self.odom = bus.latest(self.beside("odom"), Odometry)
+        self.odom = OdometryFeedback(bus, self.beside("odom"))
         self.status_key = f"{self.key}_status"
         self.name = ""  # in the sim; empty while it is not known
         self._seen: tuple[float, float, float] | None = None  # stamp and position of the last odom seen
@@ -46,15 +43,6 @@ class RobotClient:
         self.name = status.name if status else ""
         return status if status and age < 3 * LOST else CommandStatus()
 
-    def stale(self) -> bool:
-        """Whether odom is too old to show as current."""
-        return self.odom.read()[1] > self.odom.patience(self._silence)
-
-    def lost(self) -> bool:
-        """Whether odom has stopped arriving."""
-        _, age = self.odom.read()
-        return self.odom.count > 0 and age > max(LOST, self.odom.patience(self._silence))
-
     def was_reset(self) -> bool:
         """Whether the robot was reset since the last call: its clock went back, or its position jumped."""
         odom, _ = self.odom.read()
@@ -66,11 +54,6 @@ class RobotClient:
             return False
         driven = 2 * math.hypot(twist.x, twist.y) * (stamp - before[0])  # at most
         return stamp < before[0] or math.dist(before[1:], self._seen[1:]) > JUMP + driven
-
-    def rests(self, since: float) -> bool:
-        """Whether odom received after `since` (s, monotonic) shows a robot at rest."""
-        odom, age = self.odom.read()
-        return odom is not None and time.monotonic() - age > since and odom.twist.twist.is_slow(RESTS)
 
     def close(self) -> None:
         """Close its publishers and subscriptions."""

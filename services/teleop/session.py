@@ -88,7 +88,7 @@ class Session:
             self._find_root(self._root)
         if self._wanted and not self.mapper.engaged:
             self._do_wanted()
-        lost = self.client.lost()
+        lost = self.client.odom.is_lost
         if lost and self._sees and self._drives:
             self.let_go(BLIND)
         self._sees = not lost
@@ -119,7 +119,7 @@ class Session:
     def publish(self, now: float) -> None:
         """Publish the mapper's command at `now`, if any."""
         since = self.mapper.stopping_since()
-        self.sent = self.mapper.command(now, since is not None and self.client.rests(since))
+        self.sent = self.mapper.command(now, since is not None and self.client.odom.rests(since))
         self.due = now + 1 / (self.mapper.settings.repeat_rate or 20.0)
         if self.sent is not None:
             self.client.put(self.sent)

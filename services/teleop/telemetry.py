@@ -109,7 +109,7 @@ class Telemetry:
             command=_planar(session.sent) if session.sent else None,
             measured=_planar(odom.twist.twist) if odom else STOP,
             odom_age=age,
-            stale=client.stale(),
+            stale=client.odom.is_stale,
             round_trip=self._round_trip.seconds,
             real_time_factor=self._track.real_time_factor(),
             pose=self._track.pose,

@@ -9,9 +9,10 @@ from typing import TypeVar
 
 from holozen.bus import Bus, Publisher
 from holozen.limits import Planar
-from holozen.messages import CommandStatus, Header, Odometry, Point, Pose, PoseStamped, SceneEntity, Twist
+from holozen.messages import CommandStatus, Header, Point, Pose, PoseStamped, SceneEntity, Twist
+from holozen.odometry import OdometryFeedback
 from holozen.rotation import Transform
-from holozen.wire import COMMAND_SILENCE, PRIORITY_OF, key_for, topic
+from holozen.wire import COMMAND_SILENCE, PRIORITY_OF, key_for
 
 from .pad import Pad
 
@@ -19,8 +20,6 @@ T = TypeVar("T")
 
 TICK = 0.02  # s
 REPEAT = 0.05  # s
-LOST = 0.4  # s without odom once there was some, so as not to drive blind
-RESTS = 0.01  # m/s and rad/s; slower counts as at rest
 NEAR = 0.2  # m and of a quaternion; odometry that is so near the true pose is the true pose, at another moment
 SPEED, TURN = 0.5, 1.0  # m/s and rad/s at first, as in teleop_twist_keyboard
 
@@ -29,11 +28,9 @@ class Driver:
     """One robot, by the keys of its commands and its odometry."""
 
     def __init__(self, bus: Bus, command: str, odometry: str) -> None:
-        row = topic("odom")
-        assert row is not None
-        self.namespace, self._silence = command.rpartition("/")[0], row.silence
+        self.namespace = command.rpartition("/")[0]
         self._bus, self._command = bus, command
-        self._odom = bus.latest(odometry, Odometry)
+        self._odom = OdometryFeedback(bus, odometry)
         self._status = bus.latest(f"{command}_status", CommandStatus)
         self._pad, self._lock = Pad(), threading.Lock()
         self._speeds = (SPEED, TURN)
@@ -55,12 +52,10 @@ class Driver:
         """Publish what is due; returns whether the pad is in use."""
         with self._lock:
             now = time.monotonic()
-            odom, age = self._odom.read()
-            if odom is not None and age > max(LOST, self._odom.patience(self._silence)):
+            if self._odom.is_lost:
                 self._pad.stop(now)
             since = self._pad.stopping_since(now)
-            rests = since is not None and odom is not None and now - age > since and odom.twist.twist.is_slow(RESTS)
-            motion = self._pad.command(now, rests)
+            motion = self._pad.command(now, since is not None and self._odom.rests(since))
             if motion is not None and (motion != self._sent or now - self._sent_at >= REPEAT):
                 x, y, turn = motion
                 speed, rate = self._speeds
