@@ -76,7 +76,7 @@ def verbs(turns: int, timed: Sequence[str] = VERBS) -> list[Case]:
             return lambda: wall(HOLOZEN, *verb.split(), *meet_at(driven if " pub " in verb else looked_at))
 
         def floor() -> list[float]:
-            return wall(sys.executable, str(ROOT / "benchmarks" / "raw_open.py"), looked_at)
+            return wall(sys.executable, str(ROOT / "benchmarks" / "raw_zenoh.py"), "open", looked_at)
 
         def alone() -> list[float]:
             return wall(sys.executable, "-c", "print('up')")

@@ -79,7 +79,7 @@ def echo(rate: float, turns: int) -> Case:
         return Case(f"first line, odom at {rate:g} Hz", "ms", ECHO_AIM).take_turns(
             turns,
             holozen=lambda: first_line(HOLOZEN, "topic", "echo", "odom", "--once", *meet_at(endpoint)),
-            raw_zenoh=lambda: first_line(sys.executable, str(ROOT / "benchmarks" / "raw_echo.py"), endpoint),
+            raw_zenoh=lambda: first_line(sys.executable, str(ROOT / "benchmarks" / "raw_zenoh.py"), "echo", endpoint),
             python_alone=lambda: first_line(sys.executable, "-c", "print('up')"),
         )
 

@@ -1,13 +1,13 @@
-"""The client side of the sims' entity services: list, locate, spawn and delete robots and objects.
+"""The client side of the sims' services: list, locate, spawn and delete robots and objects; pause, step and reset.
 
 Several sims may run on one wire, of which one spawns. Requests about entities go to all of them.
 """
 
 from collections.abc import Callable, Iterable, Iterator
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from holozen.bus import Bus
-from holozen.messages import Message, Pose, PoseStamped
+from holozen.messages import Message, Pose, PoseStamped, RobotDescriptionReply, RobotDescriptionRequest
 from holozen.messages import simulation_interfaces as si
 from holozen.transport.errors import NoReply, ServiceError
 
@@ -53,6 +53,31 @@ def delete(bus: Bus, name: str) -> None:
     _ask(bus, "delete_entity", si.DeleteEntityRequest(name), si.DeleteEntityReply, PATIENCE)
 
 
+def description(bus: Bus, name: str, number: int, timeout: float) -> RobotDescriptionReply | None:
+    """What the entity of this name and number looks like; None if it is not there now. Raises ServiceError."""
+    replies = bus.call_all("robot_description", RobotDescriptionRequest(name), RobotDescriptionReply, timeout)
+    return next((reply for reply in replies if reply.number == number), None)
+
+
+def set_playing(bus: Bus, playing: bool) -> list[str]:
+    """Let the time of all sims pass, or pause it. Returns the sims' warnings. Raises ServiceError."""
+    state = si.SimulationState.STATE_PLAYING if playing else si.SimulationState.STATE_PAUSED
+    request = si.SetSimulationStateRequest(si.SimulationState(state))
+    return _control(bus, "set_simulation_state", request, si.SetSimulationStateReply)
+
+
+def step(bus: Bus, steps: int, timeout: float = 0.0) -> list[str]:
+    """Let all sims, which are paused, make so many steps, for which they may take `timeout` seconds more than for
+    others. Returns their warnings. Raises ServiceError.
+    """
+    return _control(bus, "step_simulation", si.StepSimulationRequest(steps), si.StepSimulationReply, timeout)
+
+
+def reset(bus: Bus, scope: int = si.ResetSimulationRequest.SCOPE_DEFAULT) -> list[str]:
+    """Put all sims back to their start. Returns their warnings. Raises ServiceError."""
+    return _control(bus, "reset_simulation", si.ResetSimulationRequest(scope), si.ResetSimulationReply)
+
+
 def spawn(bus: Bus, name: str, text: str, at: Pose, namespace: str = "") -> tuple[str, list[str]]:
     """Spawn a robot or object from URDF or SDF text. Returns its name in the world, and the sim's warnings about the
     text. Raises ServiceError.
@@ -86,6 +111,13 @@ def is_taken(error: ServiceError) -> bool:
 def has_no_room(error: ServiceError) -> bool:
     """Whether a spawn failed because something else is at its place."""
     return _code(error) == si.SpawnEntityReply.INVALID_POSE
+
+
+def _control(bus: Bus, key: str, request: Message, reply: type[Any], more: float = 0.0) -> list[str]:
+    """Ask all sims, which may take `more` seconds, and return their warnings."""
+    ask_sims(bus, "get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply)
+    answers = bus.call_all(key, request, reply, PATIENCE + more)
+    return [warning for answer in answers if (warning := answer.result.error_message)]
 
 
 def _code(error: ServiceError) -> object:

@@ -1,4 +1,4 @@
-"""Rotations and rigid transforms in plain floats: no numpy, no messages, no clock.
+"""Rotations and rigid transforms in plain floats: no numpy, no clock.
 
 Metres and radians. Quaternions are x, y, z, w, as in geometry_msgs; those taken and returned have length 1 unless a
 docstring differs. Matrices, and rotations of whole arrays, are in holozen/robot/rotation.py.
@@ -6,6 +6,7 @@ docstring differs. Matrices, and rotations of whole arrays, are in holozen/robot
 
 import math
 from dataclasses import dataclass
+from typing import Protocol
 
 XYZ = tuple[float, float, float]
 XYZW = tuple[float, float, float, float]
@@ -100,12 +101,31 @@ def yaw(q: XYZW) -> float:
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
 
 
+class Vector(Protocol):
+    """A Point or Vector3 message, of ours or of rclpy."""
+
+    x: float
+    y: float
+    z: float
+
+
+class Quaternion(Vector, Protocol):
+    """A Quaternion message, of ours or of rclpy."""
+
+    w: float
+
+
 @dataclass(frozen=True, slots=True)
 class Transform:
     """A rigid transform, which takes points of a child frame into its parent: rotate, then translate."""
 
     translation: XYZ = (0.0, 0.0, 0.0)
     rotation: XYZW = IDENTITY
+
+    @classmethod
+    def of(cls, translation: Vector, rotation: Quaternion) -> "Transform":
+        """That of two messages: a Pose's position and orientation, or a Transform's translation and rotation."""
+        return cls((translation.x, translation.y, translation.z), (rotation.x, rotation.y, rotation.z, rotation.w))
 
     def __matmul__(self, inner: "Transform") -> "Transform":
         """The composition: `inner` is applied first."""

@@ -191,8 +191,7 @@ class Watcher:
         while (received := self._odom.try_recv()) is not None:
             if received.message is not None:
                 name = received.sample.key.removesuffix("odom").removesuffix("/")
-                at = received.message.pose.pose
-                self._move(name, at.position.x, at.position.y, at.orientation.yaw())
+                self._move(name, *received.message.pose.pose.planar())
 
     def plane(self) -> Plane:
         """The current state to draw."""

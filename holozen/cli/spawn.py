@@ -286,31 +286,26 @@ def _driven(candidate: Candidate, drive: str) -> Candidate:
 
 def _chosen(model: "RobotModel", place: Place) -> "Pose":
     """The requested pose, else that of the file; on the ground unless either gives a height."""
+    from holozen.messages import Pose
     from holozen.robot.rigid import lowest
+    from holozen.rotation import from_rpy
 
     own = Place(*model.pose.xyz, *model.pose.rpy)
     x, y, z, *angles = (_first(getattr(place, part.name), getattr(own, part.name)) for part in fields(Place))
     roll, pitch, yaw = angles
     if place.z is None and own.z == 0:
         z = -lowest(model, (roll, pitch, yaw))
-    return _message((x, y, z), (roll, pitch, yaw))
+    return Pose.of((x, y, z), from_rpy(roll, pitch, yaw))
 
 
 def _kept(model: "RobotModel", old: "Pose") -> "Pose":
     """The pose of the replaced entity, raised if the new one would intersect the ground."""
     from holozen.robot.rigid import lowest
-    from holozen.rotation import to_rpy
+    from holozen.rotation import Transform, to_rpy
 
-    q, p = old.orientation, old.position
-    rpy = to_rpy((q.x, q.y, q.z, q.w))
-    return _message((p.x, p.y, max(p.z, -lowest(model, rpy))), rpy)
-
-
-def _message(xyz: tuple[float, float, float], rpy: tuple[float, float, float]) -> "Pose":
-    from holozen.messages import Point, Pose, Quaternion
-    from holozen.rotation import from_rpy
-
-    return Pose(Point(*xyz), Quaternion(*from_rpy(*rpy)))
+    at = Transform.of(old.position, old.orientation)
+    x, y, z = at.translation
+    return old.of((x, y, max(z, -lowest(model, to_rpy(at.rotation)))), at.rotation)
 
 
 def _first(value: float | None, other: float | None) -> float:

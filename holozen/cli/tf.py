@@ -36,9 +36,8 @@ class Frames:
     def take(self, message: TFMessage, static: bool) -> None:
         """Take in a message of `tf` or `tf_static`."""
         for each in message.transforms:
-            at, turn, stamp = each.transform.translation, each.transform.rotation, each.header.stamp
-            rigid = Transform((at.x, at.y, at.z), (turn.x, turn.y, turn.z, turn.w))
-            seconds = 0.0 if static else stamp.sec + stamp.nanosec * 1e-9
+            rigid = Transform.of(each.transform.translation, each.transform.rotation)
+            seconds = 0.0 if static else each.header.stamp.seconds()
             parent, child = (name.removeprefix("/") for name in (each.header.frame_id, each.child_frame_id))
             self._parents[child] = parent, rigid, seconds
 

@@ -82,6 +82,15 @@ class Pose(Message):
     position: Point = field(default_factory=Point)
     orientation: Quaternion = field(default_factory=Quaternion)
 
+    @classmethod
+    def of(cls, position: tuple[float, float, float], orientation: tuple[float, float, float, float]) -> "Pose":
+        """x, y, z in m, and a quaternion x, y, z, w. The way back is `holozen.rotation.Transform.of`."""
+        return cls(Point(*position), Quaternion(*orientation))
+
+    def planar(self) -> tuple[float, float, float]:
+        """x and y in m, and the rotation about z in radians."""
+        return self.position.x, self.position.y, self.orientation.yaw()
+
 
 class PoseStamped(Message):
     header: Header = field(default_factory=Header)

@@ -3,7 +3,7 @@
 from typing import Any
 
 from holozen.ros.generated import find
-from holozen.rotation import Transform, multiply, rotate
+from holozen.rotation import Transform, rotate
 
 __all__ = [
     "do_transform_point", "do_transform_pose", "do_transform_pose_stamped",
@@ -14,7 +14,8 @@ __all__ = [
 def do_transform_point(point: Any, transform: Any) -> Any:
     """A PointStamped in the frame of a TransformStamped."""
     there = _stamped("PointStamped", transform)
-    there.point = _point(point.point, _transform(transform))
+    p, there.point = point.point, find("geometry_msgs/msg/Point")()
+    there.point.x, there.point.y, there.point.z = _transform(transform).apply((p.x, p.y, p.z))
     return there
 
 
@@ -28,11 +29,10 @@ def do_transform_vector3(vector3: Any, transform: Any) -> Any:
 
 def do_transform_pose(pose: Any, transform: Any) -> Any:
     """A Pose (not stamped) in the frame of a TransformStamped."""
-    rigid = _transform(transform)
     there: Any = find("geometry_msgs/msg/Pose")()
-    there.position = _point(pose.position, rigid)
-    q, o = pose.orientation, there.orientation
-    o.x, o.y, o.z, o.w = multiply(rigid.rotation, (q.x, q.y, q.z, q.w))
+    moved = _transform(transform) @ Transform.of(pose.position, pose.orientation)
+    p, o = there.position, there.orientation
+    (p.x, p.y, p.z), (o.x, o.y, o.z, o.w) = moved.translation, moved.rotation
     return there
 
 
@@ -63,20 +63,13 @@ def transform_to_matrix(transform: Any) -> Any:
 
 
 def _transform(transform: Any) -> Transform:
-    t, q = transform.transform.translation, transform.transform.rotation
-    return Transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w))
+    return Transform.of(transform.transform.translation, transform.transform.rotation)
 
 
 def _stamped(name: str, transform: Any) -> Any:
     """A stamped message with the header of the transform."""
     there: Any = find(f"geometry_msgs/msg/{name}")()
     there.header.stamp, there.header.frame_id = transform.header.stamp, transform.header.frame_id
-    return there
-
-
-def _point(point: Any, rigid: Transform) -> Any:
-    there: Any = find("geometry_msgs/msg/Point")()
-    there.x, there.y, there.z = rigid.apply((point.x, point.y, point.z))
     return there
 
 

@@ -8,14 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from holozen.messages import Exposure
-from holozen.messages import Pose as PoseMessage
 from holozen.process import quiet
 from holozen.robot.description import Appearance
 from holozen.robot.errors import RobotError
 from holozen.robot.meshes import file_in
 from holozen.robot.model import Pose, Shape
 from holozen.robot.rigid import Frame
-from holozen.rotation import XYZ, XYZW, rotate
+from holozen.rotation import Transform, rotate
 
 Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
@@ -64,9 +63,9 @@ class Renderer:
     def render(self, exposure: Exposure) -> Picture:
         """The picture of an exposure."""
         self._place(exposure)
-        camera, (x, y, z), turned = exposure, *_at(exposure.pose)
-        ahead, up = rotate(turned, (1.0, 0.0, 0.0)), rotate(turned, (0.0, 0.0, 1.0))
-        view = bullet.computeViewMatrix((x, y, z), (x + ahead[0], y + ahead[1], z + ahead[2]), up)
+        camera, eye = exposure, Transform.of(exposure.pose.position, exposure.pose.orientation)
+        ahead, up = eye.apply((1.0, 0.0, 0.0)), rotate(eye.rotation, (0.0, 0.0, 1.0))
+        view = bullet.computeViewMatrix(eye.translation, ahead, up)
         across = math.tan(camera.field_of_view / 2)
         high = 2 * math.atan(across * camera.height / camera.width)
         near, far = camera.near, camera.far
@@ -90,8 +89,9 @@ class Renderer:
         for entity in exposure.entities:
             _, links = self._bodies.get(entity.name, (0, {}))
             for link, pose in zip(entity.links, entity.poses, strict=True):
+                at = Transform.of(pose.position, pose.orientation)
                 for body in links.get(link, ()):
-                    bullet.resetBasePositionAndOrientation(body, *_at(pose), self._world)
+                    bullet.resetBasePositionAndOrientation(body, at.translation, at.rotation, self._world)
 
     def _made(self, shape: Shape) -> list[int]:
         """The body of a shape in the frame of its link; none for one that cannot be drawn."""
@@ -130,8 +130,3 @@ class Renderer:
     def close(self) -> None:
         """Free the engine."""
         bullet.disconnect(self._world)
-
-
-def _at(pose: PoseMessage) -> tuple[XYZ, XYZW]:
-    p, q = pose.position, pose.orientation
-    return (p.x, p.y, p.z), (q.x, q.y, q.z, q.w)

@@ -10,7 +10,8 @@ import numpy as np
 
 from holozen.bus import Bus, Publisher, Subscription
 from holozen.console import report
-from holozen.messages import CameraInfo, Exposure, Header, Image, RobotDescriptionReply, RobotDescriptionRequest
+from holozen.entities import description
+from holozen.messages import CameraInfo, Exposure, Header, Image
 from holozen.robot.description import read
 from holozen.robot.errors import RobotError
 from holozen.transport.errors import ServiceError
@@ -55,10 +56,8 @@ class Studio:
                 continue
             self._missing[entity.number] = time.monotonic()
             try:
-                request = RobotDescriptionRequest(entity.name)
-                for reply in self._bus.call_all("robot_description", request, RobotDescriptionReply, PATIENCE):
-                    if reply.number == entity.number:
-                        self._renderer.add(entity.name, entity.number, read(reply.description))
+                if found := description(self._bus, entity.name, entity.number, PATIENCE):
+                    self._renderer.add(entity.name, entity.number, read(found.description))
             except (ServiceError, RobotError) as error:
                 report(f"camera: {entity.name} cannot be seen: {error}")
 

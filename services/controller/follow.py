@@ -128,9 +128,8 @@ class Follower:
             if reason := received.error or (received.message and self._refusal(received.message)):
                 self._report(f"goal_pose: refused: {reason}")
             elif goal := received.message:
-                at = goal.pose.position
-                self._wanted = (at.x, at.y, goal.pose.orientation.yaw())
-                self._report(f"goal_pose: ({at.x:.2f}, {at.y:.2f}) by {received.sample.source or 'an unknown sender'}")
+                self._wanted = x, y, _ = goal.pose.planar()
+                self._report(f"goal_pose: ({x:.2f}, {y:.2f}) by {received.sample.source or 'an unknown sender'}")
                 self._policy.invited()
         return self._wanted is not None
 
@@ -180,7 +179,7 @@ class Follower:
             if odom is None:
                 leg = None if self._policy.yielded_to else leg  # a new leg begins where the other source left the robot
                 continue
-            stamp, pose = odom.header.stamp.seconds(), _pose(odom)
+            stamp, pose = odom.header.stamp.seconds(), odom.pose.pose.planar()
             if leg is None or stamp < before:  # the first odom, or those of a restarted sim
                 leg, before = Leg(pose, goal, stamp), stamp - PERIOD
             leg.update(pose, stamp)
@@ -208,7 +207,7 @@ class Follower:
         elif not fresh:
             self.halt()
             self._report_hold("waiting for odom: it is stale, or none was received")
-        elif odom is None or not all(abs(value) <= MAX_DISTANCE for value in _pose(odom)):
+        elif odom is None or not all(abs(value) <= MAX_DISTANCE for value in odom.pose.pose.planar()):
             self.halt()
             self._report_hold(f"waiting for odom: its pose is more than {MAX_DISTANCE:g} m away")
         else:
@@ -230,8 +229,3 @@ class Follower:
         elif self._reported and not text:
             self._report("continues")
         self._reported = text
-
-
-def _pose(odom: Odometry) -> Pose:
-    pose = odom.pose.pose
-    return pose.position.x, pose.position.y, pose.orientation.yaw()

@@ -8,7 +8,7 @@ from itertools import chain, count
 
 from holozen.bus import Bus
 from holozen.console import report
-from holozen.messages import Point, Pose, Quaternion, SeenEntity
+from holozen.messages import Pose, SeenEntity
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.errors import RobotError
 from holozen.robot.model import Camera, RobotModel
@@ -390,5 +390,5 @@ def _motions(entity: Entity) -> Motions:
 
 def _seen(entity: Entity) -> SeenEntity:
     motions = _motions(entity)
-    poses = [Pose(Point(*at.xyz), Quaternion(*at.rotation)) for at in motions.values()]
+    poses = [Pose.of(at.xyz, at.rotation) for at in motions.values()]
     return SeenEntity(entity.name, entity.number, list(motions), poses)

@@ -16,7 +16,7 @@ from .command.inputs import CommandStats, ForceInput, JointInput, TwistInput
 from .command.motion import JointMotion
 from .command.time import CommandTime
 from .io.robot_services import RobotServices
-from .io.sensor_topics import Moment, Motions, SensorTopics, Surroundings
+from .io.sensor_topics import Motions, SensorTopics, Step, Surroundings
 from .io.topics import JOINT_RATE, NONE, DriveTopics, ForceTopics, JointTopics, Schedule
 from .io.wait_set import Reader
 from .physics.jointed import Forces, JointedBody, Motors
@@ -228,7 +228,7 @@ class Robot:
         self.publishes_at = min(self._odom_due.next, max(self._joints_due.next, self._joints_at))
         if self._sensors:
             if time >= self._sensors.next and not at_once:  # while time does not pass there is nothing new to see
-                self._sensors.publish(Moment(time, round(time / dt)), self.motions)
+                self._sensors.publish(Step(time, round(time / dt)), self.motions)
             self.publishes_at = min(self.publishes_at, self._sensors.next)
         if self.body.glides and not joints and wanted == NONE:
             return  # else encoders, and the wheels for the eye, count on observers

@@ -57,11 +57,10 @@ class Track:
 
     def see(self, odom: Odometry, now: float) -> None:
         """Take the latest odom, read at `now`."""
-        position, stamp = odom.pose.pose.position, odom.header.stamp.seconds()
-        yaw = odom.pose.pose.orientation.yaw()
-        if not all(abs(value) < FARTHEST for value in (position.x, position.y, yaw)):
+        pose, stamp = odom.pose.pose.planar(), odom.header.stamp.seconds()
+        if not all(abs(value) < FARTHEST for value in pose):
             return
-        self.pose = position.x, position.y, yaw
+        self.pose = pose
         if not self.trail or math.dist(self.trail[-1], self.pose[:2]) > TRAIL_STEP:
             self.trail.append(self.pose[:2])
         if self._times and stamp < self._times[-1][0]:

@@ -139,13 +139,8 @@ class Drivers:
 
 def in_odometry(point: tuple[float, float, float], true_pose: Pose, odometry: Pose) -> tuple[float, float, float]:
     """A point of the world, in m, in the frame of a robot's odometry, which may have begun elsewhere, and drift."""
-    true, measured = _transform(true_pose), _transform(odometry)
+    true, measured = (Transform.of(pose.position, pose.orientation) for pose in (true_pose, odometry))
     parts = zip(true.translation + true.rotation, measured.translation + measured.rotation, strict=True)
     if max(abs(a - b) for a, b in parts) < NEAR:
         return point
     return (measured @ true.inverse()).apply(point)
-
-
-def _transform(pose: Pose) -> Transform:
-    p, q = pose.position, pose.orientation
-    return Transform((p.x, p.y, p.z), (q.x, q.y, q.z, q.w))

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import viser
 
 from holozen.bus import Bus, Subscription
+from holozen.entities import description
 from holozen.limits import STOP
 from holozen.messages import (
     GetSceneReply,
@@ -17,14 +18,13 @@ from holozen.messages import (
     Point,
     Quaternion,
     RobotDescriptionReply,
-    RobotDescriptionRequest,
     SceneEntity,
 )
 from holozen.messages import Pose as PoseMessage
 from holozen.robot.errors import RobotError
 from holozen.robot.model import Joint
 from holozen.robot.rigid import moved_by
-from holozen.rotation import XYZ, XYZW, from_rpy
+from holozen.rotation import XYZ, XYZW, Transform, from_rpy
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Endpoint
 from holozen.wire import key_for
@@ -84,10 +84,10 @@ class Shown:
 
     def place(self, pose: PoseMessage) -> None:
         """Move it to a pose in the world."""
-        p, q = pose.position, pose.orientation
-        at = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+        there = Transform.of(pose.position, pose.orientation)
+        at = (*there.translation, *there.rotation)
         if not self._at or max(abs(a - b) for a, b in zip(at, self._at, strict=True)) > SEEN:
-            self._at, self._frame.position, self._frame.wxyz = at, at[:3], (q.w, q.x, q.y, q.z)
+            self._at, self._frame.position, self._frame.wxyz = at, there.translation, _wxyz(there.rotation)
 
     def turn(self, joints: list[float]) -> None:
         """Move its joints to these positions, in rad or m."""
@@ -289,16 +289,11 @@ class Scene:
         if not entity.number:
             return RobotDescriptionReply()
         try:
-            replies = self._bus.call_all(
-                "robot_description", RobotDescriptionRequest(entity.name), RobotDescriptionReply, 5.0
-            )
+            found = description(self._bus, entity.name, entity.number, 5.0)
+            if found:
+                appearance(found.description)  # here, since it takes a while: it is kept for `draw`
         except ServiceError:
             return None
-        found = next((reply for reply in replies if reply.number == entity.number), None)
-        if found is None:
-            return None
-        try:
-            appearance(found.description)  # here, since it takes a while: it is kept for `draw`
         except RobotError:
             return RobotDescriptionReply()
         return found

@@ -10,15 +10,21 @@ import viser
 
 from holozen import data, entities
 from holozen.bus import Bus
-from holozen.messages import Message, Point, Pose, Quaternion
+from holozen.messages import Point, Pose, Quaternion
 from holozen.messages import simulation_interfaces as si
-from holozen.messages.simulation_interfaces import SimulationState as State
 
 from .drive import Driver
 from .scene import Scene, Shown
 
 PATIENCE = 5.0  # s for the sims to answer
 STEPS = 24  # of the sim, that one click makes: a tenth of a second by default
+TIME: dict[str, tuple[Callable[[Bus], list[str]], str]] = {
+    "Pause": (lambda bus: entities.set_playing(bus, False), "paused"),
+    "Play": (lambda bus: entities.set_playing(bus, True), "played"),
+    "Step": (lambda bus: entities.step(bus, STEPS), f"{STEPS} steps"),
+    "Reset": (entities.reset, "reset"),
+}
+"""By button: what it does to the time of the sims, and the line that says so."""
 FARTHEST = 100.0  # m; a click near the horizon is no goal
 GIZMO = 1.5  # the scale of the handles, whose arrows are about half as long in m
 Attempt = Callable[[Callable[[], str]], None]
@@ -40,7 +46,7 @@ class WorldTab:
         goal = add.add_button("Set a goal", hint="then click on the ground; a controller drives there")
         goal.on_click(self._await_click)
         self._moves = add.add_checkbox("Move by handles", False)
-        time = add.add_button_group("", ("Pause", "Play", "Step", "Reset"), hint="the time of the sim")
+        time = add.add_button_group("", tuple(TIME), hint="the time of the sim")
         time.on_click(lambda _: attempt(lambda: self._time(time.value)))
         files = {path.name.partition(".")[0]: path for path in sorted(data.find("urdf").glob("*.xacro"))}
         files.pop("materials", None)
@@ -114,18 +120,10 @@ class WorldTab:
         self._bus.call_all("set_entity_state", request, si.SetEntityStateReply, PATIENCE)
         return f"{name} was moved to {pose.position.x:.2f} {pose.position.y:.2f}"
 
-    def _time(self, verb: str) -> str:
+    def _time(self, button: str) -> str:
         """Pause, play, step or reset the sims."""
-        state = {"Pause": State.STATE_PAUSED, "Play": State.STATE_PLAYING}
-        asks: dict[str, tuple[str, Message, type[Any], str]] = {
-            **{verb: ("set_simulation_state", si.SetSimulationStateRequest(State(state[verb])),
-                      si.SetSimulationStateReply, f"{verb.lower()}ed") for verb in state},
-            "Step": ("step_simulation", si.StepSimulationRequest(STEPS), si.StepSimulationReply, f"{STEPS} steps"),
-            "Reset": ("reset_simulation", si.ResetSimulationRequest(), si.ResetSimulationReply, "reset"),
-        }  # fmt: skip
-        key, request, reply, done = asks[verb]
-        answers = self._bus.call_all(key, request, reply, PATIENCE)
-        return next((answer.result.error_message for answer in answers if answer.result.error_message), done)
+        act, done = TIME[button]
+        return next(iter(act(self._bus)), done)
 
 
 def on_ground(origin: tuple[float, ...], direction: tuple[float, ...]) -> tuple[float, float] | None:

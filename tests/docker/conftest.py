@@ -49,13 +49,8 @@ def image(engine: None) -> Iterator[str]:
 @pytest.fixture(scope="module")
 def stack(image: str) -> Iterator[Stack]:
     """Healthy containers of all services but the teleop, for the tests of a file."""
-    stack = Stack(image)
-    try:
-        stack.up()
+    with Stack(image) as stack:
         yield stack
-    finally:
-        print(*(docker("logs", container) for container in stack.containers()), sep="\n")  # pytest shows it on failure
-        stack.down()
 
 
 @pytest.fixture

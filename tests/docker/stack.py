@@ -46,6 +46,20 @@ class Stack:
         """End and remove all that `up` made, one-off containers too."""
         self.compose("down", "--volumes", "--remove-orphans", "--timeout", "10")
 
+    def __enter__(self) -> "Stack":
+        try:
+            self.up()
+        except BaseException as error:
+            self.__exit__(error)
+            raise
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        try:
+            print(*(docker("logs", container) for container in self.containers()), sep="\n")  # shown on failure
+        finally:
+            self.down()
+
     def container(self, service: str) -> str:
         """The id of a service's container, running or not."""
         return self._ids(f"label=com.docker.compose.service={service}", "label=com.docker.compose.oneoff=False")[0]

@@ -13,7 +13,7 @@ from holozen.testing import wait_for
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, NoReply
 
-from .stack import SERVICES, Stack, Watcher, docker
+from .stack import SERVICES, Stack, Watcher
 
 pytestmark = [pytest.mark.needs("docker", "docker-compose"), pytest.mark.timeout(1800)]
 
@@ -32,13 +32,8 @@ def stack(image: str, root: Path) -> Iterator[Stack]:
     user = os.getuid() or 10001  # not as root, whoever runs the tests
     for path in [root, *root.rglob("*")]:
         os.chown(path, user, -1)
-    stack = Stack(image, "docker-compose.secure.yml", HOLOZEN_SECURE=str(root), HOLOZEN_USER=f"{user}:{user}")
-    try:
-        stack.up()
+    with Stack(image, "docker-compose.secure.yml", HOLOZEN_SECURE=str(root), HOLOZEN_USER=f"{user}:{user}") as stack:
         yield stack
-    finally:
-        print(*(docker("logs", container) for container in stack.containers()), sep="\n")  # pytest shows it on failure
-        stack.down()
 
 
 def as_member(stack: Stack, root: Path, name: str) -> Bus:

@@ -188,8 +188,7 @@ def time_of(odom: Odometry) -> float:
 
 def place(odom: Odometry) -> tuple[float, float, float]:
     """x, y in metres and yaw in radians."""
-    pose = odom.pose.pose
-    return pose.position.x, pose.position.y, pose.orientation.yaw()
+    return odom.pose.pose.planar()
 
 
 def speeds(odom: Odometry) -> tuple[float, float, float]:

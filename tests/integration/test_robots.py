@@ -113,8 +113,7 @@ class Driven:
 
     def truth(self) -> Planar:
         """Where it is in the world."""
-        pose = entities.pose(self.sim.bus, self.name)
-        return pose.position.x, pose.position.y, pose.orientation.yaw()
+        return entities.pose(self.sim.bus, self.name).planar()
 
 
 @pytest.fixture(scope="module", params=FILES)

@@ -158,8 +158,8 @@ class Buffer(HelpfulAttributes):
         return "\n".join(lines) + "\n"
 
     def _put(self, transform: Any, static: bool) -> None:
-        t, q = transform.transform.translation, transform.transform.rotation
-        rigid, header = Transform((t.x, t.y, t.z), (q.x, q.y, q.z, q.w)), transform.header
+        rigid = Transform.of(transform.transform.translation, transform.transform.rotation)
+        header = transform.header
         with self._changed:
             self._core.put(header.frame_id, transform.child_frame_id, nanoseconds(header.stamp), rigid, static)
             self._changed.notify_all()

@@ -13,9 +13,7 @@ from holozen.messages import (
     GetSceneReply,
     GetSceneRequest,
     Header,
-    Point,
     Pose,
-    Quaternion,
     RobotDescriptionReply,
     RobotDescriptionRequest,
     SceneEntity,
@@ -30,11 +28,12 @@ from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.xacro import uses_xacro
+from holozen.rotation import Transform
 from holozen.transport.services import answer_in_turn
 from holozen.wire import key_for
 
 from ..entities import Entities, Entity, EntityError, Place, checked_place
-from ..physics.engine import Rotation, Vector
+from ..physics.engine import Vector
 from ..robot import command_key
 from ..shard import Share
 
@@ -168,12 +167,9 @@ class EntityServices:
     def state(self, request: si.GetEntityStateRequest) -> si.GetEntityStateReply:
         """The pose and velocity of an entity in the world."""
         body = self._named(request.entity).body
-        position, rotation = body.pose()
         linear, angular = body.twist()
         header = Header(Time.of(self._entities.time), "world")
-        state = si.EntityState(
-            header, Pose(Point(*position), Quaternion(*rotation)), Twist(Vector3(*linear), Vector3(*angular))
-        )
+        state = si.EntityState(header, Pose.of(*body.pose()), Twist(Vector3(*linear), Vector3(*angular)))
         return si.GetEntityStateReply(_OK, state=state)
 
     def scene(self, _request: GetSceneRequest) -> GetSceneReply:
@@ -202,14 +198,13 @@ class EntityServices:
 
 
 def _seen(entity: Entity) -> SceneEntity:
-    position, rotation = entity.body.pose()
     drive = entity.model.drive if entity.robot else None
     return SceneEntity(
         entity.name,
         entity.number,
         command_key(entity.model, entity.prefix) if entity.robot else "",
         key_for(drive.odometry_topic, entity.prefix) if drive else "",
-        Pose(Point(*position), Quaternion(*rotation)),
+        Pose.of(*entity.body.pose()),
         entity.robot.joint_positions if entity.robot else [],
     )
 
@@ -237,9 +232,8 @@ def _place(header: Header, pose: Pose) -> Place:
         raise EntityError(
             si.SpawnEntityReply.INVALID_POSE, f"frame {header.frame_id[:80]!r}: give the pose in the frame 'world'"
         )
-    q = pose.orientation
-    rotation: Rotation = (q.x, q.y, q.z, q.w)
-    return checked_place((pose.position.x, pose.position.y, pose.position.z), rotation)
+    place = Transform.of(pose.position, pose.orientation)
+    return checked_place(place.translation, place.rotation)
 
 
 def _vector(v: Vector3) -> Vector:

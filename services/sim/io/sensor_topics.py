@@ -14,7 +14,6 @@ from holozen.messages import (
     Header,
     LaserScan,
     Message,
-    Point,
     PointCloud2,
     PointField,
     Pose,
@@ -39,11 +38,11 @@ Motions = Mapping[str, Motion]
 """Those of a robot's links, by name."""
 
 
-class Moment(NamedTuple):
-    """A step of the world at which sensors measure: `time` in s, and the number of `steps` until then."""
+class Step(NamedTuple):
+    """A step of the world after which sensors measure: `time` in s, and its `number`."""
 
     time: float
-    steps: int
+    number: int
 
 
 class Surroundings(NamedTuple):
@@ -80,14 +79,14 @@ class SensorTopics:
     def _add(self, topic: "LidarTopic | ImuTopic | CameraTopic") -> None:
         self._all.append((topic, Schedule(topic.sensor.rate, self._phase)))
 
-    def publish(self, moment: Moment, motions: Callable[[], Motions]) -> None:
+    def publish(self, step: Step, motions: Callable[[], Motions]) -> None:
         """Publish what is due, and wanted."""
-        due = [topic for topic, schedule in self._all if schedule.due(moment.time)]
+        due = [topic for topic, schedule in self._all if schedule.due(step.time) and topic.wanted]
         self.next = min((schedule.next for _, schedule in self._all), default=math.inf)
-        if any(topic.needs_motion for topic in due):
+        if due:
             now = motions()
             for topic in due:
-                topic.publish(moment, now)
+                topic.publish(step, now)
 
     def start_anew(self) -> None:
         """The world was reset: all are due at once, and know nothing of before."""
@@ -129,20 +128,18 @@ class LidarTopic:
         self._publisher: Publisher[Any] = bus.publisher(key, kind)
 
     @property
-    def needs_motion(self) -> bool:
-        """Whether `publish` has something to do."""
+    def wanted(self) -> bool:
+        """Whether anyone wants what `publish` sends."""
         return self._publisher.wanted
 
-    def publish(self, moment: Moment, motions: Motions) -> None:
+    def publish(self, step: Step, motions: Motions) -> None:
         """Look, and publish it."""
-        if not self._publisher.wanted:
-            return
         lidar, at = self._lidar, motions[self.sensor.link].at(self._xyz, self._rotation)
         ranges = self._around.look().ranges(at.xyz, at.rotation, self._directions, lidar.near, lidar.far, self._own)
         if lidar.noise.mean or lidar.noise.stddev:
-            noise = self._draw.noise(moment.steps, [lidar.noise], len(ranges))[0]
+            noise = self._draw.noise(step.number, [lidar.noise], len(ranges))[0]
             ranges = np.where(np.isfinite(ranges), np.clip(ranges + noise, lidar.near, lidar.far), ranges)
-        header = Header(Time.of(moment.time), self._frame)
+        header = Header(Time.of(step.time), self._frame)
         self._publisher.put(self._message(header, self.sensor, lidar, self._directions, ranges))
 
     def start_anew(self) -> None:
@@ -207,27 +204,27 @@ class ImuTopic:
         self._publisher: Publisher[ImuMessage] = bus.publisher(key_for(sensor.topic, prefix), ImuMessage)
         self._before: tuple[float, XYZ] | None = None  # s, and the velocity then
 
-    needs_motion = True  # also when it is not wanted: what is measured must not depend on readers
+    wanted = True  # also when nobody subscribes: what is measured must not depend on readers
 
-    def publish(self, moment: Moment, motions: Motions) -> None:
+    def publish(self, step: Step, motions: Motions) -> None:
         """Measure, and publish it."""
         at = motions[self.sensor.link].at(self._xyz, self._rotation)
-        before, self._before = self._before, (moment.time, at.linear)
+        before, self._before = self._before, (step.time, at.linear)
         if not self._publisher.wanted:
             return
         changes = [0.0] * 3
-        if before and moment.time > before[0]:
-            seconds = moment.time - before[0]
+        if before and step.time > before[0]:
+            seconds = step.time - before[0]
             changes = [(now - then) / seconds for now, then in zip(at.linear, before[1], strict=True)]
         back = conjugate(at.rotation)
         ax, ay, az = (change - pull for change, pull in zip(changes, self._around.world.gravity, strict=True))
         turn, force = rotate(back, at.angular), rotate(back, (ax, ay, az))
-        noise = self._draw.noise(moment.steps, self._noises)[:, 0]
+        noise = self._draw.noise(step.number, self._noises)[:, 0]
         values = [value + extra for value, extra in zip((*turn, *force), noise.tolist(), strict=True)]
         oriented = self._imu.oriented
         self._publisher.put(
             ImuMessage(
-                Header(Time.of(moment.time), self._frame),
+                Header(Time.of(step.time), self._frame),
                 Quaternion(*at.rotation) if oriented else Quaternion(),
                 [0.0 if oriented else -1.0, *[0.0] * 8],  # -1: not measured
                 Vector3(*values[:3]), _covariance(self._imu.rate), Vector3(*values[3:]),
@@ -255,22 +252,19 @@ class CameraTopic:
         self._image, self._info, self._depth = (key and key_for(key, prefix) for key in keys)
 
     @property
-    def needs_motion(self) -> bool:
-        """Whether `publish` has something to do."""
+    def wanted(self) -> bool:
+        """Whether anyone wants what `publish` sends."""
         return self._cameras.wanted
 
-    def publish(self, moment: Moment, motions: Motions) -> None:
+    def publish(self, step: Step, motions: Motions) -> None:
         """Send what it sees."""
-        if not self._cameras.wanted:
-            return
         camera, around = self._camera, self._around
         at = motions[self.sensor.link].at(self._xyz, self._rotation)
         self._cameras.expose(
             Exposure(
-                Header(Time.of(moment.time), self._frame), self._image, self._info, self._depth, camera.width,
+                Header(Time.of(step.time), self._frame), self._image, self._info, self._depth, camera.width,
                 camera.height, camera.field_of_view, camera.near, camera.far, camera.encoding, camera.noise.mean,
-                camera.noise.stddev, around.seed % 2**64, Pose(Point(*at.xyz), Quaternion(*at.rotation)),
-                around.world.ground,
+                camera.noise.stddev, around.seed % 2**64, Pose.of(at.xyz, at.rotation), around.world.ground,
                 around.seen(),
             )
         )  # fmt: skip

@@ -13,7 +13,6 @@ from holozen.messages import (
     Header,
     JointState,
     Odometry,
-    Point,
     Pose,
     PoseWithCovariance,
     Quaternion,
@@ -145,7 +144,7 @@ def odometry(
     header: Header, child: str, position: XYZ, rotation: XYZW, velocity: Planar, variances: list[float]
 ) -> Odometry:
     """The world pose, and the velocity in the body frame."""
-    pose = Pose(Point(*position), Quaternion(*rotation))
+    pose = Pose.of(position, rotation)
     return Odometry(
         header, child, PoseWithCovariance(pose, variances), TwistWithCovariance(Twist.planar(*velocity), variances)
     )
