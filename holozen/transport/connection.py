@@ -13,6 +13,7 @@ from typing import Any
 from holozen.flags import refused
 from holozen.suggest import suggest
 from holozen.transport.errors import BusError
+from holozen.transport.samples import PRIORITIES
 
 PORT = 7447  # Zenoh's own; the first of domain 0
 DOMAIN_PORTS = 10  # from the first port of a domain to that of the next
@@ -183,6 +184,9 @@ _ALWAYS: dict[str, object] = {
     "listen/timeout_ms": 0,
     "listen/exit_on_failure": True,
     "transport/link/tx/lease": LEASE,
+    # Zenoh's 2 are full when a busy machine holds up the sending thread for some milliseconds, and the next command is
+    # dropped. 16 is its maximum.
+    "transport/link/tx/queue/size": dict.fromkeys(["control", *map(str.lower, PRIORITIES)], 16),
 }
 
 

@@ -1,7 +1,9 @@
 """A publisher writes messages, and answers a get with the last one."""
 
+import json
 import math
 import os
+import signal
 import sys
 import threading
 
@@ -134,3 +136,36 @@ def test_many_gets_of_the_last_value_do_not_hold_up_the_link(wire: Wire) -> None
             wait_for(lambda: not sending.is_alive(), within=20)
             assert "awake" not in holder.out
             assert len(kept) == 1000
+
+
+COUNTING = """
+import json, sys, zenoh
+from holozen.bus import Bus
+from holozen.messages import Twist
+from holozen.transport.connection import Connection
+connection = Connection(connect=tuple(json.loads(sys.argv[1])), listen=(), cfg=(("transport/link/tx/lease", "60000"),))
+with Bus("reader", connection) as bus:
+    bulk = bus.session.declare_subscriber("bulk", zenoh.handlers.RingChannel(1))
+    commands = bus.subscribe("cmd_vel", Twist, depth=100)
+    print("ready", flush=True)
+    while (speed := commands.recv().message.linear.x) < 99:
+        print("speed", speed, flush=True)
+"""
+
+
+def test_a_burst_of_commands_passes_a_link_that_is_held_up(wire: Wire) -> None:
+    """Zenoh drops what its queue cannot hold; its own default holds two."""
+    writer = wire.bus("writer")
+    commands: Publisher[Twist] = writer.publisher("cmd_vel", Twist, "INTERACTIVE_HIGH")
+    bulk = writer.session.declare_publisher("bulk")
+    with Process([sys.executable, "-c", COUNTING, json.dumps([wire.endpoint])]) as reader:
+        reader.wait_for_line("ready")
+        wait_for(lambda: commands.matched and bulk.matching_status.matching)
+        reader.signal(signal.SIGSTOP)
+        for _ in range(400):  # more than the system's buffers hold, so the sending thread waits
+            bulk.put(bytes(60_000))
+        for number in range(10):
+            commands.put(Twist.planar(float(number)))
+        reader.signal(signal.SIGCONT)
+        reader.wait_for_line("speed 9.0")
+        assert reader.out.split("\n")[1:-1] == [f"speed {float(number)}" for number in range(10)]
