@@ -26,6 +26,7 @@ MEASURED = 1.0  # s of real time over which the real-time factor is measured
 REPORT_EVERY = 60.0  # s between two reports of overruns
 POLL = 0.02  # s; how often requests are read, and commands while no step is due
 READ_EVERY = 0.003  # s between two looks for commands and stops, and for nodes that left, however short the steps
+READ_SHARE = 0.05  # of the time that these looks take at most, unless they would be more than POLL apart
 STALL = 0.1  # s without reading; commands may have waited this long
 DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring old commands
 
@@ -126,7 +127,6 @@ class Loop:
         is_asked = steps is not None and not steps.may_begin
         if now < self._reads_at and not is_asked and not self._more_wait:
             return
-        self._reads_at = now + READ_EVERY
         if now - self._last_read > STALL:
             self._before_stall, self._trusted_from = self._last_read, now + DISTRUST
         since = self._last_read if now >= self._trusted_from else self._before_stall
@@ -145,6 +145,8 @@ class Loop:
         if now - self._served >= (HELD_POLL if self.simulation.is_held else POLL):
             self._more_wait = sum(answer() for answer in self.answers) > 0  # each of them answers
             self._served = -math.inf if self._more_wait else now
+        took = time.monotonic() - now
+        self._reads_at = now + max(READ_EVERY, min(took / READ_SHARE, POLL))
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

@@ -31,24 +31,29 @@ class WaitSet:
 
     def __init__(self) -> None:
         self._readers: list[Reader] = []
+        self._listens: list[Callable[[], Any]] = []  # theirs, apart: hundreds are called every few milliseconds
         self._unfinished: list[Reader] = []
 
     def add(self, readers: Iterable[Reader]) -> None:
         """Read these from now on."""
-        self._readers += readers
+        self._set([*self._readers, *readers])
 
     def remove(self, readers: Iterable[Reader]) -> None:
         """Read these no longer."""
         gone = set(readers)
-        self._readers = [reader for reader in self._readers if reader not in gone]
+        self._set([reader for reader in self._readers if reader not in gone])
         self._unfinished = [reader for reader in self._unfinished if reader not in gone]
+
+    def _set(self, readers: list[Reader]) -> None:
+        self._readers, self._listens = readers, [reader.listen for reader in readers]
 
     def read(self, moment: Moment) -> None:
         """Read what waits, in the order of the readers. Each is read as it is found: a request may depend on another
         that arrives in between.
         """
         self._unfinished = [reader for reader in self._unfinished if reader.read(None, moment)]
-        for reader in self._readers:
-            listen, read = reader
-            if (first := listen()) is not None and read(first, moment) and reader not in self._unfinished:
-                self._unfinished.append(reader)
+        for index, listen in enumerate(self._listens):
+            if (first := listen()) is not None:
+                reader = self._readers[index]
+                if reader.read(first, moment) and reader not in self._unfinished:
+                    self._unfinished.append(reader)

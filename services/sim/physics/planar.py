@@ -19,7 +19,8 @@ PUSH = 3.0  # m/s^2 with which it pushes an obstacle at most
 TIPPING = 0.2  # rad/s; an obstacle that tips it faster takes the load, and so the grip, from its wheels
 UPRIGHT_PUSH = 0.3  # share of the push at its centre of mass that would begin to tip it
 LOOK = 12  # steps between two looks of a body around itself
-FAR = 3 * LOOK  # steps until the next look of one that glides, where nothing can come near it before
+ENOUGH = 4 * LOOK  # steps without anything near that need no closer look
+FAR = 8 * LOOK  # steps until the next look of one that glides, at most: where nothing can come near it before
 SKIN = 0.03  # m; what is closer counts as near, however slow
 BRISK = 1.0  # m/s that parts of other robots may be faster than their bodies
 GRADE = 0.1  # m/s to a multiple of which the fastest speed is rounded up: each rise lets all bodies look anew
@@ -27,6 +28,10 @@ SETTLED = 1e-5  # m and rad by which a body that has settled moves up or tilts b
 STEEP = 0.7  # of its upward axis along z; where it lies farther over, it turns about the vertical
 LANDED = 0.2  # m/s along its upward axis; with more it falls, or jumps
 STEADY = 1e-3  # m/s and rad/s of deviation from the commanded velocity
+
+
+Box = tuple[Vector, Vector]
+"""Its corners."""
 
 
 class Field:
@@ -72,10 +77,10 @@ class Field:
             self._fastest = _graded(max((*speeds, *(body.speed for body in self.bodies.values())), default=0.0))
         for body in self._looks.pop(self.steps, ()):
             if body.looks_at == self.steps and not body.is_removed:
-                self.let_look(body, body.look())
+                body.look()
 
     def let_look(self, body: "PlanarBody", steps: int) -> None:
-        """Let a body look around in that many steps, LOOK or FAR, or before: each has a turn of its own in LOOK."""
+        """Let a body look around in that many steps, LOOK or more, or before: each has a turn of its own in LOOK."""
         at = self.steps + steps - (self.steps + steps - body.number) % LOOK
         if body.looks_at != at:
             body.looks_at = at
@@ -87,13 +92,29 @@ class Field:
             if body.looks_at > self.steps + LOOK:
                 self.let_look(body, LOOK)
 
-    def margin(self, speed: float, steps: int = LOOK) -> float:
-        """The distance in m at which a body with this speed (m/s) has to beware of others for that many steps."""
+    def closing(self, speed: float) -> float:
+        """How fast in m/s a body with this speed and another may come nearer."""
         if speed > self._fastest:
             self._fastest = _graded(speed)
             self.hasten()
-        # The others may have moved since their own last looks.
-        return SKIN + (speed + 2 * self._fastest) * steps * self.step
+        return speed + self._fastest
+
+    def margin(self, speed: float) -> float:
+        """The distance in m within which others may come near a body with this speed (m/s) before its next look, also
+        where the engine has them at the place of their own last looks.
+        """
+        return SKIN + (self.closing(speed) + self._fastest) * FAR * self.step
+
+
+def _apart(one: Box, other: Box) -> float:
+    """The distance in m between two boxes."""
+    ((x, y, z), (x2, y2, z2)), ((u, v, w), (u2, v2, w2)) = one, other
+    return math.hypot(max(0.0, u - x2, x - u2), max(0.0, v - y2, y - v2), max(0.0, w - z2, z - w2))
+
+
+def _within(distance: float, way: float) -> int:
+    """The steps of that `way` in a distance, at most FAR."""
+    return int(min(FAR, max(0.0, distance) / way))
 
 
 def _graded(speed: float) -> float:
@@ -149,8 +170,9 @@ class PlanarBody(Body):
         self._may_glide = field.level is not None and not self.weightless
         self._glide: Glide | None = None
         self._commanded = STOP  # the last velocity of the drive
-        self.speed = 0.0  # m/s that any point of it may have at that
+        self.speed = 0.0  # m/s that any point of it has had at most since its last look
         self.looks_at = -1  # the step at which it looks around next
+        self._located = 0  # since which step the engine has it where it is, while it glides
         self._stood: tuple[float, ...] = ()  # height and upward axis at the last look
         self._held: tuple[float, float] | None = None  # the place to hold
         self._driven: tuple[float, float] | None = None  # the velocity of the centre that was set for the last step
@@ -160,46 +182,77 @@ class PlanarBody(Body):
                 number, link, lateralFriction=0, linearDamping=0, angularDamping=0, physicsClientId=world
             )
         bullet.changeDynamics(number, -1, localInertiaDiagonal=body.inertia, physicsClientId=world)
-        low, high = self.box()
-        self._reach = math.dist(low, high) / 2
+        self._located_box = low, high = self.box()
+        far = (max(here - under, over - here) for here, under, over in zip(at, low, high, strict=True))
+        self._reach = math.hypot(*far)  # m from the root frame to any point
         x, y, z = (place + centre for place, centre in zip(at, body.centre, strict=True))
         edge = max(0.0, min(x - low[0], high[0] - x, y - low[1], high[1] - y))  # of what it stands on
         self._push = min(PUSH, UPRIGHT_PUSH * GRAVITY * edge / max(z - low[2], 1e-3))
         field.add(self)
 
-    def look(self) -> int:
-        """Wake whatever glides near it, and glide if nothing is near. Returns the steps until the next look."""
-        near = self._near()
-        stood, self._stood = self._stood, self._standing() if not near and not self._glide else ()
-        if not near and stood and self._stood and math.dist(stood, self._stood) < SETTLED:
+    def look(self) -> None:
+        """Wake whatever glides near it, and glide if nothing is near; then look again before anything can be."""
+        self.speed = self._speed_of(self._commanded)
+        clear = self._clear()
+        stood, self._stood = self._stood, self._standing() if clear >= LOOK and not self._glide else ()
+        if clear >= LOOK and stood and self._stood and math.dist(stood, self._stood) < SETTLED:
             self._glide_on()
-        return FAR if self._glide and not self._field.others and not self._around(FAR) else LOOK
+        self._look_after(clear)
 
-    def _around(self, steps: int) -> set[int]:
-        """What but the ground may come near it within that many steps, by boxes around each."""
-        margin = self._field.margin(self.speed, steps)
-        (x, y, z), (x2, y2, z2) = self.box()
-        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
-        found = {number for number, _ in bullet.getOverlappingObjects(low, high, self._world) or ()}
-        return found - {self.number, self._field.level}
+    def _look_after(self, clear: int) -> None:
+        """Look again before the end of that many `clear` steps."""
+        self._field.let_look(self, clear if self._glide and not self._field.others else LOOK)
 
-    def _near(self) -> bool:
-        """Whether anything but the ground is near. Then no planar body there glides any more, nor this one."""
+    def _speed_of(self, velocity: Planar) -> float:
+        """The speed in m/s that no point of it exceeds at a velocity, rounded up, so that few changes exceed it."""
+        return _graded(math.hypot(velocity[0], velocity[1]) + abs(velocity[2]) * self._reach)
+
+    def _clear(self) -> int:
+        """The steps, at most FAR, in which nothing but the ground can come near it. Fewer than LOOK: something is near,
+        and no planar body there glides any more, nor does this one.
+        """
         self.locate()
+        if not self._glide:
+            self.speed = max(self.speed, math.hypot(*super().twist()[0]))
+        (x, y, z), (x2, y2, z2) = box = self._located_box if self._glide else self.box()
         margin = self._field.margin(self.speed)
-        others = self._around(LOOK)
-        near = [n for n in others if bullet.getClosestPoints(self.number, n, margin, physicsClientId=self._world)]
+        low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
+        around = {number for number, _ in bullet.getOverlappingObjects(low, high, self._world) or ()}
+        steps = {number: self._steps_to(number, box) for number in around - {self.number, self._field.level}}
+        near = [number for number, clear in steps.items() if clear < LOOK]
         for number in near:
             if other := self._field.bodies.get(number):
                 other.wake()
         if near:
             self.wake()
-        return bool(near)
+        return min(steps.values(), default=FAR)
+
+    def _steps_to(self, number: int, box: Box) -> int:
+        """The steps, at most FAR, in which another body of the engine cannot come near this one, which is in `box`."""
+        field, other = self._field, self._field.bodies.get(number)
+        way = max(field.closing(self.speed) * field.step, 1e-9)  # in a step
+        strayed = 0.0
+        if other and other.glides:
+            strayed = other.speed * (field.steps - other._located) * field.step
+            if (steps := _within(_apart(box, other._located_box) - SKIN - strayed, way)) >= ENOUGH:
+                return steps
+        steps = _within(self._gap(number) - strayed, way)
+        if steps >= LOOK or not strayed or not other:
+            return steps
+        other.locate()
+        return _within(self._gap(number), way)
+
+    def _gap(self, number: int) -> float:
+        """The distance in m from another body, where the engine has it, to what counts as near."""
+        within = self._field.margin(self.speed)
+        points = bullet.getClosestPoints(self.number, number, within, physicsClientId=self._world)
+        return min((point[8] for point in points), default=within) - SKIN
 
     def locate(self) -> None:
         """While it glides, the engine's body is where the last look was: move it to where this one is."""
         if self._glide:
             self._place(*self.pose())
+            self._located, self._located_box = self._field.steps, self.box()
 
     def _standing(self) -> tuple[float, ...]:
         """Its height and upward axis, if it only touches the level ground, does not tilt, and moves as commanded."""
@@ -215,6 +268,7 @@ class PlanarBody(Body):
     def _glide_on(self) -> None:
         """Glide from here at the drive's velocity; the engine keeps a body that neither moves nor touches anything."""
         self._glide, self.glides = Glide(self._field.time, *self.pose(), self._commanded), True
+        self._located, self._located_box = self._field.steps, self.box()
         self._field.gliding += 1
         bullet.changeDynamics(self.number, -1, mass=0, physicsClientId=self._world)
         for link in self._links:
@@ -254,8 +308,9 @@ class PlanarBody(Body):
         """Set the body-frame velocity for the next step of `dt` seconds; gravity and contacts keep their effects."""
         if velocity != self._commanded:
             self._commanded = velocity
-            self.speed = math.hypot(velocity[0], velocity[1]) + abs(velocity[2]) * self._reach
-            self._near()
+            if (speed := self._speed_of(velocity)) > self.speed:
+                self.speed = speed
+                self._look_after(self._clear())
             if self._glide:
                 self._glide = Glide(self._field.time, *self.pose(), velocity)
         if not self._glide:

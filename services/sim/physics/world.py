@@ -15,7 +15,7 @@ from .body import Body
 from .dynamics import FRICTION
 from .engine import UPRIGHT, Rotation, Shapes, Vector, bullet
 from .jointed import JointedBody
-from .planar import FAR, Field, PlanarBody
+from .planar import Field, PlanarBody
 from .wheels import on_spheres
 
 Added = TypeVar("Added", PlanarBody, JointedBody)
@@ -114,7 +114,7 @@ class World:
         is in them only rises.
         """
         (x, y, z), (x2, y2, z2) = body.box()
-        margin = self._field.margin(0.0, FAR)
+        margin = self._field.margin(0.0)
         low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
         depths = {}
         for number in {number for number, _ in bullet.getOverlappingObjects(low, high, self.id) or ()} - {body.number}:

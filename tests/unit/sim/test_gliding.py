@@ -142,6 +142,22 @@ def test_one_that_stands_is_pushed_by_one_that_comes_fast(ground: World) -> None
     assert standing.pose()[0][0] < -0.01
 
 
+def test_two_that_start_towards_each_other_between_two_looks_meet(ground: World) -> None:
+    """How fast others may be is known from a third one, which drives all the time."""
+    third, one, other = settled(ground, 0.0, 9.0), settled(ground), settled(ground, 2.4)
+    for later in range(0, FAR, 5):
+        for base, x in ((one, 0.0), (other, 2.4)):
+            base.put((x, 0, REST), UPRIGHT, (0, 0, 0), (0, 0, 0))
+        speeds = {third: (0.0, 0.0, 2.0), one: STOP, other: STOP}
+        for step in range(240 + later):
+            speeds |= {one: (2.0, 0.0, 0.0)} if step >= 120 else {}
+            speeds |= {other: (-2.0, 0.0, 0.0)} if step >= 120 + later else {}
+            for base, velocity in speeds.items():
+                base.drive(velocity, DT)
+            ground.step()
+            assert math.dist(one.pose()[0], other.pose()[0]) > 1.3, later
+
+
 def test_what_falls_on_it_lies_on_it(ground: World) -> None:
     base, box = settled(ground), crate(ground, "0.2 0.2 0.1", 0, 0, 3, static=False)
     for _ in run(ground, 2, (base, STOP)):
