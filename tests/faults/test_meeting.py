@@ -60,7 +60,7 @@ def test_a_verb_sees_the_nodes_over_a_slow_link_and_reports_what_it_waits_for(
 def test_a_stop_reaches_the_robot_over_a_slow_link(wire: Wire, proxy: Proxy, mode: str) -> None:
     wire.start("sim").wait_for_line("listens on")
     proxy.set(delay=DELAY)
-    with Process(command("stop", "--mode", mode, "--connect", proxy.endpoint)) as stop:
+    with Process(command("stop", "--timeout", "15", "--mode", mode, "--connect", proxy.endpoint)) as stop:
         assert stop.wait(20) == 0
         assert stop.out in STOPPED
 
