@@ -18,6 +18,7 @@ from holozen.transport.samples import Answers, source
 
 ALL = "@holozen/**"
 ALL_NODE_INFO = "@holozen/*/about"
+ALL_PEERS = "@holozen/*/peers"
 SILENT_FACTOR = 5  # how much longer to wait for nodes without tokens
 MAX_GONE = 1000  # tokens kept until `left` is called; the oldest are dropped
 KINDS = ("node", "pub", "sub", "srv")
@@ -88,8 +89,10 @@ class Graph:
     """The endpoints of all nodes as their tokens come and go.
 
     `change` returns the next token's key and whether it exists now, or None without news. `roll_call` returns when all
-    nodes that are connected by now have sent their tokens; `met` returns their sessions. `undeclare` ends the
-    subscription. `took`: the seconds that the first link took. Use it in `with`, or keep it until the bus is closed.
+    nodes that are connected by now have sent their tokens; `met` returns their sessions. `ask_peers` asks the holders
+    of rendezvous points for the sessions that they are linked to; what it returns reads those, None while no holder has
+    answered. `undeclare` ends the subscription. `took`: the seconds that the first link took. Use it in `with`, or keep
+    it until the bus is closed.
     """
 
     def __init__(
@@ -97,11 +100,12 @@ class Graph:
         change: Callable[[], tuple[str, bool] | None],
         roll_call: Callable[[], object] = lambda: None,
         met: Callable[[], Iterable[str]] = tuple,
+        ask_peers: Callable[[], Callable[[], set[str] | None]] = lambda: lambda: None,
         undeclare: Callable[[], object] = lambda: None,
         took: float = 0.0,
     ) -> None:
-        self._change, self._roll_call, self._met, self._undeclare = change, roll_call, met, undeclare
-        self._took = took
+        self._change, self._roll_call, self._met, self._ask_peers = change, roll_call, met, ask_peers
+        self._undeclare, self._took = undeclare, took
         self._tokens: set[str] = set()
         self._sessions: dict[str, set[str]] = {}  # the tokens of each
         self._publishers: dict[str, Counter[str]] = {}  # key -> sessions with a publisher there
@@ -139,11 +143,12 @@ class Graph:
         return self._publishers.get(key, ())
 
     def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.015) -> list[Endpoint]:
-        """The endpoints once there is a link and nothing has changed for a while; at most twice `patience` seconds.
+        """The endpoints once there is a link and all nodes have sent theirs; at most twice `patience` seconds.
 
-        Peers introduce further peers, which takes a moment: `quiet` seconds, or twice the time that the first link or
-        the last change took, since a slow network or machine needs longer. A peer without tokens may be foreign, or
-        about to send some.
+        All are there when each session that a rendezvous point's holder is linked to has sent its tokens. Where no
+        holder answers, once nothing has changed for `quiet` seconds, or twice the time that the first link or the last
+        change took, since peers introduce further peers. A peer without tokens may be foreign, or about to send some:
+        it is waited for longer.
         """
         start = time.monotonic()
         while not connected():
@@ -152,18 +157,27 @@ class Graph:
             time.sleep(0.001)
         deadline = time.monotonic() + patience
         self._roll_call()  # on a new link there may be nothing yet that answers
+        peers = self._ask_peers()
         known, since = self.endpoints(), time.monotonic()
         while (now := time.monotonic()) < deadline:
             passed, enough = now - since, max(quiet, 2 * self._took, 2 * (since - start))
-            if known and (passed > SILENT_FACTOR * enough or (passed > enough and self._all_announced())):
+            if known and passed > SILENT_FACTOR * enough:
                 break
+            listed = peers()
+            if known and (listed is not None or passed > enough) and self._have_announced(listed or ()):
+                if listed is None:
+                    break
+                self._roll_call()  # a session's first token may have come before its others
+                if self._have_announced(peers() or ()):
+                    return self.endpoints()
             time.sleep(0.001)
             if (newer := self.endpoints()) != known:
                 known, since = newer, time.monotonic()
         return known
 
-    def _all_announced(self) -> bool:
-        return set(self._met()) <= self._sessions.keys()
+    def _have_announced(self, listed: Iterable[str]) -> bool:
+        """Whether each peer, and each session `listed`, has sent a token."""
+        return {*self._met(), *listed} <= self._sessions.keys()
 
     def _update(self) -> None:
         while (change := self._change()) is not None:
@@ -229,6 +243,17 @@ class Definition(Answers):
         key = definition_key(str(session.zid()), type_name)
         super().__init__(
             session.declare_queryable(key, channel), lambda query: query.reply(key, text, encoding="text/plain")
+        )
+
+
+class Peers(Answers):
+    """Answers queries for the sessions that a holder of a rendezvous point is linked to, with a space between."""
+
+    def __init__(self, session: Any, channel: Any) -> None:
+        key = ALL_PEERS.replace("*", str(session.zid()))
+        super().__init__(
+            session.declare_queryable(key, channel),
+            lambda query: query.reply(key, " ".join(map(str, session.info.peers_zid())), encoding="text/plain"),
         )
 
 

@@ -18,7 +18,7 @@ from holozen.console import report
 from holozen.transport import graph as graphs
 from holozen.transport.connection import UNIX, Connection, from_environment
 from holozen.transport.errors import BusError
-from holozen.transport.graph import Graph, NodeInfo
+from holozen.transport.graph import Graph, NodeInfo, Peers
 from holozen.transport.samples import Declared, RawSubscriber, Replies, source
 from holozen.transport.session import CLOSE_LIMIT, Opening, linked, one_line, wait_for_threads
 
@@ -65,6 +65,8 @@ class Node:
                 from holozen.transport.listeners import exposure
 
                 report(f"{node}: {exposure(exposed)}")
+            if self._opened().point:
+                self._keep(Peers(self.session, zenoh.handlers.RingChannel(16)))
             info = self._keep(NodeInfo(self.session, zenoh.handlers.RingChannel(16), node, exposed))
             info.ends.append(self.announce("node"))
 
@@ -200,9 +202,26 @@ class Node:
             partial(_token_change, tokens),
             lambda: list(live.get(keys, timeout=max(ROLL_CALL, self.took))),
             lambda: map(str, self.session.info.peers_zid() if keys == graphs.ALL else ()),
+            self._ask_peers if keys == graphs.ALL else lambda: lambda: None,
             partial(_undeclare, tokens),
             self.took,
         )
+
+    def _ask_peers(self) -> Callable[[], set[str] | None]:
+        """See Graph. Who meets others at a router sees through that all there is."""
+        if self.session.info.routers_zid():
+            return lambda: None
+        replies = self.ask_all(graphs.ALL_PEERS, ROLL_CALL)
+        found: set[str] = set()
+
+        def read() -> set[str] | None:
+            with contextlib.suppress(BusError):  # all have answered
+                while reply := replies.try_recv():
+                    if not isinstance(reply, bytes):
+                        found.update(reply.payload.decode(errors="replace").split())
+            return found - {self.id} if found else None
+
+        return read
 
     def endpoints(self, keys: str = graphs.ALL, patience: float = 0.5) -> list[graphs.Endpoint]:
         """A snapshot of the graph, as of `Graph.settled`, which leaves nothing declared.

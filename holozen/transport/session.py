@@ -18,6 +18,7 @@ from holozen.console import report
 from holozen.transport import rendezvous
 from holozen.transport.connection import CLIENT_TRY, Connection, covers, socket_path
 from holozen.transport.errors import BusError
+from holozen.transport.graph import Peers
 
 LAST = 1.0  # s to wait for threads at the end of the process
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
@@ -256,7 +257,13 @@ def open_point(endpoint: str) -> Callable[[], None] | None:
         return None
     # It marks a session of ours that is not a node.
     token = session.liveliness().declare_token(f"@holozen/{session.zid()}/rendezvous/rendezvous")
-    return partial(close, session, token)
+    peers = Peers(session, zenoh.handlers.RingChannel(16))
+
+    def close_point() -> None:
+        close(session, token, *peers.ends)
+        wait_for_threads([peers.thread], CLOSE_LIMIT)
+
+    return close_point
 
 
 def close(session: Any, *tokens: Any) -> None:

@@ -31,7 +31,7 @@ from holozen.transport import services as module
 from holozen.transport import session as session_module
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, NoReply, ServiceError
-from holozen.transport.graph import ALL, Endpoint, Graph
+from holozen.transport.graph import ALL, ALL_PEERS, Endpoint, Graph
 from holozen.transport.pubsub import Publisher
 from holozen.transport.rendezvous import is_free
 from holozen.transport.session import Opened, Opening
@@ -303,6 +303,19 @@ def test_when_the_holder_of_the_point_goes_another_opens_it_and_late_joiners_get
     wait_for(late.connected)
     heir.close()
     wait_for(lambda: is_free(wire.endpoint))  # a closed session holds no point
+
+
+def test_the_holder_of_the_point_lists_who_is_linked_to_it(wire: Wire) -> None:
+    holder, heir = wire.bus("holder", lasting=True), wire.bus("heir", lasting=True)
+    looker = wire.bus("looker")
+
+    def listed() -> list[set[str]]:
+        answers = [each for each in looker.ask_all(ALL_PEERS, 1.0) if not isinstance(each, bytes)]
+        return [set(each.payload.decode().split()) for each in answers]
+
+    wait_for(lambda: listed() == [{heir.id, looker.id}])
+    holder.close()
+    wait_for(lambda: listed() == [{heir.id, looker.id}])  # to the session that the heir opened for the point
 
 
 def test_what_does_not_run_long_leaves_the_point_shut(wire: Wire) -> None:

@@ -152,6 +152,24 @@ def test_a_peer_that_has_declared_nothing_yet_is_waited_for_longer() -> None:
     assert graph.settled(lambda: True) == [ODOM, late]
 
 
+def test_a_session_that_a_rendezvous_point_lists_is_waited_for_and_then_nothing() -> None:
+    """It is met long after the others have been quiet for long enough. Its first token comes before the others."""
+    late = ODOM._replace(session="b2", node="late")
+    looks = iter([*[None] * 30, (token(late._replace(kind="node", key="", type="")), True)])
+    calls = iter([None, (token(late), True)])  # the second brings what was under way
+    changes = deque([(token(ODOM), True)])
+
+    def roll_call() -> None:
+        if call := next(calls):
+            changes.append(call)
+
+    def read() -> tuple[str, bool] | None:
+        return changes.popleft() if changes else next(looks, None)
+
+    graph = Graph(read, roll_call, ask_peers=lambda: lambda: {"a1", "b2"})
+    assert {end.node for end in graph.settled(lambda: True) if end.key == ODOM.key} == {ODOM.node, "late"}
+
+
 def test_where_the_first_link_took_long_so_may_the_next() -> None:
     late = ODOM._replace(session="b2")
     looks = iter([*[None] * 30, (token(late), True)])
