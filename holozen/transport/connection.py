@@ -24,7 +24,9 @@ answer."""
 
 UNIX = "unixsock-stream/"  # before the path of a Unix socket
 LOOPBACK = "tcp/127.0.0.1:0"  # any free port, on loopback only
+_NEAR = (UNIX, "tcp/127.0.0.1:", "tcp/localhost:", "tcp/[::1]:")
 LEASE = 1500  # ms; a silent link is closed after this (Zenoh: 10 s), and a new one with a longer round trip too
+NEAR_LEASE = 10_000  # ms, between processes of one machine: no cable can be cut, and a busy machine holds them up
 FORBIDDEN = " (where an access control list is in force, it has to allow @holozen/**)"  # a reason to see no nodes
 CLIENT_TRY = 10.0  # s, for one attempt of a client to reach its router; a link with a delay of 0.5 s takes 3 s
 LARGEST_MESSAGE = 20_000_000  # bytes, in the secure set-up; a description with its meshes is the largest
@@ -106,6 +108,9 @@ class Connection:
             values["connect/endpoints"] = self.connect_endpoints
         if not self.config or self.listen is not None:
             values["listen/endpoints"] = self._listen_endpoints()
+        if self.mode == "peer" and are_near([*self.connect_endpoints, *self._listen_endpoints()]):
+            # Zenoh does not make a link anew that gossip had brought about, unless gossip comes again.
+            values["transport/link/tx/lease"] = NEAR_LEASE
         if self.config:
             # The file decides; a mode of "peer" cannot be distinguished from the default.
             values = {k: v for k, v in values.items() if k.endswith("/endpoints") or (k == "mode" and v != "peer")}
@@ -177,6 +182,9 @@ _INTACT: dict[str, object] = {
 _ALWAYS: dict[str, object] = {
     "scouting/multicast/enabled": False,
     "scouting/delay": 0,
+    # Of two peers that hear of each other one connects: where both do, and one of the two links outlives the other's
+    # lease, Zenoh joins a new link to the old session and never sends its declarations again. See session.new_id.
+    "scouting/gossip/autoconnect_strategy": {"peer": {"to_router": "always", "to_peer": "greater-zid"}},
     "connect/timeout_ms": -1,
     "connect/exit_on_failure": False,
     "connect/retry": _RETRY,
@@ -388,6 +396,11 @@ def fault(text: str) -> str:
 def socket_path(endpoint: str) -> str:
     """The path of a Unix socket's endpoint; empty for any other."""
     return endpoint.removeprefix(UNIX) if endpoint.startswith(UNIX) else ""
+
+
+def are_near(endpoints: "list[str]") -> bool:
+    """Whether all endpoints are of this machine: Unix sockets and loopback."""
+    return all(one.startswith(_NEAR) for one in endpoints)
 
 
 def address(endpoint: str) -> tuple[str, int] | None:

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable, Iterable, Sequence
 
 from holozen.console import report
-from holozen.transport.connection import socket_path
+from holozen.transport.connection import are_near, socket_path
 from holozen.transport.errors import BusError
 
 POLL = 0.2  # s between two checks of the points
@@ -21,7 +21,6 @@ NOTICE = 1.0  # s without a link before the user is informed
 PATIENCE = 5.0  # s for others to answer; a link with a delay of 0.5 s one way takes 3 s
 
 IN_USE = os.strerror(errno.EADDRINUSE)
-LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
 
 held: set[str] = set()
 """The points that any session of this process holds."""
@@ -104,10 +103,7 @@ def wait_for_link(
     Raises BusError if one is held and does not answer. A `lasting` process goes on without remote ones: those links
     come up later. Exits with code 0 when `stop` is set.
     """
-    near = [
-        one for one in endpoints
-        if socket_path(one) or (one.startswith("tcp/") and one[4:].rpartition(":")[0] in LOOPBACK)
-    ]  # fmt: skip
+    near = [one for one in endpoints if are_near([one])]
     far = [one for one in endpoints if one.startswith(("tcp/", "tls/")) and one not in near]
     attempts = None
     begin = looked = reported = time.monotonic()

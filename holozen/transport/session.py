@@ -5,9 +5,10 @@ from __future__ import annotations
 import atexit
 import contextlib
 import json
+import os
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -16,7 +17,7 @@ import zenoh
 from holozen.background import at_once, background
 from holozen.console import report
 from holozen.transport import rendezvous
-from holozen.transport.connection import CLIENT_TRY, Connection, covers, socket_path
+from holozen.transport.connection import CLIENT_TRY, Connection, are_near, covers, socket_path
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Peers
 
@@ -113,6 +114,8 @@ def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> 
             # Zenoh reports that the first is in use before it listens at another; to load socket takes 5 ms.
             listen = listen[:1] + [one for one in listen[1:] if not rendezvous.is_taken(one)]
             config.insert_json5("listen/endpoints", json.dumps(listen))
+            if "id" not in dict(connection.cfg):
+                config.insert_json5("id", json.dumps(new_id(listen, connection.rendezvous)))
         try:
             opened = Opened(zenoh.open(config))
         except zenoh.ZError as error:
@@ -127,6 +130,17 @@ def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> 
         if opened.point:
             rendezvous.held.add(opened.point)
         return opened
+
+
+def new_id(listen: list[str], points: Sequence[str]) -> str:
+    """An id for a peer's session, greater than those of the peers that it is to connect to.
+
+    Who listens nowhere connects to all. Who listens at one of the `points`, or beyond loopback, connects to none that
+    it only hears of: the others reach it, and it may not reach them. Among the rest chance decides.
+    """
+    rank = "1" if not are_near(listen) or set(listen) & set(points) else "8" if listen else "f"
+    # Zenoh compares the last byte first, and takes no zero in front.
+    return os.urandom(15).hex().lstrip("0") + rank + os.urandom(1).hex()[0]
 
 
 def _is_taken(endpoint: str, error: str) -> bool:
@@ -250,7 +264,8 @@ def _value(config: zenoh.Config, path: str) -> Any:
 
 def open_point(endpoint: str) -> Callable[[], None] | None:
     """Open a session that only listens at `endpoint`. Returns a function that closes it, or None if it is taken."""
-    cfg = (("listen/endpoints", f'["{endpoint}"]'), ("listen/exit_on_failure", "true"))
+    id = new_id([endpoint], [endpoint])
+    cfg = (("listen/endpoints", f'["{endpoint}"]'), ("listen/exit_on_failure", "true"), ("id", f'"{id}"'))
     try:
         session = zenoh.open(configuration(Connection(connect=(), listen=(), cfg=cfg)))
     except zenoh.ZError:

@@ -12,6 +12,7 @@ from holozen.transport.connection import (
     LAST_DOMAIN,
     LEASE,
     LOOPBACK,
+    NEAR_LEASE,
     RENDEZVOUS,
     Connection,
     add_arguments,
@@ -85,7 +86,10 @@ def test_links_are_retried_for_ever_and_given_up_after_a_while_of_silence() -> N
     assert value(Connection(), "connect/timeout_ms") == -1
     assert value(Connection(), "connect/exit_on_failure") is False
     assert value(Connection(), "scouting/delay") == 0
-    assert value(Connection(), "transport/link/tx/lease") == LEASE == 1500
+    assert value(Connection(), "transport/link/tx/lease") == NEAR_LEASE > 3 * LEASE
+    listens, connects = Connection(listen=("tcp/0.0.0.0:7447",)), Connection(connect=("tcp/10.0.0.1:7447",))
+    for far in (listens, connects, Connection("client")):
+        assert value(far, "transport/link/tx/lease") == LEASE
 
 
 def test_a_setting_by_hand_comes_last_and_wins() -> None:
