@@ -12,9 +12,10 @@ T = TypeVar("T")
 
 SOON, EVERY = 0.0005, 0.005  # s between two polls, at first and later: what is there soon is not waited for long
 GRACE = 3.0  # s from SIGTERM to SIGKILL
+PATIENCE = 30.0  # s; only what fails waits so long, and a loaded machine is slow
 
 
-def wait_for(condition: Callable[[], T], within: float = 10.0, what: str | Callable[[], str] = "a condition") -> T:
+def wait_for(condition: Callable[[], T], within: float = PATIENCE, what: str | Callable[[], str] = "a condition") -> T:
     """Wait until `condition()` is true, and return its value. AssertionError after `within` seconds.
 
     `what` describes the condition in the error; a function is called only then.
@@ -82,7 +83,7 @@ class Process:
         """The exit code, -N after signal N, None while it runs."""
         return self._popen.poll()
 
-    def wait_for_line(self, text: str, within: float = 20.0) -> str:
+    def wait_for_line(self, text: str, within: float = PATIENCE) -> str:
         """The first line of its output or errors that contains `text`. AssertionError if it ends without one."""
 
         def look() -> str | None:
@@ -94,7 +95,7 @@ class Process:
 
         return wait_for(look, within, lambda: f"{text!r} from {self}, which wrote:\n{self.out}{self.err}") or ""
 
-    def wait(self, within: float = 10.0) -> int:
+    def wait(self, within: float = PATIENCE) -> int:
         """Wait for its end and return the exit code. AssertionError if it keeps running."""
         try:
             return self._popen.wait(within)
@@ -105,7 +106,7 @@ class Process:
         """Send it a signal."""
         self._popen.send_signal(number)
 
-    def terminate(self, within: float = 10.0) -> int:
+    def terminate(self, within: float = PATIENCE) -> int:
         """Send SIGTERM, wait for its end and return the exit code."""
         self.signal(signal.SIGTERM)
         return self.wait(within)

@@ -10,7 +10,7 @@ import time
 from collections.abc import Mapping, Sequence
 from typing import Any, Self
 
-from holozen.testing.process import Process, wait_for
+from holozen.testing.process import PATIENCE, Process, wait_for
 
 SIZE = 100, 32  # columns and rows
 LAST = 1.0  # s for the last output of a process that has ended, while another one keeps its terminal open
@@ -121,7 +121,7 @@ class Terminal:
         self._emulator.feed(new)
         return "\n".join(line.rstrip() for line in self._emulator.listener.display)
 
-    def wait_for_text(self, text: str, within: float = 20.0) -> str:
+    def wait_for_text(self, text: str, within: float = PATIENCE) -> str:
         """Wait until the screen shows `text`, and return the screen. AssertionError if the process ends without it."""
 
         def look() -> str | None:

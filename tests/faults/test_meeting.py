@@ -50,7 +50,7 @@ def test_a_verb_sees_the_nodes_over_a_slow_link_and_reports_what_it_waits_for(
     wire.start("pose-service").wait_for_line("goals")
     proxy.set(delay=DELAY)
     with Process(command("node", "list", "--mode", mode, "--connect", proxy.endpoint)) as listing:
-        assert listing.wait(20) == 0
+        assert listing.wait() == 0
         assert listing.out == "pose_service\n"
         waited = {"client": f"waiting for a Zenoh router at {proxy.endpoint}\n"}
         assert listing.err == waited.get(mode, f"waiting for an answer from {proxy.endpoint}\n")
@@ -61,7 +61,7 @@ def test_a_stop_reaches_the_robot_over_a_slow_link(wire: Wire, proxy: Proxy, mod
     wire.start("sim").wait_for_line("listens on")
     proxy.set(delay=DELAY)
     with Process(command("stop", "--timeout", "15", "--mode", mode, "--connect", proxy.endpoint)) as stop:
-        assert stop.wait(20) == 0
+        assert stop.wait() == 0
         assert stop.out in STOPPED
 
 
@@ -74,7 +74,7 @@ def test_what_waits_for_an_answer_ends_at_once_on_a_signal(
     with Process(command("sim", "--mode", mode, "--connect", proxy.endpoint, "--listen", "tcp/127.0.0.1:0")) as sim:
         sim.wait_for_line("waiting for a")
         sim.signal(number)
-        assert sim.wait(20) == 0
+        assert sim.wait() == 0
         assert "Traceback" not in sim.err
 
 
@@ -110,7 +110,7 @@ class Town:
     def run(self, verb: str, *words: str) -> Process:
         """Run a verb here to its end."""
         process = self.start(verb, *words)
-        process.wait(20)
+        process.wait()
         return process
 
     def asleep(self, verb: str, *words: str) -> Process:

@@ -10,6 +10,7 @@ from holozen.bus import Bus
 from holozen.messages import CommandStatus, Message, Odometry, TriggerReply, TriggerRequest, Twist, TwistStamped
 from holozen.messages.rcl_interfaces import Parameter, ParameterValue, SetParametersReply, SetParametersRequest
 from holozen.testing import wait_for
+from holozen.testing.process import PATIENCE
 from holozen.transport.pubsub import Received, Subscription
 from holozen.wire import key_for
 
@@ -49,7 +50,7 @@ class Record:
         """What is sent from now on."""
         return Part(self)
 
-    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = 20.0) -> Any:
+    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = PATIENCE) -> Any:
         """The first message that is sent from now on and is as wanted; waits for it."""
         return self.from_now().next(wanted, within)
 
@@ -70,7 +71,7 @@ class Part:
     def messages(self) -> list[Any]:
         return [received.message for received in self.all() if received.message is not None]
 
-    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = 20.0) -> Any:
+    def next(self, wanted: Callable[[Any], object] = lambda _: True, within: float = PATIENCE) -> Any:
         """The first message that is as wanted; waits for it."""
         looked = 0
 
@@ -169,7 +170,7 @@ class Robot:
     def pass_time(self, seconds: float) -> Odometry:
         """Let that much sim time pass."""
         end = time_of(self.newest()) + seconds
-        odom: Odometry = self.odom.next(lambda odom: time_of(odom) >= end, within=20 + 2 * seconds)
+        odom: Odometry = self.odom.next(lambda odom: time_of(odom) >= end, within=PATIENCE + 2 * seconds)
         return odom
 
     def resume(self) -> str:

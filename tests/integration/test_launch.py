@@ -193,7 +193,7 @@ def test_a_lesson_in_gazebo_is_launched_and_its_controller_drives(wire: Wire, la
     parts = children(process.pid)
     assert parts
     process.signal(signal.SIGINT)
-    assert process.wait(within=10) == 0
+    assert process.wait() == 0
     wait_for(lambda: not any(Path(f"/proc/{pid}/cmdline").exists() for pid in parts))
 
 

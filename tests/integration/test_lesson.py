@@ -91,7 +91,7 @@ def test_the_lesson_s_own_command_asks_its_service_and_ours(wire: Wire) -> None:
 def test_a_bare_node_drives_a_square_by_time(wire: Wire, robot: Robot) -> None:
     with Process(words(wire, "square.py")) as square:
         for x, y in ((0.3, 0), (0, 0.3), (-0.3, 0), (0, -0.3)):
-            robot.odom.next(partial(moves, x=x, y=y, turn=0), within=20)
+            robot.odom.next(partial(moves, x=x, y=y, turn=0))
         assert square.wait() == 0
     assert "[square]: done" in square.err
     robot.stands()
@@ -131,7 +131,7 @@ def test_a_teleop_of_ros_drives_from_a_terminal_and_its_end_stops_the_robot(
 def test_its_node_is_seen_and_its_parameters_set_like_those_of_any_other(wire: Wire, robot: Robot) -> None:
     with Process(words(wire, "controller.py")):
         wire.start("pose-service")
-        robot.odom.next(lambda odom: not rests(odom), within=20)
+        robot.odom.next(lambda odom: not rests(odom))
         assert "hb_controller" in wire.run("node", "list").stdout.split()
         assert "hb_controller" in wire.run("topic", "info", "-v", "cmd_vel").stdout
         reported = wire.run("param", "set", "hb_controller", "kp_linear", "0.75")
@@ -158,7 +158,7 @@ def test_without_holozen_run_they_fail_as_ever(tmp_path: Path) -> None:
 
 def test_a_script_that_hangs_gets_what_everyone_gets(wire: Wire, robot: Robot) -> None:
     with Process(words(wire, "square.py")) as square:
-        robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0), within=20)
+        robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
         square.signal(signal.SIGSTOP)
         robot.stands()
         square.signal(signal.SIGCONT)

@@ -20,7 +20,7 @@ from .conftest import start_sim
 from .robots import URDF, Robot, moves, rests
 
 MANY = 1000
-PATIENCE = 20.0  # s
+PATIENCE = 30.0  # s
 
 
 @pytest.fixture(scope="module")

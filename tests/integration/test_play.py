@@ -64,7 +64,7 @@ def played(game: Game, name: str = "Fred") -> Robot:
     robot = Robot(game.wire.bus(), name)
     game.terminal.wait_for_text("listening sim")
     game.terminal.type("i")
-    robot.odom.next(lambda odom: speeds(odom)[0] > 0.1, within=20)
+    robot.odom.next(lambda odom: speeds(odom)[0] > 0.1)
     return robot
 
 
@@ -72,7 +72,7 @@ def test_fred_drives_in_an_empty_world_and_quitting_leaves_nothing_and_the_termi
     played(game)
     assert entities.names(game.wire.bus()) == ["Fred"]
     game.terminal.type("\x03")
-    game.terminal.process.wait(10)
+    game.terminal.process.wait()
     assert game.left() == ({}, [])
     assert game.terminal.modes() == game.terminal.modes_before
 
@@ -81,7 +81,7 @@ def test_fred_drives_in_an_empty_world_and_quitting_leaves_nothing_and_the_termi
 def test_a_signal_ends_all_of_it(game: Game, number: int) -> None:
     robot = played(game)
     game.terminal.process.signal(number)
-    assert game.terminal.process.wait(10) == 128 + number
+    assert game.terminal.process.wait() == 128 + number
     wait_for(lambda: game.left() == ({}, []))
     robot.wait_for_stop_command()
 
@@ -89,7 +89,7 @@ def test_a_signal_ends_all_of_it(game: Game, number: int) -> None:
 def test_a_closed_terminal_ends_all_of_it(game: Game) -> None:
     played(game)
     game.terminal.hang_up()
-    game.terminal.process.wait(10)
+    game.terminal.process.wait()
     wait_for(lambda: game.left() == ({}, []))
 
 

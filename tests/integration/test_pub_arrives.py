@@ -146,7 +146,7 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
         type_line(AHEAD, (0.2, 0, 0))
         type_line("linear: {y: 0.1}", (0, 0.1, 0))
         pub.stdin.close()
-        assert pub.wait(20) == 0
+        assert pub.wait() == 0
     assert seen
     robot.stands()
 

@@ -81,10 +81,10 @@ def runs(line: str) -> None:
     with begun(line) as started:
         if isinstance(started, Terminal):
             started.type("\x03")
-            assert started.process.wait(20) == 0, line
+            assert started.process.wait() == 0, line
         else:
             started.signal(signal.SIGINT)
-            assert started.wait(20) in (0, 130), f"{line}: {started.err}"
+            assert started.wait() in (0, 130), f"{line}: {started.err}"
             assert "Traceback" not in started.err, line
 
 
@@ -96,7 +96,7 @@ def test_what_watches_a_robot_watches_it(wire: Wire) -> None:
     for line in commands("Watch it"):
         if line.startswith("holozen replay"):
             up.signal(signal.SIGINT)
-            assert up.wait(20) == 0
+            assert up.wait() == 0
             ends(line)
             up = wire.start("up")
             up.wait_for_line("goals")

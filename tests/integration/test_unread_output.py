@@ -111,7 +111,7 @@ def test_a_controller_drives_lap_after_lap_with_its_output_unread(wire: Wire, un
     controller = wire.start("controller", "--laps", "0", stdout=unread)
     robot = Robot(wire.bus())
     for goal in 3 * [math.pi / 2, 0.0]:
-        robot.odom.next(partial(looks, goal), within=20)
+        robot.odom.next(partial(looks, goal))
     assert controller.terminate(SOON) == 0
 
 

@@ -25,7 +25,7 @@ def all_run(wire: Wire, parts: set[str]) -> dict[str, int]:
 
 
 def driven(robot: Robot) -> None:
-    robot.odom.next(lambda odom: not rests(odom), within=20)
+    robot.odom.next(lambda odom: not rests(odom))
 
 
 def test_without_a_terminal_the_controller_drives_the_square(wire: Wire) -> None:

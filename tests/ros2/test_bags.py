@@ -43,7 +43,7 @@ def a_record(wire: Wire, folder: Path, *words: str) -> dict[str, Any]:
         with Bag(folder) as bag:
             return {m.channel.key for m in bag.messages()} >= {"Fred/odom", "chatter", "tf_static"}
 
-    wait_for(complete, within=20.0)
+    wait_for(complete)
     for process in (chatter, static, recorder):
         process.signal(signal.SIGINT)
     assert recorder.wait() == 0, recorder.err
@@ -95,7 +95,7 @@ def test_the_metadata_counts_what_is_in_each_file(wire: Wire, tmp_path: Path) ->
             odom.put(Odometry(child_frame_id=random.randbytes(2000).hex()))
         return (folder / "long_1.mcap").exists()
 
-    wait_for(split, within=20.0)
+    wait_for(split)
     recorder.signal(signal.SIGINT)
     assert recorder.wait() == 0, recorder.err
     info = yaml.safe_load((folder / "metadata.yaml").read_text())["rosbag2_bagfile_information"]

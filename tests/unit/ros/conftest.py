@@ -13,7 +13,7 @@ from holozen.ros.rclpy.node import Node
 from holozen.testing import Wire
 
 Write = Callable[..., Path]
-PATIENCE = 10.0  # s
+PATIENCE = 30.0  # s
 
 
 @pytest.fixture

@@ -242,7 +242,7 @@ def test_a_signal_ends_it(script: Script, case: str) -> None:
     with script(text) as process:
         process.wait_for_line("up")
         process.signal(number)
-        assert process.wait(5) == code, process.err
+        assert process.wait() == code, process.err
         assert message in process.err if message else not process.err
         assert "Fatal Python error" not in process.err
         assert ("stopped" in process.out) == (text == POLITE)
@@ -263,7 +263,7 @@ def test_a_signal_ends_it(script: Script, case: str) -> None:
 )
 def test_it_ends_by_itself(script: Script, text: str, code: int, message: str | None) -> None:
     with script(text) as process:
-        assert process.wait(10) == code, process.err
+        assert process.wait() == code, process.err
         assert message is None or (message in process.err if message else not process.err)
         assert "Fatal Python error" not in process.err
 
