@@ -145,7 +145,7 @@ class Robot:
                 self.put(x, y, turn)
             return any(wanted(odom) for odom in new)
 
-        wait_for(look, 20, lambda: f"the robot to be driven as commanded; its status: {self.last_status()}")
+        wait_for(look, what=lambda: f"the robot to be driven as commanded; its status: {self.last_status()}")
         odoms: list[Odometry] = part.messages()[:seen]
         return odoms
 

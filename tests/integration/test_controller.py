@@ -67,6 +67,10 @@ class Scene:
         """The robot as a person has it; each test's has a name of its own, which the controller reports."""
         return Robot(self._wire.bus(name), priority="INTERACTIVE_HIGH")
 
+    def takes_over(self, person: Robot, name: str) -> None:
+        """The person drives until the controller has noticed who does."""
+        wait_for(lambda: person.drive(0, -0.3) and f"yields to {name}@" in self.controller.err)
+
     def controller_drives(self) -> None:
         wait_for(lambda: self.robot.status().obeyed.startswith("controller@"))
         self.robot.odom.next(lambda odom: not rests(odom))
@@ -101,8 +105,7 @@ def shared(played: Scene) -> Scene:
 
 def test_it_yields_to_a_person_and_stays_off_until_resume(town: Wire, shared: Scene) -> None:
     anna = shared.person("anna")
-    anna.drive(0, -0.3)
-    assert shared.controller.wait_for_line("yields to anna@")
+    shared.takes_over(anna, "anna")
     continued = shared.controller.err.count("continues")
     anna.drive(0, 0)
     stood = shared.robot.stands()
@@ -116,8 +119,7 @@ def test_it_yields_to_a_person_and_stays_off_until_resume(town: Wire, shared: Sc
 
 def test_it_publishes_no_cmd_vel_while_a_person_has_the_robot(shared: Scene) -> None:
     tom = shared.person("tom")
-    tom.drive(0, -0.3)
-    shared.controller.wait_for_line("yields to tom@")
+    shared.takes_over(tom, "tom")
     commands = shared.robot.commands.from_now()
     tom.drive(0.3)
     commands.next()

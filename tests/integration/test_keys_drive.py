@@ -1,6 +1,6 @@
 """Keys in a pseudo-terminal become commands on the wire, and the robot moves."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 
@@ -28,6 +28,16 @@ def start_teleop(wire: Wire, *flags: str) -> Terminal:
     return terminal
 
 
+def type_until(condition: Callable[[], object], terminal: Terminal, keys: str) -> None:
+    """Type keys again and again until a condition holds. Keys and commands that the machine holds up may not count."""
+
+    def look() -> object:
+        terminal.type(keys)
+        return condition()
+
+    wait_for(look)
+
+
 def after(commands: Record, terminal: Terminal, key: str) -> tuple[float, ...]:
     """The first command that is not a stop after the key was pressed on a robot that stands."""
     part = commands.from_now()
@@ -38,9 +48,7 @@ def after(commands: Record, terminal: Terminal, key: str) -> tuple[float, ...]:
 def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> None:
     with start_teleop(town) as terminal:
         start, commands = robot.newest(), robot.commands.from_now()
-        terminal.type("i")
-        robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
-        commands.next()
+        type_until(lambda: moves(robot.newest(), 0.5, 0, 0), terminal, "i")
         assert {received.sample.priority for received in commands.all()} == {"INTERACTIVE_HIGH"}
         end = robot.stands()
         assert place(end)[0] > place(start)[0] + 0.1
@@ -77,15 +85,9 @@ def test_a_key_timeout_of_zero_drives_on(shared_teleop: Terminal, robot: Robot) 
 
 def test_a_held_key_drives_on_past_the_timeout(town: Wire, robot: Robot) -> None:
     with start_teleop(town, "--key-timeout", "1") as terminal:
-        after(robot.commands, terminal, "i")
-        start = time_of(robot.odom.next(lambda odom: not rests(odom)))
-        odoms = robot.odom.from_now()
-
-        def held_for_two_seconds() -> bool:
-            terminal.type("i")
-            return time_of(robot.newest()) > start + 2.0
-
-        wait_for(held_for_two_seconds)
+        type_until(lambda: not rests(robot.newest()), terminal, "i")
+        odoms, start = robot.odom.from_now(), time_of(robot.newest())
+        type_until(lambda: time_of(robot.newest()) > start + 2.0, terminal, "i")
         assert not any(map(rests, odoms.messages()))
 
 
@@ -107,8 +109,7 @@ def test_a_stop_is_repeated_until_the_robot_rests_and_then_the_teleop_is_silent(
 def test_an_idle_teleop_publishes_nothing(town: Wire, robot: Robot) -> None:
     commands = robot.commands.from_now()
     with start_teleop(town) as terminal:
-        terminal.type("qz")
-        terminal.wait_for_text("0.495 m/s")
+        type_until(lambda: "speed     0.500 m/s" not in terminal.screen(), terminal, "qz")
     robot.newest()
     assert commands.messages() == []
 
