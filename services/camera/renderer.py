@@ -21,6 +21,7 @@ Floats = npt.NDArray[np.float32]
 GREY = (0.7, 0.7, 0.7, 1.0)  # Gazebo's, of what has no colour
 GROUND = (0.6, 0.6, 0.6, 1.0)
 WIDE, THICK = 200.0, 0.02  # m; of the ground
+MOST_REMOVED = 100  # bodies
 MISSED = 0.9999  # of the depth buffer: nothing there
 
 
@@ -39,9 +40,19 @@ class Renderer:
     """A scene of its own, in which the entities stand where an exposure says."""
 
     def __init__(self) -> None:
+        self._begin()
+
+    def _begin(self) -> None:
         self._world: int = bullet.connect(bullet.DIRECT)
         self._bodies: dict[str, tuple[int, dict[str, list[int]]]] = {}  # number and, by link, bodies of each entity
         self._ground = -1
+        self._removed = 0  # bodies, of which the engine frees almost nothing: of a mesh it keeps some 300 KB
+
+    def renew(self) -> None:
+        """Free the memory of what was removed, if that is much: begin anew, without the looks of any entity."""
+        if self._removed > max(MOST_REMOVED, len(self._bodies)):
+            self.close()
+            self._begin()
 
     def knows(self, name: str, number: int) -> bool:
         """Whether it has the looks of an entity."""
@@ -59,6 +70,7 @@ class Renderer:
         for bodies in links.values():
             for body in bodies:
                 bullet.removeBody(body, self._world)
+                self._removed += 1
 
     def render(self, exposure: Exposure) -> Picture:
         """The picture of an exposure."""

@@ -45,6 +45,7 @@ class Studio:
             self._cameras[name] = Camera(self._bus, exposure)
         camera = self._cameras[name]
         if camera.wanted:
+            self._renderer.renew()
             self._learn(exposure)
             camera.publish(exposure, self._renderer)
 
@@ -54,10 +55,13 @@ class Studio:
             asked = self._missing.get(entity.number, -math.inf)
             if self._renderer.knows(entity.name, entity.number) or time.monotonic() - asked < PATIENCE:
                 continue
-            self._missing[entity.number] = time.monotonic()
+            now = time.monotonic()
+            self._missing = {number: at for number, at in self._missing.items() if now - at < PATIENCE}
+            self._missing[entity.number] = now
             try:
                 if found := description(self._bus, entity.name, entity.number, PATIENCE):
                     self._renderer.add(entity.name, entity.number, read(found.description))
+                    self._missing.pop(entity.number, None)
             except (ServiceError, RobotError) as error:
                 report(f"camera: {entity.name} cannot be seen: {error}")
 

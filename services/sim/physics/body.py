@@ -6,7 +6,7 @@ from holozen.kinematics import to_body
 from holozen.limits import Planar
 from holozen.rotation import multiply, rotate, yaw
 
-from .engine import NOTHING, Rotation, Vector, bullet
+from .engine import NOTHING, Bodies, Rotation, Vector, bullet
 
 
 class Body:
@@ -17,15 +17,15 @@ class Body:
     """
 
     def __init__(
-        self, world: int, number: int, centre: Vector, axes: Rotation, weightless: Mapping[int, float] = {}
+        self, bodies: Bodies, number: int, centre: Vector, axes: Rotation, weightless: Mapping[int, float] = {}
     ) -> None:
-        self._world, self._body, self.number = world, number, number
+        self._bodies, self._world, self._body, self.number = bodies, bodies.world, number, number
         self.weightless = {link: mass for link, mass in weightless.items() if mass > 0}
         self.is_removed = False
         self.glides = False  # whether it keeps the velocity that was set, without being set again at each step
         self._centre = centre
         self._axes = axes
-        self._links = range(-1, bullet.getNumJoints(number, world))
+        self._links = range(-1, bullet.getNumJoints(number, bodies.world))
         self._tilted = max(map(abs, axes[:3])) > 1e-9  # principal axes that are not the root's
         self._axes_back: Rotation = bullet.invertTransform((0, 0, 0), axes)[1]
 
@@ -80,7 +80,7 @@ class Body:
     def remove(self) -> None:
         """Remove it from the world."""
         self.is_removed = True
-        bullet.removeBody(self._body, self._world)
+        self._bodies.remove(self._body)
 
     def _root(self) -> tuple[Vector, Rotation, Vector]:
         """The centre of mass, the root frame's rotation, and the offset from the root to the centre, in the world."""

@@ -10,7 +10,7 @@ from holozen.rotation import multiply, rotate
 from ..command.motion import JointMotion, Push
 from .body import Body, Links
 from .dynamics import damping_of, load_on, set_joint, set_surface
-from .engine import NOTHING, UPRIGHT, Rotation, Shapes, Vector, bullet
+from .engine import NOTHING, UPRIGHT, Bodies, Rotation, Shapes, Vector, bullet
 
 JOINTS = {"continuous": bullet.JOINT_REVOLUTE, "revolute": bullet.JOINT_REVOLUTE, "prismatic": bullet.JOINT_PRISMATIC}
 MAX_EFFORT = 1e3  # N m or N, of a joint without an effort limit
@@ -32,8 +32,7 @@ class JointedBody(Body):
 
     def __init__(
         self,
-        world: int,
-        shapes: Shapes,
+        bodies: Bodies,
         parts: list[Part],
         at: Vector,
         rotation: Rotation = UPRIGHT,
@@ -41,23 +40,20 @@ class JointedBody(Body):
         static: bool = False,
         omni: bool = False,
     ) -> None:
-        root, links = parts[0].body, Links(shapes.unseen)
-        first, carrying = _link(links, shapes, parts)
-        number: int = bullet.createMultiBody(
+        root, links, world = parts[0].body, Links(bodies.shapes.unseen), bodies.world
+        first, carrying = _link(links, bodies.shapes, parts)
+        number = bodies.add(
+            (parts, wheels, static, omni),
+            (at, rotation),
             0.0 if static else root.mass,
             first,
-            shapes.unseen,
-            basePosition=at,
-            baseOrientation=rotation,
-            baseInertialFramePosition=root.centre,
-            baseInertialFrameOrientation=root.axes,
+            (root.centre, root.axes),
             flags=bullet.URDF_GLOBAL_VELOCITIES_MB,  # without it a tumbling body turns ever faster
-            physicsClientId=world,
             **links.arguments,
         )
         numbers = links.numbers(number, world)
         floating = {numbers[own]: part.body.weightless for part, (own, *_) in zip(parts, carrying, strict=True)}
-        super().__init__(world, number, root.centre, root.axes, {} if static else floating)
+        super().__init__(bodies, number, root.centre, root.axes, {} if static else floating)
         self._dt: float = bullet.getPhysicsEngineParameters(world)["fixedTimeStep"]
         self._joints: dict[str, tuple[int, Joint]] = {}
         self._numbers_of_parts = [numbers[own] for own, *_ in carrying]

@@ -10,7 +10,7 @@ from holozen.rotation import from_axis_angle, rotate, yaw
 
 from .body import Body, Links
 from .dynamics import GRAVITY
-from .engine import NOTHING, UPRIGHT, Rotation, Shapes, Vector, bullet
+from .engine import NOTHING, UPRIGHT, Bodies, Rotation, Vector, bullet
 
 HOLD_GAIN = 0.1  # share of the distance to its place that it recovers in a step
 HOLD_LIMIT = 0.005  # m; pushed farther, it holds its new place
@@ -148,24 +148,15 @@ class PlanarBody(Body):
     """
 
     def __init__(
-        self, field: Field, shapes: Shapes, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT
+        self, field: Field, bodies: Bodies, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT
     ) -> None:
-        world = field.world
+        world, shapes = field.world, bodies.shapes
         links, (first, *others) = Links(shapes.unseen), shapes.of(body.collisions) or [NOTHING]
         links.carry(-1, others)
         # An engine's base is placed by its inertial frame, which is where its centre of mass is.
-        number: int = bullet.createMultiBody(
-            body.mass,
-            first,
-            shapes.unseen,
-            basePosition=at,
-            baseOrientation=rotation,
-            baseInertialFramePosition=body.centre,
-            baseInertialFrameOrientation=body.axes,
-            physicsClientId=world,
-            **links.arguments,
-        )
-        super().__init__(world, number, body.centre, body.axes, {-1: body.weightless})
+        place, inertial = (at, rotation), (body.centre, body.axes)
+        number = bodies.add(body, place, body.mass, first, inertial, **links.arguments)
+        super().__init__(bodies, number, body.centre, body.axes, {-1: body.weightless})
         self._field, self._inertia = field, (body.mass, body.inertia)
         self._may_glide = field.level is not None and not self.weightless
         self._glide: Glide | None = None

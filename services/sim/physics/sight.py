@@ -15,10 +15,12 @@ from holozen.robot.rigid import Frame, PlacedShape
 from holozen.robot.shapes import solid
 from holozen.rotation import XYZ, XYZW, rotate
 
-from .engine import Shapes, bullet
+from .engine import UPRIGHT, Bodies, bullet
 
 Array = npt.NDArray[np.float64]
 Pose = tuple[XYZ, XYZW]
+ORIGIN: Pose = ((0.0, 0.0, 0.0), UPRIGHT)
+MOST_KEPT = 1000  # removed bodies; nothing steps here
 OTHERS, OWN, ALL = 1, 1024, -1  # groups of shapes: 1024 is none of the engine's own, those of the sensor that looks
 
 
@@ -41,13 +43,13 @@ class Sight:
 
     def __init__(self, ground: bool) -> None:
         self._world: int = bullet.connect(bullet.DIRECT)
-        self._shapes = Shapes(self._world)
+        self._made = Bodies(self._world, MOST_KEPT)
         self._bodies: dict[str, dict[str, list[int]]] = {}
         self._at: dict[tuple[str, str], Pose] = {}  # of each link that has shapes
         self._roots: dict[str, Pose] = {}
         if ground:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._world)
-            bullet.createMultiBody(0, plane, self._shapes.unseen, physicsClientId=self._world)
+            bullet.createMultiBody(0, plane, self._made.shapes.unseen, physicsClientId=self._world)
 
     def add(self, name: str, model: RobotModel) -> None:
         """Add an entity."""
@@ -58,8 +60,7 @@ class Sight:
                 frame = Frame.of(shape.pose)
                 parts.append(PlacedShape(link.name, solid(shape), frame.xyz, frame.quaternion))
             self._bodies[name][link.name] = [
-                bullet.createMultiBody(0, shape, self._shapes.unseen, physicsClientId=self._world)
-                for shape in self._shapes.of(tuple(parts))
+                self._made.add(shape, ORIGIN, 0.0, shape) for shape in self._made.shapes.of(tuple(parts))
             ]
 
     def remove(self, name: str) -> None:
@@ -68,7 +69,7 @@ class Sight:
         for link, bodies in self._bodies.pop(name).items():
             self._at.pop((name, link), None)
             for body in bodies:
-                bullet.removeBody(body, self._world)
+                self._made.remove(body)
 
     def has_moved(self, name: str, root: Pose) -> bool:
         """Whether the root of an entity is not where it was when it was placed."""

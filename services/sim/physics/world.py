@@ -13,7 +13,7 @@ from holozen.robot.model import RobotModel, WorldSpec
 
 from .body import Body
 from .dynamics import FRICTION
-from .engine import UPRIGHT, Rotation, Shapes, Vector, bullet
+from .engine import UPRIGHT, Bodies, Rotation, Vector, bullet
 from .jointed import JointedBody
 from .planar import Field, PlanarBody
 from .wheels import on_spheres
@@ -34,7 +34,7 @@ class World:
     def _begin(self) -> None:
         spec = self.spec
         self.id: int = bullet.connect(bullet.DIRECT)
-        self._shapes = Shapes(self.id)
+        self._bodies = Bodies(self.id)
         self._floating: list[Body] = []
         bullet.setGravity(*spec.gravity, physicsClientId=self.id)
         bullet.setPhysicsEngineParameter(
@@ -86,7 +86,7 @@ class World:
 
     def add(self, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT) -> PlanarBody:
         """Add a planar base, its root frame at `at`."""
-        return self._added(PlanarBody(self._field, self._shapes, body, at, rotation))
+        return self._added(PlanarBody(self._field, self._bodies, body, at, rotation))
 
     def add_jointed(
         self,
@@ -101,9 +101,7 @@ class World:
         """
         parts = on_spheres(rigid.simulated_parts(model), omni)
         names = frozenset(wheel.joint for wheel in omni) or wheels
-        body = self._added(
-            JointedBody(self.id, self._shapes, parts, at, rotation, names, model.static, omni=bool(omni))
-        )
+        body = self._added(JointedBody(self._bodies, parts, at, rotation, names, model.static, omni=bool(omni)))
         if not model.static or len(parts) > 1:
             self._field.others.append(body)
         self._field.hasten()

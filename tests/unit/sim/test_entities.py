@@ -1,7 +1,10 @@
 """Entities are added and removed by requests; errors are reported, and nothing stays behind."""
 
+import ctypes
+import gc
 import json
 import math
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -34,7 +37,7 @@ from services.sim import entities as entities_module
 from services.sim.entities import Entities, Entity
 from services.sim.io.entity_services import EntityServices
 from services.sim.loop import Loop
-from services.sim.physics.engine import UPRIGHT, bullet
+from services.sim.physics.engine import UPRIGHT
 from services.sim.physics.planar import PlanarBody
 from services.sim.physics.world import World
 
@@ -49,6 +52,11 @@ BOX = (
     "<iyy>0.1</iyy><izz>0.1</izz></inertia></inertial><collision name='c'><geometry><box><size>1 1 1</size></box>"
     "</geometry></collision></link></model></sdf>"
 )
+
+
+MALLINFO = (
+    "arena", "ordblks", "smblks", "hblks", "hblkhd", "usmblks", "fsmblks", "uordblks", "fordblks", "keepcost",
+)  # fmt: skip
 
 
 class Town:
@@ -402,13 +410,34 @@ ARM = (
 )
 
 
-def test_a_robot_that_cannot_be_leaves_nothing_in_the_world(town: Town, world: World) -> None:
+def test_a_robot_that_cannot_be_leaves_nothing_in_the_world(town: Town) -> None:
     """wheely_boi upside down: its plugin refuses it after the engine has it."""
     text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
     town.spawn("ball", BALL, z=1.0)
     code, reported = town.refusal(lambda: town.spawn("Fred", text, z=0.3))
     assert (code, "cannot balance" in reported) == (si.SpawnEntityReply.RESOURCE_PARSE_ERROR, True)
-    assert bullet.getNumBodies(world.id) == 2  # the ground and the ball
+    town.spawn("Ann", BALL, z=0.3)  # which would be refused if anything were there
+
+
+def test_robots_that_come_and_go_under_the_same_names_leave_nothing_in_memory(town: Town) -> None:
+    """Bytes in use by the C library, of the engine and of both ends of Zenoh's link, and blocks of Python."""
+    in_use = ctypes.CDLL(None).mallinfo2
+    in_use.restype = type("mallinfo2", (ctypes.Structure,), {"_fields_": [(f, ctypes.c_size_t) for f in MALLINFO]})
+
+    def come_and_go(times: int) -> tuple[int, int]:
+        for text in (HB_BOT, ARM):
+            for _ in range(times):
+                town.spawn("Fred", text)
+                town.loop.run(threading.Event(), 1)
+                town.services.delete(si.DeleteEntityRequest("Fred"))
+        gc.collect()
+        info = in_use()
+        return info.uordblks + info.hblkhd, sys.getallocatedblocks()
+
+    come_and_go(30)  # what is made once
+    before, after = come_and_go(1), come_and_go(100)
+    assert (after[0] - before[0]) / 200 < 400, "bytes for each"
+    assert (after[1] - before[1]) / 200 < 20, "blocks for each"
 
 
 def test_errors_of_a_robot_are_reported_before_its_name_is_checked(town: Town) -> None:

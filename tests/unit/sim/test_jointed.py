@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,7 +10,7 @@ import pytest
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
-from services.sim.physics.engine import bullet
+from services.sim.physics.engine import MOST_KEPT, bullet
 from services.sim.physics.jointed import JointedBody
 from services.sim.physics.world import World
 
@@ -313,24 +312,42 @@ def test_too_many_joints_are_refused_with_their_number(space: World) -> None:
         space.add_jointed(robot(link("base"), *many), (0, 0, 0))
 
 
-def test_a_hundred_robots_added_and_removed_leave_little_behind(ground: World) -> None:
-    parts = [link(f"l{i}", 1, 0.01, CUBE) for i in range(5)]
-    joints = [joint(f"j{i}", "l0", f"l{i}", xyz=f"{i} 0 0") for i in range(1, 5)]
-    model = robot(*parts, *joints)
+def test_a_body_that_is_used_again_moves_as_a_new_one(ground: World) -> None:
+    model = robot(link("a", 1, 0.1, CUBE), link("b", 1, 0.01, CUBE), joint("j", "a", "b", xyz="0.2 0 0"))
 
-    def come_and_go(times: int) -> None:
-        for _ in range(times):
-            body = ground.add_jointed(model, (0, 0, 0.05))
+    def moves() -> list[object]:
+        body = ground.add_jointed(model, (0.1, 0.2, 0.3), (0.0, 0.1, 0.0, math.sqrt(0.99)))
+        body.turn("j", 5.0)
+        states: list[object] = []
+        for _ in range(240):
             ground.step()
-            body.remove()
+            states.append((body.pose(), body.twist(), body.states()))
+        body.remove()
+        ground.step()
+        return states
 
-    come_and_go(20)
-    before = resident()
-    come_and_go(100)
-    assert resident() - before < 5e6
-    assert bullet.getNumBodies(ground.id) == 1
+    first = moves()
+    assert moves() == first
 
 
-def resident() -> int:
-    """Bytes of memory that this process has now."""
-    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+def test_what_touched_a_body_that_was_removed_falls(ground: World) -> None:
+    table, cube = fixed(robot(link("a", 1, 1.7e-3, CUBE))), robot(link("a", 1, 1.7e-3, CUBE))
+    for _ in range(2):
+        below, above = ground.add_jointed(table, (0, 0, 0.5)), ground.add_jointed(cube, (0, 0, 0.61))
+        run(ground, 0.5)
+        assert above.pose()[0][2] == pytest.approx(0.6, abs=1e-3)
+        below.remove()
+        run(ground, 1)
+        assert above.pose()[0][2] == pytest.approx(0.05, abs=1e-3)
+        above.remove()
+
+
+def test_a_bounded_number_of_removed_bodies_is_kept(ground: World) -> None:
+    model = robot(link("a", 1, 1.7e-3, CUBE))
+    for body in [ground.add_jointed(model, (number, 0, 1)) for number in range(MOST_KEPT + 3)]:
+        body.remove()
+    assert bullet.getNumBodies(ground.id) == 1 + MOST_KEPT
+    body = ground.add_jointed(model, (0, 0, 1))
+    assert bullet.getNumBodies(ground.id) == 1 + MOST_KEPT
+    run(ground, 1)
+    assert body.pose()[0] == pytest.approx((0, 0, 0.05), abs=1e-3)
