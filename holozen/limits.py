@@ -1,6 +1,7 @@
 """Limits on speed and on change of speed, as pure functions. Metres, radians, seconds."""
 
 import math
+from collections.abc import Iterator
 
 Planar = tuple[float, float, float]
 """A planar velocity in the body frame: forward (m/s), left (m/s), counter-clockwise (rad/s)."""
@@ -31,3 +32,19 @@ def ramp(now: Planar, wanted: Planar, linear: float, angular: float, dt: float) 
 def wrap(angle: float) -> float:
     """`angle` in radians, wrapped to [-pi, pi]."""
     return math.remainder(angle, math.tau)
+
+
+def not_finite(value: object) -> str:
+    """The path of the first number in plain values that is NaN or infinite, such as `linear.x`; else empty."""
+    return next(_bad_numbers(value, ""), "")
+
+
+def _bad_numbers(value: object, path: str) -> Iterator[str]:
+    if isinstance(value, float) and not math.isfinite(value):
+        yield path
+    elif isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _bad_numbers(inner, f"{path}.{name}" if path else name)
+    elif isinstance(value, list):
+        for index, inner in enumerate(value):
+            yield from _bad_numbers(inner, f"{path}[{index}]")

@@ -9,25 +9,37 @@ import queue
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
-from holozen import wire
+import msgspec
+
+from holozen import limits, wire
+from holozen import messages as m
 from holozen.bus import Bus
 from holozen.cli import values
 from holozen.cli.hints import suggest_key
-from holozen.cli.values import Form, Ours
 from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE
 from holozen.console import report
-from holozen.messages import CommandStatus, Message
+from holozen.messages import CodecError, CommandStatus, Message, codec
+from holozen.messages.definitions import Interface, completed
+from holozen.messages.message import not_finite
+from holozen.messages.registry import Registry
 from holozen.process import stop_event
+from holozen.suggest import suggest
 from holozen.transport.graph import Endpoint, on_key
 from holozen.transport.pubsub import Publisher
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 STOPS, STOP_EVERY = 5, 0.02  # s
 CLOCK_PATIENCE = 0.2  # s to wait for the robot to ask for our clock
 LOOK = 0.1  # s between two checks for a line of standard input
 VERDICT = 0.3  # s that a single command waits for the sim's status, which comes at 10 Hz
 FRESH = 1.0  # s; an older status is ignored
+FORCE = "; --force sends it all the same"
+Kinds = tuple[type[Message], ...]
 
 
 class Refused(Exception):
@@ -108,12 +120,12 @@ def _form(args: argparse.Namespace) -> Form | None:
     row = wire.topic(args.key)
     if given:
         try:
-            form = values.form_named(given, args.key, args.wire, args.force, args.package)
+            form = form_named(given, args.key, args.wire, args.force, args.package)
         except ValueError as error:
             raise Refused(f"{args.key}: {error}") from None
         right = [kind.ROS for kind in row.types] if row else [form.kind.ROS]
         if form.kind.ROS not in right and not args.force:
-            raise Refused(f"{args.key}: its type is {' or '.join(right)}, not {given}{values.FORCE}")
+            raise Refused(f"{args.key}: its type is {' or '.join(right)}, not {given}{FORCE}")
         return form
     return Ours(row.types, args.key, args.wire, args.force) if row else None
 
@@ -121,11 +133,11 @@ def _form(args: argparse.Namespace) -> Form | None:
 def _form_of_listener(found: list[Endpoint], args: argparse.Namespace) -> Form:
     """The form of the type that the key's subscribers expect: a robot's file may give its topics any name."""
     wanted = {end.type for end in on_key(found, args.key, "sub")}
-    if kinds := values.kinds_of(wanted):
+    if kinds := kinds_of(wanted):
         return Ours(kinds, args.key, args.wire, args.force)
     for name in sorted(wanted):
         with contextlib.suppress(ValueError):
-            return values.form_named(name, args.key, args.wire, args.force, args.package)
+            return form_named(name, args.key, args.wire, args.force, args.package)
     known = ", ".join(topic.key for topic in wire.TOPICS)
     raise Refused(
         f"{args.key!r} has no known type; known keys: {known}, each also as ROBOT/key;"
@@ -267,3 +279,124 @@ class CommandFeedback:
         deadline = time.monotonic() + VERDICT
         while not self.look() and time.monotonic() < deadline and not stop.wait(0.002):
             pass
+
+
+# The value.
+
+
+def kinds_named(name: str) -> Kinds:
+    """Our type of a ROS name, such as geometry_msgs/msg/Twist or geometry_msgs/Twist; empty if we have none."""
+    package, _, last = name.replace("/msg/", "/").partition("/")
+    ours = [kind for kind in vars(m).values() if isinstance(kind, type) and issubclass(kind, Message)]
+    ours += [kind for row in wire.TOPICS for kind in row.types]
+    return tuple({kind: 0 for kind in ours if f"{package}/msg/{last}" == kind.ROS})
+
+
+def kinds_of(types: set[str]) -> Kinds:
+    """Our types for the given ROS types: all that the wire table's row accepts, if there is one."""
+    row = next((row for row in wire.TOPICS if {kind.ROS for kind in row.types} & types), None)
+    return row.types if row else next((found for name in sorted(types) if (found := kinds_named(name))), ())
+
+
+def read_message(text: str, kinds: Kinds) -> Message:
+    """The message that `text` (JSON or YAML, or - for standard input) describes, of the first of `kinds` that fits. Its
+    numbers may not be finite. Raises ValueError with the reason.
+    """
+    value = values.plain(text)
+    try:
+        return codec.convert(value, kinds)
+    except CodecError as error:
+        raise ValueError(f"{error}{_field_hint(str(error), value, kinds)}") from None
+
+
+def forced(message: Message, name: str) -> bytes:
+    """The bytes of a message with numbers that are not finite, which `codec.encode` refuses."""
+    if name == "json":
+        return json.dumps(msgspec.to_builtins(message)).encode()
+    if name == "msgpack":
+        return msgspec.msgpack.encode(message)
+    from holozen.messages import cdr
+
+    return cdr.write(Registry().find(message.ROS), msgspec.to_builtins(message))
+
+
+def _field_hint(reason: str, value: Any, kinds: Kinds) -> str:
+    """The valid names in place of an unknown field in `reason`, the closest first."""
+    word = reason.partition("unknown field `")[2].partition("`")[0]
+    if not word:
+        return ""
+    place = reason.partition(" - at `$.")[2].partition("`")[0]
+    known: Any = {}
+    for kind in kinds:
+        known = msgspec.to_builtins(kind())
+        for name in filter(None, place.split(".")):
+            known = known.get(name, {}) if isinstance(known, dict) else {}
+        if known:
+            break
+    names = list(known) if isinstance(known, dict) else []
+    return f"{suggest(word, names)}; there are {', '.join(names) or 'none'}"
+
+
+class Ours:
+    """Encodes values as one of our types, the first of `kinds` that fits."""
+
+    def __init__(self, kinds: Kinds, key: str, encoding: str, force: bool) -> None:
+        self.kind, self._kinds, self._wire, self._force = kinds[0], kinds, encoding, force
+        self._is_command = wire.is_command(key, kinds)
+
+    def payload(self, text: str) -> bytes:
+        """The bytes of a written value; sets `kind` to its type. Raises ValueError with the reason."""
+        message = read_message(text, self._kinds)
+        self.kind = type(message)
+        self._kinds = (self.kind,) if len(self._kinds) == 1 else self._kinds
+        if (bad := not_finite(message)) and self._force:
+            return forced(message, self._wire)
+        if bad:
+            raise ValueError(f"{self.kind.__name__}.{bad} is not a finite number{FORCE}")
+        if self._is_command and not self._force and (bad := wire.implausible(message)):
+            raise ValueError(f"{self.kind.__name__}.{bad}{FORCE}")
+        return codec.encode(message, self._wire)
+
+    def stop(self) -> bytes | None:
+        """The bytes that stop a robot; None if this is no command."""
+        moves = self.kind.__name__ in ("Twist", "TwistStamped")
+        return codec.encode(self.kind(), self._wire) if moves else None
+
+
+class Foreign:
+    """Encodes values as any type that has a definition."""
+
+    def __init__(self, interface: Interface, wire: str, force: bool) -> None:
+        self._interface, self._wire, self._force = interface, wire, force
+        self.kind: type[Message] = type("Foreign", (Message,), {"__module__": __name__})
+        self.kind.ROS = interface.name  # not the name that follows from the module
+
+    def payload(self, text: str) -> bytes:
+        """The bytes of a written value. Raises ValueError with the reason."""
+        value = completed(self._interface, values.plain(text))
+        if not self._force and (bad := limits.not_finite(value)):
+            raise ValueError(f"{bad} is not a finite number{FORCE}")
+        if self._wire == "cdr":
+            from holozen.messages import cdr
+
+            return cdr.write(self._interface, value)
+        if self._wire == "msgpack":
+            return msgspec.msgpack.encode(value)
+        return json.dumps(value).encode()
+
+    def stop(self) -> bytes | None:
+        """None: no command of ours."""
+        return None
+
+
+Form = Ours | Foreign
+
+
+def form_named(name: str, key: str, wire: str, force: bool, packages: Iterable[tuple[str, Path]] = ()) -> Form:
+    """The form of a type for a `key`; `packages` are those of `--package`. Raises ValueError for an unknown type,
+    naming the closest known one.
+    """
+    given = dict(packages)
+    if name.partition("/")[0] not in given and (kinds := kinds_named(name)):
+        return Ours(kinds, key, wire, force)
+    return Foreign(Registry(given).find(name), wire, force)

@@ -6,6 +6,7 @@ import argparse
 import json
 import time
 
+from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.hints import none_found, suggest_key, unknown
 from holozen.cli.output import CDR, Hex, Reader, lines
@@ -91,7 +92,8 @@ def info(args: argparse.Namespace) -> int:
 def call(args: argparse.Namespace) -> int:
     """Send a request and print the reply; a service's error is one line and exit code 1."""
     with open_bus(args) as bus:
-        with deferred_interrupt():  # while the session opens
+        looking = background(bus.endpoints)
+        with deferred_interrupt():  # while the session opens and queries the graph
             from holozen.cli import values
 
         words = list(args.words)
@@ -100,7 +102,7 @@ def call(args: argparse.Namespace) -> int:
             report(f"holozen service call: {args.key}: {words[-1]!r} is too much; write KEY [TYPE] REQUEST")
             return 2
         try:
-            payload, kind = values.request(bus, args, words[0] if words else "{}", given)
+            payload, kind = values.request(looking(), args, words[0] if words else "{}", given)
         except ValueError as error:
             report(f"holozen service call: {error}")
             return 1

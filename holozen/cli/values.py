@@ -1,4 +1,4 @@
-"""Values written on the command line, as validated bytes of a message (`topic pub`) or a request (`service call`)."""
+"""Values written on the command line, as JSON or YAML: plain, or as the validated bytes of a request."""
 
 from __future__ import annotations
 
@@ -8,77 +8,17 @@ import re
 import sys
 import time
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from msgspec import to_builtins
-
-from holozen import messages as m
-from holozen import wire
-from holozen.bus import Bus
 from holozen.console import report
-from holozen.messages import CodecError, Message, codec
-from holozen.messages.message import not_finite
+from holozen.limits import not_finite
+from holozen.messages.definitions import Interface, completed
+from holozen.messages.registry import Registry
 from holozen.suggest import suggest
 from holozen.transport.graph import Endpoint
 
-if TYPE_CHECKING:
-    from pathlib import Path
-
-    from holozen.messages.definitions import Interface
-    from holozen.messages.registry import Registry
-
 LARGEST = 1_000_000  # bytes of a value
 TYPE = re.compile(r"\w+/((msg|srv)/)?\w+")
-FORCE = "; --force sends it all the same"
-Kinds = tuple[type[Message], ...]
-
-
-def kinds_named(name: str) -> Kinds:
-    """Our type of a ROS name, such as geometry_msgs/msg/Twist or geometry_msgs/Twist; empty if we have none."""
-    package, _, last = name.replace("/msg/", "/").partition("/")
-    ours = [kind for kind in vars(m).values() if isinstance(kind, type) and issubclass(kind, Message)]
-    ours += [kind for row in wire.TOPICS for kind in row.types]
-    return tuple({kind: 0 for kind in ours if f"{package}/msg/{last}" == kind.ROS})
-
-
-def kinds_of(types: set[str]) -> Kinds:
-    """Our types for the given ROS types: all that the wire table's row accepts, if there is one."""
-    row = next((row for row in wire.TOPICS if {kind.ROS for kind in row.types} & types), None)
-    return row.types if row else next((found for name in sorted(types) if (found := kinds_named(name))), ())
-
-
-def read_message(text: str, kinds: Kinds) -> Message:
-    """The message that `text` (JSON or YAML, or - for standard input) describes. Raises ValueError with the reason."""
-    message = draft(text, kinds)
-    codec.encode(message)  # fail now if it cannot be sent
-    return message
-
-
-def draft(text: str, kinds: Kinds) -> Message:
-    """`read_message` that accepts numbers that are not finite."""
-    return message(plain(text), kinds)
-
-
-def message(value: Any, kinds: Kinds) -> Message:
-    """`draft` of a plain value."""
-    try:
-        return codec.convert(value, kinds)
-    except CodecError as error:
-        raise ValueError(f"{error}{_field_hint(str(error), value, kinds)}") from None
-
-
-def forced(message: Message, name: str) -> bytes:
-    """The bytes of a message with numbers that are not finite, which `codec.encode` refuses."""
-    if name == "json":
-        return json.dumps(to_builtins(message)).encode()
-    import msgspec
-
-    if name == "msgpack":
-        return msgspec.msgpack.encode(message)
-    from holozen.messages import cdr
-    from holozen.messages.registry import Registry
-
-    return cdr.write(Registry().find(message.ROS), to_builtins(message))
 
 
 def plain(text: str) -> Any:
@@ -132,123 +72,33 @@ def _yaml(text: str, why_no_json: ValueError) -> Any:
         raise ValueError(f"neither JSON nor YAML: {' '.join(str(error).split())}") from None
 
 
-def _field_hint(reason: str, value: Any, kinds: Kinds) -> str:
-    """The valid names in place of an unknown field in `reason`, the closest first."""
-    word = reason.partition("unknown field `")[2].partition("`")[0]
-    if not word:
-        return ""
-    place = reason.partition(" - at `$.")[2].partition("`")[0]
-    known: Any = {}
-    for kind in kinds:
-        known = to_builtins(kind())
-        for name in filter(None, place.split(".")):
-            known = known.get(name, {}) if isinstance(known, dict) else {}
-        if known:
-            break
-    names = list(known) if isinstance(known, dict) else []
-    return f"{suggest(word, names)}; there are {', '.join(names) or 'none'}"
-
-
-class Ours:
-    """Encodes values as one of our types, the first of `kinds` that fits."""
-
-    def __init__(self, kinds: Kinds, key: str, encoding: str, force: bool) -> None:
-        self.kind, self._kinds, self._wire, self._force = kinds[0], kinds, encoding, force
-        self._is_command = wire.is_command(key, kinds)
-
-    def payload(self, text: str) -> bytes:
-        """The bytes of a written value; sets `kind` to its type. Raises ValueError with the reason."""
-        message = draft(text, self._kinds)
-        self.kind = type(message)
-        self._kinds = (self.kind,) if len(self._kinds) == 1 else self._kinds
-        if (bad := not_finite(message)) and self._force:
-            return forced(message, self._wire)
-        if bad:
-            raise ValueError(f"{self.kind.__name__}.{bad} is not a finite number{FORCE}")
-        if self._is_command and not self._force and (bad := wire.implausible(message)):
-            raise ValueError(f"{self.kind.__name__}.{bad}{FORCE}")
-        return codec.encode(message, self._wire)
-
-    def stop(self) -> bytes | None:
-        """The bytes that stop a robot; None if this is no command."""
-        moves = self.kind.__name__ in ("Twist", "TwistStamped")
-        return codec.encode(self.kind(), self._wire) if moves else None
-
-
-class Foreign:
-    """Encodes values as any type that has a definition."""
-
-    def __init__(self, interface: Interface, wire: str, force: bool) -> None:
-        self._interface, self._wire, self._force = interface, wire, force
-        self.kind: type[Message] = type("Foreign", (Message,), {"__module__": __name__})
-        self.kind.ROS = interface.name  # not the name that follows from the module
-
-    def payload(self, text: str) -> bytes:
-        """The bytes of a written value. Raises ValueError with the reason."""
-        from holozen.messages.definitions import completed
-
-        value: Any = completed(self._interface, plain(text))  # not_finite walks plain dicts too
-        if not self._force and (bad := not_finite(value)):
-            raise ValueError(f"{bad} is not a finite number{FORCE}")
-        if self._wire == "cdr":
-            from holozen.messages import cdr
-
-            return cdr.write(self._interface, value)
-        if self._wire == "msgpack":
-            import msgspec
-
-            return msgspec.msgpack.encode(value)
-        return json.dumps(value).encode()
-
-    def stop(self) -> bytes | None:
-        """None: no command of ours."""
-        return None
-
-
-Form = Ours | Foreign
-
-
-def form_named(name: str, key: str, wire: str, force: bool, packages: Iterable[tuple[str, Path]] = ()) -> Form:
-    """The form of a type for a `key`; `packages` are those of `--package`. Raises ValueError for an unknown type,
-    naming the closest known one.
-    """
-    given = dict(packages)
-    if name.partition("/")[0] not in given and (kinds := kinds_named(name)):
-        return Ours(kinds, key, wire, force)
-    from holozen.messages.registry import Registry
-
-    return Foreign(Registry(given).find(name), wire, force)
-
-
-def request(bus: Bus, args: argparse.Namespace, text: str, given: str) -> tuple[bytes, str]:
+def request(found: Iterable[Endpoint], args: argparse.Namespace, text: str, given: str) -> tuple[bytes, str]:
     """The bytes of the request that `text` describes, and the service's type, empty if unknown.
 
-    `given` is the type from the command line, or empty. Raises ValueError with the reason.
+    `found` are the endpoints of all nodes; `given` is the type from the command line, or empty. Raises ValueError with
+    the reason.
     """
     text = sys.stdin.read(LARGEST + 1) if text == "-" else text
-    row = wire.service(args.key)
-    name, wrong = _full(given), ""
-    if row and name in ("", row.reply.ROS):
-        try:
-            return _by_row(text, row), row.reply.ROS
-        except ValueError as error:
-            wrong = f"{args.key}: refused: {error}"  # unless its server has another type
-    servers = [end for end in bus.endpoints() if end.kind == "srv"]
+    servers = [end for end in found if end.kind == "srv"]
     announced = next((end.type for end in servers if end.key == args.key), "")
-    if wrong and announced in ("", name, row.reply.ROS if row else ""):
-        raise ValueError(wrong)
-    from holozen.messages.registry import Registry  # here, since most calls need only our definitions
-
     registry = Registry(dict(args.package))
-    kind = _known(registry, announced or (row.reply.ROS if row else ""))
-    if name:
+    kind = _known(registry, announced or _usual(args.key))
+    if name := _full(given):
         kind = _given(registry, args.key, name, kind, announced)
     if not (kind or announced or args.any):
         raise ValueError(_untyped(args.key, servers))
     try:
-        return _by_type(text, kind), kind.name if kind else ""
+        return _payload(text, kind), kind.name if kind else ""
     except ValueError as error:
         raise ValueError(f"{args.key}: refused: {error}") from None
+
+
+def _usual(key: str) -> str:
+    """The type of a service that no node has now, by the wire table; empty if that does not have it."""
+    from holozen import wire  # loads all messages, which a call of a service that is there does not need
+
+    row = wire.service(key)
+    return row.reply.ROS if row else ""
 
 
 def _full(given: str) -> str:
@@ -256,17 +106,15 @@ def _full(given: str) -> str:
     return given.replace("/", "/srv/") if given.count("/") == 1 else given
 
 
-def _by_row(text: str, row: wire.Service) -> bytes:
-    """The request of the wire table's type. Omitted fields stay out, since the server may have another type."""
+def _payload(text: str, kind: Interface | None) -> bytes:
+    """In JSON. Omitted fields stay out: a server of another version may not know them."""
     value = plain(text)
-    filled = json.loads(codec.encode(message(value, (row.request,))))
-    return json.dumps({name: inner for name, inner in filled.items() if name in value}).encode()
-
-
-def _by_type(text: str, kind: Interface | None) -> bytes:
     if kind and kind.request:
-        return Foreign(kind.request, "json", force=False).payload(text)
-    return json.dumps(plain(text), default=str).encode()
+        checked = completed(kind.request, value)
+        if bad := not_finite(checked):
+            raise ValueError(f"{bad} is not a finite number")
+        value = {name: checked[name] for name in value}
+    return json.dumps(value, default=str).encode()
 
 
 def _known(registry: Registry, name: str) -> Interface | None:
@@ -305,6 +153,8 @@ def _fields(kind: Interface) -> list[list[str]]:
 
 
 def _untyped(key: str, servers: list[Endpoint]) -> str:
+    from holozen import wire
+
     known = [service.key for service in wire.SERVICES]
     near = suggest(key, dict.fromkeys([*(end.key for end in servers), *known]))
     return f"{key!r} has no known type{near}; known: {', '.join(known)}; give the type, or --any"

@@ -3,11 +3,13 @@
 import math
 import struct
 from array import array
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any, ClassVar
 
 import msgspec
 from msgspec import Meta, Struct
+
+from holozen import limits
 
 # `ros` is the type in the definition; a plain int is an int64, a float a float64.
 Byte = Annotated[int, Meta(ge=0, lt=2**8, extra={"ros": "byte"})]
@@ -51,7 +53,7 @@ def listed(value: Any) -> list[Any]:
 
 def not_finite(message: Message) -> str:
     """The path of the first number in `message` that is NaN or infinite, such as `linear.x`; else empty."""
-    return next(_bad_numbers(msgspec.to_builtins(message, enc_hook=_suspects), ""), "")
+    return limits.not_finite(msgspec.to_builtins(message, enc_hook=_suspects))
 
 
 def _suspects(value: Any) -> list[Any]:
@@ -59,14 +61,3 @@ def _suspects(value: Any) -> list[Any]:
     if isinstance(value, array) and (value.typecode not in "fd" or math.isfinite(sum(value))):
         return []
     return listed(value)
-
-
-def _bad_numbers(value: Any, path: str) -> Iterator[str]:
-    if isinstance(value, float) and not math.isfinite(value):
-        yield path
-    elif isinstance(value, dict):
-        for name, inner in value.items():
-            yield from _bad_numbers(inner, f"{path}.{name}" if path else name)
-    elif isinstance(value, list):
-        for index, inner in enumerate(value):
-            yield from _bad_numbers(inner, f"{path}[{index}]")

@@ -79,7 +79,7 @@ def test_service_call_on_either_wire(town: Wire, wire_name: str) -> None:
         (
             ["call", "next_goal", '{"goal": 7}'],
             1,
-            "refused: not a NextGoalRequest: Object contains unknown field `goal`",
+            "refused: holozen/srv/NextGoal_Request has no field 'goal'",
         ),
         (["call", "get_pose", '{"name": "Fred"}'], 1, "no Fred/odom was received"),
         (["call", "get_pose", '{"name": "*"}'], 1, "robot name '*': use a letter"),

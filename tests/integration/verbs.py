@@ -106,7 +106,7 @@ VERBS = {
     "service type": row("resume", ("resmue", 1, "did you mean 'resume'?"), silent=("odom", *NO_KEY)),
     "service find": row("NextGoal", ("NextGaol", 1, "of type 'NextGaol'"), silent=("x/X", 1, "types: none")),
     "service info": row("resume", ("resmue", 1, "did you mean 'resume'?"), silent=("odom", *NO_KEY)),
-    "service call": row("next_goal", ("next_goal '{{goal: 1}}'", 1, "field `goal` (did you mean 'request_goal'?)"),
+    "service call": row("next_goal", ("next_goal '{{goal: 1}}'", 1, "no field 'goal' (did you mean 'request_goal'?)"),
         foreign=("a/asked --any", "x: 1"),
         silent=("next_goal --timeout 0.2", 1, "no reply from 'next_goal' within 0.2 s at "),
         endless=Endless("next_goal -r 20", "x_goal", 130)),

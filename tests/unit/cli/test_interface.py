@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from holozen import cli
-from holozen.cli.values import read_message
+from holozen.cli.publish import read_message
 from holozen.messages import Odometry, Twist
 from holozen.messages.codec import convert
 from holozen.messages.definitions import completed

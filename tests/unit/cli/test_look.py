@@ -186,7 +186,10 @@ def test_services_are_listed_and_called(sim: Bus, run: Run) -> None:
     ("words", "expected"),
     [
         (("next_goal", "request_goal: 4"), "holozen service call: goal 4: the list holds goals 0 to 3\n"),
-        (("next_goal", "{gaol: 4}"), "holozen service call: next_goal: refused: not a NextGoalRequest: Object"),
+        (
+            ("next_goal", "{gaol: 4}"),
+            "holozen service call: next_goal: refused: holozen/srv/NextGoal_Request has no field",
+        ),
         (("get_pose", "--timeout", "0.05"), "holozen service call: no reply from 'get_pose' within 0.05 s"),
         (("nonsense",), "holozen service call: 'nonsense' has no known type; known: next_goal, get_pose, "),
     ],

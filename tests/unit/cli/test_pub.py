@@ -7,7 +7,8 @@ from typing import Any
 
 import pytest
 
-from holozen.cli.values import LARGEST, read_message
+from holozen.cli.publish import Ours, read_message
+from holozen.cli.values import LARGEST
 from holozen.messages import NextGoalRequest, Twist, TwistStamped
 
 KINDS = (Twist, TwistStamped)
@@ -15,7 +16,7 @@ KINDS = (Twist, TwistStamped)
 
 def refusal(text: str) -> str:
     with pytest.raises(ValueError) as error:
-        read_message(text, KINDS)
+        Ours(KINDS, "cmd_vel", "json", force=False).payload(text)
     assert "\n" not in str(error.value)
     return str(error.value)
 
