@@ -1,4 +1,4 @@
-"""The one table of the wire agrees with the docstrings of the services and with the README."""
+"""The one table of the wire agrees with the docstrings of the services and with its page in the docs."""
 
 import ast
 import re
@@ -61,8 +61,8 @@ def test_the_table_names_services_that_there_are() -> None:
     assert set(wire.PRIORITY_OF) <= known
 
 
-def test_the_readme_shows_the_table() -> None:
-    text = (REPO / "README.md").read_text()
+def test_the_docs_show_the_table() -> None:
+    text = (REPO / "docs" / "wire.md").read_text()
     shown = re.search(r"<!-- wire -->\n(.*)\n<!-- /wire -->", text, re.DOTALL)
     assert shown is not None
     assert shown[1] == wire.table(), "scripts/wire-table writes it anew"

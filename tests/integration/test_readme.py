@@ -17,7 +17,6 @@ REPO = Path(__file__).parents[2]
 # What those that last print, with which they have begun; they end by Ctrl-C.
 LASTING = {
     "topic echo": "pose:",
-    "topic hz": "average rate",
     "topic pub": "subscriber of cmd_vel",
     "record": "messages,",
     "plot": "x: ",

@@ -16,7 +16,7 @@ ZENOH = str(Path(sys.executable).with_name("zenoh"))
 
 
 def zenoh(wire: Wire, *words: str) -> Process:
-    """The command as the README has it, without its shout into the network while it looks for a router."""
+    """The command as docs/wire.md has it, without its shout into the network while it looks for a router."""
     quiet = ("--cfg", "scouting/multicast/enabled:false")
     return Process(
         [ZENOH, "--mode", "client", "--connect", wire.endpoint, *quiet, *words], env={"PYTHONUNBUFFERED": "1"}
