@@ -1,24 +1,21 @@
-"""A robot file under check: its sources, its elements with their lines, and the mistakes that rules find in it."""
+"""A robot file under check, read as far as possible, and the words in which rules say what is wrong with it."""
 
-import os
 import re
-import tempfile
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
-from xml.parsers import expat
 
 from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
+from holozen.check.sources import SourceFile, elements, read_sources, trace
 from holozen.robot.elements import Tag, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
-from holozen.robot.packages import find_by_name, find_package
 from holozen.robot.rigid import check_simulated
-from holozen.robot.xacro import Outcome, expand_in_child, is_xacro, process, read_text
+from holozen.robot.xacro import Outcome, is_xacro, process, read_text
 
 Severity = Literal["error", "warning"]
 
@@ -93,200 +90,6 @@ class Finding:
             "reason": self.why,
             "fix": self.fix,
         }
-
-
-# Suggestions for misspelt words.
-
-
-ALIASES = {
-    "height": "length",
-    "min": "lower",
-    "max": "upper",
-    "torque": "effort",
-    "speed": "velocity",
-    "file": "filename",
-    "uri": "filename",
-    "colour": "color",
-    "rgb": "rgba",
-    "kg": "value",
-    "kind": "type",
-    "pos": "xyz",
-    "position": "xyz",
-    "rotation": "rpy",
-    "intertia": "inertia",
-}
-"""Words commonly written instead of one of the file format."""
-
-
-def distance(one: str, other: str) -> int:
-    """Edit distance: letters to insert, delete, change or swap with the next one (optimal string alignment); the
-    difference in length if that is 3 or more.
-    """
-    if abs(len(one) - len(other)) > 2:
-        return abs(len(one) - len(other))
-    before: list[int] = []
-    last = list(range(len(other) + 1))
-    for i, a in enumerate(one, 1):
-        row = [i]
-        for j, b in enumerate(other, 1):
-            best = min(last[j] + 1, row[-1] + 1, last[j - 1] + (a != b))
-            if i > 1 and j > 1 and a == other[j - 2] and one[i - 2] == b:
-                best = min(best, before[j - 2] + 1)
-            row.append(best)
-        before, last = last, row
-    return last[-1]
-
-
-def nearest(word: str, known: Iterable[str], shortest: int = 2) -> str | None:
-    """The known word that `word` is a misspelling of, or None. Words shorter than `shortest` are not guessed at.
-
-    One wrong letter is allowed, two from eight letters on; case and underscores are ignored.
-    """
-    words, plain = list(known), _plain(word)
-    if len(word) > 40 or len(plain) < shortest:
-        return None
-    if ALIASES.get(plain) in words:
-        return ALIASES[plain]
-    allowed = 2 if len(plain) >= 8 else 1
-    near = [other for other in words if distance(plain, _plain(other)) <= allowed]
-    # Of two spellings of one word, prefer the one in the same style.
-    return min(near, key=lambda other: (distance(plain, _plain(other)), distance(word, other)), default=None)
-
-
-def _plain(word: str) -> str:
-    return word.lower().replace("_", "").replace("-", "")
-
-
-# The source files, and the line of each element of the expanded text in them.
-
-
-MARK = "holozen-line"  # the attribute that carries file and line through xacro
-MOST_FILES = 200
-
-_FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
-_FILENAME = re.compile(rb"""(filename\s*=\s*)("[^"]*"|'[^']*')""")
-
-
-@dataclass(frozen=True, slots=True)
-class SourceFile:
-    """A file as written. `includes`: the filename of each include -> the file, None if it is computed."""
-
-    path: Path
-    text: str
-    root: Tag
-    includes: Mapping[str, Path | None]
-
-
-def read_sources(path: Path, packages: Mapping[str, Path]) -> list[SourceFile]:
-    """The robot file, and the files it includes by a literal name.
-
-    Raises RobotError for a file that cannot be read or parsed.
-    """
-    files: dict[Path, SourceFile] = {}
-    waiting = [path]
-    while waiting and len(files) < MOST_FILES:
-        here = waiting.pop()
-        if here not in files:
-            files[here] = _read(here, path, packages)
-            waiting += [found for found in files[here].includes.values() if found]
-    return list(files.values())
-
-
-def trace(subject: "Subject", plain: Tag) -> list[str]:
-    """For each element of the expanded text in order: "source file number:line", or nothing if unknown.
-
-    The files are expanded a second time, with a mark in each start tag. The result is used only if the text is the
-    same otherwise. Raises RobotError if the copies cannot be read.
-    """
-    try:
-        with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
-            outcome = _expanded(Path(folder), subject)
-    except OSError:  # there is no writable folder
-        return []
-    if outcome.error:
-        return []
-    marked = list(elements(read_xml(outcome.text, "marked")))
-    places = [tag.attributes.pop(MARK, "") for tag in marked]
-    same = [(tag.name, tag.attributes) for tag in marked] == [(tag.name, tag.attributes) for tag in elements(plain)]
-    return places if same else []
-
-
-def _expanded(folder: Path, subject: "Subject") -> Outcome:
-    """The expansion of the marked copies in `folder`."""
-    sources = subject.sources
-    copies = {source.path: folder / f"{number}.xacro" for number, source in enumerate(sources)}
-    for number, source in enumerate(sources):
-        copies[source.path].write_bytes(_marked(source, number, copies))
-    packages = {**_packages(sources, subject.packages), **subject.packages}
-    return expand_in_child(copies[sources[0].path], subject.args, packages, subject.allow_env)
-
-
-def elements(root: Tag) -> Iterator[Tag]:
-    """`root` and all below it, in file order."""
-    waiting = [root]
-    while waiting:
-        tag = waiting.pop()
-        yield tag
-        waiting += tag.children[::-1]
-
-
-def _read(path: Path, start: Path, packages: Mapping[str, Path]) -> SourceFile:
-    text = read_text(path)
-    root = read_xml(text, str(path))
-    names = [tag.attributes.get("filename", "") for tag in root.below("xacro:include")]
-    return SourceFile(path, text, root, {name: _included(name, path, start, packages) for name in names})
-
-
-def _included(name: str, path: Path, start: Path, packages: Mapping[str, Path]) -> Path | None:
-    try:
-        found = path.parent / _FIND.sub(lambda match: str(find_package(match[1], start, packages)), name)
-        if "$" in str(found) or found.is_file():
-            return found if "$" not in str(found) else None
-        return next(iter(find_by_name(name, start, packages)), None) if os.path.isabs(name) else None
-    except (RobotError, OSError, ValueError):
-        return None
-
-
-def _packages(sources: list[SourceFile], packages: Mapping[str, Path]) -> dict[str, Path]:
-    """The packages as found from the original file, since the copies are elsewhere."""
-    found = {}
-    for name in {name for source in sources for name in _FIND.findall(source.text)}:
-        try:
-            found[name] = find_package(name, sources[0].path, packages)
-        except RobotError:
-            continue
-    return found
-
-
-def _marked(source: SourceFile, number: int, copies: Mapping[Path, Path]) -> bytes:
-    """The text with a mark in each start tag that is not xacro's own, and with includes of the copies."""
-    text, pieces, done = source.text.encode("utf-8", "replace"), [], 0
-    for offset, line, name in _starts(text):
-        after = offset + 1 + len(name.encode())
-        pieces.append(text[done:after])
-        done = after
-        if not name.startswith("xacro:"):
-            pieces.append(f' {MARK}="{number}:{line}"'.encode())
-        elif name == "xacro:include" and (match := _FILENAME.search(text, after)):
-            pieces += [text[after : match.start()], match[1], _copy(match[2][1:-1].decode(), source, copies)]
-            done = match.end()
-    return b"".join([*pieces, text[done:]])
-
-
-def _copy(name: str, source: SourceFile, copies: Mapping[Path, Path]) -> bytes:
-    found = source.includes.get(name)
-    path = str(copies.get(found, found)) if found else name
-    full = path.startswith(("/", "$(find", "$(env", "$(optenv", "$(cwd", "$(dirname"))
-    return f'"{path if full else source.path.parent.absolute() / path}"'.encode()
-
-
-def _starts(text: bytes) -> list[tuple[int, int, str]]:
-    """Byte offset, line and name of each start tag."""
-    found: list[tuple[int, int, str]] = []
-    parser = expat.ParserCreate("utf-8")
-    parser.StartElementHandler = lambda name, _: found.append((parser.CurrentByteIndex, parser.CurrentLineNumber, name))
-    parser.Parse(text, True)
-    return found
 
 
 _WHERE = re.compile(r"(?P<file>.*?)(?:, line (?P<line>\d+))?: (?P<text>.*)", re.DOTALL)
@@ -503,7 +306,7 @@ def _refusals(subject: Subject) -> Iterator[tuple[Severity, Mistake]]:
 def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:
     """Element of the expanded text -> its place in a source file, or in the text if unknown."""
     try:
-        marks = trace(subject, root)
+        marks = trace(subject.sources, root, subject.args, subject.packages, subject.allow_env)
     except (RobotError, OSError):
         marks = []
     tags = list(elements(root))

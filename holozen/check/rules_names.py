@@ -4,7 +4,8 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, SourceFile, Subject, rule
+from holozen.check.engine import Mistake, Subject, rule
+from holozen.check.sources import SourceFile
 from holozen.robot.elements import Tag
 from holozen.suggest import listed, suggest
 

@@ -3,7 +3,8 @@
 import re
 from collections.abc import Iterator
 
-from holozen.check.engine import Mistake, Subject, nearest, rule
+from holozen.check.engine import Mistake, Subject, rule
+from holozen.check.spelling import nearest
 from holozen.robot.elements import Tag
 from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
 from holozen.suggest import listed, suggest

@@ -3,7 +3,8 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from holozen.check.engine import Mistake, Subject, nearest, rule
+from holozen.check.engine import Mistake, Subject, rule
+from holozen.check.spelling import nearest
 from holozen.robot.elements import Tag
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.model import JOINT_KINDS

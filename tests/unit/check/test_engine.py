@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from holozen.check.engine import distance, nearest
 from holozen.check.report import check
 from holozen.check.rules_xml import PLUGIN, URDF
+from holozen.check.spelling import distance, nearest
 from tests.unit.check.conftest import Findings
 
 BALL = '<collision><geometry><sphere radius="1"/></geometry></collision>'
