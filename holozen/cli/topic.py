@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from holozen.background import background
-from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE, Noun, Verb, add_packages, by_name, open_bus
+from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE, Noun, Verb, add_packages, by_name, on_node, open_bus
 from holozen.flags import count, key, number
 from holozen.process import deferred_interrupt
 
@@ -92,10 +92,11 @@ VERBS = by_name(
             "hz": "stats", "bw": "stats", "delay": "stats", "pub": "topic", "plot": "plot",
         },
     ),
-    Verb("topic list", "the keys that nodes read and write", "-t", _list_arguments, "topics.list_topics"),
-    Verb("topic info", "a key's type, publishers and subscribers", "cmd_vel", _info_arguments, "topics.info"),
-    Verb("topic type", "a key's type", "odom", _type_arguments, "topics.type_of"),
-    Verb("topic find", "the keys of a type", "nav_msgs/msg/Odometry", _find_arguments, "topics.find"),
-    Verb("topic echo", "print the messages of a key", "odom --once", _echo_arguments, "echo.echo"),
+    Verb("topic list", "the keys that nodes read and write", "-t", _list_arguments, on_node("topics", "list_topics")),
+    Verb("topic info", "a key's type, publishers and subscribers", "cmd_vel", _info_arguments,
+        on_node("topics", "info")),
+    Verb("topic type", "a key's type", "odom", _type_arguments, on_node("topics", "type_of")),
+    Verb("topic find", "the keys of a type", "nav_msgs/msg/Odometry", _find_arguments, on_node("topics", "find")),
+    Verb("topic echo", "print the messages of a key", "odom --once", _echo_arguments, on_node("echo", "echo")),
     Verb("topic pub", "write messages to a key", PUB_EXAMPLE, _pub_arguments, pub),
 )  # fmt: skip

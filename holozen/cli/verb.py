@@ -47,8 +47,7 @@ class Verb:
     """A verb, such as `topic list` or `plot`.
 
     `about` is its line of help, `arguments` adds its flags to a parser, `run` does the work and returns the exit code.
-    A `run` such as "echo.echo" names a function of a module of holozen.cli that takes the flags and a node; the module
-    is loaded while the session opens. `json` is the help of its flag `--json`. The flags have its name as `verb`.
+    `json` is the help of its flag `--json`. The flags have its name as `verb`.
     """
 
     def __init__(
@@ -57,7 +56,7 @@ class Verb:
         about: str,
         example: str,
         arguments: Callable[[argparse.ArgumentParser], object],
-        run: Callable[[Any], int] | str,
+        run: Callable[[argparse.Namespace], int],
         json: str = JSON,
     ) -> None:
         self.name, self.about, self._example = name, about, example
@@ -65,14 +64,7 @@ class Verb:
 
     def main(self, argv: list[str]) -> int:
         """Run it with the words of a command line; returns the exit code."""
-        args = self.parser().parse_args(argv)
-        if not isinstance(self._run, str):
-            return self._run(args)
-        module, _, function = self._run.partition(".")
-        with open_node(args) as node:
-            with deferred_interrupt():
-                work = importlib.import_module(f"holozen.cli.{module}")
-            return int(getattr(work, function)(args, node))
+        return self._run(self.parser().parse_args(argv))
 
     def parser(self) -> Parser:
         """Its parser alone."""
@@ -169,16 +161,25 @@ def add_packages(parser: argparse.ArgumentParser) -> None:
         help="the folder of package NAME, whose msg and srv files define its types")  # fmt: skip
 
 
-def open_node(args: argparse.Namespace, stop: threading.Event | None = None) -> Node:
-    """The node of a verb, connected according to its flags, for samples as bytes. Its session opens while this and the
-    caller load their modules. `stop` as in Opening.
+def on_node(module: str, function: str) -> Callable[[argparse.Namespace], int]:
+    """A verb's `run`: a function of a module of holozen.cli that takes the flags and a node, for samples as bytes. The
+    module is loaded while the session opens.
     """
-    node: Node = _open(args, stop, "node", "Node")
-    return node
+
+    def run(args: argparse.Namespace) -> int:
+        node: Node
+        with _open(args, None, "node", "Node") as node:
+            with deferred_interrupt():
+                work = importlib.import_module(f"holozen.cli.{module}")
+            return int(getattr(work, function)(args, node))
+
+    return run
 
 
 def open_bus(args: argparse.Namespace, stop: threading.Event | None = None) -> Bus:
-    """The same for messages."""
+    """The bus of a verb, connected according to its flags. Its session opens while this and the caller load their
+    modules. `stop` as in Opening.
+    """
     bus: Bus = _open(args, stop, "bus", "Bus")
     return bus
 

@@ -35,8 +35,8 @@ from holozen.wire import MAX_COMMAND_BYTES, key_for
 
 from ..command.inputs import ForceInput, JointInput, TwistInput
 from ..command.motion import JointMotion, Pushes
-from ..physics.jointed import JointStates
-from ..physics.movers import Limited, Moved
+from ..physics.body import JointStates, Moved
+from ..physics.movers import Limited
 from .wait_set import Moment, Reader
 
 JOINT_RATE = 50.0  # Hz of sim time

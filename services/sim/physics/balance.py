@@ -13,9 +13,9 @@ from holozen.robot.rotation import Array
 from holozen.rotation import rotate
 from holozen.rotation import yaw as yaw_of
 
+from .body import JointStates, Moved
 from .dynamics import GRAVITY
-from .engine import Rotation, Vector
-from .jointed import JointedBody, JointStates
+from .jointed import JointedBody
 from .wheels import forward_sign, radius_of
 
 LEAN, LEAN_RATE, SPEED, DISTANCE, EFFORT = 0.2, 1.0, 0.1, 0.1, 0.1
@@ -189,7 +189,7 @@ class BalanceMover:
         feedforward = pendulum.radius * float(along * (profile.acceleration - pendulum.lag * bend) + mixed * bend)
         return feedforward - feedback
 
-    def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
+    def moved(self, time: float, dt: float) -> Moved:
         """The true pose."""
         return *self.body.pose(), self.body.planar()
 

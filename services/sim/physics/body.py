@@ -8,6 +8,11 @@ from holozen.rotation import multiply, rotate, yaw
 
 from .engine import NOTHING, Bodies, Rotation, Vector, bullet
 
+Moved = tuple[Vector, Rotation, Planar]
+"""Position (m), rotation and body-frame velocity (m/s, rad/s) for odometry."""
+JointStates = tuple[list[float], list[float], list[float]]
+"""Positions, rates and efforts: rad, rad/s, N m or m, m/s, N."""
+
 
 class Body:
     """A multibody of the engine, by its root frame; the engine itself uses the centre of mass.

@@ -6,8 +6,8 @@ from holozen.limits import Planar, clamp
 from holozen.robot.model import Differential, RobotModel
 from holozen.robot.rigid import joint_axes
 
-from .engine import Rotation, Vector
-from .jointed import JointedBody, JointStates
+from .body import JointStates, Moved
+from .jointed import JointedBody
 from .wheels import Odometer, forward_sign, radius_of
 
 SLACK = 0.1  # m/s by which a rim may lag behind its command
@@ -46,7 +46,7 @@ class WheelMover:
         left, right = (n + clamp(rim - n, SLACK) for n, rim in zip(now, self._rims, strict=True))
         return left + clamp(wanted[0] - left, most), right + clamp(wanted[1] - right, most)
 
-    def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
+    def moved(self, time: float, dt: float) -> Moved:
         """The true pose, or the one from wheel encoders if the file asks for that."""
         if not self._mechanism.encoder:
             return *self.body.pose(), self.body.planar()

@@ -8,7 +8,7 @@ from holozen.robot.rigid import Frame, Part, in_parts
 from holozen.rotation import multiply, rotate
 
 from ..command.motion import JointMotion, Push
-from .body import Body, Links
+from .body import Body, JointStates, Links
 from .dynamics import damping_of, load_on, set_joint, set_surface
 from .engine import NOTHING, UPRIGHT, Bodies, Rotation, Shapes, Vector, bullet
 
@@ -17,10 +17,6 @@ MAX_EFFORT = 1e3  # N m or N, of a joint without an effort limit
 MAX_RATE = 1e3  # rad/s or m/s
 CLOSING = 0.1  # s; time constant of a joint that moves to a position
 FOLLOWING = 0.02  # s; the same for a joint that mimics another
-
-
-JointStates = tuple[list[float], list[float], list[float]]
-"""Positions, rates and efforts: rad, rad/s, N m or m, m/s, N."""
 
 
 class JointedBody(Body):

@@ -9,17 +9,14 @@ from holozen.robot.model import Balancing, Differential, Drive, Mecanum, Omni, R
 from holozen.robot.rigid import lump
 
 from .balance import BalanceMover
-from .body import Body
+from .body import Body, JointStates, Moved
 from .differential import WheelMover
 from .engine import UPRIGHT, Rotation, Vector
-from .jointed import JointedBody, JointStates
+from .jointed import JointedBody
 from .omni import OmniMover, omni_wheels
-from .planar import PlanarBody
+from .planar import PlanarMover
 from .wheels import MecanumWheels, Wheels
 from .world import World
-
-Moved = tuple[Vector, Rotation, Planar]
-"""Position (m), rotation and body-frame velocity (m/s, rad/s) for odometry."""
 
 
 class Mover(Protocol):
@@ -47,41 +44,6 @@ class Mover(Protocol):
     def states(self) -> JointStates:
         """The states of the joints."""
         ...
-
-
-class PlanarMover:
-    """The whole body moves over the plane; its wheels turn only visually."""
-
-    def __init__(self, body: PlanarBody, wheels: Wheels | MecanumWheels) -> None:
-        self.body = body
-        self._wheels = wheels
-        self.names = wheels.names
-        self.wheels, self.kept = frozenset[str](), frozenset(wheels.names)
-        self._rolled = 0.0  # sim time up to which the wheels have turned
-
-    def move(self, velocity: Planar, dt: float) -> None:
-        """Set the body's velocity."""
-        if velocity != self.body.commanded and self.body.glides:
-            self._roll(self.body.commanded)
-        self.body.drive(velocity, dt)
-
-    def moved(self, time: float, dt: float) -> Moved:
-        """The true pose."""
-        velocity = self.body.velocity(dt)
-        if not self.body.glides:  # else its wheels roll evenly until someone looks
-            self._roll(velocity)
-        return *self.body.pose(), velocity
-
-    def _roll(self, velocity: Planar) -> None:
-        """Roll the wheels up to now."""
-        self._wheels.roll(velocity, self.body.time - self._rolled)
-        self._rolled = self.body.time
-
-    def states(self) -> JointStates:
-        """Angles and rates of the wheels, as rolling without slip would turn them; no motor has an effort."""
-        if self.body.glides:
-            self._roll(self.body.commanded)
-        return self._wheels.angles, self._wheels.rates, []
 
 
 class FreeMover:

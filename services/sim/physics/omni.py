@@ -11,8 +11,8 @@ from holozen.robot.model import Omni, RobotModel
 from holozen.robot.rotation import triple
 from holozen.suggest import listed
 
-from .engine import Rotation, Vector
-from .jointed import JointedBody, JointStates
+from .body import JointStates, Moved
+from .jointed import JointedBody
 from .wheels import Odometer, rolling_wheels
 
 WORST = 100.0  # condition of the wheels' kinematics: beyond, some motion takes far more of a wheel than others
@@ -39,7 +39,7 @@ class OmniMover:
         for (wheel, _), (rate, limits) in zip(self._limits, rates, strict=True):
             self.body.roll(wheel.joint, rate * min(share, 1.0), limits.effort or math.inf)
 
-    def moved(self, time: float, dt: float) -> tuple[Vector, Rotation, Planar]:
+    def moved(self, time: float, dt: float) -> Moved:
         """The true pose, or the one from wheel encoders if the file asks for that."""
         if not self._encoder:
             return *self.body.pose(), self.body.planar()

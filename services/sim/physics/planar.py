@@ -8,9 +8,10 @@ from holozen.limits import STOP, Planar
 from holozen.robot import rigid
 from holozen.rotation import from_axis_angle, rotate, yaw
 
-from .body import Body, Links
+from .body import Body, JointStates, Links, Moved
 from .dynamics import GRAVITY
 from .engine import NOTHING, UPRIGHT, Bodies, Rotation, Vector, bullet
+from .wheels import MecanumWheels, Wheels
 
 HOLD_GAIN = 0.1  # share of the distance to its place that it recovers in a step
 HOLD_LIMIT = 0.005  # m; pushed farther, it holds its new place
@@ -408,3 +409,38 @@ def _orbit(axis: Vector, turn: float, centre: Vector, dt: float) -> tuple[float,
         return 0.0, 0.0
     x, y, z = rotate(from_axis_angle(axis, turn * dt / 2), centre)
     return turn * (axis[1] * z - axis[2] * y), turn * (axis[2] * x - axis[0] * z)
+
+
+class PlanarMover:
+    """The whole body moves over the plane; its wheels turn only visually."""
+
+    def __init__(self, body: PlanarBody, wheels: Wheels | MecanumWheels) -> None:
+        self.body = body
+        self._wheels = wheels
+        self.names = wheels.names
+        self.wheels, self.kept = frozenset[str](), frozenset(wheels.names)
+        self._rolled = 0.0  # sim time up to which the wheels have turned
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Set the body's velocity."""
+        if velocity != self.body.commanded and self.body.glides:
+            self._roll(self.body.commanded)
+        self.body.drive(velocity, dt)
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """The true pose."""
+        velocity = self.body.velocity(dt)
+        if not self.body.glides:  # else its wheels roll evenly until someone looks
+            self._roll(velocity)
+        return *self.body.pose(), velocity
+
+    def _roll(self, velocity: Planar) -> None:
+        """Roll the wheels up to now."""
+        self._wheels.roll(velocity, self.body.time - self._rolled)
+        self._rolled = self.body.time
+
+    def states(self) -> JointStates:
+        """Angles and rates of the wheels, as rolling without slip would turn them; no motor has an effort."""
+        if self.body.glides:
+            self._roll(self.body.commanded)
+        return self._wheels.angles, self._wheels.rates, []
