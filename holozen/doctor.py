@@ -13,6 +13,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from importlib import metadata
 from typing import TYPE_CHECKING, NamedTuple
 
+from holozen.suggest import listed
 from holozen.transport import graph
 from holozen.transport.connection import ROS_DOMAIN, VARIABLES, Connection, address
 from holozen.transport.errors import BusError
@@ -150,6 +151,28 @@ def nodes(connection: Connection) -> Iterator[Finding]:
         if robots.count:
             time.sleep(max(0.0, began + LISTEN - time.monotonic()))
         yield from robots.findings(time.monotonic() - began)
+
+
+def health(connection: Connection, node: str) -> Finding:
+    """Whether a node of this machine answers, and the loop behind its parameters, if it has any. Shards go by `sim`
+    too. For the health check of a container. Raises BusError.
+    """
+    from holozen.bus import Bus
+    from holozen.messages.rcl_interfaces import ListParametersReply, ListParametersRequest
+    from holozen.transport.errors import ServiceError
+
+    with Bus("doctor", connection, patience=OPEN) as bus:
+        loops = [end for end in bus.graph().settled(bus.connected, FIND) if end.key.endswith("/list_parameters")]
+        peers = [peer for peer in ask_peers(bus).values() if peer.host == os.uname().nodename]
+        here = [peer for peer in peers if node in (peer.node, SHARD.sub("sim", peer.node))]
+        try:
+            for key in {end.key for end in loops if end.session in {peer.session for peer in here}}:
+                bus.call(key, ListParametersRequest(), ListParametersReply, LISTEN)
+        except ServiceError as error:
+            return Finding("health", ERROR, str(error), f"look at the log of {node}")
+    if not here:
+        return Finding("health", ERROR, f"no {node} of this machine answers", "start it, or check --mode and --connect")
+    return Finding("health", OK, f"{listed(map(str, here))} answers")
 
 
 # The meeting point.
@@ -320,9 +343,18 @@ class Robots:
             yield Finding("odom", ERROR, text, "continue or restart that node (fg, kill -CONT), or raise its --rtf")
         if not stale:
             yield Finding("odom", OK, f"fresh on {', '.join(list(self._odoms)[:MOST_KEYS])} ({self.count} robots)")
+        alike: dict[tuple[str, str], list[Finding]] = {}  # those of a fleet are much the same
         for key, latest in self._statuses.items():
             if status := latest.read()[0]:
-                yield from commands(key.removesuffix("_status"), status)
+                for found in commands(key.removesuffix("_status"), status):
+                    alike.setdefault((found.level, found.text.replace(status.name, "", 1)), []).append(found)
+        for group in alike.values():
+            first = group[0]
+            if len(group) <= MOST_KEYS:
+                yield from group
+            else:
+                others = listed([one.check for one in group[1:]], MOST_KEYS)
+                yield first._replace(text=f"{first.text}; the same holds for {others}")
 
 
 def commands(key: str, status: "CommandStatus") -> Iterator[Finding]:

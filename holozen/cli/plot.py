@@ -32,6 +32,7 @@ TRAIL = 2000  # points
 STEP = 0.02  # m between two points of a trail
 ASK_EVERY = 2.0  # s between two requests to the sim and the pose service
 MOST_GOALS = 100
+MOST_PLACES = 12  # of robots in words
 PATIENCE = 1.0  # s for a service to answer
 
 
@@ -202,7 +203,9 @@ class Watcher:
             for name, (x, y, yaw) in sorted(self.poses.items())
         ]
         others = {name: at for name, at in self.objects.items() if name not in self.poses and name != root}
-        return Plane(robots, self.goals, others, ", ".join(map(_place, robots)))
+        first = ", ".join(map(_place, robots[:MOST_PLACES]))
+        more = f" and {len(robots) - MOST_PLACES} more" if len(robots) > MOST_PLACES else ""
+        return Plane(robots, self.goals, others, first + more)
 
     def join(self) -> None:
         """Wait for the polling thread once the bus is closed: no thread may be inside Zenoh at exit."""
@@ -242,13 +245,10 @@ class Watcher:
                 return
 
     def _ask_objects(self) -> dict[str, Point]:
-        from holozen import entities
+        from holozen.messages import GetSceneReply, GetSceneRequest
 
-        found = {}
-        for name in entities.names(self._bus):
-            at = entities.pose(self._bus, name).position
-            found[name] = at.x, at.y
-        return found
+        scenes = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, PATIENCE)
+        return {one.name: (one.pose.position.x, one.pose.position.y) for scene in scenes for one in scene.entities}
 
 
 def _place(robot: Robot) -> str:

@@ -19,6 +19,7 @@ from holozen.transport.samples import Answers, source
 ALL = "@holozen/**"
 ALL_NODE_INFO = "@holozen/*/about"
 ALL_PEERS = "@holozen/*/peers"
+LONGEST = 5.0  # s that a snapshot waits for nodes, while some come or go
 SILENT_FACTOR = 5  # how much longer to wait for nodes without tokens
 MAX_GONE = 1000  # tokens kept until `left` is called; the oldest are dropped
 KINDS = ("node", "pub", "sub", "srv")
@@ -89,7 +90,7 @@ class Graph:
     """The endpoints of all nodes as their tokens come and go.
 
     `change` returns the next token's key and whether it exists now, or None without news. `roll_call` returns when all
-    nodes that are connected by now have sent their tokens; `met` returns their sessions. `ask_peers` asks the holders
+    nodes that are connected by now have sent their tokens, or False after waiting for long; `met` returns their sessions. `ask_peers` asks the holders
     of rendezvous points for the sessions that they are linked to; what it returns reads those, None while no holder has
     answered. `undeclare` ends the subscription. `took`: the seconds that the first link took. Use it in `with`, or keep
     it until the bus is closed.
@@ -98,7 +99,7 @@ class Graph:
     def __init__(
         self,
         change: Callable[[], tuple[str, bool] | None],
-        roll_call: Callable[[], object] = lambda: None,
+        roll_call: Callable[[], bool] = lambda: True,
         met: Callable[[], Iterable[str]] = tuple,
         ask_peers: Callable[[], Callable[[], set[str] | None]] = lambda: lambda: None,
         undeclare: Callable[[], object] = lambda: None,
@@ -110,6 +111,7 @@ class Graph:
         self._sessions: dict[str, set[str]] = {}  # the tokens of each
         self._publishers: dict[str, Counter[str]] = {}  # key -> sessions with a publisher there
         self.changes = 0  # how often a token came or went
+        self._sorted: tuple[int, list[Endpoint]] = (0, [])  # the endpoints after so many changes
         self._gone: deque[Endpoint] = deque(maxlen=MAX_GONE)
 
     def __enter__(self) -> Graph:
@@ -125,8 +127,10 @@ class Graph:
     def endpoints(self) -> list[Endpoint]:
         """The known endpoints, sorted by key."""
         self._update()
-        found = (parse(key) for key in self._tokens)
-        return sorted(endpoint for endpoint in found if endpoint)
+        if self._sorted[0] != self.changes:  # a fleet has thousands, and a screen asks at each picture
+            found = (parse(key) for key in self._tokens)
+            self._sorted = self.changes, sorted(endpoint for endpoint in found if endpoint)
+        return list(self._sorted[1])
 
     def has(self, session: str) -> bool:
         """Whether a session had any token at the last update."""
@@ -143,7 +147,8 @@ class Graph:
         return self._publishers.get(key, ())
 
     def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.015) -> list[Endpoint]:
-        """The endpoints once there is a link and all nodes have sent theirs; at most twice `patience` seconds.
+        """The endpoints once there is a link and all nodes have sent theirs; at most `patience` seconds after the last
+        change.
 
         All are there when each session that a rendezvous point's holder is linked to has sent its tokens. Where no
         holder answers, once nothing has changed for `quiet` seconds, or twice the time that the first link or the last
@@ -158,22 +163,26 @@ class Graph:
         deadline = time.monotonic() + patience
         self._roll_call()  # on a new link there may be nothing yet that answers
         peers = self._ask_peers()
-        known, since = self.endpoints(), time.monotonic()
+        self._update()
+        seen, since = self.changes, time.monotonic()
+        deadline = since + patience if seen else deadline  # more may be on its way from a slow node
         while (now := time.monotonic()) < deadline:
             passed, enough = now - since, max(quiet, 2 * self._took, 2 * (since - start))
-            if known and passed > SILENT_FACTOR * enough:
+            if self._tokens and passed > SILENT_FACTOR * enough:
                 break
             listed = peers()
-            if known and (listed is not None or passed > enough) and self._have_announced(listed or ()):
+            if self._tokens and (listed is not None or passed > enough) and self._have_announced(listed or ()):
                 if listed is None:
                     break
-                self._roll_call()  # a session's first token may have come before its others
-                if self._have_announced(peers() or ()):
-                    return self.endpoints()
+                # A session's first token may have come before its others.
+                if self._roll_call() and self._have_announced(peers() or ()):
+                    break
             time.sleep(0.001)
-            if (newer := self.endpoints()) != known:
-                known, since = newer, time.monotonic()
-        return known
+            self._update()
+            if self.changes != seen:
+                seen, since = self.changes, time.monotonic()
+                deadline = min(since + patience, start + LONGEST)
+        return self.endpoints()
 
     def _have_announced(self, listed: Iterable[str]) -> bool:
         """Whether each peer, and each session `listed`, has sent a token."""

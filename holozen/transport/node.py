@@ -8,6 +8,7 @@ from __future__ import annotations
 import contextlib
 import re
 import threading
+import time
 from collections.abc import Callable
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self, TypeVar
@@ -27,7 +28,8 @@ if TYPE_CHECKING:
 
 D = TypeVar("D", bound=Declared)
 
-ROLL_CALL = 0.5  # s
+ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
+MOST_TOKENS = 1 << 16  # that wait
 DEFINITION_WAIT = 0.5  # s for a node to answer
 
 
@@ -197,10 +199,19 @@ class Node:
     def graph(self, keys: str = graphs.ALL) -> Graph:
         """The endpoints of all nodes, or those with tokens that match `keys`, kept up to date."""
         live = self.session.liveliness()
-        tokens = live.declare_subscriber(keys, zenoh.handlers.RingChannel(4096), history=True)
+        tokens = live.declare_subscriber(keys, zenoh.handlers.RingChannel(MOST_TOKENS), history=True)
+
+        def roll_call() -> bool:
+            # A full channel would block Zenoh's thread, and the rest, for ever: the default one is for 256 replies.
+            replies: Any = zenoh.handlers.FifoChannel(MOST_TOKENS)
+            timeout, began = max(ROLL_CALL, self.took), time.monotonic()
+            for _ in live.get(keys, replies, timeout=timeout):
+                pass
+            return time.monotonic() - began < timeout
+
         return Graph(
             partial(_token_change, tokens),
-            lambda: list(live.get(keys, timeout=max(ROLL_CALL, self.took))),
+            roll_call,
             lambda: map(str, self.session.info.peers_zid() if keys == graphs.ALL else ()),
             self._ask_peers if keys == graphs.ALL else lambda: lambda: None,
             partial(_undeclare, tokens),

@@ -165,8 +165,8 @@ class Subscription(Generic[M]):
     ) -> None:
         from holozen.messages import codec
 
-        self.raw, self._kinds, self._tolerant, self._refusal = samples, kinds, tolerant, refusal
-        self._decode, self._error = codec.decode, codec.CodecError
+        self.raw, self._refusal = samples, refusal
+        self._decode, self._error = codec.decoder(kinds, tolerant), codec.CodecError
 
     def try_recv(self) -> Received[M] | None:
         """The next waiting message, or None."""
@@ -192,7 +192,7 @@ class Subscription(Generic[M]):
         if self._refusal and (reason := self._refusal(sample)):
             return Received(sample, None, reason)
         try:
-            return Received(sample, self._decode(sample.payload, sample.encoding, self._kinds, self._tolerant))
+            return Received(sample, self._decode(sample.payload, sample.encoding))
         except self._error as error:
             return Received(sample, None, str(error))
 

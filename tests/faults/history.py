@@ -4,20 +4,34 @@ No event has one exact time, since a process may be held up between two lines. E
 known, and a check assumes the end that speaks for the robot, so that load alone breaks none.
 """
 
+import sys
 from bisect import bisect_left, bisect_right
 from dataclasses import dataclass
 from itertools import pairwise
+from pathlib import Path
 
 from holozen.testing import Process
 from holozen.wire import COMMAND_SILENCE
 
 STEP = 1 / 240  # s; odom is to come at each step
 MOVES = 0.02  # m/s; slower is standing
+EACH_STEP = ("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}")  # odom, so that its times are close
+CLOCK = 4000  # s that the drivers' clock is ahead
 
 
 def whole_lines(process: Process) -> list[str]:
     """What a program has printed, but for a line that it has only begun."""
     return process.out.rpartition("\n")[0].splitlines()
+
+
+def script(name: str, endpoint: str) -> list[str]:
+    """The words that run `driver.py` or `observer.py`."""
+    return [sys.executable, str(Path(__file__).with_name(f"{name}.py")), endpoint]
+
+
+def newest(observer: Process) -> float:
+    """When the newest odom was sent."""
+    return next((float(line.split()[0]) for line in reversed(whole_lines(observer))), 0.0)
 
 
 @dataclass(frozen=True)

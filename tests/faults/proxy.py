@@ -1,8 +1,12 @@
-"""A TCP link with faults that a test sets while it runs: delay, jitter, a rate limit, a stall, a black hole."""
+"""A TCP link with faults that a test sets while it runs: delay, jitter, a rate limit, a stall, a black hole.
+
+As a program, for another host: python proxy.py HOST PORT DELAY; it prints its own port on loopback.
+"""
 
 import contextlib
 import random
 import socket
+import sys
 import threading
 import time
 from collections import deque
@@ -174,3 +178,10 @@ class _Way:
                 return
             if not data:
                 return
+
+
+if __name__ == "__main__":
+    with Proxy(int(sys.argv[2]), sys.argv[1]) as link:
+        link.set(delay=float(sys.argv[3]))
+        print(f"port {link.port}", flush=True)
+        time.sleep(3600)

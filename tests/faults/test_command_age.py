@@ -10,37 +10,24 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command, free_port
 
-from .history import STEP, History, whole_lines
+from .history import CLOCK, EACH_STEP, History, newest, script
 from .namespaces import NEEDS, Cable, Host, Lab
 from .proxy import Proxy
 
 pytestmark = NEEDS
 
-HERE = Path(__file__).parent
-CLOCK = 4000  # s that the drivers' clock is ahead
 TRIALS = 34 if os.environ.get("HOLOZEN_LONG") else 1  # of each cut and fate, so some hundred of each cut
 CUTS = (0.2, 0.6, 0.9, 2.0)  # s
 DELAYS = [(0.1, True), (0.4, True), (0.6, False), (2.0, False), (0.1, True)]
 """Delays of a link in s, one way, one after another; and whether the robot is driven over it."""
 if os.environ.get("HOLOZEN_LONG"):
     DELAYS += [(0.2, True), (1.0, False), (0.1, True)]
-EACH_STEP = ("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}")  # odom, so that its times are close
-
-
-def script(name: str, endpoint: str) -> list[str]:
-    return [sys.executable, str(HERE / f"{name}.py"), endpoint]
-
-
-def newest(observer: Process) -> float:
-    """When the newest odom was sent."""
-    return next((float(line.split()[0]) for line in reversed(whole_lines(observer))), 0.0)
 
 
 class Course:

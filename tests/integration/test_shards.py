@@ -111,3 +111,21 @@ def test_the_name_of_a_robot_whose_shard_does_not_run_is_refused_until_a_sim_tak
     second = wire.start("sim", "--shard", "auto/2", "--robot", f"{BOT}={OF_FIRST}", "--robot", f"{BOT}={OF_SECOND}")
     second.wait_for_line("this is shard 2/2")
     assert names(wire) == [OF_SECOND]
+
+
+def test_a_health_check_knows_its_own_shard_and_a_loop_that_does_not_go(
+    town: Wire, shards: tuple[Process, ...]
+) -> None:
+    done = town.run("doctor", "--health", "sim")
+    assert done.returncode == 0 and re.search(r"^ok +health: sim_1_of_2 \(.*sim_2_of_2 \(.* answers$", done.stdout), (
+        done
+    )
+    assert town.run("doctor", "--health", "controller").stdout.startswith(
+        "error    health: no controller of this machine"
+    )
+    stopped = shards[1]
+    stopped.signal(signal.SIGSTOP)
+    try:
+        assert town.run("doctor", "--health", "sim_2_of_2").returncode == 1
+    finally:
+        stopped.signal(signal.SIGCONT)

@@ -159,9 +159,10 @@ def test_a_session_that_a_rendezvous_point_lists_is_waited_for_and_then_nothing(
     calls = iter([None, (token(late), True)])  # the second brings what was under way
     changes = deque([(token(ODOM), True)])
 
-    def roll_call() -> None:
+    def roll_call() -> bool:
         if call := next(calls):
             changes.append(call)
+        return True
 
     def read() -> tuple[str, bool] | None:
         return changes.popleft() if changes else next(looks, None)

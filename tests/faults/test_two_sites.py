@@ -1,0 +1,59 @@
+"""Two sites, each with a router, over a link of 100 ms that loses packets; deploy/site.json5 says what crosses it."""
+
+import sys
+import time
+from pathlib import Path
+
+from holozen.testing import wait_for
+from holozen.testing.wire import command, free_port
+
+from .history import CLOCK, EACH_STEP, History, newest, script
+from .namespaces import NEEDS, Lab
+
+pytestmark = [NEEDS]
+
+HERE = Path(__file__).parent
+SITE = HERE.parents[1] / "deploy" / "site.json5"
+DELAY = 0.1  # s, one way
+CLIENT = ("--mode", "client", "--connect")
+
+
+def test_robots_stand_when_the_link_is_cut_and_only_fresh_commands_move_them_afterwards(
+    lab: Lab, tmp_path: Path
+) -> None:
+    robot, desk = lab.host("robot"), lab.host("desk", clock=CLOCK)
+    cable, port = lab.cable(robot, desk), free_port()
+    config, here = tmp_path / "site.json5", f"tcp/127.0.0.1:{port}"
+    config.write_text(SITE.read_text().replace("wan0", cable.interface))
+    robot.start(*command("router", "--config", str(config), "--listen", f"tcp/0.0.0.0:{port}")).wait_for_line("listens")
+    robot.start(*command("sim", *CLIENT, here)).wait_for_line("listens on cmd_vel")
+    robot.check(*command(*EACH_STEP, *CLIENT, here))
+    observer = robot.start(*script("observer", here))
+    link = desk.start(sys.executable, str(HERE / "proxy.py"), cable.address(robot), str(port), str(DELAY))
+    there = f"tcp/127.0.0.1:{link.wait_for_line('port').split()[1]}"
+    desk.start(*command("router", "--listen", here, "--connect", there)).wait_for_line("listens")
+    driver = desk.start(*script("driver", here))
+
+    def history() -> History:
+        return History.of([driver], observer, CLOCK)
+
+    def wait_for_motion(since: float) -> None:
+        wait_for(lambda: history().moves(since), 30.0, "a robot that moves")
+
+    wait_for_motion(0.0)
+    rate = desk.start(*command("topic", "hz", "odom", "--window", "5", *CLIENT, here)).wait_for_line("average rate")
+    assert float(rate.split()[-1]) < 6.0, "each step of the sim crossed"
+    assert desk.run(*command("topic", "echo", "clock", "--once", "--timeout", "2", *CLIENT, here)).returncode
+    cable.lose(0.02)
+    cable.cut()
+    began = time.monotonic()
+    time.sleep(1.5)
+    restored = time.monotonic()
+    cable.join()
+    wait_for_motion(restored)
+    wait_for(lambda: newest(observer) > restored + 1.0, 20.0, "odom")
+    driver.close()
+    found = history()
+    assert not found.moves(began + 0.55 + DELAY, restored), "the cut did not hit"
+    found.check_silence(began)
+    found.check_restored(restored)

@@ -1,0 +1,89 @@
+"""Three hundred robots in one sim: as safe, and as easy to look at, as one."""
+
+import contextlib
+import json
+
+import pytest
+
+from holozen import data
+from holozen.messages import Twist
+from holozen.testing import Wire, wait_for
+
+from .robots import Robot, speeds
+
+COUNT = 300
+FIRST, LAST = "bot0", f"bot{COUNT - 1}"
+FREE = {FIRST: -0.2, LAST: 0.2}  # m/s sideways, where nothing stands beside it
+NAN = b'{"linear": {"y": NaN}}'
+LONG = 120.0  # s for a command line on a machine that is busy
+
+
+@pytest.fixture(scope="module")
+def fleet(town: Wire) -> Wire:
+    """A wire with a sim and its robots."""
+    town.start("sim", "--empty").wait_for_line("no robot yet", LONG)
+    bot = str(data.find("urdf", "hb_bot.urdf.xacro"))
+    done = town.run("spawn", bot, "--count", str(COUNT), "--grid", "1.5", within=LONG)
+    assert done.stdout == f"{FIRST} .. {LAST} listen on {FIRST}/cmd_vel .. {LAST}/cmd_vel\n", done.stderr
+    return town
+
+
+def test_each_is_listed_drawn_diagnosed_and_driven_by_its_name(fleet: Wire) -> None:
+    assert len(fleet.run("list", within=LONG).stdout.splitlines()) == COUNT
+    assert len(fleet.run("topic", "find", "Odometry", within=LONG).stdout.splitlines()) == COUNT
+    findings = fleet.run("doctor", within=LONG).stdout
+    assert f"({COUNT} robots)" in findings and len(findings.splitlines()) < 12, findings
+
+    def all_drawn() -> bool:
+        drawn = json.loads(fleet.run("map", "--json", "-w", "5", within=LONG).stdout)
+        return len(drawn["robots"]) == COUNT
+
+    wait_for(all_drawn, LONG)
+    with fleet.terminal("teleop", FIRST) as terminal:
+        terminal.wait_for_text("listening")
+
+        def next_one() -> bool:
+            terminal.type("\t")
+            with contextlib.suppress(AssertionError):
+                terminal.wait_for_text("holozen teleop   bot1", 2)
+                return True
+            return False
+
+        wait_for(next_one, LONG)
+
+
+@pytest.mark.parametrize("name", [FIRST, LAST])
+def test_it_stops_by_itself_obeys_a_person_first_and_is_stopped_alone(fleet: Wire, name: str) -> None:
+    robot, y = Robot(fleet.bus(), name), FREE[name]
+    broken = fleet.bus().publisher(f"{name}/cmd_vel", Twist)
+    robot.drive(0, y)
+    robot.stands()  # after a silence
+    robot.drive(0, y)
+
+    def refused_and_stands() -> bool:
+        broken.put_bytes(NAN)
+        status = robot.status()
+        return status.refused.get("malformed", 0) > 0 and status.obeyed == ""
+
+    wait_for(refused_and_stands)
+    robot.stands()
+    person = Robot(fleet.bus("person"), name, "INTERACTIVE_HIGH")
+
+    def person_drives() -> bool:
+        robot.put(0, -y)
+        person.put(0, y)
+        obeyed = robot.status().obeyed
+        return obeyed.startswith("person@") and speeds(robot.newest())[1] * y > 0
+
+    wait_for(person_drives)
+    done = fleet.run("stop", name, within=LONG)
+    assert done.stdout == f"{name} is stopped\n", done.stderr
+    robot.stands()
+    moved = robot.odom.from_now()
+    for _ in range(20):
+        person.put(0, y)
+        robot.newest()
+    assert robot.status().stopped.startswith("stop@")
+    assert not any(any(speeds(odom)) for odom in moved.messages())
+    other = Robot(fleet.bus(), "bot17")
+    assert other.status().stopped == ""
