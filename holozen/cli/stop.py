@@ -182,7 +182,7 @@ class Orders:
         if not self.there:  # among thousands of tokens, those of robots come late
             return False
         if self._wanted - self.there:
-            return since > max(NOTICE, self._bus.took)
+            return since > max(NOTICE, self._bus.took) and quiet > QUIET
         return quiet > max(QUIET, self._bus.took)
 
     def _print(self, order: Order) -> None:

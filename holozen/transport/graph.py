@@ -90,10 +90,10 @@ class Graph:
     """The endpoints of all nodes as their tokens come and go.
 
     `change` returns the next token's key and whether it exists now, or None without news. `roll_call` returns when all
-    nodes that are connected by now have sent their tokens, or False after waiting for long; `met` returns their sessions. `ask_peers` asks the holders
-    of rendezvous points for the sessions that they are linked to; what it returns reads those, None while no holder has
-    answered. `undeclare` ends the subscription. `took`: the seconds that the first link took. Use it in `with`, or keep
-    it until the bus is closed.
+    nodes that are connected by now have sent their tokens, or False after waiting for long; `met` returns their
+    sessions. `ask_peers` asks the holders of rendezvous points for the sessions that they are linked to; what it
+    returns reads those, None while no holder has answered. `undeclare` ends the subscription. `took`: the seconds that
+    the first link took. Use it in `with`, or keep it until the bus is closed.
     """
 
     def __init__(

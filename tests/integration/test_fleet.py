@@ -29,10 +29,14 @@ def fleet(town: Wire) -> Wire:
 
 
 def test_each_is_listed_drawn_diagnosed_and_driven_by_its_name(fleet: Wire) -> None:
-    assert len(fleet.run("list", within=LONG).stdout.splitlines()) == COUNT
-    assert len(fleet.run("topic", "find", "Odometry", within=LONG).stdout.splitlines()) == COUNT
-    findings = fleet.run("doctor", within=LONG).stdout
-    assert f"({COUNT} robots)" in findings and len(findings.splitlines()) < 12, findings
+    for words in (("list",), ("topic", "find", "Odometry")):
+        wait_for(lambda words=words: len(fleet.run(*words, within=LONG).stdout.splitlines()) == COUNT, LONG)  # type: ignore[misc]
+
+    def diagnosed() -> bool:
+        findings = fleet.run("doctor", within=LONG).stdout
+        return f"({COUNT} robots)" in findings and len(findings.splitlines()) < 12
+
+    wait_for(diagnosed, LONG)
 
     def all_drawn() -> bool:
         drawn = json.loads(fleet.run("map", "--json", "-w", "5", within=LONG).stdout)

@@ -139,7 +139,12 @@ def test_a_graph_that_is_never_asked_for_departures_stays_small() -> None:
 
 def test_a_graph_is_settled_only_after_all_known_peers_have_declared_theirs() -> None:
     changes: deque[tuple[str, bool]] = deque()
-    graph = Graph(lambda: changes.popleft() if changes else None, lambda: changes.append((token(ODOM), True)))
+
+    def roll_call() -> bool:
+        changes.append((token(ODOM), True))
+        return True
+
+    graph = Graph(lambda: changes.popleft() if changes else None, roll_call)
     assert graph.settled(lambda: True, quiet=0.0) == [ODOM]
 
 
