@@ -77,6 +77,7 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, Non
     """Nothing is read from, or left in, the user's cache folder."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
+        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         yield
 
 

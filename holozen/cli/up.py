@@ -63,6 +63,8 @@ def parser() -> argparse.ArgumentParser:
         help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a free one)")  # fmt: skip
     add("--shards", type=flags.count(1), default=1, metavar="N",
         help="as many sims, which share the robots by name (default: 1)")  # fmt: skip
+    add("--state", metavar="DIR",
+        help="where software stops outlast it (default: HOLOZEN_STATE, else ~/.local/state/holozen)")  # fmt: skip
     add("--no-restart", action="store_true", help="do not start a part again that died (its robots would stand)")
     connection.add_arguments(parser)
     return parser
@@ -88,7 +90,7 @@ def main(argv: list[str]) -> int:
             robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
             packages = [word for package in args.package for word in ("--package", package)]
             packages += [word for name in args.allow_env for word in ("--allow-env", name)]
-            words = [*robot, *packages, *_flags(args, "world", "rtf", "drive")]
+            words = [*robot, *packages, *_flags(args, "world", "rtf", "drive"), *_state(args.state)]
             for shard in range(1, args.shards + 1):
                 if args.shards > 1:
                     team.start(f"sim {shard}/{args.shards}", [*words, "--shard", f"{shard}/{args.shards}"])
@@ -252,6 +254,15 @@ def _end(running: dict[str, subprocess.Popen[bytes]], grace: float) -> None:
 
 def _flags(args: argparse.Namespace, *names: str) -> list[str]:
     return [word for name in names if getattr(args, name) for word in (f"--{name}", getattr(args, name))]
+
+
+def _state(given: str | None) -> list[str]:
+    """The flags for the folder of software stops; none for that of the environment, or without a home folder."""
+    if given or os.environ.get("HOLOZEN_STATE"):
+        return ["--state", given] if given else []
+    base = os.environ.get("XDG_STATE_HOME", "")
+    base = base if os.path.isabs(base) else os.path.expanduser("~/.local/state")
+    return ["--state", os.path.join(base, "holozen")] if os.path.isabs(base) else []
 
 
 def _restore(terminal: list[Any]) -> None:

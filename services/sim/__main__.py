@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import os
 import sys
 import threading
 import time
@@ -47,6 +48,8 @@ def parser() -> argparse.ArgumentParser:
     shard.add_argument(parser)
     add("--paused", action="store_true", help="start paused, until `holozen sim play` or `step`")
     add("--stopped", action="store_true", help="start with the robots stopped, until `holozen release`")
+    add("--state", type=Path, metavar="DIR",
+        help="keep software stops in a file there, for the next sim (default: HOLOZEN_STATE, else none)")  # fmt: skip
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
     add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="where $(find NAME) is")  # fmt: skip
@@ -91,6 +94,7 @@ def main(argv: list[str] | None = None) -> int:
             from .parameters import declared
             from .physics.world import World
             from .spawn import add_models, spawn_all
+            from .stops import StopFile
 
             other = _other_sim(graph, mine)
             joins = bool(other) or (mine is not None and mine.number != 1)
@@ -105,6 +109,9 @@ def main(argv: list[str] | None = None) -> int:
             )
             ending.callback(cameras.close)
             entities = Entities(bus, world, (args.max_linear, args.max_angular), args.seed, cameras)
+            name = mine.node if mine else key_for("sim", args.robot[0][1] if joins else "")
+            if folder := args.state or os.environ.get("HOLOZEN_STATE"):
+                entities.restore_stops(StopFile(Path(folder), connection.from_arguments(args).where, name))
             add_models(entities, spec.models)
             if args.robot or not (args.empty or mine):
                 spawn_all(entities, args, mine)
@@ -124,7 +131,6 @@ def main(argv: list[str] | None = None) -> int:
             loop.answers.append(SimulationServices(bus, loop.simulation, stop.set).answer)
             if args.paused:
                 loop.simulation.pause(time.monotonic())
-            name = mine.node if mine else key_for("sim", args.robot[0][1] if joins else "")
             loop.answers.append(Parameters(bus, name, lambda: declared(entities, loop.pace)).answer)
             rivals = Rivals(entities, bus.id, stop)
             if not joins and not mine:

@@ -19,6 +19,7 @@ from holozen.transport.graph import Endpoint, on_key
 from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name
 
 from .cameras import Cameras
+from .command.arbiter import Arbiter
 from .command.time import CommandTime
 from .io.robot_services import RobotServices
 from .io.sensor_topics import Motions, Surroundings
@@ -30,6 +31,7 @@ from .physics.sight import Sight
 from .physics.world import World
 from .posture import Motion, posture_of
 from .robot import Memory, Robot, keys_of
+from .stops import ALL, StopFile
 
 MAX_ENTITIES = 1000  # each takes time at every step
 MAX_REASON = 300  # characters
@@ -78,6 +80,8 @@ class Entities:
         self._seen_at = 0.0
         self._all: dict[str, Entity] = {}
         self.before: dict[str, Memory] = {}  # prefix -> held sources and software stop of the last robot there
+        self._stops: StopFile | None = None
+        self._unknown = ""  # who stopped the robots that are not in `before`; empty where none are stopped
         self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
         self.robots: list[Robot] = []
         self._sight: Sight | None = None  # made when the first sensor looks
@@ -125,7 +129,16 @@ class Entities:
             if model.drive or mover.names or model.sensors:
                 phase = len(self.robots) * SPREAD % 1.0
                 entity.robot = Robot(
-                    self._bus, name, prefix, model, mover, self.limits, self._clocks, phase, self.command_time
+                    self._bus,
+                    name,
+                    prefix,
+                    model,
+                    mover,
+                    self.limits,
+                    self._clocks,
+                    phase,
+                    self.command_time,
+                    self._keep_stops,
                 )
                 entity.robot.require_age(self.max_age)
                 if self._cameras and any(isinstance(sensor.device, Camera) for sensor in model.sensors):
@@ -169,6 +182,26 @@ class Entities:
         for robot in self.robots:
             for arbiter in robot.memory:
                 arbiter.stop(by, time.monotonic())
+        self._keep_stops()
+
+    def restore_stops(self, stops: StopFile) -> None:
+        """Stop the robots that a file says, when they come, and keep it up to date from now on."""
+        self._stops, found = stops, stops.read()
+        self._unknown = found.pop(ALL, "")
+        for prefix, by in found.items():
+            self.before[prefix] = tuple(Arbiter(COMMAND_SILENCE, self.command_time) for _ in range(3))  # type: ignore[assignment]
+            for arbiter in self.before[prefix]:
+                arbiter.stop(by, time.monotonic())
+        self._keep_stops()
+
+    def _keep_stops(self) -> None:
+        """Write down who is stopped. A release ends that of unknown robots too: a person knows of it."""
+        if any(not robot.arbiter.software_stop.setter for robot in self.robots):
+            self._unknown = ""
+        if self._stops:
+            setters = {prefix: arbiter.software_stop.setter for prefix, (arbiter, *_) in self.before.items()}
+            setters[ALL] = self._unknown
+            self._stops.write({prefix: by for prefix, by in setters.items() if by})
 
     def require_age(self, limit: float) -> None:
         """Refuse commands that may be older than `limit` seconds, except stops, from now on."""
@@ -233,11 +266,13 @@ class Entities:
         """A respawned robot inherits held sources and the software stop."""
         if old := self.before.pop(prefix, None):
             robot.inherit(old)
+        elif self._unknown:
+            for arbiter in robot.memory:
+                arbiter.stop(self._unknown, time.monotonic())
         self.before[prefix] = robot.memory
+        self._keep_stops()
         if setter := robot.arbiter.software_stop.setter:
-            report(
-                f"sim: {prefix or 'the robot'} is still stopped by {setter}, as the robot before it; `holozen release`"
-            )
+            report(f"sim: {prefix or 'the robot'} is still stopped by {setter}; `holozen release` lets it drive again")
         while len(self.before) > MAX_ENTITIES:
             free = (prefix for prefix, (arbiter, *_) in self.before.items() if not arbiter.software_stop.setter)
             del self.before[next(free, next(iter(self.before)))]  # a stop is forgotten last

@@ -1,6 +1,7 @@
 """A robot in the world: reads commands from its keys, moves at each step, publishes its state."""
 
 import math
+from collections.abc import Callable
 from functools import partial
 
 from holozen.bus import Bus
@@ -33,12 +34,13 @@ class Robot:
     """A robot with a drive, with joints, or with both.
 
     `name` is its name in the world, `prefix` that on the wire, which is empty at the root. `phase`, from 0 to 1, sets
-    its telemetry apart from that of others in time.
+    its telemetry apart from that of others in time. `keep_stop` is called with each change of its software stop.
     """
 
     def __init__(
         self, bus: Bus, name: str, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float],
         senders: Senders, phase: float = 0.0, time: CommandTime | None = None,
+        keep_stop: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
         self._embody(mover)
@@ -69,7 +71,7 @@ class Robot:
         self._force_topics = ForceTopics(bus, force_input)
         self._of_members = bus.member is not None
         self._joints = JointTopics(bus, namespace, model, mover.names, prefix, joint_input, self._tf)
-        self._services = RobotServices(bus, command, self.memory, partial(self.publish_status, at_once=True))
+        self._services = RobotServices(bus, command, self.memory, partial(self._on_stop, keep_stop))
         self._odom_due = Schedule(drive.odometry_rate if drive else 0.0, phase)
         self._joints_due = Schedule(JOINT_RATE, phase)
         self._joints_at = -math.inf  # s of sim time until when no readers of the joints are looked for
@@ -117,6 +119,10 @@ class Robot:
         """Publish the command status, when it is due at `now` (s) and wanted, or `at_once`."""
         if self._drive:
             self._drive.publish_status(now, at_once)
+
+    def _on_stop(self, keep_stop: Callable[[], None], now: float) -> None:
+        keep_stop()
+        self.publish_status(now, at_once=True)
 
     @property
     def is_waiting(self) -> bool:

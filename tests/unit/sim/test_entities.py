@@ -473,7 +473,7 @@ def test_a_stop_outlives_its_robot_and_a_thousand_others(
     town.spawn("Fred")
     (robot,) = town.entities.robots
     assert robot.arbiter.offer("person", 1, (0.5, 0, 0), 20.0).startswith("stopped: by ann@1; ")
-    assert "sim: Fred is still stopped by ann@1, as the robot before it" in capsys.readouterr().err
+    assert "sim: Fred is still stopped by ann@1; `holozen release` lets it drive again" in capsys.readouterr().err
 
 
 def test_an_arm_can_be_stopped_too(town: Town, capsys: pytest.CaptureFixture[str]) -> None:
