@@ -22,9 +22,7 @@ from holozen.cli.hints import suggest_key
 from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE
 from holozen.console import report
 from holozen.messages import CodecError, CommandStatus, Message, codec
-from holozen.messages.definitions import Interface, completed
 from holozen.messages.message import not_finite
-from holozen.messages.registry import Registry
 from holozen.process import stop_event
 from holozen.suggest import suggest
 from holozen.transport.graph import Endpoint, on_key
@@ -32,6 +30,8 @@ from holozen.transport.pubsub import Publisher
 
 if TYPE_CHECKING:
     from pathlib import Path
+
+    from holozen.messages.definitions import Interface
 
 STOPS, STOP_EVERY = 5, 0.02  # s
 CLOCK_PATIENCE = 0.2  # s to wait for the robot to ask for our clock
@@ -316,6 +316,7 @@ def forced(message: Message, name: str) -> bytes:
     if name == "msgpack":
         return msgspec.msgpack.encode(message)
     from holozen.messages import cdr
+    from holozen.messages.registry import Registry
 
     return cdr.write(Registry().find(message.ROS), msgspec.to_builtins(message))
 
@@ -373,6 +374,8 @@ class Foreign:
 
     def payload(self, text: str) -> bytes:
         """The bytes of a written value. Raises ValueError with the reason."""
+        from holozen.messages.definitions import completed
+
         value = completed(self._interface, values.plain(text))
         if not self._force and (bad := limits.not_finite(value)):
             raise ValueError(f"{bad} is not a finite number{FORCE}")
@@ -399,4 +402,6 @@ def form_named(name: str, key: str, wire: str, force: bool, packages: Iterable[t
     given = dict(packages)
     if name.partition("/")[0] not in given and (kinds := kinds_named(name)):
         return Ours(kinds, key, wire, force)
+    from holozen.messages.registry import Registry
+
     return Foreign(Registry(given).find(name), wire, force)

@@ -8,14 +8,16 @@ import re
 import sys
 import time
 from collections.abc import Iterable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from holozen.console import report
 from holozen.limits import not_finite
-from holozen.messages.definitions import Interface, completed
-from holozen.messages.registry import Registry
 from holozen.suggest import suggest
 from holozen.transport.graph import Endpoint
+
+if TYPE_CHECKING:
+    from holozen.messages.definitions import Interface
+    from holozen.messages.registry import Registry
 
 LARGEST = 1_000_000  # bytes of a value
 TYPE = re.compile(r"\w+/((msg|srv)/)?\w+")
@@ -78,6 +80,8 @@ def request(found: Iterable[Endpoint], args: argparse.Namespace, text: str, give
     `found` are the endpoints of all nodes; `given` is the type from the command line, or empty. Raises ValueError with
     the reason.
     """
+    from holozen.messages.registry import Registry  # here, since `topic pub` needs only our own types
+
     text = sys.stdin.read(LARGEST + 1) if text == "-" else text
     servers = [end for end in found if end.kind == "srv"]
     announced = next((end.type for end in servers if end.key == args.key), "")
@@ -108,6 +112,8 @@ def _full(given: str) -> str:
 
 def _payload(text: str, kind: Interface | None) -> bytes:
     """In JSON. Omitted fields stay out: a server of another version may not know them."""
+    from holozen.messages.definitions import completed
+
     value = plain(text)
     if kind and kind.request:
         checked = completed(kind.request, value)
