@@ -66,10 +66,10 @@ def watch(endpoint: str) -> None:
             odoms.recv()
 
 
-def fleet(bus: Bus, world: World, model: RobotModel, robots: int) -> tuple[Entities, Stepper]:
-    """Our loop with `robots` copies of a robot on their keys."""
+def fleet(bus: Bus, world: World, model: RobotModel, robots: int, first: int = 0) -> tuple[Entities, Stepper]:
+    """Our loop with `robots` copies of a robot on their keys, from bot`first` on."""
     entities = Entities(bus, world, (5.0, 10.0))
-    for number, at in enumerate(places(robots)):
+    for number, at in enumerate(places(robots), first):
         entities.add(f"bot{number}", model, (at, UPRIGHT))
     loop = Loop(bus, world, entities, rtf=0)
     return entities, lambda steps: loop.run(threading.Event(), steps)
@@ -133,11 +133,13 @@ def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]
     }
 
 
-def one_shard(endpoint: str, robots: int, seconds: float, results: Any) -> None:
-    """A sim in a process of its own with some robots; puts the robots' steps in a second of real time."""
+def one_shard(endpoint: str, robots: int, first: int, seconds: float, results: Any) -> None:
+    """A sim in a process of its own with some robots, from bot`first` on. It puts their steps in a second of real
+    time into `results`.
+    """
     model = load(ROBOT)
     with Bus("sim", guest(endpoint)) as bus, closing(World(WORLD)) as world:
-        entities, step = fleet(bus, world, model, robots)
+        entities, step = fleet(bus, world, model, robots, first)
         for robot in entities.robots:
             robot.arbiter.offer("benchmark", 4, (0.2, 0.0, 0.5), time.monotonic() + 1e6)
         step(SETTLING)
@@ -154,8 +156,9 @@ def sharded(count: int, seconds: float) -> list[float]:
     results, endpoint = multiprocessing.get_context("spawn").Queue(), meeting_point()
     with ExitStack() as sims, Bus("watcher", host(endpoint)) as bus:
         odoms = bus.subscribe_raw("*/odom", depth=1)
-        for _ in range(count):
-            sims.enter_context(beside(one_shard, endpoint, SHARDED // count, seconds, results))
+        share = SHARDED // count
+        for number in range(count):
+            sims.enter_context(beside(one_shard, endpoint, share, number * share, seconds, results))
         found = [results.get(timeout=300) for _ in range(2 * count)]
         odoms.close()
     return [1e6 / sum(filter(None, found))]
