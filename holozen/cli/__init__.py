@@ -3,6 +3,7 @@
 import errno
 import importlib
 import os
+import signal
 import sys
 from types import ModuleType
 from typing import Any
@@ -112,6 +113,8 @@ def main(argv: list[str] | None = None) -> int:
 def _guarded(words: list[str]) -> int:
     try:
         try:
+            if signal.getsignal(signal.SIGINT) is signal.SIG_DFL:  # see __main__
+                signal.signal(signal.SIGINT, signal.default_int_handler)
             return _main(words)
         finally:
             _ = sys.stdout and sys.stdout.flush()  # a reader that is gone shows here, and not at the interpreter's end

@@ -161,10 +161,13 @@ class Node:
             subscriber = self.session.declare_subscriber(key, zenoh.handlers.RingChannel(depth))
         return self._keep(RawSubscriber(subscriber, limit))
 
-    def ask(self, key: str, timeout: float, replier: str = "", **request: Any) -> Replies:
-        """Send one request, without waiting for the service. `replier`: the session whose replies are read."""
+    def ask(self, key: str, timeout: float, replier: str = "", number: str = "", **request: Any) -> Replies:
+        """Send one request, without waiting for the service. `replier`: the session whose replies are read. `number`: a
+        request that was sent before, and may have been answered, has the same.
+        """
+        attachment = f"{self.source};{number}" if number else self.source
         with one_line(f"key {key!r}"):
-            replies = self.session.get(key, timeout=timeout, attachment=self.source, **request)
+            replies = self.session.get(key, timeout=timeout, attachment=attachment, **request)
         return Replies(replies, replier)
 
     def served(self, key: str) -> Callable[[], bool]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import threading
 import time
 from collections import deque
@@ -11,7 +12,14 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeVar
 
 from holozen.console import report
 from holozen.transport.errors import TIMEOUT, BusError, Elsewhere, NoReply, ServiceError
-from holozen.transport.samples import Declared, Replies, Sample, release_memory, source_in
+from holozen.transport.samples import (
+    MAX_ATTACHMENT_BYTES,
+    Declared,
+    Replies,
+    Sample,
+    release_memory,
+    source_in,
+)
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -23,6 +31,10 @@ RING = 4096  # requests in Zenoh's ring; beyond, the oldest get no reply
 ROOM = 1000  # waiting requests of one service, by default
 BATCH = 200  # requests read at once; to refuse as many takes 5 ms
 BUDGET = 0.002  # s for replies per poll of a thread with other work
+KEPT, KEPT_BYTES = (
+    256,
+    4096,
+)  # replies that are kept, and the largest; those that are larger are of requests that only read
 MAX_REQUEST_BYTES = 5_000_000  # a robot's URDF has at most 4 MB; larger ones are refused unread
 
 
@@ -86,6 +98,7 @@ class Server(Declared):
         self.listen = queryable.handler.try_recv  # Zenoh's next request or None, for `keep`
         self._waiting, self._room = Waiting(room), room
         self.caller = ""  # the claimed sender of the request that is being answered
+        self._kept: dict[bytes, tuple[bytes, str]] = {}  # number of a request -> its reply, in order
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
     def take_in(self, most: int = BATCH) -> int:
@@ -155,6 +168,9 @@ class Server(Declared):
     def _reply(self, query: Any) -> None:
         with query:
             self.caller = source_in(query.attachment)
+            if earlier := self._kept.get(_number(query)):  # its caller asks again, since this reply was lost
+                query.reply(self._key, earlier[0], encoding=earlier[1])
+                return
             try:
                 self.reply(query, self._answer(self.read(query)))
             except ServiceError as error:
@@ -174,7 +190,12 @@ class Server(Declared):
     def reply(self, query: Any, answer: Message) -> None:
         """Answer a request."""
         reply, wire = self._codec.written(answer, self._wire)
-        query.reply(self._key, reply, encoding=self._codec.encoding(wire, type(answer)))
+        encoding = self._codec.encoding(wire, type(answer))
+        if len(reply) <= KEPT_BYTES and (number := _number(query)):
+            if len(self._kept) == KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[number] = reply, encoding
+        query.reply(self._key, reply, encoding=encoding)
 
     def read(self, query: Any) -> Any:
         """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`)."""
@@ -185,6 +206,13 @@ class Server(Declared):
             release_memory()
             raise ServiceError(f"request of {len(query.payload)} bytes; at most {MAX_REQUEST_BYTES} are read")
         return self._codec.decode(bytes(query.payload), str(query.encoding), (self._request,))
+
+
+def _number(query: Any) -> bytes:
+    """The sender and number of a request that may be sent again; empty if it has none."""
+    attachment = query.attachment
+    found = bytes(attachment) if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else b""
+    return found if b";" in found else b""
 
 
 def answer_in_turn(servers: list[Server], seconds: float = BUDGET) -> bool:
@@ -237,12 +265,15 @@ def call(bus: Asks, key: str, request: Message, reply: type[R], timeout: float, 
 def call_bytes(
     bus: Asks, key: str, payload: bytes, encoding: str, timeout: float, everyone: bool = False
 ) -> list[Sample]:
-    """As `call`, without types: the samples of the replies."""
+    """As `call`, without types: the samples of the replies. All attempts have one number, so a service applies the
+    request once.
+    """
+    number = os.urandom(8).hex()
     deadline, pause, busy = time.monotonic() + timeout, FIRST_PAUSE, None
     while (left := deadline - time.monotonic()) > 0:
         found = []
         ask = bus.ask_all if everyone else bus.ask
-        for answer in ask(key, left, payload=payload, encoding=encoding):
+        for answer in ask(key, left, number=number, payload=payload, encoding=encoding):
             if isinstance(answer, Sample):
                 found.append(answer)
                 if not everyone:

@@ -10,23 +10,28 @@ import signal
 import sys
 import time
 from collections.abc import Iterator
+from itertools import count
 
 import pytest
 
+from holozen.messages import CommandStatus, Odometry, Twist
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command, free_port
+from holozen.transport.samples import Sample
 
-from .history import CLOCK, EACH_STEP, History, newest, script
+from .history import CLOCK, EACH_STEP, MOVES, History, newest, script
 from .namespaces import NEEDS, Cable, Host, Lab
 from .proxy import Proxy
 
 pytestmark = NEEDS
 
-TRIALS = 34 if os.environ.get("HOLOZEN_LONG") else 1  # of each cut and fate, so some hundred of each cut
+LONG = os.environ.get("HOLOZEN_LONG") == "1"
+TRIALS = 34 if LONG else 1  # of each cut and fate, so some hundred of each cut
 CUTS = (0.2, 0.6, 0.9, 2.0)  # s
+LONG_CUTS = (15.0, 60.0) if LONG else ()  # s, once each
 DELAYS = [(0.1, True), (0.4, True), (0.6, False), (2.0, False), (0.1, True)]
 """Delays of a link in s, one way, one after another; and whether the robot is driven over it."""
-if os.environ.get("HOLOZEN_LONG"):
+if LONG:
     DELAYS += [(0.2, True), (1.0, False), (0.1, True)]
 
 
@@ -70,12 +75,11 @@ def course() -> Iterator[Course]:
         yield Course(lab)
 
 
-@pytest.mark.timeout(60 + 15 * TRIALS * len(CUTS))
+@pytest.mark.timeout(60 + 15 * TRIALS * len(CUTS) + 2 * sum(LONG_CUTS))
 @pytest.mark.parametrize("fate", ["alive", "killed", "stopped"])
 def test_after_a_cut_nothing_that_waited_moves_the_robot(course: Course, fate: str) -> None:
-    longest = 0.0
-    for trial in range(TRIALS * len(CUTS)):
-        cut = CUTS[trial % len(CUTS)]
+    longest = away = 0.0
+    for cut in (*CUTS * TRIALS, *LONG_CUTS):
         driver = course.drive()
         course.cable.cut()
         began = time.monotonic()
@@ -89,6 +93,7 @@ def test_after_a_cut_nothing_that_waited_moves_the_robot(course: Course, fate: s
         course.cable.join()
         if fate == "alive":
             course.wait_for_motion(restored)
+            away = max(away, course.history().moves(restored)[0].begin - restored)
         course.wait_for_odom(restored + 1.0)
         resumed = time.monotonic()
         driver.signal(signal.SIGCONT)
@@ -101,6 +106,7 @@ def test_after_a_cut_nothing_that_waited_moves_the_robot(course: Course, fate: s
         longest = max(longest, history.longest(began))
         course.drivers, course.observer = [], restart(course)
     print(f"{fate}: moved on for at most {longest:.3f} s after the last command was sent")
+    print(f"{fate}: driven again at most {away:.3f} s after the link came back")
 
 
 @pytest.mark.needs("nft")
@@ -210,3 +216,56 @@ def test_a_link_that_jitters_moves_the_robot_only_by_what_is_fresh(far: Far) -> 
     far.driver.kill()
     far.wait_for_odom(time.monotonic() + 2)
     far.history().check_silence()
+
+
+def test_a_link_of_64_kbit_per_second_drives_and_a_slower_one_moves_the_robot_only_by_what_is_fresh(far: Far) -> None:
+    far.proxy.upstream.rate = 8000  # bytes/s
+    since = time.monotonic() + 1.0
+    wait_for(lambda: far.history().moves(since), 20.0, "a robot that is driven at 20 Hz over 64 kbit/s")
+    far.proxy.upstream.rate = 2000  # less than the driver sends, so that its commands wait longer and longer
+    since = time.monotonic()
+    wait_for(lambda: any(not row.moves for row in far.history().odom if row.begin > since), 30.0, "a link that is full")
+    assert far.driver.returncode is None
+    far.driver.kill()
+    far.wait_for_odom(time.monotonic() + 2)
+    far.history().check_silence()
+    assert not far.history().odom[-1].moves
+
+
+def test_commands_that_a_relay_reorders_never_go_back(wire: Wire) -> None:
+    """It holds some back and sends them on in another order, each with the stamp of its sender."""
+    wire.start("sim").wait_for_line("listens on cmd_vel")
+    bus, relay = wire.bus("driver"), wire.bus("relay")
+    commands, waiting = bus.publisher("relayed", Twist), relay.subscribe_raw("relayed")
+    odom, status = bus.subscribe("odom", Odometry, depth=10_000), bus.latest("cmd_vel_status", CommandStatus)
+    steps = count(1)
+    speeds: list[float] = []
+    wait_for(lambda: commands.matched)
+
+    def send(speed: float) -> Sample:
+        commands.put(Twist.planar(speed))
+        return wait_for(waiting.try_recv) or pytest.fail("no command to relay")
+
+    def pass_on(samples: list[Sample]) -> list[float]:
+        for sample in samples:
+            relay.session.put("cmd_vel", sample.payload, encoding=sample.encoding, attachment=sample.attachment)
+        while (received := odom.try_recv()) is not None:
+            speeds.append(received.message.twist.twist.linear.x if received.message else 0.0)
+        return speeds
+
+    def reordered() -> bool:
+        held = [send(0.1 + 0.0001 * next(steps)) for _ in range(3)]
+        random.shuffle(held)
+        read = status.read()[0]
+        return bool(max(pass_on(held), default=0) > 0.1 and read and read.refused.get("out of order", 0) > 20)
+
+    wait_for(reordered, 30, lambda: f"commands out of order; {status.read()[0]}")
+    moved = [each for each in speeds if each > MOVES]
+    assert moved == sorted(moved)
+    late, stop = send(1.0), send(0.0)
+    pass_on([stop, late])
+    wait_for(lambda: pass_on([])[-1] < MOVES, 20, "a robot that stands")
+    del speeds[:]
+    pass_on([late] * 3)
+    wait_for(lambda: len(pass_on([])) > 20)
+    assert max(speeds) < MOVES

@@ -99,6 +99,15 @@ def test_ctrl_c_that_was_typed_during_a_pause_quits(town: Wire, robot: Robot) ->
         assert_tidy(terminal)
 
 
+def test_a_size_that_changes_after_the_terminal_was_given_back_changes_nothing(town: Wire, robot: Robot) -> None:
+    with town.terminal("teleop") as terminal:
+        terminal.wait_for_text("listening")
+        for number in (signal.SIGTSTP, signal.SIGWINCH, signal.SIGCONT, signal.SIGTERM):
+            terminal.process.signal(number)
+        assert terminal.process.wait() == 0
+        assert_tidy(terminal)
+
+
 def test_a_terminal_that_is_closed_stops_the_robot(town: Wire, robot: Robot) -> None:
     with driving(robot, town.terminal("teleop", *DRIVES_ON)) as terminal:
         terminal.hang_up()

@@ -54,7 +54,11 @@ class Terminal:
         self.greet()
 
     def greet(self) -> None:
-        """Set up screen and reports, and query the terminal's identity, which may have changed."""
+        """Set up screen and reports, and query the terminal's identity, which may have changed. Does nothing while the
+        terminal is the shell's: a signal may come after `leave`.
+        """
+        if not self._before:
+            return
         self.write((FULL[0] if self._full else "") + REPORTS[0])
         self.ask(ASK_KEYBOARD + ASK_TERMINAL)
 
