@@ -164,7 +164,9 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,63}")
 def robot_name(text: str) -> str:
     """`text` if it may name a robot, else ValueError. Zenoh would accept `*`, which drives every robot."""
     if not _NAME.fullmatch(text):
-        raise ValueError(f"robot name {text!r}: use a letter, then up to 63 letters, digits, '_' or '-' (such as Fred)")
+        raise ValueError(
+            f"robot name {text[:80]!r}: use a letter, then up to 63 letters, digits, '_' or '-' (such as Fred)"
+        )
     return text
 
 

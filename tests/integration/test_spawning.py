@@ -13,6 +13,7 @@ from holozen.messages import Clock
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.xacro import expand
 from holozen.testing import Process, Wire, wait_for
+from holozen.transport.errors import ServiceError
 
 from .robots import Robot, distance, place
 
@@ -117,6 +118,17 @@ def test_a_repeated_name_an_unknown_robot_and_a_wrong_file_are_reported_with_the
     assert "no such" in refused(wire, "spawn", str(tmp_path / "none.urdf")).lower()
     assert wire.run("spawn", HB_BOT, "--name", "a/*").returncode == 2
     assert [line.split()[0] for line in done(wire, "list").splitlines()] == ["Fred"]
+
+
+def test_a_name_that_is_none_is_refused_by_the_sim_too(wire: Wire, sim: Process) -> None:
+    """A robot called `*` would drive them all; a look-alike letter would pass for another robot's."""
+    bus, text = wire.bus(), expand(Path(HB_BOT))
+    for name in ("*", "**", "$*", "a/b", "..", "F\0", "Fred\n", "\u0391nn", "x" * 5000):
+        request = si.SpawnEntityRequest(name, resource_string=text)
+        with pytest.raises(ServiceError, match="use a letter, then") as refusal:
+            bus.call("spawn_entity", request, si.SpawnEntityReply, timeout=20)
+        assert str(refusal.value).isprintable() and len(str(refusal.value)) < 1000, name
+    assert wire.run("list").stdout == ""
 
 
 def test_a_robot_that_is_replaced_stays_where_it_was_and_stands(wire: Wire, sim: Process) -> None:
