@@ -164,7 +164,8 @@ ROS_DOMAIN = "ROS_DOMAIN_ID"  # the domain where neither the flag nor our own va
 _ROLE_OF = {
     "sim": "sim", "router": "router", "controller": "autopilot", "pose-service": "autopilot", "up": "",
     **dict.fromkeys((
-        "teleop", "view", "stop", "release", "spawn", "delete", "param set", "param load", "xacro",
+        "teleop", "view", "stop", "release", "spawn", "delete", "param set", "param load", "xacro", "sim pause",
+        "sim play", "sim step", "sim reset",
     ), "operator"),
     **dict.fromkeys((
         "doctor", "graph", "list", "map", "plot", "record", "tf echo", "bag record", "node list", "node info",

@@ -1,5 +1,6 @@
 """The process that renders what cameras see, and what the sim sends to it."""
 
+import shlex
 import subprocess
 import sys
 
@@ -17,7 +18,8 @@ class Cameras:
     """
 
     def __init__(self, bus: Bus, key: str, where: list[str]) -> None:
-        self._bus, self._key, self._where = bus, key, where
+        self._bus, self._key = bus, key
+        self._words = ["camera", "--exposures", key, *where]
         self._publisher: Publisher[Exposure] | None = None
         self._process: subprocess.Popen[bytes] | None = None
 
@@ -25,9 +27,8 @@ class Cameras:
         """Start the process unless it runs."""
         self._publisher = self._publisher or self._bus.publisher(self._key, Exposure)
         if self._process is None:
-            words = ["camera", "--exposures", self._key, *self._where]
             self._process = subprocess.Popen(
-                [sys.executable, "-m", "holozen", *words],
+                [sys.executable, "-m", "holozen", *self._words],
                 stdin=subprocess.DEVNULL,
                 start_new_session=True,
                 preexec_fn=dies_with_parent(),
@@ -38,7 +39,7 @@ class Cameras:
         """Whether exposures are read. Reports once that the process ended."""
         if self._process and (code := self._process.poll()) is not None:
             self._process = None
-            again = f"`holozen camera --exposures {self._key}` starts it again"
+            again = f"`{shlex.join(['holozen', *self._words])}` starts it again"
             report(f"sim: the camera ended with exit code {code}, so there are no pictures; {again}")
         return self._publisher is not None and self._publisher.wanted
 

@@ -265,6 +265,11 @@ def test_an_autopilot_may_stop_and_an_operator_release(fleet: Fleet, robot: Robo
     robot.bus.call("release", TriggerRequest(), TriggerReply)
 
 
+def test_an_operator_holds_and_steps_the_time_of_the_sim(fleet: Fleet, robot: Robot) -> None:
+    for verb in ("pause", "step", "play"):
+        assert fleet.start("sim", verb, "--connect", fleet.endpoint).wait() == 0
+
+
 def test_a_service_cannot_be_taken_over(fleet: Fleet, robot: Robot) -> None:
     with fleet.bus("script") as bus:
         bus.session.declare_queryable(
