@@ -10,7 +10,8 @@ COMMANDS = ("**/cmd_vel", "**/joint_command", "**/gazebo_ros_force", "**/goal_po
 READS = (
     ABOUT, DEFINITIONS, *(f"**/{key}" for key in (
         "cmd_vel_status", "odom", "tf", "joint_states", "clock", "get_pose", "get_entities", "get_entity_state",
-        "get_scene", "get_simulation_state", "robot_description", "list_parameters", "get_parameters", "describe_parameters",
+        "get_scene", "get_simulation_state", "robot_description", "list_parameters", "get_parameters",
+        "describe_parameters",
     )),
 )  # fmt: skip
 """Keys of queries that change nothing."""
