@@ -38,9 +38,9 @@ class Page:
         self._client, self._bus, self._scene, self._drivers, self._guard = client, bus, scene, drivers, guard
         self._names: list[str] = []
         self.robot = ""  # the one that is chosen
-        self._number = 0  # of the robot's entity
         self._said = self._shown = ""
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
+        self._pressed: dict[str, tuple[str, int]] = {}  # button -> the entity that it was pressed for
         self._driven: set[Driver] = set()  # by this page
         self._followed: tuple[float, float, float] | None = None
         self._world: WorldTab | None = None
@@ -62,13 +62,7 @@ class Page:
             if self.robot not in names:
                 self._choice.value = names[0] if names else NONE  # type: ignore[misc]
             self._choose()
-        shown = self._shown_robot()
-        if shown and shown.entity.number != self._number:  # another robot of the name, which was not chosen
-            self._number = shown.entity.number
-            if driver := self.driver:
-                driver.use(lambda pad, now: pad.stop(now))
-        for driver in list(self._driven):
-            self._replace_buttons(driver)
+        self._replace_buttons()
         self._move_camera()
         if self._world:
             self._world.update()
@@ -94,7 +88,9 @@ class Page:
     @property
     def driver(self) -> Driver | None:
         """What drives the chosen robot; None if that takes no commands."""
-        shown = self._shown_robot()
+        return self._driver_of(self._shown_robot())
+
+    def _driver_of(self, shown: Shown | None) -> Driver | None:
         return self._drivers.of(shown.entity) if shown and shown.entity.command else None
 
     def _shown_robot(self) -> Shown | None:
@@ -139,23 +135,37 @@ class Page:
         handle.on_hold(partial(self._on_hold, button), callback_hz=HOLD_RATE)
         handle.on_click(partial(self._on_release, button))
 
-    def _replace_buttons(self, driver: Driver) -> None:
-        """What the page does not report any more it may still hold; it cannot hold a button that is not there."""
-        page = self._client.client_id
-        for button in driver.use(lambda pad, now: pad.worn(page, now)):
+    def _replace_buttons(self) -> None:
+        """What the page does not report any more it may still hold, and what was pressed for another robot than the one
+        that is chosen now; it cannot hold a button that is not there.
+        """
+        page, chosen = self._client.client_id, _entity(self._shown_robot())
+        wrong = {button for button, entity in self._pressed.items() if entity != chosen}
+        for driver in self._driven:
+            wrong.update(driver.use(lambda pad, now: pad.worn(page, now)))
+        for button in wrong:
             old = self._buttons[button]
             self._add_button(button, old.order)
             old.remove()
-            driver.use(lambda pad, now, button=button: pad.renew(page, button))  # type: ignore[misc]
+            self._let_go(button)
+            for driver in self._driven:
+                driver.use(lambda pad, now, button=button: pad.renew(page, button))  # type: ignore[misc]
 
     async def _on_hold(self, button: str, _event: Any) -> None:
-        if driver := self.driver:
+        shown = self._shown_robot()
+        if self._pressed.setdefault(button, _entity(shown)) != _entity(shown):
+            return  # nobody chose this robot for it
+        if driver := self._driver_of(shown):
             self._driven.add(driver)
             page, speeds = self._client.client_id, (float(self._speed.value), float(self._turn.value))
             self._said = driver.use(lambda pad, now: pad.hold(page, button, now), speeds)
 
     async def _on_release(self, button: str, _event: Any) -> None:
-        for driver in list(self._driven):
+        self._let_go(button)
+
+    def _let_go(self, button: str) -> None:
+        self._pressed.pop(button, None)
+        for driver in self._driven:
             driver.use(lambda pad, now: pad.release(self._client.client_id, button, now))
 
     def _call(self, verb: str) -> None:
@@ -190,3 +200,8 @@ class Page:
             self._client.camera.up_direction = (0.0, 0.0, 1.0)
             self._client.camera.position = (x - 0.01, y, ABOVE)  # straight down, no direction would be up
             self._client.camera.look_at = (x, y, 0.0)
+
+
+def _entity(shown: Shown | None) -> tuple[str, int]:
+    """The name and number of a robot's entity; "" and 0 of none."""
+    return (shown.entity.name, shown.entity.number) if shown else ("", 0)

@@ -1,0 +1,118 @@
+"""A page's held button drives the robot that it was pressed for, and no other."""
+
+import asyncio
+from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import MagicMock
+
+import pytest
+
+from holozen.limits import STOP, Planar
+from holozen.messages import CommandStatus, Pose, SceneEntity
+from services.view.pad import Pad
+from services.view.page import Page
+
+FORWARD = (1.0, 0.0, 0.0)
+
+
+class Driver:
+    """A pad, at a time that stands still."""
+
+    namespace = ""
+
+    def __init__(self) -> None:
+        self.pad = Pad()
+
+    def use(self, act: Callable[[Pad, float], Any], _speeds: object = None) -> Any:
+        return act(self.pad, 0.0)
+
+    def measured(self) -> None:
+        return None
+
+    def status(self) -> CommandStatus:
+        return CommandStatus()
+
+
+class Robots:
+    """The scene of some robots, and their drivers."""
+
+    def __init__(self) -> None:
+        self.shown: dict[str, Any] = {}
+        self.rate = 20.0
+        self.drivers: dict[str, Driver] = {}
+
+    def add(self, name: str, number: int) -> None:
+        entity = SceneEntity(name, command=f"{name}/cmd_vel", number=number)
+        self.shown[name] = SimpleNamespace(entity=entity, position=(0.0, 0.0, 0.0), pose=Pose())
+
+    def robots(self) -> list[str]:
+        return sorted(self.shown)
+
+    def of(self, entity: SceneEntity) -> Driver:
+        return self.drivers.setdefault(entity.name, Driver())
+
+    def motion(self, name: str) -> Planar | None:
+        return self.drivers[name].pad.command(0.0, False) if name in self.drivers else None
+
+
+class Buttons:
+    """A page for robots a and b, of which a is chosen."""
+
+    def __init__(self) -> None:
+        self.robots = Robots()
+        self.robots.add("a", 1)
+        self.robots.add("b", 2)
+        self.client = MagicMock(client_id=7)
+        self.made: dict[str, list[Any]] = {}
+        self.client.gui.add_button = self._add
+        self.choice = self.client.gui.add_dropdown.return_value
+        self.page = Page(self.client, MagicMock(), self.robots, self.robots, MagicMock(late_at=-9.0), False)  # type: ignore[arg-type]
+        self.choose("a")
+
+    def _add(self, label: str, **_: Any) -> Any:
+        self.made.setdefault(label, []).append(handle := MagicMock())
+        return handle
+
+    def choose(self, name: str) -> None:
+        self.choice.value = name
+        self.choice.on_update.call_args.args[0](None)
+        self.page.update(0.0)
+
+    def hold(self) -> None:
+        """The finger that first pressed the button reports that it holds it; unless its button is gone."""
+        first = self.made["Forward"][0]
+        if not first.remove.called:
+            asyncio.run(first.on_hold.call_args.args[0](None))
+
+    def press_anew(self) -> None:
+        asyncio.run(self.made["Forward"][-1].on_hold.call_args.args[0](None))
+
+
+@pytest.mark.parametrize("change", ["deleted", "chosen", "replaced", "not there at first"])
+def test_a_held_button_drives_the_robot_that_it_was_pressed_for_and_no_other(change: str) -> None:
+    it = Buttons()
+    robots, now = it.robots, "a" if change == "replaced" else "b"
+    if change == "not there at first":
+        robots.shown.clear()
+        it.page.update(0.0)
+        it.hold()
+        robots.add("b", 2)
+    else:
+        it.hold()
+        assert robots.motion("a") == FORWARD
+        if change == "deleted":
+            del robots.shown["a"]
+        elif change == "chosen":
+            it.choice.value = "b"
+            it.choice.on_update.call_args.args[0](None)
+        else:
+            robots.add("a", 3)
+    it.hold()  # before the page is drawn
+    assert robots.motion("b") is None
+    it.page.update(0.0)
+    it.hold()
+    assert robots.motion("b") is None
+    assert robots.motion("a") in (None, STOP), "the one that it was pressed for stands"
+    it.press_anew()
+    assert robots.motion(now) == FORWARD, "pressed again, it drives the one that is chosen now"
