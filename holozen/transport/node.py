@@ -36,9 +36,9 @@ DEFINITION_WAIT = 0.5  # s for a node to answer
 class Node:
     """A node on the wire. Use it in `with`: an open session keeps a Python process from ending.
 
-    `wire` is "json" or "msgpack", by default that of the connection. `lasting` is for long-running nodes, which are
-    listed in the graph; with `patience` and `stop` it is one of Opening. With an early Opening, the first use waits for
-    it, and raises its error.
+    `wire` is "json", "msgpack" or "cdr", by default that of the connection. `lasting` is for long-running nodes, which
+    are listed in the graph; with `patience` and `stop` it is one of Opening. With an early Opening, the first use waits
+    for it, and raises its error.
     """
 
     def __init__(

@@ -209,7 +209,7 @@ class RawSubscriber(Declared):
         self.thread = threading.current_thread()
         try:
             sample = self._samples.recv()
-        except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+        except Exception:  # a ZError: the session is closed. Zenoh is imported later than this module
             raise BusError("closed") from None
         return Sample(sample, self.limit)
 
@@ -228,7 +228,7 @@ class Replies:
             while (reply := self._replies.try_recv()) is not None:
                 if not self._replier or (reply.replier_id and str(reply.replier_id.zid) == self._replier):
                     return _read(reply)
-        except Exception:  # zenoh's own error type, which only bus.py may name: all have replied, or it timed out
+        except Exception:  # a ZError: all have replied, or it timed out
             raise BusError("no more replies") from None
         return None
 

@@ -127,7 +127,7 @@ class Server(Declared):
         """The next request in Zenoh's ring, or None, to be answered with `read`, `reply` or `refuse`."""
         try:
             return self._queries.try_recv()
-        except Exception:  # zenoh's own error type: this service is closed
+        except Exception:  # a ZError: this service is closed
             return None
 
     def recv(self) -> Any:
