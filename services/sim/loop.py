@@ -21,7 +21,7 @@ from .simulation import Simulation
 CLOCK_RATE = 50.0  # Hz of sim time
 STATUS_RATE = 10.0  # Hz of real time
 HELD_RATE = 20.0  # Hz of real time, at which a world that is held is published: no reader takes it for lost
-HELD_POLL = 0.002  # s; the same as POLL while it is held
+HELD_POLL = 0.002  # s; the poll period while paused
 MEASURED = 1.0  # s of real time over which the real-time factor is measured
 REPORT_EVERY = 60.0  # s between two reports of overruns
 POLL = 0.02  # s; how often requests are read, and commands while no step is due

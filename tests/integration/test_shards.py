@@ -58,7 +58,7 @@ def test_robots_of_all_shards_drive_and_are_stopped_paused_and_reset(
     assert town.run("release").returncode == 0
     assert town.run("sim", "pause").stdout == "paused\n"
     for shard in shards:
-        shard.wait_for_line("it is paused")
+        shard.wait_for_line("sim: set to paused by")
     assert town.run("sim", "play").stdout == "playing\n"
     assert town.run("sim", "reset").returncode == 0
     for shard in shards:

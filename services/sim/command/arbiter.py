@@ -263,15 +263,20 @@ class Arbiter:
         """Whether every autopilot waits for `resume`: a source above them drove."""
         return self._highest < AUTOPILOT
 
-    def resume(self, now: float) -> str:
-        """Let every source drive again. Returns why not, if a source above the autopilots moves the robot at `now`, or
-        the robot is stopped.
-        """
+    def resume_refusal(self, now: float) -> str:
+        """Why `resume` is refused at `now`, or "": a source above the autopilots moves the robot, or it is stopped."""
         if self.software_stop.setter:
             return STOPPED.format(by=self.software_stop.setter)
         driver = self.driver(now)
         if driver and driver.rank < AUTOPILOT and not is_stop(driver.motion):
             return f"{driver.source} drives; stop first"
+        return ""
+
+    def resume(self, now: float) -> str:
+        """Let every source drive again. Returns the `resume_refusal`, if there is any."""
+        if reason := self.resume_refusal(now):
+            return reason
+        driver = self.driver(now)
         self._drive(driver if driver and driver.rank >= AUTOPILOT else None)
         self._held.clear()
         self._highest = AUTOPILOT + 1

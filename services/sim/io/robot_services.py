@@ -85,9 +85,11 @@ class RobotServices:
         return TriggerReply(True, RELEASED)
 
     def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
+        refusals = [arbiter.resume_refusal(self._now) for arbiter in self._arbiters]
+        if reason := next(filter(None, refusals), ""):  # of any: no source is let go while another is refused
+            raise ServiceError(reason)
         for arbiter in self._arbiters:
-            if reason := arbiter.resume(self._now):
-                raise ServiceError(reason)
+            arbiter.resume(self._now)
         return TriggerReply(True, "every source may drive")
 
     def _report_change(self, what: str) -> None:

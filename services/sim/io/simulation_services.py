@@ -61,7 +61,8 @@ class SimulationServices:
                 State.STATE_PLAYING: self._simulation.play,
                 State.STATE_PAUSED: self._simulation.pause,
             }[wanted](now)
-        report(f"sim: it is {NAMES.get(wanted, 'ended')} by {self._setter.caller or 'an unknown caller'}")
+        done = f"set to {NAMES[wanted]}" if wanted in NAMES else "ended"
+        report(f"sim: {done} by {self._setter.caller or 'an unknown caller'}")
         return si.SetSimulationStateReply(_OK)
 
     def reset(self, request: si.ResetSimulationRequest) -> si.ResetSimulationReply:

@@ -46,12 +46,12 @@ class JointTopics:
     """The keys of a robot's joints, in the namespace `place`. `names` are those of the engine's joints."""
 
     def __init__(
-        self, bus: Bus, place: str, model: RobotModel, names: list[str], prefix: str, twist_input: JointInput,
+        self, bus: Bus, place: str, model: RobotModel, names: list[str], prefix: str, joint_input: JointInput,
         tf: Publisher[TFMessage],
     ) -> None:  # fmt: skip
-        self._input, self._tf, self.names = twist_input, tf, names
+        self._input, self._tf, self.names = joint_input, tf, names
         self._frames = JointFrames(model, key_for("", prefix))
-        self._commands = bus.subscribe(twist_input.key, JointState, limit=MAX_COMMAND_BYTES)
+        self._commands = bus.subscribe(joint_input.key, JointState, limit=MAX_COMMAND_BYTES)
         self.readers = [Reader(self._commands.raw.listen, self._read)]
         self._states: Publisher[JointState] = bus.publisher(key_for("joint_states", place), JointState)
 

@@ -459,6 +459,27 @@ def test_a_respawned_robot_inherits_held_sources(town: Town) -> None:
     assert robot.arbiter.offer("script", 4, (0.5, 0, 0), 20.2) == ""
 
 
+def test_resume_is_refused_for_the_base_too_while_a_person_moves_a_joint(town: Town) -> None:
+    town.spawn("Fred")
+    (robot,) = town.entities.robots
+    for arbiter, then in ((robot.arbiter, (0.0, 0.0, 0.0)), (robot.joint_arbiter, (0.5, 0.0, 0.0))):
+        arbiter.set_timeout(-1.0, now := time.monotonic())
+        for motion in ((0.5, 0.0, 0.0), then):
+            assert arbiter.offer("person", 1, motion, now) == ""
+    resume = town.client.session.declare_querier("Fred/resume")
+    wait_for(lambda: resume.matching_status.matching)
+    replies: list[zenoh.Reply] = []
+    resume.get(replies.append)
+
+    def answered() -> bool:
+        town.loop.run(steps(), 24)
+        return bool(replies)
+
+    wait_for(answered)
+    assert replies[0].err and "person drives; stop first" in replies[0].err.payload.to_string()
+    assert (robot.arbiter.held, robot.arbiter.resumed) == (True, 0)
+
+
 def test_a_stop_outlives_its_robot_and_a_thousand_others(
     town: Town, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
