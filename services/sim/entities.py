@@ -234,6 +234,15 @@ class Entities:
         report(f"sim: {name} was removed from the world: {error}")
         self.remove(name)
 
+    def remove_lost(self, error: Exception) -> None:
+        """Remove all whose pose or velocity is not finite, since a step failed. Raises `error` if all are."""
+        lost = [entity.name for entity in self if not _is_finite(entity.body)]
+        if not lost:
+            raise error
+        for name in lost:
+            report(f"sim: {name} was removed from the world: its pose or velocity is not finite: {error}")
+            self.remove(name)
+
     def _mover(self, model: RobotModel, place: Place) -> Mover:
         try:
             check_shapes(model)
@@ -414,6 +423,10 @@ def checked_place(position: Vector, rotation: Rotation) -> Place:
         )
     x, y, z, w = (part / length for part in rotation)
     return position, (x, y, z, w)
+
+
+def _is_finite(body: Body) -> bool:
+    return all(math.isfinite(sum(part)) for part in (*body.pose(), *body.twist()))
 
 
 def _motions(entity: Entity) -> Motions:

@@ -16,6 +16,7 @@ from .io.topics import Schedule
 from .io.wait_set import Moment
 from .pace import Pace
 from .physics.world import World
+from .robot import Robot
 from .simulation import Simulation
 
 CLOCK_RATE = 50.0  # Hz of sim time
@@ -27,6 +28,7 @@ REPORT_EVERY = 60.0  # s between two reports of overruns
 POLL = 0.02  # s; how often requests are read, and commands while no step is due
 READ_EVERY = 0.003  # s between two looks for commands and stops, and for nodes that left, however short the steps
 READ_SHARE = 0.05  # of the time that these looks take at most, unless they would be more than POLL apart
+FAULTS = (ArithmeticError, ValueError)  # of a body whose position became NaN
 STALL = 0.1  # s without reading; commands may have waited this long
 DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring old commands
 
@@ -94,7 +96,7 @@ class Loop:
         for robot in list(self._robots):
             try:
                 robot.publish(self._world.time, self._world.spec.step, at_once=True)
-            except (ArithmeticError, ValueError) as error:
+            except FAULTS as error:
                 self._entities.fail(robot, error)
         if self._clock:
             self._clock.put(Clock(Time.of(self._world.time)))
@@ -150,16 +152,26 @@ class Loop:
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step
-        try:
-            for robot in self._robots:
-                if now > robot.arbiter.due or not robot.body.glides:  # else it continues as last commanded
+        failed: dict[Robot, Exception] = {}
+        for robot in self._robots:
+            if now > robot.arbiter.due or not robot.body.glides:  # else it continues as last commanded
+                try:
                     robot.move(now, dt)
+                except FAULTS as error:
+                    failed[robot] = error
+        try:
             world.step()
-            sim_time = world.time
-            for robot in self._robots:
-                if sim_time >= robot.publishes_at:
+        except FAULTS as error:
+            self._entities.remove_lost(error)
+        sim_time = world.time
+        for robot in self._robots:
+            if sim_time >= robot.publishes_at:
+                try:
                     robot.publish(sim_time, dt)
-        except (ArithmeticError, ValueError) as error:  # such as a position that became NaN
-            self._entities.fail(robot, error)
+                except FAULTS as error:
+                    failed[robot] = error
+        for robot, why in failed.items():
+            if robot in self._robots:
+                self._entities.fail(robot, why)
         if self._clock and self._clock_due.due(world.time):
             self._clock.put(Clock(Time.of(world.time)))

@@ -1,6 +1,7 @@
 """A rigid base that is moved over the plane, as Gazebo's planar_move does."""
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from holozen.kinematics import to_body, to_world, travelled
@@ -72,11 +73,23 @@ class Field:
     def stepped(self) -> None:
         """Count a step of the world, and let the bodies whose turn it is look around."""
         self.steps += 1
+        looks = self._looks.pop(self.steps, ())
+        try:
+            self._look_around(looks)
+        except (ValueError, ArithmeticError):
+            for body in self.bodies.values():
+                if body.looks_at <= self.steps:  # it may not have looked
+                    self.let_look(body, LOOK)
+            raise
+
+    def _look_around(self, looks: Iterable["PlanarBody"]) -> None:
         if not self.steps % LOOK:
             self.others = [body for body in self.others if not body.is_removed]
             speeds = [BRISK + math.hypot(*body.twist()[0]) for body in self.others]
             self._fastest = _graded(max((*speeds, *(body.speed for body in self.bodies.values())), default=0.0))
-        for body in self._looks.pop(self.steps, ()):
+            if not math.isfinite(sum(speeds)):
+                raise ValueError(f"a speed of {sum(speeds)} m/s")
+        for body in looks:
             if body.looks_at == self.steps and not body.is_removed:
                 body.look()
 

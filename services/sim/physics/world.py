@@ -76,7 +76,9 @@ class World:
         self._begin()
 
     def step(self) -> None:
-        """Advance the world by one step."""
+        """Advance the world by one step. Raises ValueError or ArithmeticError, after it, if a body's numbers are not
+        finite.
+        """
         self._floating = [body for body in self._floating if not body.is_removed]
         for body in self._floating:
             body.cancel_gravity(self.spec.gravity)

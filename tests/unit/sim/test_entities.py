@@ -37,7 +37,7 @@ from services.sim import entities as entities_module
 from services.sim.entities import Entities, Entity
 from services.sim.io.entity_services import EntityServices
 from services.sim.loop import Loop
-from services.sim.physics.engine import UPRIGHT
+from services.sim.physics.engine import UPRIGHT, bullet
 from services.sim.physics.planar import PlanarBody
 from services.sim.physics.world import World
 
@@ -541,6 +541,19 @@ def test_a_robots_file_puts_nothing_on_a_key_that_is_taken(town: Town, tag: str)
     model = parse(text, Path("r"))
     code, reported = town.refusal(lambda: town.entities.add("Fred", model, ((0, 0, 0), UPRIGHT), ""))
     assert (code, repr(tag) in reported) == (si.SpawnEntityReply.NAMESPACE_INVALID, True)
+
+
+@pytest.mark.parametrize("robots", [(), ("Fred", "Ann")])
+def test_what_fails_in_the_engine_is_taken_out_and_no_other(
+    town: Town, world: World, robots: tuple[str, ...], capsys: pytest.CaptureFixture[str]
+) -> None:
+    for place, name in enumerate(robots):
+        town.spawn(name, x=5.0 * place, entity_namespace=name)
+    ball = town.spawn("ball", BALL, z=0.2, x=-5)
+    bullet.resetBaseVelocity(ball.body.number, (math.nan, 0.0, 0.0), physicsClientId=world.id)
+    town.loop.run(steps(), 24)
+    assert [entity.name for entity in town.entities] == list(robots)
+    assert "sim: ball was removed from the world: its pose or velocity is not finite" in capsys.readouterr().err
 
 
 def test_a_robot_that_moves_to_nowhere_is_taken_out_and_the_others_go_on(

@@ -220,3 +220,17 @@ def test_a_robot_that_is_removed_while_it_glides_is_gone(ground: World) -> None:
     for _ in run(ground, 6, (other, (-0.5, 0, 0))):
         assert other.glides
     assert other.pose()[0][0] == pytest.approx(0, abs=1e-3)
+
+
+def test_a_robot_looks_again_after_a_step_that_failed(monkeypatch: pytest.MonkeyPatch) -> None:
+    with closing(World(FLAT)) as world, monkeypatch.context() as patch:
+        base = put(world)
+
+        def look(_body: PlanarBody) -> None:
+            raise ValueError
+
+        patch.setattr(PlanarBody, "look", look)
+        with pytest.raises(ValueError):
+            for _ in range(FAR + 1):
+                world.step()
+        assert base.looks_at > world.steps
