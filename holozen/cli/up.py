@@ -79,6 +79,9 @@ def main(argv: list[str]) -> int:
     where, router = _meeting(connection.from_arguments(args))
     stop = stop_event()
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+    if has_terminal and driven and args.view is not None and (where.private or where.secure):
+        # The teleop's screen would hide it, and other users see the arguments of a process.
+        options.error("--view has no place here to show the token of its page: run `holozen view` in another terminal")
     if not has_terminal:
         report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []

@@ -3,6 +3,7 @@
 import argparse
 import contextlib
 import io
+import re
 import secrets
 import socket
 import sys
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
     from .guard import Guard
 
 PORT = 8080
-LOOPBACK = ("localhost", "::1")
 
 
 def parser() -> argparse.ArgumentParser:
@@ -36,9 +36,11 @@ def parser() -> argparse.ArgumentParser:
     )
     add = parser.add_argument
     add("--host", default="127.0.0.1", metavar="ADDRESS",
-        help="where to listen; beyond this machine its address has a token (default: %(default)s)")  # fmt: skip
+        help="where to listen (default: %(default)s)")  # fmt: skip
     add("--port", type=flags.count(), default=PORT, metavar="N", help="0: a free one (default: %(default)s)")
-    add("--token", default="", metavar="WORD", help="the token of the page's address (default: a random one)")
+    add("--token", type=_word, metavar="WORD",
+        help="the token of the page's address (default: a random one with --private, --secure or a --host beyond this "
+        "machine, else none)")  # fmt: skip
     add("--look-only", action="store_true", help="a page that drives, adds and deletes nothing")
     connection.add_arguments(parser)
     return parser
@@ -46,18 +48,18 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
-    is_local = args.host in LOOPBACK or args.host.startswith("127.")
-    token = args.token or ("" if is_local else secrets.token_urlsafe(16))
+    where = connection.from_arguments(args)
+    token = args.token or random_token(args.host, where)
     stop = stop_event()
     try:
         _check_port(args.host, args.port)
         from .guard import Guard
 
         guard = Guard(token)
-        with Bus("view", connection.from_arguments(args), lasting=True, stop=stop) as bus:
+        with Bus("view", where, lasting=True, stop=stop) as bus:
             server = _serve(args.host, args.port, guard)
             try:
-                for line in _addresses(args, server.get_port(), token, is_local):
+                for line in _addresses(args, server.get_port(), token):
                     report(f"view: {line}")
                 _show(bus, server, guard, args.look_only, stop)
             finally:
@@ -69,10 +71,26 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
-def _addresses(args: argparse.Namespace, port: int, token: str, is_local: bool) -> Iterator[str]:
+def random_token(host: str, where: connection.Connection) -> str:
+    """A token where more people reach `host` than the robots; empty where they are the same."""
+    from .guard import is_loopback
+
+    return "" if is_loopback(host) and not where.private and not where.secure else secrets.token_urlsafe(16)
+
+
+def _word(text: str) -> str:
+    """Parses a token: what needs no quoting in an address or a cookie."""
+    if not re.fullmatch(r"[A-Za-z0-9._~-]+", text):
+        raise flags.refused(f"{text!r}: use letters, digits and any of . _ ~ -")
+    return text
+
+
+def _addresses(args: argparse.Namespace, port: int, token: str) -> Iterator[str]:
     """Where the page is, and what that exposes."""
+    from .guard import is_loopback
+
     host = f"[{args.host}]" if ":" in args.host else args.host
-    if not is_local:
+    if not is_loopback(args.host):
         may = "see" if args.look_only else "see and drive"
         yield f"port {port} of {args.host} is open to the network; anyone with this address may {may} the robots:"
         host = host if args.host not in ("0.0.0.0", "::") else socket.gethostname()

@@ -8,6 +8,7 @@ import asyncio
 import contextlib
 import hmac
 import http
+import ipaddress
 import logging
 import time
 from collections.abc import Awaitable, Callable, Iterator
@@ -24,7 +25,6 @@ from websockets.http11 import Request, Response
 PING_EVERY = 0.05  # s
 MAX_AGE = 0.3  # s; a held button that may be older moves nothing
 MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage")  # in viser's messages that may move a robot
-LOOPBACK = ("localhost", "127.0.0.1", "::1")
 
 
 class Guard:
@@ -38,7 +38,7 @@ class Guard:
     def refusal(self, request: Request) -> str:
         """Why a request is refused; empty if it is not."""
         host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
-        if not self._token and urlsplit(f"//{host}").hostname not in LOOPBACK:
+        if not self._token and not is_loopback(urlsplit(f"//{host}").hostname or ""):
             # Else a web site whose name leads to 127.0.0.1 could read and send what it likes.
             return f"{host!r} is not this machine; open http://127.0.0.1 with the port that `holozen view` printed"
         if origin is not None and urlsplit(origin).netloc != host:
@@ -116,6 +116,14 @@ class TimedConnection(websockets.ServerConnection):
                     self._guard.late_at = now
                     return
         super().process_event(event)
+
+
+def is_loopback(host: str) -> bool:
+    """Whether a name or an address reaches this machine alone."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
 
 
 def _cookie(request: Request) -> str:

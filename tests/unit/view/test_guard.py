@@ -63,7 +63,9 @@ async def socket_status(port: int, **headers: str) -> int:
 def test_without_a_token_it_answers_this_machine_and_its_own_page() -> None:
     async def test(port: int, _heard: list[bytes]) -> None:
         assert await asyncio.to_thread(status, port) == (200, "")
-        assert await asyncio.to_thread(status, port, "/", Host=f"rebound.example:{port}") == (403, "")
+        assert await asyncio.to_thread(status, port, "/", Host=f"127.0.0.2:{port}") == (200, "")
+        for host in ("rebound.example", "127.example.org"):
+            assert await asyncio.to_thread(status, port, "/", Host=f"{host}:{port}") == (403, "")
         assert await socket_status(port) == 101
         assert await socket_status(port, Origin=f"http://127.0.0.1:{port}") == 101
         assert await socket_status(port, Origin="http://evil.example") == 403

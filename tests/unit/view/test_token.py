@@ -1,0 +1,38 @@
+"""Who needs a token to open the page, and which ones there are."""
+
+from types import SimpleNamespace
+
+import pytest
+
+from holozen.cli import up
+from holozen.transport.connection import Connection
+from services.view.__main__ import parser, random_token
+
+OPEN, PRIVATE, SECURE = Connection(), Connection(private="/run/user/1/holozen"), Connection(secure="/members/operator")
+
+
+def test_a_page_has_a_token_where_more_people_reach_it_than_the_robots() -> None:
+    for host in ("127.0.0.1", "127.0.0.2", "localhost", "::1"):
+        assert random_token(host, OPEN) == ""
+        assert random_token(host, PRIVATE) and random_token(host, SECURE)
+    for host in ("0.0.0.0", "::", "127.example.org", "10.0.0.2"):
+        assert random_token(host, OPEN)
+
+
+def test_a_token_needs_no_quoting(capsys: pytest.CaptureFixture[str]) -> None:
+    assert parser().parse_args(["--token", "a-B.9_~"]).token == "a-B.9_~"
+    for wrong in ("a&b", "a;b", "a b", "ä", "a%41", ""):
+        with pytest.raises(SystemExit):
+            parser().parse_args([f"--token={wrong}"])
+        assert f"{wrong!r}: use letters, digits and any of . _ ~ -" in capsys.readouterr().err
+
+
+def test_up_starts_no_page_whose_token_the_teleop_would_hide(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr("sys.stdout", SimpleNamespace(isatty=lambda: True))
+    monkeypatch.setattr(up, "Team", lambda *_: pytest.fail("it starts"))
+    with pytest.raises(SystemExit):
+        up.main(["--view", "--private"])
+    assert "run `holozen view` in another terminal" in capsys.readouterr().err
