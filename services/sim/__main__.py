@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from .entities import Entities
 
 
-RIVALRY = 250  # polls, some five seconds, after which all other nodes are known on a busy machine too
 HOW = "holozen sim --join --robot FILE=NAME"
 JOIN = f"end it, or join it with named robots: {HOW}"
 
@@ -137,7 +136,7 @@ def main(argv: list[str] | None = None) -> int:
                 loop.answers.append(rivals.answer)
             loop.run(stop)
             if rivals.first:
-                report(f"sim: {rivals.first} simulates here too, since the same instant; {JOIN}")
+                report(f"sim: {rivals.first} simulates here too; {JOIN}")
                 return 1
     except (BusError, RobotError) as error:
         report(f"sim: {error}")
@@ -146,21 +145,21 @@ def main(argv: list[str] | None = None) -> int:
 
 
 class Rivals:
-    """Looks for sims that started in the same instant as this one: of all that are on the wire then, the one with the
-    lowest session id goes on. `stop` is set if that is another, the `first`.
+    """Looks for other sims that serve the keys of the world, as one that started in the same instant or that did not
+    discover this one: of all of them the one with the lowest session id goes on. `stop` is set if that is another, the
+    `first`.
     """
 
     def __init__(self, entities: "Entities", session: str, stop: threading.Event) -> None:
-        self._entities, self._session, self._stop, self._left = entities, session, stop, RIVALRY
+        self._entities, self._session, self._stop = entities, session, stop
         self.first = ""
 
     def answer(self) -> bool:
-        """Look, while others may not have been known when this one looked at its start."""
-        if self._left:
-            self._left -= 1
+        """Look, if anything changed on the wire and another node publishes a clock."""
+        if not self.first and self._entities.has_new_clock():
             others = self._entities.others_on("spawn_entity", "srv")
             if first := next((one for one in others if one.session < self._session), None):
-                self._left, self.first = 0, first.source
+                self.first = first.source
                 self._stop.set()
         return False
 

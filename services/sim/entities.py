@@ -78,6 +78,7 @@ class Entities:
         self.max_age = COMMAND_SILENCE  # s; a command that may be older is refused, unless it is a stop
         self._seen = -1  # changes of the graph at its last scan, and the time of that
         self._seen_at = 0.0
+        self._clocks_seen = -1  # the same for other clocks
         self._all: dict[str, Entity] = {}
         self.before: dict[str, Memory] = {}  # prefix -> held sources and software stop of the last robot there
         self._stops: StopFile | None = None
@@ -224,6 +225,12 @@ class Entities:
             self._clocks.track({session for key in keys for session in self._graph.publishers(key)}, now)
         self._clocks.poll(now)
 
+    def has_new_clock(self) -> bool:
+        """Whether another node publishes the time of a world, and the graph changed since the last call."""
+        clocks, seen = self._graph.publishers("clock"), self._clocks_seen
+        self._clocks_seen = self._graph.changes
+        return seen != self._graph.changes and any(session != self._bus.id for session in clocks)
+
     def others_on(self, key: str, kind: str) -> list[Endpoint]:
         """The endpoints of a kind that other nodes have on a key."""
         return [end for end in on_key(self._graph.endpoints(), key, kind) if end.session != self._bus.id]
@@ -282,9 +289,11 @@ class Entities:
         self._keep_stops()
         if setter := robot.arbiter.software_stop.setter:
             report(f"sim: {prefix or 'the robot'} is still stopped by {setter}; `holozen release` lets it drive again")
-        while len(self.before) > MAX_ENTITIES:
-            free = (prefix for prefix, (arbiter, *_) in self.before.items() if not arbiter.software_stop.setter)
-            del self.before[next(free, next(iter(self.before)))]  # a stop is forgotten last
+        if len(self.before) > MAX_ENTITIES:
+            live = {prefix, *(robot.prefix for robot in self.robots)}
+            gone = [prefix for prefix in self.before if prefix not in live]
+            free = (prefix for prefix in gone if not self.before[prefix][0].software_stop.setter)
+            del self.before[next(free, gone[0])]  # a stop is forgotten last
 
     def remove(self, name: str) -> None:
         """Remove an entity from the world, and its keys from the wire. Raises EntityError."""
