@@ -5,14 +5,17 @@ known, and a check assumes the end that speaks for the robot, so that load alone
 """
 
 import sys
-from bisect import bisect_left, bisect_right
+from bisect import bisect_left
 from dataclasses import dataclass
-from itertools import pairwise
+from functools import cached_property
+from itertools import accumulate, pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 from holozen.testing import Process
 from holozen.wire import COMMAND_SILENCE
 
+PROMPT = 0.05  # s; a robot at rest may obey a command that took no longer, see docs/safety.md
 STEP = 1 / 240  # s; odom is to come at each step
 MOVES = 0.02  # m/s; slower is standing
 EACH_STEP = ("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}")  # odom, so that its times are close
@@ -43,29 +46,42 @@ class Row:
     moves: bool
 
 
+class Command(NamedTuple):
+    """When the sending of a command began, when it ended at the latest, and the number of its driver."""
+
+    began: float
+    ended: float
+    driver: int = 0
+
+
+class Violation(AssertionError):
+    """A promise that was broken at a time."""
+
+    def __init__(self, what: str, at: float) -> None:
+        super().__init__(what)
+        self.at = at
+
+
 @dataclass(frozen=True)
 class History:
-    """Each odom in order, and when the sending of each command began and when it ended at the latest."""
+    """The commands in the order in which they began, and each odom in order."""
 
-    began: list[float]
-    ended: list[float]
+    commands: list[Command]
     odom: list[Row]
 
     @classmethod
     def of(cls, drivers: list[Process], observer: Process, clock: float) -> "History":
         """From what the programs printed. The drivers' clock is `clock` seconds ahead of the robot's."""
-        began: list[float] = []
-        ended: list[float] = []
-        for driver in drivers:
+        commands: list[Command] = []
+        for number, driver in enumerate(drivers):
             rows = [line.split() for line in whole_lines(driver)]
             sent = [(what, float(at) - clock) for what, at in rows]
-            began += [at for what, at in sent if what == "begin"]
             # One that was killed while it sent prints no end.
-            ended += [after if end == "end" else at for (what, at), (end, after) in pairwise([*sent, ("", 0.0)])
-                      if what == "begin"]  # fmt: skip
+            commands += [Command(at, after if end == "end" else at, number)
+                         for (what, at), (end, after) in pairwise([*sent, ("", 0.0)]) if what == "begin"]  # fmt: skip
         seen = [tuple(map(float, line.split())) for line in whole_lines(observer)]
         odom = [Row(before, at, speed > MOVES) for (before, _), (at, speed) in pairwise(seen)]
-        return cls(sorted(began), sorted(ended), odom)
+        return cls(sorted(commands), odom)
 
     def moves(self, begin: float, end: float = float("inf")) -> list[Row]:
         """Where the robot surely moved between two times."""
@@ -77,19 +93,30 @@ class History:
 
     def check_silence(self, begin: float = 0.0) -> None:
         """Motion ends half a second and a step after the last command was sent."""
-        late = self.longest(begin)
-        assert late <= COMMAND_SILENCE + STEP, f"it moved on for {late:.3f} s"
+        for row in self.moves(begin):
+            if (late := row.begin - self._sent(row.end)) > COMMAND_SILENCE + STEP:
+                raise Violation(f"it moved {late:.3f} s after the last command was sent", row.begin)
 
     def check_restored(self, restored: float, until: float = float("inf")) -> None:
-        """A robot that stood when the link came back moves by nothing that was sent before."""
-        before = [row for row in self.odom if row.end < restored]
-        if before[-1].moves:
+        """A robot that stood when the link came back is not set moving by what was sent before, unless that was prompt:
+        a link that is reset holds nothing up, and the newest of what waited may be fresh.
+        """
+        last = bisect_left(self.odom, restored, key=lambda row: row.end)
+        fresh = min((each.began for each in self.commands if each.ended >= restored), default=float("inf"))
+        odom = [row for row in self.odom[max(0, last - 1) :] if row.end < min(fresh, until)]
+        if not odom or odom[0].moves:
             return
-        first = next(iter(self.began[bisect_right(self.began, restored) :]), float("inf"))
-        late = [row.end - restored for row in self.odom if row.moves and restored < row.end < min(first, until)]
-        assert late == [], f"it moved {len(late)} times by what waited, {late[0]:.3f} s after the link came back"
+        for before, row in pairwise(odom):
+            if row.moves and not before.moves and row.begin - self._sent(row.end) > PROMPT:
+                late = row.end - restored
+                raise Violation(f"it was moved by what waited, {late:.3f} s after the link came back", row.end)
+
+    @cached_property
+    def _latest(self) -> list[float]:
+        """When at the latest the sending of each command and of those before it ended."""
+        return list(accumulate((each.ended for each in self.commands), max))
 
     def _sent(self, at: float) -> float:
         """When at the latest the last command was sent of those that may have been before `at`."""
-        index = bisect_left(self.began, at)
-        return self.ended[index - 1] if index else float("-inf")
+        index = bisect_left(self.commands, (at,))
+        return self._latest[index - 1] if index else float("-inf")

@@ -15,6 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,13 +25,16 @@ from holozen.messages import TriggerReply, TriggerRequest
 from holozen.messages import simulation_interfaces as si
 from holozen.testing import Process, Wire
 from holozen.transport.errors import BusError, ServiceError
+from holozen.transport.samples import Sample, Stamp
 
-from .history import STEP, History, whole_lines
+from .history import STEP, History, Violation, whole_lines
 from .proxy import Proxy
 
 HERE = Path(__file__).parent
 EVERY = 5.0  # s between two figures
-MOST = 10  # spawned robots
+NAMES = [f"bot{number}" for number in range(8)]
+"""Of spawned robots. Few, since Zenoh keeps each key that it has told over a link until that link ends."""
+BEFORE, AFTER = 2.0, 0.2  # s around a violation that are printed
 BOT = """<robot name="bot"><link name="base"><inertial><mass value="1"/>
 <inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
 <collision><geometry><sphere radius="0.1"/></geometry></collision></link>
@@ -70,11 +74,18 @@ class Soak:
         self.observer = Process([sys.executable, str(HERE / "observer.py"), wire.endpoint])
         self.drivers: list[Process] = []
         self.names: list[str] = []
-        self.restored: list[float] = []  # when a cut ended
+        self.acts: list[tuple[float, float, str]] = []  # when each began and ended
+        self.restored: list[float] = []  # when the link came back
+        self.passed: list[tuple[float, Stamp]] = []  # when each command came past the sim
         self.stopped: list[tuple[float, float]] = []  # from the reply of a stop to the release
         self.figures: list[Figures] = []
         self.done: Counter[str] = Counter()
         self.wrong: list[str] = []
+        self._bus.session.declare_subscriber("cmd_vel", self._pass)
+
+    def _pass(self, sample: zenoh.Sample) -> None:
+        if stamp := Sample(sample, 1).stamp:
+            self.passed.append((time.monotonic(), stamp))
 
     def run(self, seconds: float) -> None:
         acts: list[Callable[[], None]] = [
@@ -87,7 +98,9 @@ class Soak:
                 self.figures.append(Figures.of(self.sim.pid))
             act = self.random.choice(acts)
             self.done[act.__name__] += 1
+            began = time.monotonic()
             act()
+            self.acts.append((began, time.monotonic(), act.__name__))
             time.sleep(self.random.uniform(0.05, 0.4))
         for driver in self.drivers:
             driver.close()
@@ -128,6 +141,7 @@ class Soak:
         self._proxy.set(lost=False)
 
     def reset(self) -> None:
+        """Without a silence."""
         self.restored.append(time.monotonic())
         self._proxy.reset()
 
@@ -148,9 +162,10 @@ class Soak:
             self._bus.call("resume", TriggerRequest(), TriggerReply)
 
     def spawn(self) -> None:
-        if len(self.names) >= MOST:
+        unused = sorted({*NAMES} - {*self.names})
+        if not unused:
             return self.delete()
-        name = f"bot{self.done.total()}"
+        name = self.random.choice(unused)
         x, y = (self.random.uniform(20, 60) for _ in "xy")
         request = si.SpawnEntityRequest(name, resource_string=BOT)
         request.initial_pose.pose.position.x, request.initial_pose.pose.position.y = x, y
@@ -186,11 +201,12 @@ class Soak:
         for check in checks:
             try:
                 check()
-            except AssertionError as error:
-                self.wrong.append(str(error))
+            except Violation as error:
+                self.wrong.append(f"{error}\n{self.story(history, error.at)}")
         for since, until in self.stopped:
             if rows := history.moves(since + STEP, until):
-                self.wrong.append(f"it moved {len(rows)} times while it was stopped")
+                wrong = f"it moved {len(rows)} times while it was stopped"
+                self.wrong.append(f"{wrong}\n{self.story(history, rows[0].end)}")
         times = [float(line.split()[0]) for line in whole_lines(self.observer)]
         if not any(row.moves for row in history.odom):
             self.wrong.append("it never moved: nothing was tried")
@@ -199,6 +215,20 @@ class Soak:
         if "Traceback" in self.sim.err:
             self.wrong.append("the sim wrote a traceback")
         return history
+
+    def story(self, history: History, at: float) -> str:
+        """All that happened around a time, in seconds from it: acts, commands sent and passed, and the odom that shows
+        that the robot starts or stops, each with the odom before it.
+        """
+        lines = [(began, f"{name}, for {ended - began:.3f} s") for began, ended, name in self.acts]
+        lines += [(restored, "the link is back") for restored in self.restored]
+        lines += [(each.began, f"driver {each.driver} sends, and is done after {each.ended - each.began:.4f} s")
+                  for each in history.commands]  # fmt: skip
+        lines += [(came, f"command {stamp.number} of {stamp.session[:6]} comes, sent at {stamp.sent - at:+.4f}, "
+                         f"{came - stamp.sent:.4f} s old") for came, stamp in self.passed]  # fmt: skip
+        lines += [(row.end, f"odom {'moves' if row.moves else 'stands'}, the one before it at {row.begin - at:+.4f}")
+                  for before, row in pairwise(history.odom) if before.moves != row.moves]  # fmt: skip
+        return "\n".join(f"  {when - at:+.4f} {what}" for when, what in sorted(lines) if -BEFORE < when - at < AFTER)
 
     def growth(self) -> tuple[float, float, float]:
         """MB an hour, and the change of threads and descriptors, from the second quarter to the last."""
@@ -227,7 +257,7 @@ def main(minutes: float, seed: int) -> int:
     run, history = soak(minutes, seed)
     moved = sum(row.end - row.begin for row in history.odom if row.moves)
     print(", ".join(f"{count} {name}" for name, count in sorted(run.done.items())))
-    print(f"{len(history.began)} commands, {len(history.odom)} odom; it moved for {moved:.0f} s")
+    print(f"{len(history.commands)} commands, {len(history.odom)} odom; it moved for {moved:.0f} s")
     print(f"it moved on after the last command for at most {history.longest():.3f} s")
     first, last, (memory, threads, descriptors) = run.figures[0], run.figures[-1], run.growth()
     print(f"memory {first.memory:.1f} to {last.memory:.1f} MB ({memory:+.1f} MB/h from the second quarter on), "
