@@ -176,7 +176,7 @@ def _run(verb: str, words: list[str]) -> int:
         if name not in EXTRAS:
             raise
         extra = "secure" if name == "cryptography" else verb  # any verb with --secure needs it
-        report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install '.[{extra}]'")
+        report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install -e '.[{extra}]'")
         return 1
 
 

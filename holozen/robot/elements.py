@@ -320,6 +320,8 @@ def _advice(reason: str, lines: list[str]) -> str:
         return "close each element, inner ones first: </name>, or /> at the end of its tag"
     if "declaration not at start" in reason:
         return "nothing, not even a space, may come before <?xml"
+    if "unbound prefix" in reason:
+        return 'add xmlns:xacro="http://www.ros.org/wiki/xacro" to <robot>, or that of another prefix'
     if "junk after" in reason:
         return "a file has a single <robot> or <sdf> around everything: remove what follows its end"
     for line in reversed(lines):

@@ -176,7 +176,7 @@ def test_the_sim_starts_from_the_wheel_and_publishes_odom(full: Path, wire: Wire
 def test_the_sim_without_its_extra_names_it(bare: Path, wire: Wire) -> None:
     done = run(holozen(bare), "sim", *wire.flags)
     assert (done.returncode, done.stdout) == (1, "")
-    advice = r"in the checkout of holozen, run: pip install '\.\[sim\]'"
+    advice = r"in the checkout of holozen, run: pip install -e '\.\[sim\]'"
     assert re.fullmatch(rf"holozen sim needs (numpy|pybullet|xacro); {advice}\n", done.stderr)
 
 

@@ -47,5 +47,5 @@ def test_a_missing_library_is_reported_with_what_to_do(
     monkeypatch.setitem(sys.modules, "matplotlib", None)
     monkeypatch.delitem(sys.modules, "matplotlib.figure", raising=False)
     assert main(["bag", "plot", str(path)]) == 1
-    advice = "in the checkout of holozen, run: pip install '.[bag]'"
+    advice = "in the checkout of holozen, run: pip install -e '.[bag]'"
     assert capsys.readouterr().err == f"holozen bag needs matplotlib; {advice}\n"

@@ -115,7 +115,7 @@ def test_what_is_not_installed_is_named_with_its_extra(
 ) -> None:
     failing(monkeypatch, ModuleNotFoundError(name=name))
     assert cli.main(["node", "list"]) == 1
-    advice = "in the checkout of holozen, run: pip install '.[node]'"
+    advice = "in the checkout of holozen, run: pip install -e '.[node]'"
     assert capsys.readouterr().err == f"holozen node needs {name}; {advice}\n"
 
 
