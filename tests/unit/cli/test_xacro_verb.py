@@ -79,7 +79,8 @@ def test_values_may_stand_on_both_sides_of_the_flags(file: Path, capsys: pytest.
         ),
         (
             b'<robot name="r"><xacro:property name="x" value="1"/></robot>',
-            'robot.xacro, line 1: broken XML: unbound prefix; add xmlns:xacro="http://www.ros.org/wiki/xacro" to <robot>, '
+            "robot.xacro, line 1: broken XML: unbound prefix; "
+            'add xmlns:xacro="http://www.ros.org/wiki/xacro" to <robot>, '
             "or that of another prefix",
         ),
         (b"\x7fELF\xff\x00", "robot.xacro: byte 4 is not UTF-8 text; save the file as UTF-8"),
