@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
     add("--paused", action="store_true", help="start paused, until `holozen sim play` or `step`")
     add("--stopped", action="store_true", help="start with the robots stopped, until `holozen release`")
     add("--state", type=Path, metavar="DIR",
-        help="keep software stops in a file there, for the next sim (default: HOLOZEN_STATE, else none)")  # fmt: skip
+        help="keep software stops in files there, for the next sim (default: HOLOZEN_STATE, else none)")  # fmt: skip
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
     add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
         help="where $(find NAME) is")  # fmt: skip
@@ -93,7 +93,7 @@ def main(argv: list[str] | None = None) -> int:
             from .parameters import declared
             from .physics.world import World
             from .spawn import add_models, spawn_all
-            from .stops import StopFile
+            from .stops import StopFiles
 
             other = _other_sim(graph, mine)
             joins = bool(other) or (mine is not None and mine.number != 1)
@@ -110,7 +110,7 @@ def main(argv: list[str] | None = None) -> int:
             entities = Entities(bus, world, (args.max_linear, args.max_angular), args.seed, cameras)
             name = mine.node if mine else key_for("sim", args.robot[0][1] if joins else "")
             if folder := args.state or os.environ.get("HOLOZEN_STATE"):
-                entities.restore_stops(StopFile(Path(folder), connection.from_arguments(args).where, name))
+                entities.keep_stops_in(StopFiles(Path(folder), connection.from_arguments(args).where))
             add_models(entities, spec.models)
             if args.robot or not (args.empty or mine):
                 spawn_all(entities, args, mine)

@@ -4,6 +4,7 @@ import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import chain, count
 
 from holozen.bus import Bus
@@ -19,7 +20,6 @@ from holozen.transport.graph import Endpoint, on_key
 from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name
 
 from .cameras import Cameras
-from .command.arbiter import Arbiter
 from .command.time import CommandTime
 from .io.robot_services import RobotServices
 from .io.sensor_topics import Motions, Surroundings
@@ -30,8 +30,8 @@ from .physics.movers import Mover, mover_for
 from .physics.sight import Sight
 from .physics.world import World
 from .posture import Motion, posture_of
-from .robot import Memory, Robot, keys_of
-from .stops import ALL, StopFile
+from .robot import Memory, Robot, command_key, keys_of
+from .stops import StopFiles
 
 MAX_ENTITIES = 1000  # each takes time at every step
 MAX_REASON = 300  # characters
@@ -80,9 +80,8 @@ class Entities:
         self._seen_at = 0.0
         self._clocks_seen = -1  # the same for other clocks
         self._all: dict[str, Entity] = {}
-        self.before: dict[str, Memory] = {}  # prefix -> held sources and software stop of the last robot there
-        self._stops: StopFile | None = None
-        self._unknown = ""  # who stopped the robots that are not in `before`; empty where none are stopped
+        self.before: dict[str, Memory] = {}  # place on the wire -> what the last robot there left
+        self._stops: StopFiles | None = None
         self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
         self.robots: list[Robot] = []
         self._sight: Sight | None = None  # made when the first sensor looks
@@ -139,7 +138,7 @@ class Entities:
                     self._clocks,
                     phase,
                     self.command_time,
-                    self._keep_stops,
+                    partial(self._keep_stop, _place_of(model, prefix)),
                 )
                 entity.robot.require_age(self.max_age)
                 if self._cameras and any(isinstance(sensor.device, Camera) for sensor in model.sensors):
@@ -152,7 +151,7 @@ class Entities:
         self._all[name] = entity
         if entity.robot:
             self._keys |= dict.fromkeys(keys_of(model, prefix), name)
-            self._remember(prefix, entity.robot)
+            self._remember(_place_of(model, prefix), entity.robot)
             self.robots.append(entity.robot)
             self.commands.add(entity.robot.command_readers)
             self.requests.add(entity.robot.request_readers)
@@ -183,26 +182,17 @@ class Entities:
         for robot in self.robots:
             for arbiter in robot.memory:
                 arbiter.stop(by, time.monotonic())
-        self._keep_stops()
+        for place in self.before:
+            self._keep_stop(place)
 
-    def restore_stops(self, stops: StopFile) -> None:
-        """Stop the robots that a file says, when they come, and keep it up to date from now on."""
-        self._stops, found = stops, stops.read()
-        self._unknown = found.pop(ALL, "")
-        for prefix, by in found.items():
-            self.before[prefix] = tuple(Arbiter(COMMAND_SILENCE, self.command_time) for _ in range(3))  # type: ignore[assignment]
-            for arbiter in self.before[prefix]:
-                arbiter.stop(by, time.monotonic())
-        self._keep_stops()
+    def keep_stops_in(self, stops: StopFiles) -> None:
+        """Stop the robots that the files say, when they come, and keep those up to date from now on."""
+        self._stops = stops
 
-    def _keep_stops(self) -> None:
-        """Write down who is stopped. A release ends that of unknown robots too: a person knows of it."""
-        if any(not robot.arbiter.software_stop.setter for robot in self.robots):
-            self._unknown = ""
+    def _keep_stop(self, place: str) -> None:
+        """Write down who stopped a robot."""
         if self._stops:
-            setters = {prefix: arbiter.software_stop.setter for prefix, (arbiter, *_) in self.before.items()}
-            setters[ALL] = self._unknown
-            self._stops.write({prefix: by for prefix, by in setters.items() if by})
+            self._stops.write(place, self.before[place][0].software_stop.setter)
 
     def require_age(self, limit: float) -> None:
         """Refuse commands that may be older than `limit` seconds, except stops, from now on."""
@@ -278,22 +268,24 @@ class Entities:
         found = (entities[number] for number in numbers if number in entities)
         return next((entity for entity in found if not (entity.model.static and model.static)), None)
 
-    def _remember(self, prefix: str, robot: Robot) -> None:
-        """A respawned robot inherits held sources and the software stop."""
-        if old := self.before.pop(prefix, None):
+    def _remember(self, place: str, robot: Robot) -> None:
+        """A respawned robot inherits held sources and the software stop; one that another sim had, the stop."""
+        if old := self.before.pop(place, None):
             robot.inherit(old)
-        elif self._unknown:
+        self.before[place] = robot.memory
+        if self._stops and (by := self._stops.read(place)):
             for arbiter in robot.memory:
-                arbiter.stop(self._unknown, time.monotonic())
-        self.before[prefix] = robot.memory
-        self._keep_stops()
+                arbiter.stop(by, time.monotonic())
+        self._keep_stop(place)
         if setter := robot.arbiter.software_stop.setter:
-            report(f"sim: {prefix or 'the robot'} is still stopped by {setter}; `holozen release` lets it drive again")
+            report(f"sim: {place or 'the robot'} is still stopped by {setter}; `holozen release` lets it drive again")
         if len(self.before) > MAX_ENTITIES:
-            live = {prefix, *(robot.prefix for robot in self.robots)}
-            gone = [prefix for prefix in self.before if prefix not in live]
-            free = (prefix for prefix in gone if not self.before[prefix][0].software_stop.setter)
-            del self.before[next(free, gone[0])]  # a stop is forgotten last
+            live = {robot.arbiter, *(robot.arbiter for robot in self.robots)}
+            gone = [place for place, (arbiter, *_) in self.before.items() if arbiter not in live]
+            free = (place for place in gone if not self.before[place][0].software_stop.setter)
+            del self.before[forgotten := next(free, gone[0])]  # a stop is forgotten last
+            if self._stops:
+                self._stops.forget(forgotten)
 
     def remove(self, name: str) -> None:
         """Remove an entity from the world, and its keys from the wire. Raises EntityError."""
@@ -412,6 +404,11 @@ class Entities:
 def _at(position: Vector) -> str:
     x, y = (round(part, 2) + 0.0 for part in position[:2])  # no -0
     return f"x {x:g} y {y:g}"
+
+
+def _place_of(model: RobotModel, prefix: str) -> str:
+    """The place of a robot on the wire: its prefix, or else the namespace in its file."""
+    return prefix or command_key(model, prefix).rpartition("/")[0]
 
 
 def has_keys(model: RobotModel) -> bool:

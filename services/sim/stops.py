@@ -1,75 +1,91 @@
-"""The software stops in a file, so that they outlast the sim: one that is started again has its robots stopped too."""
+"""The software stops in files, so that they outlast the sim: one that is started again has its robots stopped too."""
 
-import json
 import os
 import re
 import stat
 import zlib
-from collections.abc import Mapping
 from pathlib import Path
+from urllib.parse import quote
 
 from holozen.console import report
 from holozen.suggest import cut
 
-ALL = "*"  # in the place of a robot's prefix: every robot that is not known
-UNREADABLE = "this sim, which could not read who was"
-MOST_BYTES = 1_000_000
+UNREADABLE = "this sim, which could not read who did"
+MOST_BYTES = 1000
 
 
-class StopFile:
-    """Who stopped which robot of one sim. In a `folder` each network (`where`) and each node of it has its own file.
+class StopFiles:
+    """Who stopped which robot: in a `folder` each network (`where`) has a folder of its own, and there each robot that
+    is stopped has a file, by whichever sim.
 
     It is written before a stop is confirmed, but not synced: it outlasts the sim, however that ends, and after a loss
     of power it may lack the last seconds.
     """
 
-    def __init__(self, folder: Path, where: str, node: str) -> None:
-        self.path = folder / f"{_plain(where)}-{zlib.crc32(where.encode()):08x}-{_plain(node)}.json"
-        self._last: Mapping[str, str] | None = {}  # what it holds; None after an error
+    def __init__(self, folder: Path, where: str) -> None:
+        plain = re.sub(r"[^A-Za-z0-9.]+", "_", where)[:60]
+        self._folder = folder / f"{plain}-{zlib.crc32(where.encode()):08x}"
+        self._last: dict[str, str] = {}  # what the files of robots hold, where that is known
         self._is_reported = False
 
-    def read(self) -> dict[str, str]:
-        """The prefix of each stopped robot -> who stopped it; empty without a file, ALL for one that cannot be read."""
-        try:
-            self._last = found = _stops_in(self.path)
-            return dict(found)
-        except FileNotFoundError:
-            return {}
-        except (OSError, ValueError, RecursionError) as error:
-            why = error.strerror if isinstance(error, OSError) else "it is damaged"
-            report(f"sim: {self.path}: {why}, so every robot is stopped until `holozen release`")
-            self._last = None
-            return {ALL: UNREADABLE}
+    def path(self, robot: str) -> Path:
+        """The file of a robot; `robot` is empty for that at the root."""
+        return self._folder / f"{quote(robot, safe='') or '@'}.stop"
 
-    def write(self, stops: Mapping[str, str]) -> None:
-        """Replace what it holds. An error is reported once: the sim has the stops all the same."""
-        if stops == self._last:
-            return
-        new = self.path.with_suffix(".new")
+    def read(self, robot: str) -> str:
+        """Who stopped a robot; empty without a file. Whatever else is in its place stops it too."""
+        path = self.path(robot)
+        self._last.pop(robot, None)
         try:
-            self.path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
-            new.unlink(missing_ok=True)
-            with open(new, "xb", opener=lambda path, flags: os.open(path, flags, 0o600)) as file:
-                file.write(json.dumps(stops).encode())
-            new.replace(self.path)
-            self._last, self._is_reported = dict(stops), False
+            by = self._last[robot] = _setter_in(path)
+            return by if by.isprintable() and len(by) < 100 else cut(by)
+        except FileNotFoundError:
+            self._last[robot] = ""
+            return ""
+        except (OSError, ValueError) as error:
+            why = error.strerror if isinstance(error, OSError) else "it is damaged"
+            report(f"sim: {path}: {why}, so {robot or 'the robot'} is stopped until `holozen release`")
+            return UNREADABLE
+
+    def write(self, robot: str, by: str) -> None:
+        """Keep who stopped a robot; empty: no one. An error is reported once: the sim has the stops all the same."""
+        if self._last.get(robot) == by:
+            return
+        path = self.path(robot)
+        self._last.pop(robot, None)
+        try:
+            if by:
+                _replace(path, by)
+            else:
+                path.unlink(missing_ok=True)
+            self._last[robot], self._is_reported = by, False
         except OSError as error:
-            self._last = None
             if not self._is_reported:
-                report(f"sim: {self.path}: {error.strerror}: stops hold, but not beyond the end of this sim")
+                kept = "stops hold, but not beyond the end of this sim" if by else "the next sim has the robot stopped"
+                report(f"sim: {path}: {error.strerror}: {kept}")
             self._is_reported = True
 
+    def forget(self, robot: str) -> None:
+        """Free the memory of a robot that is gone; its file stays."""
+        self._last.pop(robot, None)
 
-def _stops_in(path: Path) -> dict[str, str]:
-    """Raises OSError, ValueError or RecursionError."""
+
+def _replace(path: Path, text: str) -> None:
+    """Raises OSError."""
+    new = path.with_suffix(".new")
+    path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    new.unlink(missing_ok=True)
+    with open(new, "xb", opener=lambda path, flags: os.open(path, flags, 0o600)) as file:
+        file.write(text.encode(errors="replace"))
+    new.replace(path)
+
+
+def _setter_in(path: Path) -> str:
+    """Raises OSError or ValueError."""
     with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise ValueError
-        data = json.loads(file.read(MOST_BYTES))
-    if not isinstance(data, dict) or not all(isinstance(by, str) and by for by in data.values()):
+        text = file.read(MOST_BYTES).decode()
+    if not text:
         raise ValueError
-    return {prefix: by if by.isprintable() and len(by) < 100 else cut(by) for prefix, by in data.items()}
-
-
-def _plain(text: str) -> str:
-    return re.sub(r"[^A-Za-z0-9.]+", "_", text)[:60]
+    return text

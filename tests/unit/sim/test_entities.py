@@ -40,7 +40,7 @@ from services.sim.loop import Loop
 from services.sim.physics.engine import UPRIGHT, bullet
 from services.sim.physics.planar import PlanarBody
 from services.sim.physics.world import World
-from services.sim.stops import StopFile
+from services.sim.stops import StopFiles
 
 REPO = Path(__file__).parents[3]
 HB_BOT = expand(REPO / "urdf" / "hb_bot.urdf.xacro")
@@ -502,13 +502,13 @@ def test_a_robot_that_lives_is_remembered_however_many_come_after_it(
     town: Town, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(entities_module, "MAX_ENTITIES", 2)
-    town.entities.restore_stops(StopFile(tmp_path, "here", "sim"))
+    town.entities.keep_stops_in(StopFiles(tmp_path, "here"))
     town.spawn("Fred")
     for name in ("Ann", "Bob", "Eve"):
         town.spawn(name, x=5.0)
         town.services.delete(si.DeleteEntityRequest(name))
     town.entities.stop("ann@1")
-    assert StopFile(tmp_path, "here", "sim").read() == {"Fred": "ann@1"}
+    assert StopFiles(tmp_path, "here").read("Fred") == "ann@1"
 
 
 def test_an_arm_can_be_stopped_too(town: Town, capsys: pytest.CaptureFixture[str]) -> None:
