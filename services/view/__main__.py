@@ -128,7 +128,7 @@ def _serve(host: str, port: int, guard: "Guard") -> "viser.ViserServer":
     return server
 
 
-def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", looks: bool, stop: threading.Event) -> None:
+def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", look_only: bool, stop: threading.Event) -> None:
     import asyncio
 
     from .drive import Drivers
@@ -142,7 +142,7 @@ def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", looks: bool, st
 
     # All that writes to pages runs in the server's event loop: from other threads viser's buffers are not safe.
     async def opened(client: "viser.ClientHandle") -> None:
-        pages[client.client_id] = Page(client, bus, scene, drivers, guard, looks)
+        pages[client.client_id] = Page(client, bus, scene, drivers, guard, look_only)
 
     async def closed(client: "viser.ClientHandle") -> None:
         drivers.close(client.client_id)
@@ -152,6 +152,7 @@ def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", looks: bool, st
         scene.draw(now, news, {page.robot: driver for page in pages.values() if (driver := page.driver)})
         for page in pages.values():
             page.update(now)
+        drivers.keep([page.driver for page in pages.values()])
 
     server.on_client_connect(opened)
     server.on_client_disconnect(closed)

@@ -3,16 +3,16 @@
 import math
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import cached_property
 from typing import TypeVar
 
 from holozen.bus import Bus, Publisher
 from holozen.limits import Planar
-from holozen.messages import CommandStatus, Header, Point, Pose, PoseStamped, SceneEntity, Twist
+from holozen.messages import CommandStatus, Header, Odometry, Point, Pose, PoseStamped, SceneEntity, Twist
 from holozen.odometry import OdometryFeedback
 from holozen.rotation import Transform
-from holozen.wire import COMMAND_SILENCE, PRIORITY_OF, key_for
+from holozen.wire import PRIORITY_OF, key_for
 
 from .pad import Pad
 
@@ -64,6 +64,21 @@ class Driver:
             self._sent = motion
             return motion is not None
 
+    def is_used(self) -> bool:
+        """Whether its pad is held, or stops."""
+        return self.use(lambda pad, now: pad.command(now, False)) is not None
+
+    def close(self) -> None:
+        """Stop listening to it, and being its publisher."""
+        made = (vars(self).get(name) for name in ("_commands", "_goals"))
+        for end in (self._odom, self._status, *filter(None, made)):
+            end.close()
+
+    def _current(self) -> Odometry | None:
+        """Its odometry, unless that is stale."""
+        odom, age = self._odom.read()
+        return None if age > self._odom.stale_after else odom
+
     def status(self) -> CommandStatus:
         """The sim's last command status; empty if it is outdated."""
         status, age = self._status.read()
@@ -71,8 +86,8 @@ class Driver:
 
     def measured(self) -> Planar | None:
         """Its measured velocity in m/s and rad/s, in the body frame; None if not known."""
-        odom, age = self._odom.read()
-        if odom is None or age > COMMAND_SILENCE:
+        odom = self._current()
+        if odom is None:
             return None
         twist = odom.twist.twist
         return twist.linear.x, twist.linear.y, twist.angular.z
@@ -85,8 +100,8 @@ class Driver:
         """Ask its controller to drive to a point of the world, in m; the robot keeps its heading. Returns what came of
         it. `true_pose` is the robot's in the world, now.
         """
-        odom, age = self._odom.read()
-        if odom is None or age > COMMAND_SILENCE:
+        odom = self._current()
+        if odom is None:
             return "it has no odometry now"
         if not self._goals.matched:
             return f"no controller is there for it; start one: holozen controller {self.namespace} --laps 0"
@@ -97,7 +112,7 @@ class Driver:
 
 
 class Drivers:
-    """The drivers of all robots that were chosen in a page, and the thread that publishes for them."""
+    """The drivers of all robots that are chosen in a page, and the thread that publishes for them."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus, self._stop = bus, threading.Event()
@@ -113,6 +128,14 @@ class Drivers:
             if keys not in self._all:
                 self._all[keys] = Driver(self._bus, *keys)
             return self._all[keys]
+
+    def keep(self, chosen: Collection[Driver | None]) -> None:
+        """Drop the others, once their pads are at rest."""
+        with self._lock:
+            unused = [keys for keys, one in self._all.items() if one not in chosen and not one.is_used()]
+            dropped = [self._all.pop(keys) for keys in unused]
+        for driver in dropped:
+            driver.close()
 
     def close(self, page: int) -> None:
         """A page is gone: what it drives stops."""

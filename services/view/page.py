@@ -30,10 +30,10 @@ SLOW_LINK = "the link to this page is too slow to drive"
 
 
 class Page:
-    """What one browser shows beside the scene. With `looks` it has nothing that changes the world."""
+    """What one browser shows beside the scene. With `look_only` it has nothing that changes the world."""
 
     def __init__(
-        self, client: viser.ClientHandle, bus: Bus, scene: Scene, drivers: Drivers, guard: Guard, looks: bool
+        self, client: viser.ClientHandle, bus: Bus, scene: Scene, drivers: Drivers, guard: Guard, look_only: bool
     ) -> None:
         self._client, self._bus, self._scene, self._drivers, self._guard = client, bus, scene, drivers, guard
         self._names: list[str] = []
@@ -48,7 +48,7 @@ class Page:
         self._choice = add.add_dropdown("Robot", (NONE,))
         self._choice.on_update(lambda _: self._choose())
         self._status = add.add_markdown("")
-        if looks:
+        if look_only:
             self._add_camera()
         else:
             self._add_pad()
@@ -150,6 +150,7 @@ class Page:
             self._let_go(button)
             for driver in self._driven:
                 driver.use(lambda pad, now, button=button: pad.renew(page, button))  # type: ignore[misc]
+        self._driven = {driver for driver in self._driven if driver is self.driver}
 
     async def _on_hold(self, button: str, _event: Any) -> None:
         shown = self._shown_robot()

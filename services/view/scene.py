@@ -112,11 +112,11 @@ class Shown:
             self._odom.close()
 
     def _add_links(self, text: str) -> None:
-        looks, parts = appearance(text)
-        joint_of = {joint.child: joint for joint in looks.joints}
-        numbers = {link.name: number for number, link in enumerate(looks.links)}  # names may hold a slash
+        model, parts = appearance(text)
+        joint_of = {joint.child: joint for joint in model.joints}
+        numbers = {link.name: number for number, link in enumerate(model.links)}  # names may hold a slash
         paths: dict[str, str] = {}
-        waiting = [link.name for link in looks.links if link.name not in joint_of]
+        waiting = [link.name for link in model.links if link.name not in joint_of]
         for name in waiting:
             joint = joint_of.get(name)
             paths[name] = f"{paths[joint.parent] if joint else self.root}/{numbers[name]}"
@@ -125,7 +125,7 @@ class Shown:
             if joint and joint.kind in JOINTS:
                 self._joints[joint.name] = joint, frame, turned
             self._add_parts(paths[name], parts[numbers[name]])
-            waiting += [other.child for other in looks.joints if other.parent == name and other.child in numbers]
+            waiting += [other.child for other in model.joints if other.parent == name and other.child in numbers]
 
     def _add_parts(self, path: str, parts: Parts) -> None:
         for number, (pose, part) in enumerate(parts):
@@ -166,7 +166,7 @@ class News(NamedTuple):
 
     there: dict[str, SceneEntity]
     answered: list[SceneEntity]
-    looks: dict[str, RobotDescriptionReply]
+    appearances: dict[str, RobotDescriptionReply]
 
 
 class Scene:
@@ -195,8 +195,8 @@ class Scene:
         entities = [one.entity for one in self.shown.values() if one.entity.number] if answered is None else answered
         there = {entity.name: entity for entity in [*self._others(entities), *entities]}
         new = [entity for name, entity in there.items() if not self._has(entity)]
-        looks = {entity.name: found for entity in new if (found := self._description(entity)) is not None}
-        return News(there, answered or [], looks)
+        appearances = {entity.name: found for entity in new if (found := self._description(entity)) is not None}
+        return News(there, answered or [], appearances)
 
     def draw(self, now: float, news: News, watched: Mapping[str, Driver]) -> None:
         """Show what is there at `now` (s, monotonic); of the robots that are `watched`, by name, also how they move.
@@ -281,7 +281,7 @@ class Scene:
             if name not in news.there or news.there[name].number != shown.entity.number:
                 shown.close()
                 del self.shown[name]
-        for name, found in news.looks.items():
+        for name, found in news.appearances.items():
             self.shown[name] = Shown(self._server, self._bus, news.there[name], found.description, found.joints)
 
     def _description(self, entity: SceneEntity) -> RobotDescriptionReply | None:

@@ -1,0 +1,45 @@
+"""What drives a robot: it believes no stale odometry, and goes when no page has the robot any more."""
+
+from typing import Any
+from unittest.mock import MagicMock
+
+import pytest
+
+from holozen.messages import Odometry, Point, Pose, SceneEntity
+from services.view import drive
+from services.view.drive import Driver, Drivers
+
+STALE_AFTER = 0.2
+
+
+def feedback(age: float) -> Any:
+    """Odometry of that age, in s."""
+    made = MagicMock(is_lost=False, stale_after=STALE_AFTER)
+    made.read.return_value = (Odometry(), age)
+    return made
+
+
+def test_stale_odometry_gives_no_velocity_and_takes_no_goal(monkeypatch: pytest.MonkeyPatch) -> None:
+    nobody = MagicMock(matched=False)
+    for age, is_current in ((STALE_AFTER - 0.1, True), (STALE_AFTER + 0.1, False)):
+        monkeypatch.setattr(drive, "OdometryFeedback", lambda *_, age=age: feedback(age))
+        driver = Driver(MagicMock(publisher=lambda *_: nobody), "cmd_vel", "odom")
+        assert (driver.measured() is not None) == is_current
+        assert (driver.send_to(1.0, 0.0, Pose(Point())) == "it has no odometry now") != is_current
+
+
+def test_a_driver_goes_when_no_page_has_its_robot_and_its_pad_rests(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(drive, "OdometryFeedback", lambda *_: feedback(0.0))
+    drivers = Drivers(MagicMock(latest=lambda *_: MagicMock()))
+    one, other = (SceneEntity(name, command=f"{name}/cmd_vel") for name in ("one", "other"))
+    kept, dropped = drivers.of(one), drivers.of(other)
+    dropped.use(lambda pad, now: pad.hold(1, "forward", now + 1e6))
+    drivers.keep([kept, None])
+    assert drivers.of(other) is dropped, "it is held"
+    dropped.use(lambda pad, now: pad.close(1, now - 1e6))
+    drivers.keep([kept, None])
+    assert drivers.of(one) is kept
+    assert drivers.of(other) is not dropped
+    dropped._odom.close.assert_called_once()  # type: ignore[attr-defined]
+    dropped._status.close.assert_called_once()  # type: ignore[attr-defined]
+    drivers.halt()
