@@ -29,8 +29,9 @@ def test_stale_odometry_gives_no_velocity_and_takes_no_goal(monkeypatch: pytest.
 
 
 def test_a_driver_goes_when_no_page_has_its_robot_and_its_pad_rests(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(drive, "OdometryFeedback", lambda *_: feedback(0.0))
-    drivers = Drivers(MagicMock(latest=lambda *_: MagicMock()))
+    odom = {f"{name}/odom": feedback(0.0) for name in ("one", "other")}
+    monkeypatch.setattr(drive, "OdometryFeedback", lambda _, key: odom[key])
+    drivers = Drivers(MagicMock())
     one, other = (SceneEntity(name, command=f"{name}/cmd_vel") for name in ("one", "other"))
     kept, dropped = drivers.of(one), drivers.of(other)
     dropped.use(lambda pad, now: pad.hold(1, "forward", now + 1e6))
@@ -40,6 +41,6 @@ def test_a_driver_goes_when_no_page_has_its_robot_and_its_pad_rests(monkeypatch:
     drivers.keep([kept, None])
     assert drivers.of(one) is kept
     assert drivers.of(other) is not dropped
-    dropped._odom.close.assert_called_once()  # type: ignore[attr-defined]
-    dropped._status.close.assert_called_once()  # type: ignore[attr-defined]
+    odom["other/odom"].close.assert_called_once()
+    odom["one/odom"].close.assert_not_called()
     drivers.halt()
