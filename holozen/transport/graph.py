@@ -92,8 +92,8 @@ class Graph:
     `change` returns the next token's key and whether it exists now, or None without news. `roll_call` returns when all
     nodes that are connected by now have sent their tokens, or False after waiting for long; `met` returns their
     sessions. `ask_peers` asks the holders of rendezvous points for the sessions that they are linked to; what it
-    returns reads those, None while no holder has answered. `undeclare` ends the subscription. `took`: the seconds that
-    the first link took. Use it in `with`, or keep it until the bus is closed.
+    returns reads those: None before an answer, an empty set if no holder answers. `undeclare` ends the subscription.
+    `took`: the seconds that the first link took. Use it in `with`, or keep it until the bus is closed.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class Graph:
         change: Callable[[], tuple[str, bool] | None],
         roll_call: Callable[[], bool] = lambda: True,
         met: Callable[[], Iterable[str]] = tuple,
-        ask_peers: Callable[[], Callable[[], set[str] | None]] = lambda: lambda: None,
+        ask_peers: Callable[[], Callable[[], set[str] | None]] = lambda: set,
         undeclare: Callable[[], object] = lambda: None,
         took: float = 0.0,
     ) -> None:
@@ -150,10 +150,10 @@ class Graph:
         """The endpoints once there is a link and all nodes have sent theirs; at most `patience` seconds after the last
         change.
 
-        All are there when each session that a rendezvous point's holder is linked to has sent its tokens. Where no
-        holder answers, once nothing has changed for `quiet` seconds, or twice the time that the first link or the last
-        change took, since peers introduce further peers. A peer without tokens may be foreign, or about to send some:
-        it is waited for longer.
+        All are there when each session that a rendezvous point's holder is linked to has sent its tokens; those are
+        waited for. Where no holder answers, once nothing has changed for `quiet` seconds, or twice the time that the
+        first link or the last change took, since peers introduce further peers. A peer without tokens may be foreign,
+        or about to send some: it is waited for longer.
         """
         start = time.monotonic()
         while not connected():
@@ -168,15 +168,16 @@ class Graph:
         deadline = since + patience if seen else deadline  # more may be on its way from a slow node
         while (now := time.monotonic()) < deadline:
             passed, enough = now - since, max(quiet, 2 * self._took, 2 * (since - start))
-            if self._tokens and passed > SILENT_FACTOR * enough:
-                break
             listed = peers()
-            if self._tokens and (listed is not None or passed > enough) and self._have_announced(listed or ()):
-                if listed is None:
+            if self._tokens and listed is not None and listed <= self._sessions.keys():
+                if passed > SILENT_FACTOR * enough:
                     break
-                # A session's first token may have come before its others.
-                if self._roll_call() and self._have_announced(peers() or ()):
-                    break
+                if self._have_announced(()):
+                    # A session's first token may have come before its others.
+                    if listed and self._roll_call() and self._have_announced(peers() or ()):
+                        break
+                    if not listed and passed > enough:
+                        break
             time.sleep(0.001)
             self._update()
             if self.changes != seen:

@@ -216,7 +216,7 @@ class Node:
             partial(_token_change, tokens),
             roll_call,
             lambda: map(str, self.session.info.peers_zid() if keys == graphs.ALL else ()),
-            self._ask_peers if keys == graphs.ALL else lambda: lambda: None,
+            self._ask_peers if keys == graphs.ALL else lambda: set,
             partial(_undeclare, tokens),
             self.took,
         )
@@ -224,15 +224,17 @@ class Node:
     def _ask_peers(self) -> Callable[[], set[str] | None]:
         """See Graph. Who meets others at a router sees through that all there is."""
         if self.session.info.routers_zid():
-            return lambda: None
+            return set
         replies = self.ask_all(graphs.ALL_PEERS, ROLL_CALL)
         found: set[str] = set()
 
         def read() -> set[str] | None:
-            with contextlib.suppress(BusError):  # all have answered
+            try:
                 while reply := replies.try_recv():
                     if not isinstance(reply, bytes):
                         found.update(reply.payload.decode(errors="replace").split())
+            except BusError:  # all have answered
+                return found - {self.id}
             return found - {self.id} if found else None
 
         return read

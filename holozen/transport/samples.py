@@ -12,7 +12,7 @@ from holozen.transport.errors import BusError
 
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
-TRIM_AFTER = 1.0  # s
+TRIM_AFTER = (1.0, 2.0, 4.0)  # s
 PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
 """Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
 
@@ -60,7 +60,7 @@ def _stamp_in(attachment: Any) -> Stamp | None:
 
 
 def release_memory() -> None:
-    """Return the memory of a refused payload to the system, in a second: the C library would keep it.
+    """Return the memory of a refused payload to the system, in seconds: the C library would keep it.
 
     It came in fragments, some of which lie between memory in use.
     """
@@ -76,7 +76,7 @@ _trimmer: threading.Thread | None = None
 
 
 def _trim() -> None:
-    """Trim a second after each refusal, those during a trim included; at most once a second."""
+    """Trim after each refusal, those during a trim included; again later, since parts of it may have been in use."""
     import ctypes
 
     try:
@@ -86,8 +86,9 @@ def _trim() -> None:
     while True:
         _refused.wait()
         _refused.clear()
-        time.sleep(TRIM_AFTER)
-        trim(0)
+        for pause in TRIM_AFTER:
+            time.sleep(pause)
+            trim(0)
 
 
 class Sample:

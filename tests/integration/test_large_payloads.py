@@ -59,7 +59,7 @@ def test_a_sim_that_got_payloads_of_100_mb_counts_them_and_is_as_small_as_before
             return any(each.refused.get("oversized", 0) >= wanted for each in status.messages())
 
         wait_for(is_counted, 30)
-    wait_for(lambda: memory(sim) < before + NEAR, 10, lambda: f"{before} bytes; it has {memory(sim)}")
+    wait_for(lambda: memory(sim) < before + NEAR, what=lambda: f"{before} bytes; it has {memory(sim)}")
     assert driver.session.info.peers_zid() == links
 
     def moves() -> bool:
@@ -84,4 +84,4 @@ def test_a_request_of_100_mb_is_refused_and_takes_no_memory(sim: Process, foreig
     (reply,) = foreign.ask("spawn_entity", 30.0, payload=zenoh.ZBytes(bytes(LARGE)))
     assert not isinstance(reply, Sample)
     assert str(refusal(reply)) == f"request of {LARGE} bytes; at most {MAX_REQUEST_BYTES} are read"
-    wait_for(lambda: memory(sim) < before + NEAR, 10, lambda: f"{before} bytes; it has {memory(sim)}")
+    wait_for(lambda: memory(sim) < before + NEAR, what=lambda: f"{before} bytes; it has {memory(sim)}")

@@ -158,9 +158,10 @@ def test_a_peer_that_has_declared_nothing_yet_is_waited_for_longer() -> None:
 
 
 def test_a_session_that_a_rendezvous_point_lists_is_waited_for_and_then_nothing() -> None:
-    """It is met long after the others have been quiet for long enough. Its first token comes before the others."""
+    """It is met after the others have been quiet for longer than a silent peer is waited for. Its first token comes
+    before the others."""
     late = ODOM._replace(session="b2", node="late")
-    looks = iter([*[None] * 30, (token(late._replace(kind="node", key="", type="")), True)])
+    looks = iter([*[None] * 200, (token(late._replace(kind="node", key="", type="")), True)])
     calls = iter([None, (token(late), True)])  # the second brings what was under way
     changes = deque([(token(ODOM), True)])
 
