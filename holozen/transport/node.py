@@ -30,7 +30,7 @@ D = TypeVar("D", bound=Declared)
 
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
 MOST_TOKENS = 1 << 16  # that wait
-DEFINITION_WAIT = 0.5  # s for a node to answer
+DEFINITION_WAIT = 2.0  # s for a node to answer; a busy one takes long, and without one nothing is waited for
 
 
 class Node:
