@@ -30,7 +30,8 @@ D = TypeVar("D", bound=Declared)
 
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
 MOST_TOKENS = 1 << 16  # that wait
-DEFINITION_WAIT = 2.0  # s for a node to answer; a busy one takes long, and without one nothing is waited for
+DEFINITION_WAIT = 0.5  # s for a node to be found that answers
+DEFINITION_TIMEOUT = 2.0  # s for its answer
 
 
 class Node:
@@ -194,10 +195,14 @@ class Node:
         """The definition of a type and of those nested in it, from a node that publishes it; empty without one."""
         if not re.fullmatch(r"\w+/(?:msg|srv)/\w+", type_name):
             return ""
-        for reply in self.ask_all(graphs.definition_key("*", type_name), DEFINITION_WAIT):
-            if not isinstance(reply, bytes):
-                return reply.payload.decode(errors="replace")
-        return ""
+        deadline = time.monotonic() + DEFINITION_WAIT
+        while True:  # on a new link its tokens may be known before what it answers
+            for reply in self.ask_all(graphs.definition_key("*", type_name), DEFINITION_TIMEOUT):
+                if not isinstance(reply, bytes):
+                    return reply.payload.decode(errors="replace")
+            if time.monotonic() > deadline:
+                return ""
+            time.sleep(0.01)
 
     def graph(self, keys: str = graphs.ALL) -> Graph:
         """The endpoints of all nodes, or those with tokens that match `keys`, kept up to date."""
