@@ -28,7 +28,11 @@ WANTED = {"cells": [{"volts": 3.5, "state": 1}], "maker": "here", "on": [False, 
 
 @pytest.fixture(params=["json", "cdr"])
 def battery(request: pytest.FixtureRequest, wire: Wire, tmp_path: Path) -> Process:
-    """A process that publishes a type of a package that lies where no one else looks."""
+    """A process that publishes a type of a package that lies where no one else looks.
+
+    Another one holds the meeting point: else the first verb might, which leaves it a moment later.
+    """
+    wire.bus("holder", lasting=True)
     for name, text in PACKAGE.items():
         path = tmp_path / "package" / name
         path.parent.mkdir(parents=True, exist_ok=True)
