@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections.abc import Callable, Iterator
+from functools import cache
 from itertools import count
 from typing import Any, NamedTuple
 
@@ -13,6 +14,7 @@ from holozen.transport.errors import BusError
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
 TRIM_AFTER = (1.0, 2.0, 4.0)  # s
+M_TRIM_THRESHOLD = -1  # mallopt(3)
 PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
 """Zenoh's priorities, the strongest first; Zenoh counts them from 1."""
 
@@ -60,11 +62,12 @@ def _stamp_in(attachment: Any) -> Stamp | None:
 
 
 def release_memory() -> None:
-    """Return the memory of a refused payload to the system, in seconds: the C library would keep it.
+    """Return the memory of a refused payload to the system, now and in the next seconds: the C library would keep it.
 
-    It came in fragments, some of which lie between memory in use.
+    It came in fragments, some of which lie between memory in use. Call it before the payload is freed.
     """
     global _trimmer
+    _keep_little()
     _refused.set()
     if _trimmer is None or not _trimmer.is_alive():  # none, or a forked process, which has no threads
         _trimmer = threading.Thread(target=_trim, name="trim", daemon=True)
@@ -75,20 +78,33 @@ _refused = threading.Event()
 _trimmer: threading.Thread | None = None
 
 
-def _trim() -> None:
-    """Trim after each refusal, those during a trim included; again later, since parts of it may have been in use."""
+@cache
+def _c_library() -> Any:
+    """The C library, if it is glibc, whose functions these are; else None."""
     import ctypes
 
-    try:
-        trim = ctypes.CDLL(None).malloc_trim
-    except (OSError, AttributeError):  # not in every C library
-        return
-    while True:
+    library = ctypes.CDLL(None)
+    return library if hasattr(library, "malloc_trim") and hasattr(library, "mallopt") else None
+
+
+@cache
+def _keep_little() -> None:
+    """Let each heap return what is free at its end.
+
+    glibc keeps twice the largest block that it ever freed there, up to 64 MB; `malloc_trim` shortens only the first heap.
+    """
+    if library := _c_library():
+        library.mallopt(M_TRIM_THRESHOLD, LARGE)
+
+
+def _trim() -> None:
+    """Trim after each refusal, those during a trim included; again later, since parts of it may have been in use."""
+    while library := _c_library():
         _refused.wait()
         _refused.clear()
         for pause in TRIM_AFTER:
             time.sleep(pause)
-            trim(0)
+            library.malloc_trim(0)
 
 
 class Sample:
