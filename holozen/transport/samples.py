@@ -91,7 +91,8 @@ def _c_library() -> Any:
 def _keep_little() -> None:
     """Let each heap return what is free at its end.
 
-    glibc keeps twice the largest block that it ever freed there, up to 64 MB; `malloc_trim` shortens only the first heap.
+    There glibc keeps up to twice the largest block ever freed, at most 64 MB.
+    `malloc_trim` shortens only the first heap.
     """
     if library := _c_library():
         library.mallopt(M_TRIM_THRESHOLD, LARGE)
