@@ -27,6 +27,7 @@ from cryptography.hazmat.primitives.serialization import (
 )
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
+from holozen.console import Failure
 from holozen.transport.members import AUTHORITY, CERTIFICATE, KEY, MEMBERS
 from holozen.transport.roles import ROLES, ROUTER
 
@@ -37,8 +38,8 @@ HERE = ("localhost", "127.0.0.1", "::1")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 
 
-class AuthorityError(Exception):
-    """What cannot be done, in one line."""
+class AuthorityError(Failure):
+    """What cannot be done with the certificates."""
 
 
 def initialize(root: Path, hosts: Sequence[str], days: int) -> None:

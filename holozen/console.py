@@ -25,6 +25,10 @@ SIZE = (80, 24)
 _BEGIN, _END = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"  # a screen of its own without a cursor, and back
 
 
+class Failure(Exception):
+    """What was asked for cannot be done. One line, for a person: what was given, where, what is allowed, what to do."""
+
+
 def printable(text: str) -> str:
     """`text` with `?` for control characters: parts of it come over the wire."""
     return text if text.isprintable() else "".join(c if c.isprintable() else "?" for c in text)

@@ -133,6 +133,41 @@ def package(text: str) -> tuple[str, Path]:
     return name, path
 
 
+def add_packages(parser: argparse.ArgumentParser, use: str = "whose msg and srv files define its types") -> None:
+    """Add the flag `--package`; `use`: what its folder is for."""
+    parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR",
+        help=f"the folder of package NAME, {use}")  # fmt: skip
+
+
+def add_robot_sources(parser: argparse.ArgumentParser) -> None:
+    """Add the flags `--package` and `--allow-env`, for what reads the files of robots."""
+    add_packages(parser, "for $(find NAME) and package://NAME")
+    parser.add_argument("--allow-env", type=variable, action="append", default=[], metavar="NAME",
+        help="let a file read this environment variable, as $(env NAME)")  # fmt: skip
+
+
+def pair(text: str) -> tuple[str, str]:
+    """Parses name:=value."""
+    name, assign, value = (part.strip() for part in text.partition(":="))
+    if not assign or not name:
+        raise refused(f"{text!r}: write name:=value")
+    return name, value
+
+
+def path(text: str) -> Path:
+    """Parses a path; a verb loads pathlib when it has one."""
+    from pathlib import Path
+
+    return Path(text)
+
+
+def file(text: str) -> Path:
+    """Parses the path of a file that exists."""
+    if not (found := path(text)).is_file():
+        raise refused(f"{text!r}: there is no such file")
+    return found
+
+
 def variable(text: str) -> str:
     """Parses the name of an environment variable."""
     if not text or "=" in text:

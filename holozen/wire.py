@@ -142,7 +142,7 @@ OF_NODES = (
 
 
 def table() -> str:
-    """The table as Markdown, for docs/wire.md (`scripts/wire-table` puts it there)."""
+    """The table as Markdown, for docs/wire.md (`scripts/tables` puts it there)."""
     topics = [_topic_row(row) for row in TOPICS]
     services = [f"| `{row.key}` | {row.reply.ROS} | {row.server} | {row.does} |" for row in SERVICES]
     heads = ("| key | type | writers -> readers | rate | silence rule |", "| service | type | server | what it does |")

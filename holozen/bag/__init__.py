@@ -2,11 +2,13 @@
 
 from typing import NamedTuple
 
+from holozen.console import Failure
+
 ENCODING = "zenoh_encoding"
 """The key in a channel's metadata that holds the Zenoh Encoding."""
 
 
-class BagError(Exception):
+class BagError(Failure):
     """A file that cannot be read, or cannot be written any further. The text is one line with the reason."""
 
 

@@ -163,12 +163,11 @@ def _main(words: list[str]) -> int:
 
 
 def _run(verb: str, words: list[str]) -> int:
-    from holozen.console import report
-    from holozen.transport.errors import BusError
+    from holozen.console import Failure, report
 
     try:
         return int(command(verb).main(words))
-    except BusError as error:
+    except Failure as error:
         report(f"holozen {' '.join([verb, *words[: verb in NOUNS]])}: {error}")
         return 1
     except ModuleNotFoundError as error:  # optional libraries are imported where they are used

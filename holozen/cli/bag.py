@@ -1,70 +1,19 @@
-"""`holozen bag`: info and plot; record and play, as ROS 2 names them."""
+"""`holozen bag`: info and plot; record and play, as ROS 2 names `holozen record` and `holozen replay`."""
 
 import argparse
 import json
-from typing import TYPE_CHECKING
 
-from holozen import cli
-from holozen.console import printable, report
-from holozen.flags import Parser
-
-if TYPE_CHECKING:
-    from pathlib import Path
-
-VERBS = {"record": "record", "play": "replay"}  # the same as `holozen record` and `holozen replay`
-EXAMPLES = {"record": "record odom cmd_vel -o square", "play": "play square.mcap -r 2"}
-
-
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="holozen bag", description="Record, play and inspect bags: MCAP files of messages.")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
-    help_line = "what is in a bag: counts, missing messages, rates"
-    add = verbs.add_parser(
-        "info", help=help_line, description=help_line, epilog="example: holozen bag info square.mcap"
-    )
-    add.add_argument("files", nargs="+", type=_file, metavar="FILE")
-    add.add_argument("--json", action="store_true", help="one JSON object per file and line")
-    help_line = "draw the paths and velocities of a bag's robots"
-    add = verbs.add_parser(
-        "plot", help=help_line, description=help_line, epilog="example: holozen bag plot square.mcap -o square.svg"
-    )
-    add.add_argument("file", type=_file, metavar="FILE")
-    add.add_argument("-o", "--output", type=_file, metavar="PICTURE", help=".png or .svg (default: FILE with .png)")
-    add.add_argument("--topics", nargs="+", metavar="KEY", help="only these keys of odometry")
-    add.add_argument("--json", action="store_true", help="what was drawn, as one JSON object")
-    for name, verb in VERBS.items():
-        same = f"the same as `holozen {verb}`"
-        verbs.add_parser(name, help=same, description=same, epilog=f"example: holozen bag {EXAMPLES[name]}",
-            parents=[cli.command(verb).parser()], add_help=False)  # fmt: skip
-    return parser
-
-
-def _file(text: str) -> "Path":
-    from pathlib import Path
-
-    return Path(text)
-
-
-def main(argv: list[str]) -> int:
-    if argv and argv[0] in VERBS:
-        code: int = cli.command(VERBS[argv[0]]).main(argv[1:])
-        return code
-    args = parser().parse_args(argv)
-    from holozen.bag import BagError
-
-    try:
-        return {"info": info, "plot": plot}[args.verb](args)
-    except BagError as error:
-        report(f"holozen bag {args.verb}: {error}")
-        return 1
+from holozen.cli.verb import Noun, Verb, by_name
+from holozen.console import printable
+from holozen.flags import path
 
 
 def info(args: argparse.Namespace) -> int:
     """Print what is in each file."""
     from holozen.bag.reader import Bag, summarize
 
-    for path in args.files:
-        with Bag(path) as bag:
+    for file in args.files:
+        with Bag(file) as bag:
             summary = summarize(bag)
         if args.json:
             print(json.dumps(summary.figures()), flush=True)
@@ -84,3 +33,24 @@ def plot(args: argparse.Namespace) -> int:
     else:
         print(printable(f"{target}: {', '.join(f'{key} ({count} messages)' for key, count in drawn.items())}"))
     return 0
+
+
+def _info_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("files", nargs="+", type=path, metavar="FILE")
+
+
+def _plot_arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("file", type=path, metavar="FILE")
+    add("-o", "--output", type=path, metavar="PICTURE", help=".png or .svg (default: FILE with .png)")
+    add("--topics", nargs="+", metavar="KEY", help="only these keys of odometry")
+
+
+VERBS = by_name(
+    Noun("bag", "Record, play and inspect bags: MCAP files of messages.",
+        {"info": "bag", "plot": "bag", "record": "record", "play": "replay"}),
+    Verb("bag info", "what is in a bag: counts, missing messages, rates", "square.mcap", _info_arguments, info,
+        "one JSON object per file and line", bus=False),
+    Verb("bag plot", "draw the paths and velocities of a bag's robots", "square.mcap -o square.svg", _plot_arguments,
+        plot, "what was drawn, as one JSON object", bus=False),
+)  # fmt: skip

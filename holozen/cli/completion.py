@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from holozen.bus import Bus
 from holozen.cli.hints import is_any
-from holozen.cli.verb import Noun, Service
+from holozen.cli.verb import Noun, Service, Verb, by_name
 from holozen.flags import Parser, package
 from holozen.transport import connection
 from holozen.transport.graph import Endpoint
@@ -43,16 +43,8 @@ complete -c holozen -a '(holozen __complete (commandline -opc)[2..-1] (commandli
 SCRIPTS = {"bash": BASH, "zsh": ZSH, "fish": FISH}
 
 
-def parser() -> Parser:
-    about = "Print a script that completes verbs, flags, and the keys, types, services, nodes and robots found."
-    parser = Parser(prog="holozen completion", description=about, epilog="example: source <(holozen completion bash)")
-    parser.add_argument("shell", choices=SCRIPTS, help="for which shell")
-    parser.add_argument("--json", action="store_true", help="the script as one JSON object")
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
+def run(args: argparse.Namespace) -> int:
+    """Print the script of a shell."""
     script = SCRIPTS[args.shell]
     print(json.dumps({"shell": args.shell, "script": script}) + "\n" if args.json else script, end="")
     return 0
@@ -191,3 +183,14 @@ def _words(kind: str, ends: list[Endpoint]) -> list[str]:
         "robots": [end.key.rpartition("/")[0] for end in topics if end.key.endswith("/odom")],
     }[kind]
     return [word for word in found if word and "*" not in word]
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("shell", choices=SCRIPTS, help="for which shell")
+
+
+VERBS = by_name(
+    Verb("completion", "Print a script that completes verbs, flags, and the keys, types, services, nodes and robots"
+        " found.", "bash > ~/.local/share/bash-completion/completions/holozen", _arguments, run,
+        "the script as one JSON object", bus=False),
+)  # fmt: skip

@@ -3,27 +3,14 @@
 import argparse
 import json
 
+from holozen.cli.verb import Verb, by_name
 from holozen.console import printable
-from holozen.flags import Parser
 from holozen.transport import connection
 from holozen.transport.errors import BusError
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="holozen doctor",
-        description="Check this machine and the running nodes, and suggest fixes. Changes nothing.",
-        epilog="exit code: 0 without errors, 1 with one; warnings do not count. example: holozen doctor --json",
-    )
-    parser.add_argument("--health", metavar="NODE",
-        help="check only that this node of this machine answers: for a container, such as --health sim")  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="one JSON object per line")
-    connection.add_arguments(parser)
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
+def run(args: argparse.Namespace) -> int:
+    """Print the findings; exit code 1 if one is an error."""
     from holozen.doctor import ERROR, Finding, diagnose, health
 
     where = connection.from_arguments(args)
@@ -36,3 +23,14 @@ def main(argv: list[str]) -> int:
         code = max(code, int(finding.level == ERROR))
         print(json.dumps(finding._asdict()) if args.json else printable(str(finding)), flush=True)
     return code
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--health", metavar="NODE",
+        help="check only that this node of this machine answers: for a container, such as --health sim")  # fmt: skip
+
+
+VERBS = by_name(
+    Verb("doctor", "Check this machine and the running nodes, and suggest fixes. Changes nothing.", "--json",
+        _arguments, run, notes="exit code: 0 without errors, 1 with one; warnings do not count. "),
+)  # fmt: skip

@@ -5,50 +5,11 @@ import json
 from collections.abc import Iterator
 from typing import Any
 
-from holozen import flags
-from holozen.console import printable, report
+from holozen.cli.verb import Noun, Verb, by_name, open_bus
+from holozen.console import printable
+from holozen.flags import add_packages
 from holozen.messages.definitions import Interface, InterfaceError, prototype
 from holozen.messages.registry import Registry
-from holozen.transport import connection
-
-
-def parser() -> flags.Parser:
-    parser = flags.Parser(prog="holozen interface", description="Show message and service types.")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
-    for name, (about, example) in VERBS.items():
-        verb = verbs.add_parser(name, help=about, description=about, epilog=f"example: {example}")
-        if name == "list":
-            verb.add_argument("-m", "--only-msgs", action="store_true", help="no services")
-            verb.add_argument("-s", "--only-srvs", action="store_true", help="no messages")
-        else:
-            verb.add_argument("type", metavar="TYPE|KEY" if name == "show" else "TYPE",
-                help="such as geometry_msgs/msg/Twist or std_srvs/srv/Trigger"
-                     + "; or a key, such as odom" * (name == "show"))  # fmt: skip
-        verb.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
-            help="the folder of package NAME, with msg and srv folders in it")  # fmt: skip
-        verb.add_argument("--json", action="store_true", help="one JSON object per line")
-        if name == "show":
-            connection.add_arguments(verb)
-    return parser
-
-
-VERBS = {
-    "list": ("all known types", "holozen interface list --only-srvs"),
-    "show": ("the fields of a type, nested ones included", "holozen interface show geometry_msgs/msg/Twist"),
-    "proto": (
-        "a message with all fields, to edit and publish",
-        "holozen interface proto geometry_msgs/msg/Twist | holozen topic pub cmd_vel -",
-    ),
-}
-
-
-def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
-    try:
-        return {"list": list_types, "show": show, "proto": proto}[args.verb](args)
-    except InterfaceError as error:
-        report(f"holozen interface {args.verb}: {error}")
-        return 1
 
 
 def list_types(args: argparse.Namespace) -> int:
@@ -80,10 +41,9 @@ def _found(args: argparse.Namespace) -> Interface:
         package = args.type.partition("/")[0]
         if package.isidentifier() and registry.places.names(package):
             raise  # it is here, without that type
-        from holozen.bus import Bus
         from holozen.transport.graph import on_key
 
-        with Bus("interface_show", connection.from_arguments(args)) as bus:
+        with open_bus(args) as bus:
             ends, key = bus.endpoints(), args.type.removeprefix("/")
             types = {end.type for kind in ("pub", "sub", "srv") for end in on_key(ends, key, kind)}
             name = min((one for one in types if not one.startswith("any/")), default="")
@@ -137,3 +97,30 @@ def yaml(value: dict[str, Any], indent: str = "") -> Iterator[str]:
             yield from yaml(inner, indent + "  ")
         else:
             yield f"{indent}{name}: {json.dumps(inner)}"
+
+
+def _list_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("-m", "--only-msgs", action="store_true", help="no services")
+    parser.add_argument("-s", "--only-srvs", action="store_true", help="no messages")
+    add_packages(parser)
+
+
+def _show_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("type", metavar="TYPE|KEY", help=f"{SUCH}; or a key, such as odom")
+    add_packages(parser)
+
+
+def _proto_arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("type", metavar="TYPE", help=SUCH)
+    add_packages(parser)
+
+
+SUCH = "such as geometry_msgs/msg/Twist or std_srvs/srv/Trigger"
+VERBS = by_name(
+    Noun("interface", "Show message and service types.", dict.fromkeys(("list", "show", "proto"), "interface")),
+    Verb("interface list", "all known types", "--only-srvs", _list_arguments, list_types, bus=False),
+    Verb("interface show", "the fields of a type, nested ones included", "geometry_msgs/msg/Twist", _show_arguments,
+        show),
+    Verb("interface proto", "a message with all fields, to edit and publish",
+        "geometry_msgs/msg/Twist | holozen topic pub cmd_vel -", _proto_arguments, proto, bus=False),
+)  # fmt: skip

@@ -1,11 +1,13 @@
 """`holozen launch`: run a Python launch file that was written for ROS 2, without ROS."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from holozen import flags
-from holozen.console import report
+from holozen.cli.verb import Verb, by_name
+from holozen.console import Failure, report
 from holozen.suggest import suggest
 from holozen.transport import connection
 
@@ -13,30 +15,9 @@ if TYPE_CHECKING:
     from holozen.ros.launch.launch_description import LaunchDescription
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = flags.Parser(
-        prog="holozen launch",
-        usage="%(prog)s [options] FILE|PACKAGE FILE [name:=value ...]",
-        description="Run a Python launch file that was written for ROS 2, without ROS.",
-        epilog="example: holozen launch launch/gazebo.launch.py world:=arena.world",
-    )
-    parser.add_argument("words", nargs="+", metavar="FILE [name:=value]",
-        help="the launch file, or its package and its name; and values of its arguments")  # fmt: skip
-    parser.add_argument("-s", "--show-args", action="store_true", help="only list its arguments")
-    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
-        help="the folder of package NAME")  # fmt: skip
-    parser.add_argument("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
-        help="let the file read this environment variable, as $(env NAME)")  # fmt: skip
-    connection.add_arguments(parser)
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    options = parser()
-    args = options.parse_intermixed_args(argv)
-    from holozen.robot.errors import RobotError
-    from holozen.ros import executables, importer, packages, tracebacks
-    from holozen.ros.launch.launch_context import LaunchError
+def run(args: argparse.Namespace) -> int:
+    """Run a launch file, or list its arguments."""
+    from holozen.ros import importer, packages, tracebacks
     from holozen.ros.launch.launch_description_sources import read
     from holozen.ros.launch.stand_ins import replace_gazebo_packages
 
@@ -45,7 +26,7 @@ def main(argv: list[str]) -> int:
     replace_gazebo_packages()
     values = dict(word.split(":=", 1) for word in args.words if ":=" in word)
     try:
-        path = _file([word for word in args.words if ":=" not in word], options)
+        path = _file([word for word in args.words if ":=" not in word], args.error)
         packages.use(given, path.resolve().parent)
         importer.install(packages.given, [path.resolve().parent])
         description = read(path)
@@ -54,8 +35,8 @@ def main(argv: list[str]) -> int:
             if args.show_args
             else _follow(path.absolute(), description, values, where, args.allow_env)
         )
-    except (LaunchError, RobotError, executables.NotFound) as error:
-        report(f"holozen launch: {error}")
+    except Failure:
+        raise
     except Exception as error:
         if not (line := tracebacks.import_error_line(error) or tracebacks.argument_error_line(error)):
             tracebacks.show(error)
@@ -97,7 +78,7 @@ def _report_unused(path: Path, used: set[str], left: set[str], later: set[str]) 
         report(f"holozen launch: {path.name} does not use {name!r}{hint}")
 
 
-def _file(words: list[str], options: argparse.ArgumentParser) -> Path:
+def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
     """The launch file that the words name. Raises RobotError for a package, NotFound for its file."""
     from holozen.ros import packages
     from holozen.ros.executables import NotFound
@@ -105,7 +86,7 @@ def _file(words: list[str], options: argparse.ArgumentParser) -> Path:
     if len(words) == 1:
         return Path(words[0]).expanduser()
     if len(words) != 2:
-        options.error(f"give FILE, or PACKAGE FILE, not {' '.join(words) or 'nothing'!r}")
+        refuse(f"give FILE, or PACKAGE FILE, not {' '.join(words) or 'nothing'!r}")
     package, name = words
     folder = packages.find(package)
     there = sorted(each for each in (folder / "launch").rglob("*") if each.is_file()) if folder.is_dir() else []
@@ -134,3 +115,17 @@ def _show(description: "LaunchDescription") -> int:
             found.append(entity.summary())
     print("\n".join(found) or "it has no arguments")
     return 0
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("words", nargs="+", metavar="FILE [name:=value]",
+        help="the launch file, or its package and its name; and values of its arguments")  # fmt: skip
+    parser.add_argument("-s", "--show-args", action="store_true", help="only list its arguments")
+    flags.add_robot_sources(parser)
+
+
+VERBS = by_name(
+    Verb("launch", "Run a Python launch file that was written for ROS 2, without ROS.",
+        "launch/gazebo.launch.py world:=arena.world", _arguments, run, json=None,
+        usage="%(prog)s [options] FILE|PACKAGE FILE [name:=value ...]"),
+)  # fmt: skip

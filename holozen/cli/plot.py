@@ -15,9 +15,9 @@ from holozen.bus import Bus
 from holozen.cli.fields import path, pick
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import Reader
-from holozen.cli.verb import Verb, add_packages, by_name, open_bus
+from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import Screen, printable, report
-from holozen.flags import number
+from holozen.flags import add_packages, number
 from holozen.plotting import Plane, Point, Robot, draw, panels
 from holozen.process import stop_event
 from holozen.transport.errors import ServiceError

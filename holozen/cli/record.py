@@ -7,8 +7,9 @@ import threading
 import time
 from typing import TYPE_CHECKING
 
+from holozen.cli.verb import Verb, by_name
 from holozen.console import Line, printable, report
-from holozen.flags import Parser, key, number
+from holozen.flags import key, number
 from holozen.process import stop_event
 from holozen.transport import connection
 
@@ -21,34 +22,10 @@ IDLE = 0.01  # s between two looks at an empty queue
 REPORT_EVERY = {True: 0.5, False: 5.0}  # s between two lines, in a terminal and elsewhere
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="holozen record",
-        description="Record the messages of keys into an MCAP file, until Ctrl-C. It needs 8 MB of free disk space, "
-        "reserved to finish the file on a full disk.",
-        epilog="example: holozen record odom cmd_vel -o square",
-    )
-    parser.add_argument("keys", nargs="*", type=key, metavar="KEY", help="a key or key expression, such as */odom")
-    parser.add_argument("-a", "--all", action="store_true", help="every key")
-    parser.add_argument("-o", "--output", metavar="NAME", help="write NAME.mcap (default: holozen_DATE-TIME.mcap)")
-    parser.add_argument("--max-size", type=number(0.1, 1e6, "MB"), metavar="MB",
-        help="start a new file when one has this size: NAME_0.mcap, NAME_1.mcap, ...")  # fmt: skip
-    parser.add_argument("--max-duration", type=number(0.1, 1e9, "s"), metavar="S", help="stop after S seconds")
-    parser.add_argument(
-        "--use-sim-time", action="store_true", help="use the times of the sim's clock, which are those of the stamps"
-    )
-    parser.add_argument("--ros2", action="store_true",
-        help="write the folder NAME as `ros2 bag record` does, for `ros2 bag play`")  # fmt: skip
-    parser.add_argument("--json", action="store_true", help="the figures as one JSON object a line")
-    connection.add_arguments(parser)
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    arguments = parser()
-    args = arguments.parse_args(argv)
+def run(args: argparse.Namespace) -> int:
+    """Record until Ctrl-C, or until --max-duration has passed."""
     if bool(args.keys) == args.all:
-        arguments.error("name the keys to record, or use -a for all")
+        args.error("name the keys to record, or use -a for all")
     from holozen.bag.rosbag2 import RosBagWriter
     from holozen.bag.writer import BagWriter
 
@@ -188,3 +165,25 @@ class Progress:
         text += f", {figures['dropped']} dropped" if figures["dropped"] else ", none dropped"
         text += f", {figures['lost']} lost on the way" if figures["lost"] else ""
         return text + (f", queue overrun {figures['overran']} times" if figures["overran"] else "")
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("keys", nargs="*", type=key, metavar="KEY", help="a key or key expression, such as */odom")
+    add("-a", "--all", action="store_true", help="every key")
+    add("-o", "--output", metavar="NAME", help="write NAME.mcap (default: holozen_DATE-TIME.mcap)")
+    add("--max-size", type=number(0.1, 1e6, "MB"), metavar="MB",
+        help="start a new file when one has this size: NAME_0.mcap, NAME_1.mcap, ...")  # fmt: skip
+    add("--max-duration", type=number(0.1, 1e9, "s"), metavar="S", help="stop after S seconds")
+    add("--use-sim-time", action="store_true", help="use the times of the sim's clock, which are those of the stamps")
+    add("--ros2", action="store_true", help="write the folder NAME as `ros2 bag record` does, for `ros2 bag play`")
+
+
+ABOUT = (
+    "Record the messages of keys into an MCAP file, until Ctrl-C. It needs 8 MB of free disk space, reserved to finish"
+    " the file on a full disk."
+)
+VERBS = by_name(
+    *(Verb(name, ABOUT, "odom cmd_vel -o square", _arguments, run, "the figures as one JSON object a line")
+    for name in ("record", "bag record"))
+)  # fmt: skip

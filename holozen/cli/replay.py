@@ -2,14 +2,14 @@
 
 import argparse
 import json
-import threading
 import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
+from holozen.cli.verb import Verb, by_name
 from holozen.console import Line, printable, report
-from holozen.flags import Parser, key, number
+from holozen.flags import key, number, path, refused
 from holozen.process import stop_event
 from holozen.transport import connection
 
@@ -25,68 +25,15 @@ AGAIN = 0.02  # s between two rounds of a loop, so that a very short bag does no
 SHOW_EVERY = 0.2  # s between two updates of the line in a terminal
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="holozen replay",
-        description="Publish the messages of MCAP files again, unchanged and in time. Keys that move robots are left "
-        "out unless --commands is given, and so are keys that have a publisher now (see --remap). In a terminal, space "
-        "pauses and resumes, and the right arrow (or s) plays the next message during a pause.",
-        epilog="example: holozen replay square.mcap --remap odom:=old/odom -r 2",
-    )
-    parser.add_argument("files", nargs="+", type=_file, metavar="FILE", help="played one after the other")
-    parser.add_argument(
-        "-r", "--rate", type=number(0.001, 1e6), default=1.0, metavar="X", help="times as fast (default: 1)"
-    )
-    parser.add_argument("-l", "--loop", action="store_true", help="start again at the end, until Ctrl-C")
-    parser.add_argument(
-        "--start-offset", type=number(0, 1e9, "s"), default=0.0, metavar="S", help="start S seconds into the bag"
-    )
-    parser.add_argument(
-        "--until", type=number(0, 1e9, "s"), metavar="S", help="stop S seconds after the start of the bag"
-    )
-    parser.add_argument("--topics", nargs="+", type=key, metavar="KEY", help="only these keys or key expressions")
-    parser.add_argument("--remap", nargs="+", type=_remap, default=[], metavar="OLD:=NEW", help="play on another key")
-    parser.add_argument(
-        "--commands", action="store_true", help="also play keys that move robots; they are stopped at the end"
-    )
-    parser.add_argument("--json", action="store_true", help="the figures as one JSON object at the end")
-    connection.add_arguments(parser)
-    return parser
-
-
-def _file(text: str) -> "Path":
-    from pathlib import Path
-
-    return Path(text)
-
-
-def _remap(text: str) -> tuple[str, str]:
-    old, sign, new = text.partition(":=")
-    if not (old and sign and new):
-        raise argparse.ArgumentTypeError(f"{text!r}: write OLD:=NEW, such as odom:=old/odom")
-    return key(old), key(new)
-
-
-def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
-    from holozen.bag import BagError
+def run(args: argparse.Namespace) -> int:
+    """Play files, one after the other."""
+    from holozen.bag.player import Outlet, Player, keys, plan
     from holozen.bag.reader import Bag, summarize
 
-    stop = stop_event()
-    try:
-        summaries = []
-        for path in args.files:
-            with Bag(path) as bag:
-                summaries.append(summarize(bag))
-        return _replay(args, summaries, stop)
-    except BagError as error:
-        report(f"holozen replay: {error}")
-        return 1
-
-
-def _replay(args: argparse.Namespace, summaries: list["Summary"], stop: threading.Event) -> int:
-    from holozen.bag.player import Outlet, Player, keys, plan
-
+    stop, summaries = stop_event(), []
+    for file in args.files:
+        with Bag(file) as bag:
+            summaries.append(summarize(bag))
     channels = {channel for summary in summaries for channel in summary.streams}
     wire = connection.from_arguments(args)
     # Zenoh drops a sample after a millisecond in a full queue; samples of a bag may wait longer.
@@ -147,8 +94,8 @@ def _play(
 def _messages(files: "list[Path]", wanted: set[object], first: int, last: int) -> Iterator["Message"]:
     from holozen.bag.reader import Bag
 
-    for path in files:
-        with Bag(path) as bag:
+    for file in files:
+        with Bag(file) as bag:
             yield from (m for m in bag.messages() if m.channel in wanted and first <= m.at <= last)
 
 
@@ -172,3 +119,33 @@ class _Position:
     def clear(self) -> None:
         """Leave an empty line."""
         self._line.show("")
+
+
+def _remap(text: str) -> tuple[str, str]:
+    old, sign, new = text.partition(":=")
+    if not (old and sign and new):
+        raise refused(f"{text!r}: write OLD:=NEW, such as odom:=old/odom")
+    return key(old), key(new)
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("files", nargs="+", type=path, metavar="FILE", help="played one after the other")
+    add("-r", "--rate", type=number(0.001, 1e6), default=1.0, metavar="X", help="times as fast (default: 1)")
+    add("-l", "--loop", action="store_true", help="start again at the end, until Ctrl-C")
+    add("--start-offset", type=number(0, 1e9, "s"), default=0.0, metavar="S", help="start S seconds into the bag")
+    add("--until", type=number(0, 1e9, "s"), metavar="S", help="stop S seconds after the start of the bag")
+    add("--topics", nargs="+", type=key, metavar="KEY", help="only these keys or key expressions")
+    add("--remap", nargs="+", type=_remap, default=[], metavar="OLD:=NEW", help="play on another key")
+    add("--commands", action="store_true", help="also play keys that move robots; they are stopped at the end")
+
+
+ABOUT = (
+    "Publish the messages of MCAP files again, unchanged and in time. Keys that move robots are left out unless"
+    " --commands is given, and so are keys that have a publisher now (see --remap). In a terminal, space pauses and"
+    " resumes, and the right arrow (or s) plays the next message during a pause."
+)
+VERBS = by_name(
+    *(Verb(name, ABOUT, "square.mcap --remap odom:=old/odom -r 2", _arguments, run,
+        "the figures as one JSON object at the end") for name in ("replay", "bag play"))
+)  # fmt: skip

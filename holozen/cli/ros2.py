@@ -4,8 +4,8 @@ import argparse
 import os
 
 from holozen.bus import Bus
+from holozen.cli.verb import Verb, by_name
 from holozen.console import report
-from holozen.flags import Parser
 from holozen.process import stop_event
 from holozen.transport import connection
 
@@ -13,27 +13,11 @@ STAMPED = ("timestamping/enabled", "true")  # as the caches of latched topics ne
 EVERY = 0.05  # s between two looks at the nodes
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="holozen ros2",
-        description="Join the keys here with the topics of ROS 2 nodes that use rmw_zenoh: they see our topics and "
-        "services, and we see their topics. What a ROS 2 node publishes on cmd_vel has the priority of plain data.",
-        epilog="example: holozen ros2 --connect tcp/192.168.1.5:7447",
-    )
-    parser.add_argument(
-        "--ros-domain-id", type=connection.domain, default=os.environ.get("ROS_DOMAIN_ID") or "0", metavar="N",
-        help="as ROS_DOMAIN_ID of the ROS 2 nodes (default: that variable here, else 0)",
-    )  # fmt: skip
-    connection.add_arguments(parser)
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    arguments = parser()
-    args = arguments.parse_args(argv)
+def run(args: argparse.Namespace) -> int:
+    """Join both until Ctrl-C."""
     where = connection.from_arguments(args)
     if where.secure:
-        arguments.error("--secure: no certificate vouches for what ROS 2 nodes write, so they cannot be let in")
+        args.error("--secure: no certificate vouches for what ROS 2 nodes write, so they cannot be let in")
     where = where.replace(cfg=(STAMPED, *where.cfg))
     from holozen.transport.ros_gateway import NODE, Gateway
 
@@ -47,3 +31,17 @@ def main(argv: list[str]) -> int:
     if why:
         report(f"holozen ros2: {why}")
     return 1 if why else 0
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--ros-domain-id", type=connection.domain, default=os.environ.get("ROS_DOMAIN_ID") or "0", metavar="N",
+        help="as ROS_DOMAIN_ID of the ROS 2 nodes (default: that variable here, else 0)",
+    )  # fmt: skip
+
+
+ABOUT = (
+    "Join the keys here with the topics of ROS 2 nodes that use rmw_zenoh: they see our topics and services, and we see"
+    " their topics. What a ROS 2 node publishes on cmd_vel has the priority of plain data."
+)
+VERBS = by_name(Verb("ros2", ABOUT, "--connect tcp/192.168.1.5:7447", _arguments, run, json=None))

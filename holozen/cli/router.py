@@ -3,25 +3,16 @@
 import argparse
 
 from holozen.bus import Bus
+from holozen.cli.verb import Verb, by_name, no_arguments
 from holozen.console import report
-from holozen.flags import Parser
 from holozen.process import POLL, stop_event
 from holozen.transport import connection
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(
-        prog="holozen router",
-        description="Run a Zenoh router.",
-        epilog="example: holozen router --listen tcp/0.0.0.0:7447",
-    )
-    connection.add_arguments(parser)
-    parser.set_defaults(mode="router")
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    where = connection.from_arguments(parser().parse_args(argv)).replace(mode="router")
+def run(args: argparse.Namespace) -> int:
+    """Route until Ctrl-C."""
+    args.mode = args.mode or "router"
+    where = connection.from_arguments(args).replace(mode="router")
     stop = stop_event()
     while not stop.is_set():
         members = _members(where)
@@ -42,3 +33,8 @@ def _members(where: connection.Connection) -> tuple[int, int]:
         return version(where.secure)
     except OSError:
         return 0, 0
+
+
+VERBS = by_name(
+    Verb("router", "Run a Zenoh router.", "--listen tcp/0.0.0.0:7447", no_arguments, run, json=None),
+)  # fmt: skip

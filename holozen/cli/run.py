@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from holozen import flags
+from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.transport import connection
 
@@ -13,41 +14,19 @@ if TYPE_CHECKING:
     from holozen.ros.executables import Script
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = flags.Parser(
-        prog="holozen run",
-        usage="%(prog)s [options] FILE.py|PACKAGE [EXECUTABLE] [arguments] [--ros-args ...]",
-        description="Run a Python script that was written for ROS 2, without ROS.",
-        epilog="example: holozen run scripts/controller.py --ros-args -r cmd_vel:=Fred/cmd_vel",
-    )
-    parser.add_argument("target", metavar="FILE.py|PACKAGE", help="the script, or the package of the executable")
-    parser.add_argument("words", nargs=argparse.REMAINDER, metavar="[EXECUTABLE] ...",
-        help="the package's executable; what follows it, or FILE.py, goes to the script, except for flags of holozen "
-             "that the script does not have")  # fmt: skip
-    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
-        help="the folder of package NAME, whose scripts, messages and services are used")  # fmt: skip
-    parser.add_argument("--force", action="store_true", help="run even where ROS is sourced; its rclpy is not used")
-    connection.add_arguments(parser)
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
-    from holozen.ros import executables, packages, runner
+def run(args: argparse.Namespace) -> int:
+    """Run a script in this process."""
+    from holozen.ros import packages, runner
 
     if not args.force and (reason := runner.real_ros()):
         report(f"holozen run: {reason}: start the script with ROS's own `ros2 run`, or over Zenoh with --force")
         return 1
     words, found = _split(args.words[1:] if args.words[:1] == ["--"] else args.words, ["--package"])
-    args = parser().parse_args([*found, args.target], args)
-    try:
-        script, words = _script(args.target, words, dict(args.package))
-    except executables.NotFound as error:
-        report(f"holozen run: {error}")
-        return 1
+    args = VERBS["run"].parser().parse_args([*found, args.target], args)
+    script, words = _script(args.target, words, dict(args.package))
     source = script.path.read_text(errors="replace")
     words, found = _split(words, [flag for flag in _BEHIND if flag not in source], sure=("--package",))
-    args = parser().parse_args([*found, args.target], args)
+    args = VERBS["run"].parser().parse_args([*found, args.target], args)
     from holozen.ros import importer
     from holozen.ros.rclpy import context
 
@@ -107,3 +86,20 @@ def _script(target: str, words: list[str], given: dict[str, Path]) -> "tuple[Scr
     script = executables.find(target, name)
     packages.use(given, script.root)
     return script, words[1:]
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("target", metavar="FILE.py|PACKAGE", help="the script, or the package of the executable")
+    add("words", nargs=argparse.REMAINDER, metavar="[EXECUTABLE] ...",
+        help="the package's executable; what follows it, or FILE.py, goes to the script, except for flags of holozen "
+             "that the script does not have")  # fmt: skip
+    flags.add_packages(parser, "whose scripts, messages and services are used")
+    add("--force", action="store_true", help="run even where ROS is sourced; its rclpy is not used")
+
+
+VERBS = by_name(
+    Verb("run", "Run a Python script that was written for ROS 2, without ROS.",
+        "scripts/controller.py --ros-args -r cmd_vel:=Fred/cmd_vel", _arguments, run, json=None,
+        usage="%(prog)s [options] FILE.py|PACKAGE [EXECUTABLE] [arguments] [--ros-args ...]"),
+)  # fmt: skip

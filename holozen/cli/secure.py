@@ -2,78 +2,96 @@
 
 import argparse
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
-from holozen.console import printable, report
-from holozen.flags import Parser, refused
+from holozen.cli.verb import Noun, Verb, by_name
+from holozen.console import Failure, printable
+from holozen.flags import refused
 from holozen.transport.connection import secure_folder
 from holozen.transport.roles import ROLES, ROUTER
 
 DAYS = 365
+Act = Callable[[Any, Path, argparse.Namespace], str]
+"""What a verb does with holozen.authority in a folder; returns what to say where there is no --json."""
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = Parser(prog="holozen secure", description="Make and revoke the certificates of a network's members.")
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB", prog=parser.prog)
-
-    def verb(name: str, text: str, example: str) -> argparse.ArgumentParser:
-        made = verbs.add_parser(name, help=text, description=text, epilog=f"example: holozen secure {name} {example}")
-        made.add_argument("--secure", metavar="DIR", type=Path,
-            help="the folder of the authority (default: HOLOZEN_SECURE, or ~/.config/holozen/secure)")  # fmt: skip
-        made.add_argument("--json", action="store_true", help="one JSON object per line")
-        return made
-
-    init = verb("init", "make an authority, a router and a member of each role", "--host robot.local")
-    init.add_argument("--host", action="append", default=[], help="where others reach the router, besides loopback")
-    init.add_argument("--days", type=_days, default=DAYS, help=f"until the certificates expire (default: {DAYS})")
-    add = verb("add", "add a member", "operator Ann")
-    add.add_argument("role", choices=ROLES)
-    add.add_argument("name")
-    add.add_argument("--days", type=_days, default=DAYS, help=f"until the certificate expires (default: {DAYS})")
-    verb("revoke", "remove a member; the router starts anew without it", "Ann").add_argument("name")
-    verb("show", "list the members, their roles and when their certificates expire", "")
-    return parser
+def _init(authority: Any, root: Path, args: argparse.Namespace) -> str:
+    authority.initialize(root, args.host, args.days)
+    return f"{root}: {ROUTER}, {', '.join(ROLES)}; run `holozen router --secure {root}`, and other verbs like that"
 
 
-def main(argv: list[str]) -> int:
-    args = parser().parse_args(argv)
-    from holozen import authority  # loads cryptography
-
-    root: Path = args.secure or Path(secure_folder())
-    try:
-        if args.verb == "init":
-            authority.initialize(root, args.host, args.days)
-        elif args.verb == "add":
-            authority.add(root, args.role, args.name, args.days)
-        elif args.verb == "revoke":
-            authority.revoke(root, args.name)
-        table = authority.members(root)["members"]
-    except authority.AuthorityError as error:
-        report(f"holozen secure {args.verb}: {error}")
-        return 1
-    except OSError as error:
-        report(f"holozen secure {args.verb}: {error.filename}: {error.strerror}")
-        return 1
-    if args.json:
-        for name, row in table.items():
-            print(json.dumps({"name": name, "role": row["role"], "expires": row["expires"]}))
-    elif args.verb == "show":
-        for name, row in table.items():
-            print(printable(f"{name:<16} {row['role']:<10} until {row['expires'][:10]}"))
-    else:
-        print(_done(args, root))
-    return 0
+def _add(authority: Any, root: Path, args: argparse.Namespace) -> str:
+    authority.add(root, args.role, args.name, args.days)
+    return f"{root / args.name}: copy it to where {args.name} works, and keep it secret"
 
 
-def _done(args: argparse.Namespace, root: Path) -> str:
-    if args.verb == "init":
-        return f"{root}: {ROUTER}, {', '.join(ROLES)}; run `holozen router --secure {root}`, and other verbs like that"
-    if args.verb == "add":
-        return f"{root / args.name}: copy it to where {args.name} works, and keep it secret"
+def _revoke(authority: Any, root: Path, args: argparse.Namespace) -> str:
+    authority.revoke(root, args.name)
     return f"{args.name} is revoked; if router or sim run elsewhere, copy their new members.json from {root} there"
+
+
+def _show(authority: Any, root: Path, _args: argparse.Namespace) -> str:
+    rows = authority.members(root)["members"].items()
+    return "\n".join(f"{name:<16} {row['role']:<10} until {row['expires'][:10]}" for name, row in rows)
+
+
+def _run(act: Act) -> Callable[[argparse.Namespace], int]:
+    """A verb's `run`: it acts, and prints the result, or with --json all members."""
+
+    def run(args: argparse.Namespace) -> int:
+        from holozen import authority  # loads cryptography
+
+        root: Path = args.secure or Path(secure_folder())
+        try:
+            done = act(authority, root, args)
+            table = authority.members(root)["members"]
+        except OSError as error:
+            raise Failure(f"{error.filename}: {error.strerror}") from None
+        if args.json:
+            for name, row in table.items():
+                print(json.dumps({"name": name, "role": row["role"], "expires": row["expires"]}))
+        else:
+            print("\n".join(map(printable, done.splitlines())))
+        return 0
+
+    return run
 
 
 def _days(text: str) -> int:
     if not text.isdecimal() or not 0 < int(text) <= 3650:
         raise refused(f"{text!r}: use a whole number of days from 1 to 3650")
     return int(text)
+
+
+def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
+    """A function that adds the flags of a verb to its parser."""
+
+    def fill(parser: argparse.ArgumentParser) -> None:
+        add = parser.add_argument
+        add("--secure", metavar="DIR", type=Path,
+            help="the folder of the authority (default: HOLOZEN_SECURE, or ~/.config/holozen/secure)")  # fmt: skip
+        if verb == "init":
+            add("--host", action="append", default=[], help="where others reach the router, besides loopback")
+        if verb == "add":
+            add("role", choices=ROLES)
+        if verb in ("add", "revoke"):
+            add("name")
+        if verb in ("init", "add"):
+            add("--days", type=_days, default=DAYS, help=f"until certificates expire (default: {DAYS})")
+
+    return fill
+
+
+VERBS = by_name(
+    Noun("secure", "Make and revoke the certificates of a network's members.",
+        dict.fromkeys(("init", "add", "revoke", "show"), "secure")),
+    *(Verb(f"secure {name}", about, example, _arguments(name), _run(act), bus=False)
+    for name, about, example, act in (
+        ("init", "make an authority, a router and a member of each role", "--host robot.local", _init),
+        ("add", "add a member", "operator Ann", _add),
+        ("revoke", "remove a member; the router starts anew without it", "Ann", _revoke),
+        ("show", "list the members, their roles and when their certificates expire", "", _show),
+    ))
+)  # fmt: skip

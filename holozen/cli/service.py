@@ -10,9 +10,9 @@ from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.hints import none_found, suggest_key, unknown
 from holozen.cli.output import CDR, Hex, Reader, lines
-from holozen.cli.verb import Noun, Verb, add_packages, by_name, open_bus
+from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
-from holozen.flags import key, number
+from holozen.flags import add_packages, key, number
 from holozen.process import deferred_interrupt
 from holozen.suggest import listed, suggest
 from holozen.transport.errors import NoReply

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from holozen import flags
 from holozen.bus import Bus
+from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.robot.errors import RobotError
 from holozen.transport import connection
@@ -74,65 +75,25 @@ class Spawned:
         return json.dumps({"name": self.name, "key": self.key, "pose": to_builtins(self.pose), "hint": self.hint})
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = flags.Parser(
-        prog="holozen spawn",
-        usage="%(prog)s [options] FILE [name:=value ...]",
-        description="Put a robot or object (xacro, URDF or SDF) into the running sim.",
-        epilog="example: holozen spawn urdf/hb_bot.urdf.xacro --name Fred -x 1 -Y 1.57",
-    )
-    parser.add_argument("words", nargs="*", metavar="FILE [name:=value]", help="the file, and values of its xacro:arg")
-    parser.add_argument("-file", "--file", metavar="FILE", help="the file, as for spawn_model")
-    parser.add_argument("--name", "-model", "-entity", type=flags.robot, default="", help="default: as in the file")
-    for flag in "xyz":
-        parser.add_argument(f"-{flag}", type=flags.number(-FAR, FAR, "m"), metavar="m", help=PLACES[flag])
-    for flag in "RPY":
-        parser.add_argument(f"-{flag}", type=flags.number(-ROUND, ROUND, "rad"), metavar="rad", help=PLACES[flag])
-    parser.add_argument("--namespace", "-robot_namespace", default="", metavar="NAME",
-        help="its keys are below this; / is the root (default: its name)")  # fmt: skip
-    parser.add_argument("--timeout", "-timeout", type=flags.number(0.1, 3600, "s"), default=0.0, metavar="S",
-        help=f"seconds to wait for a sim (default: {PATIENCE:g})")  # fmt: skip
-    parser.add_argument("--count", type=flags.count(1), default=0, metavar="N",
-        help="a fleet of N copies on a grid: bot0, bot1 ..., or NAME0, NAME1 ...")  # fmt: skip
-    parser.add_argument("--grid", type=flags.number(0.01, 100, "m"), default=2.0, metavar="M",
-        help="metres between two of --count (default: %(default)g)")  # fmt: skip
-    parser.add_argument("--replace", action="store_true", help="replace the entity with that name")
-    parser.add_argument("--drive", choices=flags.DRIVES, help=flags.DRIVE)
-    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
-        help="the folder of package NAME, for $(find NAME) and package://NAME")  # fmt: skip
-    parser.add_argument("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
-        help="let the file read this environment variable, as $(env NAME)")  # fmt: skip
-    parser.add_argument("--strict", action="store_true", help="a missing or bad mesh is an error")
-    parser.add_argument("-urdf", "-sdf", action="store_true", help=argparse.SUPPRESS)  # detected from the file
-    parser.add_argument("--json", action="store_true", help="its name, key and pose as one JSON object")
-    connection.add_arguments(parser)
-    return parser
-
-
 PLACES = {
     "x": "position", "y": "position", "z": "height (default: it stands on the ground)",
     "R": "roll, not in degrees", "P": "pitch, not in degrees", "Y": "yaw, not in degrees",
 }  # fmt: skip
 
 
-def main(argv: list[str]) -> int:
-    options = parser()
-    args = options.parse_intermixed_args(_joined(argv))  # plain parse_args takes no name:=value after a flag
-    file, values = _words(options, args)
+def run(args: argparse.Namespace) -> int:
+    """Read a file and spawn it, or a fleet of copies."""
+    file, values = _words(args)
     if args.count and (args.replace or args.namespace):
-        options.error("--count gives names of its own: leave out --replace and --namespace")
+        args.error("--count gives names of its own: leave out --replace and --namespace")
     place = Place(args.x, args.y, args.z, args.R, args.P, args.Y)
-    try:
-        candidate = read(file, args.name, values, dict(args.package), args.drive or "", args.strict, args.allow_env)
-        candidate = replace(candidate, namespace=args.namespace)
-        with Bus("spawn", connection.from_arguments(args), patience=args.timeout or None) as bus:
-            if args.count:
-                return _put_fleet(bus, candidate, place, args)
-            spawned = put(bus, candidate, place, args.replace, args.timeout)
-        print(spawned.as_json() if args.json else spawned)
-    except RobotError as error:
-        report(f"holozen spawn: {error}")
-        return 1
+    candidate = read(file, args.name, values, dict(args.package), args.drive or "", args.strict, args.allow_env)
+    candidate = replace(candidate, namespace=args.namespace)
+    with Bus("spawn", connection.from_arguments(args), patience=args.timeout or None) as bus:
+        if args.count:
+            return _put_fleet(bus, candidate, place, args)
+        spawned = put(bus, candidate, place, args.replace, args.timeout)
+    print(spawned.as_json() if args.json else spawned)
     return 0
 
 
@@ -266,11 +227,11 @@ def _joined(words: list[str]) -> list[str]:
     return joined
 
 
-def _words(options: argparse.ArgumentParser, args: argparse.Namespace) -> tuple[Path, dict[str, str]]:
+def _words(args: argparse.Namespace) -> tuple[Path, dict[str, str]]:
     values = dict(word.split(":=", 1) for word in args.words if not word.startswith(":=") and ":=" in word)
     files = [word for word in (*args.words, *([args.file] if args.file else ())) if ":=" not in word]
     if len(files) != 1:
-        options.error(f"give one FILE, not {len(files)}" + (f": {' '.join(files)}" if files else ""))
+        args.error(f"give one FILE, not {len(files)}" + (f": {' '.join(files)}" if files else ""))
     return Path(files[0]), values
 
 
@@ -321,3 +282,39 @@ def _spawned(name: str, candidate: Candidate, pose: "Pose") -> Spawned:
     moves = any(joint.kind in ("continuous", "revolute", "prismatic") for joint in model.joints.values())
     hint = "nothing drives it: spawn it with --drive planar_move to move it as a whole" if moves else ""
     return Spawned(name, "", pose, hint)
+
+
+class _Spawn(Verb):
+    def main(self, argv: list[str]) -> int:
+        return super().main(_joined(argv))
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("words", nargs="*", metavar="FILE [name:=value]", help="the file, and values of its xacro:arg")
+    add("-file", "--file", metavar="FILE", help="the file, as for spawn_model")
+    add("--name", "-model", "-entity", type=flags.robot, default="", help="default: as in the file")
+    for flag in "xyz":
+        add(f"-{flag}", type=flags.number(-FAR, FAR, "m"), metavar="m", help=PLACES[flag])
+    for flag in "RPY":
+        add(f"-{flag}", type=flags.number(-ROUND, ROUND, "rad"), metavar="rad", help=PLACES[flag])
+    add("--namespace", "-robot_namespace", default="", metavar="NAME",
+        help="its keys are below this; / is the root (default: its name)")  # fmt: skip
+    add("--timeout", "-timeout", type=flags.number(0.1, 3600, "s"), default=0.0, metavar="S",
+        help=f"seconds to wait for a sim (default: {PATIENCE:g})")  # fmt: skip
+    add("--count", type=flags.count(1), default=0, metavar="N",
+        help="a fleet of N copies on a grid: bot0, bot1 ..., or NAME0, NAME1 ...")  # fmt: skip
+    add("--grid", type=flags.number(0.01, 100, "m"), default=2.0, metavar="M",
+        help="metres between two of --count (default: %(default)g)")  # fmt: skip
+    add("--replace", action="store_true", help="replace the entity with that name")
+    add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
+    flags.add_robot_sources(parser)
+    add("--strict", action="store_true", help="a missing or bad mesh is an error")
+    add("-urdf", "-sdf", action="store_true", help=argparse.SUPPRESS)  # detected from the file
+
+
+VERBS = by_name(
+    _Spawn("spawn", "Put a robot or object (xacro, URDF or SDF) into the running sim.",
+        "urdf/hb_bot.urdf.xacro --name Fred -x 1 -Y 1.57", _arguments, run, "its name, key and pose as one JSON object",
+        usage="%(prog)s [options] FILE [name:=value ...]"),
+)  # fmt: skip

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 
 from holozen.background import background
-from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE, Noun, Verb, add_packages, by_name, on_node, open_bus
-from holozen.flags import count, key, number
+from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE, Noun, Verb, by_name, on_node, open_bus
+from holozen.flags import add_packages, count, key, number
 from holozen.process import deferred_interrupt
 
 LISTEN = 1.0  # s to listen for samples of foreign nodes, also by `info -v`

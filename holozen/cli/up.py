@@ -10,103 +10,49 @@ import tempfile
 import termios
 import threading
 import time
-from typing import IO, Any
+from typing import IO, TYPE_CHECKING, Any
 
 from holozen import flags
+from holozen.cli import command
+from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.process import dies_with_parent, stop_event
 from holozen.transport import connection
 from holozen.transport.rendezvous import is_taken
 from holozen.transport.roles import ROUTER
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 GRACE = 1.2  # s for the commanding processes to stop the robot; the sim ends after them
 SIM_GRACE = 0.5  # s
 LOOK = 0.05  # s
 SETTLED = 10.0  # s; a part that fails sooner at its first start has a wrong flag or file
-PAUSES = (
-    0.5,
-    30.0,
-)  # s before a part is started again: the first, doubled with each that does not settle, and the longest
+PAUSES = 0.5, 30.0  # s before a part is started again: the first, doubled until it settles, and the longest
 LAST_LINES = 20
 # Plain keys, no update under way, lines wrap, no reports of focus and pastes, a cursor, the main screen.
 SCREEN_LEFT = "\x1b[<u\x1b[?2026l\x1b[?7h\x1b[?1004l\x1b[?2004l\x1b[?25h\x1b[?1049l"
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = flags.Parser(
-        prog="holozen up",
-        description="Start the sim, the controller, the pose service, and the teleop if there is a terminal; with"
-        " --secure a router too, unless --connect names one.",
-        epilog="example: holozen up --robot my_bot.urdf.xacro",
-    )
-    add = parser.add_argument
-    add("--robot", type=flags.robot_file, metavar="FILE[=NAME]",
-        help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root)")  # fmt: skip
-    add("--world", metavar="FILE", help="an SDF file (default: gazebo.world)")
-    add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
-    add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
-    add(
-        "--package",
-        action="append",
-        default=[],
-        metavar="NAME=DIR",
-        help="the folder of package NAME, for $(find NAME)",
-    )
-    add("--allow-env", action="append", default=[], metavar="NAME",
-        help="let the robot's file read this environment variable, as $(env NAME)")  # fmt: skip
-    add("--shape", metavar="SHAPE",
-        help="of the goals: square, triangle, rectangle, infinity or hexagon (default: square)")  # fmt: skip
-    add("--size", metavar="M", help="the side of that shape (infinity: half its length) in m")
-    add("--goals", metavar="FILE", help="goals from a file instead: x y theta a line")
-    add("--laps", metavar="N", default="0", help="times round the goals; 0: for ever (default: 0)")
-    add("--view", nargs="?", type=flags.count(), const=8080, metavar="PORT",
-        help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a free one)")  # fmt: skip
-    add("--shards", type=flags.count(1), default=1, metavar="N",
-        help="as many sims, which share the robots by name (default: 1)")  # fmt: skip
-    add("--state", metavar="DIR",
-        help="where software stops outlast it (default: HOLOZEN_STATE, else ~/.local/state/holozen)")  # fmt: skip
-    add("--no-restart", action="store_true", help="do not start a part again that died (its robots would stand)")
-    connection.add_arguments(parser)
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    options = parser()
-    args = options.parse_args(argv)
+def run(args: argparse.Namespace) -> int:
+    """Start the parts and watch them until Ctrl-C, or until one fails for good."""
     if args.shards > 1 and args.robot and not args.robot[1]:
-        options.error("--shards gives each robot to the shard of its name: use --robot FILE=NAME")
-    driven = args.shards == 1 or args.robot  # else there is no robot yet
+        args.error("--shards gives each robot to the shard of its name: use --robot FILE=NAME")
+    has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
+    parts = _parts(args, has_terminal)
     where, router = _meeting(connection.from_arguments(args))
     stop = stop_event()
-    has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
-    if has_terminal and driven and args.view is not None and (where.private or where.secure):
+    if "teleop" in parts and args.view is not None and (where.private or where.secure):
         # The teleop's screen would hide it, and other users see the arguments of a process.
-        options.error("--view has no place here to show the token of its page: run `holozen view` in another terminal")
+        args.error("--view has no place here to show the token of its page: run `holozen view` in another terminal")
     if not has_terminal:
         report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
     with tempfile.TemporaryFile("w+", errors="replace") as log:
         team = Team(where.arguments(), log if has_terminal else None, not args.no_restart)
         try:
-            if router:
-                team.start("router", router)
-            robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
-            packages = [word for package in args.package for word in ("--package", package)]
-            packages += [word for name in args.allow_env for word in ("--allow-env", name)]
-            words = [*robot, *packages, *_flags(args, "world", "rtf", "drive"), *_state(args.state)]
-            for shard in range(1, args.shards + 1):
-                if args.shards > 1:
-                    team.start(f"sim {shard}/{args.shards}", [*words, "--shard", f"{shard}/{args.shards}"])
-                else:
-                    team.start("sim", words)
-            name = [args.robot[1]] if args.robot and args.robot[1] else []
-            if driven:
-                team.start("pose-service", _flags(args, "shape", "size", "goals"))
-                team.start("controller", [*name, "--laps", args.laps])
-            if args.view is not None:
-                team.start("view", ["--port", str(args.view)])
-            if has_terminal and driven:
-                team.start("teleop", name)
+            for part, words in (({ROUTER: router} if router else {}) | parts).items():
+                team.start(part, words)
             failed = team.watch(stop)
         finally:
             team.end()
@@ -114,6 +60,31 @@ def main(argv: list[str]) -> int:
                 _restore(terminal)
             _report_last(log)
     return 1 if failed else 0
+
+
+def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]:
+    """The parts to start and their arguments. Exits with code 2 if a part would refuse one."""
+    robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
+    name = [args.robot[1]] if args.robot and args.robot[1] else []
+    sources = [word for package, folder in args.package for word in ("--package", f"{package}={folder}")]
+    sources += [word for variable in args.allow_env for word in ("--allow-env", variable)]
+    pace, goals = _flags(args, "rtf"), _flags(args, "shape", "size", "goals")
+    for verb, words in (("sim", pace), ("pose-service", goals)):
+        if words:
+            parser = command(verb).parser()
+            parser.prog = f"holozen {args.verb}"
+            parser.parse_args(words)
+    sim = [*robot, *sources, *pace, *_flags(args, "world", "drive"), *_state(args.state)]
+    shards = [f"{shard}/{args.shards}" for shard in range(1, args.shards + 1)]
+    parts = {f"sim {shard}": [*sim, "--shard", shard] for shard in shards} if args.shards > 1 else {"sim": sim}
+    driven = args.shards == 1 or args.robot  # else there is no robot yet
+    if driven:
+        parts |= {"pose-service": goals, "controller": [*name, "--laps", str(args.laps)]}
+    if args.view is not None:
+        parts["view"] = ["--port", str(args.view)]
+    if driven and has_terminal:
+        parts["teleop"] = name
+    return parts
 
 
 def _meeting(where: connection.Connection) -> tuple[connection.Connection, list[str]]:
@@ -256,7 +227,7 @@ def _end(running: dict[str, subprocess.Popen[bytes]], grace: float) -> None:
 
 
 def _flags(args: argparse.Namespace, *names: str) -> list[str]:
-    return [word for name in names if getattr(args, name) for word in (f"--{name}", getattr(args, name))]
+    return [word for name in names if getattr(args, name) for word in (f"--{name}", str(getattr(args, name)))]
 
 
 def _state(given: str | None) -> list[str]:
@@ -279,3 +250,37 @@ def _report_last(log: IO[str]) -> None:
     log.seek(0)
     for line in log.readlines()[-LAST_LINES:]:
         report(line.rstrip())
+
+
+def _robot(text: str) -> "tuple[Path, str]":
+    path, name = flags.robot_file(text)
+    return flags.file(str(path)), name
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--robot", type=_robot, metavar="FILE[=NAME]",
+        help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root)")  # fmt: skip
+    add("--world", type=flags.file, metavar="FILE", help="an SDF file (default: gazebo.world)")
+    add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
+    add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
+    flags.add_robot_sources(parser)
+    add("--shape", metavar="SHAPE",
+        help="of the goals: square, triangle, rectangle, infinity or hexagon (default: square)")  # fmt: skip
+    add("--size", metavar="M", help="the side of that shape (infinity: half its length) in m")
+    add("--goals", type=flags.file, metavar="FILE", help="goals from a file instead: x y theta a line")
+    add("--laps", type=flags.count(), metavar="N", default=0, help="times round the goals; 0: for ever (default: 0)")
+    add("--view", nargs="?", type=flags.count(), const=8080, metavar="PORT",
+        help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a free one)")  # fmt: skip
+    add("--shards", type=flags.count(1), default=1, metavar="N",
+        help="as many sims, which share the robots by name (default: 1)")  # fmt: skip
+    add("--state", metavar="DIR",
+        help="where software stops outlast it (default: HOLOZEN_STATE, else ~/.local/state/holozen)")  # fmt: skip
+    add("--no-restart", action="store_true", help="do not start a part again that died (its robots would stand)")
+
+
+ABOUT = (
+    "Start the sim, the controller, the pose service, and the teleop if there is a terminal; with --secure a router"
+    " too, unless --connect names one."
+)
+VERBS = by_name(Verb("up", ABOUT, "--robot my_bot.urdf.xacro", _arguments, run, json=None))

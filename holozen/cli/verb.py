@@ -8,11 +8,10 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from holozen.flags import Parser, package
+from holozen.flags import Parser
 from holozen.process import deferred_interrupt
 from holozen.suggest import suggest
 from holozen.transport import connection
-from holozen.transport.session import Opening
 
 if TYPE_CHECKING:
     from types import ModuleType
@@ -47,7 +46,8 @@ class Verb:
     """A verb, such as `topic list` or `plot`.
 
     `about` is its line of help, `arguments` adds its flags to a parser, `run` does the work and returns the exit code.
-    `json` is the help of its flag `--json`. The flags have its name as `verb`.
+    `json` is the help of its flag `--json`, None if it has none; `notes` are what its help says before the example.
+    `bus`: whether it has the flags of a connection. The flags have its name as `verb`, and `error` as of the parser.
     """
 
     def __init__(
@@ -57,14 +57,21 @@ class Verb:
         example: str,
         arguments: Callable[[argparse.ArgumentParser], object],
         run: Callable[[argparse.Namespace], int],
-        json: str = JSON,
+        json: str | None = JSON,
+        notes: str = "",
+        usage: str | None = None,
+        bus: bool = True,
     ) -> None:
         self.name, self.about, self._example = name, about, example
         self._arguments, self._run, self._json = arguments, run, json
+        self._notes, self._usage, self._bus = notes, usage, bus
 
     def main(self, argv: list[str]) -> int:
         """Run it with the words of a command line; returns the exit code."""
-        return self._run(self.parser().parse_args(argv))
+        parser = self.parser()
+        if any(action.nargs == argparse.REMAINDER for action in parser._actions):
+            return self._run(parser.parse_args(argv))
+        return self._run(parser.parse_intermixed_args(argv))  # flags may stand anywhere, also before a last value
 
     def parser(self) -> Parser:
         """Its parser alone."""
@@ -75,14 +82,17 @@ class Verb:
     def options(self) -> dict[str, Any]:
         """The arguments of its parser."""
         prog = f"holozen {self.name}"
-        return {"prog": prog, "description": self.about, "epilog": f"example: {prog} {self._example}".rstrip()}
+        epilog = f"{self._notes}example: {prog} {self._example}".rstrip()
+        return {"prog": prog, "usage": self._usage, "description": self.about, "epilog": epilog}
 
     def fill(self, parser: argparse.ArgumentParser) -> None:
         """Add all its flags to a parser."""
-        parser.set_defaults(verb=self.name)
+        parser.set_defaults(verb=self.name, error=parser.error)
         self._arguments(parser)
-        parser.add_argument("--json", action="store_true", help=self._json)
-        connection.add_arguments(parser)
+        if self._json:
+            parser.add_argument("--json", action="store_true", help=self._json)
+        if self._bus:
+            connection.add_arguments(parser)
         if self.name.partition(" ")[0] in ("topic", "service", "node", "param"):
             _add_ros2_flags(parser, self.name)
 
@@ -155,12 +165,6 @@ def _add_ros2_flags(parser: argparse.ArgumentParser, name: str) -> None:
             group.add_argument(option, action="store_true")
 
 
-def add_packages(parser: argparse.ArgumentParser) -> None:
-    """Add the flag `--package`, for verbs that look up types."""
-    parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR",
-        help="the folder of package NAME, whose msg and srv files define its types")  # fmt: skip
-
-
 def on_node(module: str, function: str) -> Callable[[argparse.Namespace], int]:
     """A verb's `run`: a function of a module of holozen.cli that takes the flags and a node, for samples as bytes. The
     module is loaded while the session opens.
@@ -185,6 +189,8 @@ def open_bus(args: argparse.Namespace, stop: threading.Event | None = None) -> B
 
 
 def _open(args: argparse.Namespace, stop: threading.Event | None, module: str, name: str) -> Any:
+    from holozen.transport.session import Opening  # loads zenoh
+
     opening = Opening(connection.from_arguments(args), stop=stop, early=True)
     try:
         kind = getattr(importlib.import_module(f"holozen.transport.{module}"), name)

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from holozen import flags
+from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.process import stop_event
 from holozen.robot.errors import RobotError
@@ -25,43 +26,13 @@ LOOK = 0.2  # s
 SETTLED = 0.05  # s without a change: an editor may truncate a file before writing it
 
 
-def parser() -> argparse.ArgumentParser:
-    parser = flags.Parser(
-        prog="holozen xacro",
-        description="Expand a xacro file to URDF.",
-        epilog="example: holozen xacro my_bot.urdf.xacro -o my_bot.urdf",
-    )
-    parser.add_argument("file", type=Path, help="the xacro file")
-    parser.add_argument("args", nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg")
-    parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
-    parser.add_argument("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
-        help="the folder of package NAME, for $(find NAME)")  # fmt: skip
-    parser.add_argument("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
-        help="let the file read this environment variable, as $(env NAME)")  # fmt: skip
-    text = "one JSON object a line: the URDF, or with --watch the result of each save"
-    parser.add_argument("--json", action="store_true", help=text)
-    watch = parser.add_argument_group("watch", "Expand again on every save, and respawn the robot in a running sim.")
-    watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
-    watch.add_argument("--name", type=flags.robot, metavar="NAME", help="the robot's name (default: as in the file)")
-    watch.add_argument("--drive", choices=flags.DRIVES, default="", help=flags.DRIVE)
-    for axis in "xy":
-        watch.add_argument(f"-{axis}", type=flags.number(-1000, 1000, "m"), metavar="m",
-            help="position at its first spawn; later it stays where it is")  # fmt: skip
-    connection.add_arguments(parser)
-    return parser
-
-
-def main(argv: list[str]) -> int:
-    args = parser().parse_intermixed_args(argv)
-    try:
-        _check(args)
-        given = dict(map(_pair, args.args)), dict(args.package), frozenset(args.allow_env)
-        if args.watch:
-            return watch(args, *given)
-        _give(args, expand_xacro(args.file, *given))
-    except RobotError as error:
-        report(f"holozen xacro: {error}")
-        return 1
+def run(args: argparse.Namespace) -> int:
+    """Expand a file, once or on every save."""
+    _check(args)
+    given = dict(args.args), dict(args.package), frozenset(args.allow_env)
+    if args.watch:
+        return watch(args, *given)
+    _give(args, expand_xacro(args.file, *given))
     return 0
 
 
@@ -109,13 +80,6 @@ def _check(args: argparse.Namespace) -> None:
         raise RobotError("--name, --drive, -x and -y are for --watch; `holozen spawn FILE` spawns once")
     if args.output and args.output.exists() and args.file.exists() and args.output.samefile(args.file):
         raise RobotError(f"-o {args.output} is the file that is expanded; write to another one")
-
-
-def _pair(text: str) -> tuple[str, str]:
-    name, assign, value = (part.strip() for part in text.partition(":="))
-    if not assign or not name:
-        raise RobotError(f"{text!r}: write name:=value")
-    return name, value
 
 
 def watch(
@@ -188,3 +152,25 @@ def _wait_for_save(inputs: Inputs, path: Path, packages: Mapping[str, Path], sto
         pass
     while (latest := now(saved, path, packages)) != saved and not stop.wait(SETTLED):
         saved = latest
+
+
+def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", type=Path, help="the xacro file")
+    parser.add_argument(
+        "args", type=flags.pair, nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg"
+    )
+    parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
+    flags.add_robot_sources(parser)
+    watch = parser.add_argument_group("watch", "Expand again on every save, and respawn the robot in a running sim.")
+    watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
+    watch.add_argument("--name", type=flags.robot, metavar="NAME", help="the robot's name (default: as in the file)")
+    watch.add_argument("--drive", choices=flags.DRIVES, default="", help=flags.DRIVE)
+    for axis in "xy":
+        watch.add_argument(f"-{axis}", type=flags.number(-1000, 1000, "m"), metavar="m",
+            help="position at its first spawn; later it stays where it is")  # fmt: skip
+
+
+VERBS = by_name(
+    Verb("xacro", "Expand a xacro file to URDF.", "my_bot.urdf.xacro -o my_bot.urdf", _arguments, run,
+        "one JSON object a line: the URDF, or with --watch the result of each save"),
+)  # fmt: skip

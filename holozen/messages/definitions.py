@@ -9,6 +9,7 @@ import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+from holozen.console import Failure
 from holozen.suggest import shorten, suggest
 
 LARGEST = 16_000_000  # bytes of the smallest message of a type; nested fixed arrays multiply
@@ -45,7 +46,7 @@ _BOOLS = {"true": True, "1": True, "false": False, "0": False}
 _SIZES = {"bool": 1, "byte": 1, "char": 1, "string": 4, "wstring": 4}
 
 
-class InterfaceError(ValueError):
+class InterfaceError(Failure, ValueError):
     """An unknown type, a malformed definition, or a value that does not fit its field. The text is one line."""
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from holozen.console import Failure
 from holozen.robot.errors import RobotError
 from holozen.ros import packages
 from holozen.suggest import listed, suggest
@@ -19,7 +20,7 @@ FOLDERS = ("scripts", "{package}", "nodes", "src", "bin")  # where scripts lie i
 _HEAD = 200  # bytes of a file that show whether it is a script
 
 
-class NotFound(ValueError):
+class NotFound(Failure, ValueError):
     """There is no such file, package or executable, or it is not a Python script. One line that lists what there is."""
 
 

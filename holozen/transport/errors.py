@@ -1,9 +1,11 @@
 """The errors of the bus. Each text is one line with the reason."""
 
+from holozen.console import Failure
+
 TIMEOUT = b"Timeout"  # Zenoh's own reply for a service that does not reply
 
 
-class BusError(Exception):
+class BusError(Failure):
     """The bus could not do what was asked."""
 
 

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from holozen.console import Failure
+
 _OURS = str(Path(__file__).resolve().parents[2]) + os.sep
 _TRUE, _FALSE = ("true", "1", "yes", "on"), ("false", "0", "no", "off")
 
 
-class LaunchError(Exception):
+class LaunchError(Failure):
     """An error in a launch file. One line; `place` is the file and line."""
 
     def __init__(self, message: str, place: str = "") -> None:

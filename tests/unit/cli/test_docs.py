@@ -1,13 +1,16 @@
 """docs/cli.md has the verbs and flags as they are, and every verb shows an example."""
 
-from holozen import cli
-from scripts.cli_table import MARK, PAGE, table
+from pathlib import Path
 
+from holozen import cli
+from scripts.table_of_verbs import table
+
+PAGE = Path(__file__).parents[3] / "docs" / "cli.md"
 VERBS = [(noun, verb) for noun in ("topic", "service", "node", "param") for verb in cli.command(noun).modules]
 
 
 def test_the_table_of_the_verbs_is_current() -> None:
-    assert PAGE.read_text().endswith(MARK + table()), "scripts/cli-table writes it anew"
+    assert f"<!-- table -->\n{table()}\n<!-- /table -->\n" in PAGE.read_text(), "scripts/tables writes it anew"
 
 
 def test_a_row_has_three_cells() -> None:

@@ -49,8 +49,6 @@ def test_what_fails_is_one_line(file: Path, capsys: pytest.CaptureFixture[str]) 
         (["FILE", "-o", "."], "holozen xacro: cannot write .: Is a directory\n"),
         (["FILE", "-o", "FILE"], "holozen xacro: -o "),
         (["FILE", "--name", "Fred"], "holozen xacro: --name, --drive, -x and -y are for --watch; "),
-        (["FILE", "name=Fred"], "holozen xacro: 'name=Fred': write name:=value\n"),
-        (["FILE", ":=Fred"], "holozen xacro: ':=Fred': write name:=value\n"),
         (
             ["FILE", "-o", "no/such/folder/x"],
             "holozen xacro: cannot write no/such/folder/x: No such file or directory\n",

@@ -34,5 +34,5 @@ def test_up_starts_no_page_whose_token_the_teleop_would_hide(
     monkeypatch.setattr("sys.stdout", SimpleNamespace(isatty=lambda: True))
     monkeypatch.setattr(up, "Team", lambda *_: pytest.fail("it starts"))
     with pytest.raises(SystemExit):
-        up.main(["--view", "--private"])
+        up.VERBS["up"].main(["--view", "--private"])
     assert "run `holozen view` in another terminal" in capsys.readouterr().err

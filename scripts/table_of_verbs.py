@@ -1,38 +1,27 @@
-"""`scripts/cli-table`: writes the table of the command line, read off the parsers, to the end of docs/cli.md."""
+"""The table of docs/cli.md: the command line, read off the parsers."""
 
 import argparse
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from holozen import cli
-from holozen.cli.verb import ROS2_TITLE, Service
+from holozen.cli.verb import ROS2_TITLE, Noun, Service
 
-PAGE = Path(__file__).parents[1] / "docs" / "cli.md"
-MARK = "<!-- table -->\n"
 LEFT_OUT = ("zenoh", ROS2_TITLE)  # groups of flags that many verbs have
 
 
 def table() -> str:
     """A row for each verb: how it is called, what it does, its flags, an example."""
     rows = [_row(parser) for verb in cli.VERBS for parser in _parsers(cli.command(verb))]
-    return "\n".join(["| command | does | flags |", "|---|---|---|", *rows]) + "\n"
+    return "\n".join(["| command | does | flags |", "|---|---|---|", *rows])
 
 
 def _parsers(command: Any) -> Iterator[argparse.ArgumentParser]:
-    yield from _verbs(command.parser())
-    if isinstance(command, Service):
+    """The parsers of a verb, of the verbs of a noun, or of a service and its verbs."""
+    if not isinstance(command, Noun) or isinstance(command, Service):
+        yield command.parser()
+    if isinstance(command, Noun):
         yield from (command.verb(name).parser() for name in command.modules)
-
-
-def _verbs(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    """The parsers of the verbs of a noun; a verb's own."""
-    inner = [action for action in parser._actions if isinstance(action, argparse._SubParsersAction)]
-    if not inner:
-        yield parser
-    for action in inner:
-        for child in action.choices.values():
-            yield from _verbs(child)
 
 
 def _row(parser: argparse.ArgumentParser) -> str:
@@ -66,9 +55,3 @@ def _flag(action: argparse.Action) -> str:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|")
-
-
-if __name__ == "__main__":
-    head, mark, _ = PAGE.read_text().partition(MARK)
-    assert mark, f"{PAGE} lost its {MARK.strip()} mark"
-    PAGE.write_text(f"{head}{mark}{table()}")

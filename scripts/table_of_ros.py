@@ -1,4 +1,4 @@
-"""Prints the table of docs/coming-from-ros.md: every name of ROS that scripts find here, read off the code."""
+"""The tables of docs/coming-from-ros.md: every name of ROS that scripts find here, read off the code."""
 
 from collections.abc import Iterable
 from enum import Enum
@@ -9,17 +9,18 @@ from holozen.messages.registry import tables
 from holozen.ros.catalog import HINTS, INTERNAL, MODULES, REEXPORTS
 
 
-def main() -> None:
+def table() -> str:
+    """A row for each module, class and name that is not here."""
     modules = [row(aliases(ours), import_module(ours).__all__) for ours in dict.fromkeys(MODULES.values())]
     reexports = [row(f"`{module}`", sorted(names)) for module, names in REEXPORTS.items()]
     members = [row(f"`{kind.__name__}`", public(kind)) for kind in classes()]
     packages = ", ".join(f"`{name}`" for name in sorted({*tables()} - {"holozen"}))
     instead = [f"| `{name}` | {hint.replace('|', chr(92) + '|')} |" for name, hint in sorted(HINTS.items())]
-    print("| module | its names |", "|---|---|", *modules, sep="\n")
-    print("\n| module | names that it has from other modules, as in ROS |", "|---|---|", *reexports, sep="\n")
-    print("\n| class | its members |", "|---|---|", *members, sep="\n")
-    print(f"\nInterfaces: {packages}, and those of any package that is found.")
-    print("\n| not here | instead |", "|---|---|", *instead, sep="\n")
+    rows = ["| module | its names |", "|---|---|", *modules]
+    rows += ["\n| module | names that it has from other modules, as in ROS |", "|---|---|", *reexports]
+    rows += ["\n| class | its members |", "|---|---|", *members]
+    rows += [f"\nInterfaces: {packages}, and those of any package that is found."]
+    return "\n".join([*rows, "\n| not here | instead |", "|---|---|", *instead])
 
 
 def aliases(ours: str) -> str:
@@ -50,4 +51,4 @@ def row(head: str, names: Iterable[str]) -> str:
 
 
 if __name__ == "__main__":
-    main()
+    print(table())
