@@ -21,7 +21,7 @@ VERBS = {
     "view": "show the robots in a browser, and drive them from there",
     "pose-service": "answer next_goal and get_pose",
     "router": "run a Zenoh router",
-    "ros2": "join ROS 2 nodes that use rmw_zenoh",
+    "ros2": "join ROS 2 nodes, by rmw_zenoh or a bridge to DDS",
     "secure": "init, add, revoke, show",
     "run": "run a Python script that was written for ROS 2",
     "launch": "run a Python launch file that was written for ROS 2",

@@ -1,4 +1,4 @@
-"""`holozen ros2`: joins the wire with ROS 2 nodes that use rmw_zenoh."""
+"""`holozen ros2`: joins the wire with ROS 2 nodes that use rmw_zenoh, or that a bridge to DDS connects."""
 
 import argparse
 import os
@@ -15,16 +15,24 @@ EVERY = 0.05  # s between two looks at the nodes
 
 def run(args: argparse.Namespace) -> int:
     """Join both until Ctrl-C."""
-    where = connection.from_arguments(args)
+    if args.bridge and (args.humble or args.ros_domain_id is not None):
+        flag = "--humble" if args.humble else "--ros-domain-id"
+        args.error(f"{flag} is for rmw_zenoh; with --bridge give the bridge its domain and distribution")
+    where, domain = connection.from_arguments(args), _domain(args)
     if where.secure:
         args.error("--secure: no certificate vouches for what ROS 2 nodes write, so they cannot be let in")
     where = where.replace(cfg=(STAMPED, *where.cfg))
-    from holozen.transport.ros_gateway import NODE, Gateway
+    from holozen.transport import rmw_zenoh, ros2dds
+    from holozen.transport.ros_gateway import NODE, Gateway, open_bridges
 
     stop = stop_event()
     with Bus(NODE, where, lasting=True, stop=stop) as bus:
-        gateway = Gateway(bus, args.ros_domain_id)
-        report(f"{NODE}: joins ROS 2's domain {args.ros_domain_id} at {bus.where}; Ctrl-C ends it")
+        if args.bridge:
+            gateway = Gateway(bus, ros2dds.Form(), open_bridges(args.bridge, STAMPED))
+            report(f"{NODE}: joins ROS 2 behind the bridge at {', '.join(args.bridge)} and {bus.where}; Ctrl-C ends it")
+        else:
+            gateway = Gateway(bus, rmw_zenoh.Form(domain, args.humble), bus.session)
+            report(f"{NODE}: joins ROS 2's domain {domain} at {bus.where}; Ctrl-C ends it")
         while not (why := gateway.update()) and not stop.wait(EVERY):
             pass
         gateway.close()
@@ -33,15 +41,30 @@ def run(args: argparse.Namespace) -> int:
     return 1 if why else 0
 
 
+def _domain(args: argparse.Namespace) -> int:
+    """The domain of the flag, or that of the environment."""
+    if args.ros_domain_id is not None:
+        return int(args.ros_domain_id)
+    try:
+        return connection.domain(os.environ.get("ROS_DOMAIN_ID") or "0")
+    except argparse.ArgumentTypeError as error:
+        args.error(f"ROS_DOMAIN_ID {error}")
+        raise
+
+
 def _arguments(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--bridge", action="append", type=connection.endpoint, default=[], metavar="ENDPOINT",
+        help="where a zenoh-bridge-ros2dds listens, such as tcp/192.168.1.5:7447; can be repeated")  # fmt: skip
     parser.add_argument(
-        "--ros-domain-id", type=connection.domain, default=os.environ.get("ROS_DOMAIN_ID") or "0", metavar="N",
-        help="as ROS_DOMAIN_ID of the ROS 2 nodes (default: that variable here, else 0)",
+        "--ros-domain-id", type=connection.domain, metavar="N",
+        help="as ROS_DOMAIN_ID of the nodes with rmw_zenoh (default: that variable here, else 0); a bridge has its own",
     )  # fmt: skip
+    parser.add_argument("--humble", action="store_true",
+        help="the nodes with rmw_zenoh are of ROS 2 Humble, where keys hold no type hashes")  # fmt: skip
 
 
 ABOUT = (
-    "Join the keys here with the topics of ROS 2 nodes that use rmw_zenoh: they see our topics and services, and we see"
-    " their topics. What a ROS 2 node publishes on cmd_vel has the priority of plain data."
+    "Join the keys here with the topics and services of ROS 2 nodes: those with rmw_zenoh, or with --bridge all behind"
+    " a zenoh-bridge-ros2dds. What ROS 2 publishes on cmd_vel has the priority of plain data."
 )
 VERBS = by_name(Verb("ros2", ABOUT, "--connect tcp/192.168.1.5:7447", _arguments, run, json=None))

@@ -27,6 +27,10 @@ M = TypeVar("M", bound="Message")
 R = TypeVar("R", bound="Message")
 
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
+NO_ENCODING = "zenoh/bytes"  # Zenoh's default
+UNTYPED = (
+    "CDR without an Encoding, so of no certain type; what a bridge to ROS 2 sends comes in by `holozen ros2 --bridge`"
+)
 GETS = 256  # waiting queries for a publisher's last value; beyond, the oldest get no reply
 
 
@@ -122,7 +126,13 @@ class Bus(Node):
         raw = self.subscribe_raw(key, depth, limit)
         raw.ends.append(self.announce("sub", kinds[0].ROS, key))
         is_command = wire.is_command(key, kinds)
-        return Subscription(raw, kinds, tolerant=not is_command, refusal=self._unproven if is_command else None)
+        return Subscription(raw, kinds, tolerant=not is_command, refusal=self._refusal if is_command else None)
+
+    def _refusal(self, sample: Sample) -> str:
+        """Why a command is not read, before its payload is."""
+        if sample.encoding == NO_ENCODING and sample.payload[:1] == b"\0":
+            return UNTYPED
+        return self._unproven(sample) if self._unproven else ""
 
     @cached_property
     def _unproven(self) -> Callable[[Sample], str] | None:

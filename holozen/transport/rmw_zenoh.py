@@ -9,13 +9,20 @@ from __future__ import annotations
 import hashlib
 import re
 import struct
+import time
 from typing import NamedTuple
+
+from holozen.messages.definitions import Interface
+from holozen.messages.type_hash import type_hash
+from holozen.transport.errors import ServiceError
+from holozen.transport.samples import Sample
 
 TOPIC = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
 """What a topic or a service may be called, without the slash at its beginning."""
 QOS = "::,10:,:,:,,"  # ROS 2's default: reliable, volatile, the last 10
 LATCHED_QOS = ":1:,1:,:,:,,"  # transient local, the last one
 KINDS = {"MP": "pub", "MS": "sub", "SS": "srv"}
+NO_HASH = "TypeHashNotSupported"  # in the place of hashes in ROS 2 Humble
 _CODES = {kind: code for code, kind in KINDS.items()}
 _ATTACHMENT = struct.Struct("<qqB16s")
 _TYPE = re.compile(r"([A-Za-z]\w*)::(msg|srv)::dds_::([A-Za-z]\w*)_")
@@ -36,20 +43,68 @@ class Endpoint(NamedTuple):
     number: int = 0  # within its session
     latched: bool = False
 
-    def key(self, domain: int) -> str:
+
+class Form:
+    """What the gateway writes and reads in a domain. `humble`: without the hashes of types."""
+
+    shows_readers = True  # by their tokens
+
+    def __init__(self, domain: int, humble: bool = False) -> None:
+        self.domain, self.humble = domain, humble
+
+    @property
+    def tokens(self) -> str:
+        """Where the liveliness tokens are."""
+        return f"@ros2_lv/{self.domain}/**"
+
+    def parse(self, token: str) -> Endpoint | None:
+        """See `parse`."""
+        return parse(token)
+
+    def key(self, endpoint: Endpoint) -> str:
         """The key of its samples or requests."""
-        return f"{domain}/{self.topic}/{dds_type(self.type)}/{self.hash}"
+        return f"{self.domain}/{endpoint.topic}/{dds_type(endpoint.type)}/{endpoint.hash}"
 
-    def token(self, domain: int, node_number: int) -> str:
+    def node_token(self, session: str, number: int, node: str) -> str:
+        """The key of a node's liveliness token."""
+        return f"@ros2_lv/{self.domain}/{session}/{number}/{number}/NN/%/%/{node}"
+
+    def token(self, endpoint: Endpoint, node_number: int) -> str:
         """The key of its liveliness token; `node_number` is that of its node."""
-        start = f"@ros2_lv/{domain}/{self.session}/{node_number}/{self.number}/{_CODES[self.kind]}/%/%/{self.node}"
-        qos = LATCHED_QOS if self.latched else QOS
-        return f"{start}/{_mangled(self.topic)}/{dds_type(self.type)}/{self.hash}/{qos}"
+        place = f"{endpoint.session}/{node_number}/{endpoint.number}/{_CODES[endpoint.kind]}/%/%/{endpoint.node}"
+        name, qos = _mangled(endpoint.topic), LATCHED_QOS if endpoint.latched else QOS
+        return f"@ros2_lv/{self.domain}/{place}/{name}/{dds_type(endpoint.type)}/{endpoint.hash}/{qos}"
 
+    def hash(self, interface: Interface) -> str:
+        """The hash of a type, as keys and tokens have it."""
+        return NO_HASH if self.humble else type_hash(interface)
 
-def node_token(domain: int, session: str, number: int, node: str) -> str:
-    """The key of a node's liveliness token."""
-    return f"@ros2_lv/{domain}/{session}/{number}/{number}/NN/%/%/{node}"
+    def mismatch(self, theirs: Endpoint, interface: Interface) -> str:
+        """Why its samples cannot be read; empty if they can."""
+        if theirs.hash == self.hash(interface):
+            return ""
+        if (theirs.hash == NO_HASH) != self.humble:
+            return f"{theirs.node} is {'not ' if self.humble else ''}of ROS 2 Humble; see --humble"
+        return f"its {theirs.type} is not the one known here"
+
+    def attachment(self, number: int, gid: bytes) -> bytes | None:
+        """What a sample or a request of ours carries."""
+        return Attachment(number, time.time_ns(), gid).packed()
+
+    def answered(self, request: bytes) -> bytes | None:
+        """What a reply carries, by the attachment of its request. Raises ServiceError."""
+        stamp = attachment(request)
+        if stamp is None:
+            raise ServiceError("a request of rmw_zenoh has an attachment of 33 bytes")
+        return stamp._replace(sent=time.time_ns()).packed()
+
+    def stamp(self, sample: Sample) -> Attachment | None:
+        """When and by whom a sample was sent; None if it does not say so."""
+        return attachment(sample.attachment)
+
+    def writer(self, stamp: Attachment) -> str:
+        """The session that must hold a token of the sample's topic and type: none, as its key has both."""
+        return ""
 
 
 def parse(token: str) -> Endpoint | None:

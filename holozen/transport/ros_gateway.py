@@ -1,8 +1,10 @@
-"""Joins the wire with a ROS 2 graph on Zenoh (rmw_zenoh): what one side has appears on the other, and is carried there
-while something there reads it.
+"""Joins the wire with a ROS 2 graph on Zenoh: what one side has appears on the other, and is carried there while
+something there reads it.
 
-Both sides are one Zenoh network: the gateway copies between its keys, so a sample takes one more hop. Nothing that it
-carries comes back to it, as its readers take only what other sessions wrote. For that there must be no second gateway.
+With rmw_zenoh both sides are one Zenoh network, and the gateway copies between its keys. Bridges have keys as ours with
+other bytes, so they are a network of their own, where the gateway has a second session. Either way a sample takes one
+more hop. Nothing that it carries comes back to it, as its readers take only what other sessions wrote. For that there
+must be no second gateway.
 """
 
 from __future__ import annotations
@@ -10,8 +12,9 @@ from __future__ import annotations
 import contextlib
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import count
 from typing import TYPE_CHECKING, Any
 
 import zenoh
@@ -21,12 +24,14 @@ from holozen.console import report
 from holozen.messages import CodecError, cdr, codec
 from holozen.messages.definitions import Interface, InterfaceError
 from holozen.messages.registry import Registry
-from holozen.messages.type_hash import type_hash
 from holozen.transport import graph as graphs
 from holozen.transport import rmw_zenoh as rmw
+from holozen.transport import ros2dds
+from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.samples import Answers, RawSubscriber, Sample, stamps
 from holozen.transport.services import MAX_REQUEST_BYTES, RING, call_bytes, refuse
+from holozen.transport.session import close, configuration, one_line
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
@@ -42,32 +47,52 @@ Route = tuple[str, str]  # topic and type
 Ends = list[Callable[[], object]]
 
 
-class Gateway:
-    """Call `update` again and again; it returns why the gateway has to end, or "". `close` withdraws everything."""
+def open_bridges(endpoints: Sequence[str], stamped: tuple[str, str]) -> Any:
+    """A session that meets only bridges, which listen at `endpoints` now or later. Raises BusError."""
+    alone = (("listen/endpoints", "[]"), stamped)
+    config = configuration(Connection(connect=tuple(endpoints), listen=(), cfg=alone))
+    with one_line(f"--bridge {', '.join(endpoints)}"):
+        return zenoh.open(config)
 
-    def __init__(self, bus: Bus, domain: int) -> None:
-        self._bus, self._domain, self._registry = bus, domain, Registry()
-        self._ours = bus.graph()
-        live = bus.session.liveliness()
+
+class Gateway:
+    """Call `update` again and again; it returns why the gateway has to end, or "". `close` withdraws everything.
+
+    `there` is the session on ROS 2's side, which has the `form` of its keys.
+    """
+
+    def __init__(self, bus: Bus, form: rmw.Form | ros2dds.Form, there: Any) -> None:
+        self._bus, self._form, self._there, self._registry = bus, form, there, Registry()
+        self._ours, self._id = bus.graph(), str(there.zid())
         tokens: Any = zenoh.handlers.RingChannel(4096)
-        self._tokens = live.declare_subscriber(f"@ros2_lv/{domain}/**", tokens, history=True)
+        self._tokens = there.liveliness().declare_subscriber(form.tokens, tokens, history=True)
         self._theirs: dict[str, rmw.Endpoint] = {}  # by token
+        # Seen from its own session always; from another one if that is on the same network.
+        same = "" if there is bus.session else f"@holozen/{bus.id}/**"
+        self._same = same and there.liveliness().declare_subscriber(same, zenoh.handlers.RingChannel(1), history=True)
+        self._writers: set[tuple[str, str, str]] = set()  # session, topic and type of their publishers
         self._numbers: dict[str, int] = {}  # of our nodes and endpoints, in the ROS graph
         self._held: dict[Any, Ends] = {}  # tokens, services and routes, and what ends each
         self._types: dict[str, Interface | None] = {}
         self._reported: set[str] = set()
+        self._bridges: set[str] = set()  # those with a link
 
     def update(self) -> str:
         """Follow both graphs."""
         while (change := self._tokens.try_recv()) is not None:
             token = str(change.key_expr)
             self._theirs.pop(token, None)
-            endpoint = rmw.parse(token)
-            if change.kind == zenoh.SampleKind.PUT and endpoint and endpoint.session != self._bus.id:
+            endpoint = self._form.parse(token)
+            if change.kind == zenoh.SampleKind.PUT and endpoint and endpoint.session != self._id:
                 self._theirs[token] = endpoint
+            # Replaced as a whole, since the routes' threads read it.
+            self._writers = {(one.session, one.topic, one.type) for one in self._theirs.values() if one.kind == "pub"}
+        self._report_bridges()
         everything = self._ours.endpoints()
         if any(one.kind == "node" and one.node == NODE and one.session < self._bus.id for one in everything):
             return "another `holozen ros2` runs here; what both carry would go round and round"
+        if self._same and self._same.try_recv():
+            return "the bridge is on our own network, where what is carried would go round: give it one of its own"
         ours = [one for one in everything if one.session != self._bus.id and not one.node.startswith(NODES)]
         wanted = {**self._announced(ours), **self._routes(ours)}
         for gone in self._held.keys() - wanted.keys():
@@ -83,6 +108,17 @@ class Gateway:
             for end in ends:
                 end()
         self._held.clear()
+        if self._there is not self._bus.session:
+            close(self._there)
+
+    def _report_bridges(self) -> None:
+        if self._there is self._bus.session:
+            return
+        info = self._there.info
+        now = {str(one)[:6] for one in (*info.routers_zid(), *info.peers_zid())}
+        for one in sorted(now ^ self._bridges):
+            report(f"{NODE}: bridge {one} {'is there' if one in now else 'is gone'}")
+        self._bridges = now
 
     def _announced(self, ours: list[graphs.Endpoint]) -> dict[Any, Callable[[], Ends]]:
         """What each side has to be shown of the other, with a function that shows it."""
@@ -90,28 +126,37 @@ class Gateway:
         for one in ours:
             number, name = self._named(one.node)
             if one.kind == "node":
-                wanted[one] = partial(self._show, rmw.node_token(self._domain, self._bus.id, number, name))
+                wanted[one] = partial(self._show, self._form.node_token(self._id, number, name))
             elif found := self._exported(one):
-                wanted[one] = partial(
-                    self._show, found.token(self._domain, number), found if one.kind == "srv" else None
-                )
+                wanted[one] = partial(self._show, self._form.token(found, number), found)
         for theirs in self._theirs.values():
-            shown = graphs.Endpoint(theirs.topic, theirs.kind, theirs.type, NODES + theirs.node, self._bus.id)
-            if theirs.kind != "srv":  # a call of theirs is not carried
-                wanted[shown] = partial(self._show, graphs.token(shown))
+            if theirs.kind != "srv":
+                shown = graphs.Endpoint(theirs.topic, theirs.kind, theirs.type, NODES + theirs.node, self._bus.id)
+                wanted[shown] = partial(self._hold, self._bus.session, graphs.token(shown))
+            elif self._may_offer(theirs, ours):
+                wanted["call", theirs.topic, theirs.type] = partial(self._offer, theirs)
         return wanted
 
-    def _show(self, token: str, service: rmw.Endpoint | None = None) -> Ends:
-        shown = _quietly(self._bus.session.liveliness().declare_token(token).undeclare)
-        return [shown, self._serve(service)] if service else [shown]
+    def _hold(self, session: Any, token: str) -> Ends:
+        return [_quietly(session.liveliness().declare_token(token).undeclare)]
+
+    def _show(self, token: str, found: rmw.Endpoint | None = None) -> Ends:
+        """Show a node or an endpoint of ours to ROS 2, and answer the calls of a service."""
+        ends = self._hold(self._there, token) if token else []
+        if found and found.kind == "sub" and not self._form.shows_readers:
+            reader = self._there.declare_subscriber(self._form.key(found), zenoh.handlers.RingChannel(1))
+            ends.append(_quietly(reader.undeclare))
+        if found and found.kind == "srv":
+            ends.append(self._serve(found))
+        return ends
 
     def _routes(self, ours: list[graphs.Endpoint]) -> dict[Any, Callable[[], Ends]]:
         """What has to be carried, with a function that begins it."""
         wanted: dict[Any, Callable[[], Ends]] = {}
-        read = {(one.topic, one.type, one.hash) for one in self._theirs.values() if one.kind == "sub"}
+        read = {(one.topic, one.type) for one in self._theirs.values() if one.kind == "sub" and self._is_known(one)}
         for one in ours:
             found = self._exported(one) if one.kind == "pub" else None
-            if found and (found.latched or (found.topic, found.type, found.hash) in read):
+            if found and (found.latched or (found.topic, found.type) in read):
                 wanted["out", found.topic, found.type] = partial(self._carry_out, found)
         for theirs in self._theirs.values():
             if theirs.kind == "pub" and graphs.on_key(ours, theirs.topic, "sub") and self._may_enter(theirs, ours):
@@ -126,7 +171,7 @@ class Gateway:
         latched = one.kind == "pub" and one.key.rpartition("/")[2] in wire.LATCHED
         number, name = self._numbers.setdefault(f"{one}", len(self._numbers)), self._named(one.node)[1]
         return rmw.Endpoint(
-            one.kind, one.key, interface.name, type_hash(interface), name, self._bus.id, number, latched
+            one.kind, one.key, interface.name, self._form.hash(interface), name, self._id, number, latched
         )
 
     def _named(self, node: str) -> tuple[int, str]:
@@ -147,13 +192,28 @@ class Gateway:
         interface = self._interface(theirs.type)
         if not interface:
             return self._refuse(theirs.topic, f"its type {theirs.type} is not known here")
-        if type_hash(interface) != theirs.hash:
-            return self._refuse(theirs.topic, f"its {theirs.type} is not the one known here")
+        if why := self._form.mismatch(theirs, interface):
+            return self._refuse(theirs.topic, why)
         row = wire.topic(theirs.topic)
         writers = graphs.on_key(ours, theirs.topic, "pub")
         if row and not row.is_command and row.key not in SHARED and writers:
             return self._refuse(theirs.topic, f"{writers[0].node} publishes {theirs.topic} here")
         return True
+
+    def _may_offer(self, theirs: rmw.Endpoint, ours: list[graphs.Endpoint]) -> bool:
+        """Whether a service of theirs may be called from our side. Most of each node's have types not known here."""
+        interface = self._interface(theirs.type)
+        if not interface or interface.kind != "srv":
+            return False
+        if why := self._form.mismatch(theirs, interface):
+            return self._refuse(theirs.topic, why)
+        if servers := graphs.on_key(ours, theirs.topic, "srv"):
+            return self._refuse(theirs.topic, f"{servers[0].node} serves {theirs.topic} here")
+        return True
+
+    def _is_known(self, theirs: rmw.Endpoint) -> bool:
+        interface = self._interface(theirs.type)
+        return bool(interface and not self._form.mismatch(theirs, interface))
 
     def _refuse(self, topic: str, why: str) -> bool:
         """Report once why something of a topic is not carried. Returns False."""
@@ -163,9 +223,9 @@ class Gateway:
             report(f"{NODE}: {text}")
         return False
 
-    def _reader(self, key: str, work: Callable[[Sample], None]) -> Callable[[], object]:
+    def _reader(self, session: Any, key: str, work: Callable[[Sample], None]) -> Callable[[], object]:
         """Do `work` with each sample of other sessions on a key, in a thread."""
-        subscriber = self._bus.session.declare_subscriber(
+        subscriber = session.declare_subscriber(
             key, zenoh.handlers.RingChannel(DEPTH), allowed_origin=zenoh.Locality.REMOTE
         )
         raw = RawSubscriber(subscriber)
@@ -174,8 +234,8 @@ class Gateway:
 
     def _carry_out(self, found: rmw.Endpoint) -> Ends:
         """Our samples, in CDR, to ROS 2."""
-        session, interface = self._bus.session, self._registry.find(found.type)
-        key, gid, number = found.key(self._domain), rmw.gid(found.token(self._domain, 0)), 0
+        session, interface = self._there, self._registry.find(found.type)
+        key, gid, number = self._form.key(found), rmw.gid(self._form.token(found, 0)), 0
         if found.latched:
             from zenoh.ext import CacheConfig, declare_advanced_publisher
 
@@ -192,11 +252,9 @@ class Gateway:
                 self._refuse(found.topic, str(error))
                 return
             number += 1
-            publisher.put(
-                payload, encoding="application/cdr", attachment=rmw.Attachment(number, time.time_ns(), gid).packed()
-            )
+            publisher.put(payload, encoding="application/cdr", attachment=self._form.attachment(number, gid))
 
-        ends = [self._reader(found.topic, put), _quietly(publisher.undeclare)]
+        ends = [self._reader(self._bus.session, found.topic, put), _quietly(publisher.undeclare)]
         for sample in self._bus.ask(found.topic, 0.5) if found.latched else ():
             if isinstance(sample, Sample):
                 put(sample)
@@ -214,9 +272,13 @@ class Gateway:
         _ = self._bus.stamp  # from now on this session answers for its clock
 
         def put(sample: Sample) -> None:
-            stamp = rmw.attachment(sample.attachment)
+            stamp = self._form.stamp(sample)
             if stamp is None:
-                self._refuse(key, "a sample came without the attachment of rmw_zenoh")
+                self._refuse(key, "a sample does not say when it was sent, as all of ROS 2 do")
+                return
+            writer = self._form.writer(stamp)
+            if writer and (writer, key, theirs.type) not in self._writers:
+                self._refuse(key, f"a sample came from {writer[:6]}, which announces no publisher of {theirs.type}")
                 return
             if stamp.gid not in ages:
                 if len(ages) == MANY:
@@ -228,7 +290,7 @@ class Gateway:
                 return
             publisher.put(sample.payload, attachment=stamped())
 
-        return [self._reader(theirs.key(self._domain), put), _quietly(publisher.undeclare)]
+        return [self._reader(self._there, self._form.key(theirs), put), _quietly(publisher.undeclare)]
 
     def _source(self, theirs: rmw.Endpoint, gid: bytes) -> str:
         """What a publisher is called on our side: its node, where that is the only one on the topic."""
@@ -237,29 +299,32 @@ class Gateway:
 
     def _serve(self, found: rmw.Endpoint) -> Callable[[], object]:
         """Answer ROS 2's calls of one of our services."""
-        key = found.key(self._domain)
-        queryable = self._bus.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=True)
+        return self._answers(self._there, self._form.key(found), partial(self._answer, found))
+
+    def _answers(self, session: Any, key: str, reply: Callable[[Any], None]) -> Callable[[], object]:
+        """Answer the queries on a key by `reply`, in a thread, and those with an error for which it raises one."""
+        queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=True)
 
         def answer(query: Any) -> None:
             try:
-                self._answer(query, found, key)
+                if len(query.payload or b"") > MAX_REQUEST_BYTES:
+                    raise ServiceError(f"a request of {len(query.payload)} bytes; at most {MAX_REQUEST_BYTES}")
+                reply(query)
             except (ServiceError, CodecError, InterfaceError) as error:
                 refuse(query, str(error))
-            except BusError:  # the bus is closed, and with it the queryable
+            except (BusError, zenoh.ZError):  # the session is closed, and with it the queryable
                 pass
 
         return _quietly(Answers(queryable, answer).close)
 
-    def _answer(self, query: Any, found: rmw.Endpoint, key: str) -> None:
+    def _answer(self, found: rmw.Endpoint, query: Any) -> None:
         interface = self._registry.find(found.type)
         assert interface.request
         assert interface.response
-        stamp = rmw.attachment(bytes(query.attachment or b""))
-        if stamp is None or query.payload is None or len(query.payload) > MAX_REQUEST_BYTES:
-            raise ServiceError("a request of rmw_zenoh has a payload and an attachment of 33 bytes")
+        attachment = self._form.answered(bytes(query.attachment or b""))
         request = f"application/cdr;{interface.request.name}"
         try:
-            (reply,) = call_bytes(self._bus, found.topic, bytes(query.payload), request, CALL)
+            (reply,) = call_bytes(self._bus, found.topic, bytes(query.payload or b""), request, CALL)
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)
         except ServiceError as error:
             names = {field.name for field in interface.response.fields}
@@ -267,8 +332,33 @@ class Gateway:
                 raise
             # A client of ROS 2 takes no notice of an error reply, and would wait for ever.
             payload = cdr.write(interface.response, {"success": False, "message": str(error)})
-        answered = stamp._replace(sent=time.time_ns()).packed()
-        query.reply(key, payload, encoding="application/cdr", attachment=answered)
+        query.reply(self._form.key(found), payload, encoding="application/cdr", attachment=attachment)
+
+    def _offer(self, theirs: rmw.Endpoint) -> Ends:
+        """Let a service of ROS 2 be called on our side."""
+        interface, numbers, key = self._registry.find(theirs.type), count(1), self._form.key(theirs)
+        assert interface.request
+        assert interface.response
+        asked, answered = interface.request, interface.response
+        gid = rmw.gid(self._form.token(theirs._replace(session=self._id), 0))
+
+        def answer(query: Any) -> None:
+            payload = codec.transcoded(asked, bytes(query.payload or b"{}"), str(query.encoding or ""))
+            attachment = self._form.attachment(next(numbers), gid)
+            for reply in self._there.get(
+                key, payload=payload, encoding="application/cdr", attachment=attachment, timeout=CALL
+            ):
+                if not reply.ok:
+                    raise ServiceError(f"/{theirs.topic} of ROS 2: {bytes(reply.err.payload).decode(errors='replace')}")
+                found = bytes(reply.ok.payload)
+                cdr.read(answered, found)
+                query.reply(theirs.topic, found, encoding=f"application/cdr;{answered.name}")
+                return
+            raise ServiceError(f"/{theirs.topic} of ROS 2 did not reply within {CALL:g} s")
+
+        shown = graphs.Endpoint(theirs.topic, "srv", theirs.type, NODES + theirs.node, self._bus.id)
+        token = self._hold(self._bus.session, graphs.token(shown))
+        return [*token, self._answers(self._bus.session, theirs.topic, answer)]
 
 
 def _moves(type_name: str, key: str) -> bool:

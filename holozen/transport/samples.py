@@ -162,6 +162,12 @@ class Sample:
         return self._stamp[0]
 
     @property
+    def timestamp(self) -> tuple[int, str] | None:
+        """Zenoh's own timestamp: ns since 1970, and the session that made it, a router's if its sender made none."""
+        stamp = self._sample.timestamp
+        return stamp and (stamp.get_time_as_ntp64().as_nanos(), str(stamp.get_id()))
+
+    @property
     def number(self) -> tuple[str, int] | None:
         """The publisher's id and its sequence number; None without them."""
         info = self._sample.source_info

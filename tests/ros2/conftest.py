@@ -1,7 +1,9 @@
-"""Nodes of zenoh-ros2-sdk, an implementation of rmw_zenoh's protocol that shares no code with ours."""
+"""Nodes of zenoh-ros2-sdk, an implementation of rmw_zenoh's protocol that shares no code with ours; and the bridge."""
 
 import contextlib
+import subprocess
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -9,6 +11,12 @@ import pytest
 from holozen.messages.definitions import whole_text
 from holozen.messages.registry import Registry
 from holozen.testing import Wire
+
+ROOT = Path(__file__).resolve().parents[2]
+BRIDGE = Path(
+    subprocess.run([ROOT / "scripts/bridge", "--path"], capture_output=True, text=True, check=True).stdout.strip()
+)
+"""Where the bridge is; asked before the tests get a cache folder of their own."""
 
 HASHES = {
     "std_msgs/msg/String": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
@@ -20,17 +28,20 @@ HASHES = {
 }
 """Hashes that other programs print: those of rmw_zenoh's design.md, and of programs that were tried with ROS 2."""
 
+TRIGGER = {"request_definition": "", "response_definition": "bool success\nstring message"}
+
 
 class Theirs:
-    """Publishers, subscribers and clients of ROS 2 nodes, on a wire."""
+    """Publishers, subscribers, clients and servers of ROS 2 nodes, on a wire. In the form of `humble` on request."""
 
     def __init__(self, wire: Wire) -> None:
-        self._wire, self._ends = wire, contextlib.ExitStack()
+        self._wire, self._ends, self.humble = wire, contextlib.ExitStack(), False
 
     def _made(self, kind: str, *words: Any, **more: Any) -> Any:
         import zenoh_ros2_sdk  # type: ignore[import-untyped]
 
-        made = getattr(zenoh_ros2_sdk, kind)(*words, router_port=self._wire.port, type_hash=HASHES[words[1]], **more)
+        hashed = "TypeHashNotSupported" if self.humble else HASHES[words[1]]
+        made = getattr(zenoh_ros2_sdk, kind)(*words, router_port=self._wire.port, type_hash=hashed, **more)
         self._ends.callback(made.close)
         return made
 
@@ -44,8 +55,16 @@ class Theirs:
 
     def trigger(self, name: str) -> Any:
         """A client of a service with the type Trigger: `call()`."""
-        texts = {"request_definition": "", "response_definition": "bool success\nstring message"}
-        return self._made("ROS2ServiceClient", name, "std_srvs/srv/Trigger", timeout=10.0, **texts)
+        return self._made("ROS2ServiceClient", name, "std_srvs/srv/Trigger", timeout=10.0, **TRIGGER)
+
+    def serve_trigger(self, name: str, message: str) -> Any:
+        """A server of a service with the type Trigger, which replies with `message`."""
+
+        def answer(_request: Any) -> Any:
+            return server.response_msg_class(success=True, message=message)
+
+        server = self._made("ROS2ServiceServer", name, "std_srvs/srv/Trigger", answer, **TRIGGER)
+        return server
 
     def type(self, name: str) -> Any:
         """The class of a message type that a publisher or subscriber uses."""
@@ -85,3 +104,11 @@ def theirs(wire: Wire) -> Iterator[Theirs]:
 def published() -> dict[str, str]:
     """Published hashes of types."""
     return HASHES
+
+
+@pytest.fixture(scope="module")
+def bridge() -> Path:
+    """The program zenoh-bridge-ros2dds."""
+    if not BRIDGE.exists():
+        pytest.skip("not built: scripts/bridge builds zenoh-bridge-ros2dds, as scripts/test --long does")
+    return BRIDGE

@@ -5,7 +5,16 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from holozen.messages import CommandStatus, Odometry, TFMessage, TransformStamped, Twist, codec
+from holozen.messages import (
+    CommandStatus,
+    Odometry,
+    TFMessage,
+    TransformStamped,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+    codec,
+)
 from holozen.testing import Wire, wait_for
 from holozen.transport import rmw_zenoh as rmw
 from holozen.transport.rmw_zenoh import Ages, Attachment
@@ -16,8 +25,8 @@ if TYPE_CHECKING:
 TWIST, ODOM = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry"
 
 
-def joined(wire: Wire) -> Any:
-    process = wire.start("ros2")
+def joined(wire: Wire, *words: str) -> Any:
+    process = wire.start("ros2", *words)
     process.wait_for_line("joins ROS 2's domain 0")
     return process
 
@@ -75,6 +84,49 @@ def test_their_topics_are_listed_and_read_here(wire: Wire, theirs: "Theirs") -> 
         return "data: grüße" in echo.out
 
     wait_for(heard)
+
+
+def test_a_service_of_theirs_is_called_from_here(wire: Wire, theirs: "Theirs") -> None:
+    joined(wire)
+    theirs.serve_trigger("/dock", "docked")
+    assert wire.bus().call("dock", TriggerRequest(), TriggerReply, timeout=10.0) == TriggerReply(True, "docked")
+    assert wire.run("service", "type", "/dock").stdout.strip() == "std_srvs/srv/Trigger"
+
+
+def test_a_service_that_is_ours_is_not_replaced_by_theirs(wire: Wire, theirs: "Theirs") -> None:
+    wire.bus("sim").serve("stop", TriggerRequest, TriggerReply, lambda _: TriggerReply(True, "ours")).start()
+    gateway = joined(wire)
+    theirs.serve_trigger("/stop", "theirs")
+    gateway.wait_for_line("ros2: /stop is not carried: sim serves stop here")
+    assert wire.bus().call("stop", TriggerRequest(), TriggerReply).message == "ours"
+
+
+def test_nodes_of_humble_have_keys_without_hashes(wire: Wire, theirs: "Theirs") -> None:
+    theirs.humble = True
+    joined(wire, "--humble")
+    odom = wire.bus("sim").publisher("odom", Odometry)
+    reader = wire.bus().subscribe("cmd_vel", Twist)
+    heard: list[Any] = []
+    theirs.subscriber("/odom", ODOM, heard.append)
+    commands, vector = theirs.publisher("/cmd_vel", TWIST), theirs.type("geometry_msgs/msg/Vector3")
+    theirs.serve_trigger("/dock", "docked")
+
+    def both() -> bool:
+        odom.put(Odometry(child_frame_id="ours"))
+        commands.publish(linear=vector(x=0.3, y=0.0, z=0.0), angular=vector(x=0.0, y=0.0, z=0.0))
+        return bool(heard) and reader.try_recv() is not None
+
+    wait_for(both)
+    assert heard[0].child_frame_id == "ours"
+    assert wire.bus().call("dock", TriggerRequest(), TriggerReply, timeout=10.0).message == "docked"
+
+
+def test_a_node_of_humble_is_reported_without_the_flag(wire: Wire, theirs: "Theirs") -> None:
+    gateway = joined(wire)
+    theirs.humble = True
+    wire.bus().subscribe("cmd_vel", Twist)
+    theirs.publisher("/cmd_vel", TWIST, "old_teleop")
+    gateway.wait_for_line("ros2: /cmd_vel is not carried: old_teleop is of ROS 2 Humble; see --humble")
 
 
 def test_a_latched_topic_reaches_a_late_subscriber(wire: Wire, theirs: "Theirs") -> None:
@@ -207,5 +259,5 @@ def test_a_token_is_that_of_the_design() -> None:
     assert endpoint == rmw.Endpoint(
         "pub", "robot1/chatter", "std_msgs/msg/String", "RIHS01_df", "talker", "aac3178e146ba6f1fc6e6a4085e77f21", 10
     )
-    assert endpoint.token(2, 0) == token
-    assert endpoint.key(2) == "2/robot1/chatter/std_msgs::msg::dds_::String_/RIHS01_df"
+    assert rmw.Form(2).token(endpoint, 0) == token
+    assert rmw.Form(2).key(endpoint) == "2/robot1/chatter/std_msgs::msg::dds_::String_/RIHS01_df"

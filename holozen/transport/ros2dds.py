@@ -1,0 +1,79 @@
+"""The form that zenoh-bridge-ros2dds gives to ROS 2 on Zenoh: keys as ours, CDR without an Encoding, liveliness tokens.
+
+Each bridge holds a token for what its ROS nodes read, write and serve, and makes a DDS endpoint for each token of
+another. In a token § stands for /. Samples carry no type and no sender: a token states the type, and Zenoh's timestamp
+the bridge's session (zenoh-plugin-ros2dds 1.x, liveliness_mgt.rs).
+"""
+
+import re
+
+from holozen.messages.definitions import Interface
+from holozen.messages.type_hash import type_hash
+from holozen.transport.rmw_zenoh import KINDS, TOPIC, Attachment, Endpoint
+from holozen.transport.samples import Sample
+
+QOS = ":1:0:0,10"  # no key; reliable, volatile, the last 10
+LATCHED_QOS = ":1:1:0,1"  # transient local, the last one
+_TYPE = re.compile(r"[A-Za-z]\w*/(msg|srv)/[A-Za-z]\w*")
+_HASH = re.compile(r"typehash=(RIHS\d+_[0-9a-f]+)")
+_CODES = {kind: code for code, kind in KINDS.items()}
+
+
+class Form:
+    """What the gateway writes and reads on a network of bridges."""
+
+    tokens = "@/*/@ros2_lv/**"
+    shows_readers = False  # a bridge shows what we read only once it has a reader there
+
+    def parse(self, token: str) -> Endpoint | None:
+        """The endpoint that a token names; None for another kind, and for one that is malformed."""
+        parts = token.split("/")
+        start, kind = parts[:3:2], KINDS.get("".join(parts[3:4]), "")
+        if start != ["@", "@ros2_lv"] or not kind or len(parts) != (6 if kind == "srv" else 7):
+            return None
+        topic, type_name, qos = (part.replace("§", "/") for part in [*parts[4:], ""][:3])
+        if not TOPIC.fullmatch(topic) or not _TYPE.fullmatch(type_name):
+            return None
+        found = _HASH.search(qos)
+        hashed, latched = found[1] if found else "", qos.split(":")[2:3] == ["1"]
+        return Endpoint(kind, topic, type_name, hashed, f"bridge_{parts[1][:6]}", parts[1], latched=latched)
+
+    def key(self, endpoint: Endpoint) -> str:
+        """The key of its samples or requests."""
+        return endpoint.topic
+
+    def node_token(self, session: str, number: int, node: str) -> str:
+        """Empty: nodes have no token, and ROS 2 sees the bridge's."""
+        return ""
+
+    def token(self, endpoint: Endpoint, node_number: int) -> str:
+        """The key of its liveliness token."""
+        start = f"@/{endpoint.session}/@ros2_lv/{_CODES[endpoint.kind]}"
+        names = "/".join(name.replace("/", "§") for name in (endpoint.topic, endpoint.type))
+        if endpoint.kind == "srv":
+            return f"{start}/{names}"
+        return f"{start}/{names}/{LATCHED_QOS if endpoint.latched else QOS}:typehash={endpoint.hash};"
+
+    def hash(self, interface: Interface) -> str:
+        """The hash of a type, as tokens have it."""
+        return type_hash(interface)
+
+    def mismatch(self, theirs: Endpoint, interface: Interface) -> str:
+        """Why its type is not the one known here; empty if it is. ROS 2 Humble states no hash."""
+        return "" if theirs.hash in ("", self.hash(interface)) else f"its {theirs.type} is not the one known here"
+
+    def attachment(self, number: int, gid: bytes) -> bytes | None:
+        """What a sample or a request of ours carries."""
+        return None
+
+    def answered(self, request: bytes) -> bytes | None:
+        """What a reply carries, by the attachment of its request."""
+        return None
+
+    def stamp(self, sample: Sample) -> Attachment | None:
+        """When a bridge sent a sample; its gid is the bridge's session. None without a timestamp."""
+        return sample.timestamp and Attachment(0, sample.timestamp[0], sample.timestamp[1].encode())
+
+    def writer(self, stamp: Attachment) -> str:
+        """The session that must hold a token of the sample's topic and type."""
+        return stamp.gid.decode()
