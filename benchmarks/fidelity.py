@@ -1,4 +1,5 @@
-"""Commanded against driven path: hb_bot on its wheels, and as planar_move.
+"""Commanded against driven path: on omni wheels, as spheres or with real rollers, on mecanum and other wheels, and as
+planar_move.
 
 Each drive starts from rest, settles, and is commanded for some seconds, on a level floor and on a ramp, with wheels of
 different friction. The commanded path is the closed form of the body-frame velocity, in the plane of the ground: the
@@ -26,7 +27,18 @@ from holozen.rotation import conjugate, from_rpy, multiply, rotate, yaw
 from services.sim.physics.movers import mover_for
 from services.sim.physics.world import World
 
-HB_BOT = load(Path(__file__).resolve().parents[1] / "urdf" / "hb_bot.urdf.xacro")
+URDF = Path(__file__).resolve().parents[1] / "urdf"
+HB_BOT = load(URDF / "hb_bot.urdf.xacro")
+ROBOTS = {
+    "omni": driven(HB_BOT, "omni"),
+    "omni_rollers": load(URDF / "omni.urdf.xacro"),
+    "mecanum_rollers": load(URDF / "mecanum_rollers.urdf.xacro"),
+    "differential": load(URDF / "differential.urdf.xacro"),
+    "skid": load(URDF / "rover.urdf.xacro"),
+    "planar_move": HB_BOT,
+}
+TWO_SIDED = ("differential", "skid")
+SLIDES = ("omni", "omni_rollers", "mecanum_rollers")  # driven with each of FRICTIONS; the others as their file has it
 MOTIONS: dict[str, Planar] = {
     "straight": (0.3, 0.0, 0.0),
     "strafe": (0.0, 0.3, 0.0),
@@ -35,9 +47,8 @@ MOTIONS: dict[str, Planar] = {
     "arc": (0.3, 0.0, 0.5),
 }
 """m/s and rad/s in the body frame; hb_bot's wheels turn by at most 5 rad/s, which is 0.7 m/s at their rims."""
-DRIVES = ("omni", "planar_move")
 SLOPES = {"floor": 0.0, "ramp": 5.0}  # degrees, up along x
-FRICTIONS = (0.2, 0.5, 1.0)  # of the wheels on the ground; planar_move uses none
+FRICTIONS = (0.2, 0.5, 1.0)  # of the wheels on the ground
 SETTLES, SPEEDS_UP, LASTS = 0.5, 0.5, 4.0  # s
 
 
@@ -60,7 +71,7 @@ class Result:
     commanded: list[tuple[float, float]]
 
     def row(self) -> tuple[str, ...]:
-        mu = f"{self.mu:g}" if self.drive == "omni" else "-"
+        mu = f"{self.mu:g}" if self.drive in SLIDES else "-"
         figures = (f"{self.error:.2f} %", f"{self.aside:.1f} mm", f"{self.heading:+.2f}", f"{self.start:.1f}")
         return self.drive, self.ground, mu, self.motion, *figures
 
@@ -69,9 +80,9 @@ HEAD = ("drive", "ground", "mu", "motion", "error", "aside", "heading", "start")
 
 
 def with_friction(model: RobotModel, mu: float) -> RobotModel:
-    """The model with this friction on its wheels."""
+    """The model with this friction on its wheels and rollers."""
     links = {
-        name: replace(link, surface=replace(link.surface, mu1=mu, mu2=mu)) if name.endswith("wheel_link") else link
+        name: replace(link, surface=replace(link.surface, mu1=mu, mu2=mu)) if "wheel" in name else link
         for name, link in model.links.items()
     }
     return replace(model, links=links)
@@ -86,7 +97,7 @@ def sloped(degrees: float) -> RobotModel:
 def drive(name: str, ground: str, mu: float, motion: str, seconds: float) -> Result:
     """One drive from rest."""
     tilt = from_rpy(0.0, -math.radians(SLOPES[ground]), 0.0)
-    model = driven(with_friction(HB_BOT, mu), name)
+    model = with_friction(ROBOTS[name], mu) if name in SLIDES else ROBOTS[name]
     with closing(World(WorldSpec(ground=ground == "floor"))) as world:
         if ground != "floor":
             mover_for(world, sloped(SLOPES[ground]), (0.0, 0.0, 0.0))
@@ -130,12 +141,13 @@ def ahead(place: Planar, velocity: Planar, seconds: float) -> Planar:
 
 
 def drives(quick: bool) -> Iterator[Result]:
-    """All of them; what friction does not touch once."""
-    for name in DRIVES:
+    """All of them; with the friction of a robot's file once."""
+    for name in ROBOTS:
         for ground in SLOPES:
-            for mu in FRICTIONS if name == "omni" and not quick else FRICTIONS[-1:]:
-                for motion in MOTIONS:
-                    yield drive(name, ground, mu, motion, 0.5 if quick else LASTS)
+            for mu in FRICTIONS if name in SLIDES and not quick else FRICTIONS[-1:]:
+                for motion, velocity in MOTIONS.items():
+                    if name not in TWO_SIDED or not velocity[1]:
+                        yield drive(name, ground, mu, motion, 0.5 if quick else LASTS)
 
 
 def plot(results: list[Result]) -> Iterator[str]:

@@ -8,7 +8,11 @@ from holozen.limits import Planar
 
 @dataclass(frozen=True, slots=True)
 class Wheel:
-    """A wheel that rolls on the ground: centre (x, y) and axle direction (ax, ay) in the body frame, radius in m."""
+    """A wheel that rolls on the ground: centre (x, y) and axle direction (ax, ay) in the body frame, radius in m.
+
+    `skew` is the tangent of the angle from the rolling direction to the axis of the roller on the ground: 0 on an omni
+    wheel, 1 or -1 on a mecanum wheel.
+    """
 
     joint: str
     x: float
@@ -16,6 +20,7 @@ class Wheel:
     ax: float
     ay: float
     radius: float
+    skew: float = 0.0
 
 
 def to_world(velocity: Planar, yaw: float, dt: float) -> tuple[float, float]:
@@ -46,12 +51,12 @@ def to_body(vx: float, vy: float, yaw: float) -> tuple[float, float]:
 def wheel_rate(velocity: Planar, wheel: Wheel) -> float:
     """The rate (rad/s) about its axle of a wheel that rolls without slipping.
 
-    The rolling direction is axle x up; the speed of the wheel's centre along it, over the radius. The rollers of an
-    omni wheel take the motion along the axle. Source: Siegwart, Introduction to Autonomous Mobile Robots, 3.2.3.
+    The rolling direction is axle x up. A roller takes the motion across its own axis, along which the rim and the
+    wheel's centre have the same speed. Source: Siegwart, Introduction to Autonomous Mobile Robots, 3.2.3.
     """
     x, y, turn = velocity
     vx, vy = x - turn * wheel.y, y + turn * wheel.x
-    return (vx * wheel.ay - vy * wheel.ax) / wheel.radius
+    return (vx * wheel.ay - vy * wheel.ax + wheel.skew * (vx * wheel.ax + vy * wheel.ay)) / wheel.radius
 
 
 def mecanum_rates(velocity: Planar, arm: float, radius: float) -> tuple[float, float, float, float]:

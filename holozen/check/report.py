@@ -31,7 +31,7 @@ from holozen.check.engine import (
 )
 from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
-from holozen.robot.gazebo_plugins import DRIVES, kind_of
+from holozen.robot.gazebo_plugins import DRIVES, FORCE, OMNI, kind_of
 from holozen.suggest import shorten
 
 # A file that cannot be read.
@@ -116,6 +116,9 @@ def check(
     return found, _summary(subject)
 
 
+MOVING = (*DRIVES, OMNI, FORCE)
+
+
 def _summary(subject: Subject) -> str:
     """`9 links, 3 wheels, planar_move on cmd_vel`."""
     if is_library(subject):
@@ -125,7 +128,7 @@ def _summary(subject: Subject) -> str:
         parts.append(_counted(len(subject.wheels), "wheel"))
     drive = subject.model.drive if subject.model else None
     if drive is not None:
-        plugin = next(kind for plugin in subject.plugins if (kind := kind_of(plugin)) in DRIVES)
+        plugin = next(kind for plugin in subject.plugins if (kind := kind_of(plugin)) in MOVING)
         parts.append(f"{plugin.removeprefix('gazebo_ros_')} on {drive.command_topic}")
     elif subject.links and not (subject.model and subject.model.static):
         parts.append("no drive: holozen spawn --drive planar_move moves it as a whole")

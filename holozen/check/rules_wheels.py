@@ -124,7 +124,7 @@ def wheel_collisions(subject: Subject) -> Iterator[Mistake]:
     driven = {name for _, name in subject.plugin_joints}
     for name, joint in subject.model.joints.items():
         called = joint.kind == "continuous" and is_called_wheel(name, joint.child)
-        if (called or name in driven) and not _solid(joint.child, subject):
+        if (called or name in driven) and not _touching(joint.child, subject):
             fix = "add a <collision> with a <cylinder> (a URDF cylinder stands along z)"
             yield Mistake(subject.links[joint.child], f"wheel {joint.child!r} has no <collision>", fix)
 
@@ -219,6 +219,13 @@ def _needs(rough: list[Placed], subject: Subject, centre: Vector, ground: Ground
         return True
     without = stand(others, centre)
     return without.tips or dot(without.up, ground.up) < SAME
+
+
+def _touching(wheel: str, subject: Subject) -> bool:
+    """Whether a wheel has collision shapes, or rollers that have."""
+    assert subject.model is not None
+    rollers = [joint.child for joint in subject.model.joints.values() if joint.parent == wheel]
+    return any(_solid(link, subject) for link in (wheel, *rollers))
 
 
 def _solid(link: str, subject: Subject) -> bool:

@@ -509,7 +509,9 @@ def gz_diff_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
 
 
 def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
-    """MecanumDrive: one wheel per corner."""
+    """MecanumDrive: one wheel per corner. Motors turn wheels with rollers, which are links that turn on them; others
+    only turn as the robot moves.
+    """
     corners = []
     for corner in ("front_left", "front_right", "back_left", "back_right"):
         name = f"{corner}_joint"
@@ -517,6 +519,9 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
         if len(named) > 1:
             source.warn(settings.each(name)[-1], f"is a second wheel at one corner; only {cut(named[0])} drives")
         corners.append(named[0])
+    carriers = {joint.parent for joint in joints.values() if joint.kind == "continuous"}
+    if all(joints[name].child in carriers for name in corners):
+        return _gz_drive(settings, Omni(encoder=True), source)
     front_left, front_right, back_left, back_right = corners
     wheels = Mecanum(
         front_left,
@@ -533,7 +538,7 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
 def with_publisher(drive: Drive, settings: Settings, source: Source) -> Drive:
     """The drive with the odometry of an OdometryPublisher, which is the true pose."""
     wheels = drive.mechanism
-    if isinstance(wheels, Differential | Mecanum):
+    if isinstance(wheels, Differential | Mecanum | Omni):
         wheels = replace(wheels, encoder=False)
     return replace(
         drive,

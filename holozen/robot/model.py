@@ -188,8 +188,8 @@ class Mecanum:
 
 @dataclass(frozen=True, slots=True)
 class Omni:
-    """Wheels with free rollers on their rims, three or more: it moves any way. They are the continuous joints with a
-    level axle and a round collision shape. `encoder` as for Differential.
+    """Omni or mecanum wheels, three or more: it moves any way. They are the continuous joints with a level axle that
+    carry rollers; without such, those with a round collision shape. `encoder` as for Differential.
     """
 
     encoder: bool = False

@@ -49,7 +49,8 @@ class WorldTab:
         time = add.add_button_group("", tuple(TIME), hint="the time of the sim")
         time.on_click(lambda _: attempt(lambda: self._time(time.value)))
         files = {path.name.partition(".")[0]: path for path in sorted(data.find("urdf").glob("*.xacro"))}
-        files.pop("materials", None)
+        for part in ("materials", "wheels"):
+            files.pop(part, None)
         kind = add.add_dropdown("Model", tuple(files))
         add.add_button("Spawn").on_click(lambda _: attempt(lambda: self._spawn(files[str(kind.value)])))
         add.add_button("Delete the robot").on_click(lambda _: attempt(self._delete))

@@ -28,6 +28,8 @@ def test_a_good_file_is_summed_up_in_one_line(tmp_path: Path) -> None:
     assert (done.returncode, done.stdout, done.stderr) == (0, "ok: 5 links, 3 wheels, planar_move on cmd_vel\n", "")
     assert run(str(BOT), "--json").stdout == ""
     (tmp_path / "r.urdf").write_text(WARNS.replace("9", "0.004"))
+    omni = "ok: 40 links, holozen_omni_drive on cmd_vel\n"  # wheels whose collision shapes are those of rollers
+    assert run(str(data.find("urdf", "omni.urdf.xacro"))).stdout == omni
     expected = "ok: 1 link, no drive: holozen spawn --drive planar_move moves it as a whole\n"
     assert run(str(tmp_path / "r.urdf")).stdout == expected
     assert run(str(data.find("urdf", "materials.xacro"))).stdout.startswith(

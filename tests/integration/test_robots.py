@@ -22,7 +22,7 @@ from holozen.wire import COMMAND_SILENCE, key_for
 
 from .robots import URDF, Planar, Robot, ahead, place, speeds, time_of
 
-NO_ROBOTS = {"materials.xacro"}
+NO_ROBOTS = {"materials.xacro", "wheels.xacro"}
 FILES = sorted(path.name for path in URDF.glob("*.xacro") if path.name not in NO_ROBOTS)
 
 
@@ -51,6 +51,20 @@ STATED = {
     "hb_bot.urdf.xacro": Stated(sideways=True),
     "explorer.urdf.xacro": Stated(sideways=True),
     "mecanum.urdf.xacro": Stated(sideways=True),
+    "omni.urdf.xacro": Stated(
+        way=0.01, yaw=0.01, turn=(0.99, 1.01), spot=5e-3, settling=0.5, stopping=0.03, speed=0.02, sideways=True
+    ),
+    "mecanum_rollers.urdf.xacro": Stated(
+        way=0.02,
+        yaw=0.02,
+        turn=(0.97, 1.03),
+        spot=0.01,
+        settling=0.5,
+        stopping=0.03,
+        odom=(0.1, 0.1),
+        speed=0.02,
+        sideways=True,
+    ),
     "differential.urdf.xacro": Stated(
         way=5e-3, yaw=0.015, turn=(0.99, 1.01), spot=0.04, settling=0.5, stopping=0.06, odom=(0.1, 0.05), speed=5e-3
     ),
@@ -206,13 +220,9 @@ def test_its_wheels_turn_forward_when_it_drives_forward(driven: Driven) -> None:
 
 
 def forward_rates(model: RobotModel, speed: float) -> dict[str, float]:
-    """Of the wheels across the way: an axle to the left turns by +v/r, one to the right by -v/r."""
-    rates = {}
-    for name, axis in joint_axes(model).items():
-        radius = next(s.size[0] for s in model.links[model.joints[name].child].collisions if s.kind == "cylinder")
-        if abs(axis.direction[1]) > 0.99:
-            rates[name] = math.copysign(speed / radius, axis.direction[1])
-    return rates
+    """Of the wheels, not of what rolls on them: an axle to the left turns by +v/r, one to the right by -v/r."""
+    wheels = {name: axis for name, axis in joint_axes(model).items() if "roller" not in name}
+    return {name: speed * axis.direction[1] / (axis.xyz[2] - lowest(model)) for name, axis in wheels.items()}
 
 
 def test_its_odometry_is_where_it_is(driven: Driven) -> None:

@@ -15,7 +15,7 @@ from .engine import UPRIGHT, Rotation, Vector
 from .jointed import JointedBody
 from .omni import OmniMover, omni_wheels
 from .planar import PlanarMover
-from .wheels import MecanumWheels, Wheels
+from .wheels import MecanumWheels, Wheels, has_rollers
 from .world import World
 
 
@@ -97,8 +97,9 @@ def mover_for(world: World, model: RobotModel, at: Vector, rotation: Rotation = 
         rolling = MecanumWheels(model, mechanism) if isinstance(mechanism, Mecanum) else Wheels(model)
         return PlanarMover(world.add(lump(model), at, rotation), rolling)
     if isinstance(mechanism, Omni):
-        rollers = omni_wheels(model)
-        return OmniMover(world.add_jointed(model, at, rotation, omni=rollers), model, mechanism, rollers)
+        omni = omni_wheels(model)
+        spheres = [wheel for wheel in omni if not has_rollers(model, wheel)]
+        return OmniMover(world.add_jointed(model, at, rotation, omni=spheres), model, mechanism, omni)
     wheels = (*mechanism.left, *mechanism.right) if isinstance(mechanism, Differential) else ()
     body = world.add_jointed(model, at, rotation, frozenset(wheels))
     try:

@@ -1,4 +1,8 @@
-"""Wheels with free rollers on their rims, driven by motors; contacts with the ground move the robot any way."""
+"""Omni and mecanum wheels, driven by motors; contacts with the ground move the robot any way.
+
+A wheel's rollers are those of its file, links that turn on it; without such it touches the ground as a sphere without
+friction along its axle.
+"""
 
 import math
 
@@ -13,7 +17,7 @@ from holozen.suggest import listed
 
 from .body import JointStates, Moved
 from .jointed import JointedBody
-from .wheels import Odometer, rolling_wheels
+from .wheels import Odometer, has_rollers, rolling_wheels
 
 WORST = 100.0  # condition of the wheels' kinematics: beyond, some motion takes far more of a wheel than others
 UNITS = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -58,6 +62,7 @@ class OmniMover:
 def omni_wheels(model: RobotModel) -> list[Wheel]:
     """The wheels of a model. Raises RobotError if they cannot move it any way."""
     wheels = rolling_wheels(model)
+    wheels = [wheel for wheel in wheels if has_rollers(model, wheel)] or wheels
     names = listed(wheel.joint for wheel in wheels)
     arm = max((math.hypot(wheel.x, wheel.y) for wheel in wheels), default=0.0)
     if len(wheels) < 3 or not arm or np.linalg.cond(_matrix(wheels) / (1.0, 1.0, arm)) > WORST:

@@ -8,6 +8,7 @@ import numpy as np
 
 from holozen.kinematics import Wheel, mecanum_rates, travelled, wheel_rate
 from holozen.limits import STOP, Planar
+from holozen.robot.gazebo_plugins import ROUND, radius_across
 from holozen.robot.model import HERE, Mecanum, RobotModel, Shape
 from holozen.robot.rigid import Axis, Part, PlacedShape, joint_axes
 from holozen.robot.rotation import quaternion_of, triple
@@ -21,9 +22,9 @@ class Wheels:
     """Angles (rad) and rates (rad/s) of the moving joints, in the order of `names`; those of no wheel stay at 0."""
 
     def __init__(self, model: RobotModel) -> None:
-        axes = joint_axes(model)
-        self.names = list(axes)
-        self._wheels = [_wheel(model, name, axes[name]) for name in self.names]
+        self.names = list(joint_axes(model))
+        wheels = {wheel.joint: wheel for wheel in rolling_wheels(model)}
+        self._wheels = [wheels.get(name) for name in self.names]
         self.angles = [0.0] * len(self.names)
         self.rates = [0.0] * len(self.names)
 
@@ -72,8 +73,26 @@ class Odometer:
 
 
 def rolling_wheels(model: RobotModel) -> list[Wheel]:
-    """The wheels of a model: continuous joints with a level axle and a round collision shape."""
-    return [wheel for name, axis in joint_axes(model).items() if (wheel := _wheel(model, name, axis))]
+    """The wheels of a model: continuous joints with a level axle and a round collision shape, or with rollers. What
+    turns on a wheel is no wheel.
+    """
+    turning = {name: axis for name, axis in joint_axes(model).items() if model.joints[name].kind == "continuous"}
+    carried = {name: model.joints[name].parent for name in turning}
+    rims = {model.joints[name].child for name in turning}
+    rollers: dict[str, list[str]] = {}
+    for name, carrier in carried.items():
+        if carrier in rims:
+            rollers.setdefault(carrier, []).append(name)
+    return [
+        wheel
+        for name, axis in turning.items()
+        if carried[name] not in rims and (wheel := _wheel(model, name, axis, rollers.get(model.joints[name].child)))
+    ]
+
+
+def has_rollers(model: RobotModel, wheel: Wheel) -> bool:
+    """Whether a wheel touches the ground with links that turn on it."""
+    return any(model.joints[name].parent == model.joints[wheel.joint].child for name in joint_axes(model))
 
 
 def on_spheres(parts: list[Part], wheels: Sequence[Wheel]) -> list[Part]:
@@ -101,17 +120,40 @@ def forward_sign(model: RobotModel, joint: str) -> float:
     return -1.0 if joint_axes(model)[joint].direction[1] < 0 else 1.0
 
 
-def _wheel(model: RobotModel, name: str, axis: Axis) -> Wheel | None:
-    joint = model.joints[name]
-    radius = radius_of(model, joint.child)
+def _wheel(model: RobotModel, name: str, axis: Axis, rollers: list[str] | None) -> Wheel | None:
     length = math.hypot(axis.direction[0], axis.direction[1])
-    if joint.kind != "continuous" or not radius or abs(axis.direction[2]) > FLAT:
+    radius, skew = _rim(model, axis, rollers) if rollers else (radius_of(model, model.joints[name].child), 0.0)
+    if not radius or abs(axis.direction[2]) > FLAT:
         return None
     ax, ay = axis.direction[0] / length, axis.direction[1] / length
-    return Wheel(name, axis.xyz[0], axis.xyz[1], ax, ay, radius)
+    return Wheel(name, axis.xyz[0], axis.xyz[1], ax, ay, radius, skew)
+
+
+def _rim(model: RobotModel, wheel: Axis, rollers: list[str]) -> tuple[float, float]:
+    """The radius (m) of a wheel with rollers, from its axle to where a roller reaches at its middle; and its skew. 0, 0
+    where its rollers have no shapes, or cannot roll.
+    """
+    axis, link = joint_axes(model)[rollers[0]], model.links[model.joints[rollers[0]].child]
+    along, axle = np.array(axis.direction), np.array(wheel.direction)
+    out = np.cross(along, axle)  # along the radius to where the roller's axis is nearest to the axle
+    round_radii = [shape.size[0] for shape in link.collisions if shape.kind in ROUND]
+    sine, thick = (
+        float(np.linalg.norm(out)),
+        max(round_radii, default=radius_across(link, model.joints[rollers[0]].axis)),
+    )
+    if sine < FLAT or not thick:
+        return 0.0, 0.0
+    away = float((np.array(axis.xyz) - np.array(wheel.xyz)) @ out) / sine
+    # At the lowest point of the wheel the radius points down, and axle x up is the rolling direction: radius x axle.
+    forward = float(along @ np.cross(out, axle)) / sine
+    # A roller is straight: at an angle of the rim from its middle, its axis has the cosine of that angle less of the
+    # rolling direction. This is the mean over its part of the rim.
+    half = math.pi / max(len(rollers), 3)
+    mean = math.asinh(math.tan(half)) / half
+    return abs(away) + thick, mean * float(along @ axle) / forward * math.copysign(1.0, away)
 
 
 def radius_of(model: RobotModel, link: str) -> float:
     """The radius in metres of a link's first round collision shape; 0 if it has none."""
-    round_shapes = (shape for shape in model.links[link].collisions if shape.kind in ("cylinder", "sphere"))
+    round_shapes = (shape for shape in model.links[link].collisions if shape.kind in ROUND)
     return next((shape.size[0] for shape in round_shapes), 0.0)
