@@ -43,7 +43,6 @@ MANY = 256  # publishers of a topic whose ages are measured
 CALL = 5.0  # s for a service to answer
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
 
-Route = tuple[str, str]  # topic and type
 Ends = list[Callable[[], object]]
 
 
@@ -154,10 +153,16 @@ class Gateway:
         """What has to be carried, with a function that begins it."""
         wanted: dict[Any, Callable[[], Ends]] = {}
         read = {(one.topic, one.type) for one in self._theirs.values() if one.kind == "sub" and self._is_known(one)}
+        writers: dict[str, list[str]] = {}
+        for one in ours:
+            if one.kind == "pub":
+                writers.setdefault(one.key, []).append(one.session)
         for one in ours:
             found = self._exported(one) if one.kind == "pub" else None
             if found and (found.latched or (found.topic, found.type) in read):
-                wanted["out", found.topic, found.type] = partial(self._carry_out, found)
+                # A latched message may have been put before this session heard of its publisher: a new one is asked.
+                asked = tuple(writers[found.topic]) if found.latched else ()
+                wanted["out", found.topic, found.type, asked] = partial(self._carry_out, found)
         for theirs in self._theirs.values():
             if theirs.kind == "pub" and graphs.on_key(ours, theirs.topic, "sub") and self._may_enter(theirs, ours):
                 wanted["in", theirs.topic, theirs.type] = partial(self._carry_in, theirs)
