@@ -133,7 +133,9 @@ def package(text: str) -> tuple[str, Path]:
     return name, path
 
 
-def add_packages(parser: argparse.ArgumentParser, use: str = "whose msg and srv files define its types") -> None:
+def add_packages(
+    parser: argparse.ArgumentParser, use: str = "whose msg, srv and action files define its types"
+) -> None:
     """Add the flag `--package`; `use`: what its folder is for."""
     parser.add_argument("--package", type=package, action="append", default=[], metavar="NAME=DIR",
         help=f"the folder of package NAME, {use}")  # fmt: skip

@@ -56,6 +56,15 @@ class Service(NamedTuple):
     does: str
 
 
+class Action(NamedTuple):
+    """A key below which goals are sent, see holozen.transport.actions."""
+
+    key: str
+    type: str
+    server: str
+    does: str
+
+
 TOPICS = (
     Topic("cmd_vel", (m.Twist, m.TwistStamped), ("teleop", "view", "controller"), ("sim",), 20.0, COMMAND_SILENCE,
           "0.5 s without a fresh one: the robot stands"),
@@ -130,6 +139,16 @@ SERVICES = (
     ),
 )
 
+ACTIONS = (
+    Action("navigate_to_pose", "nav2_msgs/action/NavigateToPose", "controller", "drives to a pose in odom"),
+    Action(
+        "follow_waypoints", "nav2_msgs/action/FollowWaypoints", "controller", "drives to several, one after another"
+    ),
+    Action(
+        "simulate_steps", "simulation_interfaces/action/SimulateSteps", "sim", "as `step_simulation`, with progress"
+    ),
+)
+
 OF_NODES = (
     Service("list_parameters", r.ListParametersRequest, r.ListParametersReply, "", "names of a node's parameters"),
     Service("get_parameters", r.GetParametersRequest, r.GetParametersReply, "", "their values"),
@@ -145,8 +164,10 @@ def table() -> str:
     """The table as Markdown, for docs/wire.md (`scripts/tables` puts it there)."""
     topics = [_topic_row(row) for row in TOPICS]
     services = [f"| `{row.key}` | {row.reply.ROS} | {row.server} | {row.does} |" for row in SERVICES]
-    heads = ("| key | type | writers -> readers | rate | silence rule |", "| service | type | server | what it does |")
-    return "\n".join([heads[0], "|---|---|---|---|---|", *topics, "", heads[1], "|---|---|---|---|", *services])
+    actions = [f"| `{row.key}` | {row.type} | {row.server} | {row.does} |" for row in ACTIONS]
+    heads = [f"| {kind} | type | server | what it does |\n|---|---|---|---|" for kind in ("service", "action")]
+    first = ("| key | type | writers -> readers | rate | silence rule |", "|---|---|---|---|---|")
+    return "\n".join([*first, *topics, "", heads[0], *services, "", heads[1], *actions])
 
 
 def _topic_row(row: Topic) -> str:

@@ -32,6 +32,7 @@ VERBS = {
     "check": "report what is wrong with a robot file",
     "topic": "list, info, type, find, echo, hz, bw, delay, pub, plot",
     "service": "list, type, find, info, call",
+    "action": "list, info, send_goal",
     "node": "list, info",
     "param": "list, get, set, describe, dump, load",
     "tf": "echo",
@@ -52,13 +53,12 @@ MODULES = {
     "map": "plot",
     "release": "stop",
 }  # of verbs in another noun's module
-NOUNS = ("secure", "topic", "service", "node", "param", "tf", "interface", "bag")  # followed by a verb
+NOUNS = ("secure", "topic", "service", "action", "node", "param", "tf", "interface", "bag")  # followed by a verb
 _DRAWS = "`holozen view` shows robots in a browser, `holozen map` and `holozen plot` draw in the terminal"
-_NO_ACTIONS = "there are no actions here; `holozen service` calls services"
 _TYPES = "`holozen interface` shows messages and services"
 ELSEWHERE = {
     "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
-    "action": _NO_ACTIONS, "pkg": "`--package NAME=DIR` gives the folder of a package",
+    "pkg": "`--package NAME=DIR` gives the folder of a package",
     "tf2_echo": "write `holozen tf echo SOURCE TARGET`", "tf2": "write `holozen tf`",
     "rqt_graph": "write `holozen graph`", "wtf": "write `holozen doctor`", "msg": _TYPES, "srv": _TYPES,
     "gazebo": "write `holozen sim`", "gz": "write `holozen sim`", "teleop_twist_keyboard": "write `holozen teleop`",

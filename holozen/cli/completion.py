@@ -16,6 +16,7 @@ from holozen.cli.hints import is_any
 from holozen.cli.verb import Noun, Service, Verb, by_name
 from holozen.flags import Parser, package
 from holozen.transport import connection
+from holozen.transport.actions import found_in
 from holozen.transport.graph import Endpoint
 
 if TYPE_CHECKING:
@@ -55,7 +56,8 @@ SAFE = re.compile(r"[A-Za-z0-9_./@%+-]+")  # words that need no quoting in a she
 PARAMETERS = "rcl_interfaces/srv/ListParameters"
 LIVE = {
     "key": "keys", "keys": "keys", "robot": "robots", "robots": "robots", "delete names": "robots",
-    "topic type": "types", "topic words": "types", "service key": "services", "service type": "services' types",
+    "topic type": "types", "topic words": "types", "action key": "actions",
+    "service key": "services", "service type": "services' types",
     "node name": "nodes", "param node": "nodes with parameters",
 }  # fmt: skip
 """By argument, or by verb and argument: the kind of candidates that are looked up on the wire."""
@@ -176,6 +178,7 @@ def _words(kind: str, ends: list[Endpoint]) -> list[str]:
     found = {
         "keys": [end.key for end in topics],
         "types": [end.type for end in topics],
+        "actions": [action.key for action in found_in(services)],
         "services": [end.key for end in services],
         "services' types": [end.type for end in services],
         "nodes": [end.node for end in ends],

@@ -15,9 +15,11 @@ from holozen.messages.registry import Registry
 def list_types(args: argparse.Namespace) -> int:
     """Print the name of each type."""
     names = Registry(dict(args.package)).names()
-    wanted = [("msg", "Messages", args.only_srvs), ("srv", "Services", args.only_msgs)]
-    for kind, title, left_out in wanted:
-        found = [] if left_out and not (args.only_msgs and args.only_srvs) else [n for n in names if f"/{kind}/" in n]
+    kinds = [("msg", "Messages", args.only_msgs), ("srv", "Services", args.only_srvs),
+             ("action", "Actions", args.only_actions)]  # fmt: skip
+    all_kinds = not any(wanted for _, _, wanted in kinds)
+    for kind, title, wanted in kinds:
+        found = [name for name in names if f"/{kind}/" in name] if wanted or all_kinds else []
         if args.json:
             print("".join(json.dumps({"name": name, "kind": kind}) + "\n" for name in found), end="")
         elif found:
@@ -53,17 +55,17 @@ def _found(args: argparse.Namespace) -> Interface:
 
 
 def proto(args: argparse.Namespace) -> int:
-    """Print a message, or the request of a service, with all fields at their defaults."""
+    """Print a message, the request of a service or the goal of an action, with all fields at their defaults."""
     interface = Registry(dict(args.package)).find(args.type)
-    value = prototype(interface.request or interface)
+    value = prototype(interface.parts[0] if interface.parts else interface)
     print(json.dumps(value) if args.json else "\n".join(yaml(value)) or "{}")
     return 0
 
 
 def definition(interface: Interface, indent: str = "") -> Iterator[str]:
-    """The lines of a .msg or .srv file."""
-    if interface.request and interface.response:
-        yield from (*definition(interface.request), "---", *definition(interface.response))
+    """The lines of a .msg, .srv or .action file."""
+    for number, part in enumerate(sections(interface)):
+        yield from (*(["---"] if number else []), *definition(part))
     for constant in interface.constants:
         value = constant.value if isinstance(constant.value, str) else json.dumps(constant.value)
         yield f"{indent}{constant.type} {constant.name}={value}"
@@ -72,6 +74,11 @@ def definition(interface: Interface, indent: str = "") -> Iterator[str]:
         yield f"{indent}{field.spelled(interface.package)} {field.name}{default}"
         if field.nested:
             yield from definition(field.nested, indent + "\t")
+
+
+def sections(interface: Interface) -> tuple[Interface, ...]:
+    """The messages that the file of a service or an action defines; none for a message."""
+    return interface.parts[: 3 if interface.kind == "action" else 2]
 
 
 def printable_line(line: str) -> str:
@@ -83,8 +90,9 @@ def printable_line(line: str) -> str:
 def described(interface: Interface) -> dict[str, Any]:
     """A type as plain values."""
     row: dict[str, Any] = {"name": interface.name, "kind": interface.kind}
-    if interface.request and interface.response:
-        return row | {"request": described(interface.request), "response": described(interface.response)}
+    if interface.parts:
+        names = ("request", "response") if interface.kind == "srv" else ("goal", "result", "feedback")
+        return row | {name: described(part) for name, part in zip(names, sections(interface), strict=True)}
     fields = [field._asdict() | {"nested": field.nested and described(field.nested)} for field in interface.fields]
     return row | {"fields": fields, "constants": [constant._asdict() for constant in interface.constants]}
 
@@ -100,8 +108,9 @@ def yaml(value: dict[str, Any], indent: str = "") -> Iterator[str]:
 
 
 def _list_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-m", "--only-msgs", action="store_true", help="no services")
-    parser.add_argument("-s", "--only-srvs", action="store_true", help="no messages")
+    parser.add_argument("-m", "--only-msgs", action="store_true", help="only messages")
+    parser.add_argument("-s", "--only-srvs", action="store_true", help="only services")
+    parser.add_argument("-a", "--only-actions", action="store_true", help="only actions")
     add_packages(parser)
 
 
@@ -115,9 +124,9 @@ def _proto_arguments(parser: argparse.ArgumentParser) -> None:
     add_packages(parser)
 
 
-SUCH = "such as geometry_msgs/msg/Twist or std_srvs/srv/Trigger"
+SUCH = "such as geometry_msgs/msg/Twist, std_srvs/srv/Trigger, nav2_msgs/action/NavigateToPose"
 VERBS = by_name(
-    Noun("interface", "Show message and service types.", dict.fromkeys(("list", "show", "proto"), "interface")),
+    Noun("interface", "Show message, service and action types.", dict.fromkeys(("list", "show", "proto"), "interface")),
     Verb("interface list", "all known types", "--only-srvs", _list_arguments, list_types, bus=False),
     Verb("interface show", "the fields of a type, nested ones included", "geometry_msgs/msg/Twist", _show_arguments,
         show),

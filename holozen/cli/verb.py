@@ -93,7 +93,7 @@ class Verb:
             parser.add_argument("--json", action="store_true", help=self._json)
         if self._bus:
             connection.add_arguments(parser)
-        if self.name.partition(" ")[0] in ("topic", "service", "node", "param"):
+        if self.name.partition(" ")[0] in ("topic", "service", "action", "node", "param"):
             _add_ros2_flags(parser, self.name)
 
 

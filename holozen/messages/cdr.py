@@ -68,12 +68,17 @@ class Shape:
         return f"{owner}[{field.name!r}]"
 
 
+def _message_names(interface: Interface) -> list[str]:
+    return [part.name for part in interface.parts if part.kind == "msg"]
+
+
 class Codec:
     """Reads and writes one type, as values of a `shape`. Its code is generated on first use."""
 
     def __init__(self, interface: Interface, shape: Shape, name: str = "") -> None:
-        if interface.kind == "srv":
-            raise CodecError(f"{interface.name} is a service; its messages are {interface.name}_Request and _Response")
+        if interface.kind != "msg":
+            what = "a service" if interface.kind == "srv" else "an action"
+            raise CodecError(f"{interface.name} is {what}; its messages are {' and '.join(_message_names(interface))}")
         self.interface, self._shape, self._name = interface, shape, name or interface.name
         self._readers: dict[str, Any] = {}
         self._writer: Any = None

@@ -1,4 +1,4 @@
-"""Types as .msg and .srv files define them: parsed from their text, and their values as plain dicts, lists and numbers.
+"""Types as .msg, .srv and .action files define them, parsed from their text; values as plain dicts, lists and numbers.
 
 Written by hand, for the grammar is one line per field: libraries that read it (rosbags, rosidl) bring numpy or ROS
 along, and an echo has to start at once. The spellings of ROS 1 are read too: Header, time and duration.
@@ -82,12 +82,14 @@ class Constant(NamedTuple):
 
 
 class Interface:
-    """A message type; or a service type, which has a `request` and a `response` and no fields of its own.
+    """A message type; or a service type, which has a `request` and a `response`, or an action type, which has `parts`;
+    neither of them has fields of its own.
 
-    `kind` is "msg" or "srv". The messages of a service are messages: `std_srvs/srv/Trigger_Request`.
+    `kind` is "msg", "srv" or "action". The messages of a service are messages: `std_srvs/srv/Trigger_Request`. Those of
+    an action, and its two services, are its `parts`, see `action_parts`.
     """
 
-    __slots__ = ("constants", "fields", "kind", "least", "name", "request", "response", "width")
+    __slots__ = ("constants", "fields", "kind", "least", "name", "parts", "request", "response", "width")
 
     def __init__(
         self,
@@ -95,11 +97,11 @@ class Interface:
         kind: str,
         fields: tuple[Field, ...] = (),
         constants: tuple[Constant, ...] = (),
-        parts: "tuple[Interface, Interface] | None" = None,
+        parts: "tuple[Interface, ...]" = (),
     ) -> None:
-        self.name, self.kind, self.fields, self.constants = name, kind, fields, constants
-        self.request = parts[0] if parts else None
-        self.response = parts[1] if parts else None
+        self.name, self.kind, self.fields, self.constants, self.parts = name, kind, fields, constants, parts
+        self.request = parts[0] if kind == "srv" else None
+        self.response = parts[1] if kind == "srv" else None
         self.least: int = max(1, sum(map(_least, fields)))  # bytes; an empty message has one
         self.width: int = 1 + sum(field.nested.width if field.nested else 1 for field in fields)
         if self.least > LARGEST or self.width > MOST_FIELDS:
@@ -132,8 +134,42 @@ class PlacedError(InterfaceError):
     """An error that already names its file and line."""
 
 
+ACTION_PARTS = ("Goal", "Result", "Feedback", "FeedbackMessage", "SendGoal", "GetResult")
+"""The endings of what an action consists of: its sections, the message of its topic, and its services."""
+
+
+def action_parts(name: str, sections: "list[Section]", resolve: "Resolve") -> list[Interface]:
+    """The parts of an action, in the order of ACTION_PARTS, from the sections of its file.
+
+    Source: ROS 2's design, "Actions", and rosidl, which adds the goal's id to what is sent.
+    """
+    goal, result, feedback = (
+        Interface(f"{name}_{part}", "msg", *section) for part, section in zip(ACTION_PARTS, sections, strict=False)
+    )
+    uuid = resolve("unique_identifier_msgs/UUID")
+
+    def nested(name: str, kind: Interface) -> Field:
+        return Field(name, kind.name, nested=kind)
+
+    def service(part: str, request: list[Field], response: list[Field]) -> Interface:
+        halves = zip(("Request", "Response"), (request, response), strict=True)
+        return Interface(
+            f"{name}_{part}", "srv",
+            parts=tuple(Interface(f"{name}_{part}_{half}", "msg", tuple(fields)) for half, fields in halves),
+        )  # fmt: skip
+
+    identified = nested("goal_id", uuid)
+    accepted = [Field("accepted", "bool"), nested("stamp", resolve("builtin_interfaces/Time"))]
+    return [
+        goal, result, feedback,
+        Interface(f"{name}_FeedbackMessage", "msg", (identified, nested("feedback", feedback))),
+        service("SendGoal", [identified, nested("goal", goal)], accepted),
+        service("GetResult", [identified], [Field("status", "int8"), nested("result", result)]),
+    ]  # fmt: skip
+
+
 class Section(NamedTuple):
-    """The fields and constants of a message, or of one half of a service."""
+    """The fields and constants of a message, or of a part of a service or an action."""
 
     fields: tuple[Field, ...]
     constants: tuple[Constant, ...]
@@ -391,7 +427,7 @@ def split_text(name: str, text: str) -> dict[str, str]:
     for other in others:
         package, _, rest = other.partition("/")
         last, _, lines = rest.partition("\n")
-        found[f"{package}/msg/{last}"] = lines
+        found[f"{package}/{last}" if "/" in last else f"{package}/msg/{last}"] = lines  # that of an action has its kind
     return found
 
 

@@ -13,6 +13,11 @@ from holozen import limits
 
 # `ros` is the type in the definition; a plain int is an int64, a float a float64.
 Byte = Annotated[int, Meta(ge=0, lt=2**8, extra={"ros": "byte"})]
+Int8 = Annotated[int, Meta(ge=-(2**7), lt=2**7, extra={"ros": "int8"})]
+Int16 = Annotated[int, Meta(ge=-(2**15), lt=2**15, extra={"ros": "int16"})]
+UInt16 = Annotated[int, Meta(ge=0, lt=2**16, extra={"ros": "uint16"})]
+UInt32 = Annotated[int, Meta(ge=0, lt=2**32, extra={"ros": "uint32"})]
+Float32 = Annotated[float, Meta(extra={"ros": "float32"})]
 UInt8 = Annotated[int, Meta(ge=0, lt=2**8, extra={"ros": "uint8"})]
 Int32 = Annotated[int, Meta(ge=-(2**31), lt=2**31, extra={"ros": "int32"})]
 UInt64 = Annotated[int, Meta(ge=0, extra={"ros": "uint64"})]

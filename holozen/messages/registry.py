@@ -1,4 +1,4 @@
-"""Looks up types by name, in the tables of interfaces/ and in the msg and srv folders of packages."""
+"""Looks up types by name, in the tables of interfaces/ and in the msg, srv and action folders of packages."""
 
 import functools
 import os
@@ -7,16 +7,26 @@ import stat
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
-from holozen.messages.definitions import LARGEST_FILE, Interface, InterfaceError, parse, split_text
+from holozen.messages.definitions import (
+    ACTION_PARTS,
+    LARGEST_FILE,
+    Interface,
+    InterfaceError,
+    action_parts,
+    parse,
+    split_text,
+)
 from holozen.suggest import last_part, listed, suggest
 
 TABLES = os.path.join(os.path.dirname(os.path.abspath(__file__)), "interfaces")
-KINDS = ("msg", "srv")
-_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/(?:(msg|srv)/)?([A-Za-z][A-Za-z0-9_]*)")
+KINDS = ("msg", "srv", "action")
+_SECTIONS = {"msg": 1, "srv": 2, "action": 3}  # of a file
+_NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z][A-Za-z0-9_]*)")
 DEEPEST = 50  # levels of nesting
 MOST_LOST = 100  # unknown names that are remembered
 MOST = 20  # names in an error
 _HALVES = ("_Request", "_Response")
+_PARTS = tuple(f"_{part}{half}" for part in ACTION_PARTS for half in ("", *_HALVES))  # ends of names within an action
 
 Folders = Mapping[str, "str | os.PathLike[str]"]
 Paths = Sequence["str | os.PathLike[str]"]
@@ -87,7 +97,9 @@ class Places:
         path = self.folder(package)
         found = sorted(_names_in(path)) if path else []
         if package in self._given and not found:
-            raise InterfaceError(f"--package {package}={path}: no .msg or .srv files in its folders msg and srv")
+            raise InterfaceError(
+                f"--package {package}={path}: no .msg, .srv or .action files in its folders msg, srv and action"
+            )
         return found
 
     def packages(self) -> list[str]:
@@ -224,16 +236,19 @@ class Registry:
     def _get(self, package: str, name: str) -> Interface | None:
         full = f"{package}/{name}"
         if full not in self._found:
-            stem = next((name.removesuffix(half) for half in _HALVES if name.endswith(half)), name)
-            whole = name if name.startswith("msg/") else stem
+            whole = _file(name)
             source = self.places.source(package, whole)
+            if source is None and whole != name:  # a part of an action that a node has defined
+                whole, source = name, self.places.learned.get(full)
             if source is None:
                 return None
             self._keep(package, whole, source)
         return self._found.get(full)
 
     def _keep(self, package: str, name: str, source: Source) -> None:
-        full, kind = f"{package}/{name}", name[:3]
+        full, kind = f"{package}/{name}", name.partition("/")[0]
+        if kind != "msg" and _file(name) != name:
+            kind = "msg"
         if full in self._open:
             raise InterfaceError(f"{full} contains itself: {' > '.join([*self._open, full])}")
         if len(self._open) == DEEPEST:
@@ -241,24 +256,29 @@ class Registry:
         self._open.append(full)
         try:
             sections = parse(source.text, source.where, lambda other: self._nested(package, other), source.line)
-            wanted = 2 if kind == "srv" else 1
+            wanted = _SECTIONS[kind]
             if len(sections) != wanted:
                 raise InterfaceError(f"{source.where}: {len(sections) - 1} lines of '---'; a .{kind} has {wanted - 1}")
-            ends = _HALVES if kind == "srv" else ("",)
-            made = [Interface(full + end, "msg", *section) for end, section in zip(ends, sections, strict=True)]
+            if kind == "action":
+                made = action_parts(full, sections, self.find)
+            else:
+                ends = _HALVES if kind == "srv" else ("",)
+                made = [Interface(full + end, "msg", *section) for end, section in zip(ends, sections, strict=True)]
         finally:
             self._open.pop()
-        if kind == "srv":
-            made.append(Interface(full, "srv", parts=(made[0], made[1])))
+        if kind != "msg":
+            made.append(Interface(full, kind, parts=tuple(made)))
+        made += [half for service in made if kind == "action" and service.kind == "srv" for half in service.parts]
         self._found.update({interface.name: interface for interface in made})
 
     def _nested(self, package: str, name: str) -> Interface:
         """The message that a file of `package` calls `name`."""
         if "/" in name:
             home, kind, last = _parts(name)
-            if kind == "srv":
-                raise InterfaceError(f"{name}: a field is a message, not a service")
-            return self.find(f"{home}/msg/{last}")
+            if kind == "srv" or (kind == "action" and _file(f"action/{last}") == f"action/{last}"):
+                what = "a service" if kind == "srv" else "an action"
+                raise InterfaceError(f"{name}: a field is a message, not {what}")
+            return self.find(f"{home}/{kind or 'msg'}/{last}")
         if name == "Header" and not self.places.source(package, "msg/Header"):
             package = "std_msgs"  # as ROS 1 wrote it
         return self.find(f"{package}/msg/{name}")
@@ -277,11 +297,19 @@ class Registry:
         return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MOST)}"
 
 
+def _file(name: str) -> str:
+    """The name of the file that defines `srv/Trigger_Request` or `action/Fibonacci_SendGoal_Request`, such as
+    `srv/Trigger`.
+    """
+    ends = {"msg": (), "srv": _HALVES, "action": _PARTS}[name.partition("/")[0]]
+    return next((name.removesuffix(end) for end in ends if name.endswith(end)), name)
+
+
 def full_name(name: str) -> str:
     """A full type name as ROS 2 writes it. Raises InterfaceError if package, kind or name are missing."""
     package, kind, last = _parts(name)
     if not kind:
-        raise InterfaceError(f"{name!r} does not specify msg or srv")
+        raise InterfaceError(f"{name!r} does not specify msg, srv or action")
     return f"{package}/{kind}/{last}"
 
 

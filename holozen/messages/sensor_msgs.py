@@ -6,11 +6,9 @@ from typing import Annotated, ClassVar
 from msgspec import Meta, field
 
 from holozen.messages.geometry_msgs import Quaternion, Vector3
-from holozen.messages.message import Message, UInt8
+from holozen.messages.message import Float32, Message, UInt8, UInt32
 from holozen.messages.std_msgs import Header
 
-Float32 = Annotated[float, Meta(extra={"ros": "float32"})]
-UInt32 = Annotated[int, Meta(ge=0, lt=2**32, extra={"ros": "uint32"})]
 # Writers may give an array, which is sent without a look at each number.
 Floats = Annotated[Sequence[float], Meta(extra={"ros": "float32[]"})]
 Bytes = Annotated[Sequence[int], Meta(extra={"ros": "uint8[]"})]

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from msgspec import field
 
+from holozen.messages.action import Action, ActionPart
 from holozen.messages.geometry_msgs import Accel, Pose, PoseStamped, Twist, Vector3
 from holozen.messages.message import Message, UInt8, UInt64
 from holozen.messages.std_msgs import Header
@@ -201,3 +202,21 @@ class ResetSimulationRequest(Message):
 
 class ResetSimulationReply(Message):
     result: Result = field(default_factory=Result)
+
+
+class SimulateStepsGoal(ActionPart):
+    """As the service step_simulation, with the progress as feedback."""
+
+    steps: UInt64 = 0
+
+
+class SimulateStepsResult(ActionPart):
+    result: Result = field(default_factory=Result)
+
+
+class SimulateStepsFeedback(ActionPart):
+    completed_steps: UInt64 = 0
+    remaining_steps: UInt64 = 0
+
+
+SimulateSteps = Action(SimulateStepsGoal, SimulateStepsResult, SimulateStepsFeedback)

@@ -16,6 +16,7 @@ from msgspec import StructMeta
 
 import holozen.messages
 from holozen.messages import CodecError
+from holozen.messages.action import ActionPart
 from holozen.messages.cdr import Codec, Shape
 from holozen.messages.definitions import INTEGERS, Field, Interface, completed
 from holozen.messages.message import Message, listed
@@ -32,7 +33,8 @@ def ros_name(kind: type[Message]) -> str:
     if made := getattr(kind, "__interface__", None):
         return str(made.name)
     halves = (half for end, half in _HALVES.items() if kind.__name__.endswith(end))
-    return kind.ROS + (next(halves, "") if "/srv/" in kind.ROS else "")
+    is_half = "/srv/" in kind.ROS or kind.ROS.endswith(("_SendGoal", "_GetResult"))
+    return kind.ROS + (next(halves, "") if is_half else "")
 
 
 def interface(kind: type[Message]) -> Interface:
@@ -129,9 +131,14 @@ def definitions() -> str:
     for module in pkgutil.iter_modules(holozen.messages.__path__):
         importlib.import_module(f"{holozen.messages.__name__}.{module.name}")
     halves: dict[str, list[str]] = {}
-    for kind in sorted(Message.__subclasses__(), key=lambda kind: kind.__name__.endswith("Reply")):
-        if kind.__module__.startswith(f"{holozen.messages.__name__}."):
-            halves.setdefault(kind.ROS, []).append("".join(f"{line}\n" for line in _lines(kind)))
+    parts = ("Reply", "Result", "Feedback")  # after a request, or a goal
+    kinds = (*(set(Message.__subclasses__()) - {ActionPart}), *ActionPart.__subclasses__())
+    for kind in sorted(
+        kinds, key=lambda kind: next((parts.index(end) for end in parts if kind.__name__.endswith(end)), -1)
+    ):
+        name, _, part = kind.ROS.rpartition("_") if "/action/" in kind.ROS else (kind.ROS, "", "Goal")
+        if kind.__module__.startswith(f"{holozen.messages.__name__}.") and part in ("Goal", "Result", "Feedback"):
+            halves.setdefault(name, []).append("".join(f"{line}\n" for line in _lines(kind)))
     return "\n".join(f"[{name}]\n" + "---\n".join(texts) for name, texts in sorted(halves.items()))
 
 

@@ -10,7 +10,8 @@ from holozen.suggest import suggest
 PAGE = "docs/coming-from-ros.md"
 
 SAME = (
-    "rclpy", "rclpy.callback_groups", "rclpy.client", "rclpy.clock", "rclpy.context", "rclpy.exceptions",
+    "rclpy", "rclpy.action", "rclpy.action.client", "rclpy.action.graph", "rclpy.action.server",
+    "rclpy.callback_groups", "rclpy.client", "rclpy.clock", "rclpy.context", "rclpy.exceptions",
     "rclpy.executors", "rclpy.logging", "rclpy.node", "rclpy.parameter", "rclpy.publisher", "rclpy.qos",
     "rclpy.service", "rclpy.subscription", "rclpy.task", "rclpy.time", "rclpy.timer", "tf2_ros",
     "tf2_geometry_msgs", "tf_transformations", "ament_index_python", "launch",
@@ -59,6 +60,8 @@ _TF2_ROS = (
 )  # fmt: skip
 
 REEXPORTS: dict[str, tuple[str, ...]] = {
+    "rclpy.action.client": ("GoalStatus",),
+    "rclpy.action.server": ("GoalInfo", "GoalStatus"),
     "rclpy.client": ("CallbackGroup", "Context", "Future", "QoSProfile"),
     "rclpy.clock": ("ClockType", "Context", "Duration", "Time", "get_default_context"),
     "rclpy.executors": (
@@ -92,6 +95,7 @@ REEXPORTS: dict[str, tuple[str, ...]] = {
 """ROS's module -> names that it imports from others, and that scripts therefore find in it as well."""
 
 MESSAGES = {
+    "action_msgs.msg": ("GoalInfo", "GoalStatus"),
     "rcl_interfaces.msg": (
         "FloatingPointRange", "IntegerRange", "ListParametersResult", "ParameterDescriptor", "ParameterEvent",
         "ParameterType", "ParameterValue", "SetParametersResult",
@@ -101,14 +105,13 @@ MESSAGES = {
 }  # fmt: skip
 """The messages among the re-exported names, by module; all others are rclpy's."""
 
-ACTIONS = "there are no actions here; use a service, or a topic for the goal and one for the progress"
 COMPONENTS = "there are no components here, which are C++; start each as a Node of its own: Python scripts run"
 MOVEIT = "there is no MoveIt here"
-NAV2 = "there is no Nav2 here; `holozen controller` drives to goals"
+NAV2 = "there is no Nav2 here; `holozen controller` serves navigate_to_pose and follow_waypoints"
 ROS_1 = "this belongs to ROS 1; here is ROS 2's rclpy"
 
 HINTS = {
-    "actionlib": ACTIONS,
+    "actionlib": f"{ROS_1}, which has actions in rclpy.action",
     "ament_index_python.resources": "ament_index_python.packages finds the folders of packages",
     "cv_bridge": "numpy.frombuffer(image.data, 'uint8').reshape(image.height, image.width, -1) is a colour image",
     "interactive_markers": "there are no interactive markers here; a topic or a service can set what a marker would",
@@ -123,8 +126,8 @@ HINTS = {
     "moveit_configs_utils": MOVEIT,
     "nav2_common": NAV2,
     "nav2_simple_commander": NAV2,
-    "rclpy.action": ACTIONS,
     "rclpy.lifecycle": "there are no lifecycle nodes here; use rclpy.node.Node",
+    "rclpy_components": COMPONENTS,
     "rclpy.serialization": "holozen.messages.codec.encode and decode do this",
     "rosbag2_py": "`holozen record` and `holozen replay` do this",
     "rosidl_runtime_py": "holozen.ros.generated.find gives the class of a name such as 'geometry_msgs/msg/Twist'",

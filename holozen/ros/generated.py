@@ -1,4 +1,4 @@
-"""ROS's message and service classes, generated from their definitions on first use.
+"""ROS's message, service and action classes, generated from their definitions on first use.
 
 They are Structs, encoded and decoded by the same codec (JSON, msgpack, CDR) as our own messages. Values assigned by
 scripts are checked as in ROS; a decoder checks what it reads, so reading costs no more than for our own messages.
@@ -42,6 +42,7 @@ _store = Struct.__setattr__
 MADE: dict[Interface, type["RosMessage"]] = {}
 _kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by content: another registry parses the same file anew
 _services: dict[tuple[str, Any, Any], type["RosService"]] = {}
+_actions: dict[tuple[Any, ...], type["RosAction"]] = {}
 _registry = Registry()
 _lock = threading.RLock()  # callbacks in several threads may ask first
 
@@ -99,6 +100,19 @@ class RosService:
         raise NotImplementedError(f"a service type has no instances; create a {type(self).__name__}.Request()")
 
 
+class RosAction:
+    """The base class of all generated actions, which only name their messages; `Impl` has those that travel."""
+
+    ROS: ClassVar[str] = ""
+    Goal: ClassVar[Any]
+    Result: ClassVar[Any]
+    Feedback: ClassVar[Any]
+    Impl: ClassVar[Any]
+
+    def __init__(self) -> None:
+        raise NotImplementedError(f"an action type has no instances; create a {type(self).__name__}.Goal()")
+
+
 def use(registry: Registry) -> None:
     """Look up types in this registry from now on."""
     global _registry
@@ -106,13 +120,14 @@ def use(registry: Registry) -> None:
 
 
 def find(name: str) -> Any:
-    """The class of `geometry_msgs/msg/Twist`, `std_srvs/srv/Trigger` or `std_srvs/srv/Trigger_Request`.
+    """The class of `geometry_msgs/msg/Twist`, `std_srvs/srv/Trigger`, `std_srvs/srv/Trigger_Request` or
+    `example_interfaces/action/Fibonacci`.
 
     Raises InterfaceError, with the closest name that exists.
     """
     with _lock:
         interface = _registry.find(name)
-        return make_service(interface) if interface.kind == "srv" else make(interface)
+        return {"msg": make, "srv": make_service, "action": make_action}[interface.kind](interface)
 
 
 def make(interface: Interface) -> type[RosMessage]:
@@ -139,6 +154,23 @@ def make_service(interface: Interface) -> type[RosService]:
     return _services[key]
 
 
+def make_action(interface: Interface) -> type[RosAction]:
+    """The class of an action, one per definition. Raises InterfaceError."""
+    made = {part.name.rpartition("_")[2]: part for part in interface.parts}
+    kinds = {name: (make_service if part.kind == "srv" else make)(part) for name, part in made.items()}
+    key = (interface.name, *kinds.values())
+    if key not in _actions:
+        travels = {
+            "SendGoalService": kinds["SendGoal"], "GetResultService": kinds["GetResult"],
+            "FeedbackMessage": kinds["FeedbackMessage"], "CancelGoalService": find("action_msgs/srv/CancelGoal"),
+            "GoalStatusMessage": find("action_msgs/msg/GoalStatusArray"),
+        }  # fmt: skip
+        parts = {name: kinds[name] for name in ("Goal", "Result", "Feedback")}
+        names = {"__module__": _module(interface), "ROS": interface.name, "Impl": type("Impl", (), travels), **parts}
+        _actions[key] = type(_last(interface), (RosAction,), names)
+    return _actions[key]
+
+
 def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[RosMessage]:
     for name in (*(field.name for field in interface.fields), *(each.name for each in interface.constants)):
         if keyword.iskeyword(name) or hasattr(RosMessage, name):
@@ -150,7 +182,8 @@ def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[Ros
     if codes := {field.name: _typecode(field) for field in interface.fields if _typecode(field)}:
         names["__post_init__"] = _array_filler(codes)
     kind: Any = RosMeta(_last(interface), (RosMessage,), names)
-    kind.ROS = re.sub("_(Request|Response)$", "", interface.name) if "/srv/" in interface.name else interface.name
+    is_half = re.search("/srv/|_(SendGoal|GetResult)_", interface.name)
+    kind.ROS = re.sub("_(Request|Response)$", "", interface.name) if is_half else interface.name
     kind.__interface__ = interface
     owner = f"{kind.__module__}.{kind.__name__}"
     kind.__checks__ = {field.name: _check(owner, field, nested.get(field.name)) for field in interface.fields}
@@ -272,7 +305,7 @@ def _hint(field: Field, nested: type | None) -> Any:
 
 def _spelled(field: Field) -> str:
     """The type as ROS's `get_fields_and_field_types` writes it, such as `sequence<geometry_msgs/Point>`."""
-    one = field.type.replace("/msg/", "/") if field.nested else _IDL.get(field.type, field.type)
+    one = re.sub("/(msg|action)/", "/", field.type) if field.nested else _IDL.get(field.type, field.type)
     one += f"<{field.longest}>" if field.longest else ""
     if field.array == "fixed":
         return f"{one}[{field.bound}]"

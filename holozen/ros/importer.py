@@ -1,8 +1,8 @@
 """Makes ROS's modules and interface packages importable in this process.
 
 Two finders on sys.meta_path do so. The first stands before Python's own, for what must be ours: ROS's modules, the
-interfaces that come with holozen, and `msg` and `srv` of any package. The second stands behind Python's, for packages
-known only from the folders around the script.
+interfaces that come with holozen, and `msg`, `srv` and `action` of any package. The second stands behind Python's, for
+packages known only from the folders around the script.
 """
 
 import os
@@ -15,14 +15,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from holozen.messages.definitions import InterfaceError
-from holozen.messages.registry import Places, Registry, tables
+from holozen.messages.definitions import ACTION_PARTS, InterfaceError
+from holozen.messages.registry import KINDS, Places, Registry, tables
 from holozen.robot.packages import folders_above, local_packages
 from holozen.ros import generated
-from holozen.ros.catalog import ACTIONS, HINTS, MESSAGES, MODULES, PAGE, REEXPORTS
+from holozen.ros.catalog import HINTS, MESSAGES, MODULES, PAGE, REEXPORTS
 from holozen.suggest import suggest
 
-KINDS = ("msg", "srv")
 _SUFFIXES = ("_msgs", "_srvs", "_interfaces", "_interface", "_msg", "_srv")  # of names that only interfaces have
 _TOP_LEVEL = {name.partition(".")[0] for name in MODULES}
 _installed: list["_Front | _Back"] = []
@@ -100,15 +99,13 @@ class _Finder:
         self.tables = {*tables()} - {"holozen"}  # which is a Python package as well
 
     def interfaces(self, name: str) -> ModuleSpec:
-        """The module `my_pkg.msg` or `my_pkg.srv`. Raises ModuleNotFoundError."""
+        """The module `my_pkg.msg`, `my_pkg.srv` or `my_pkg.action`. Raises ModuleNotFoundError."""
         top, _, kind = name.partition(".")
         try:
             names = self.places.names(top)
             folder = self.places.folder(top) if top not in self.tables else None
         except ValueError as error:
             raise ModuleNotFoundError(str(error)) from None
-        if kind == "action":
-            raise ModuleNotFoundError(f"{name}: {ACTIONS}; see {PAGE}")
         if any(each.startswith(f"{kind}/") for each in names):
             return _spec(name, _fill_interfaces(self.places))
         if folder or names:
@@ -122,7 +119,7 @@ class _Finder:
         known = {*self.places.packages(), *(found for start in starts for found in local_packages(start))} - {"holozen"}
         folders = list(dict.fromkeys(str(above[0]) for start in starts if (above := folders_above(start))))
         return (
-            f"no package {name!r} with .msg or .srv files{suggest(name, known)}; searched AMENT_PREFIX_PATH,"
+            f"no package {name!r} with .msg, .srv or .action files{suggest(name, known)}; searched AMENT_PREFIX_PATH,"
             f" ROS_PACKAGE_PATH and the package.xml files around {', '.join(folders) or 'no folder'};"
             f" to give its folder: --package {name}=DIR"
         )
@@ -144,7 +141,7 @@ class _Front(_Finder):
             raise ModuleNotFoundError(_missing_name(module, last, getattr(sys.modules[module], "__all__", [])))
         if top in self.tables:
             return self._bundled(name, rest)
-        if rest in (*KINDS, "action"):
+        if rest in KINDS:
             return self._beside_python(name, top)
         module = name.rpartition(".")[0]
         if module and _is_ours(module):
@@ -157,7 +154,9 @@ class _Front(_Finder):
         top, _, kind = module.partition(".")
         if kind not in KINDS or not last.startswith("_") or not _is_ours(module):
             return None
-        suffixes = ("", "_Request", "_Response") if kind == "srv" else ("",)
+        suffixes = {
+            "msg": ("",), "srv": ("", "_Request", "_Response"), "action": ("", *(f"_{part}" for part in ACTION_PARTS)),
+        }[kind]  # fmt: skip
         for each in self.places.names(top):
             if each.startswith(f"{kind}/") and f"_{_snake_case(each.partition('/')[2])}" == last:
                 return _spec(name, _fill_single_type([f"{top}/{each}{suffix}" for suffix in suffixes]))
@@ -167,7 +166,7 @@ class _Front(_Finder):
         """A package, or its module, of the interfaces that come with holozen."""
         if not rest:
             return _spec(name, _fill_package)
-        if rest in (*KINDS, "action"):
+        if rest in KINDS:
             return self.interfaces(name)
         raise self._no_type(name)
 
@@ -301,7 +300,7 @@ def _fill_package(module: ModuleType) -> None:
                 return import_module(f"{name}.{wanted}")
             except ImportError as error:
                 raise AttributeError(str(error)) from None
-        raise AttributeError(f"{name} has no {wanted!r}; it has msg and srv")
+        raise AttributeError(f"{name} has no {wanted!r}; it has msg, srv and action")
 
     _finish(module, f"The interfaces of {name}.", [], get)
 

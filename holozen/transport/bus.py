@@ -90,7 +90,7 @@ class Bus(Node):
             sign = partial(self.member.attachment, key, priority)
         writer: Publisher[M] = Publisher(publisher, wire or self.wire, self.stamp, number, watch, sign)
         self._answer_gets(writer, key)
-        self._define(kind)
+        self.define(kind)
         # Last, so that nodes that discover it can query it at once.
         writer.ends.append(self.announce("pub", kind.ROS, key))
         return self._keep(writer)
@@ -106,7 +106,7 @@ class Bus(Node):
             writer.gets = self._gets[expression] = self._keep(Gets(queryable))
             writer.gets.add(writer)
 
-    def _define(self, kind: type[Message]) -> None:
+    def define(self, kind: type[Message]) -> None:
         """Answer with the definition of a type that other processes may not have: one from the files of a package."""
         from holozen.messages import definitions, registry
 

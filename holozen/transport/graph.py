@@ -1,7 +1,7 @@
 """The graph: the nodes and what they read, write and serve, announced by Zenoh liveliness tokens.
 
-A token's key is `@holozen/<session>/<node>/<kind>/<package>/<msg or srv>/<Type>/<key>`; a `node` token ends after its
-kind. A slash in a node's name is written as `%2F`. The `@` excludes them from a plain `**`.
+A token's key is `@holozen/<session>/<node>/<kind>/<package>/<msg, srv or action>/<Type>/<key>`; a `node` token ends
+after its kind. A slash in a node's name is written as `%2F`. The `@` excludes them from a plain `**`.
 """
 
 from __future__ import annotations

@@ -193,7 +193,7 @@ class Node:
 
     def definition(self, type_name: str) -> str:
         """The definition of a type and of those nested in it, from a node that publishes it; empty without one."""
-        if not re.fullmatch(r"\w+/(?:msg|srv)/\w+", type_name):
+        if not re.fullmatch(r"\w+/(?:msg|srv|action)/\w+", type_name):
             return ""
         deadline = time.monotonic() + DEFINITION_WAIT
         while True:  # on a new link its tokens may be known before what it answers

@@ -16,6 +16,8 @@ READS = (
 )  # fmt: skip
 """Keys of queries that change nothing."""
 STOP = "**/stop"
+ACTIONS = tuple(f"**/{key}/_action/*" for key in ("navigate_to_pose", "follow_waypoints"))
+"""Those that send an autopilot to goals."""
 
 
 class Role(NamedTuple):
@@ -43,10 +45,11 @@ ROLES = {
     "sim": Role("", EVERY, (*READS, CLOCK), EVERY, (NODES,)),
     "operator": Role("REAL_TIME", COMMANDS, EVERY, _OWN, _DRIVES),
     "autopilot": Role(
-        "DATA_LOW", COMMANDS, (*READS, "**/next_goal", STOP), (*_OWN, *_GOALS),
-        (*_DRIVES, *(f"@holozen/*/*/srv/*/*/*/{key}" for key in _GOALS)),
+        "DATA_LOW", (*COMMANDS, *ACTIONS), (*READS, "**/next_goal", STOP, *ACTIONS), (*_OWN, *_GOALS, *ACTIONS),
+        (*_DRIVES, *(f"@holozen/*/*/srv/*/*/*/{key}" for key in (*_GOALS, *ACTIONS)),
+         *(f"@holozen/*/*/pub/*/*/*/{key}" for key in ACTIONS)),
     ),
-    "script": Role("DATA", COMMANDS, (*READS, "**/next_goal", STOP), _OWN, _DRIVES),
+    "script": Role("DATA", COMMANDS, (*READS, "**/next_goal", STOP, *ACTIONS), _OWN, _DRIVES),
     "viewer": Role("", (), READS, (ABOUT,), ()),
 }  # fmt: skip
 """The roles of a router's clients."""

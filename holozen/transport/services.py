@@ -84,7 +84,8 @@ class Waiting:
 class Server(Declared):
     """A service. Requests wait until `answer_pending` is called, or until the thread of `start` takes them.
 
-    At most `room` of them wait; the others are refused as busy, and `Bus.call` retries those.
+    At most `room` of them wait; the others are refused as busy, and `Bus.call` retries those. `answer` returns the
+    reply, or a pair of it and a note.
     """
 
     def __init__(
@@ -98,7 +99,7 @@ class Server(Declared):
         self.listen = queryable.handler.try_recv  # Zenoh's next request or None, for `keep`
         self._waiting, self._room = Waiting(room), room
         self.caller = ""  # the claimed sender of the request that is being answered
-        self._kept: dict[bytes, tuple[bytes, str]] = {}  # number of a request -> its reply, in order
+        self._kept: dict[bytes, tuple[bytes, str, str]] = {}  # number of a request -> its reply, in order
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
     def take_in(self, most: int = BATCH) -> int:
@@ -169,10 +170,11 @@ class Server(Declared):
         with query:
             self.caller = source_in(query.attachment)
             if earlier := self._kept.get(_number(query)):  # its caller asks again, since this reply was lost
-                query.reply(self._key, earlier[0], encoding=earlier[1])
+                self._send(query, *earlier)
                 return
             try:
-                self.reply(query, self._answer(self.read(query)))
+                answer = self._answer(self.read(query))
+                self.reply(query, *(answer if isinstance(answer, tuple) else (answer,)))
             except ServiceError as error:
                 refuse(query, str(error), error.fields)
             except Elsewhere:
@@ -187,15 +189,18 @@ class Server(Declared):
         """Whether a request names this service's key; wildcards are only used for discovery."""
         return str(query.key_expr) == self._key
 
-    def reply(self, query: Any, answer: Message) -> None:
-        """Answer a request."""
+    def reply(self, query: Any, answer: Message, note: str = "") -> None:
+        """Answer a request. The reply's type has no place for `note`, so it is the attachment."""
         reply, wire = self._codec.written(answer, self._wire)
         encoding = self._codec.encoding(wire, type(answer))
         if len(reply) <= KEPT_BYTES and (number := _number(query)):
             if len(self._kept) == KEPT:
                 self._kept.pop(next(iter(self._kept)))
-            self._kept[number] = reply, encoding
-        query.reply(self._key, reply, encoding=encoding)
+            self._kept[number] = reply, encoding, note
+        self._send(query, reply, encoding, note)
+
+    def _send(self, query: Any, reply: bytes, encoding: str, note: str) -> None:
+        query.reply(self._key, reply, encoding=encoding, attachment=note or None)
 
     def read(self, query: Any) -> Any:
         """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`)."""

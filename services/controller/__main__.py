@@ -98,6 +98,7 @@ def follow(args: argparse.Namespace, where: connection.Connection) -> int:
                 print_legs(follower.lap(), laps := laps + 1)
         finally:
             follower.halt()
+            follower.close()
     return 0
 
 

@@ -15,14 +15,17 @@ from holozen.transport.pubsub import Publisher
 from holozen.wire import PRIORITY_OF, key_for
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
+from .journeys import GoalServers, Journey
 
 PERIOD = 0.05  # s of the odom's clock between two commands
 PATIENCE = 0.5  # s between two attempts to reach a service
 STOP_FOR, STOP_EVERY = 1.0, 0.05  # s; how long and how often a stop is repeated
 LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
+LOST = 2.0  # s without fresh odom, after which the goal of an action is aborted; the robot has stopped long before
 FRAMES = ("", "odom", "map", "world")  # of a goal: all of them mean the frame of odom
-GOAL = "a goal of goal_pose"
+GOAL = "a goal of goal_pose or of an action"
+ENDS = "the controller ends"
 RESUMES = "`holozen controller --resume` or the teleop's r resumes"
 
 
@@ -46,11 +49,11 @@ class YieldPolicy:
         return f"yields to {self.yielded_to}; {RESUMES}" if self.yielded_to else ""
 
     def stay(self) -> None:
-        """A goal of goal_pose is reached: the robot stays until a resume, or the next of them."""
+        """A goal of goal_pose or of an action has ended: the robot stays until a resume, or the next of them."""
         self.yielded_to = self.yielded_to or GOAL
 
     def invited(self) -> None:
-        """The next goal of goal_pose has come."""
+        """The next of these goals has come."""
         if self.yielded_to == GOAL:
             self.yielded_to = ""
 
@@ -71,8 +74,8 @@ class YieldPolicy:
 class Follower:
     """Drives one robot from goal to goal until `stop` is set.
 
-    A goal on `goal_pose` comes first: the robot drives there at once and stays, until the next one or a resume. While
-    the controller yields, the newest of them waits for the resume.
+    A goal on `goal_pose`, or of an action, comes first: the robot drives there at once and stays, until the next one or
+    a resume. While the controller yields, the newest of goal_pose waits for the resume; that of an action is aborted.
     """
 
     def __init__(
@@ -85,7 +88,9 @@ class Follower:
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
-        self._wanted: Pose | None = None  # of goal_pose, not reached yet
+        self._wanted: Journey | None = None  # of goal_pose or an action, not ended yet
+        self._actions = GoalServers(bus, robot, self._refusal, report)
+        self._seen = time.monotonic()  # the last fresh odom, or the start of a journey
         self._policy = YieldPolicy(bus.source, "--held" if held else "")
         self._now: Planar = STOP
         self._yielded = False
@@ -95,13 +100,13 @@ class Follower:
         """Visit every goal of the list once. Returns the legs driven; fewer than the list if stopped before its end."""
         legs: list[Leg] = []
         while not self._stop.is_set():
-            if self._is_sent_elsewhere():
-                self._visit()
+            if journey := self._newest_journey():
+                self._travel(journey)
                 continue
             goal = self._ask(len(legs))
             if self._wanted:
                 continue
-            leg = goal and self._drive((goal.x_goal, goal.y_goal, goal.theta_goal))
+            leg = goal and self._drive((goal.x_goal, goal.y_goal, goal.theta_goal), None)
             if self._wanted:
                 continue
             if not goal or not leg:
@@ -121,17 +126,32 @@ class Follower:
             if time.monotonic() > ends or self._odom.rests(since):
                 self._now = STOP
 
-    def _is_sent_elsewhere(self) -> bool:
-        """Whether a goal of goal_pose is to be reached; reads the newest."""
+    def close(self) -> None:
+        """End the goals of actions: this controller drives no more."""
+        self._actions.close(ENDS)
+        if self._wanted:
+            self._wanted.give_up(ENDS)
+
+    def _newest_journey(self) -> Journey | None:
+        """Where the robot is sent by goal_pose or an action: the newest, which ends the one before."""
         received = self._goals.try_recv()
         if received is not None:
             if reason := received.error or (received.message and self._refusal(received.message)):
                 self._report(f"goal_pose: refused: {reason}")
             elif goal := received.message:
-                self._wanted = x, y, _ = goal.pose.planar()
+                x, y, theta = goal.pose.planar()
                 self._report(f"goal_pose: ({x:.2f}, {y:.2f}) by {received.sample.source or 'an unknown sender'}")
-                self._policy.invited()
-        return self._wanted is not None
+                self._set_out(Journey([(x, y, theta)]), "a newer goal came on goal_pose")
+        if journey := self._actions.take():
+            self._set_out(journey, "a newer goal came")
+            journey.begin()
+        return self._wanted
+
+    def _set_out(self, journey: Journey, why: str) -> None:
+        if self._wanted:
+            self._wanted.give_up(why)
+        self._wanted, self._seen = journey, time.monotonic()
+        self._policy.invited()
 
     def _refusal(self, goal: PoseStamped) -> str:
         """Why the robot does not drive to a goal; empty if it does."""
@@ -145,9 +165,12 @@ class Follower:
             return f"it is more than {MAX_DISTANCE:g} m away"
         return ""
 
-    def _visit(self) -> None:
-        """Drive to the goal of goal_pose, and stay there."""
-        if (goal := self._wanted) and self._drive(goal) and goal is self._wanted:
+    def _travel(self, journey: Journey) -> None:
+        """Drive to all poses of a journey, and stay at the last, or where it is cancelled or given up."""
+        while journey.left and self._drive(journey.left[0], journey):
+            journey.reached()
+        if not self._stop.is_set() and self._wanted is journey:
+            journey.end()
             self._wanted = None
             self._policy.stay()
 
@@ -155,7 +178,7 @@ class Follower:
         """Goal `number` of the list; waits for the service. None when `stop` is set or a goal of goal_pose comes
         first.
         """
-        while not self._stop.is_set() and not self._is_sent_elsewhere():
+        while not self._stop.is_set() and not self._newest_journey():
             try:
                 goal = self._bus.call("next_goal", NextGoalRequest(number), NextGoalReply, PATIENCE)
                 if all(abs(value) <= MAX_DISTANCE for value in (goal.x_goal, goal.y_goal, goal.theta_goal)):
@@ -170,12 +193,17 @@ class Follower:
             self._stop.wait(PATIENCE)
         return None
 
-    def _drive(self, goal: Pose) -> Leg | None:
-        """Drive to a goal. None when `stop` is set or another goal of goal_pose comes first."""
+    def _drive(self, goal: Pose, journey: Journey | None) -> Leg | None:
+        """Drive to a goal, that of a journey or of the list. None if that is not reached: `stop` is set, the robot is
+        sent elsewhere, or the journey ends here.
+        """
         leg: Leg | None = None
         before = 0.0
-        while not self._stop.is_set() and (not self._is_sent_elsewhere() or self._wanted is goal):
+        while not self._stop.is_set() and self._newest_journey() is journey:
             odom = self._next_odom()
+            if journey and (journey.is_canceled or self._is_given_up(journey, odom)):
+                self.halt()
+                return None
             if odom is None:
                 leg = None if self._policy.yielded_to else leg  # a new leg begins where the other source left the robot
                 continue
@@ -183,6 +211,8 @@ class Follower:
             if leg is None or stamp < before:  # the first odom, or those of a restarted sim
                 leg, before = Leg(pose, goal, stamp), stamp - PERIOD
             leg.update(pose, stamp)
+            if journey:
+                journey.follow(leg, odom, self.gains.max_speed)
             left = error(pose, goal)
             if arrived(left, self._now, self.gains):
                 self.halt()
@@ -191,6 +221,17 @@ class Follower:
                 self._command(velocity(left, self._now, self.gains, min(stamp - before, 2 * PERIOD)))
                 before = stamp
         return None
+
+    def _is_given_up(self, journey: Journey, odom: Odometry | None) -> bool:
+        """Whether the journey ends here since the controller may not drive, or there has been no odom for too long."""
+        now = time.monotonic()
+        if odom is not None:
+            self._seen = now
+        elif reason := self._policy.reason:
+            return journey.give_up(f"the controller {reason}")
+        elif now - self._seen > LOST:
+            return journey.give_up(f"there was no odom to act on for {LOST:g} s")
+        return False
 
     def _next_odom(self) -> Odometry | None:
         """The next odom, if this controller may act on it; else None, and this controller sends no commands."""

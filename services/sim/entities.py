@@ -47,6 +47,7 @@ class EntityError(ServiceError):
 
     def __init__(self, code: int, text: str) -> None:
         super().__init__(text, result={"result": code, "error_message": text})
+        self.code = code
 
 
 @dataclass(slots=True, eq=False)

@@ -44,7 +44,7 @@ class Simulation:
 
     def play(self, now: float) -> None:
         """Play from `now` (s) on. What was commanded before counts no longer, unless the robot's watchdog is off."""
-        self._end_steps("it plays")
+        self.end_steps("it plays")
         self.state = State.STATE_PLAYING
         self._entities.command_time.play(now)
         for robot in self._entities.robots:
@@ -55,7 +55,7 @@ class Simulation:
 
     def pause(self, now: float) -> None:
         """Hold the world from `now` (s) on, and end requested steps."""
-        self._end_steps("it was paused")
+        self.end_steps("it was paused")
         self._hold(now, State.STATE_PAUSED)
         self._publish()
 
@@ -86,9 +86,10 @@ class Simulation:
         if self.steps:
             self.steps.left -= 1
             if not self.steps.left:
-                self._end_steps("")
+                self.end_steps("")
 
-    def _end_steps(self, reason: str) -> None:
+    def end_steps(self, reason: str) -> None:
+        """End requested steps, if there are any; early with a `reason`."""
         steps, self.steps = self.steps, None
         if steps:
             self._publish()
@@ -99,7 +100,7 @@ class Simulation:
         if scope not in (*range(8), ALL):
             problem = f"scope is {scope}; use 0 or 255 (all), or a sum of 1 (time), 2 (state), 4 (spawned)"
             raise EntityError(si.Result.FEATURE_UNSUPPORTED, problem)
-        self._end_steps("it was reset")
+        self.end_steps("it was reset")
         scope = scope or ALL
         if scope & SPAWNED:
             self._entities.remove_spawned()

@@ -36,7 +36,7 @@ def is_public(path: str, node: Definition) -> bool:
 def is_a_message(node: Definition) -> bool:
     """ROS documents it."""
     bases = node.bases if isinstance(node, ast.ClassDef) else []
-    return any(isinstance(base, ast.Name) and base.id == "Message" for base in bases)
+    return any(isinstance(base, ast.Name) and base.id in ("Message", "ActionPart") for base in bases)
 
 
 def is_of_a_protocol(node: Definition) -> bool:

@@ -57,7 +57,7 @@ def test_the_picture_is_closed() -> None:
 def test_the_table_names_services_that_there_are() -> None:
     known = {folder.name for folder in FOLDERS}
     named = {name for row in wire.TOPICS for name in (*row.writers, *row.readers)}
-    assert named | {row.server for row in wire.SERVICES} == known
+    assert named | {row.server for row in (*wire.SERVICES, *wire.ACTIONS)} == known
     assert set(wire.PRIORITY_OF) <= known
 
 

@@ -25,6 +25,15 @@ HASHES = {
     "tf2_msgs/msg/TFMessage": "RIHS01_e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087",
     "std_srvs/srv/Trigger": "RIHS01_eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f",
     "example_interfaces/srv/AddTwoInts": "RIHS01_e118de6bf5eeb66a2491b5bda11202e7b68f198d6f67922cf30364858239c81a",
+    "example_interfaces/action/Fibonacci_SendGoal": (
+        "RIHS01_d1a57fb2a4afe8c21e34fb10db206f16ce6729b28531141472df92277c55b557"
+    ),
+    "example_interfaces/action/Fibonacci_GetResult": (
+        "RIHS01_1b0de0d5d29dc955d92f546706568428632771db13ec84c15ec1c1a59f424a57"
+    ),
+    "example_interfaces/action/Fibonacci_FeedbackMessage": (
+        "RIHS01_c1de71afd52e49a89c53d8262366884185bc0a02f78ce051c4e46b0a7fe59bb2"
+    ),
 }
 """Hashes that other programs print: those of rmw_zenoh's design.md, and of programs that were tried with ROS 2."""
 

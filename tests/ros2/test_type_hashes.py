@@ -7,7 +7,13 @@ from holozen.messages.registry import Registry
 from holozen.messages.type_hash import type_hash
 
 STORE = get_typestore(Stores.ROS2_JAZZY)
-ELSEWHERE = {"example_interfaces", "holozen", "simulation_interfaces"}  # packages that rosbags does not have
+ELSEWHERE = {
+    "action_tutorials_interfaces",
+    "example_interfaces",
+    "holozen",
+    "nav2_msgs",
+    "simulation_interfaces",
+}  # packages that rosbags does not have
 NOT_AS_ROS = {"std_msgs/msg/Char"}  # rosbags gives it a char, where ROS 2's .msg files mean uint8 by that word
 
 

@@ -1,5 +1,6 @@
-"""The services of simulation_interfaces that play, pause, step and reset the simulation."""
+"""What plays, pauses, steps and resets the simulation: the services of simulation_interfaces, and its action."""
 
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -10,6 +11,8 @@ from holozen.console import report
 from holozen.messages import simulation_interfaces as si
 from holozen.messages.codec import CodecError
 from holozen.messages.simulation_interfaces import SimulationState as State
+from holozen.transport.actions import ActionServer, Goal
+from holozen.transport.actions import State as GoalState
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import answer_in_turn, refuse
 
@@ -17,6 +20,7 @@ from ..entities import EntityError
 from ..simulation import NAMES, Simulation
 
 _OK = si.Result(si.Result.OK)
+FEEDBACK_EVERY = 0.1  # s
 
 
 class SimulationServices:
@@ -33,12 +37,19 @@ class SimulationServices:
             self._setter,
             bus.serve("reset_simulation", si.ResetSimulationRequest, si.ResetSimulationReply, self.reset),
         ]
+        self._action = ActionServer(bus, "simulate_steps", si.SimulateSteps, lambda _: "", self._begin)
+        self._goal: Goal | None = None  # whose steps are made
+        self._reported = -math.inf  # s; the last feedback
 
     def answer(self) -> bool:
         """Answer waiting requests for a short time. Returns whether more may wait."""
         while not self._simulation.steps and (query := self._steps.try_recv()) is not None:
             self._step(query)
-        return answer_in_turn(self._servers)
+        if self._goal and self._goal.state is GoalState.CANCELING:
+            self._simulation.end_steps("the goal was cancelled")
+        if self._goal and time.monotonic() >= self._reported + FEEDBACK_EVERY:
+            self._report_progress(self._goal)
+        return self._action.answer() | answer_in_turn(self._servers)
 
     def state(self, _request: si.GetSimulationStateRequest) -> si.GetSimulationStateReply:
         """The state of the sim."""
@@ -80,6 +91,32 @@ class SimulationServices:
         except (ServiceError, CodecError) as error:
             with query:
                 refuse(query, str(error), getattr(error, "fields", {}))
+
+    def _begin(self, _server: ActionServer, goal: Goal) -> None:
+        """Begin the steps of a goal."""
+        try:
+            if self._simulation.steps:
+                raise EntityError(si.Result.INCORRECT_STATE, "other steps are being made")
+            self._simulation.step(goal.request.steps, partial(self._ended, goal))
+        except EntityError as error:
+            self._action.finish(goal, GoalState.ABORTED, si.SimulateStepsResult(si.Result(error.code, str(error))))
+            return
+        self._goal = goal
+        self._action.move(goal, GoalState.EXECUTING)
+
+    def _report_progress(self, goal: Goal) -> None:
+        left = self._simulation.steps.left if self._simulation.steps else 0
+        self._action.feedback(goal, si.SimulateStepsFeedback(goal.request.steps - left, left))
+        self._reported = time.monotonic()
+
+    def _ended(self, goal: Goal, reason: str) -> None:
+        self._goal = None
+        if not reason:
+            self._report_progress(goal)
+            self._action.finish(goal, GoalState.SUCCEEDED, si.SimulateStepsResult(_OK))
+            return
+        state = GoalState.CANCELED if goal.state is GoalState.CANCELING else GoalState.ABORTED
+        self._action.finish(goal, state, si.SimulateStepsResult(si.Result(si.Result.OPERATION_FAILED, reason)))
 
     def _stepped(self, query: Any, reason: str) -> None:
         with query:

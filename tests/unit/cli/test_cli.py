@@ -43,7 +43,6 @@ def test_an_unknown_verb_gets_the_nearest_or_what_there_is_instead(capsys: pytes
     for word, hint in [
         ("topics", " (did you mean 'topic'?)"),
         ("rviz2", "; `holozen view` shows robots in a browser"),
-        ("action", "; there are no actions here"),
         ("pkg", "; `--package NAME=DIR`"),
         ("tf2_echo", "; write `holozen tf echo SOURCE TARGET`"),
     ]:

@@ -155,3 +155,15 @@ def test_it_starts_without_anything_heavy() -> None:
     heavy = {"numpy", "msgspec", "zenoh", "yaml", "pathlib", "dataclasses", "inspect", "subprocess", "asyncio", "xacro",
              "xml.etree.ElementTree", "difflib", "holozen.bus"}  # fmt: skip
     assert heavy & set(done.stdout.splitlines()[-1].split()) == set()
+
+
+def test_an_action_is_listed_shown_and_its_goal_given(capsys: pytest.CaptureFixture[str]) -> None:
+    assert set(run(capsys, "list", "-a").split()) >= {"Actions:", "nav2_msgs/action/NavigateToPose"}
+    assert run(capsys, "show", "example_interfaces/Fibonacci").split("---\n") == [
+        "int32 order\n", "int32[] sequence\n", "int32[] sequence\n",
+    ]  # fmt: skip
+    shown = json.loads(run(capsys, "show", "example_interfaces/action/Fibonacci", "--json"))
+    assert [shown[part]["name"].rpartition("_")[2] for part in ("goal", "result", "feedback")] == [
+        "Goal", "Result", "Feedback",
+    ]  # fmt: skip
+    assert run(capsys, "proto", "example_interfaces/action/Fibonacci") == "order: 0\n"

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from holozen.messages.definitions import Field, InterfaceError
+from holozen.messages.definitions import Field, InterfaceError, whole_text
 from holozen.messages.registry import Registry
+from holozen.messages.type_hash import type_hash
 
 
 @pytest.fixture
@@ -116,7 +117,8 @@ def test_a_wrong_name_is_reported_with_the_closest(lesson: Path) -> None:
         ("Zwist", "the package is missing; `holozen interface list` lists all"),
         ("a/msg/../B", "'a/msg/../B' is not a type; write PACKAGE/msg/NAME"),
         ("../a/b", "is not a type"),
-        ("a/action/B", "is not a type"),
+        ("a/idl/B", "is not a type"),
+        ("example_interfaces/action/Fibonaci", "did you mean 'example_interfaces/action/Fibonacci'?"),
         ("", "'' is not a type"),
         ("std_srvs/srv/Trigger_Requst", "did you mean 'std_srvs/srv/Trigger'?"),
     ]:
@@ -183,4 +185,39 @@ def test_unreadable_files_are_reported(lesson: Path) -> None:
     assert refusal(registry, "lesson/msg/Folder").endswith("Folder.msg is not a file")
     assert refusal(registry, "lesson/msg/Pipe").endswith("Pipe.msg is not a file")
     assert refusal(registry, "gone/msg/A") == f"--package gone={lesson}/gone: there is no such folder"
-    assert "no .msg or .srv files" in refusal(registry, "empty/msg/A")
+    assert "no .msg, .srv or .action files" in refusal(registry, "empty/msg/A")
+
+
+def test_an_action_has_its_parts_with_the_id_of_a_goal() -> None:
+    action = Registry().find("example_interfaces/Fibonacci")
+    assert (action.name, action.kind) == ("example_interfaces/action/Fibonacci", "action")
+    fields = {
+        part.name.rpartition("_")[2]: [field.spelled(action.package) for field in part.fields] for part in action.parts
+    }
+    assert fields == {
+        "Goal": ["int32"], "Result": ["int32[]"], "Feedback": ["int32[]"], "SendGoal": [], "GetResult": [],
+        "FeedbackMessage": ["unique_identifier_msgs/UUID", "example_interfaces/action/Fibonacci_Feedback"],
+    }  # fmt: skip
+    response = Registry().find("example_interfaces/action/Fibonacci_GetResult_Response")
+    assert [field.name for field in response.fields] == ["status", "result"]
+
+
+def test_an_action_is_learned_from_its_whole_text(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    name = "lesson/action/Turn_FeedbackMessage"
+    known = Registry({"lesson": tmp_path})
+    (tmp_path / "action").mkdir()
+    (tmp_path / "action" / "Turn.action").write_text("float64 angle\n---\n---\nfloat64 left\n")
+    text = whole_text(known.find(name))
+    learned = Registry().learn(name, lambda _: text)
+    assert [field.name for field in learned.fields] == ["goal_id", "feedback"]
+    assert type_hash(learned) == type_hash(known.find(name))
+
+
+def test_an_action_file_has_three_sections_and_is_no_field(lesson: Path) -> None:
+    (lesson / "action").mkdir()
+    (lesson / "action" / "Turn.action").write_text("float64 angle\n---\n")
+    (lesson / "msg" / "Bad.msg").write_text("example_interfaces/action/Fibonacci it\n")
+    registry = Registry({"lesson": lesson})
+    assert "1 lines of '---'; a .action has 2" in refusal(registry, "lesson/action/Turn")
+    assert "a field is a message, not an action" in refusal(registry, "lesson/msg/Bad")

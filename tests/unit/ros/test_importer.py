@@ -179,7 +179,7 @@ def test_an_unknown_package_is_reported_with_the_nearest_and_the_folders_searche
         return tracebacks.import_error_line(error.value)
 
     assert line("from my_pgk.srv import NextGoal") == (
-        f"{script}:1: no package 'my_pgk' with .msg or .srv files (did you mean 'my_pkg'?); searched "
+        f"{script}:1: no package 'my_pgk' with .msg, .srv or .action files (did you mean 'my_pkg'?); searched "
         f"AMENT_PREFIX_PATH, ROS_PACKAGE_PATH and the package.xml files around {package}, {Path.cwd()}; "
         "to give its folder: --package my_pgk=DIR"
     )
@@ -225,7 +225,7 @@ def test_what_a_package_does_not_have_is_reported(package: Path) -> None:
     expected = f"package 'my_pkg' has no .msg files in {package / 'msg'}"
     assert refused("from my_pkg.msg import Shape", ModuleNotFoundError) == expected
     assert refused("import my_pkg\nmy_pkg.msg", AttributeError) == expected
-    assert refused("import my_pkg\nmy_pkg.other", AttributeError) == "my_pkg has no 'other'; it has msg and srv"
+    assert refused("import my_pkg\nmy_pkg.other", AttributeError) == "my_pkg has no 'other'; it has msg, srv and action"
     assert refused("import geometry_msgs.srv", ModuleNotFoundError) == "package 'geometry_msgs' has no .srv files"
 
 
@@ -275,12 +275,25 @@ def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     assert "numpy.frombuffer(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
 
 
-def test_actions_are_reported_to_be_missing(package: Path, pretend: ModuleType) -> None:
+def test_actions_of_a_package_are_made_from_its_files(package: Path) -> None:
     importer.install({"my_pkg": package})
-    for line in ("from my_pkg.action import Turn", "from rclpy.action import ActionClient", "from rclpy import action"):
-        expected = refused(line, ModuleNotFoundError)
-        assert "there are no actions here; use a service" in expected
-        assert expected.endswith("; see docs/coming-from-ros.md")
+    assert f"no .action files in {package}" in refused("from my_pkg.action import Turn", ModuleNotFoundError)
+    (package / "action").mkdir()
+    (package / "action" / "Turn.action").write_text("float64 angle\n---\nbool done\n---\nfloat64 left\n")
+    importer.install({"my_pkg": package})
+    turn = ran("from my_pkg.action import Turn")["Turn"]
+    assert (turn.Goal(angle=1.0).angle, turn.Result().done, turn.Feedback().left) == (1.0, False, 0.0)
+    assert turn.Impl.SendGoalService.Request().get_fields_and_field_types() == {
+        "goal_id": "unique_identifier_msgs/UUID",
+        "goal": "my_pkg/Turn_Goal",
+    }
+
+
+def test_lifecycle_nodes_and_components_are_refused_in_one_line() -> None:
+    importer.install()
+    for line in ("from rclpy.lifecycle import Node", "import rclpy.lifecycle"):
+        assert "there are no lifecycle nodes here; use rclpy.node.Node" in refused(line, ModuleNotFoundError)
+    assert "there are no components here" in refused("import rclpy_components", ModuleNotFoundError)
 
 
 def test_the_module_of_one_type_has_the_same_class(package: Path) -> None:

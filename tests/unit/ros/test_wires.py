@@ -24,7 +24,12 @@ PACKAGES = (
     "geometry_msgs", "nav_msgs", "std_msgs", "std_srvs", "sensor_msgs", "builtin_interfaces", "rosgraph_msgs",
     "tf2_msgs", "visualization_msgs", "rcl_interfaces",
 )  # fmt: skip
-MESSAGES = [name + half for name in NAMES for half in (("_Request", "_Response") if "/srv/" in name else ("",))]
+MESSAGES = [
+    name + half
+    for name in NAMES
+    if "/action/" not in name
+    for half in (("_Request", "_Response") if "/srv/" in name else ("",))
+]
 TF = m.TFMessage([m.TransformStamped(m.Header(m.Time(1, 2), "odom"), "base"), m.TransformStamped()])
 ODOM = m.Odometry(
     m.Header(m.Time(-3, 999_999_999), "odom"), "base_link", twist=m.TwistWithCovariance(m.Twist.planar(1.0))

@@ -1,0 +1,73 @@
+"""Actions as Structs: a goal, a result and a feedback, and from these the messages that travel.
+
+An action class of `holozen run` (`holozen.ros.generated`) has the same names.
+"""
+
+from functools import cached_property
+from typing import Any
+
+import msgspec
+
+from holozen.messages.message import Int8, Message
+
+
+class ActionPart(Message):
+    """A message of an action. Its class is called after the action and the part: NavigateToPoseGoal."""
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        package, _, name = cls.ROS.replace("/srv/", "/msg/").partition("/msg/")
+        if not name.endswith(("_SendGoal", "_GetResult")):  # a service has its underscore already
+            part = next(part for part in ("FeedbackMessage", "Goal", "Result", "Feedback") if name.endswith(part))
+            name = f"{name.removesuffix(part)}_{part}"
+        cls.ROS = f"{package}/action/{name}"
+
+
+class Service:
+    """The two messages of a service."""
+
+    def __init__(self, request: type[Message], response: type[Message]) -> None:
+        self.Request: Any = request
+        self.Response: Any = response
+
+
+class Implementation:
+    """What travels: the messages of an action with a goal's id."""
+
+    def __init__(self, send_goal: Service, get_result: Service, feedback: type[Message]) -> None:
+        self.SendGoalService, self.GetResultService = send_goal, get_result
+        self.FeedbackMessage: Any = feedback
+
+
+class Action:
+    """An action of Structs: `Goal`, `Result`, `Feedback`, and in `Impl` the messages that carry them."""
+
+    def __init__(self, goal: type[ActionPart], result: type[ActionPart], feedback: type[ActionPart]) -> None:
+        self.Goal, self.Result, self.Feedback = goal, result, feedback
+        self.ROS = goal.ROS.removesuffix("_Goal")
+
+    @cached_property
+    def Impl(self) -> Implementation:
+        """What travels, made on first use."""
+        from holozen.messages.builtin_interfaces import Time
+        from holozen.messages.unique_identifier_msgs import UUID
+
+        return Implementation(
+            Service(
+                self._made("_SendGoalRequest", goal_id=UUID, goal=self.Goal),
+                self._made("_SendGoalReply", accepted=bool, stamp=Time),
+            ),
+            Service(
+                self._made("_GetResultRequest", goal_id=UUID),
+                self._made("_GetResultReply", status=Int8, result=self.Result),
+            ),
+            self._made("FeedbackMessage", goal_id=UUID, feedback=self.Feedback),
+        )
+
+    def _made(self, ending: str, **fields: Any) -> type[Message]:
+        described = [
+            (name, kind, msgspec.field(default_factory=int if kind is Int8 else kind)) for name, kind in fields.items()
+        ]
+        name = self.ROS.rpartition("/")[2] + ending
+        made: Any = msgspec.defstruct(name, described, bases=(ActionPart,), module=self.Goal.__module__)
+        return made  # type: ignore[no-any-return]

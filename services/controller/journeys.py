@@ -1,0 +1,183 @@
+"""Where the controller is sent: a goal of goal_pose, or those of the actions navigate_to_pose and follow_waypoints."""
+
+import math
+import threading
+from collections import deque
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+from holozen.bus import Bus
+from holozen.messages import Odometry, PoseStamped
+from holozen.messages import nav2_msgs as nav
+from holozen.messages.builtin_interfaces import Duration
+from holozen.transport.actions import ActionServer, Goal, State
+from holozen.wire import key_for
+
+from .goto import Leg, Pose
+
+FEEDBACK_EVERY = 0.2  # s of the odom's clock
+MOST_POSES = 10_000  # of one goal, all loops included
+
+
+class Journey:
+    """Poses to visit, in order. That of goal_pose has one, and no client who waits for its end."""
+
+    is_canceled = False  # whether its client no longer wants it
+
+    def __init__(self, poses: Sequence[Pose]) -> None:
+        self.left = deque(poses)
+
+    def follow(self, leg: Leg, odom: Odometry, speed: float) -> None:
+        """Hear where the robot is on the way to the first pose left, at most as fast as `speed` (m/s)."""
+
+    def reached(self) -> None:
+        """Hear that the first pose left is reached."""
+        self.left.popleft()
+
+    def give_up(self, reason: str) -> bool:
+        """Hear why the robot cannot go on now; whether that ends the journey. Else it waits."""
+        return False
+
+    def end(self) -> None:
+        """Hear that the robot stands where it was sent, or where it was stopped as the client wished."""
+
+
+class GoalJourney(Journey):
+    """The journey of an action's goal. Its end is published once, whoever causes it."""
+
+    def __init__(self, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any) -> None:
+        super().__init__([one.pose.planar() for one in poses])
+        self._server, self._goal, self._stamped, self._kind = server, goal, poses, kind
+        self._began: float | None = None  # s, of the odom's clock
+        self._reported = -math.inf
+
+    @property
+    def is_canceled(self) -> bool:  # type: ignore[override]
+        """Whether its client no longer wants it."""
+        return self._goal.state is State.CANCELING
+
+    def begin(self) -> None:
+        """Let its client know that the robot is on the way."""
+        with self._server.lock:
+            if self._goal.state is State.ACCEPTED:
+                self._server.move(self._goal, State.EXECUTING)
+
+    def follow(self, leg: Leg, odom: Odometry, speed: float) -> None:
+        """Publish the progress, from time to time."""
+        if self._began is None or leg.began < self._began:
+            self._began, self._reported = leg.began, -math.inf
+        if leg.ended - self._reported < FEEDBACK_EVERY:
+            return
+        self._reported = leg.ended
+        self._server.feedback(self._goal, self._progress(leg, odom, speed))
+
+    def _progress(self, leg: Leg, odom: Odometry, speed: float) -> Any:
+        if self._kind is nav.FollowWaypoints:
+            return nav.FollowWaypointsFeedback(self._index(0))
+        x, y, _ = odom.pose.pose.planar()
+        distance = math.hypot(leg.goal[0] - x, leg.goal[1] - y)
+        return nav.NavigateToPoseFeedback(
+            PoseStamped(odom.header, odom.pose.pose), Duration.of(leg.ended - (self._began or 0.0)),
+            Duration.of(distance / speed), distance_remaining=distance,
+        )  # fmt: skip
+
+    def _index(self, ahead: int) -> int:
+        """The number of a waypoint in the goal's list, so many ahead of the next one."""
+        done = len(self._stamped) - len(self.left)
+        return int((self._goal.request.goal_index + done + ahead) % len(self._goal.request.poses))
+
+    def give_up(self, reason: str) -> bool:
+        """Abort the goal."""
+        self._finish(State.CANCELED if self.is_canceled else State.ABORTED, reason)
+        return True
+
+    def end(self) -> None:
+        """The goal has succeeded, or is cancelled."""
+        if self.left:
+            self._finish(State.CANCELED, "it was cancelled")
+        else:
+            self._finish(State.SUCCEEDED, "")
+
+    def _finish(self, state: State, reason: str) -> None:
+        with self._server.lock:
+            if self._goal.is_active:
+                self._server.finish(self._goal, state, self._result(reason))
+
+    def _result(self, reason: str) -> Any:
+        unknown = self._kind.Result.UNKNOWN if reason else 0
+        if self._kind is nav.NavigateToPose:
+            return nav.NavigateToPoseResult(unknown, reason)
+        done = len(self._stamped) - len(self.left)
+        missed = [nav.MissedWaypoint(self._index(number), goal) for number, goal in enumerate(self._stamped[done:])]
+        return nav.FollowWaypointsResult(missed, unknown, reason)
+
+
+class GoalServers:
+    """Serves the actions, in threads of their own. `refusal` returns why the robot does not drive to a pose, or ""."""
+
+    def __init__(
+        self, bus: Bus, robot: str, refusal: Callable[[PoseStamped], str], report: Callable[[str], None]
+    ) -> None:
+        self._refusal, self._report = refusal, report
+        self._lock = threading.Lock()
+        self._newest: GoalJourney | None = None
+        self._ended = ""  # why no goal is accepted any more
+        for name, kind, poses in (
+            ("navigate_to_pose", nav.NavigateToPose, _one),
+            ("follow_waypoints", nav.FollowWaypoints, _looped),
+        ):
+            begin = partial(self._begin, name, kind, poses)
+            ActionServer(bus, key_for(name, robot), kind, partial(self._refuses, poses), begin).start()
+
+    def take(self) -> GoalJourney | None:
+        """The newest goal that was accepted, once."""
+        with self._lock:
+            newest, self._newest = self._newest, None
+        return newest
+
+    def close(self, reason: str) -> None:
+        """Accept no more goals, and end one that waits."""
+        with self._lock:
+            self._ended = reason
+        if waiting := self.take():
+            waiting.give_up(reason)
+
+    def _refuses(self, poses: "Callable[[Any], Sequence[PoseStamped]]", goal: Any) -> str:
+        if self._ended:
+            return self._ended
+        try:
+            poses(goal)
+        except ValueError as error:
+            return str(error)
+        if isinstance(goal, nav.NavigateToPoseGoal):
+            return self._refusal(goal.pose)
+        refused = ((number, self._refusal(pose)) for number, pose in enumerate(goal.poses))
+        return next((f"pose {number}: {reason}" for number, reason in refused if reason), "")
+
+    def _begin(self, name: str, kind: Any, poses: Any, server: ActionServer, goal: Goal) -> None:
+        journey = GoalJourney(server, goal, poses(goal.request), kind)
+        x, y, _ = journey.left[0]
+        self._report(f"{name}: ({x:.2f}, {y:.2f}) by {server.caller or 'an unknown sender'}")
+        with self._lock:
+            before, self._newest = self._newest, journey
+        if before:
+            before.give_up("a newer goal came")
+
+
+def _one(goal: Any) -> Sequence[PoseStamped]:
+    if goal.behavior_tree:
+        raise ValueError("there are no behavior trees here; leave behavior_tree empty")
+    return [goal.pose]
+
+
+def _looped(goal: Any) -> Sequence[PoseStamped]:
+    """The poses from the index on, and then all of them once for each further loop. Raises ValueError."""
+    count = len(goal.poses)
+    if not count:
+        raise ValueError("it has no poses")
+    if goal.goal_index >= count:
+        raise ValueError(f"goal_index is {goal.goal_index}; use 0 to {count - 1}")
+    if count * (goal.number_of_loops + 1) > MOST_POSES:
+        raise ValueError(f"{count} poses in {goal.number_of_loops + 1} rounds; at most {MOST_POSES} in all")
+    return [*goal.poses[goal.goal_index :], *list(goal.poses) * goal.number_of_loops]
