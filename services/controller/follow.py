@@ -24,7 +24,7 @@ LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
 LOST = 2.0  # s without fresh odom, after which the goal of an action is aborted; the robot has stopped long before
 FRAMES = ("", "odom", "map", "world")  # of a goal: all of them mean the frame of odom
-GOAL = "a goal of goal_pose or of an action"
+GOAL = "a goal of "
 ENDS = "the controller ends"
 RESUMES = "`holozen controller --resume` or the teleop's r resumes"
 
@@ -48,13 +48,13 @@ class YieldPolicy:
             return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, and then {RESUMES}"
         return f"yields to {self.yielded_to}; {RESUMES}" if self.yielded_to else ""
 
-    def stay(self) -> None:
-        """A goal of goal_pose or of an action has ended: the robot stays until a resume, or the next of them."""
-        self.yielded_to = self.yielded_to or GOAL
+    def stay(self, origin: str) -> None:
+        """A goal of goal_pose or of an action, `origin`, has ended: the robot stays until a resume, or the next one."""
+        self.yielded_to = self.yielded_to or GOAL + origin
 
     def invited(self) -> None:
         """The next of these goals has come."""
-        if self.yielded_to == GOAL:
+        if self.yielded_to.startswith(GOAL):
             self.yielded_to = ""
 
     def update(self, status: CommandStatus) -> None:
@@ -141,7 +141,7 @@ class Follower:
             elif goal := received.message:
                 x, y, theta = goal.pose.planar()
                 self._report(f"goal_pose: ({x:.2f}, {y:.2f}) by {received.sample.source or 'an unknown sender'}")
-                self._set_out(Journey([(x, y, theta)]), "a newer goal came on goal_pose")
+                self._set_out(Journey("goal_pose", [(x, y, theta)]), "a newer goal came on goal_pose")
         if journey := self._actions.take():
             self._set_out(journey, "a newer goal came")
             journey.begin()
@@ -172,7 +172,7 @@ class Follower:
         if not self._stop.is_set() and self._wanted is journey:
             journey.end()
             self._wanted = None
-            self._policy.stay()
+            self._policy.stay(journey.origin)
 
     def _ask(self, number: int) -> NextGoalReply | None:
         """Goal `number` of the list; waits for the service. None when `stop` is set or a goal of goal_pose comes

@@ -21,12 +21,12 @@ MOST_POSES = 10_000  # of one goal, all loops included
 
 
 class Journey:
-    """Poses to visit, in order. That of goal_pose has one, and no client who waits for its end."""
+    """Poses to visit, in order, and the key that they came on: one pose of goal_pose, for whose end nobody waits."""
 
     is_canceled = False  # whether its client no longer wants it
 
-    def __init__(self, poses: Sequence[Pose]) -> None:
-        self.left = deque(poses)
+    def __init__(self, origin: str, poses: Sequence[Pose]) -> None:
+        self.origin, self.left = origin, deque(poses)
 
     def follow(self, leg: Leg, odom: Odometry, speed: float) -> None:
         """Hear where the robot is on the way to the first pose left, at most as fast as `speed` (m/s)."""
@@ -46,8 +46,10 @@ class Journey:
 class GoalJourney(Journey):
     """The journey of an action's goal. Its end is published once, whoever causes it."""
 
-    def __init__(self, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any) -> None:
-        super().__init__([one.pose.planar() for one in poses])
+    def __init__(
+        self, origin: str, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any
+    ) -> None:  # fmt: skip
+        super().__init__(origin, [one.pose.planar() for one in poses])
         self._server, self._goal, self._stamped, self._kind = server, goal, poses, kind
         self._began: float | None = None  # s, of the odom's clock
         self._reported = -math.inf
@@ -156,7 +158,7 @@ class GoalServers:
         return next((f"pose {number}: {reason}" for number, reason in refused if reason), "")
 
     def _begin(self, name: str, kind: Any, poses: Any, server: ActionServer, goal: Goal) -> None:
-        journey = GoalJourney(server, goal, poses(goal.request), kind)
+        journey = GoalJourney(name, server, goal, poses(goal.request), kind)
         x, y, _ = journey.left[0]
         self._report(f"{name}: ({x:.2f}, {y:.2f}) by {server.caller or 'an unknown sender'}")
         with self._lock:

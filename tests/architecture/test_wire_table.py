@@ -71,7 +71,7 @@ def test_the_docs_show_the_table() -> None:
 def test_the_table_has_a_row_for_each_key_with_its_types_ends_rate_and_rule() -> None:
     rows = [[cell.strip() for cell in line.split("|")[1:-1]] for line in wire.table().splitlines()]
     cells = {row[0].strip("`"): row for row in rows if row and row[0].startswith("`")}
-    assert set(cells) == {row.key for row in (*wire.TOPICS, *wire.SERVICES)}
+    assert set(cells) == {row.key for row in (*wire.TOPICS, *wire.SERVICES, *wire.ACTIONS)}
     assert cells["cmd_vel"][1:4] == [
         "geometry_msgs/msg/Twist (TwistStamped accepted)", "teleop, view, controller, anyone -> sim", "20 Hz",
     ]  # fmt: skip
