@@ -55,7 +55,7 @@ MODULES = {
 }  # of verbs in another noun's module
 NOUNS = ("secure", "topic", "service", "action", "node", "param", "tf", "interface", "bag")  # followed by a verb
 _DRAWS = "`holozen view` shows robots in a browser, `holozen map` and `holozen plot` draw in the terminal"
-_TYPES = "`holozen interface` shows messages and services"
+_TYPES = "`holozen interface` shows messages, services and actions"
 ELSEWHERE = {
     "rviz": _DRAWS, "rviz2": _DRAWS, "rqt": _DRAWS, "foxglove": _DRAWS, "rqt_plot": _DRAWS,
     "pkg": "`--package NAME=DIR` gives the folder of a package",
