@@ -117,10 +117,13 @@ def impossible_inertia(subject: Subject) -> Iterator[Mistake]:
     """Impossible inertias: missing, not positive definite, or one moment above the sum of the other two."""
     for name, tag in subject.links.items():
         given = read_inertial(tag)
-        if given is None or not given.mass or (given.inertia_tag is None and subject.sdf):
+        if given is None or given.mass == 0 or (given.inertia_tag is None and (subject.sdf or not given.mass)):
             continue
         if given.inertia_tag is None:
             yield Mistake(given.tag, f"link {name!r} has a mass and no <inertia>", "add one")
+        elif not subject.sdf and any(given.inertia or ()) and (left_out := _left_out(given.inertia_tag)):
+            problem = f"the inertia of link {name!r} has no {' and no '.join(left_out)}, and what is left out is 0"
+            yield Mistake(given.inertia_tag, problem, "compute it from the shape")
         elif given.inertia and any(given.inertia) and (problem := impossible(given.inertia)):
             yield Mistake(given.inertia_tag, f"the inertia of link {name!r} {problem}", "compute it from the shape")
 
@@ -222,6 +225,10 @@ def _moment(shape: Shape, mass: float) -> float:
     if shape.kind == "cylinder":
         return mass * max(x / 2, x / 4 + z / 3)
     return mass * (x + y + z - min(x, y, z)) / 3
+
+
+def _left_out(inertia: Tag) -> list[str]:
+    return [word for word in WORDS if word[1] == word[2] and inertia.given(word) is None]
 
 
 def _tensor(tag: Tag) -> Tensor | None:

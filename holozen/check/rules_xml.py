@@ -1,11 +1,13 @@
-"""Misspelt and misplaced elements and attributes: parsers silently ignore both."""
+"""Misspelt and misplaced elements and attributes, which parsers silently ignore, and values that are no numbers."""
 
-from collections.abc import Iterable, Iterator
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from holozen.check.engine import Mistake, Subject, rule
+from holozen.check.engine import Mistake, Subject, rule, split
 from holozen.check.spelling import nearest
-from holozen.robot.elements import Tag
+from holozen.robot.elements import LARGEST, Tag
+from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.model import JOINT_KINDS
 from holozen.suggest import listed
@@ -222,6 +224,32 @@ def joint_kinds(subject: Subject) -> Iterator[Mistake]:
             suggestion = nearest(kind, kinds)
             fix = f'write type="{suggestion}"' if suggestion else f"write one of {', '.join(kinds)}"
             yield Mistake(tag, f"{tag} has unknown type {kind!r}", fix)
+
+
+@rule("number", "error", "a value that is no number", "the robot cannot be loaded")
+def bad_numbers(subject: Subject) -> Iterator[Mistake]:
+    """Values of links and joints that are not finite numbers, or not as many as needed, and axes without direction."""
+    for tag in _outside_plugins(subject.root) if subject.sdf else _urdf_elements(subject):
+        most = math.inf if tag.name == "limit" else LARGEST
+        for name, count in NUMBERS.get(tag.name, {}).items():
+            try:
+                tag.numbers(name, count, (0.0,) * count, most)
+                if tag.name == "axis" and not (tag.parent and tag.parent.attributes.get("type") in UNMOVED):
+                    tag.direction(name, (1.0, 0.0, 0.0))
+            except RobotError as error:
+                problem, _, fix = split(str(error), subject.path)[1].partition("; ")
+                yield Mistake(tag, problem, fix or f"write {count}, with spaces between them")
+
+
+_MOMENTS = dict.fromkeys(("ixx", "ixy", "ixz", "iyy", "iyz", "izz"), 1)
+NUMBERS: Mapping[str, Mapping[str, int]] = {
+    "origin": {"xyz": 3, "rpy": 3}, "axis": {"xyz": 3}, "inertia": _MOMENTS, "box": {"size": 3},
+    "sphere": {"radius": 1}, "cylinder": {"radius": 1, "length": 1}, "mesh": {"scale": 3},
+    "dynamics": {"damping": 1, "friction": 1}, "limit": {"lower": 1, "upper": 1, "effort": 1, "velocity": 1},
+    "mimic": {"multiplier": 1, "offset": 1},
+}  # fmt: skip
+"""How many numbers a value of an element has: an attribute in URDF, a child in SDF. Masses have a rule of their own."""
+UNMOVED = ("fixed", "floating")  # joints whose axis is not read
 
 
 def _read_elements(subject: Subject) -> Iterator[tuple[Tag, frozenset[str], int]]:

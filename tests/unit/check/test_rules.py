@@ -83,6 +83,9 @@ BROKEN = [
     ("attribute", '<mass value="2"/>', '<mass vlaue="2"/>', "write value="),
     ("heavy", BASE, '<mass value="2000"/><inertia ixx="9" iyy="17" izz="24"/>', "2000 kg"),
     ("inertia", 'ixx="0.009"', 'ixx="-0.009"', "not positive definite"),
+    ("inertia", 'ixx="0.009" ', "", "has no ixx, and what is left out is 0"),
+    ("number", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 abc"/>', "'abc' is not a finite number"),
+    ("number", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0"/>', "write 3"),
     ("inertia", 'ixx="0.009" ixy="0"', 'ixx="0.009" ixy="0.02"', "not positive definite"),
     ("inertia", 'izz="0.024"', 'izz="0.029"', "sum of the other two"),
     ("inertia-size", BASE, '<mass value="2"/><inertia ixx="1" iyy="1" izz="1"/>', "up to 1 kg m^2"),
@@ -263,7 +266,20 @@ def test_a_robot_heavier_than_steel_though_no_link_is(good: str, findings: Findi
 
 def test_a_warning_does_not_hide_why_a_part_cannot_be_loaded(good: str, rules: Rules) -> None:
     text = good.replace('<material name="orange"/>', '<material name="ornge"/>', 1)
-    assert rules(text.replace('<origin xyz="0 0 0.02"/>', '<origin xyz="0 0 abc"/>', 1)) == ["colour", "load"]
+    assert rules(text.replace('<origin xyz="0 0 0.02"/>', '<origin xyz="0 0 abc"/>', 1)) == ["colour", "number"]
+
+
+def test_a_wrong_value_hides_no_other(findings: Findings) -> None:
+    """All are found at once: mass, numbers, inertia and axis, in one link or several."""
+    text = (
+        '<robot name="r"><link name="a"><inertial><mass value="nan"/><origin xyz="0 0 abc"/>'
+        '<inertia iyy="1" izz="1"/></inertial><collision><geometry><box size="1 inf 1"/></geometry></collision></link>'
+        '<link name="b"/><joint name="j" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 0"/>'
+        '</joint></robot>'
+    )  # fmt: skip
+    problems = " ".join(each.problem for each in findings(text) if each.severity == "error")
+    for part in ("mass of link 'a' is not a number", "'abc'", "'inf'", "has no ixx", "no direction in xyz"):
+        assert part in problems
 
 
 def test_a_file_that_is_wrong_all_over_ends_soon(good: str, findings: Findings) -> None:
