@@ -324,6 +324,9 @@ class Robots:
         published = [end for end in endpoints if end.kind == "pub"]
         self._nodes = {end.key: end.node for end in published if end.type == EXCLUSIVE[0]}
         self.count = len(self._nodes)
+        self._writers: dict[str, list[str]] = {}
+        for end in published:
+            self._writers.setdefault(end.key, []).append(end.node)
         # Samples are not decoded: it is enough that they arrive.
         self._odoms = {key: bus.subscribe_raw(key, depth=1) for key in sorted(self._nodes)[:MOST_ROBOTS]}
         self._statuses: dict[str, Latest[CommandStatus]] = {}
@@ -346,7 +349,8 @@ class Robots:
         alike: dict[tuple[str, str], list[Finding]] = {}  # those of a fleet are much the same
         for key, latest in self._statuses.items():
             if status := latest.read()[0]:
-                for found in commands(key.removesuffix("_status"), status):
+                command = key.removesuffix("_status")
+                for found in commands(command, status, self._writers.get(command, ())):
                     alike.setdefault((found.level, found.text.replace(status.name, "", 1)), []).append(found)
         for group in alike.values():
             first = group[0]
@@ -357,14 +361,21 @@ class Robots:
                 yield first._replace(text=f"{first.text}; the same holds for {others}")
 
 
-def commands(key: str, status: "CommandStatus") -> Iterator[Finding]:
-    """The findings about the sources that command the robot of `key`."""
-    robot = status.name or "the robot"
+def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> Iterator[Finding]:
+    """The findings about the sources that command the robot of `key`, and the nodes that could, its `writers`."""
+    robot, name = status.name or "the robot", key.rpartition("/")[0]
     if status.stopped:
         text = f"{robot} is stopped by {status.stopped}, and ignores all commands"
-        yield Finding(key, WARNING, text, f"holozen release {key.rpartition('/')[0]}".strip())
+        yield Finding(key, WARNING, text, f"holozen release {name}".strip())
     driving = sorted((source for source in status.sources if source.rate >= DRIVES), key=_rank)
-    if not driving:
+    resume = f"holozen controller {name and f'{name} '}--resume, or r in the teleop"
+    if not driving and status.held:
+        text = f"{robot} stands, and the controller and scripts are held, since one above them took over"
+        yield Finding(key, WARNING, text, resume)
+    elif not driving and (silent := listed({*writers})) != "none":
+        more = f"; if the controller is held: {resume}" if "controller" in writers else ""
+        yield Finding(key, OK, f"nothing commands {robot} now; {silent} could{more}")
+    elif not driving:
         yield Finding(key, OK, f"nothing commands {robot}; `holozen teleop` or `holozen controller` does")
     if len(driving) > 1:
         level = ERROR if _rank(driving[0]) == _rank(driving[1]) else WARNING  # among equals chance decides

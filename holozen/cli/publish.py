@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 STOPS, STOP_EVERY = 5, 0.02  # s
 CLOCK_PATIENCE = 0.2  # s to wait for the robot to ask for our clock
 LOOK = 0.1  # s between two checks for a line of standard input
-VERDICT = 0.3  # s that a single command waits for the sim's status, which comes at 10 Hz
+VERDICT = 0.3, 2.0  # s to wait for the sim's status, which comes at 10 Hz: where none was found, and where one was
 FRESH = 1.0  # s; an older status is ignored
 FORCE = "; --force sends it all the same"
 Kinds = tuple[type[Message], ...]
@@ -96,14 +96,14 @@ def _run(
             sent += 1
             if feedback:
                 feedback.look()
-        if feedback and args.once and matched:
-            feedback.wait(stop)
+        if feedback and (args.once or args.times) and matched:
+            feedback.wait(stop, VERDICT[bool(on_key(looking(), f"{args.key}_status", "pub"))])
     finally:
         if stopping and not args.once:
             _stop_robot(publisher, stopping)
     if args.json:
         print(json.dumps({"key": args.key, "type": form.kind.ROS, "subscribers": matched, "published": sent}))
-    return 0
+    return int(bool(feedback and feedback.refusal and (args.once or args.times) and payload != stopping))
 
 
 def _form(args: argparse.Namespace) -> Form | None:
@@ -138,9 +138,11 @@ def _form_of_listener(found: list[Endpoint], args: argparse.Namespace) -> Form:
     for name in sorted(wanted):
         with contextlib.suppress(ValueError):
             return form_named(name, args.key, args.wire, args.force, args.package)
-    known = ", ".join(topic.key for topic in wire.TOPICS)
+    known = [topic.key for topic in wire.TOPICS]
+    robot = args.key[: args.key.rfind("/") + 1]
+    near = suggest(args.key, [*(f"{robot}{key}" for key in known), *(end.key for end in found if end.kind == "sub")])
     raise Refused(
-        f"{args.key!r} has no known type; known keys: {known}, each also as ROBOT/key;"
+        f"{args.key!r} has no known type{near}; known keys: {', '.join(known)}, each also as ROBOT/key;"
         f" for any other give the type: holozen topic pub {args.key} geometry_msgs/msg/Twist VALUE"
     )
 
@@ -261,6 +263,8 @@ class CommandFeedback:
 
     def __init__(self, bus: Bus, key: str) -> None:
         self._bus, self._reported = bus, ""
+        self.refusal = ""
+        """Why the robot does not obey, by the latest look; empty if it does, or is not known to."""
         self._latest = bus.latest(f"{key}_status", CommandStatus)
 
     def look(self) -> bool:
@@ -271,12 +275,12 @@ class CommandFeedback:
             return False
         if why != self._reported:
             report(why if why.startswith(LIMITED) else f"not obeyed: {why}" if why else "obeyed again")
-        self._reported = why
+        self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
         return True
 
-    def wait(self, stop: threading.Event) -> None:
-        """Wait until the sim has judged our commands, at most VERDICT seconds."""
-        deadline = time.monotonic() + VERDICT
+    def wait(self, stop: threading.Event, seconds: float) -> None:
+        """Wait until the sim has judged our commands, at most `seconds`."""
+        deadline = time.monotonic() + seconds
         while not self.look() and time.monotonic() < deadline and not stop.wait(0.002):
             pass
 
@@ -304,7 +308,7 @@ def read_message(text: str, kinds: Kinds) -> Message:
     """
     value = values.plain(text)
     try:
-        return codec.convert(value, kinds)
+        return codec.convert(value, kinds, strict=True)
     except CodecError as error:
         raise ValueError(f"{error}{_field_hint(str(error), value, kinds)}") from None
 

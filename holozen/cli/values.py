@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 LARGEST = 1_000_000  # bytes of a value
 TYPE = re.compile(r"\w+/((msg|srv)/)?\w+")
+EXPONENT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
 
 
 def plain(text: str) -> Any:
@@ -68,8 +69,13 @@ def _yaml(text: str, why_no_json: ValueError) -> Any:
         import yaml
     except ModuleNotFoundError:
         raise ValueError(f"no JSON: {why_no_json}; to write YAML: pip install pyyaml") from None
+
+    class Loader(yaml.SafeLoader):
+        """As YAML 1.2 and JSON, it takes 1e-3 for a number; YAML 1.1 asks for a point."""
+
+    Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, list("-+.0123456789"))
     try:
-        return yaml.safe_load(text)
+        return yaml.load(text, Loader)
     except yaml.YAMLError as error:
         raise ValueError(f"neither JSON nor YAML: {' '.join(str(error).split())}") from None
 

@@ -136,10 +136,12 @@ def _fields(kind: type[Message]) -> dict[str, Any]:
     return {name: hint for name, hint in get_type_hints(kind).items() if name in kind.__struct_fields__}
 
 
-def convert(value: Any, types: tuple[type[M], ...]) -> M:
-    """`decode` for the dicts, lists and numbers of parsed JSON or YAML. Unknown fields are refused."""
+def convert(value: Any, types: tuple[type[M], ...], strict: bool = False) -> M:
+    """`decode` for the dicts, lists and numbers of parsed JSON or YAML. Unknown fields are refused; if `strict`, so are
+    texts in place of numbers.
+    """
     _decoders(types, "", "json")  # prepares the types
-    makers = tuple((kind, partial(msgspec.convert, type=kind, strict=False)) for kind in types)
+    makers = tuple((kind, partial(msgspec.convert, type=kind, strict=strict)) for kind in types)
     made: M = _first(makers, value)
     return made
 

@@ -8,6 +8,7 @@ with `--secure` at a router, by mutual TLS.
 import argparse
 import json
 import os
+from collections.abc import Iterable
 from typing import Any
 
 from holozen.flags import refused
@@ -124,7 +125,9 @@ class Connection:
 
     def arguments(self) -> list[str]:
         """The flags that give another process the same connection, whatever its environment."""
-        flags = ["--mode", self.mode, "--domain", str(self.domain)]
+        flags = ["--mode", self.mode]
+        if self.connect is None or _is_within(self.connect, self.domain):  # else it is from the environment
+            flags += ["--domain", str(self.domain)]
         for name, endpoints in (("--connect", self.connect), ("--listen", self.listen)):
             for endpoint in endpoints or ():
                 flags += [name, endpoint]
@@ -239,6 +242,12 @@ def from_environment(role: str = "script", **given: object) -> Connection:
     `role`: whose certificate it uses where the folder of `secure` has those of all; empty: it uses none itself.
     """
     values: dict[str, Any] = {name: _variable(name) for name in VARIABLES if name not in given} | given
+    domain = values["domain"] if "domain" in given else 0
+    if values["connect"] is not None and not _is_within(values["connect"], domain):
+        raise BusError(
+            f"--domain {domain} meets others at port {PORT + DOMAIN_PORTS * domain} of this machine,"
+            f" but --connect (or {VARIABLES['connect']}) is {', '.join(values['connect'])}: leave one of them out"
+        )
     if values["secure"] is not None:
         _check_closed(values, "--secure", ("listen", "connect"))
         values["mode"], values["secure"] = values["mode"] or "client", _member(values["secure"], role)
@@ -252,6 +261,12 @@ def from_environment(role: str = "script", **given: object) -> Connection:
     for name in ("connect", "listen"):
         values[name] = None if values[name] is None else tuple(values[name])
     return Connection(**values)
+
+
+def _is_within(endpoints: Iterable[str], domain: int) -> bool:
+    """Whether any of the endpoints is one where a domain meets; domain 0 may meet anywhere."""
+    ports = range(PORT + DOMAIN_PORTS * domain, PORT + DOMAIN_PORTS * (domain + 1))
+    return not domain or any((address(one) or ("", 0))[1] in ports for one in endpoints)
 
 
 def _check_closed(values: "dict[str, Any]", flag: str, tls: tuple[str, ...]) -> None:

@@ -11,8 +11,10 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 from holozen.console import printable
+from holozen.suggest import shorten
 from holozen.transport.connection import address, socket_path
 
+LONGEST = 60  # characters of a command line
 PATIENCE = 0.4  # s to connect
 REFUSED = 1.0  # s for a router to refuse a certificate
 ACCEPTS = 0x10000  # the kernel's flag of a socket that listens
@@ -88,7 +90,8 @@ def _holder(pid: int, proc: str) -> Holder:
     with open(f"{proc}/{pid}/cmdline", "rb") as file, open(f"{proc}/{pid}/stat", "rb") as stat:
         program, *words = file.read(10_000).decode(errors="replace").split("\0")
         state = stat.read().rpartition(b") ")[2][:1]
-    return Holder(pid, printable(" ".join([os.path.basename(program), *words]).strip())[:60], state in (b"T", b"t"))
+    command = printable(" ".join([os.path.basename(program), *words]).strip())
+    return Holder(pid, shorten(command, LONGEST), state in (b"T", b"t"))
 
 
 class Attempts:

@@ -10,7 +10,9 @@ from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, PoseStamped, Twist
 from holozen.messages.message import not_finite
 from holozen.odometry import OdometryFeedback
+from holozen.suggest import listed, suggest
 from holozen.transport.errors import NoReply, ServiceError
+from holozen.transport.graph import Endpoint
 from holozen.transport.pubsub import Publisher
 from holozen.wire import PRIORITY_OF, key_for
 
@@ -20,6 +22,7 @@ from .journeys import GoalServers, Journey
 PERIOD = 0.05  # s of the odom's clock between two commands
 PATIENCE = 0.5  # s between two attempts to reach a service
 STOP_FOR, STOP_EVERY = 1.0, 0.05  # s; how long and how often a stop is repeated
+NOTICE = 3.0  # s without any odom until the robots that there are get named
 LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
 LOST = 2.0  # s without fresh odom, after which the goal of an action is aborted; the robot has stopped long before
@@ -93,6 +96,7 @@ class Follower:
         self._seen = time.monotonic()  # the last fresh odom, or the start of a journey
         self._policy = YieldPolicy(bus.source, "--held" if held else "")
         self._now: Planar = STOP
+        self._robot, self._began, self._others = robot, time.monotonic(), ""
         self._yielded = False
         self._reported = ""
 
@@ -247,7 +251,7 @@ class Follower:
             self._report_hold(reason)
         elif not fresh:
             self.halt()
-            self._report_hold("waiting for odom: it is stale, or none was received")
+            self._report_hold(self._no_odom())
         elif odom is None or not all(abs(value) <= MAX_DISTANCE for value in odom.pose.pose.planar()):
             self.halt()
             self._report_hold(f"waiting for odom: its pose is more than {MAX_DISTANCE:g} m away")
@@ -258,6 +262,15 @@ class Follower:
             self._report_hold("")
             return odom
         return None
+
+    def _no_odom(self) -> str:
+        """Why it waits for odom; where none came for NOTICE seconds since its start, with the robots that there are."""
+        if not self._others and not self._odom.count and time.monotonic() - self._began > NOTICE:
+            robots = {end.key.removesuffix("odom").rstrip("/") for end in self._bus.endpoints() if _is_odom(end)}
+            names = [robot or "the one at the root of the keys" for robot in robots]
+            name = self._robot or "robot"
+            self._others = f"{name}: no node publishes its odom{suggest(name, names)}; there are: {listed(names)}"
+        return f"waiting for {self._others or 'odom: it is stale, or none was received'}"
 
     def _command(self, planar: Planar) -> None:
         self._commands.put(Twist.planar(*planar))
@@ -270,3 +283,7 @@ class Follower:
         elif self._reported and not text:
             self._report("continues")
         self._reported = text
+
+
+def _is_odom(end: Endpoint) -> bool:
+    return end.kind == "pub" and end.key.rpartition("/")[2] == "odom"

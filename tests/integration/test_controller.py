@@ -169,6 +169,12 @@ def test_it_stops_when_odom_stops_and_goes_on_when_the_sim_is_back(wire: Wire, s
     assert scene.controller.returncode is None
 
 
+def test_a_robot_that_is_not_there_is_reported_with_those_that_are(town: Wire, shared: Scene) -> None:
+    controller = town.start("controller", "Fred")
+    controller.wait_for_line("waiting for Fred: no node publishes its odom; there are: the one at the root of the keys")
+    assert controller.terminate() == 0
+
+
 def test_asked_to_end_it_stops_the_robot_first(scene: Scene) -> None:
     scene.controller.signal(signal.SIGTERM)
     assert scene.controller.wait() == 0

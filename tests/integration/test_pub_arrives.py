@@ -56,6 +56,7 @@ def test_it_needs_no_subscriber_where_it_does_not_wait(town: Wire) -> None:
         ('{"linaer": {}}', "unknown field `linaer` (did you mean 'linear'?)"),
         ('{"linear": {"X": 1}}', "unknown field `X` - at `$.linear`"),
         ('{"angular": {"zz": 1}}', "unknown field `zz` - at `$.angular` (did you mean 'z'?)"),
+        ('{"linear": {"x": "1"}}', "Expected `float`, got `str` - at `$.linear.x`"),
         ("linear: {x: .inf}", "linear.x is not a finite number; --force sends it all the same"),
     ],
 )
@@ -96,6 +97,29 @@ def test_force_sends_what_the_sim_then_refuses_and_reports_it(town: Wire, robot:
     pub.signal(signal.SIGINT)
     assert pub.wait() == 0
     robot.stands()
+
+
+@pytest.mark.parametrize("often", ["--once", "-t 2"])
+def test_to_a_stopped_robot_it_fails_and_says_so(town: Wire, robot: Robot, often: str) -> None:
+    assert town.run("stop").returncode == 0
+    try:
+        done = town.run("topic", "pub", "cmd_vel", *often.split(), AHEAD)
+    finally:
+        assert town.run("release").returncode == 0
+    assert done.returncode == 1
+    assert "not obeyed: stop@" in done.stderr and "has set the software stop" in done.stderr
+
+
+def test_a_misspelt_key_is_refused_with_the_closest(town: Wire, robot: Robot) -> None:
+    for key, meant in (("cmd_vl", "cmd_vel"), ("Fred/cmd_vle", "Fred/cmd_vel")):
+        expected = f"holozen topic pub: '{key}' has no known type (did you mean '{meant}'?); known keys: cmd_vel, odom"
+        assert_one_line(town.run("topic", "pub", key, AHEAD, "--once"), 1, expected)
+
+
+def test_numbers_are_those_of_json_in_yaml_too(town: Wire) -> None:
+    heard = town.bus("other").subscribe("cmd_vel", Twist)
+    assert town.run("topic", "pub", "cmd_vel", "{linear: {x: 2e-1}}", "--once").returncode == 0
+    assert heard.recv().message == Twist.planar(0.2)
 
 
 def test_it_reports_when_another_one_drives_and_when_it_is_obeyed(town: Wire, robot: Robot) -> None:

@@ -99,6 +99,13 @@ def test_sources_that_command_at_once_are_an_error_if_none_takes_precedence() ->
         assert [finding.level for finding in found] == ([level] if level else [])
 
 
+def test_what_keeps_a_robot_that_nothing_commands_is_reported() -> None:
+    (finding,) = commands("Fred/cmd_vel", CommandStatus(held=True), ["controller"])
+    assert (finding.level, finding.fix) == (WARNING, "holozen controller Fred --resume, or r in the teleop")
+    (finding,) = commands("cmd_vel", CommandStatus(), ["teleop", "controller"])
+    assert "now; controller, teleop could; if the controller is held: holozen controller --resume" in finding.text
+
+
 def test_a_stopped_robot_is_reported_with_what_releases_it() -> None:
     finding, _ = commands("Fred/cmd_vel", CommandStatus(stopped="stop@1"))
     assert (finding.check, finding.level, finding.fix) == ("Fred/cmd_vel", WARNING, "holozen release Fred")

@@ -47,6 +47,7 @@ class LaunchService:
         self._timer_numbers = count()
         self._handlers: list[tuple[Scope, EventHandler]] = []
         self._processes: list[Process] = []
+        self._held: list[tuple[Action, Program]] | None = []  # until all is executed: an error then starts none of them
         self._numbers, self._selector = count(1), selectors.DefaultSelector()
 
     def __enter__(self) -> "LaunchService":
@@ -65,6 +66,7 @@ class LaunchService:
         """
         self._queue_first(self.context.scope, entities)
         self._execute()
+        self._start_held()
         self.on_started()
         while not self._stopping and (self._processes or self._timers):
             if self._stop.is_set():
@@ -87,11 +89,23 @@ class LaunchService:
         """Start a process. Raises LaunchError."""
         if self._stopping:
             return
+        if self._held is not None:
+            self._held.append((action, program))
+            return
         process = Process(action, program, f"{program.name}-{next(self._numbers)}", self._stop.is_set)
         self._processes.append(process)
         for pipe in process.pipes:
             self._selector.register(pipe.source, selectors.EVENT_READ, pipe)
         self._emit(ProcessStarted(action, process.name))
+
+    def _start_held(self) -> None:
+        held, self._held = self._held or [], None
+        for action, program in held:
+            try:
+                self.start(action, program)
+            except LaunchError as error:
+                raise error.at(action.place) from None
+        self._execute()
 
     def skip(self, action: Action, ends: bool) -> None:
         """Go on as if the process had been started, and if it `ends` had ended."""

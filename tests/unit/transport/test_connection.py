@@ -19,6 +19,7 @@ from holozen.transport.connection import (
     from_arguments,
     from_environment,
 )
+from holozen.transport.errors import BusError
 
 endpoints = st.none() | st.lists(
     st.sampled_from(["tcp/127.0.0.1:7447", "tcp/10.0.0.2:1", "udp/[::1]:9", "unixsock-stream//tmp/x"]), min_size=1
@@ -204,3 +205,13 @@ def test_a_wrong_variable_is_one_line_that_names_it_unless_a_flag_wins(
     assert reason in message
     flag = {"ROS_DOMAIN_ID": "--domain"}.get(variable, f"--{variable.removeprefix('HOLOZEN_').lower()}")
     parsed(flag, {"--mode": "peer", "--config": "there.json5", "--domain": "5"}.get(flag, "tcp/h:1"))
+
+
+def test_a_domain_that_an_endpoint_leaves_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    there = ("tcp/10.0.0.2:7447",)
+    with pytest.raises(BusError, match="--domain 5 meets others at port 7497 of this machine"):
+        from_environment(domain=5, connect=there)
+    assert from_environment(domain=5, connect=("tcp/10.0.0.2:7497",)).domain == 5
+    monkeypatch.setenv("ROS_DOMAIN_ID", "5")  # for ROS 2 alone, perhaps
+    where = from_environment(connect=there)
+    assert (where.connect, "--domain" in where.arguments()) == (there, False)

@@ -22,7 +22,7 @@ time.sleep(999)
 @pytest.fixture
 def listener() -> Iterator[Process]:
     """A process that listens and reports where."""
-    with Process([sys.executable, "-c", LISTEN, "--mark"]) as process:
+    with Process([sys.executable, "-c", LISTEN, "--mark" + "." * 99]) as process:
         wait_for(lambda: process.out.strip())
         yield process
 
@@ -31,7 +31,7 @@ def test_the_process_that_holds_a_port_is_named_also_when_it_is_stopped(listener
     port = int(listener.out)
     (holder,) = holders(f"tcp/127.0.0.1:{port}")
     assert (holder.pid, holder.stopped, holder.fix) == (listener.pid, False, f"end it: kill {listener.pid}")
-    assert f"(pid {listener.pid})" in str(holder)
+    assert f"...' (pid {listener.pid})" in str(holder)  # its command line is longer than what is shown
     listener.signal(signal.SIGSTOP)
     (holder,) = wait_for(lambda: [holder for holder in holders(f"tcp/127.0.0.1:{port}") if holder.stopped])
     assert "stopped as by Ctrl-Z" in str(holder)

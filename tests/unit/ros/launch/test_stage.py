@@ -177,6 +177,19 @@ def test_a_stop_ends_all_kindly_first(
     assert ("launch: p-1 did not end and was killed" in err) == (not last)
 
 
+def once_started(function: Callable[[Any], None]) -> a.RegisterEventHandler:
+    return a.RegisterEventHandler(OnProcessStart(on_start=[a.OpaqueFunction(function=function)]))
+
+
+def test_nothing_starts_before_all_of_the_launch_file_was_executed(play: Play, tmp_path: Path) -> None:
+    def fail(_context: Any) -> None:
+        raise LaunchError("a wrong value")
+
+    with pytest.raises(LaunchError, match="a wrong value"):
+        play(sh(f"touch {tmp_path}/started"), a.OpaqueFunction(function=fail))
+    assert not (tmp_path / "started").exists()
+
+
 def test_a_failure_of_the_launch_file_ends_what_runs(my_bot: Path, tmp_path: Path) -> None:
     pid = tmp_path / "pid"
 
@@ -185,7 +198,7 @@ def test_a_failure_of_the_launch_file_ends_what_runs(my_bot: Path, tmp_path: Pat
         raise KeyError("the user's")
 
     with pytest.raises(KeyError), LaunchService([], threading.Event()) as stage:
-        stage.run([sh(f"echo $$ > {pid}; sleep 60"), a.OpaqueFunction(function=fail)])
+        stage.run([once_started(fail), sh(f"echo $$ > {pid}; sleep 60")])
     assert gone(int(pid.read_text()))
 
 
@@ -197,7 +210,7 @@ def test_what_a_process_started_ends_with_it(my_bot: Path, tmp_path: Path) -> No
         stop.set()
 
     with LaunchService([], stop) as stage:
-        stage.run([sh(f"sleep 60 & echo $! > {pid}; wait"), a.OpaqueFunction(function=end)])
+        stage.run([once_started(end), sh(f"sleep 60 & echo $! > {pid}; wait")])
     wait_for(lambda: gone(int(pid.read_text())))
 
 
