@@ -10,6 +10,7 @@ must be no second gateway.
 from __future__ import annotations
 
 import contextlib
+import json
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -31,7 +32,7 @@ from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.samples import Answers, RawSubscriber, Sample, stamps
 from holozen.transport.services import MAX_REQUEST_BYTES, RING, call_bytes, refuse
-from holozen.transport.session import close, configuration, one_line
+from holozen.transport.session import close, configuration, new_id, one_line
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
@@ -48,7 +49,7 @@ Ends = list[Callable[[], object]]
 
 def open_bridges(endpoints: Sequence[str], stamped: tuple[str, str]) -> Any:
     """A session that meets only bridges, which listen at `endpoints` now or later. Raises BusError."""
-    alone = (("listen/endpoints", "[]"), stamped)
+    alone = (("listen/endpoints", "[]"), ("id", json.dumps(new_id([], ()))), stamped)
     config = configuration(Connection(connect=tuple(endpoints), listen=(), cfg=alone))
     with one_line(f"--bridge {', '.join(endpoints)}"):
         return zenoh.open(config)
@@ -66,8 +67,8 @@ class Gateway:
         tokens: Any = zenoh.handlers.RingChannel(4096)
         self._tokens = there.liveliness().declare_subscriber(form.tokens, tokens, history=True)
         self._theirs: dict[str, rmw.Endpoint] = {}  # by token
-        # Seen from its own session always; from another one if that is on the same network.
-        same = "" if there is bus.session else f"@holozen/{bus.id}/**"
+        # A session for bridges alone sees no node of ours, or else it is on our network.
+        same = "" if there is bus.session else graphs.ALL
         self._same = same and there.liveliness().declare_subscriber(same, zenoh.handlers.RingChannel(1), history=True)
         self._writers: set[tuple[str, str, str]] = set()  # session, topic and type of their publishers
         self._numbers: dict[str, int] = {}  # of our nodes and endpoints, in the ROS graph

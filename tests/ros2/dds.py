@@ -80,14 +80,14 @@ def _field(field: Field) -> Any:
 
 
 def default(name: str) -> Any:
-    """A message of a flat type with nothing in it."""
+    """A message with nothing in it."""
     fields = REGISTRY.find(name).fields
     return dds_type(name)(**{each.name: _default(each) for each in fields})
 
 
 def _default(field: Field) -> Any:
     if field.array:
-        return []
+        return [0] * field.bound if field.array == "fixed" else []
     return default(field.nested.name) if field.nested else PLAIN.get(field.type, int)()
 
 

@@ -219,6 +219,40 @@ def test_a_topic_of_ros_is_listed_and_read_here(bridged: Bridged) -> None:
     wait_for(heard)
 
 
+def test_a_robot_of_ros_is_driven_and_its_odometry_read_from_here(bridged: Bridged) -> None:
+    bus, node = bridged.wire.bus("ours"), bridged.node
+    ours, odom = bus.publisher("turtle/cmd_vel", Twist), bus.latest("turtle/odom", Odometry)
+    wheels, place = node.subscriber("/turtle/cmd_vel", TWIST), node.publisher("/turtle/odom", ODOM)
+    reported = bridged.dds.default(ODOM)
+    reported.child_frame_id = "turtle"
+
+    def commanded() -> bool:
+        ours.put(Twist.planar(x=0.2))
+        return any(each.linear.x == 0.2 for each in wheels.take(100))
+
+    def read() -> bool:
+        place.write(reported)
+        found = odom.read()[0]
+        return found is not None and found.child_frame_id == "turtle"
+
+    wait_for(commanded)
+    wait_for(read)
+
+
+def test_wires_are_mixed_on_one_key(bridged: Bridged) -> None:
+    reader = bridged.node.subscriber("/mixed", TWIST)
+    writers = [bridged.wire.bus(wire).publisher("mixed", Twist, wire=wire) for wire in codec.WIRES]
+    seen: set[float] = set()
+
+    def all_arrive() -> bool:
+        for number, writer in enumerate(writers, 1):
+            writer.put(Twist.planar(x=number))
+        seen.update(each.linear.x for each in reader.take(100))
+        return seen == {1.0, 2.0, 3.0}
+
+    wait_for(all_arrive, what=lambda: f"Twists of all wires: {seen}")
+
+
 def test_another_definition_of_a_type_stays_there(bridged: Bridged) -> None:
     bridged.wire.bus().subscribe("go", Twist)
     bridged.node.publisher("/go", TWIST, bridged.dds.hashed(f"RIHS01_{'0' * 64}"))
@@ -273,7 +307,7 @@ def test_nodes_of_two_domains_share_the_robot(bridged: Bridged) -> None:
 
 
 def test_a_bridge_on_our_own_network_is_refused(wire: Wire) -> None:
-    wire.bus("other")
+    wire.bus("other", lasting=True)
     ended = wire.start("ros2", "--bridge", wire.endpoint)
     assert ended.wait() == 1
     assert "the bridge is on our own network" in ended.err.splitlines()[-1]
