@@ -71,6 +71,7 @@ ELSEWHERE = {
 }  # fmt: skip
 """Verbs of ROS's tools and other likely guesses, with what to use instead."""
 EXTRAS = (
+    "PIL",
     "collada",
     "cryptography",
     "lz4",

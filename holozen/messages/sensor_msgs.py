@@ -114,6 +114,14 @@ class Image(Message):
     data: Bytes = field(default_factory=list)
 
 
+class CompressedImage(Message):
+    """A picture as a file of JPEG or PNG. `format` as in ROS's image_transport: `ENCODING; jpeg compressed bgr8`."""
+
+    header: Header = field(default_factory=Header)
+    format: str = ""
+    data: Bytes = field(default_factory=list)
+
+
 class RegionOfInterest(Message):
     """A part of an image in pixels; all zero: the whole."""
 

@@ -317,6 +317,11 @@ class Camera:
     encoding: str = "rgb8"
     noise: Noise = NO_NOISE
 
+    @property
+    def compressed(self) -> str:
+        """The key of its pictures as JPEG."""
+        return self.image and f"{self.image}/compressed"
+
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
@@ -337,7 +342,7 @@ class Sensor:
     def topics(self) -> tuple[str, ...]:
         """All its keys."""
         camera = self.device
-        keys = (camera.image, camera.info, camera.depth) if isinstance(camera, Camera) else ()
+        keys = (camera.image, camera.compressed, camera.info, camera.depth) if isinstance(camera, Camera) else ()
         return (self.topic, *(key for key in keys if key and key != self.topic))
 
 

@@ -165,7 +165,7 @@ VARIABLES = {
 ROS_DOMAIN = "ROS_DOMAIN_ID"  # the domain where neither the flag nor our own variable gives one
 
 _ROLE_OF = {
-    "sim": "sim", "router": "router", "controller": "autopilot", "pose-service": "autopilot", "up": "",
+    "sim": "sim", "camera": "sim", "router": "router", "controller": "autopilot", "pose-service": "autopilot", "up": "",
     **dict.fromkeys((
         "teleop", "view", "stop", "release", "spawn", "delete", "param set", "param load", "xacro", "sim pause",
         "sim play", "sim step", "sim reset",

@@ -6,7 +6,7 @@ from typing import NamedTuple
 NODES = "@holozen/**"  # tokens, clocks, definitions, and descriptions of nodes
 ABOUT, CLOCK, DEFINITIONS = "@holozen/*/about", "@holozen/*/clock", "@holozen/*/definition/**"
 EVERY = ("**", NODES)  # `**` alone does not match a chunk that begins with @
-COMMANDS = ("**/cmd_vel", "**/joint_command", "**/gazebo_ros_force", "**/goal_pose")
+COMMANDS = ("**/cmd_vel", "**/joint_command", "**/$*_force", "**/goal_pose")
 READS = (
     ABOUT, DEFINITIONS, *(f"**/{key}" for key in (
         "cmd_vel_status", "odom", "tf", "joint_states", "clock", "get_pose", "get_entities", "get_entity_state",

@@ -1,5 +1,6 @@
 """All cameras of a sim: exposures in, pictures out."""
 
+import io
 import math
 import threading
 import time
@@ -7,11 +8,12 @@ import zlib
 from array import array
 
 import numpy as np
+from PIL import Image as Jpeg
 
 from holozen.bus import Bus, Publisher, Subscription
 from holozen.console import report
 from holozen.entities import description
-from holozen.messages import CameraInfo, Exposure, Header, Image
+from holozen.messages import CameraInfo, CompressedImage, Exposure, Header, Image
 from holozen.robot.description import read
 from holozen.robot.errors import RobotError
 from holozen.transport.errors import ServiceError
@@ -19,6 +21,7 @@ from holozen.transport.errors import ServiceError
 from .renderer import Bytes, Floats, Renderer
 
 POLL = 0.005  # s between two looks for exposures
+QUALITY = 80  # of a JPEG, from 1 to 95; image_transport's default
 PATIENCE = 5.0  # s for the looks of an entity
 
 
@@ -71,21 +74,27 @@ class Camera:
 
     def __init__(self, bus: Bus, first: Exposure) -> None:
         self._image: Publisher[Image] | None = bus.publisher(first.image, Image, wire="cdr") if first.image else None
+        self._compressed: Publisher[CompressedImage] | None = (
+            bus.publisher(f"{first.image}/compressed", CompressedImage, wire="cdr") if first.image else None
+        )
         self._depth: Publisher[Image] | None = bus.publisher(first.depth, Image, wire="cdr") if first.depth else None
         self._info: Publisher[CameraInfo] = bus.publisher(first.info, CameraInfo)
 
     @property
     def wanted(self) -> bool:
         """Whether anyone wants what `publish` sends."""
-        wanted = [one.wanted for one in (self._image, self._depth, self._info) if one]
+        wanted = [one.wanted for one in (self._image, self._compressed, self._depth, self._info) if one]
         return any(wanted)
 
     def publish(self, exposure: Exposure, renderer: Renderer) -> None:
         """Render and publish a picture."""
         if self._image or self._depth:
             colors, depth = renderer.render(exposure)
-            if self._image:
-                self._image.put(_image(exposure, _with_noise(exposure, colors)))
+            if self._image and self._compressed:
+                picture = _image(exposure, _with_noise(exposure, colors))
+                self._image.put(picture)
+                if self._compressed.wanted:
+                    self._compressed.put(_compressed(picture))
             if self._depth:
                 self._depth.put(_image(exposure, depth))
         self._info.put(info(exposure))
@@ -109,6 +118,16 @@ def _image(exposure: Exposure, pixels: Bytes | Floats) -> Image:
     data = pixels.tobytes()
     header = Header(exposure.header.stamp, exposure.header.frame_id)
     return Image(header, height, width, encoding, 0, len(data) // height, array("B", data))
+
+
+def _compressed(picture: Image) -> CompressedImage:
+    """The JPEG of a picture."""
+    color = picture.encoding != "mono8"
+    file = io.BytesIO()
+    pixels = Jpeg.frombytes("RGB" if color else "L", (picture.width, picture.height), bytes(picture.data))
+    pixels.save(file, "JPEG", quality=QUALITY)
+    name = f"{picture.encoding}; jpeg compressed {'bgr8' if color else ''}"  # cv2 reads colours as bgr8
+    return CompressedImage(picture.header, name, array("B", file.getvalue()))
 
 
 def _with_noise(exposure: Exposure, colors: Bytes) -> Bytes:

@@ -1,5 +1,6 @@
 """Pictures of a camera: what stands where, at which time, in a process of its own."""
 
+import io
 import math
 import os
 import signal
@@ -8,10 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import PIL.Image
 import pytest
 
 from holozen import entities
-from holozen.messages import CameraInfo, Image, Pose
+from holozen.messages import CameraInfo, CompressedImage, Image, Pose
 from holozen.messages.geometry_msgs import Point
 from holozen.testing import LockStep, Wire, wait_for
 
@@ -43,7 +45,12 @@ class Eye:
         self.sim = sim
         self._read: dict[str, Any] = {
             key: sim.bus.subscribe(f"cam/{key}", kind, depth=100, limit=1_000_000)
-            for key, kind in (("image_raw", Image), ("depth/image_raw", Image), ("camera_info", CameraInfo))
+            for key, kind in (
+                ("image_raw", Image),
+                ("image_raw/compressed", CompressedImage),
+                ("depth/image_raw", Image),
+                ("camera_info", CameraInfo),
+            )
         }
         self._newest: dict[str, Any] = {}
 
@@ -57,7 +64,7 @@ class Eye:
                 for received in iter(subscription.try_recv, None):
                     self._newest[key] = received.message
             stamps = [message.header.stamp.seconds() for message in self._newest.values()]
-            return len(stamps) == 3 and min(stamps) == max(stamps) > began + 0.1
+            return len(stamps) == len(self._read) and min(stamps) == max(stamps) > began + 0.1
 
         wait_for(has_come, 60.0, "a picture")
         return self._newest
@@ -100,6 +107,17 @@ def test_a_red_cube_is_where_geometry_puts_it(eye: Eye) -> None:
     assert depth.encoding == "32FC1"
     assert row[round(WIDTH / 2 - FOCAL * 0.5 / near)] == pytest.approx(near, abs=0.01)
     assert row[-1] == math.inf, "it looks past the cube at the sky"
+
+
+def test_the_compressed_picture_is_the_same_one(eye: Eye) -> None:
+    seen = eye.see()
+    picture, compressed = seen["image_raw"], seen["image_raw/compressed"]
+    assert compressed.format == "rgb8; jpeg compressed bgr8"
+    assert len(compressed.data) < len(picture.data) / 10
+    opened = PIL.Image.open(io.BytesIO(bytes(compressed.data)))
+    assert (opened.format, opened.mode, opened.size) == ("JPEG", "RGB", (WIDTH, HEIGHT))
+    pairs = zip(opened.tobytes(), bytes(picture.data), strict=True)
+    assert sum(abs(one - other) for one, other in pairs) / len(picture.data) < 5, "of 255 levels, on the average"
 
 
 def test_the_camera_moves_with_its_robot_and_forgets_what_is_gone(eye: Eye) -> None:

@@ -11,10 +11,22 @@ import pytest
 import zenoh
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from holozen import authority
+from holozen import authority, entities
 from holozen.authority import AuthorityError
-from holozen.bus import Bus
-from holozen.messages import CommandStatus, Odometry, PoseStamped, TriggerReply, TriggerRequest, Twist
+from holozen.bus import Bus, Publisher
+from holozen.messages import (
+    CommandStatus,
+    CompressedImage,
+    Odometry,
+    Pose,
+    PoseStamped,
+    TriggerReply,
+    TriggerRequest,
+    Twist,
+    Vector3,
+    Wrench,
+)
+from holozen.messages.geometry_msgs import Point
 from holozen.testing import Process, wait_for
 from holozen.testing.wire import command, free_port
 from holozen.transport.connection import Connection, from_environment
@@ -104,6 +116,37 @@ def test_an_operator_drives_and_the_status_shows_the_proven_name(fleet: Fleet, r
     robot.moves(driver)
     assert driver.source.startswith("operator/test@")
     driver.close()
+
+
+SEEING = """<robot name="seeing"><link name="body"><inertial><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><geometry><sphere radius="0.1"/></geometry></collision></link>
+<gazebo reference="body"><sensor type="camera" name="eye"><camera><image><width>32</width><height>24</height></image>
+</camera></sensor></gazebo>
+<gazebo><plugin name="push" filename="libgazebo_ros_force.so"><ros><remapping>gazebo_ros_force:=hand_force</remapping>
+</ros><link_name>body</link_name></plugin></gazebo></robot>"""
+
+
+def test_cameras_are_seen_by_all_and_forces_push_by_role(fleet: Fleet, robot: Robot) -> None:
+    entities.spawn(robot.bus, "seeing", SEEING, Pose(Point(5.0, 5.0, 0.1)))
+    with fleet.bus("viewer") as viewer, fleet.bus("script") as script:
+        pictures = viewer.subscribe("seeing/eye/image_raw/compressed", CompressedImage)
+        odom = viewer.latest("seeing/odom", Odometry)
+        picture = wait_for(pictures.try_recv, 60.0, "a picture")
+        assert picture and picture.message and bytes(picture.message.data[:2]) == b"\xff\xd8", "a JPEG"
+        push = Wrench(Vector3(x=1.0))
+        refused, obeyed = (bus.publisher("seeing/hand_force", Wrench, "DATA") for bus in (viewer, script))
+
+        def moves(publisher: Publisher[Wrench]) -> bool:
+            publisher.put(push)
+            message, _ = odom.read()
+            return message is not None and message.twist.twist.linear.x > 0.05
+
+        before = odom.count
+        wait_for(lambda: moves(refused) or odom.count > before + 25)
+        assert not moves(refused), "a viewer sends no commands"
+        wait_for(lambda: moves(obeyed))
+    entities.delete(robot.bus, "seeing")
 
 
 def test_an_autopilot_checks_who_sets_its_goals(fleet: Fleet, robot: Robot) -> None:
@@ -369,7 +412,11 @@ def test_what_would_open_it_is_refused(fleet: Fleet, more: dict[str, Any], reaso
 
 
 def test_the_rules_name_every_command() -> None:
-    assert {*COMMANDS} == {f"**/{row.key}" for row in TOPICS if row.is_command}
+    named = {row.key: [one for one in COMMANDS if zenoh.KeyExpr(one).includes(zenoh.KeyExpr(f"a/{row.key}"))]
+             for row in TOPICS}  # fmt: skip
+    assert {key for key, found in named.items() if found} == {row.key for row in TOPICS if row.is_command}
+    assert [one for found in named.values() for one in found] == [*COMMANDS]
+    assert any(zenoh.KeyExpr(one).includes(zenoh.KeyExpr("hb_bot_1/left_wheel_force")) for one in COMMANDS)
 
 
 def test_files_are_for_their_owner_alone(fleet: Fleet) -> None:
