@@ -8,6 +8,8 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from typing import IO, Self, TypeVar
 
+from holozen.process import dies_with_parent
+
 T = TypeVar("T")
 
 SOON, EVERY = 0.0005, 0.005  # s between two polls, at first and later: what is there soon is not waited for long
@@ -31,7 +33,8 @@ def wait_for(condition: Callable[[], T], within: float = PATIENCE, what: str | C
 
 
 class Process:
-    """A running program, the leader of its own session. `out` and `err` are its output so far.
+    """A running program, the leader of its own session. `out` and `err` are its output so far. It gets a SIGTERM when
+    the thread that has started it ends, so that a killed test leaves nothing behind.
 
     `stdin`, `stdout` and `stderr` are as for subprocess.Popen; the first is empty and the others captured by default.
     """
@@ -56,6 +59,7 @@ class Process:
             stderr=self._err if stderr is None else stderr,
             env={**os.environ, **(env or {})},
             start_new_session=True,
+            preexec_fn=dies_with_parent(),
         )
         self.pid = self._popen.pid
 

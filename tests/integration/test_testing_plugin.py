@@ -1,9 +1,12 @@
 """The fixtures that come with holozen, as other projects' tests use them."""
 
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
+
+from holozen.testing import wait_for
 
 USERS_TESTS = """
 from holozen.messages import Odometry, Twist
@@ -132,3 +135,19 @@ def test_it(terminal, monkeypatch):
 """,
     )
     assert "RuntimeError: Terminal.screen needs pyte; run: pip install pyte" in done.stdout
+
+
+def test_a_killed_test_leaves_no_process(tmp_path: Path) -> None:
+    """As the workers of pytest-xdist are killed after Ctrl-C."""
+    test = """
+import os, pathlib, signal
+
+def test_it(wire):
+    sim = wire.start("sim")
+    sim.wait_for_line("listens on")
+    pathlib.Path("pid").write_text(str(sim.pid))
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    assert run_pytest(tmp_path, test).returncode == -signal.SIGKILL
+    pid = (tmp_path / "pid").read_text()
+    wait_for(lambda: not Path(f"/proc/{pid}").exists(), what="the end of the sim")
