@@ -146,7 +146,7 @@ def nodes(connection: Connection) -> Iterator[Finding]:
         peers = ask_peers(bus) if bus.connected() else {}
         yield from versions(endpoints, peers, version("holozen"))
         yield from clocks(peers.values())
-        yield from exposures(peers.values())
+        yield from open_ports(peers.values())
         yield from duplicates(endpoints, peers)
         if robots.count:
             time.sleep(max(0.0, began + LISTEN - time.monotonic()))
@@ -286,7 +286,7 @@ def clocks(peers: Iterable[Peer], here: str = os.uname().nodename) -> Iterator[F
         yield Finding("clock", level, text + ("; stamped commands are refused" if level == ERROR else ""), fix)
 
 
-def exposures(peers: Iterable[Peer]) -> Iterator[Finding]:
+def open_ports(peers: Iterable[Peer]) -> Iterator[Finding]:
     """Nodes that other machines can reach without a password, a certificate or a permission."""
     for peer in peers:
         if peer.exposed:

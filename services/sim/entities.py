@@ -14,6 +14,7 @@ from holozen.messages import simulation_interfaces as si
 from holozen.robot.errors import RobotError
 from holozen.robot.model import Camera, RobotModel
 from holozen.robot.rigid import MOVING, check_shapes
+from holozen.rotation import XYZ, XYZW
 from holozen.suggest import listed
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Endpoint, on_key
@@ -22,14 +23,13 @@ from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name
 from .cameras import Cameras
 from .command.time import CommandTime
 from .io.robot_services import RobotServices
-from .io.sensor_topics import Motions, Surroundings
+from .io.sensor_topics import LinkStates, Surroundings
 from .io.wait_set import Moment, WaitSet
+from .link_states import LinkState, link_tree
 from .physics.body import Body
-from .physics.engine import Rotation, Vector
 from .physics.movers import Mover, mover_for
-from .physics.sight import Sight
+from .physics.ray_caster import RayCaster
 from .physics.world import World
-from .posture import Motion, posture_of
 from .robot import Memory, Robot, command_key, keys_of
 from .stops import StopFiles
 
@@ -39,7 +39,7 @@ GRAPH_SCAN = 0.02  # s between two scans of all tokens for the senders of comman
 MAX_DISTANCE = 1e4  # m from the origin; far beyond, the engine's numbers are too coarse for contacts
 SPREAD = 0.618  # of a period between the telemetry of a robot and that of the next; the golden ratio spreads any number
 KEYS = {"clock", "simulation_status"}  # of the sim itself
-Place = tuple[Vector, Rotation]
+Place = tuple[XYZ, XYZW]
 
 
 class EntityError(ServiceError):
@@ -85,8 +85,8 @@ class Entities:
         self._stops: StopFiles | None = None
         self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
         self.robots: list[Robot] = []
-        self._sight: Sight | None = None  # made when the first sensor looks
-        self._in_sight: dict[str, int] = {}  # number of the entity of that name
+        self._rays: RayCaster | None = None  # made when the first sensor looks
+        self._traced: dict[str, int] = {}  # number of the entity of that name
         self._cameras = cameras
         self._around = Surroundings(world.spec, self.look, self.seen, seed, cameras)
         self.commands, self.requests = WaitSet(), WaitSet()  # of all robots: what moves or stops them; all else
@@ -158,7 +158,7 @@ class Entities:
             self.requests.add(entity.robot.request_readers)
         return entity
 
-    def put(self, name: str, place: Place, linear: Vector, angular: Vector) -> None:
+    def put(self, name: str, place: Place, linear: XYZ, angular: XYZ) -> None:
         """Move an entity to a place that no other has taken, with its velocity and rotation rate in the world. Raises
         EntityError, and then it stays where it is.
         """
@@ -330,21 +330,21 @@ class Entities:
                 report(f"sim: {entity.name} did not come back: {error}")
         self.robots[:] = [entity.robot for entity in self if entity.robot]
 
-    def look(self) -> Sight:
+    def look(self) -> RayCaster:
         """What sensors see now."""
-        if self._sight is None:
-            self._sight = Sight(self._world.spec.ground)
-        for name, number in list(self._in_sight.items()):
+        if self._rays is None:
+            self._rays = RayCaster(self._world.spec.ground)
+        for name, number in list(self._traced.items()):
             if name not in self._all or self._all[name].number != number:
-                self._sight.remove(name)
-                del self._in_sight[name]
+                self._rays.remove(name)
+                del self._traced[name]
         for entity in self:
-            if entity.name not in self._in_sight:
-                self._sight.add(entity.name, entity.model)
-                self._in_sight[entity.name] = entity.number
-            if self._sight.has_moved(entity.name, pose := entity.body.pose()) or entity.robot:
-                self._sight.place(entity.name, pose, _motions(entity))
-        return self._sight
+            if entity.name not in self._traced:
+                self._rays.add(entity.name, entity.model)
+                self._traced[entity.name] = entity.number
+            if self._rays.has_moved(entity.name, pose := entity.body.pose()) or entity.robot:
+                self._rays.place(entity.name, pose, _link_states(entity))
+        return self._rays
 
     def seen(self) -> list[SeenEntity]:
         """Where everything is, for pictures."""
@@ -402,7 +402,7 @@ class Entities:
             )
 
 
-def _at(position: Vector) -> str:
+def _at(position: XYZ) -> str:
     x, y = (round(part, 2) + 0.0 for part in position[:2])  # no -0
     return f"x {x:g} y {y:g}"
 
@@ -417,7 +417,7 @@ def has_keys(model: RobotModel) -> bool:
     return bool(model.drive or model.sensors) or any(joint.kind in MOVING for joint in model.joints.values())
 
 
-def checked_place(position: Vector, rotation: Rotation) -> Place:
+def checked_place(position: XYZ, rotation: XYZW) -> Place:
     """A place from the wire, with its rotation normalized. Raises EntityError."""
     if not all(map(math.isfinite, (*position, *rotation))) or max(map(abs, position)) > MAX_DISTANCE:
         raise EntityError(
@@ -436,14 +436,14 @@ def _is_finite(body: Body) -> bool:
     return all(math.isfinite(sum(part)) for part in (*body.pose(), *body.twist()))
 
 
-def _motions(entity: Entity) -> Motions:
+def _link_states(entity: Entity) -> LinkStates:
     """How its links move; those of an object that has no joints as its root."""
     if entity.robot:
-        return entity.robot.motions()
-    return posture_of(entity.model).motions(Motion(*entity.body.pose()))
+        return entity.robot.link_states()
+    return link_tree(entity.model).states(LinkState(*entity.body.pose()))
 
 
 def _seen(entity: Entity) -> SeenEntity:
-    motions = _motions(entity)
-    poses = [Pose.of(at.xyz, at.rotation) for at in motions.values()]
-    return SeenEntity(entity.name, entity.number, list(motions), poses)
+    links = _link_states(entity)
+    poses = [Pose.of(at.xyz, at.rotation) for at in links.values()]
+    return SeenEntity(entity.name, entity.number, list(links), poses)

@@ -17,12 +17,12 @@ from .command.inputs import CommandStats, ForceInput, JointInput, TwistInput
 from .command.motion import JointMotion
 from .command.time import CommandTime
 from .io.robot_services import RobotServices
-from .io.sensor_topics import Motions, SensorTopics, Step, Surroundings
+from .io.sensor_topics import LinkStates, SensorTopics, Step, Surroundings
 from .io.topics import JOINT_RATE, NONE, DriveTopics, ForceTopics, JointTopics, Schedule
 from .io.wait_set import Reader
+from .link_states import LinkState, link_tree
 from .physics.jointed import Forces, JointedBody, Motors
 from .physics.movers import Mover
-from .posture import Motion, posture_of
 
 IDLE = 0.06  # s of sim time between two looks for readers of the joints, while there are none
 
@@ -77,16 +77,16 @@ class Robot:
         self._joints_at = -math.inf  # s of sim time until when no readers of the joints are looked for
         self.publishes_at = -math.inf  # s of sim time from when on `publish` has something to do
         self._sensors: SensorTopics | None = None
-        self._posture = posture_of(model)
+        self._tree = link_tree(model)
 
     def sense(self, bus: Bus, name: str, around: Surroundings, phase: float) -> None:
         """Publish what its sensors measure in a world."""
         self._sensors = SensorTopics(bus, name, self.prefix, self._model.sensors, around, phase)
 
-    def motions(self) -> Motions:
+    def link_states(self) -> LinkStates:
         """How its links move now."""
         positions, rates = (dict(zip(self.mover.names, values, strict=True)) for values in self.mover.states()[:2])
-        return self._posture.motions(Motion(*self.body.pose(), *self.body.twist()), positions, rates)
+        return self._tree.states(LinkState(*self.body.pose(), *self.body.twist()), positions, rates)
 
     @property
     def memory(self) -> Memory:
@@ -234,7 +234,7 @@ class Robot:
         self.publishes_at = min(self._odom_due.next, max(self._joints_due.next, self._joints_at))
         if self._sensors:
             if time >= self._sensors.next and not at_once:  # while time does not pass there is nothing new to see
-                self._sensors.publish(Step(time, round(time / dt)), self.motions)
+                self._sensors.publish(Step(time, round(time / dt)), self.link_states)
             self.publishes_at = min(self.publishes_at, self._sensors.next)
         if self.body.glides and not joints and wanted == NONE:
             return  # else encoders, and the wheels for the eye, count on observers

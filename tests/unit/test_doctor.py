@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from holozen.doctor import ERROR, OK, WARNING, Peer, clocks, commands, duplicates, exposures, packages, read_peer
+from holozen.doctor import ERROR, OK, WARNING, Peer, clocks, commands, duplicates, open_ports, packages, read_peer
 from holozen.doctor import versions as versions_of
 from holozen.messages import CommandSource, CommandStatus, Odometry, TFMessage, Twist
 from holozen.transport.graph import Endpoint
@@ -62,7 +62,7 @@ def test_a_node_that_is_open_to_the_network_is_a_warning() -> None:
     payload = json.dumps(ABOUT | {"exposed": ["tcp/0.0.0.0:7447"]}).encode()
     exposed = read_peer("@holozen/abc/about", payload, 100.0, 100.2)
     assert exposed is not None
-    (finding,) = exposures([exposed, peer()])
+    (finding,) = open_ports([exposed, peer()])
     assert (finding.level, finding.check) == (WARNING, "network")
     assert finding.text.startswith("sim (pid 7 on there) listens at tcp/0.0.0.0:7447, open to the network: anyone")
 

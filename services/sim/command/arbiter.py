@@ -10,13 +10,13 @@ from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
 
-from .motion import Motion, Push, Pushes, is_stop
+from .motion import AppliedForce, AppliedForces, Motion, is_stop
 from .time import ROUNDING, CommandTime
 
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # no source ranks above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here down, a source waits for `resume` once a higher one has driven
 MAX_HELD = 100  # names of each rank, since they come over the wire; beyond, the whole rank is held but its driver
-MAX_SOURCES = 100  # names of each rank, since they come over the wire; those beyond share one entry
+MAX_PER_RANK = 100  # names of each rank, since they come over the wire; those beyond share one entry
 NEVER = 1e9  # s
 STOPPED = "stopped: by {by}; `holozen release` lets it drive again"
 LET_GO = "let go first: it commanded while the robot was stopped; send a stop{or_wait}"
@@ -39,7 +39,7 @@ class SoftwareStop:
         self.set_timeout(timeout)
         self._last_moves: dict[int, dict[str, float]] = {}  # rank -> source -> time of its last motion
         self._stopped = -math.inf  # when it was set: any source may have commanded until then
-        self._others: dict[int, float] = {}  # rank -> the same for all sources beyond MAX_SOURCES
+        self._others: dict[int, float] = {}  # rank -> the same for all sources beyond MAX_PER_RANK
 
     def set_timeout(self, timeout: float) -> None:
         """Set the timeout of the watchdog."""
@@ -85,7 +85,7 @@ class SoftwareStop:
 
     def _note(self, source: str, rank: int, when: float) -> None:
         sources = self._last_moves.setdefault(rank, {})
-        if source in sources or len(sources) < MAX_SOURCES:
+        if source in sources or len(sources) < MAX_PER_RANK:
             sources[source] = when
         else:
             self._others[rank] = max(self._others.get(rank, -math.inf), when)
@@ -208,18 +208,18 @@ class Arbiter:
             self.due = self.time.real(driver.sent + patience)
         return driver.motion
 
-    def pushes(self, now: float) -> list[Push] | None:
+    def pushes(self, now: float) -> list[AppliedForce] | None:
         """The forces at `now`, each until it has been silent for too long; None when no source drives."""
         motion = self.motion(now)
-        if not isinstance(motion, Pushes):
+        if not isinstance(motion, AppliedForces):
             return None
         return list(motion.since(self.time.at(now) - self.time.slack - COMMAND_SILENCE))
 
-    def pushes_of(self, source: str, rank: int, now: float) -> Pushes:
+    def pushes_of(self, source: str, rank: int, now: float) -> AppliedForces:
         """What a source pushes with at `now`."""
         driver = self.driver(now)
         is_driver = driver is not None and (driver.source, driver.rank) == (source, max(rank, PERSON))
-        return driver.motion if driver and is_driver and isinstance(driver.motion, Pushes) else Pushes(())
+        return driver.motion if driver and is_driver and isinstance(driver.motion, AppliedForces) else AppliedForces(())
 
     def _patience(self, driver: Driver) -> float:
         """The silence in s after which a driver no longer drives; below zero: never."""

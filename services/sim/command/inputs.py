@@ -18,12 +18,12 @@ from holozen.wire import MAX_STAMP_AGE, implausible
 
 from .arbiter import Arbiter
 from .freshness import Freshness, Judged, Senders, source_of
-from .motion import JointMotion, Push, Pushes, is_stop, motion_of
+from .motion import AppliedForce, AppliedForces, JointMotion, is_stop, motion_of
 
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
 LINEAR, ANGULAR = (0.01, 50.0), (0.01, 100.0)  # their ranges
-MAX_SOURCES = 16  # names come over the wire; beyond, the least recent of the lowest rank is forgotten
+MAX_RATES = 16  # names come over the wire; beyond, the least recent of the lowest rank is forgotten
 RECENT = 3.0  # s
 SPAN = 1.0  # s over which commands are counted
 MARK = 0.1  # s between two samples of a count
@@ -222,8 +222,10 @@ class ForceInput:
             arbiter.note_refused(source, rank, now)
         else:
             others = arbiter.pushes_of(source, rank, now).but(key)
-            push = Push(key, _wrench(message), arbiter.time.at(now) - (0.0 if arbiter.time.is_held else now - sent))
-            refusal = arbiter.offer(source, rank, Pushes(tuple(sorted((*others, push)))), now, sent)
+            push = AppliedForce(
+                key, _wrench(message), arbiter.time.at(now) - (0.0 if arbiter.time.is_held else now - sent)
+            )
+            refusal = arbiter.offer(source, rank, AppliedForces(tuple(sorted((*others, push)))), now, sent)
         if refusal:
             self._stats.refuse(key, refusal.partition(":")[0], refusal, source, now)
         else:
@@ -271,7 +273,7 @@ class SourceRates:
         """
         each = self._all.get((source, rank))
         if is_new := each is None:
-            if len(self._all) >= MAX_SOURCES:
+            if len(self._all) >= MAX_RATES:
                 del self._all[max(self._all, key=lambda name: (name[1], -self._all[name].last))]
             each = self._all[source, rank] = SourceRate(now)
         each.rank, each.last, each.delay = rank, now, delay

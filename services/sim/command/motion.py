@@ -26,7 +26,7 @@ class JointMotion:
         return JointMotion(self.kind, values) if values else None
 
 
-class Push(NamedTuple):
+class AppliedForce(NamedTuple):
     """The wrench of one topic, sent at `sent` (s) at the earliest: x, y, z of the force in N, then of the torque in
     N m.
     """
@@ -37,26 +37,26 @@ class Push(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Pushes:
+class AppliedForces:
     """The wrenches of one source, one for each topic."""
 
-    pushes: tuple[Push, ...]
+    pushes: tuple[AppliedForce, ...]
 
     @property
     def stops(self) -> bool:
         """Whether it pushes nothing."""
         return not any(any(push.wrench) for push in self.pushes)
 
-    def since(self, time: float) -> Iterator[Push]:
+    def since(self, time: float) -> Iterator[AppliedForce]:
         """Those sent since `time` (s)."""
         return (push for push in self.pushes if push.sent >= time)
 
-    def but(self, key: str) -> tuple[Push, ...]:
+    def but(self, key: str) -> tuple[AppliedForce, ...]:
         """Those of all topics but one."""
         return tuple(push for push in self.pushes if push.key != key)
 
 
-Motion = Planar | JointMotion | Pushes
+Motion = Planar | JointMotion | AppliedForces
 
 
 def is_stop(motion: Motion) -> bool:

@@ -28,12 +28,11 @@ from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.xacro import uses_xacro
-from holozen.rotation import Transform
+from holozen.rotation import XYZ, Transform
 from holozen.transport.services import answer_in_turn
 from holozen.wire import key_for
 
 from ..entities import Entities, Entity, EntityError, Place, checked_place
-from ..physics.engine import Vector
 from ..robot import command_key
 from ..shard import Share
 
@@ -236,5 +235,5 @@ def _place(header: Header, pose: Pose) -> Place:
     return checked_place(place.translation, place.rotation)
 
 
-def _vector(v: Vector3) -> Vector:
+def _vector(v: Vector3) -> XYZ:
     return v.x, v.y, v.z

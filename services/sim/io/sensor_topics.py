@@ -30,11 +30,11 @@ from holozen.transport.pubsub import Publisher
 from holozen.wire import key_for
 
 from ..cameras import Cameras
-from ..physics.sight import Array, Sight
-from ..posture import Motion, placed
+from ..link_states import LinkState, placed
+from ..physics.ray_caster import Array, RayCaster
 from .topics import Schedule
 
-Motions = Mapping[str, Motion]
+LinkStates = Mapping[str, LinkState]
 """Those of a robot's links, by name."""
 
 
@@ -51,7 +51,7 @@ class Surroundings(NamedTuple):
     """
 
     world: WorldSpec
-    look: Callable[[], Sight]
+    look: Callable[[], RayCaster]
     seen: Callable[[], list[SeenEntity]]
     seed: int
     cameras: Cameras | None
@@ -79,12 +79,12 @@ class SensorTopics:
     def _add(self, topic: "LidarTopic | ImuTopic | CameraTopic") -> None:
         self._all.append((topic, Schedule(topic.sensor.rate, self._phase)))
 
-    def publish(self, step: Step, motions: Callable[[], Motions]) -> None:
+    def publish(self, step: Step, links: Callable[[], LinkStates]) -> None:
         """Publish what is due, and wanted."""
         due = [topic for topic, schedule in self._all if schedule.due(step.time) and topic.wanted]
         self.next = min((schedule.next for _, schedule in self._all), default=math.inf)
         if due:
-            now = motions()
+            now = links()
             for topic in due:
                 topic.publish(step, now)
 
@@ -132,9 +132,9 @@ class LidarTopic:
         """Whether anyone wants what `publish` sends."""
         return self._publisher.wanted
 
-    def publish(self, step: Step, motions: Motions) -> None:
+    def publish(self, step: Step, links: LinkStates) -> None:
         """Look, and publish it."""
-        lidar, at = self._lidar, motions[self.sensor.link].at(self._xyz, self._rotation)
+        lidar, at = self._lidar, links[self.sensor.link].at(self._xyz, self._rotation)
         ranges = self._around.look().ranges(at.xyz, at.rotation, self._directions, lidar.near, lidar.far, self._own)
         if lidar.noise.mean or lidar.noise.stddev:
             noise = self._draw.noise(step.number, [lidar.noise], len(ranges))[0]
@@ -206,9 +206,9 @@ class ImuTopic:
 
     wanted = True  # also when nobody subscribes: what is measured must not depend on readers
 
-    def publish(self, step: Step, motions: Motions) -> None:
+    def publish(self, step: Step, links: LinkStates) -> None:
         """Measure, and publish it."""
-        at = motions[self.sensor.link].at(self._xyz, self._rotation)
+        at = links[self.sensor.link].at(self._xyz, self._rotation)
         before, self._before = self._before, (step.time, at.linear)
         if not self._publisher.wanted:
             return
@@ -256,10 +256,10 @@ class CameraTopic:
         """Whether anyone wants what `publish` sends."""
         return self._cameras.wanted
 
-    def publish(self, step: Step, motions: Motions) -> None:
+    def publish(self, step: Step, links: LinkStates) -> None:
         """Send what it sees."""
         camera, around = self._camera, self._around
-        at = motions[self.sensor.link].at(self._xyz, self._rotation)
+        at = links[self.sensor.link].at(self._xyz, self._rotation)
         self._cameras.expose(
             Exposure(
                 Header(Time.of(step.time), self._frame), self._image, self._info, self._depth, camera.width,

@@ -34,7 +34,7 @@ from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
 from ..command.inputs import ForceInput, JointInput, TwistInput
-from ..command.motion import JointMotion, Pushes
+from ..command.motion import AppliedForces, JointMotion
 from ..physics.body import JointStates, Moved
 from ..physics.movers import Limited
 from .wait_set import Moment, Reader
@@ -242,7 +242,7 @@ class DriveTopics:
     def motion(self, now: float, dt: float) -> Planar | JointMotion:
         """The commanded motion of the next step of `dt` seconds, within the limits of its file."""
         motion = self._input.arbiter.motion(now)
-        assert not isinstance(motion, Pushes), "forces are another arbiter's where a drive is"
+        assert not isinstance(motion, AppliedForces), "forces are another arbiter's where a drive is"
         if isinstance(motion, JointMotion):
             self._limited(STOP, dt)
             return motion

@@ -4,11 +4,11 @@ from collections.abc import Iterable, Mapping
 
 from holozen.kinematics import to_body
 from holozen.limits import Planar
-from holozen.rotation import multiply, rotate, yaw
+from holozen.rotation import XYZ, XYZW, multiply, rotate, yaw
 
-from .engine import NOTHING, Bodies, Rotation, Vector, bullet
+from .engine import NOTHING, Bodies, bullet
 
-Moved = tuple[Vector, Rotation, Planar]
+Moved = tuple[XYZ, XYZW, Planar]
 """Position (m), rotation and body-frame velocity (m/s, rad/s) for odometry."""
 JointStates = tuple[list[float], list[float], list[float]]
 """Positions, rates and efforts: rad, rad/s, N m or m, m/s, N."""
@@ -22,7 +22,7 @@ class Body:
     """
 
     def __init__(
-        self, bodies: Bodies, number: int, centre: Vector, axes: Rotation, weightless: Mapping[int, float] = {}
+        self, bodies: Bodies, number: int, centre: XYZ, axes: XYZW, weightless: Mapping[int, float] = {}
     ) -> None:
         self._bodies, self._world, self._body, self.number = bodies, bodies.world, number, number
         self.weightless = {link: mass for link, mass in weightless.items() if mass > 0}
@@ -32,14 +32,14 @@ class Body:
         self._axes = axes
         self._links = range(-1, bullet.getNumJoints(number, bodies.world))
         self._tilted = max(map(abs, axes[:3])) > 1e-9  # principal axes that are not the root's
-        self._axes_back: Rotation = bullet.invertTransform((0, 0, 0), axes)[1]
+        self._axes_back: XYZW = bullet.invertTransform((0, 0, 0), axes)[1]
 
-    def pose(self) -> tuple[Vector, Rotation]:
+    def pose(self) -> tuple[XYZ, XYZW]:
         """Position and rotation of the root frame in the world."""
         position, rotation, centre = self._root()
         return (position[0] - centre[0], position[1] - centre[1], position[2] - centre[2]), rotation
 
-    def twist(self) -> tuple[Vector, Vector]:
+    def twist(self) -> tuple[XYZ, XYZ]:
         """The root frame's velocity and rotation rate in the world."""
         _, _, centre = self._root()
         linear, angular = bullet.getBaseVelocity(self._body, self._world)
@@ -51,28 +51,28 @@ class Body:
         x, y = to_body(vx, vy, yaw(self.pose()[1]))
         return x, y, turn
 
-    def box(self) -> tuple[Vector, Vector]:
+    def box(self) -> tuple[XYZ, XYZ]:
         """The corners of the box around it in the engine, along the axes of the world."""
         if len(self._links) == 1:
-            box: tuple[Vector, Vector] = bullet.getAABB(self._body, -1, self._world)
+            box: tuple[XYZ, XYZ] = bullet.getAABB(self._body, -1, self._world)
             return box
         boxes = [bullet.getAABB(self._body, link, self._world) for link in self._links]
         low, high = (zip(*corners, strict=True) for corners in zip(*boxes, strict=True))
         return tuple(map(min, low)), tuple(map(max, high))
 
-    def put(self, position: Vector, rotation: Rotation, linear: Vector, angular: Vector) -> None:
+    def put(self, position: XYZ, rotation: XYZW, linear: XYZ, angular: XYZ) -> None:
         """Place the root frame in the world, with its velocity and rotation rate there."""
         centre = self._place(position, rotation)
         bullet.resetBaseVelocity(self._body, _at(linear, angular, centre), angular, self._world)
 
-    def _place(self, position: Vector, rotation: Rotation) -> Vector:
+    def _place(self, position: XYZ, rotation: XYZW) -> XYZ:
         """Place the root frame in the world. Returns the offset from it to the centre of mass, in the world."""
         (x, y, z), (cx, cy, cz) = position, rotate(rotation, self._centre)
         axes = multiply(rotation, self._axes) if self._tilted else rotation
         bullet.resetBasePositionAndOrientation(self._body, (x + cx, y + cy, z + cz), axes, self._world)
         return cx, cy, cz
 
-    def cancel_gravity(self, gravity: Vector) -> None:
+    def cancel_gravity(self, gravity: XYZ) -> None:
         """Cancel the world's `gravity` on weightless links for the next step: the engine has no such flag."""
         for link, mass in self.weightless.items():
             if link < 0:
@@ -87,7 +87,7 @@ class Body:
         self.is_removed = True
         self._bodies.remove(self._body)
 
-    def _root(self) -> tuple[Vector, Rotation, Vector]:
+    def _root(self) -> tuple[XYZ, XYZW, XYZ]:
         """The centre of mass, the root frame's rotation, and the offset from the root to the centre, in the world."""
         position, rotation = bullet.getBasePositionAndOrientation(self._body, self._world)
         if self._tilted:
@@ -112,10 +112,10 @@ class Links:
         parent: int,
         shape: int = NOTHING,
         joint: int = bullet.JOINT_FIXED,
-        axis: Vector = (0.0, 0.0, 1.0),
-        at: tuple[Vector, Rotation] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+        axis: XYZ = (0.0, 0.0, 1.0),
+        at: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
         mass: float = 0.0,
-        inertial: tuple[Vector, Rotation] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
+        inertial: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
     ) -> int:
         """One link on link `parent` (-1: the base) with its frame `at` in the parent's. Returns its index."""
         values = (mass, shape, self._visual, *at, *inertial, parent + 1, joint, axis)
@@ -140,7 +140,7 @@ _NAMES = (
 )  # fmt: skip
 
 
-def _at(linear: Vector, angular: Vector, away: Vector) -> Vector:
+def _at(linear: XYZ, angular: XYZ, away: XYZ) -> XYZ:
     """The velocity of a point `away` from one that moves and turns: v + w x r."""
     (vx, vy, vz), (wx, wy, wz), (x, y, z) = linear, angular, away
     return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x

@@ -7,9 +7,9 @@ from typing import Any
 from holozen.robot.model import GRAVITY as GRAVITY_VECTOR
 from holozen.robot.model import Surface
 from holozen.robot.rigid import Part
-from holozen.rotation import conjugate, rotate
+from holozen.rotation import XYZ, conjugate, rotate
 
-from .engine import Vector, bullet
+from .engine import bullet
 
 FRICTION = 1.0  # Gazebo's default for mu and mu2
 DRAG = 0.1  # friction of a caster whose file sets none; with more it chatters and lifts the wheels
@@ -87,7 +87,7 @@ def _carrier(parts: list[Part], part: Part) -> float:
     return carrier.mass if part.joint.kind == "prismatic" else carrier.moment(rotate(part.rotation, part.joint.axis))
 
 
-def _inertia(part: Part, axis: Vector) -> float:
+def _inertia(part: Part, axis: XYZ) -> float:
     """A part's own inertia on its joint: kg, or kg m^2 about its centre of mass; it never is less than that."""
     return part.body.mass if part.joint and part.joint.kind == "prismatic" else part.body.moment(axis)
 

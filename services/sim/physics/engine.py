@@ -7,18 +7,15 @@ from typing import Any
 
 from holozen.process import quiet
 from holozen.robot.rigid import PlacedShape
-from holozen.rotation import multiply, rotate
+from holozen.rotation import XYZ, XYZW, multiply, rotate
 
-__all__ = ["NOTHING", "UPRIGHT", "Bodies", "Rotation", "Shapes", "Vector", "bullet"]
+__all__ = ["NOTHING", "UPRIGHT", "Bodies", "Shapes", "bullet"]
 
-Vector = tuple[float, float, float]
-Rotation = tuple[float, float, float, float]
-
-UPRIGHT: Rotation = (0.0, 0.0, 0.0, 1.0)
+UPRIGHT: XYZW = (0.0, 0.0, 0.0, 1.0)
 MAX_IN_ONE = 16  # pybullet's MAX_COMPOUND_COLLISION_SHAPES; it silently drops the rest
 NOTHING = -1  # pybullet's shape that touches nothing
 MOST_KEPT = 64  # removed bodies; each takes 0.6 us a step
-FAR_AWAY: Vector = (0.0, 0.0, 1e6)
+FAR_AWAY: XYZ = (0.0, 0.0, 1e6)
 ASLEEP, AWAKE = 1 | 8, 2 | 4  # of pybullet's flags: it may sleep, and does; it may not, and is awake
 FREE, FIXED = (1, -1), (2, ~2)  # group, and groups that it touches; the engine's own for bodies and fixed bases
 
@@ -89,8 +86,8 @@ class Bodies:
         self._kept: dict[int, object] = {}  # of those that are not; the first was removed first
 
     def add(
-        self, kind: object, place: tuple[Vector, Rotation], mass: float, shape: int,
-        inertial: tuple[Vector, Rotation] = ((0.0, 0.0, 0.0), UPRIGHT), **arguments: Any,
+        self, kind: object, place: tuple[XYZ, XYZW], mass: float, shape: int,
+        inertial: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), UPRIGHT), **arguments: Any,
     ) -> int:  # fmt: skip
         """A body that stands, its root frame at `place` and its inertial frame at `inertial` in that; the rest are
         arguments of createMultiBody. `kind` equals that of another only if both are made, and have their dynamics set,
@@ -126,7 +123,7 @@ class Bodies:
             del self._kept[oldest]
             bullet.removeBody(oldest, self.world)
 
-    def _place(self, number: int, at: Vector, rotation: Rotation) -> None:
+    def _place(self, number: int, at: XYZ, rotation: XYZW) -> None:
         """Let it stand, its centre of mass at a pose, and its joints at zero."""
         bullet.resetBasePositionAndOrientation(number, at, rotation, self.world)
         bullet.resetBaseVelocity(number, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), self.world)

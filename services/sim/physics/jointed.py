@@ -5,12 +5,12 @@ import math
 from holozen.limits import clamp
 from holozen.robot.model import Force, Joint, Pose, RobotModel
 from holozen.robot.rigid import Frame, Part, in_parts
-from holozen.rotation import multiply, rotate
+from holozen.rotation import XYZ, XYZW, multiply, rotate
 
-from ..command.motion import JointMotion, Push
+from ..command.motion import AppliedForce, JointMotion
 from .body import Body, JointStates, Links
 from .dynamics import damping_of, load_on, set_joint, set_surface
-from .engine import NOTHING, UPRIGHT, Bodies, Rotation, Shapes, Vector, bullet
+from .engine import NOTHING, UPRIGHT, Bodies, Shapes, bullet
 
 JOINTS = {"continuous": bullet.JOINT_REVOLUTE, "revolute": bullet.JOINT_REVOLUTE, "prismatic": bullet.JOINT_PRISMATIC}
 MAX_EFFORT = 1e3  # N m or N, of a joint without an effort limit
@@ -30,8 +30,8 @@ class JointedBody(Body):
         self,
         bodies: Bodies,
         parts: list[Part],
-        at: Vector,
-        rotation: Rotation = UPRIGHT,
+        at: XYZ,
+        rotation: XYZW = UPRIGHT,
         wheels: frozenset[str] = frozenset(),
         static: bool = False,
         omni: bool = False,
@@ -82,7 +82,7 @@ class JointedBody(Body):
         efforts = [self._efforts.get(number, state[3]) for number, state in zip(self._numbers, states, strict=True)]
         return [state[0] for state in states], [state[1] for state in states], efforts
 
-    def wrench(self, part: int, at: Frame, along: bool, force: Vector, torque: Vector) -> None:
+    def wrench(self, part: int, at: Frame, along: bool, force: XYZ, torque: XYZ) -> None:
         """Push with a force (N) and a torque (N m) during the next step, at the point `at` of a part; along the axes of
         that frame, or of the world. `part` is an index of `assemble`.
         """
@@ -261,7 +261,7 @@ class Forces:
         self._turning = frozenset(joint.name for joint in model.joints.values() if joint.kind == "continuous")
         self._rolls: bool | None = None
 
-    def do(self, pushes: list[Push] | None) -> None:
+    def do(self, pushes: list[AppliedForce] | None) -> None:
         """Push during the next step; None: no source drives."""
         rolls = pushes is not None
         if self._brakes and rolls != self._rolls:

@@ -7,11 +7,12 @@ from holozen.limits import Planar, clamp_speed, ramp
 from holozen.robot import model as drives
 from holozen.robot.model import Balancing, Differential, Drive, Mecanum, Omni, RobotModel
 from holozen.robot.rigid import lump
+from holozen.rotation import XYZ, XYZW
 
 from .balance import BalanceMover
 from .body import Body, JointStates, Moved
 from .differential import WheelMover
-from .engine import UPRIGHT, Rotation, Vector
+from .engine import UPRIGHT
 from .jointed import JointedBody
 from .omni import OmniMover, omni_wheels
 from .planar import PlanarMover
@@ -88,7 +89,7 @@ class Limited:
         return self._now
 
 
-def mover_for(world: World, model: RobotModel, at: Vector, rotation: Rotation = UPRIGHT) -> Mover:
+def mover_for(world: World, model: RobotModel, at: XYZ, rotation: XYZW = UPRIGHT) -> Mover:
     """The robot in the world, its root frame at `at`; nothing drives a static one. Raises RobotError if the engine
     cannot simulate it, and then leaves nothing behind.
     """

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from holozen.kinematics import to_body, to_world, travelled
 from holozen.limits import STOP, Planar
 from holozen.robot import rigid
-from holozen.rotation import from_axis_angle, rotate, yaw
+from holozen.rotation import XYZ, XYZW, from_axis_angle, rotate, yaw
 
 from .body import Body, JointStates, Links, Moved
 from .dynamics import GRAVITY
-from .engine import NOTHING, UPRIGHT, Bodies, Rotation, Vector, bullet
+from .engine import NOTHING, UPRIGHT, Bodies, bullet
 from .wheels import MecanumWheels, Wheels
 
 HOLD_GAIN = 0.1  # share of the distance to its place that it recovers in a step
@@ -32,7 +32,7 @@ LANDED = 0.2  # m/s along its upward axis; with more it falls, or jumps
 STEADY = 1e-3  # m/s and rad/s of deviation from the commanded velocity
 
 
-Box = tuple[Vector, Vector]
+Box = tuple[XYZ, XYZ]
 """Its corners."""
 
 
@@ -41,7 +41,7 @@ class Field:
     world has one; `steps` counts those of the world, of `step` seconds. `gravity` is in m/s^2.
     """
 
-    def __init__(self, world: int, step: float, level: int | None, gravity: Vector) -> None:
+    def __init__(self, world: int, step: float, level: int | None, gravity: XYZ) -> None:
         self.world, self.step, self.level, self.gravity = world, step, level, gravity
         self.steps = 0
         self.bodies: dict[int, PlanarBody] = {}
@@ -140,11 +140,11 @@ class Glide:
     """A motion at a constant body-frame velocity over level ground, from a pose of the root frame at time `start`."""
 
     start: float
-    position: Vector
-    rotation: Rotation
+    position: XYZ
+    rotation: XYZW
     velocity: Planar
 
-    def pose(self, time: float) -> tuple[Vector, Rotation]:
+    def pose(self, time: float) -> tuple[XYZ, XYZW]:
         """The pose of the root frame; its height and tilt stay as they are."""
         seconds, (x, y, z), (i, j, k, w) = time - self.start, self.position, self.rotation
         dx, dy = travelled(self.velocity, yaw(self.rotation), seconds)
@@ -161,9 +161,7 @@ class PlanarBody(Body):
     engine's steps and in closed form, until something comes near or it is moved by other than its drive.
     """
 
-    def __init__(
-        self, field: Field, bodies: Bodies, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT
-    ) -> None:
+    def __init__(self, field: Field, bodies: Bodies, body: rigid.Body, at: XYZ, rotation: XYZW = UPRIGHT) -> None:
         world, shapes = field.world, bodies.shapes
         links, (first, *others) = Links(shapes.unseen), shapes.of(body.collisions) or [NOTHING]
         links.carry(-1, others)
@@ -297,11 +295,11 @@ class PlanarBody(Body):
         self._held, self._driven, self._is_blocked = None, None, False
         super().put(position, rotation, linear, angular)
 
-    def pose(self) -> tuple[Vector, Rotation]:
+    def pose(self) -> tuple[XYZ, XYZW]:
         """Position and rotation of the root frame in the world."""
         return self._glide.pose(self._field.time) if self._glide else super().pose()
 
-    def twist(self) -> tuple[Vector, Vector]:
+    def twist(self) -> tuple[XYZ, XYZ]:
         """The root frame's velocity and rotation rate in the world."""
         if not self._glide:
             return super().twist()
@@ -365,7 +363,7 @@ class PlanarBody(Body):
         share = self._push * dt / missing
         return now[0] + (wanted[0] - now[0]) * share, now[1] + (wanted[1] - now[1]) * share
 
-    def put(self, position: Vector, rotation: Rotation, linear: Vector, angular: Vector) -> None:
+    def put(self, position: XYZ, rotation: XYZW, linear: XYZ, angular: XYZ) -> None:
         """Place the root frame in the world, with its velocity and rotation rate there."""
         self.wake()
         self._field.hasten()
@@ -408,13 +406,13 @@ class PlanarBody(Body):
         super().remove()
 
 
-def _axes(rotation: Rotation) -> tuple[Vector, Vector]:
+def _axes(rotation: XYZW) -> tuple[XYZ, XYZ]:
     """The upward axis of a body, and the one that it turns about: the same, unless it lies on its side."""
     up = rotate(rotation, (0.0, 0.0, 1.0))
     return up, up if up[2] > STEEP else (0.0, 0.0, 1.0)
 
 
-def _orbit(axis: Vector, turn: float, centre: Vector, dt: float) -> tuple[float, float]:
+def _orbit(axis: XYZ, turn: float, centre: XYZ, dt: float) -> tuple[float, float]:
     """The horizontal velocity of the centre, away from the root, of a body that turns about `axis`; evaluated at
     mid-step, as the heading, so that it stays on its circle.
     """

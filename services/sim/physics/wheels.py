@@ -12,8 +12,9 @@ from holozen.robot.gazebo_plugins import ROUND, radius_across
 from holozen.robot.model import HERE, Mecanum, RobotModel, Shape
 from holozen.robot.rigid import Axis, Part, PlacedShape, joint_axes
 from holozen.robot.rotation import quaternion_of, triple
+from holozen.rotation import XYZ, XYZW
 
-from .engine import UPRIGHT, Rotation, Vector
+from .engine import UPRIGHT
 
 FLAT = 0.1  # sine of the axle's angle to the ground; a steeper joint is not a wheel
 
@@ -63,7 +64,7 @@ class Odometer:
         self._x = self._y = self._yaw = 0.0
         self._seen = STOP
 
-    def update(self, rolled: Planar) -> tuple[Vector, Rotation]:
+    def update(self, rolled: Planar) -> tuple[XYZ, XYZW]:
         """The pose after the wheels have rolled, in total: forward and left (m), counter-clockwise (rad)."""
         x, y, turn = (now - before for now, before in zip(rolled, self._seen, strict=True))
         self._seen = rolled

@@ -10,10 +10,11 @@ from typing import TypeVar
 from holozen.kinematics import Wheel
 from holozen.robot import rigid
 from holozen.robot.model import RobotModel, WorldSpec
+from holozen.rotation import XYZ, XYZW
 
 from .body import Body
 from .dynamics import FRICTION
-from .engine import UPRIGHT, Bodies, Rotation, Vector, bullet
+from .engine import UPRIGHT, Bodies, bullet
 from .jointed import JointedBody
 from .planar import Field, PlanarBody
 from .wheels import on_spheres
@@ -86,15 +87,15 @@ class World:
             bullet.stepSimulation(self.id)
         self._field.stepped()
 
-    def add(self, body: rigid.Body, at: Vector, rotation: Rotation = UPRIGHT) -> PlanarBody:
+    def add(self, body: rigid.Body, at: XYZ, rotation: XYZW = UPRIGHT) -> PlanarBody:
         """Add a planar base, its root frame at `at`."""
         return self._added(PlanarBody(self._field, self._bodies, body, at, rotation))
 
     def add_jointed(
         self,
         model: RobotModel,
-        at: Vector,
-        rotation: Rotation = UPRIGHT,
+        at: XYZ,
+        rotation: XYZW = UPRIGHT,
         wheels: frozenset[str] = frozenset(),
         omni: Sequence[Wheel] = (),
     ) -> JointedBody:
@@ -130,7 +131,7 @@ class World:
         shapes = bullet.getCollisionShapeData(number, -1, physicsClientId=self.id)
         return any(shape[2] == bullet.GEOM_PLANE for shape in shapes)
 
-    def free_place(self, body: Body) -> Vector | None:
+    def free_place(self, body: Body) -> XYZ | None:
         """The nearest free position of its root frame on a grid around `body`, which is moved there; None if all are
         taken.
         """
@@ -145,7 +146,7 @@ class World:
                 return place
         return None
 
-    def put(self, body: Body, place: tuple[Vector, Rotation], linear: Vector, angular: Vector) -> None:
+    def put(self, body: Body, place: tuple[XYZ, XYZW], linear: XYZ, angular: XYZ) -> None:
         """Place the root frame of a body in the world, with its velocity and rotation rate there."""
         body.put(*place, linear, angular)
         self._field.hasten()

@@ -116,9 +116,9 @@ DEADMAN = BTN_TL
 PRESSES = {BTN_START: "resume", BTN_DPAD_UP: "faster", BTN_DPAD_DOWN: "slower"}
 DEAD_ZONE = 0.15  # of a stick's travel, since worn sticks do not rest at zero
 
-Motion = tuple[float, float, float]
+Deflection = tuple[float, float, float]
 """Forward, left, counter-clockwise: each -1..1, the first two together at most 1 long."""
-REST: Motion = (0.0, 0.0, 0.0)
+REST: Deflection = (0.0, 0.0, 0.0)
 
 
 class Gamepad:
@@ -159,7 +159,7 @@ class Gamepad:
         return self._pressed(code, value) if kind == EV_KEY else ""
 
     @property
-    def direction(self) -> Motion:
+    def direction(self) -> Deflection:
         """The commanded direction."""
         if not self._held:
             return REST
@@ -255,7 +255,7 @@ class Joystick:
         return self._device.fileno()
 
     @property
-    def direction(self) -> Motion:
+    def direction(self) -> Deflection:
         """Forward, left, counter-clockwise, each -1..1, as of the last `read`; zeros unless the dead-man is held."""
         return self._pad.direction
 

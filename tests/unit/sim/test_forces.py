@@ -14,7 +14,7 @@ from holozen.robot.rotation import matrix_of
 from holozen.rotation import from_rpy
 from services.sim.command.arbiter import Arbiter
 from services.sim.command.inputs import CommandStats, ForceInput
-from services.sim.command.motion import Push
+from services.sim.command.motion import AppliedForce
 from services.sim.physics.jointed import Forces, Motors
 from services.sim.physics.world import World
 from tests.unit.sim.fakes import FakeSenders, received
@@ -45,7 +45,7 @@ def test_a_wrench_moves_a_free_body_by_newton_and_euler(space: World, frame: str
     )
     body = space.add_jointed(model, (0, 0, 0), from_rpy(*TILT))
     force, torque = np.array([1.0, 2.0, -3.0]), np.array([-0.5, 0.2, 0.4])
-    Forces(body, {"k": list(model.forces)}, model, None).do([Push("k", (*force, *torque), 0.0)])
+    Forces(body, {"k": list(model.forces)}, model, None).do([AppliedForce("k", (*force, *torque), 0.0)])
     space.step()
     base = matrix_of(TILT)
     axes = np.eye(3) if frame == "world" else base @ (matrix_of(HAND) if link == "hand" else np.eye(3))
@@ -60,7 +60,7 @@ def test_a_wrench_moves_a_free_body_by_newton_and_euler(space: World, frame: str
 def test_a_torque_on_a_wheel_turns_it_against_its_base(space: World) -> None:
     model = parse(f"{TOP}{WHEEL}{plugin('<link_name>wheel</link_name>')}</robot>", TOP_FILE)
     body = space.add_jointed(model, (0, 0, 0))
-    Forces(body, {"k": list(model.forces)}, model, None).do([Push("k", (0, 0, 0, 0, 1.0, 0), 0.0)])
+    Forces(body, {"k": list(model.forces)}, model, None).do([AppliedForce("k", (0, 0, 0, 0, 1.0, 0), 0.0)])
     space.step()
     _, (rate,), _ = body.states()
     assert rate == pytest.approx(1 / 0.2 * space.spec.step, rel=1e-3)
@@ -73,17 +73,17 @@ def test_without_a_source_its_wheels_brake_and_with_one_they_turn_freely(space: 
     motors = Motors(body, frozenset(body.names))
     drive = Forces(body, {"k": list(model.forces)}, model, motors)
 
-    def rate(pushes: list[Push] | None, steps: int = 60) -> float:
+    def rate(pushes: list[AppliedForce] | None, steps: int = 60) -> float:
         for _ in range(steps):
             drive.do(pushes)
             motors.do(None)
             space.step()
         return body.states()[1][0]
 
-    assert rate([Push("k", (0, 0, 0, 0, 0.2, 0), 0.0)]) == pytest.approx(0.25, rel=1e-2)
+    assert rate([AppliedForce("k", (0, 0, 0, 0, 0.2, 0), 0.0)]) == pytest.approx(0.25, rel=1e-2)
     assert rate([]) == pytest.approx(0.25, rel=1e-2), "zero is no brake"
     assert rate(None) == pytest.approx(0, abs=1e-6)
-    assert rate([Push("k", (0, 0, 0, 0, 0.2, 0), 0.0)]) == pytest.approx(0.25, rel=1e-2)
+    assert rate([AppliedForce("k", (0, 0, 0, 0, 0.2, 0), 0.0)]) == pytest.approx(0.25, rel=1e-2)
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.sim.command.arbiter import MAX_SOURCES, SoftwareStop
+from services.sim.command.arbiter import MAX_PER_RANK, SoftwareStop
 
 RANK, PERSON = 4, 1
 STOPPED = "stopped: by ann@1; `holozen release` lets it drive again"
@@ -134,10 +134,10 @@ def test_the_robot_that_takes_its_place_is_stopped_as_well(stop: SoftwareStop) -
 
 def test_a_flood_of_names_lets_no_one_of_its_rank_through_and_delays_no_one_of_another(stop: SoftwareStop) -> None:
     set_at(stop, 1.0)
-    for number in range(MAX_SOURCES + 10):
+    for number in range(MAX_PER_RANK + 10):
         stop.refusal(f"script {number}", RANK, False, 2.0)
     stop.release()
-    for number in (0, MAX_SOURCES + 5):
+    for number in (0, MAX_PER_RANK + 5):
         assert stop.refusal(f"script {number}", RANK, False, 2.3) == LET_GO
     assert stop.refusal("a fresh script", RANK, False, 2.3) == LET_GO
     assert stop.refusal("teleop", PERSON, False, 2.3) == ""

@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.sim.command.inputs import MAX_SOURCES, RECENT, SourceRates
+from services.sim.command.inputs import MAX_RATES, RECENT, SourceRates
 
 
 @pytest.fixture
@@ -50,4 +50,4 @@ def test_the_strongest_come_first(rates: SourceRates) -> None:
 def test_a_flood_of_names_leaves_the_newest(rates: SourceRates) -> None:
     for number in range(1000):
         rates.record(f"n{number}", 4, number * 1e-3)
-    assert {source for source, *_ in rates.recent(1.0)} == {f"n{number}" for number in range(1000 - MAX_SOURCES, 1000)}
+    assert {source for source, *_ in rates.recent(1.0)} == {f"n{number}" for number in range(1000 - MAX_RATES, 1000)}

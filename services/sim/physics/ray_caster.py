@@ -38,7 +38,7 @@ class Placed(Protocol):
         ...
 
 
-class Sight:
+class RayCaster:
     """The shapes, by the name of their entity. `ground`: a level plane at z = 0."""
 
     def __init__(self, ground: bool) -> None:

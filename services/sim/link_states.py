@@ -9,7 +9,7 @@ from holozen.robot.rigid import Frame, moved_by
 from holozen.rotation import XYZ, XYZW, multiply, rotate
 
 
-class Motion(NamedTuple):
+class LinkState(NamedTuple):
     """A frame in the world: position (m), rotation, velocity (m/s) and rotation rate (rad/s)."""
 
     xyz: XYZ
@@ -17,14 +17,14 @@ class Motion(NamedTuple):
     linear: XYZ = (0.0, 0.0, 0.0)
     angular: XYZ = (0.0, 0.0, 0.0)
 
-    def at(self, xyz: XYZ, rotation: XYZW) -> "Motion":
+    def at(self, xyz: XYZ, rotation: XYZW) -> "LinkState":
         """The motion of a frame that is fixed in this one."""
         (x, y, z), (a, b, c), (u, v, w) = self.xyz, rotate(self.rotation, xyz), self.angular
         along = (self.linear[0] + v * c - w * b, self.linear[1] + w * a - u * c, self.linear[2] + u * b - v * a)
-        return Motion((x + a, y + b, z + c), multiply(self.rotation, rotation), along, self.angular)
+        return LinkState((x + a, y + b, z + c), multiply(self.rotation, rotation), along, self.angular)
 
 
-class Posture:
+class LinkTree:
     """The links of a model, every parent before its children."""
 
     def __init__(self, model: RobotModel) -> None:
@@ -35,9 +35,9 @@ class Posture:
             frame = Frame.of(above[name].pose)
             self._joints.append((above[name], frame.xyz, frame.quaternion))
 
-    def motions(
-        self, root: Motion, positions: Mapping[str, float] = {}, rates: Mapping[str, float] = {}
-    ) -> dict[str, Motion]:
+    def states(
+        self, root: LinkState, positions: Mapping[str, float] = {}, rates: Mapping[str, float] = {}
+    ) -> dict[str, LinkState]:
         """Each link's, from those of the root and of the joints (rad or m; per s); a joint that is not given is at
         zero, and still.
         """
@@ -55,9 +55,9 @@ class Posture:
 
 
 @lru_cache(64)
-def posture_of(model: RobotModel) -> Posture:
-    """The posture of a model, which its copies share."""
-    return Posture(model)
+def link_tree(model: RobotModel) -> LinkTree:
+    """The links of a model, which its copies share."""
+    return LinkTree(model)
 
 
 def placed(pose: Pose) -> tuple[XYZ, XYZW]:
