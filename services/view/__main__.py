@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .guard import Guard
 
 PORT = 8080
+NO_TOKEN = "none"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -40,7 +41,7 @@ def parser() -> argparse.ArgumentParser:
     add("--port", type=flags.count(), default=PORT, metavar="N", help="0: a free one (default: %(default)s)")
     add("--token", type=_word, metavar="WORD",
         help="the token of the page's address (default: a random one with --private, --secure or a --host beyond this "
-        "machine, else none)")  # fmt: skip
+        "machine, else none); none: no token, where all who reach the port may drive")  # fmt: skip
     add("--look-only", action="store_true", help="a page that drives, adds and deletes nothing")
     connection.add_arguments(parser)
     return parser
@@ -49,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
 def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
     where = connection.from_arguments(args)
-    token = args.token or random_token(args.host, where)
+    token = random_token(args.host, where) if args.token is None else "" if args.token == NO_TOKEN else args.token
     stop = stop_event()
     try:
         _check_port(args.host, args.port)
@@ -92,6 +93,10 @@ def _addresses(args: argparse.Namespace, port: int, token: str) -> Iterator[str]
     host = f"[{args.host}]" if ":" in args.host else args.host
     if not is_loopback(args.host):
         may = "see" if args.look_only else "see and drive"
+        if not token:
+            yield f"port {port} of {args.host} has no token: anyone who reaches it may {may} the robots"
+            yield f"http://127.0.0.1:{port}/"
+            return
         yield f"port {port} of {args.host} is open to the network; anyone with this address may {may} the robots:"
         host = host if args.host not in ("0.0.0.0", "::") else socket.gethostname()
     yield f"http://{host}:{port}/{token and f'?token={token}'}"

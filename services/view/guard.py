@@ -24,6 +24,11 @@ from websockets.http11 import Request, Response
 
 PING_EVERY = 0.05  # s
 MAX_AGE = 0.3  # s; a held button that may be older moves nothing
+LET_GO = b"""<script>
+addEventListener("blur", () => document.querySelectorAll("button").forEach(
+  button => button.dispatchEvent(new PointerEvent("pointercancel", {bubbles: true}))))
+</script>"""
+"""Lets go of held buttons when another window comes to the front; viser's page would go on holding them."""
 MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage")  # in viser's messages that may move a robot
 
 
@@ -64,8 +69,14 @@ class Guard:
         def check(connection: Any, request: Request) -> Response | None:
             if reason := self.refusal(request):
                 return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")  # type: ignore[no-any-return]
+            if "Accept-Encoding" in request.headers:
+                del request.headers["Accept-Encoding"]  # viser's page is compressed in itself, and LET_GO goes into it
             response: Response | None = process_request(connection, request)
             if response is not None:
+                if b"</head>" in response.body:
+                    response.body = response.body.replace(b"</head>", LET_GO + b"</head>", 1)
+                    del response.headers["Content-Length"]
+                    response.headers["Content-Length"] = str(len(response.body))
                 response.headers["Referrer-Policy"] = "no-referrer"
                 response.headers["X-Frame-Options"] = "DENY"
                 if self._token:  # for the web socket, whose address the page makes without it

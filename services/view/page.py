@@ -36,7 +36,6 @@ class Page:
         self, client: viser.ClientHandle, bus: Bus, scene: Scene, drivers: Drivers, guard: Guard, look_only: bool
     ) -> None:
         self._client, self._bus, self._scene, self._drivers, self._guard = client, bus, scene, drivers, guard
-        self._names: list[str] = []
         self.robot = ""  # the one that is chosen
         self._said = self._shown = ""
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
@@ -55,13 +54,13 @@ class Page:
 
     def update(self, now: float) -> None:
         """Show the robots that there are, and what the chosen one does. `now` in s (monotonic)."""
+        # Once one is chosen, only a person chooses another; one that is gone stays chosen, and may come back.
         names = self._scene.robots()
-        if names != self._names:
-            self._names = names
-            self._choice.options = tuple(names) or (NONE,)
-            if self.robot not in names:
-                self._choice.value = names[0] if names else NONE  # type: ignore[misc]
-            self._choose()
+        self.robot = self.robot or next(iter(names), "")
+        options = tuple(sorted({*names, self.robot} - {""})) or (NONE,)
+        if options != self._choice.options:
+            self._choice.options = options
+            self._choice.value = self.robot or NONE  # type: ignore[misc]
         self._replace_buttons()
         self._move_camera()
         if self._world:
@@ -73,7 +72,8 @@ class Page:
     def _text(self, now: float) -> str:
         driver = self.driver
         if driver is None:
-            return "no robot is there; `holozen up` starts one"
+            others = self._scene.robots()
+            return f"{self.robot} is gone; choose another" if others else "no robot is there; `holozen up` starts one"
         status, speed = driver.status(), driver.measured()
         lines = [f"{math.hypot(*speed[:2]):.2f} m/s, {speed[2]:+.2f} rad/s" if speed else "no odometry"]
         if status.stopped:
@@ -97,9 +97,9 @@ class Page:
         return self._scene.shown.get(self.robot)
 
     def _choose(self) -> None:
-        before, self.robot = self.robot, str(self._choice.value)
-        if before != self.robot:
-            self._said, self._followed = "", None
+        before, chosen = self.robot, str(self._choice.value)
+        if chosen not in (before, NONE):
+            self.robot, self._said, self._followed = chosen, "", None
 
     def _add_pad(self) -> None:
         add = self._client.gui

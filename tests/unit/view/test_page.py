@@ -89,15 +89,28 @@ class Buttons:
         asyncio.run(self.made["Forward"][-1].on_hold.call_args.args[0](None))
 
 
+def test_a_page_chooses_the_first_robot_and_after_that_only_a_person_does() -> None:
+    it = Buttons()
+    it.choose("b")
+    del it.robots.shown["b"]
+    it.page.update(0.0)
+    assert it.page.robot == "b"
+    assert it.page.driver is None
+    assert "b is gone; choose another" in it.client.gui.add_markdown.return_value.content
+    it.robots.add("b", 3)
+    it.page.update(0.0)
+    assert it.page.driver is it.robots.drivers["b"], "it came back"
+
+
 @pytest.mark.parametrize("change", ["deleted", "chosen", "replaced", "not there at first"])
 def test_a_held_button_drives_the_robot_that_it_was_pressed_for_and_no_other(change: str) -> None:
     it = Buttons()
-    robots, now = it.robots, "a" if change == "replaced" else "b"
+    robots, now = it.robots, "b" if change in ("deleted", "chosen") else "a"
     if change == "not there at first":
         robots.shown.clear()
         it.page.update(0.0)
         it.hold()
-        robots.add("b", 2)
+        robots.add("a", 3)
     else:
         it.hold()
         assert robots.motion("a") == FORWARD
@@ -114,5 +127,9 @@ def test_a_held_button_drives_the_robot_that_it_was_pressed_for_and_no_other(cha
     it.hold()
     assert robots.motion("b") is None
     assert robots.motion("a") in (None, STOP), "the one that it was pressed for stands"
+    if change == "deleted":
+        it.press_anew()
+        assert robots.motion("b") is None, "nobody has chosen it"
+        it.choose("b")
     it.press_anew()
     assert robots.motion(now) == FORWARD, "pressed again, it drives the one that is chosen now"
