@@ -7,7 +7,7 @@ import json
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
 
@@ -61,12 +61,14 @@ def plot(args: argparse.Namespace) -> int:
 
 
 class Lines:
-    """The points of each field, as they arrive."""
+    """The points of each field, as they arrive: the time by `clock`, and the value."""
 
-    def __init__(self, bus: Bus, fields: list[Field], reader: Reader) -> None:
+    def __init__(
+        self, bus: Bus, fields: list[Field], reader: Reader, clock: Callable[[], float] = time.monotonic
+    ) -> None:
         self.points: dict[str, deque[tuple[float, float]]] = {name: deque(maxlen=MOST) for name, _, _ in fields}
         self.bad = 0  # messages that could not be decoded
-        self._fields, self._bus, self._reader = fields, bus, reader
+        self._fields, self._bus, self._reader, self._clock = fields, bus, reader, clock
         self._taps: dict[str, RawSubscriber] = {}
         for key in dict.fromkeys(key for _, key, _ in fields):
             self._taps[key] = bus.subscribe_raw(key)
@@ -92,8 +94,13 @@ class Lines:
                     row[name] = _number(pick(value, place))
                 except LookupError as error:
                     raise LookupError(f"{name}: {error.args[0]}") from None
-                self.points[name].append((time.monotonic(), row[name]))
+                self.points[name].append((self._clock(), row[name]))
         return row
+
+    def close(self) -> None:
+        """Stop listening."""
+        for tap in self._taps.values():
+            tap.close()
 
 
 def _number(value: Any) -> float:

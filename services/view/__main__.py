@@ -151,7 +151,8 @@ def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", look_only: bool
 
     async def closed(client: "viser.ClientHandle") -> None:
         drivers.close(client.client_id)
-        pages.pop(client.client_id, None)
+        if page := pages.pop(client.client_id, None):
+            page.close()
 
     async def draw(now: float, news: News) -> None:
         scene.draw(now, news, {page.robot: driver for page in pages.values() if (driver := page.driver)})

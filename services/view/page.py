@@ -13,9 +13,11 @@ from holozen.robot.errors import RobotError
 from holozen.transport.errors import BusError, ServiceError
 from holozen.wire import key_for
 
+from .displays import Displays
 from .drive import SPEED, TURN, Driver, Drivers
 from .guard import Guard
 from .pad import DIRECTIONS
+from .plots import Plots
 from .scene import FRAME, LOOK_AT, Scene, Shown
 from .world import WorldTab
 
@@ -51,6 +53,8 @@ class Page:
             self._add_camera()
         else:
             self._add_pad()
+        self._displays = Displays(client, bus, scene, self._shown_robot)
+        self._plots = Plots(client, bus, scene)
 
     def update(self, now: float) -> None:
         """Show the robots that there are, and what the chosen one does. `now` in s (monotonic)."""
@@ -65,9 +69,16 @@ class Page:
         self._move_camera()
         if self._world:
             self._world.update()
+        self._displays.update()
+        self._plots.update()
         text = self._text(now)
         if text != self._shown:
             self._shown = self._status.content = text
+
+    def close(self) -> None:
+        """Stop listening: the page is gone."""
+        self._displays.close()
+        self._plots.close()
 
     def _text(self, now: float) -> str:
         driver = self.driver

@@ -87,7 +87,7 @@ class Shown:
         there = Transform.of(pose.position, pose.orientation)
         at = (*there.translation, *there.rotation)
         if not self._at or max(abs(a - b) for a, b in zip(at, self._at, strict=True)) > SEEN:
-            self._at, self._frame.position, self._frame.wxyz = at, there.translation, _wxyz(there.rotation)
+            self._at, self._frame.position, self._frame.wxyz = at, there.translation, wxyz(there.rotation)
 
     def turn(self, joints: list[float]) -> None:
         """Move its joints to these positions, in rad or m."""
@@ -121,7 +121,7 @@ class Shown:
             joint = joint_of.get(name)
             paths[name] = f"{paths[joint.parent] if joint else self.root}/{numbers[name]}"
             at, turned = (joint.pose.xyz, from_rpy(*joint.pose.rpy)) if joint else ((0.0, 0.0, 0.0), from_rpy(0, 0, 0))
-            frame = self._server.scene.add_frame(paths[name], show_axes=False, position=at, wxyz=_wxyz(turned))
+            frame = self._server.scene.add_frame(paths[name], show_axes=False, position=at, wxyz=wxyz(turned))
             if joint and joint.kind in JOINTS:
                 self._joints[joint.name] = joint, frame, turned
             self._add_parts(paths[name], parts[numbers[name]])
@@ -132,7 +132,7 @@ class Shown:
             mesh = self._server.scene.add_mesh_simple(
                 f"{path}/part{number}", part.vertices, part.faces, color=part.color,
                 opacity=part.opacity if part.opacity < 1 else None, flat_shading=True, side="double",
-                position=pose.xyz, wxyz=_wxyz(from_rpy(*pose.rpy)),
+                position=pose.xyz, wxyz=wxyz(from_rpy(*pose.rpy)),
             )  # fmt: skip
             self._meshes.append((mesh, part.color))
 
@@ -147,7 +147,7 @@ class Shown:
         if joint.kind == "prismatic":
             frame.position = at
         else:
-            frame.wxyz = _wxyz(rotation)
+            frame.wxyz = wxyz(rotation)
 
     def _age(self, seconds: int) -> None:
         """Grey it after so many seconds without news; 0: it is current."""
@@ -176,6 +176,7 @@ class Scene:
         self._server, self._bus, self._graph = server, bus, bus.graph()
         self._ends: list[Endpoint] = []
         self._changes = -1  # of the graph, at the last look
+        self.topics: dict[str, str] = {}  # the type of each key that is published, by the graph
         self.shown: dict[str, Shown] = {}
         self._tracks: dict[tuple[str, int], Track] = {}  # by name and number of an entity
         self._times: deque[float] = deque(maxlen=round(1 / FRAME))
@@ -250,6 +251,9 @@ class Scene:
         self._graph.left()
         if self._graph.changes != self._changes:
             self._changes, self._ends = self._graph.changes, self._graph.endpoints()
+            topics = {end.key: end.type for end in sorted(self._ends) if end.kind == "pub" and "*" not in end.key}
+            if topics != self.topics:
+                self.topics = topics
         sims = {end.session for end in self._ends if end.kind == "srv" and end.key == "get_scene"}
         known = {entity.odometry for entity in entities}
         keys = [
@@ -305,6 +309,6 @@ def _without_sim(key: str) -> SceneEntity:
     return SceneEntity(place.replace("/", "_") or "robot", command=key_for("cmd_vel", place), odometry=key)
 
 
-def _wxyz(q: XYZW) -> tuple[float, float, float, float]:
+def wxyz(q: XYZW) -> tuple[float, float, float, float]:
     """viser's order of a quaternion."""
     return q[3], q[0], q[1], q[2]

@@ -3,25 +3,42 @@
 import io
 import math
 from collections.abc import Callable, Iterator
+from itertools import count
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from PIL import Image
+from PIL import Image as Picture
 from playwright.sync_api import Browser, Page
 
 from holozen import entities
 from holozen.bus import Bus
-from holozen.messages import Odometry, Point, Pose, SimulationStatus
+from holozen.messages import (
+    Header,
+    Image,
+    LaserScan,
+    Odometry,
+    Point,
+    Pose,
+    Range,
+    SimulationStatus,
+    TFMessage,
+    TransformStamped,
+    Vector3,
+)
+from holozen.messages import Transform as TransformMessage
 from holozen.messages.simulation_interfaces import (
     EntityState,
     SetEntityStateReply,
     SetEntityStateRequest,
     SimulationState,
 )
+from holozen.rotation import Transform, yaw
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 from services.view.scene import EYE, FIELD, LOOK_AT
+from tests.faults.proxy import Proxy
 
 from .conftest import TOKEN
 
@@ -64,17 +81,17 @@ def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
     """Opens pages, as a phone or not, once they show a robot. None fetches anything from elsewhere, or has an error."""
     faults: list[str] = []
     contexts = []
-    own = view.partition("?")[0]
-    own_socket = own.replace("http", "ws", 1)
 
-    def page(**options: Any) -> Page:
+    def page(address: str = view, **options: Any) -> Page:
+        own = address.partition("?")[0]
+        own_socket = own.replace("http", "ws", 1)
         contexts.append(context := chromium.new_context(**{"viewport": SIZE, **options}))
         page = context.new_page()
         page.on("console", lambda reported: faults.append(reported.text) if reported.type == "error" else None)
         page.on("pageerror", lambda error: faults.append(str(error)))
         page.on("request", lambda sent: None if own in sent.url else faults.append(sent.url))
         page.on("websocket", lambda made: None if made.url.startswith(own_socket) else faults.append(made.url))
-        page.goto(view)
+        page.goto(address)
         notice = page.get_by_text("Software WebGL")  # it would cover the pad
         notice.locator("xpath=../..").get_by_role("button").click()
         page.get_by_text("not driven").or_(page.get_by_text("driven by")).first.wait_for()
@@ -118,7 +135,7 @@ def pixel(x: float, y: float, z: float) -> tuple[float, float]:
 
 def colored(page: Page, color: Callable[[Any, Any, Any], Any]) -> list[tuple[int, int]]:
     """The pixels x, y of a colour."""
-    picture = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
+    picture = Picture.open(io.BytesIO(page.screenshot())).convert("RGB")
     red, green, blue = np.asarray(picture, float).transpose(2, 0, 1)
     rows, columns = np.nonzero(color(red, green, blue) & FREE)
     return list(zip(columns.tolist(), rows.tolist(), strict=True))
@@ -187,6 +204,31 @@ def test_the_robot_is_where_its_odometry_places_it_in_its_colours_and_moves_when
 def measured(red: Any, green: Any, blue: Any) -> Any:
     """The arrow of the velocity by odometry."""
     return (green - red > 60) & (green - blue > 60)
+
+
+def test_another_window_in_front_ends_a_held_button(page: Page, odom: Latest[Odometry]) -> None:
+    hold(page, "Forward", lambda: speed(odom) > 0.4)
+    # A headless browser has no other windows: this is what it reports when one comes to the front.
+    page.evaluate("window.dispatchEvent(new Event('blur'))")
+    stands_near(odom, place(odom))
+    seen = odom.count
+    assert odom.wait(seen + 25, 5) and speed(odom) < 0.01, "half a second later, with the button still held"
+    page.mouse.up()
+
+
+def test_a_lost_network_stops_the_robot_and_a_button_that_was_held_does_not_go_on(
+    opened: Open, view: str, odom: Latest[Odometry]
+) -> None:
+    with Proxy(urlsplit(view).port or 0) as link:
+        page = opened(f"http://127.0.0.1:{link.port}/?token={TOKEN}", device_scale_factor=COARSE)
+        hold(page, "Backward", lambda: speed(odom) > 0.4)
+        link.stall()
+        stands_near(odom, place(odom))
+        link.resume()
+        page.get_by_text("not driven").wait_for()
+        seen = odom.count
+        assert odom.wait(seen + 25, 5) and speed(odom) < 0.01, "what was held back moves nothing"
+        page.close()
 
 
 def test_a_page_that_hung_stops_the_robot_and_does_not_go_on_by_itself(page: Page, odom: Latest[Odometry]) -> None:
@@ -261,6 +303,74 @@ def test_stop_counts_while_a_button_of_the_same_page_is_held(page: Page, odom: L
         page.mouse.up()
         page.get_by_role("button", name="Release", exact=True).click()
         page.get_by_text("not driven").wait_for()
+
+
+def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
+    page.get_by_text("Displays", exact=True).click()
+    scans, frames = bus.publisher("scan", LaserScan), bus.publisher("tf", TFMessage)
+    images = bus.publisher("eye", Image)
+    for name in ("LaserScan: scan", "Image: eye"):
+        page.get_by_text(name, exact=True).click()
+    x, y = place(odom)
+    message = odom.read()[0]
+    assert message is not None
+    turned = yaw(Transform.of(Point(), message.pose.pose.orientation).rotation)
+
+    def shown() -> bool:
+        at = TransformMessage(Vector3(0.0, 0.0, 0.1))
+        frames.put(TFMessage([TransformStamped(Header(frame_id=message.child_frame_id), "laser", at)]))
+        hits = {
+            "angle_min": -turned - math.pi / 2 - 0.05,
+            "angle_increment": 0.01,
+            "range_max": 5.0,
+            "ranges": [0.8] * 11,
+        }
+        scans.put(LaserScan(Header(frame_id="laser"), **hits))
+        images.put(Image(height=2, width=2, encoding="rgb8", step=6, data=[0, 0, 255] * 4))
+        found = colored(page, lambda r, g, b: (r > 180) & (g < 60) & (b < 60))
+        return bool(found) and math.dist(np.mean(found, axis=0), pixel(x, y - 0.8, 0.1)) < NEAR
+
+    wait_for(shown, 20, "the wall that the scan hit")
+    page.locator("img[src^=blob]").wait_for()
+    for name in ("LaserScan: scan", "Image: eye"):
+        page.get_by_text(name, exact=True).click()
+    wait_for(lambda: not colored(page, lambda r, g, b: (r > 180) & (g < 60) & (b < 60)), what="no scan")
+    before = len(axes(page))
+    page.get_by_text("TF", exact=True).click()
+    wait_for(lambda: len(axes(page)) > before + 20, what="the axes of the frames")
+    page.get_by_text("TF", exact=True).click()
+    wait_for(lambda: len(axes(page)) < before + 10, what="no axes")
+    page.get_by_text("Displays", exact=True).click()
+
+
+def axes(page: Page) -> list[tuple[int, int]]:
+    """The pixels of axes that point up."""
+    return colored(page, lambda r, g, b: (b > 130) & (r < 90) & (g < 90))
+
+
+def test_a_number_of_a_topic_is_plotted_until_it_is_paused(page: Page, bus: Bus) -> None:
+    numbers = bus.publisher("level", Range)
+    sent = count(1)
+    page.get_by_text("Plots", exact=True).click()
+    choose(page, "Topic", "level")
+    offered = page.get_by_text("Field", exact=True).locator("xpath=following::input[1]")
+
+    def plotted() -> Any:
+        numbers.put(Range(range=next(sent)))
+        charts = "Object.values(window.__viserTestpoints?.uplots ?? {})"
+        return page.evaluate(f"{charts}.map(one => Array.from(one.chart.data[1]))")
+
+    wait_for(lambda: (plotted(), offered.input_value() != "(none)")[1], what="the fields of a message")
+    choose(page, "Field", "range")
+    page.get_by_role("button", name="Plot it").click()
+    wait_for(lambda: len((plotted() or [[]])[0]) > 5, what="a plot")
+    (line,) = plotted()
+    assert line == sorted(line)
+    page.get_by_text("Pause plots").click()
+    wait_for(lambda: plotted() == plotted(), what="a plot that stands still")
+    page.get_by_role("button", name="Remove").click()
+    wait_for(lambda: plotted() == [], what="no plot")
+    page.get_by_text("Plots", exact=True).click()
 
 
 def test_what_is_spawned_and_deleted_by_its_buttons_comes_and_goes(page: Page, bus: Bus) -> None:

@@ -15,18 +15,19 @@ from holozen.testing.wire import free_port
 from holozen.transport.connection import Connection
 
 ROOT = Path(__file__).resolve().parents[2]
-SERVICES = ("router", "sim", "pose_service", "controller")
+SERVICES = ("router", "sim", "pose_service", "controller", "view")
 
 
 class Stack:
-    """Containers and a network called `name`, the router on `port` of this machine's loopback. `files` are compose
-    files besides docker-compose.yml, `env` what they need.
+    """Containers and a network called `name`, the router on `port` of this machine's loopback and the view's page on
+    `page`. `files` are compose files besides docker-compose.yml, `env` what they need, `services` what they start.
     """
 
-    def __init__(self, image: str, *files: str, **env: str) -> None:
+    def __init__(self, image: str, *files: str, services: tuple[str, ...] = SERVICES, **env: str) -> None:
         self._files = [word for file in ("docker-compose.yml", *files) for word in ("-f", str(ROOT / file))]
-        self.name, self.port = f"holozen-test-{uuid4().hex[:8]}", free_port()
-        self.env = {"HOLOZEN_IMAGE": image, "HOLOZEN_PORT": str(self.port), **env}
+        self.name, self.port, self.page = f"holozen-test-{uuid4().hex[:8]}", free_port(), free_port()
+        self.env = {"HOLOZEN_IMAGE": image, "HOLOZEN_PORT": str(self.port), "HOLOZEN_VIEW_PORT": str(self.page), **env}
+        self.services = services
         self.connection = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.port}",))
 
     def words(self, *words: str) -> list[str]:
@@ -74,14 +75,14 @@ class Stack:
         return found
 
     def healths(self) -> dict[str, str]:
-        return {service: self.inspect(service)["State"]["Health"]["Status"] for service in SERVICES}
+        return {service: self.inspect(service)["State"]["Health"]["Status"] for service in self.services}
 
     def starts(self, *services: str) -> dict[str, str]:
         """When each of these started, so that a restart is seen."""
         return {service: self.inspect(service)["State"]["StartedAt"] for service in services}
 
     def logs(self, *services: str) -> str:
-        return "\n".join(docker("logs", self.container(service)) for service in services or SERVICES)
+        return "\n".join(docker("logs", self.container(service)) for service in services or self.services)
 
     def complaints(self) -> list[str]:
         """Lines of the logs that should not be there."""

@@ -3,8 +3,12 @@
 import json
 import sys
 from typing import Any
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
 
 import pytest
+import viser
+from websockets.sync.client import connect
 
 from holozen.testing import Terminal, wait_for
 
@@ -37,17 +41,32 @@ def listeners(stack: Stack, service: str) -> set[tuple[str, int]]:
     return found
 
 
-def test_only_the_router_is_published_and_only_on_loopback(stack: Stack) -> None:
+def test_only_the_router_and_the_page_of_the_view_are_published_and_only_on_loopback(stack: Stack) -> None:
     bound = {service: stack.inspect(service)["NetworkSettings"]["Ports"] for service in SERVICES}
-    here = [{"HostIp": "127.0.0.1", "HostPort": str(stack.port)}]
-    assert bound == {"router": {"7447/tcp": here}, "sim": {}, "pose_service": {}, "controller": {}}
-    rows = run("ss", "--listening", "--tcp", "--numeric", "--no-header", f"sport = :{stack.port}").splitlines()
-    assert [row.split()[3] for row in rows] == [f"127.0.0.1:{stack.port}"]
+    ports = {"router": ("7447/tcp", stack.port), "view": ("8080/tcp", stack.page)}
+    here = {
+        service: {inside: [{"HostIp": "127.0.0.1", "HostPort": str(port)}]} for service, (inside, port) in ports.items()
+    }
+    assert bound == {service: here.get(service, {}) for service in SERVICES}
+    for _, port in ports.values():
+        rows = run("ss", "--listening", "--tcp", "--numeric", "--no-header", f"sport = :{port}").splitlines()
+        assert [row.split()[3] for row in rows] == [f"127.0.0.1:{port}"]
 
 
-def test_only_the_router_listens(stack: Stack) -> None:
+def test_only_the_router_and_the_view_listen(stack: Stack) -> None:
     found = {service: listeners(stack, service) for service in SERVICES}
-    assert found == {"router": {("tcp", 7447)}, "sim": set(), "pose_service": set(), "controller": set()}
+    listen: dict[str, set[tuple[str, int]]] = {"router": {("tcp", 7447)}, "view": {("tcp", 8080)}}
+    assert found == {service: listen.get(service, set()) for service in SERVICES}
+
+
+def test_the_page_shows_the_robot_to_this_machine(stack: Stack) -> None:
+    where = f"127.0.0.1:{stack.page}"
+    assert b"<title>" in urlopen(f"http://{where}/", timeout=10).read()
+    with pytest.raises(HTTPError, match="403"):  # as from a web site whose name leads here
+        urlopen(Request(f"http://{where}/", headers={"Host": "evil.example"}), timeout=10)
+    protocols = [f"viser-v{viser.__version__}"]
+    with connect(f"ws://{where}", subprotocols=protocols, max_size=None, open_timeout=10) as page:  # type: ignore[arg-type]
+        wait_for(lambda: b"/entities/hb_bot" in page.recv(10), what="the robot")  # type: ignore[operator]
 
 
 def test_a_process_may_nothing_but_its_work(stack: Stack) -> None:

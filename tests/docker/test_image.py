@@ -8,7 +8,7 @@ from .stack import ROOT, docker
 
 pytestmark = [pytest.mark.needs("docker", "docker-compose"), pytest.mark.timeout(1800)]
 
-LARGEST = 400e6  # bytes; 344e6 with the stand-in base, which is 191e6 of it
+LARGEST = 420e6  # bytes; 397e6 with the stand-in base, which is 191e6 of it, and the view with all it needs 53e6
 
 # Prints the modules of every process that have no byte code on disk.
 UNCOMPILED = """
@@ -16,6 +16,7 @@ import importlib.util, os, sys
 import holozen.cli.up, holozen.cli.topic, holozen.cli.node, holozen.cli.service, holozen.robot.xacro, xacro
 import holozen.sim.__main__, holozen.sim.loop, holozen.sim.spawn, holozen.teleop.__main__, holozen.teleop.app
 import holozen.teleop.session, holozen.controller.__main__, holozen.pose_service.__main__
+import holozen.view.__main__, holozen.view.page
 files = {getattr(module, "__file__", None) or "" for module in list(sys.modules.values())}
 print(*[f for f in files if f.endswith(".py") and not os.path.exists(importlib.util.cache_from_source(f))])
 """

@@ -13,7 +13,7 @@ from holozen.testing import wait_for
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, NoReply
 
-from .stack import SERVICES, Stack, Watcher
+from .stack import Stack, Watcher
 
 pytestmark = [pytest.mark.needs("docker", "docker-compose"), pytest.mark.timeout(1800)]
 
@@ -32,7 +32,8 @@ def stack(image: str, root: Path) -> Iterator[Stack]:
     user = os.getuid() or 10001  # not as root, whoever runs the tests
     for path in [root, *root.rglob("*")]:
         os.chown(path, user, -1)
-    with Stack(image, "docker-compose.secure.yml", HOLOZEN_SECURE=str(root), HOLOZEN_USER=f"{user}:{user}") as stack:
+    env = {"HOLOZEN_SECURE": str(root), "HOLOZEN_USER": f"{user}:{user}"}
+    with Stack(image, "docker-compose.secure.yml", services=tuple(MEMBER), **env) as stack:
         yield stack
 
 
@@ -57,7 +58,7 @@ def test_without_a_certificate_nothing_is_reached(stack: Stack) -> None:
 
 
 def test_each_container_holds_its_own_key_and_no_rights(stack: Stack) -> None:
-    for service in SERVICES:
+    for service in stack.services:
         lines = stack.execute(service, "cat", "/proc/1/status").splitlines()
         status = dict(line.split(":\t", 1) for line in lines)
         assert int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0 and "0" not in status["Uid"].split(), service

@@ -40,6 +40,7 @@ class Robots:
     def __init__(self) -> None:
         self.shown: dict[str, Any] = {}
         self.rate = 20.0
+        self.topics: dict[str, str] = {}
         self.drivers: dict[str, Driver] = {}
 
     def add(self, name: str, number: int) -> None:
@@ -66,8 +67,12 @@ class Buttons:
         self.client = MagicMock(client_id=7)
         self.made: dict[str, list[Any]] = {}
         self.client.gui.add_button = self._add
-        self.choice = self.client.gui.add_dropdown.return_value
-        self.page = Page(self.client, MagicMock(), self.robots, self.robots, MagicMock(late_at=-9.0), False)  # type: ignore[arg-type]
+        dropdowns: list[Any] = []
+        self.client.gui.add_dropdown = lambda *_, **__: dropdowns.append(MagicMock()) or dropdowns[-1]
+        bus = MagicMock()
+        bus.subscribe.return_value.try_recv.return_value = bus.state.return_value.try_recv.return_value = None
+        self.page = Page(self.client, bus, self.robots, self.robots, MagicMock(late_at=-9.0), False)  # type: ignore[arg-type]
+        self.choice = dropdowns[0]
         self.choose("a")
 
     def _add(self, label: str, **_: Any) -> Any:

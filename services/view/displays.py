@@ -1,0 +1,313 @@
+"""What RViz calls displays, of the robot that a page has chosen: its frames, and what its topics hold in them."""
+
+import math
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+import viser
+
+from holozen.bus import Bus, Subscription
+from holozen.messages import Image, LaserScan, Message, Odometry, Path, PointCloud2, PointField, TFMessage
+from holozen.rotation import Transform
+from holozen.wire import key_for
+
+from .scene import SEEN, Scene, Shown, wxyz
+
+KINDS: dict[str, type[Message]] = {kind.ROS: kind for kind in (LaserScan, PointCloud2, Image, Path, Odometry)}
+DRAW_EVERY = 4  # frames of the page
+LARGEST = 16_000_000  # bytes of a message that is shown
+WAITING = 256  # transforms
+DEEPEST = 100  # frames from one to the root
+RED, YELLOW, GREEN = (230, 0, 0), (235, 200, 0), (0, 150, 0)
+POINT = 0.02  # m
+LINE = 0.015  # m
+AXES = 0.25  # m
+ELLIPSE = 32  # points
+WIDEST = 1e4  # m^2; the variance of what is not known
+NUMPY = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
+PICTURES = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1}
+"""The channels of the encodings with a byte for each; others are depths."""
+DEPTHS = {"32FC1": "f4", "16UC1": "u2"}
+
+
+class Frames:
+    """The newest transforms between a robot's frames, by `tf`, `tf_static` and its odometry."""
+
+    def __init__(self, bus: Bus, namespace: str, odometry: str) -> None:
+        self._tf = [
+            bus.subscribe(key_for(key, namespace), TFMessage, depth=WAITING, limit=LARGEST)
+            for key in ("tf", "tf_static")
+        ]
+        self._odometry = bus.state(odometry, Odometry)
+        self._parents: dict[str, tuple[str, Transform]] = {}
+        self.body = ""  # the frame that odometry moves
+
+    def update(self) -> None:
+        """Take in what has arrived."""
+        for reader in self._tf:
+            while received := reader.try_recv():
+                for one in received.message.transforms if received.message else ():
+                    at = Transform.of(one.transform.translation, one.transform.rotation)
+                    self._parents[one.child_frame_id] = one.header.frame_id, at
+        if (newest := self._odometry.try_recv()) and (odom := newest.message):
+            pose = odom.pose.pose
+            self.body = odom.child_frame_id
+            self._parents[self.body] = odom.header.frame_id, Transform.of(pose.position, pose.orientation)
+
+    def names(self) -> list[str]:
+        """All frames, sorted."""
+        return sorted({*self._parents, *(parent for parent, _ in self._parents.values())})
+
+    def of(self, frame: str) -> Transform | None:
+        """Where a frame is in that of the robot's body; None if no transforms lead there."""
+        (root, body), (other, there) = self._from_root(self.body), self._from_root(frame.removeprefix("/"))
+        return body.inverse() @ there if root == other else None
+
+    def close(self) -> None:
+        """Stop listening."""
+        for reader in self._tf:
+            reader.close()
+        self._odometry.close()
+
+    def _from_root(self, frame: str) -> tuple[str, Transform]:
+        at = Transform()
+        for _ in range(DEEPEST):
+            if frame not in self._parents:
+                break
+            frame, step = self._parents[frame]
+            at = step @ at
+        return frame, at
+
+
+class Display:
+    """The newest message of a topic, drawn in its frame below the robot's node `root`, or in the panel."""
+
+    def __init__(
+        self, client: viser.ClientHandle, folder: viser.GuiFolderHandle, bus: Bus, frames: Frames, root: str, key: str,
+        kind: str,
+    ) -> None:  # fmt: skip
+        self._client, self._folder, self._frames, self._key = client, folder, frames, key
+        self._path = f"{root}/displays/{key.replace('/', '_')}"
+        self._reader: Subscription[Any] = bus.subscribe(key, KINDS[kind], depth=1, limit=LARGEST)
+        self._handles: list[Any] = []
+        self.problem = "no message"
+
+    def update(self) -> None:
+        """Draw what has arrived."""
+        received = self._reader.try_recv()
+        if received is None:
+            return
+        if received.message is None:
+            self.problem = received.error
+            return
+        message = received.message
+        at = self._frames.of(message.header.frame_id)
+        if at is None and not isinstance(message, Image):
+            self.problem = f"no transform from {message.header.frame_id or 'no frame'} to {self._frames.body}"
+            return
+        self.problem = ""
+        if isinstance(message, Image):
+            self._draw_image(message)
+        else:
+            self._draw(message, at or Transform())
+
+    def close(self) -> None:
+        """Take it out of the page."""
+        self._reader.close()
+        for handle in self._handles:
+            handle.remove()
+
+    def _draw_image(self, image: Image) -> None:
+        pixels = picture(image)
+        if pixels is None:
+            self.problem = f"images of {image.width} x {image.height} {image.encoding!r} are not shown"
+        elif self._handles:
+            self._handles[0].image = pixels
+        else:
+            with self._folder:
+                self._handles.append(self._client.gui.add_image(pixels, label=self._key, format="jpeg"))
+
+    def _draw(self, message: Any, at: Transform) -> None:
+        add = self._client.scene
+        if isinstance(message, LaserScan | PointCloud2):
+            points = scan_points(message) if isinstance(message, LaserScan) else cloud_points(message)
+            handle: Any = add.add_point_cloud(self._path, points, RED, point_size=POINT, precision="float32")
+        elif isinstance(message, Path):
+            line = [(one.pose.position.x, one.pose.position.y, one.pose.position.z) for one in message.poses]
+            handle = add.add_line_segments(self._path, segments(np.array(line)), GREEN, thickness=LINE)
+        else:
+            handle = add.add_line_segments(self._path, segments(ellipse(message)), YELLOW, thickness=LINE)
+        handle.position, handle.wxyz = at.translation, wxyz(at.rotation)
+        self._handles = [handle]  # one of the same name has taken the place of the last
+
+
+class Displays:
+    """The displays of one page. `chosen` is its robot."""
+
+    def __init__(self, client: viser.ClientHandle, bus: Bus, scene: Scene, chosen: Callable[[], Shown | None]) -> None:
+        self._client, self._bus, self._scene, self._chosen = client, bus, scene, chosen
+        self._frames: Frames | None = None
+        self._robot: Shown | None = None
+        self._topics: Mapping[str, str] = {}
+        self._boxes: list[Any] = []
+        self._on: dict[str, Display] = {}
+        self._axes: dict[str, tuple[Any, Transform]] | None = None
+        self._updates = 0
+        self._folder = client.gui.add_folder("Displays", expand_by_default=False)
+        with self._folder:
+            self._problems = client.gui.add_markdown("")
+
+    def update(self) -> None:
+        """Draw what is switched on, of the robot that is chosen now."""
+        if self._chosen() is not self._robot or self._scene.topics is not self._topics:
+            self._offer()
+        self._updates += 1
+        if self._updates % DRAW_EVERY or not self._frames:
+            return
+        self._frames.update()
+        for display in self._on.values():
+            display.update()
+        if self._axes is not None and self._robot:
+            self._draw_axes(self._frames, f"{self._robot.root}/displays/tf")
+        problems = "  \n".join(f"{key}: {one.problem}" for key, one in self._on.items() if one.problem)
+        if problems != self._problems.content:
+            self._problems.content = problems
+
+    def close(self) -> None:
+        """Stop listening."""
+        for key in list(self._on):
+            self._switch(key, "", False)
+        if self._axes:
+            self._switch_axes(False)
+        if self._frames:
+            self._frames.close()
+        self._frames = None
+
+    def _offer(self) -> None:
+        """A box for each topic of the robot; what was on stays on while it is the same robot."""
+        robot, self._topics = self._chosen(), self._scene.topics
+        if robot is not self._robot:
+            self.close()
+        self._robot = robot
+        for box in self._boxes:
+            box.remove()
+        self._boxes = []
+        if robot is None:
+            return
+        entity = robot.entity
+        place, odometry = entity.command.rpartition("/")[0], entity.odometry or key_for("odom", entity.name)
+        self._frames = self._frames or Frames(self._bus, place, odometry)
+        others = {shown.entity.command.rpartition("/")[0] for shown in self._scene.shown.values()} - {place, ""}
+        with self._folder:
+            self._box("TF", self._axes is not None, self._switch_axes)
+            for key, kind in self._topics.items():
+                is_own = key.startswith(f"{place}/") if place else key.partition("/")[0] not in others
+                if kind in KINDS and is_own:
+                    switch = partial(self._switch, key, kind)
+                    self._box(f"{KINDS[kind].__name__}: {key}", key in self._on, switch)
+
+    def _box(self, label: str, is_on: bool, switch: Callable[[bool], None]) -> None:
+        box = self._client.gui.add_checkbox(label, is_on)
+
+        async def changed(_event: Any) -> None:
+            switch(box.value)
+
+        box.on_update(changed)
+        self._boxes.append(box)
+
+    def _switch(self, key: str, kind: str, is_on: bool) -> None:
+        if display := self._on.pop(key, None):
+            display.close()
+        if is_on and self._frames and self._robot:
+            root = self._robot.root
+            self._on[key] = Display(self._client, self._folder, self._bus, self._frames, root, key, kind)
+
+    def _switch_axes(self, is_on: bool) -> None:
+        for handle, _ in (self._axes or {}).values():
+            handle.remove()
+        self._axes = {} if is_on else None
+
+    def _draw_axes(self, frames: Frames, path: str) -> None:
+        axes, add = self._axes, self._client.scene
+        for name in frames.names():
+            if axes is None or (at := frames.of(name)) is None:
+                continue
+            handle, before = axes.get(name, (None, at))
+            if handle is None:
+                node = f"{path}/{name.replace('/', '_')}"
+                handle = add.add_frame(node, axes_length=AXES, axes_radius=AXES / 25)
+                add.add_label(f"{node}/name", name)
+            elif max(map(abs, np.subtract(at.translation + at.rotation, before.translation + before.rotation))) < SEEN:
+                continue
+            handle.position, handle.wxyz = at.translation, wxyz(at.rotation)
+            axes[name] = handle, at
+
+
+def scan_points(scan: LaserScan) -> Any:
+    """The points (n, 3) that a scan has hit, in m in its frame."""
+    ranges = np.asarray(scan.ranges, float)
+    hit = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
+    angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
+    return np.stack((ranges * np.cos(angles), ranges * np.sin(angles), 0 * angles), axis=1)[hit].astype(np.float32)
+
+
+def cloud_points(cloud: PointCloud2) -> Any:
+    """The finite points (n, 3) of a cloud, in m in its frame; none if it has no x, y and z."""
+    fields = {field.name: field for field in cloud.fields}
+    if not all(name in fields and fields[name].datatype in NUMPY for name in "xyz") or not cloud.point_step:
+        return np.zeros((0, 3), np.float32)
+    order = ">" if cloud.is_bigendian else "<"
+    kind = np.dtype({
+        "names": ["x", "y", "z"], "formats": [order + NUMPY[fields[name].datatype] for name in "xyz"],
+        "offsets": [fields[name].offset for name in "xyz"], "itemsize": cloud.point_step,
+    })  # fmt: skip
+    data = np.asarray(cloud.data, np.uint8).tobytes()
+    points = np.frombuffer(data, kind, len(data) // cloud.point_step)
+    found = np.stack([points[name] for name in "xyz"], axis=1).astype(np.float32)
+    return found[np.isfinite(found).all(axis=1)]
+
+
+def picture(image: Image) -> Any:
+    """An image's pixels (height, width, 3) as red, green and blue, depths from near (bright) to far; None if it cannot
+    be shown.
+    """
+    shape, data = (image.height, image.width), np.asarray(image.data, np.uint8)
+    if channels := PICTURES.get(image.encoding):
+        if data.size != math.prod(shape) * channels or not data.size:
+            return None
+        pixels = data.reshape(*shape, channels)
+        if channels == 1:
+            return np.repeat(pixels, 3, axis=2)
+        return np.ascontiguousarray(pixels[:, :, 2::-1] if image.encoding.startswith("bgr") else pixels[:, :, :3])
+    if image.encoding in DEPTHS:
+        kind = np.dtype((">" if image.is_bigendian else "<") + DEPTHS[image.encoding])
+        if data.size != math.prod(shape) * kind.itemsize or not data.size:
+            return None
+        depths = data.view(kind).reshape(shape).astype(float)
+        known = np.isfinite(depths) & (depths > 0)
+        farthest = depths[known].max() if known.any() else 1.0
+        grey = np.where(known, 255 * (1 - 0.9 * depths / farthest), 0).astype(np.uint8)
+        return np.repeat(grey[:, :, None], 3, axis=2)
+    return None
+
+
+def ellipse(odom: Odometry) -> Any:
+    """The covariance of the position (n, 3) on the plane, one standard deviation wide, in m in the frame of odometry;
+    empty if it is not known.
+    """
+    covariance = np.array(odom.pose.covariance, float).reshape(6, 6)[:2, :2]
+    values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
+    if not np.isfinite(values).all() or values.max() <= 0 or values.max() > WIDEST:
+        return np.zeros((0, 3))
+    turn = np.linspace(0, 2 * np.pi, ELLIPSE + 1)
+    flat = vectors @ (np.sqrt(np.maximum(values, 0))[:, None] * np.stack((np.cos(turn), np.sin(turn))))
+    at = odom.pose.pose.position
+    return np.stack((flat[0] + at.x, flat[1] + at.y, np.full_like(turn, at.z + LINE)), axis=1)
+
+
+def segments(line: Any) -> Any:
+    """The pieces (n, 2, 3) of a line of points."""
+    points = np.asarray(line, np.float32).reshape(-1, 3)
+    return np.stack((points[:-1], points[1:]), axis=1) if len(points) > 1 else np.zeros((0, 2, 3), np.float32)

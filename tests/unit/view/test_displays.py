@@ -1,0 +1,63 @@
+"""What messages look like in the page."""
+
+import math
+import struct
+from array import array
+
+import numpy as np
+import pytest
+
+from holozen.messages import Image, LaserScan, Odometry, Point, PointCloud2, PointField, Pose, PoseWithCovariance
+from services.view.displays import cloud_points, ellipse, picture, scan_points
+from services.view.plots import fields
+
+
+def test_a_scan_is_shown_where_it_hit() -> None:
+    ranges = [1.0, 2.0, math.inf, math.nan, 0.05, 9.0]  # the last two are out of range
+    scan = LaserScan(angle_increment=math.pi / 2, range_min=0.1, range_max=5.0, ranges=ranges)
+    assert scan_points(scan) == pytest.approx(np.array([[1, 0, 0], [0, 2, 0]]), abs=1e-6)
+
+
+def test_a_cloud_is_read_by_its_fields() -> None:
+    named = [PointField(name, offset, PointField.FLOAT32, 1) for name, offset in (("z", 8), ("x", 0), ("y", 4))]
+    data = struct.pack("<4f", 1, 2, 3, 0.5) + struct.pack("<4f", math.nan, 0, 0, 0)
+    cloud = PointCloud2(fields=named, point_step=16, width=2, height=1, data=array("B", data))
+    assert cloud_points(cloud).tolist() == [[1, 2, 3]]
+    assert len(cloud_points(PointCloud2(fields=named[:2], point_step=16, data=array("B", data)))) == 0
+
+
+@pytest.mark.parametrize(
+    ("encoding", "data", "pixel"),
+    [
+        ("rgb8", [1, 2, 3], [1, 2, 3]),
+        ("bgr8", [1, 2, 3], [3, 2, 1]),
+        ("bgra8", [1, 2, 3, 4], [3, 2, 1]),
+        ("mono8", [7], [7, 7, 7]),
+        ("32FC1", struct.pack("<f", 2.0), [25, 25, 25]),
+        ("16UC1", [0, 0], [0, 0, 0]),
+    ],
+)
+def test_a_picture_has_the_colours_of_its_encoding(encoding: str, data: "list[int] | bytes", pixel: list[int]) -> None:
+    assert picture(Image(height=1, width=1, encoding=encoding, data=array("B", data)))[0, 0].tolist() == pixel
+
+
+@pytest.mark.parametrize(("encoding", "size"), [("yuv422", 2), ("rgb8", 2), ("rgb8", 0), ("32FC1", 3)])
+def test_what_is_no_picture_is_not_shown(encoding: str, size: int) -> None:
+    assert picture(Image(height=1, width=1, encoding=encoding, data=[0] * size)) is None
+
+
+def test_a_covariance_is_an_ellipse_of_one_standard_deviation() -> None:
+    covariance = [0.0] * 36
+    covariance[0], covariance[7] = 0.04, 0.25
+    line = ellipse(Odometry(pose=PoseWithCovariance(Pose(Point(1.0, 2.0)), covariance)))
+    assert np.ptp(line[:, 0]) == pytest.approx(0.4, rel=0.02)
+    assert np.ptp(line[:, 1]) == pytest.approx(1.0, rel=0.02)
+    assert line[:-1].mean(axis=0)[:2] == pytest.approx([1.0, 2.0])
+    for unknown in (0.0, 1e12, math.nan):
+        covariance[0] = covariance[7] = unknown
+        assert len(ellipse(Odometry(pose=PoseWithCovariance(Pose(), covariance)))) == 0
+
+
+def test_the_number_fields_of_a_message_have_paths() -> None:
+    message = {"pose": {"x": 1.0, "name": "a"}, "ranges": [1, 2], "held": False, "none": None}
+    assert list(fields(message)) == ["pose.x", "ranges[0]", "ranges[1]", "held"]
