@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from holozen import flags
+from holozen.bag import BagError
 from holozen.bus import Bus
 from holozen.console import report
 from holozen.process import stop_event
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     import viser
 
     from .guard import Guard
+    from .playback import Playback
 
 PORT = 8080
 NO_TOKEN = "none"
@@ -33,9 +35,15 @@ def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen view",
         description="Show the robots and their world in a browser, and drive them from there.",
-        epilog="example: holozen view --port 8081",
+        epilog="example: holozen view square.mcap",
     )
     add = parser.add_argument
+    add(
+        "bag",
+        nargs="?",
+        metavar="BAG",
+        help="show this recording, with a slider for its time, instead of what is on the network",
+    )
     add("--host", default="127.0.0.1", metavar="ADDRESS",
         help="where to listen (default: %(default)s)")  # fmt: skip
     add("--port", type=flags.count(), default=PORT, metavar="N", help="0: a free one (default: %(default)s)")
@@ -57,19 +65,33 @@ def main(argv: list[str] | None = None) -> int:
         from .guard import Guard
 
         guard = Guard(token)
-        with Bus("view", where, lasting=True, stop=stop) as bus:
+        with _bus(args.bag, where, stop) as bus, contextlib.ExitStack() as ending:
+            playback = None
+            if args.bag:
+                from .playback import Playback
+
+                playback = Playback(bus, args.bag)
+                ending.callback(playback.close)
             server = _serve(args.host, args.port, guard)
             try:
                 for line in _addresses(args, server.get_port(), token):
                     report(f"view: {line}")
-                _show(bus, server, guard, args.look_only, stop)
+                _show(bus, server, guard, args.look_only, playback, stop)
             finally:
                 with contextlib.redirect_stdout(io.StringIO()):
                     server.stop()
-    except (BusError, OSError) as error:
+    except (BusError, BagError, OSError) as error:
         report(f"view: {error}")
         return 1
     return 0
+
+
+def _bus(bag: str | None, where: connection.Connection, stop: threading.Event) -> Bus:
+    if not bag:
+        return Bus("view", where, lasting=True, stop=stop)
+    from .playback import ALONE
+
+    return Bus("view", ALONE, stop=stop)
 
 
 def random_token(host: str, where: connection.Connection) -> str:
@@ -133,7 +155,10 @@ def _serve(host: str, port: int, guard: "Guard") -> "viser.ViserServer":
     return server
 
 
-def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", look_only: bool, stop: threading.Event) -> None:
+def _show(
+    bus: Bus, server: "viser.ViserServer", guard: "Guard", look_only: bool, playback: "Playback | None",
+    stop: threading.Event,
+) -> None:  # fmt: skip
     import asyncio
 
     from .drive import Drivers
@@ -142,12 +167,14 @@ def _show(bus: Bus, server: "viser.ViserServer", guard: "Guard", look_only: bool
 
     # A page may close while it is written to.
     warnings.filterwarnings("ignore", "Queued a .* on a closed connection", UserWarning)
-    scene, drivers = Scene(server, bus), Drivers(bus)
+    scene, drivers = Scene(server, bus, lambda: playback is not None and playback.paused), Drivers(bus)
     pages: dict[int, Page] = {}
 
     # All that writes to pages runs in the server's event loop: from other threads viser's buffers are not safe.
     async def opened(client: "viser.ClientHandle") -> None:
-        pages[client.client_id] = Page(client, bus, scene, drivers, guard, look_only)
+        if playback and playback.paused and not playback.position:
+            playback.toggle()
+        pages[client.client_id] = Page(client, bus, scene, drivers, guard, look_only, playback)
 
     async def closed(client: "viser.ClientHandle") -> None:
         drivers.close(client.client_id)

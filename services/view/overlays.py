@@ -18,6 +18,7 @@ from .meshes import RGB
 GREEN, BLUE, MAGENTA, RED = (0, 150, 0), (30, 90, 255), (200, 0, 160), (220, 0, 0)
 STEP = 0.03  # m between two points of a trail
 TRAIL = 600  # points
+JUMP = 0.5  # m from one frame to the next: it was put elsewhere, and its trail begins there
 TRAIL_EVERY = 4  # frames between two drawings of a trail
 AT_LEAST = 0.02  # m/s; slower has no arrow
 SEEN = 0.005  # m/s; smaller changes are not sent to the pages
@@ -42,6 +43,8 @@ class Track:
     def update(self, position: XYZ, commanded: Planar, measured: Planar) -> None:
         """Draw it as it is now; velocities are in the body frame."""
         last = self._trail[-1] if self._trail else None
+        if last and max(abs(position[0] - last[0]), abs(position[1] - last[1])) > JUMP:
+            self._trail.clear()
         if last is None or sum(abs(a - b) for a, b in zip(last, position, strict=True)) > STEP:
             self._trail.append((position[0], position[1], FLAT))
         self._frames += 1

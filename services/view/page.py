@@ -1,6 +1,7 @@
 """The panel of one page: which robot, the camera, and the pad."""
 
 import math
+import time
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -17,6 +18,7 @@ from .displays import Displays
 from .drive import SPEED, TURN, Driver, Drivers
 from .guard import Guard
 from .pad import DIRECTIONS
+from .playback import Playback
 from .plots import Plots
 from .scene import FRAME, LOOK_AT, Scene, Shown
 from .world import WorldTab
@@ -26,6 +28,7 @@ NONE = "(no robot)"
 ABOVE = 6.0  # m; the height of the top view
 PAD_WIDTH = 240  # CSS pixels
 FEW = 0.7  # of the frames; fewer are reported
+DRAGGED = 0.5  # s after a person's last drag that the time is not drawn anew
 LATE = 2.0  # s that a late message is reported
 TIMEOUT = 2.0  # s for stop and release
 SLOW_LINK = "the link to this page is too slow to drive"
@@ -35,8 +38,9 @@ class Page:
     """What one browser shows beside the scene. With `look_only` it has nothing that changes the world."""
 
     def __init__(
-        self, client: viser.ClientHandle, bus: Bus, scene: Scene, drivers: Drivers, guard: Guard, look_only: bool
-    ) -> None:
+        self, client: viser.ClientHandle, bus: Bus, scene: Scene, drivers: Drivers, guard: Guard, look_only: bool,
+        playback: Playback | None = None,
+    ) -> None:  # fmt: skip
         self._client, self._bus, self._scene, self._drivers, self._guard = client, bus, scene, drivers, guard
         self.robot = ""  # the one that is chosen
         self._said = self._shown = ""
@@ -49,12 +53,15 @@ class Page:
         self._choice = add.add_dropdown("Robot", (NONE,))
         self._choice.on_update(lambda _: self._choose())
         self._status = add.add_markdown("")
-        if look_only:
+        self._playback, self._dragged_at = playback, -math.inf
+        if playback:
+            self._add_time(playback)
+        if look_only or playback:
             self._add_camera()
         else:
             self._add_pad()
         self._displays = Displays(client, bus, scene, self._shown_robot)
-        self._plots = Plots(client, bus, scene)
+        self._plots = Plots(client, bus, scene, (lambda: playback.position) if playback else time.monotonic)
 
     def update(self, now: float) -> None:
         """Show the robots that there are, and what the chosen one does. `now` in s (monotonic)."""
@@ -69,6 +76,8 @@ class Page:
         self._move_camera()
         if self._world:
             self._world.update()
+        if self._playback and now - self._dragged_at > DRAGGED:
+            self._time.value = round(min(self._playback.position, self._playback.duration), 2)  # type: ignore[misc]
         self._displays.update()
         self._plots.update()
         text = self._text(now)
@@ -87,7 +96,9 @@ class Page:
             return f"{self.robot} is gone; choose another" if others else "no robot is there; `holozen up` starts one"
         status, speed = driver.status(), driver.measured()
         lines = [f"{math.hypot(*speed[:2]):.2f} m/s, {speed[2]:+.2f} rad/s" if speed else "no odometry"]
-        if status.stopped:
+        if self._playback and self._playback.paused:
+            lines = ["paused"]
+        elif status.stopped:
             lines.append(f"**stopped by {status.stopped}**, until it is released")
         else:
             lines.append(f"driven by {status.obeyed}" if status.obeyed else "not driven")
@@ -136,6 +147,22 @@ class Page:
     def _add_camera(self) -> None:
         self._follow = self._client.gui.add_checkbox("Follow", False)
         self._client.gui.add_button("Top view").on_click(lambda _: self._look_down())
+
+    def _add_time(self, playback: Playback) -> None:
+        add = self._client.gui
+        self._time = add.add_slider("Time, s", 0.0, max(0.01, round(playback.duration + 0.005, 2)), 0.01, 0.0)
+        play = add.add_button("Pause or play")
+
+        async def seek(event: viser.GuiEvent[Any]) -> None:
+            if event.client is not None:  # a person did it
+                self._dragged_at = time.monotonic()
+                playback.seek(float(self._time.value))
+
+        async def toggle(_event: Any) -> None:
+            playback.toggle()
+
+        self._time.on_update(seek)
+        play.on_click(toggle)
 
     def _add_button(self, button: str, order: float | None = None) -> None:
         hint = "moves the robot while it is held"

@@ -50,7 +50,7 @@ class Chart:
         found = [(at, value) for at, value in list(points) if now - WINDOW <= at <= now and math.isfinite(value)]
         if len(found) < 2:
             return
-        data = tuple(np.array(column, float) for column in zip(*found, strict=True))
+        data = tuple(np.array(column, float) for column in zip(*sorted(found), strict=True))  # a bag may go back
         if self._plot:
             self._plot.data = data
             return

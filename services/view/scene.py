@@ -3,7 +3,7 @@
 import math
 import time
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import viser
@@ -74,11 +74,13 @@ class Shown:
         if not text:
             self._odom = bus.subscribe(entity.odometry, Odometry, depth=1, limit=LARGEST)
 
-    def update(self) -> None:
-        """Show what has arrived since the last call, and how old it is."""
+    def update(self, still: bool) -> None:
+        """Show what has arrived since the last call, and how old it is; nothing is while time stands `still`."""
         if self._odom and (odom := self._odom.try_recv()) and odom.message:
             self.seen = time.monotonic()
             self.place(odom.message.pose.pose)
+        if still:
+            self.seen = time.monotonic()
         age = time.monotonic() - self.seen
         self._age(0 if age < STALE else max(1, int(age)))
 
@@ -172,8 +174,9 @@ class News(NamedTuple):
 class Scene:
     """All that is shown, by name. Call `ask` and `draw` in turns, often."""
 
-    def __init__(self, server: viser.ViserServer, bus: Bus) -> None:
+    def __init__(self, server: viser.ViserServer, bus: Bus, stands_still: Callable[[], bool] = lambda: False) -> None:
         self._server, self._bus, self._graph = server, bus, bus.graph()
+        self._stands_still = stands_still  # whether silence is meant: a bag is paused
         self._ends: list[Endpoint] = []
         self._changes = -1  # of the graph, at the last look
         self.topics: dict[str, str] = {}  # the type of each key that is published, by the graph
@@ -192,6 +195,7 @@ class Scene:
 
     def ask(self) -> News:
         """Ask the sims what there is, and what it looks like. Raises BusError once the bus is closed."""
+        self._look()
         answered = self._ask()
         entities = [one.entity for one in self.shown.values() if one.entity.number] if answered is None else answered
         there = {entity.name: entity for entity in [*self._others(entities), *entities]}
@@ -214,8 +218,9 @@ class Scene:
                     shown.place(entity.pose)
                     if self._drawn % JOINTS_EVERY == 0:
                         shown.turn(entity.joints)
+            still = self._stands_still()
             for shown in self.shown.values():
-                shown.update()
+                shown.update(still)
             self._goals.update()
             self._follow(watched)
 
@@ -238,8 +243,20 @@ class Scene:
         """The names of the robots that take commands, sorted."""
         return sorted(name for name, shown in self.shown.items() if shown.is_robot)
 
+    def _look(self) -> None:
+        """Follow the graph."""
+        self._graph.left()
+        if self._graph.changes == self._changes:
+            return
+        self._changes, self._ends = self._graph.changes, self._graph.endpoints()
+        topics = {end.key: end.type for end in sorted(self._ends) if end.kind == "pub" and "*" not in end.key}
+        if topics != self.topics:
+            self.topics = topics
+
     def _ask(self) -> list[SceneEntity] | None:
         """The entities of all sims; None if no sim answers."""
+        if not any(end.kind == "srv" and end.key == "get_scene" for end in self._ends):
+            return None
         try:
             replies = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, PATIENCE)
         except ServiceError:
@@ -248,12 +265,6 @@ class Scene:
 
     def _others(self, entities: list[SceneEntity]) -> list[SceneEntity]:
         """Robots that no sim has: those that publish odometry. They stay in the page, grey, when they are gone."""
-        self._graph.left()
-        if self._graph.changes != self._changes:
-            self._changes, self._ends = self._graph.changes, self._graph.endpoints()
-            topics = {end.key: end.type for end in sorted(self._ends) if end.kind == "pub" and "*" not in end.key}
-            if topics != self.topics:
-                self.topics = topics
         sims = {end.session for end in self._ends if end.kind == "srv" and end.key == "get_scene"}
         known = {entity.odometry for entity in entities}
         keys = [

@@ -4,6 +4,7 @@ import io
 import math
 from collections.abc import Callable, Iterator
 from itertools import count
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -40,7 +41,9 @@ from holozen.transport.pubsub import Latest
 from services.view.scene import EYE, FIELD, LOOK_AT
 from tests.faults.proxy import Proxy
 
-from .conftest import TOKEN
+from tests.unit.bag.bags import a_bag
+
+from .conftest import TOKEN, address
 
 pytestmark = [pytest.mark.needs("chromium"), pytest.mark.alone]
 
@@ -82,7 +85,7 @@ def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
     faults: list[str] = []
     contexts = []
 
-    def page(address: str = view, **options: Any) -> Page:
+    def page(address: str = view, ready: str = "not driven", **options: Any) -> Page:
         own = address.partition("?")[0]
         own_socket = own.replace("http", "ws", 1)
         contexts.append(context := chromium.new_context(**{"viewport": SIZE, **options}))
@@ -94,7 +97,7 @@ def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
         page.goto(address)
         notice = page.get_by_text("Software WebGL")  # it would cover the pad
         notice.locator("xpath=../..").get_by_role("button").click()
-        page.get_by_text("not driven").or_(page.get_by_text("driven by")).first.wait_for()
+        page.get_by_text(ready).or_(page.get_by_text("driven by")).first.wait_for()
         return page
 
     yield page
@@ -476,6 +479,23 @@ def test_the_camera_follows_and_looks_down(page: Page, bus: Bus) -> None:
     page.get_by_text("Follow").click()
     page.get_by_role("button", name="Top view").click()
     wait_for(in_the_middle, what="the robot from above in the middle")
+
+
+def test_a_bag_is_played_with_a_slider_for_its_time(town: Wire, opened: Open, tmp_path: Path) -> None:
+    bag = town.start("view", "--port", "0", str(a_bag(tmp_path / "a.mcap")))
+    page = opened(address(bag), ready="paused")  # its 2 s are over
+    wait_for(lambda: shows_arrow_at(page, 1.9), what="where it ended")
+    slider = page.get_by_text("Time, s", exact=True).locator("xpath=following::input[not(@type='hidden')][1]")
+    slider.fill("0.5")
+    wait_for(lambda: shows_arrow_at(page, 0.5), what="where it was after half a second")
+    assert page.get_by_text("Forward").count() == 0, "a bag is not driven"
+    page.close()
+
+
+def shows_arrow_at(page: Page, x: float) -> bool:
+    """Whether the orange arrow of a robot without a description is there."""
+    middle = deck(page)
+    return middle is not None and math.dist(middle, pixel(x, 0.0, 0.03)) < NEAR
 
 
 def test_a_page_needs_the_token(chromium: Browser, page: Page, view: str) -> None:
