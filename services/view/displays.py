@@ -32,6 +32,10 @@ PICTURES = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1}
 DEPTHS = {"32FC1": "f4", "16UC1": "u2"}
 
 
+Place = viser.GuiFolderHandle | viser.GuiTabHandle
+"""Where in the panel."""
+
+
 class Frames:
     """The newest transforms between a robot's frames, by `tf`, `tf_static` and its odometry."""
 
@@ -85,10 +89,9 @@ class Display:
     """The newest message of a topic, drawn in its frame below the robot's node `root`, or in the panel."""
 
     def __init__(
-        self, client: viser.ClientHandle, folder: viser.GuiFolderHandle, bus: Bus, frames: Frames, root: str, key: str,
-        kind: str,
+        self, client: viser.ClientHandle, place: Place, bus: Bus, frames: Frames, root: str, key: str, kind: str
     ) -> None:  # fmt: skip
-        self._client, self._folder, self._frames, self._key = client, folder, frames, key
+        self._client, self._place, self._frames, self._key = client, place, frames, key
         self._path = f"{root}/displays/{key.replace('/', '_')}"
         self._reader: Subscription[Any] = bus.subscribe(key, KINDS[kind], depth=1, limit=LARGEST)
         self._handles: list[Any] = []
@@ -126,7 +129,7 @@ class Display:
         elif self._handles:
             self._handles[0].image = pixels
         else:
-            with self._folder:
+            with self._place:
                 self._handles.append(self._client.gui.add_image(pixels, label=self._key, format="jpeg"))
 
     def _draw(self, message: Any, at: Transform) -> None:
@@ -146,8 +149,10 @@ class Display:
 class Displays:
     """The displays of one page. `chosen` is its robot."""
 
-    def __init__(self, client: viser.ClientHandle, bus: Bus, scene: Scene, chosen: Callable[[], Shown | None]) -> None:
-        self._client, self._bus, self._scene, self._chosen = client, bus, scene, chosen
+    def __init__(
+        self, client: viser.ClientHandle, place: Place, bus: Bus, scene: Scene, chosen: Callable[[], Shown | None]
+    ) -> None:
+        self._client, self._place, self._bus, self._scene, self._chosen = client, place, bus, scene, chosen
         self._frames: Frames | None = None
         self._robot: Shown | None = None
         self._topics: Mapping[str, str] = {}
@@ -155,8 +160,7 @@ class Displays:
         self._on: dict[str, Display] = {}
         self._axes: dict[str, tuple[Any, Transform]] | None = None
         self._updates = 0
-        self._folder = client.gui.add_folder("Displays", expand_by_default=False)
-        with self._folder:
+        with place:
             self._problems = client.gui.add_markdown("")
 
     def update(self) -> None:
@@ -200,7 +204,7 @@ class Displays:
         place, odometry = entity.command.rpartition("/")[0], entity.odometry or key_for("odom", entity.name)
         self._frames = self._frames or Frames(self._bus, place, odometry)
         others = {shown.entity.command.rpartition("/")[0] for shown in self._scene.shown.values()} - {place, ""}
-        with self._folder:
+        with self._place:
             self._box("TF", self._axes is not None, self._switch_axes)
             for key, kind in self._topics.items():
                 is_own = key.startswith(f"{place}/") if place else key.partition("/")[0] not in others
@@ -222,7 +226,7 @@ class Displays:
             display.close()
         if is_on and self._frames and self._robot:
             root = self._robot.root
-            self._on[key] = Display(self._client, self._folder, self._bus, self._frames, root, key, kind)
+            self._on[key] = Display(self._client, self._place, self._bus, self._frames, root, key, kind)
 
     def _switch_axes(self, is_on: bool) -> None:
         for handle, _ in (self._axes or {}).values():

@@ -14,7 +14,7 @@ from holozen.robot.errors import RobotError
 from holozen.transport.errors import BusError, ServiceError
 from holozen.wire import key_for
 
-from .displays import Displays
+from .displays import Displays, Place
 from .drive import SPEED, TURN, Driver, Drivers
 from .guard import Guard
 from .pad import DIRECTIONS
@@ -26,7 +26,7 @@ from .world import WorldTab
 HOLD_RATE = 10.0  # Hz; of the reports of a held button; at 20 those of a second one would be swallowed
 NONE = "(no robot)"
 ABOVE = 6.0  # m; the height of the top view
-PAD_WIDTH = 240  # CSS pixels
+PAD_WIDTH = 300  # CSS pixels
 FEW = 0.7  # of the frames; fewer are reported
 DRAGGED = 0.5  # s after a person's last drag that the time is not drawn anew
 LATE = 2.0  # s that a late message is reported
@@ -58,10 +58,12 @@ class Page:
             self._add_time(playback)
         if look_only or playback:
             self._add_camera()
+            places: list[Place] = [add.add_folder(name, expand_by_default=False) for name in ("Displays", "Plots")]
         else:
-            self._add_pad()
-        self._displays = Displays(client, bus, scene, self._shown_robot)
-        self._plots = Plots(client, bus, scene, (lambda: playback.position) if playback else time.monotonic)
+            panel = self._add_pad()
+            places = [panel.add_tab(name) for name in ("Displays", "Plots")]
+        self._displays = Displays(client, places[0], bus, scene, self._shown_robot)
+        self._plots = Plots(client, places[1], bus, scene, (lambda: playback.position) if playback else time.monotonic)
 
     def update(self, now: float) -> None:
         """Show the robots that there are, and what the chosen one does. `now` in s (monotonic)."""
@@ -123,7 +125,7 @@ class Page:
         if chosen not in (before, NONE):
             self.robot, self._said, self._followed = chosen, "", None
 
-    def _add_pad(self) -> None:
+    def _add_pad(self) -> viser.PanelHandle:
         add = self._client.gui
         self._speed = add.add_slider("Speed, m/s", 0.1, 2.0, 0.1, SPEED)
         self._turn = add.add_slider("Turn, rad/s", 0.1, 3.0, 0.1, TURN)
@@ -143,6 +145,7 @@ class Page:
             self._world = WorldTab(
                 self._client, self._bus, self._scene, self._try, self._shown_robot, lambda: self.driver
             )
+        return panel
 
     def _add_camera(self) -> None:
         self._follow = self._client.gui.add_checkbox("Follow", False)

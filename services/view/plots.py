@@ -15,6 +15,7 @@ from holozen.cli.output import Reader
 from holozen.cli.plot import Lines
 from holozen.transport.samples import RawSubscriber
 
+from .displays import Place
 from .scene import Scene
 
 NONE = "(none)"
@@ -69,15 +70,19 @@ class Plots:
     """The plots of one page. `clock` is the time that they are drawn over, in s."""
 
     def __init__(
-        self, client: viser.ClientHandle, bus: Bus, scene: Scene, clock: Callable[[], float] = time.monotonic
+        self,
+        client: viser.ClientHandle,
+        place: Place,
+        bus: Bus,
+        scene: Scene,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self._client, self._bus, self._scene, self._clock = client, bus, scene, clock
+        self._client, self._place, self._bus, self._scene, self._clock = client, place, bus, scene, clock
         self._charts: list[Chart] = []
         self._probe: RawSubscriber | None = None  # of the topic whose fields are to be offered
         self._reader = Reader()
         self._updates = 0
-        self._folder = client.gui.add_folder("Plots", expand_by_default=False)
-        with self._folder:
+        with place:
             self._topic = client.gui.add_dropdown("Topic", (NONE,))
             self._field = client.gui.add_dropdown("Field", (NONE,))
             self._add = client.gui.add_button("Plot it")
@@ -119,7 +124,7 @@ class Plots:
         key, field = self._topic.value, self._field.value
         if NONE in (key, field) or any(chart.name == f"{key} {field}" for chart in self._charts):
             return
-        with self._folder:
+        with self._place:
             chart = Chart(self._client, self._bus, key, field, self._clock)
         self._charts.append(chart)
 

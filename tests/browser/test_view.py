@@ -40,7 +40,6 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.transport.pubsub import Latest
 from services.view.scene import EYE, FIELD, LOOK_AT
 from tests.faults.proxy import Proxy
-
 from tests.unit.bag.bags import a_bag
 
 from .conftest import TOKEN, address
@@ -309,7 +308,7 @@ def test_stop_counts_while_a_button_of_the_same_page_is_held(page: Page, odom: L
 
 
 def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
-    page.get_by_text("Displays", exact=True).click()
+    page.get_by_role("tab", name="Displays").click()
     scans, frames = bus.publisher("scan", LaserScan), bus.publisher("tf", TFMessage)
     images = bus.publisher("eye", Image)
     for name in ("LaserScan: scan", "Image: eye"):
@@ -322,13 +321,8 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
     def shown() -> bool:
         at = TransformMessage(Vector3(0.0, 0.0, 0.1))
         frames.put(TFMessage([TransformStamped(Header(frame_id=message.child_frame_id), "laser", at)]))
-        hits = {
-            "angle_min": -turned - math.pi / 2 - 0.05,
-            "angle_increment": 0.01,
-            "range_max": 5.0,
-            "ranges": [0.8] * 11,
-        }
-        scans.put(LaserScan(Header(frame_id="laser"), **hits))
+        first, many = -turned - math.pi / 2 - 0.05, [0.8] * 11
+        scans.put(LaserScan(Header(frame_id="laser"), first, angle_increment=0.01, range_max=5.0, ranges=many))
         images.put(Image(height=2, width=2, encoding="rgb8", step=6, data=[0, 0, 255] * 4))
         found = colored(page, lambda r, g, b: (r > 180) & (g < 60) & (b < 60))
         return bool(found) and math.dist(np.mean(found, axis=0), pixel(x, y - 0.8, 0.1)) < NEAR
@@ -343,7 +337,7 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
     wait_for(lambda: len(axes(page)) > before + 20, what="the axes of the frames")
     page.get_by_text("TF", exact=True).click()
     wait_for(lambda: len(axes(page)) < before + 10, what="no axes")
-    page.get_by_text("Displays", exact=True).click()
+    page.get_by_role("tab", name="Drive").click()
 
 
 def axes(page: Page) -> list[tuple[int, int]]:
@@ -354,7 +348,7 @@ def axes(page: Page) -> list[tuple[int, int]]:
 def test_a_number_of_a_topic_is_plotted_until_it_is_paused(page: Page, bus: Bus) -> None:
     numbers = bus.publisher("level", Range)
     sent = count(1)
-    page.get_by_text("Plots", exact=True).click()
+    page.get_by_role("tab", name="Plots").click()
     choose(page, "Topic", "level")
     offered = page.get_by_text("Field", exact=True).locator("xpath=following::input[1]")
 
@@ -373,7 +367,7 @@ def test_a_number_of_a_topic_is_plotted_until_it_is_paused(page: Page, bus: Bus)
     wait_for(lambda: plotted() == plotted(), what="a plot that stands still")
     page.get_by_role("button", name="Remove").click()
     wait_for(lambda: plotted() == [], what="no plot")
-    page.get_by_text("Plots", exact=True).click()
+    page.get_by_role("tab", name="Drive").click()
 
 
 def test_what_is_spawned_and_deleted_by_its_buttons_comes_and_goes(page: Page, bus: Bus) -> None:
@@ -391,6 +385,8 @@ def test_what_is_spawned_and_deleted_by_its_buttons_comes_and_goes(page: Page, b
     wait_for(lambda: "mecanum1" not in entities.names(bus), what="it to be deleted")
     wait_for(lambda: blue() < before + 25, what="it to be gone")
     assert "hb_bot" in entities.names(bus)
+    page.get_by_text("mecanum1 is gone; choose another").wait_for()
+    choose(page, "Robot", "hb_bot")
 
 
 def choose(page: Page, label: str, value: str) -> None:
