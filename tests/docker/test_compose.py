@@ -66,7 +66,7 @@ def test_the_page_shows_the_robot_to_this_machine(stack: Stack) -> None:
         urlopen(Request(f"http://{where}/", headers={"Host": "evil.example"}), timeout=10)
     protocols = [f"viser-v{viser.__version__}"]
     with connect(f"ws://{where}", subprotocols=protocols, max_size=None, open_timeout=10) as page:  # type: ignore[arg-type]
-        wait_for(lambda: b"/entities/hb_bot" in page.recv(10), what="the robot")  # type: ignore[operator]
+        wait_for(lambda: b"/entities/hb_bot" in page.recv(10), what="the robot")
 
 
 def test_a_process_may_nothing_but_its_work(stack: Stack) -> None:
