@@ -19,13 +19,13 @@ from benchmarks.company import beside, guest, host, meeting_point
 from benchmarks.report import Case, parser, publish
 from holozen import data
 from holozen.bus import Bus
+from holozen.command import inputs
 from holozen.messages import Twist
 from holozen.robot.loading import load
 from holozen.robot.rigid import lump
 from holozen.robot.sdf_world import load_world
 from holozen.robot.xacro import expand
 from holozen.transport.pubsub import Publisher
-from services.sim.command import inputs
 from services.sim.entities import Entities
 from services.sim.loop import Loop
 from services.sim.physics.engine import bullet

@@ -1,6 +1,7 @@
 """Kinematics of a planar base, as pure functions. Metres, radians, seconds; x forward, y left, z up."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from holozen.limits import Planar
@@ -57,6 +58,31 @@ def wheel_rate(velocity: Planar, wheel: Wheel) -> float:
     x, y, turn = velocity
     vx, vy = x - turn * wheel.y, y + turn * wheel.x
     return (vx * wheel.ay - vy * wheel.ax + wheel.skew * (vx * wheel.ax + vy * wheel.ay)) / wheel.radius
+
+
+def planar_velocity(rates: Sequence[float], wheels: Sequence[Wheel]) -> Planar:
+    """The body-frame velocity at which wheels turn at `rates` (rad/s): the inverse of `wheel_rate` for three omni
+    wheels, the least squares for more. Raises ValueError for wheels that leave a velocity open, as parallel ones do.
+    """
+    rows = [
+        [wheel_rate(unit, wheel) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))] for wheel in wheels
+    ]
+    squares = [[sum(row[i] * row[j] for row in rows) for j in range(3)] for i in range(3)]
+    sums = [sum(row[i] * rate for row, rate in zip(rows, rates, strict=True)) for i in range(3)]
+    whole = _determinant(squares)
+    if abs(whole) < 1e-9:
+        raise ValueError("these wheels leave a velocity open; three omni wheels with axles in three directions do not")
+    # Cramer's rule.
+    x, y, turn = (
+        _determinant([[sums[i] if j == column else squares[i][j] for j in range(3)] for i in range(3)]) / whole
+        for column in range(3)
+    )
+    return x, y, turn
+
+
+def _determinant(m: list[list[float]]) -> float:
+    (a, b, c), (d, e, f), (g, h, i) = m
+    return a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
 
 
 def mecanum_rates(velocity: Planar, arm: float, radius: float) -> tuple[float, float, float, float]:

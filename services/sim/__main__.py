@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from holozen import data, flags
 from holozen.bus import Bus
+from holozen.command import inputs
 from holozen.console import report
 from holozen.process import stop_event
 from holozen.robot.errors import RobotError
@@ -21,7 +22,6 @@ from holozen.transport.graph import Graph, on_key
 from holozen.wire import key_for
 
 from . import pace, shard
-from .command import inputs
 
 if TYPE_CHECKING:
     from .entities import Entities

@@ -8,6 +8,9 @@ from functools import partial
 from itertools import chain, count
 
 from holozen.bus import Bus
+from holozen.command.stop_services import RobotServices
+from holozen.command.time import CommandTime
+from holozen.command.wait_set import Moment, WaitSet
 from holozen.console import report
 from holozen.messages import Pose, SeenEntity
 from holozen.messages import simulation_interfaces as si
@@ -21,10 +24,7 @@ from holozen.transport.graph import Endpoint, on_key
 from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name
 
 from .cameras import Cameras
-from .command.time import CommandTime
-from .io.robot_services import RobotServices
 from .io.sensor_topics import LinkStates, Surroundings
-from .io.wait_set import Moment, WaitSet
 from .link_states import LinkState, link_tree
 from .physics.body import Body
 from .physics.movers import Mover, mover_for

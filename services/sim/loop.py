@@ -6,6 +6,8 @@ import time
 from collections import deque
 
 from holozen.bus import Bus
+from holozen.command.time import Reads
+from holozen.command.wait_set import Moment
 from holozen.console import report
 from holozen.messages import Clock, SimulationStatus, Time
 from holozen.transport.pubsub import Publisher
@@ -13,7 +15,6 @@ from holozen.transport.pubsub import Publisher
 from .entities import Entities
 from .io.entity_services import EntityServices
 from .io.topics import Schedule
-from .io.wait_set import Moment
 from .pace import Pace
 from .physics.world import World
 from .robot import Robot
@@ -29,8 +30,6 @@ POLL = 0.02  # s; how often requests are read, and commands while no step is due
 READ_EVERY = 0.003  # s between two looks for commands and stops, and for nodes that left, however short the steps
 READ_SHARE = 0.05  # of the time that these looks take at most, unless they would be more than POLL apart
 FAULTS = (ArithmeticError, ValueError)  # of a body whose position became NaN
-STALL = 0.1  # s without reading; commands may have waited this long
-DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring old commands
 
 
 class Loop:
@@ -57,8 +56,8 @@ class Loop:
         self._reported = 0  # overruns
         self._marks: deque[tuple[float, float]] = deque()  # real and sim time of past statuses
         self.simulation = Simulation(world, entities, self.pace, self.publish_all)
-        self._last_read = self._before_stall = time.monotonic()
-        self._trusted_from = self._reads_at = 0.0
+        self._reads = Reads(time.monotonic())
+        self._reads_at = 0.0
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:
         """Step until `stop` is set, or for a number of `steps`."""
@@ -129,10 +128,7 @@ class Loop:
         is_asked = steps is not None and not steps.may_begin
         if now < self._reads_at and not is_asked and not self._more_wait:
             return
-        if now - self._last_read > STALL:
-            self._before_stall, self._trusted_from = self._last_read, now + DISTRUST
-        since = self._last_read if now >= self._trusted_from else self._before_stall
-        self._last_read = now
+        since = self._reads.since(now)
         moment = Moment(now, since, (time.time(), self._world.time))
         self._entities.commands.read(moment)
         for robot in self._robots:

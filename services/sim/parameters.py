@@ -3,10 +3,10 @@
 import time
 from collections.abc import Iterator
 
+from holozen.command.freshness import AGES
+from holozen.command.inputs import ANGULAR, LINEAR
 from holozen.transport.parameters import Number
 
-from .command.freshness import AGES
-from .command.inputs import ANGULAR, LINEAR
 from .entities import Entities
 from .pace import FACTORS, Pace
 from .robot import Robot

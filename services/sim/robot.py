@@ -5,21 +5,21 @@ from collections.abc import Callable
 from functools import partial
 
 from holozen.bus import Bus
+from holozen.command.arbiter import Arbiter
+from holozen.command.freshness import Senders
+from holozen.command.inputs import CommandStats, ForceInput, JointInput, TwistInput
+from holozen.command.motion import JointMotion
+from holozen.command.stop_services import RobotServices
+from holozen.command.time import CommandTime
+from holozen.command.wait_set import Reader
 from holozen.messages import TFMessage, Time
 from holozen.robot.model import STEP, Balancing, Differential, Force, Pushed, RobotModel
 from holozen.suggest import listed
 from holozen.transport.pubsub import Publisher
 from holozen.wire import COMMAND_SILENCE, key_for
 
-from .command.arbiter import Arbiter
-from .command.freshness import Senders
-from .command.inputs import CommandStats, ForceInput, JointInput, TwistInput
-from .command.motion import JointMotion
-from .command.time import CommandTime
-from .io.robot_services import RobotServices
 from .io.sensor_topics import LinkStates, SensorTopics, Step, Surroundings
 from .io.topics import JOINT_RATE, NONE, DriveTopics, ForceTopics, JointTopics, Schedule
-from .io.wait_set import Reader
 from .link_states import LinkState, link_tree
 from .physics.jointed import Forces, JointedBody, Motors
 from .physics.movers import Mover

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.kinematics import Wheel, mecanum_rates, to_body, to_world, wheel_rate
+from holozen.kinematics import Wheel, mecanum_rates, planar_velocity, to_body, to_world, wheel_rate
 
 speeds = st.floats(-5, 5)
 angles = st.floats(-10, 10)
@@ -81,3 +81,20 @@ def test_a_mecanum_wheel_rolls_what_its_rollers_cannot(
 
 def test_a_mecanum_base_goes_left_on_crossed_wheels() -> None:
     assert mecanum_rates((0, 0.3, 0), 0.5, 0.1) == pytest.approx((-3, 3, 3, -3))
+
+
+@given(speeds, speeds, speeds, st.floats(0.02, 1), st.floats(0.02, 1))
+def test_the_velocity_of_omni_wheels_is_the_one_that_turns_them(
+    x: float, y: float, turn: float, arm: float, radius: float
+) -> None:
+    angles = [math.radians(degrees) for degrees in (30, 150, 270)]
+    wheels = [Wheel("w", arm * math.cos(a), arm * math.sin(a), math.cos(a), math.sin(a), radius) for a in angles]
+    for some in (wheels, [*wheels, Wheel("w", 2 * arm, 0, 1, 0, radius)]):
+        found = planar_velocity([wheel_rate((x, y, turn), wheel) for wheel in some], some)
+        assert found == pytest.approx((x, y, turn), abs=1e-6)
+
+
+def test_wheels_that_leave_a_velocity_open_are_refused() -> None:
+    beside = [Wheel("w", 0, side, 0, 1, 0.1) for side in (0.2, 0.0, -0.2)]
+    with pytest.raises(ValueError, match="leave a velocity open"):
+        planar_velocity([1, 1, 1], beside)

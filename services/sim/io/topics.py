@@ -7,6 +7,9 @@ from random import Random
 from typing import Any
 
 from holozen.bus import Bus
+from holozen.command.inputs import ForceInput, JointInput, TwistInput
+from holozen.command.motion import AppliedForces, JointMotion
+from holozen.command.wait_set import Moment, Reader
 from holozen.limits import STOP, Planar
 from holozen.messages import (
     CommandStatus,
@@ -33,11 +36,8 @@ from holozen.rotation import XYZ, XYZW, conjugate, from_axis_angle, multiply, ro
 from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
-from ..command.inputs import ForceInput, JointInput, TwistInput
-from ..command.motion import AppliedForces, JointMotion
 from ..physics.body import JointStates, Moved
 from ..physics.movers import Limited
-from .wait_set import Moment, Reader
 
 JOINT_RATE = 50.0  # Hz of sim time
 

@@ -2,12 +2,12 @@
 
 import math
 
+from holozen.command.motion import AppliedForce, JointMotion
 from holozen.limits import clamp
 from holozen.robot.model import Force, Joint, Pose, RobotModel
 from holozen.robot.rigid import Frame, Part, in_parts
 from holozen.rotation import XYZ, XYZW, multiply, rotate
 
-from ..command.motion import AppliedForce, JointMotion
 from .body import Body, JointStates, Links
 from .dynamics import damping_of, load_on, set_joint, set_surface
 from .engine import NOTHING, UPRIGHT, Bodies, Shapes, bullet

@@ -7,10 +7,10 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
+from holozen.command.arbiter import AUTOPILOT, HELD, MAX_HELD, Arbiter, Driver
+from holozen.command.motion import JointMotion, Motion
 from holozen.limits import STOP, Planar
 from holozen.transport.samples import PRIORITIES
-from services.sim.command.arbiter import AUTOPILOT, HELD, MAX_HELD, Arbiter, Driver
-from services.sim.command.motion import JointMotion, Motion
 
 FORWARD: Planar = (0.3, 0.0, 0.0)
 LEFT: Planar = (0.0, 0.3, 0.0)

@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from holozen.command.arbiter import Arbiter
+from holozen.command.inputs import CommandStats, ForceInput
+from holozen.command.motion import AppliedForce
 from holozen.messages import Vector3, Wrench
 from holozen.robot.loading import parse
 from holozen.robot.model import Force, Pushed
 from holozen.robot.rotation import matrix_of
 from holozen.rotation import from_rpy
-from services.sim.command.arbiter import Arbiter
-from services.sim.command.inputs import CommandStats, ForceInput
-from services.sim.command.motion import AppliedForce
 from services.sim.physics.jointed import Forces, Motors
 from services.sim.physics.world import World
 from tests.unit.sim.fakes import FakeSenders, received

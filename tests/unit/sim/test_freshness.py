@@ -2,9 +2,9 @@
 
 import pytest
 
+from holozen.command.freshness import MAX_KNOWN, MAX_WAITING, PROMPT, Freshness
 from holozen.messages import Twist
 from holozen.transport.pubsub import Received
-from services.sim.command.freshness import MAX_KNOWN, MAX_WAITING, PROMPT, Freshness
 from tests.unit.sim.fakes import FakeSenders, received
 
 GO, STOP = Twist.planar(0.3), Twist()

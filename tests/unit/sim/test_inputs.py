@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from holozen.command.arbiter import Arbiter
+from holozen.command.inputs import REPORT_EVERY, TwistInput
+from holozen.command.motion import Motion
 from holozen.limits import STOP
 from holozen.messages import CommandSource, Header, Time, Twist, TwistStamped, Vector3
 from holozen.wire import MAX_STAMP_AGE
-from services.sim.command.arbiter import Arbiter
-from services.sim.command.inputs import REPORT_EVERY, TwistInput
-from services.sim.command.motion import Motion
 from tests.unit.sim.fakes import FakeSenders, received
 
 CLOCKS = (1000.0, 5.0)  # the day's and the sim's

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from holozen.command.motion import JointMotion, motion_of
 from holozen.messages import JointState
 from holozen.robot.loading import load, parse
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import lowest
-from services.sim.command.motion import JointMotion, motion_of
 from services.sim.physics.jointed import JointedBody, Motors
 from services.sim.physics.movers import mover_for
 from services.sim.physics.world import World

@@ -15,6 +15,7 @@ from types import SimpleNamespace
 import pytest
 import zenoh
 
+from holozen.command.time import DISTRUST
 from holozen.limits import STOP
 from holozen.messages import (
     Clock,
@@ -36,7 +37,7 @@ from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, PRIORITY_OF
 from services.sim import loop as loop_module
 from services.sim.entities import Entities
-from services.sim.loop import DISTRUST, POLL, Loop
+from services.sim.loop import POLL, Loop
 from services.sim.physics.engine import UPRIGHT
 from services.sim.physics.world import World
 

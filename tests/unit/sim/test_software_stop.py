@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.sim.command.arbiter import MAX_PER_RANK, SoftwareStop
+from holozen.command.arbiter import MAX_PER_RANK, SoftwareStop
 
 RANK, PERSON = 4, 1
 STOPPED = "stopped: by ann@1; `holozen release` lets it drive again"

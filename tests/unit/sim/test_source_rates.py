@@ -2,7 +2,7 @@
 
 import pytest
 
-from services.sim.command.inputs import MAX_RATES, RECENT, SourceRates
+from holozen.command.inputs import MAX_RATES, RECENT, SourceRates
 
 
 @pytest.fixture

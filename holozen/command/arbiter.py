@@ -6,12 +6,11 @@ No clock, no socket.
 import math
 from dataclasses import dataclass, replace
 
+from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
+from holozen.command.time import ROUNDING, CommandTime
 from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
-
-from .motion import AppliedForce, AppliedForces, Motion, is_stop
-from .time import ROUNDING, CommandTime
 
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # no source ranks above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here down, a source waits for `resume` once a higher one has driven

@@ -5,14 +5,13 @@ from functools import partial
 from typing import Any
 
 from holozen.bus import Bus
+from holozen.command.arbiter import Arbiter
+from holozen.command.wait_set import Moment, Reader
 from holozen.console import report
 from holozen.messages import TriggerReply, TriggerRequest
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import RING, Server
 from holozen.wire import key_for
-
-from ..command.arbiter import Arbiter
-from .wait_set import Moment, Reader
 
 MAX_REQUESTS = 16  # of one service answered per poll; a flood of them must not stall the steps
 RELEASED = (
@@ -23,13 +22,16 @@ RELEASED = (
 
 class RobotServices:
     """Serves them in the namespace of the key `command`, for all `arbiters` alike. `changed` is called with the
-    time, in s, before a stop or a release is confirmed.
+    time, in s, before a stop or a release is confirmed. `reporter` begins the lines that tell of it.
     """
 
     VERBS = ("release", "resume", "stop")
 
-    def __init__(self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[float], None]) -> None:
-        self._arbiters, self._changed = arbiters, changed
+    def __init__(
+        self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[float], None],
+        reporter: str = "sim",
+    ) -> None:  # fmt: skip
+        self._arbiters, self._changed, self._reporter = arbiters, changed, reporter
         answers = (self._on_release, self._on_resume, self._on_stop)
         self._namespace = namespace = command.rpartition("/")[0]
         self._release, self._resume, self._stop = self._servers = tuple(
@@ -93,5 +95,5 @@ class RobotServices:
         return TriggerReply(True, "every source may drive")
 
     def _report_change(self, what: str) -> None:
-        report(f"sim: {self._namespace or 'the robot'} {what}")
+        report(f"{self._reporter}: {self._namespace or 'the robot'} {what}")
         self._changed(self._now)

@@ -1,5 +1,7 @@
-"""The time by which commands grow old."""
+"""The time by which commands grow old, and since when those may have waited that are read."""
 
+STALL = 0.1  # s without reading; commands may have waited this long
+DISTRUST = 0.1  # s after a stall in which the network's buffers may still bring old commands
 ROUNDING = 1e-6  # s; by which times may be off: the step that ends a silence must not depend on the clock's value
 
 
@@ -34,3 +36,19 @@ class CommandTime:
     def play(self, now: float) -> None:
         """Let real time pass."""
         self._ahead, self.is_held, self.slack = self.at(now) - now, False, 0.0
+
+
+class Reads:
+    """When commands were read, from `now` (s) on."""
+
+    def __init__(self, now: float) -> None:
+        self._last = self._before_stall = now
+        self._trusted_from = 0.0
+
+    def since(self, now: float) -> float:
+        """Commands are read at `now`: the time at or after which those came that wait."""
+        if now - self._last > STALL:
+            self._before_stall, self._trusted_from = self._last, now + DISTRUST
+        since = self._last if now >= self._trusted_from else self._before_stall
+        self._last = now
+        return since

@@ -7,6 +7,9 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import TypeVar
 
+from holozen.command.arbiter import Arbiter
+from holozen.command.freshness import Freshness, Judged, Senders, source_of
+from holozen.command.motion import AppliedForce, AppliedForces, JointMotion, is_stop, motion_of
 from holozen.console import report
 from holozen.limits import STOP, Planar, clamp_speed
 from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped, Wrench
@@ -15,10 +18,6 @@ from holozen.suggest import listed
 from holozen.transport.pubsub import Received
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import MAX_STAMP_AGE, implausible
-
-from .arbiter import Arbiter
-from .freshness import Freshness, Judged, Senders, source_of
-from .motion import AppliedForce, AppliedForces, JointMotion, is_stop, motion_of
 
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s

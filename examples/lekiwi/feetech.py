@@ -1,0 +1,112 @@
+"""Feetech's serial bus servos (STS3215), as wheels: speeds out, speeds in. Linux, no further library.
+
+Source of packets and addresses: Feetech's protocol manual for the SMS and STS series. A speed is in steps per second,
+4096 steps a turn, with its sign in bit 15.
+"""
+
+import math
+import os
+import select
+import termios
+import time
+import tty
+from collections.abc import Iterable, Mapping
+from typing import Self
+
+READ, WRITE, SYNC_WRITE = 2, 3, 0x83  # instructions
+ALL = 0xFE  # the id of all servos; nobody answers
+MODE, TORQUE, GOAL_SPEED, SPEED = 33, 40, 46, 58  # addresses
+SPEED_MODE = 1
+STEPS = 4096 / math.tau  # a radian
+ANSWER = 0.02  # s; a servo answers within 1 ms, a USB adapter holds it up for some more
+
+
+class ServoError(Exception):
+    """A servo did not answer, or the port is gone. The text is one line."""
+
+
+def packet(servo: int, instruction: int, parameters: bytes = b"") -> bytes:
+    """The bytes of an instruction, or of an answer with its error in that place."""
+    body = bytes((servo, len(parameters) + 2, instruction)) + parameters
+    return b"\xff\xff" + body + bytes((~sum(body) & 0xFF,))
+
+
+def speed_bytes(rate: float) -> bytes:
+    """A rate in rad/s as the servo has it."""
+    steps = min(round(abs(rate) * STEPS), 0x7FFF)
+    return (steps | (0x8000 if rate < 0 else 0)).to_bytes(2, "little")
+
+
+def rate_of(value: bytes) -> float:
+    """The rate in rad/s of a servo's speed."""
+    number = int.from_bytes(value, "little")
+    return (number & 0x7FFF) / STEPS * (-1 if number & 0x8000 else 1)
+
+
+class Servos:
+    """The servos on a serial port such as /dev/ttyACM0, at 1 Mbit/s. Raises ServoError."""
+
+    def __init__(self, port: str) -> None:
+        self._port = port
+        try:
+            self._file = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_CLOEXEC)
+            tty.setraw(self._file)
+            modes = termios.tcgetattr(self._file)
+            modes[4] = modes[5] = termios.B1000000
+            termios.tcsetattr(self._file, termios.TCSANOW, modes)
+        except (OSError, termios.error) as error:
+            raise ServoError(f"cannot open {port}: {error.args[-1]}") from None
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        os.close(self._file)
+
+    def make_wheels(self, servos: Iterable[int]) -> None:
+        """Let servos turn for ever, at speed 0."""
+        for servo in servos:
+            for address, value in (
+                (TORQUE, b"\0"),
+                (MODE, bytes((SPEED_MODE,))),
+                (GOAL_SPEED, b"\0\0"),
+                (TORQUE, b"\1"),
+            ):
+                self._ask(servo, WRITE, bytes((address,)) + value)
+
+    def turn(self, rates: Mapping[int, float]) -> None:
+        """Let servos turn at `rates` (rad/s), from now on; no answer is waited for."""
+        values = b"".join(bytes((servo,)) + speed_bytes(rate) for servo, rate in rates.items())
+        self._send(packet(ALL, SYNC_WRITE, bytes((GOAL_SPEED, 2)) + values))
+
+    def rate(self, servo: int) -> float:
+        """The rate (rad/s) at which a servo turns."""
+        return rate_of(self._ask(servo, READ, bytes((SPEED, 2))))
+
+    def _ask(self, servo: int, instruction: int, parameters: bytes) -> bytes:
+        """The parameters of a servo's answer."""
+        termios.tcflush(self._file, termios.TCIFLUSH)
+        self._send(packet(servo, instruction, parameters))
+        received, deadline = b"", time.monotonic() + ANSWER
+        while True:
+            start = received.find(bytes((0xFF, 0xFF, servo)))
+            whole = received[start:] if start >= 0 else b""
+            if len(whole) > 3 and len(whole) >= 4 + whole[3]:
+                answer = whole[: 4 + whole[3]]
+                if len(answer) < 6 or answer != packet(servo, answer[4], answer[5:-1]):
+                    raise ServoError(f"servo {servo} at {self._port}: its answer is garbled")
+                if answer[4]:
+                    raise ServoError(f"servo {servo} at {self._port} reports error {answer[4]:#04x}")
+                return answer[5:-1]
+            if not select.select([self._file], [], [], max(0.0, deadline - time.monotonic()))[0]:
+                raise ServoError(f"servo {servo} at {self._port} does not answer: is it powered, is that its id?")
+            try:
+                received += os.read(self._file, 256)
+            except OSError as error:
+                raise ServoError(f"{self._port}: {error.strerror}") from None
+
+    def _send(self, data: bytes) -> None:
+        try:
+            os.write(self._file, data)
+        except OSError as error:
+            raise ServoError(f"{self._port}: {error.strerror}") from None

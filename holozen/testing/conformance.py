@@ -1,0 +1,256 @@
+"""What any base promises that hears `cmd_vel`: put a robot through it before people stand beside it.
+
+    @pytest.fixture(scope="module")
+    def probe():
+        with Wire() as wire:
+            wire.start("sim")  # or your base
+            yield Probe(wire.bus)
+
+    @pytest.mark.parametrize("promise", PROMISES, ids=name)
+    def test_the_base_keeps_its_promises(promise, probe):
+        promise(probe)
+
+For one that runs, `python -m holozen.testing.conformance [ROBOT]` does the same. The robot moves: forward and back by
+some `speed` (m/s), for a few seconds at a time. Each promise raises AssertionError with what was seen instead.
+"""
+
+import argparse
+import math
+import struct
+import sys
+import time
+from collections.abc import Callable
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+from holozen import flags
+from holozen.bus import Bus
+from holozen.console import output, report
+from holozen.messages import Odometry, TriggerReply, TriggerRequest, Twist
+from holozen.messages.codec import encode, encoding
+from holozen.testing.process import wait_for
+from holozen.transport import connection
+from holozen.transport.errors import BusError
+from holozen.wire import COMMAND_SILENCE, key_for
+
+SPEED = 0.1  # m/s
+PATIENCE = 10.0  # s for a base to begin to move; it may be held up
+SETTLING = 3.0  # s from the last command to rest: COMMAND_SILENCE, its braking, and what a busy machine adds
+LOOK = 1.0  # s for which a base is watched that must not move
+EVERY = 0.05  # s between two commands, as a teleop sends them
+SLOWEST = 10.0  # Hz of odom: readers call it stale after 0.2 s
+AGREES = 0.25  # of the way: how far pose and twist of the odometry may be apart
+
+
+class Probe:
+    """A base by its robot's name, and two who command it: a script and a person. `connect` opens a bus by its name.
+
+    `speed` (m/s) is what it is driven at; what is slower than a fifth of that counts as rest.
+    """
+
+    def __init__(self, connect: Callable[[str], Bus], robot: str = "", speed: float = SPEED) -> None:
+        self.speed, self._robot, self._bus = speed, robot, connect("conformance")
+        self.odom = self._bus.subscribe(key_for("odom", robot), Odometry, depth=4096)
+        key = key_for("cmd_vel", robot)
+        self.script = self._bus.publisher(key, Twist)
+        self.person = connect("conformance_person").publisher(key, Twist, "INTERACTIVE_HIGH")
+
+    def call(self, service: str) -> None:
+        """Call one of the robot's services without fields, such as `stop`."""
+        self._bus.call(key_for(service, self._robot), TriggerRequest(), TriggerReply)
+
+    def newest(self) -> Odometry:
+        """An odom that comes after this call."""
+        self.watch(0.0)
+        wait_for(lambda: bool(self._read()), PATIENCE, "odom")
+        return self._last
+
+    def watch(self, seconds: float, meanwhile: Callable[[], object] = lambda: None) -> list[Odometry]:
+        """All odoms of so many seconds; `meanwhile` is called every EVERY seconds."""
+        found, end, due = list[Odometry](), time.monotonic() + seconds, 0.0
+        while (now := time.monotonic()) <= end:
+            if now >= due:
+                meanwhile()
+                due = now + EVERY
+            found += self._read()
+            time.sleep(0.002)
+        return found + self._read()
+
+    def drive(self, commands: Callable[[], object], way: int) -> None:
+        """Command until the robot moves forward (`way` 1) or back (-1)."""
+        due = 0.0
+
+        def moves() -> bool:
+            nonlocal due
+            if time.monotonic() >= due:
+                commands()
+                due = time.monotonic() + EVERY
+            return any(way * odom.twist.twist.linear.x > self.speed / 2 for odom in self._read())
+
+        wait_for(moves, PATIENCE, f"the robot to move {'forward' if way > 0 else 'back'} as commanded")
+
+    def rest(self, why: str, within: float = SETTLING) -> None:
+        """Wait until the robot rests."""
+        wait_for(lambda: any(map(self.rests, self._read())), within, f"the robot to rest {why}")
+
+    def rests(self, odom: Odometry) -> bool:
+        """Whether it moves slower than a fifth of the speed."""
+        return odom.twist.twist.is_slow(self.speed / 5)
+
+    def calm(self) -> None:
+        """Let go, wait for rest, and let everybody drive again."""
+        self.person.put(Twist())
+        self.script.put(Twist())
+        self.rest("after a stop was sent")
+        time.sleep(2 * COMMAND_SILENCE)
+        try:
+            self.call("resume")
+        except BusError:  # a base may have no such service: then nobody has to be resumed
+            pass
+
+    def _read(self) -> list[Odometry]:
+        found = [received.message for received in iter(self.odom.try_recv, None) if received.message]
+        self._last = found[-1] if found else getattr(self, "_last", Odometry())
+        return found
+
+
+def it_obeys_and_stops_in_silence(probe: Probe) -> None:
+    """It moves as commanded, and rests once nobody has commanded for 0.5 s."""
+    probe.drive(lambda: probe.script.put(Twist.planar(probe.speed)), 1)
+    probe.rest(f"after {COMMAND_SILENCE:g} s without a command: is there a watchdog?")
+
+
+def it_stops_at_once_when_told_so(probe: Probe) -> None:
+    """A zero Twist stops it."""
+    probe.drive(lambda: probe.script.put(Twist.planar(-probe.speed)), -1)
+    probe.script.put(Twist())
+    probe.rest("after a zero command")
+
+
+def it_refuses_what_is_no_speed(probe: Probe) -> None:
+    """A NaN, an infinity and an absurd speed move nothing, leave odometry finite, and it obeys again afterwards."""
+    for bad in (math.nan, math.inf, 1e300):
+        payload = encode(Twist.planar(probe.speed), "cdr").replace(
+            struct.pack("<d", probe.speed), struct.pack("<d", bad)
+        )
+        send = partial(probe.script.put_bytes, payload, encoding("cdr", Twist))
+        seen = probe.watch(LOOK, send)
+        assert seen, f"no odom after a speed of {bad}"
+        for odom in seen:
+            numbers = (*odom.pose.pose.planar(), odom.twist.twist.linear.x, odom.twist.twist.linear.y)
+            assert all(map(math.isfinite, numbers)), f"odom has {numbers} after a speed of {bad}"
+            assert probe.rests(odom), f"the robot moves at {numbers[3]:g} m/s after a speed of {bad}"
+    it_obeys_and_stops_in_silence(probe)
+
+
+def a_person_comes_first(probe: Probe) -> None:
+    """While a script commands forward, four times as often, a person commands back: it moves back."""
+
+    def both() -> None:
+        for _ in range(4):
+            probe.script.put(Twist.planar(probe.speed))
+        probe.person.put(Twist.planar(-probe.speed))
+        for _ in range(4):
+            probe.script.put(Twist.planar(probe.speed))
+
+    probe.drive(lambda: probe.script.put(Twist.planar(probe.speed)), 1)
+    probe.drive(both, -1)
+    for odom in probe.watch(LOOK, both):
+        x = odom.twist.twist.linear.x
+        assert x < 0, (
+            f"the robot moves at {x:g} m/s, while a person commands {-probe.speed:g} and a script the opposite"
+        )
+    probe.calm()
+
+
+def it_stands_while_it_is_stopped(probe: Probe) -> None:
+    """After the service `stop` no command moves it; after `release` one does whose sender has let go."""
+    forward = partial(probe.script.put, Twist.planar(probe.speed))
+    probe.drive(forward, 1)
+    probe.call("stop")
+    try:
+        deadline = time.monotonic() + SETTLING
+        while not any(map(probe.rests, probe.watch(EVERY, forward))):
+            assert time.monotonic() < deadline, "the robot goes on after `stop`"
+        moving = [odom for odom in probe.watch(LOOK, forward) if not probe.rests(odom)]
+        assert not moving, f"the robot moves at {moving[0].twist.twist.linear.x:g} m/s while it is stopped"
+    finally:
+        probe.call("release")
+    probe.calm()
+    it_obeys_and_stops_in_silence(probe)
+
+
+def its_odometry_is_steady_and_agrees_with_itself(probe: Probe) -> None:
+    """odom comes at 10 Hz at least with increasing stamps and frames, and its pose moves as its twist says."""
+    probe.newest()
+    seen = probe.watch(2 * LOOK, lambda: probe.script.put(Twist.planar(probe.speed)))
+    stamps = [odom.header.stamp.seconds() for odom in seen]
+    assert len(seen) > 1, f"{len(seen)} odoms in {2 * LOOK:g} s"
+    assert all(later > earlier for earlier, later in pairwise(stamps)), "stamps do not increase"
+    rate = (len(seen) - 1) / (stamps[-1] - stamps[0])
+    assert rate >= SLOWEST, f"odom comes at {rate:.1f} Hz; at least {SLOWEST:g} Hz are needed"
+    assert seen[0].header.frame_id, "odom has no header.frame_id"
+    assert seen[0].child_frame_id, "odom has no child_frame_id"
+    speeds = [odom.twist.twist.linear.x for odom in seen[1:]]
+    way = sum(speed * (later - earlier) for speed, (earlier, later) in zip(speeds, pairwise(stamps), strict=True))
+    (x, y, _), (x1, y1, _) = seen[0].pose.pose.planar(), seen[-1].pose.pose.planar()
+    went = math.hypot(x1 - x, y1 - y)
+    assert abs(went - abs(way)) <= AGREES * abs(way) + 0.01, f"its pose moved {went:.3f} m, its twist says {way:.3f} m"
+    probe.rest("after silence")
+
+
+PROMISES: tuple[Callable[[Probe], None], ...] = (
+    it_obeys_and_stops_in_silence, it_stops_at_once_when_told_so, it_refuses_what_is_no_speed, a_person_comes_first,
+    it_stands_while_it_is_stopped, its_odometry_is_steady_and_agrees_with_itself,
+)  # fmt: skip
+
+
+def name(promise: Any) -> str:
+    """What a promise says, in words."""
+    return str(promise.__name__).replace("_", " ")
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Put a robot that runs through all promises; returns 0 if it keeps them."""
+    parser = flags.Parser(
+        prog="python -m holozen.testing.conformance",
+        description="Check what a base promises. The robot MOVES: clear some metres, and keep a hand at its switch.",
+        epilog="example: python -m holozen.testing.conformance Fred --speed 0.05",
+    )
+    parser.add_argument("robot", nargs="?", default="", type=flags.robot, help="the robot's name")
+    parser.add_argument(
+        "--speed", type=flags.number(0.01, 1.0, "m/s"), default=SPEED, metavar="M/S", help="default: %(default)g"
+    )
+    connection.add_arguments(parser)
+    args: argparse.Namespace = parser.parse_args(argv)
+    where, buses, broken = connection.from_arguments(args), list[Bus](), 0
+
+    def connect(node: str) -> Bus:
+        buses.append(Bus(node, where))
+        return buses[-1]
+
+    try:
+        probe = Probe(connect, args.robot, args.speed)
+        if not probe.watch(PATIENCE / 2):
+            report(f"conformance: no odom of {args.robot or 'a robot without a name'} at {where.where}; start its base")
+            return 1
+        for promise in PROMISES:
+            try:
+                promise(probe)
+                output(f"ok      {name(promise)}")
+            except AssertionError as error:
+                broken += 1
+                output(f"BROKEN  {name(promise)}: {error}")
+                probe.calm()
+    except (BusError, AssertionError) as error:
+        report(f"conformance: {error}")
+        return 1
+    finally:
+        for bus in buses:
+            bus.close()
+    return int(broken > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
