@@ -32,7 +32,7 @@ ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
 MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
-OPTIONAL = ("matplotlib", "pycollada", "viser")  # not in requirements.lock: only `bag plot` and `view` need them
+OPTIONAL = ("matplotlib", "viser")  # not in requirements.lock: only `bag plot` and `view` need them
 SHARED = (
     "delete_entity", "get_entities", "get_entity_state", "set_entity_state", "get_simulation_state",
     "set_simulation_state", "step_simulation", "reset_simulation", "get_scene", "robot_description",

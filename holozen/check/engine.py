@@ -9,13 +9,14 @@ from typing import Literal
 
 from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
 from holozen.check.sources import SourceFile, elements, read_sources, trace
+from holozen.robot import reader
 from holozen.robot.elements import Tag, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import check_simulated
-from holozen.robot.xacro import Outcome, is_xacro, process, read_text
+from holozen.robot.xacro import Outcome, is_xacro, read_text
 
 Severity = Literal["error", "warning"]
 
@@ -225,10 +226,12 @@ def read(
     requirements: Requirements,
     allow_env: Collection[str] = (),
 ) -> Subject:
-    """The file, expanded and loaded as far as possible. Raises RobotError if it is not the XML of a robot."""
+    """The file, expanded and loaded as far as possible, in the process that reads. Raises RobotError if it is not the
+    XML of a robot.
+    """
     text = read_text(path)
     expanded = is_xacro(path, text)
-    outcome = process(path, args, packages, allow_env) if expanded else Outcome(text)
+    outcome = reader.ask("expand") if expanded else Outcome(text)
     if outcome.error:
         raise RobotError(outcome.error)
     plain, place = outcome.text, f"{path}{EXPANDED}" if expanded else str(path)
@@ -306,7 +309,7 @@ def _refusals(subject: Subject) -> Iterator[tuple[Severity, Mistake]]:
 def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:
     """Element of the expanded text -> its place in a source file, or in the text if unknown."""
     try:
-        marks = trace(subject.sources, root, subject.args, subject.packages, subject.allow_env)
+        marks = trace(subject.sources, root, subject.packages)
     except (RobotError, OSError):
         marks = []
     tags = list(elements(root))

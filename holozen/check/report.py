@@ -29,9 +29,13 @@ from holozen.check.engine import (
     read,
     split,
 )
+from holozen.check.sources import expand_marked
+from holozen.robot import reader
 from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, FORCE, OMNI, kind_of
+from holozen.robot.packages import readable
+from holozen.robot.xacro import process
 from holozen.suggest import shorten
 
 # A file that cannot be read.
@@ -106,9 +110,31 @@ def check(
     `allow_env` as for `xacro.expand`. Any file is accepted; one that cannot be read has one finding and no summary.
     """
     try:
-        subject = read(path, args, packages, requirements, allow_env)
+        return reader.run(
+            tuple[list[Finding], str], path, _check, path, args, packages, requirements, allow_env,
+            readable=partial(_readable, path, packages, requirements),
+            handlers={
+                "expand": partial(process, path, args, packages, allow_env),
+                "marked": partial(expand_marked, path, args, packages, allow_env),
+            },
+        )  # fmt: skip
     except RobotError as error:
         return [_fatal(path, str(error))], ""
+
+
+def _readable(path: Path, packages: Mapping[str, Path], requirements: Requirements) -> list[str]:
+    required = [requirements.require] if requirements.require else []
+    return [*readable(path, packages), *map(str, required)]
+
+
+def _check(
+    path: Path,
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    requirements: Requirements,
+    allow_env: Collection[str],
+) -> tuple[list[Finding], str]:
+    subject = read(path, args, packages, requirements, allow_env)
     mistakes = [(rule, mistake) for rule in RULES for mistake in _first(rule, subject)]
     mistakes += [(rule, mistake) for rule in (LOAD, NOTE) for mistake in _unreported(rule, subject, mistakes)]
     findings = [_finding(rule, mistake, subject) for rule, mistake in mistakes]

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.parsers import expat
 
+from holozen.robot import reader
 from holozen.robot.elements import Tag, read_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.packages import find_by_name, find_package
+from holozen.robot.packages import find_by_name, find_package, known_folders, lies_in
 from holozen.robot.xacro import expand_in_child, read_text
 
 MARK = "holozen-line"  # the attribute that carries file and line through xacro
@@ -45,39 +46,44 @@ def read_sources(path: Path, packages: Mapping[str, Path]) -> list[SourceFile]:
     return list(files.values())
 
 
-def trace(
-    sources: list[SourceFile],
-    plain: Tag,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    allow_env: Collection[str],
-) -> list[str]:
+def trace(sources: list[SourceFile], plain: Tag, packages: Mapping[str, Path]) -> list[str]:
     """For each element of the expanded text in order: "source file number:line", or nothing if unknown.
 
     The files are expanded a second time, with a mark in each start tag. The result is used only if the text is the
     same otherwise. Raises RobotError if the copies cannot be read.
     """
-    try:
-        with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
-            copies = _copies(sources, Path(folder))
-            found = {**_packages(sources, packages), **packages}
-            outcome = expand_in_child(copies[sources[0].path], args, found, allow_env)
-    except OSError:  # there is no writable folder
+    copies = {source.path: Path(f"{number}.xacro") for number, source in enumerate(sources)}
+    texts = [_marked(source, number, copies) for number, source in enumerate(sources)]
+    found = {name: str(folder) for name, folder in _packages(sources, packages).items()}
+    text = reader.ask("marked", texts, found)
+    if not text:
         return []
-    if outcome.error:
-        return []
-    marked = list(elements(read_xml(outcome.text, "marked")))
+    marked = list(elements(read_xml(text, "marked")))
     places = [tag.attributes.pop(MARK, "") for tag in marked]
     same = [(tag.name, tag.attributes) for tag in marked] == [(tag.name, tag.attributes) for tag in elements(plain)]
     return places if same else []
 
 
-def _copies(sources: list[SourceFile], folder: Path) -> dict[Path, Path]:
-    """Marked copies of the files in `folder`, by their paths."""
-    copies = {source.path: folder / f"{number}.xacro" for number, source in enumerate(sources)}
-    for number, source in enumerate(sources):
-        copies[source.path].write_bytes(_marked(source, number, copies))
-    return copies
+def expand_marked(
+    path: Path,
+    args: Mapping[str, str],
+    packages: Mapping[str, Path],
+    allow_env: Collection[str],
+    texts: list[bytes],
+    found: Mapping[str, str],
+) -> str:
+    """The text of the marked copies of `path` and of what it includes, expanded; empty if that fails. For the process
+    outside: of the packages `found` by the one that reads, only those that `path` may use count.
+    """
+    known = known_folders(path, packages)
+    given = {name: Path(folder) for name, folder in found.items() if lies_in(Path(folder, "package.xml"), known)}
+    try:
+        with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
+            for number, text in enumerate(texts):
+                Path(folder, f"{number}.xacro").write_bytes(text)
+            return expand_in_child(Path(folder, "0.xacro"), args, {**given, **packages}, allow_env).text
+    except OSError:  # there is no writable folder
+        return ""
 
 
 def elements(root: Tag) -> Iterator[Tag]:
@@ -134,7 +140,9 @@ def _marked(source: SourceFile, number: int, copies: Mapping[Path, Path]) -> byt
 
 def _copy(name: str, source: SourceFile, copies: Mapping[Path, Path]) -> bytes:
     found = source.includes.get(name)
-    path = str(copies.get(found, found)) if found else name
+    if found and found in copies:
+        return f'"{copies[found]}"'.encode()  # beside this copy
+    path = str(found) if found else name
     full = path.startswith(("/", "$(find", "$(env", "$(optenv", "$(cwd", "$(dirname"))
     return f'"{path if full else source.path.parent.absolute() / path}"'.encode()
 

@@ -72,7 +72,6 @@ ELSEWHERE = {
 """Verbs of ROS's tools and other likely guesses, with what to use instead."""
 EXTRAS = (
     "PIL",
-    "collada",
     "cryptography",
     "lz4",
     "matplotlib",

@@ -163,12 +163,12 @@ def read(
     allow_env: Collection[str] = (),
 ) -> Candidate:
     """Read and check a file here, where its lines are known; warnings are reported. Raises RobotError."""
-    from holozen.robot.loading import load, portable
+    from holozen.robot.loading import both
     from holozen.robot.model import takes
     from holozen.robot.rigid import FALLS, falls_through
     from holozen.wire import robot_name
 
-    model = load(path, args, packages, strict, allow_env)
+    model, text = both(path, args, packages, strict, allow_env)
     for warning in model.warnings:
         report(f"holozen spawn: warning: {warning}")
     try:
@@ -177,7 +177,6 @@ def read(
         raise RobotError(f"{path}: {error}; give one with --name") from None
     if falls_through(model):
         report(f"holozen spawn: warning: {path}: {FALLS}; give a link a <collision>")
-    text, _ = portable(path, args, packages, allow_env)  # its warnings are among the model's
     if drive and takes(model, drive):
         return _driven(Candidate(name, text, model), drive)
     if drive:

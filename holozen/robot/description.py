@@ -4,10 +4,14 @@ import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
+import numpy as np
+import numpy.typing as npt
+
+from holozen.robot import reader
 from holozen.robot.elements import Source
 from holozen.robot.errors import RobotError
-from holozen.robot.meshes import file_uri
-from holozen.robot.model import Joint, Link, Pose, RobotModel, Shape
+from holozen.robot.meshes import Surface, file_uri, surfaces_in
+from holozen.robot.model import Color, Joint, Link, Pose, RobotModel, Shape
 from holozen.robot.packages import NOWHERE
 from holozen.robot.rigid import Frame
 from holozen.robot.urdf import read_joint, read_link
@@ -17,11 +21,38 @@ THIN = 0.002  # m; how thick a plane is shown
 
 
 @dataclass(frozen=True, slots=True)
+class Mesh:
+    """Triangles as bytes, as they come from the process that read them; `arrays` checks them. `color` is that of the
+    mesh file, if it has one.
+    """
+
+    points: bytes
+    triangles: bytes
+    color: Color | None = None
+
+    def arrays(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
+        """Points (n, 3) in metres, without the scale of the shape, and triangles (m, 3) of their indexes."""
+        points = np.frombuffer(self.points, np.float32).reshape(-1, 3)
+        triangles = np.frombuffer(self.triangles, np.uint32).reshape(-1, 3)
+        if not np.isfinite(points).all() or (len(triangles) and triangles.max() >= len(points)):
+            raise ValueError("triangles without corners, or corners nowhere")
+        return points, triangles
+
+
+@dataclass(frozen=True, slots=True)
 class Appearance:
-    """Links with their visual shapes, whose meshes are in `data`, and joints, of which every child has one."""
+    """Links with their visual shapes, and joints, of which every child has one. `meshes`, by link and shape, are what
+    the shapes that are meshes consist of; one that cannot be read has none.
+    """
 
     links: tuple[Link, ...]
     joints: tuple[Joint, ...]
+    meshes: tuple[tuple[tuple[Mesh, ...], ...], ...] = ()
+
+    def shapes(self) -> Iterator[tuple[Link, list[tuple[Shape, tuple[Mesh, ...]]]]]:
+        """Each link, and its visual shapes with their meshes."""
+        for link, meshes in zip(self.links, self.meshes, strict=True):
+            yield link, [*zip(link.visuals, meshes, strict=True)]
 
 
 def written(model: RobotModel) -> str:
@@ -47,13 +78,35 @@ def written(model: RobotModel) -> str:
 
 
 def read(text: str) -> Appearance:
-    """What `written`, or any URDF, describes; no file is opened. Raises RobotError."""
+    """What `written`, or any URDF, describes; no file is opened. It is read in a process apart. Raises RobotError."""
+    return reader.run(Appearance, "robot_description", _read, text, only_known=True)
+
+
+def _read(text: str) -> Appearance:
     source = Source(NOWHERE / "robot_description", {}, confined=True)
     robot = source.read(text, "")
     if robot.name != "robot":
         raise robot.wrong("is not a robot")
-    links = tuple(read_link(tag, source) for tag in robot.all("link"))
-    return Appearance(links, tuple(read_joint(tag, source) for tag in robot.all("joint")))
+    links = [read_link(tag, source) for tag in robot.all("link")]
+    joints = tuple(read_joint(tag, source) for tag in robot.all("joint"))
+    meshes = tuple(tuple(tuple(_meshes(shape)) for shape in link.visuals) for link in links)
+    bare = (replace(link, visuals=tuple(replace(shape, data="") for shape in link.visuals)) for link in links)
+    return Appearance(tuple(bare), joints, meshes)
+
+
+def _meshes(shape: Shape) -> list[Mesh]:
+    if not shape.data:
+        return []
+    try:
+        return [_mesh(surface) for surface in surfaces_in(shape.data)]
+    except (RobotError, ArithmeticError, ValueError):
+        return []
+
+
+def _mesh(surface: Surface) -> Mesh:
+    count = len(surface.points)
+    triangles = np.arange(count - count % 3) if surface.triangles is None else surface.triangles
+    return Mesh(surface.points.astype(np.float32).tobytes(), triangles.astype(np.uint32).tobytes(), surface.color)
 
 
 def _sent(shape: Shape) -> Shape:

@@ -10,6 +10,7 @@ from dataclasses import replace
 from itertools import product
 
 import numpy as np
+from msgspec import structs
 
 from holozen.robot.elements import LARGEST, Source, Tag, Vector, number
 from holozen.robot.errors import RobotError
@@ -279,7 +280,7 @@ def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
     if wheels.radius:
         return drive
     link, radius = _first_radius(left[0], plugin, robot)
-    return drive if _round(link) else replace(drive, mechanism=replace(wheels, radius=radius))
+    return drive if _round(link) else replace(drive, mechanism=structs.replace(wheels, radius=radius))
 
 
 def _check_once(left: tuple[str, ...], right: tuple[str, ...], plugin: Tag) -> None:
@@ -539,7 +540,7 @@ def with_publisher(drive: Drive, settings: Settings, source: Source) -> Drive:
     """The drive with the odometry of an OdometryPublisher, which is the true pose."""
     wheels = drive.mechanism
     if isinstance(wheels, Differential | Mecanum | Omni):
-        wheels = replace(wheels, encoder=False)
+        wheels = structs.replace(wheels, encoder=False)
     return replace(
         drive,
         odometry_topic=_gz_topic(settings, "odometry", "odom", "odom_topic"),

@@ -1,20 +1,25 @@
-"""Robot files -> a checked RobotModel, or a self-contained text."""
+"""Robot files -> a checked RobotModel, or a self-contained text. What is hostile in them is read in a process apart."""
 
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import TypeVar
 from xml.parsers import expat
 
+from holozen.robot import reader
 from holozen.robot.elements import Source, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.meshes import data_uri, file_uri
 from holozen.robot.model import RobotModel
-from holozen.robot.packages import is_data, resolve_uri
+from holozen.robot.packages import is_data, readable, readable_by_strangers, resolve_uri
 from holozen.robot.sdf_models import parse_sdf
 from holozen.robot.urdf import read_robot
-from holozen.robot.xacro import expand, expanded, is_xacro, read_text
+from holozen.robot.xacro import expanded, is_xacro, read_text
 from holozen.suggest import cut
+
+T = TypeVar("T")
 
 
 def load(
@@ -27,13 +32,46 @@ def load(
     """The robot in a xacro, URDF or SDF file. `args`, `packages` and `allow_env` as for `xacro.expand`. Raises
     RobotError; with `strict` also for a missing or invalid mesh, otherwise replaced by a box with a warning.
     """
+    text, place, warnings = _written(path, args, packages, allow_env)
+    model = _apart(RobotModel, path, packages, parse, text, path, packages, place, strict)
+    return replace(model, warnings=warnings + model.warnings)
+
+
+def received(text: str, packages: Mapping[str, Path] = {}) -> RobotModel:
+    """The robot in a text that came over the network. Raises RobotError."""
+    origin = Path("resource_string")
+    known = partial(readable_by_strangers, packages)
+    return reader.run(
+        RobotModel,
+        origin,
+        _parse_received,
+        text,
+        origin,
+        packages,
+        readable=known,
+        only_known=True,
+        seconds=MOST_SECONDS,
+    )
+
+
+def _parse_received(text: str, origin: Path, packages: Mapping[str, Path]) -> RobotModel:
+    return parse(text, origin, packages, confined=True)
+
+
+def _written(
+    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
+) -> tuple[str, str, tuple[str, ...]]:
+    """The text of a file, expanded; how messages name it, and the warnings of its expansion."""
     text = read_text(path)
     if not is_xacro(path, text):
-        return parse(text, path, packages, "", strict)
+        return text, "", ()
     outcome = expanded(path, args, packages, allow_env)
     # Line numbers are those of the expanded text, so messages have to mention it.
-    model = parse(outcome.text, path, packages, f"{path} (as `holozen xacro` prints it)", strict)
-    return replace(model, warnings=outcome.warnings + model.warnings)
+    return outcome.text, f"{path} (as `holozen xacro` prints it)", outcome.warnings
+
+
+def _apart(kind: type[T], path: Path, packages: Mapping[str, Path], function: Callable[..., T], *args: object) -> T:
+    return reader.run(kind, path, function, *args, readable=partial(readable, path, packages))
 
 
 def parse(
@@ -57,6 +95,7 @@ def parse(
     return read_robot(tag, source)
 
 
+MOST_SECONDS = 3  # of the processor, for a text that was sent: the sim waits for it
 MESHES = {"collision": ["collision", "geometry", "mesh"], "visual": ["visual", "geometry", "mesh"]}
 MOST_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accepts MOST_TEXT in all
 
@@ -73,7 +112,25 @@ def portable(
     `args`, `packages` and `allow_env` are those of `xacro.expand`. Raises RobotError for a file that
     cannot be read or is not XML.
     """
-    text, _ = repair_xml(expand(path, args, packages, allow_env))
+    text, _, _ = _written(path, args, packages, allow_env)
+    return _apart(tuple[str, tuple[str, ...]], path, packages, _with_meshes, text, path, packages)
+
+
+def both(
+    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], strict: bool, allow_env: Collection[str]
+) -> tuple[RobotModel, str]:
+    """What `load` and `portable` make of a file, in one go; the warnings of the latter are among the model's."""
+    text, place, warnings = _written(path, args, packages, allow_env)
+    model, sent = _apart(tuple[RobotModel, str], path, packages, _both, text, path, packages, place, strict)
+    return replace(model, warnings=warnings + model.warnings), sent
+
+
+def _both(text: str, path: Path, packages: Mapping[str, Path], place: str, strict: bool) -> tuple[RobotModel, str]:
+    return parse(text, path, packages, place, strict), _with_meshes(text, path, packages)[0]
+
+
+def _with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[str, tuple[str, ...]]:
+    text, _ = repair_xml(text)
     read_xml(text, str(path))  # reports broken XML with its line, and rejects entities
     data = text.encode()
     warnings: list[str] = []

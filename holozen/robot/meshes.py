@@ -1,4 +1,4 @@
-"""Mesh files (.dae, .stl, .obj) -> the points of a convex hull, in metres in the link's frame."""
+"""Mesh files (.dae, .stl, .obj) -> triangles, and the points of a convex hull, in metres in the link's frame."""
 
 import base64
 import binascii
@@ -13,6 +13,7 @@ from array import array
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import lru_cache
+from itertools import pairwise
 from pathlib import Path
 from typing import BinaryIO, TypeVar
 
@@ -108,7 +109,18 @@ def _check(part: Array, place: str) -> None:
         raise RobotError(f"{place}: has a vertex beyond {FARTHEST:g}; export it again, in metres")
 
 
-# STL, binary and ASCII -> the corners of the triangles.
+@dataclass(frozen=True, slots=True)
+class Surface:
+    """Points (n, 3) in metres that its triangles use: (m, 3) of their indexes; None: three by three, as they come.
+    `color` is that of the file, if it has one: red, green, blue, alpha.
+    """
+
+    points: Array
+    triangles: npt.NDArray[np.int64] | None = None
+    color: tuple[float, float, float, float] | None = None
+
+
+# STL, binary and ASCII -> triangles.
 
 
 HEAD = 84  # bytes: 80 of any text, then the number of triangles
@@ -119,19 +131,19 @@ BLOCK = 4_000_000  # bytes of text at once
 _VERTEX = re.compile(rb"vertex\s+(\S+\s+\S+\s+\S+)")
 
 
-def read_stl(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
-    """Corners (n, 3), one part of the file at a time. `size` is the file's in bytes. Raises RobotError."""
+def read_stl(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
+    """The triangles, one part of the file at a time. `size` is the file's in bytes. Raises RobotError."""
     head = file.read(HEAD)
     count = int.from_bytes(head[80:HEAD], "little")
     whole = HEAD + count * TRIANGLE.itemsize
     # A binary file may also start with "solid", so its size decides.
     if size != whole and head.lstrip().lower().startswith(b"solid"):
-        yield from _ascii(file, head, place)
+        yield from map(Surface, _ascii(file, head, place))
     elif len(head) < HEAD or size < whole:
         expected = f"{count} triangles take {whole}" if len(head) == HEAD else f"the head alone takes {HEAD}"
         raise RobotError(f"{place}: is cut off: it has {size} bytes, and {expected}; export it again as STL")
     else:
-        yield from _binary(file, count)
+        yield from map(Surface, _binary(file, count))
 
 
 def write_stl(points: Array) -> bytes:
@@ -170,22 +182,26 @@ def _ascii_corners(text: bytes, place: str) -> Array:
         raise RobotError(f"{place}: a vertex is not a number: {str(error)[:200]}") from None
 
 
-# Wavefront OBJ -> the corners of the faces.
+# Wavefront OBJ -> triangles: each face is a fan of them about its first corner.
 
 
 VERTEX = (b"v ", b"v\t")
 FACE = (b"f ", b"f\t")
 
 
-def read_obj(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
-    """The vertices (n, 3) that faces use. Raises RobotError with the line."""
+def read_obj(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
+    """The triangles of all faces. Raises RobotError with the line."""
     vertices, used = array("d"), array("q")
     for number, line in enumerate(file, 1):
         try:
             if line.startswith(VERTEX):
                 vertices.extend(_vertex(line.split()[1:4]))
             elif line.startswith(FACE):
-                used.extend(_face_corners(line.split()[1:], len(vertices) // 3))
+                corners = _face_corners(line.split()[1:], len(vertices) // 3)
+                if len(corners) < 3:
+                    corners += corners[-1:] * (3 - len(corners))  # of no area, but they count for the hull
+                for second, third in pairwise(corners[1:]):
+                    used.extend((corners[0], second, third))
         except OverflowError:
             raise RobotError(f"{place}, line {number}: a face refers to a vertex that does not exist") from None
         except ValueError as error:
@@ -207,21 +223,20 @@ def _face_corners(words: list[bytes], count: int) -> list[int]:
     return [number - 1 if number > 0 else count + number for number in numbers]
 
 
-def _chosen(vertices: Array, used: npt.NDArray[np.int64], place: str) -> Array:
+def _chosen(vertices: Array, used: npt.NDArray[np.int64], place: str) -> Surface:
     low, high = int(used.min()), int(used.max())
     if low < 0 or high >= len(vertices):
         raise RobotError(f"{place}: a face refers to vertex {(low if low < 0 else high) + 1} of {len(vertices)}")
     chosen = np.zeros(len(vertices), bool)
     chosen[used] = True
-    return vertices[chosen]
+    return Surface(vertices[chosen], (np.cumsum(chosen) - 1)[used].reshape(-1, 3))
 
 
-# COLLADA -> the corners of the faces in metres, z up. Following the COLLADA 1.4 specification, `<unit>` is the file's
+# COLLADA -> triangles in metres, z up. Following the COLLADA 1.4 specification, `<unit>` is the file's
 # unit of length in metres, `<up_axis>` (Y_UP by default) is rotated to z, and each geometry is placed by the nodes of
 # the scene.
 
 
-FACES = ("triangles", "polylist", "polygons", "tristrips", "trifans")
 UP = {
     "Z_UP": ((1, 0, 0), (0, 1, 0), (0, 0, 1)),
     "Y_UP": ((1, 0, 0), (0, 0, -1), (0, 1, 0)),
@@ -232,19 +247,20 @@ MOST_NODES = 20_000  # nodes that instantiate nodes can make a short file expand
 MOST_POINTS = 20_000_000  # and one geometry may be instantiated by many nodes
 
 
-def read_dae(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
-    """Corners (n, 3) of each geometry of the scene. Raises RobotError."""
+def read_dae(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
+    """The triangles of each geometry of the scene, by material. Raises RobotError."""
     root = read_xml(file.read(size).decode("utf-8-sig", "replace"), place, most=size)
     if root.name != "COLLADA":
         raise root.wrong("is not a <COLLADA>; a .dae file starts with one")
     scene, turned, total = _Scene.of(root), _unit(root) * np.array(UP[_up(root)], float), 0
-    for geometry, frame in scene.placed(root):
-        points = scene.corners(geometry)
-        total += len(points)
-        if total > MOST_POINTS:
-            raise RobotError(f"{place}: has more than {MOST_POINTS} corners in its scene; simplify it")
-        if len(points):
-            yield (points @ frame[:3, :3].T + frame[:3, 3]) @ turned.T
+    for geometry, frame, instance in scene.placed(root):
+        for surface, material in scene.surfaces(geometry):
+            total += len(surface.points)
+            if total > MOST_POINTS:
+                raise RobotError(f"{place}: has more than {MOST_POINTS} corners in its scene; simplify it")
+            if len(surface.points):
+                points = (surface.points @ frame[:3, :3].T + frame[:3, 3]) @ turned.T
+                yield Surface(points, surface.triangles, scene.color(instance, material))
 
 
 def _unit(root: Tag) -> float:
@@ -265,10 +281,12 @@ def _up(root: Tag) -> str:
 
 @dataclass(slots=True)
 class _Scene:
-    """The elements of a file by kind and id, and the corners of geometries that were read."""
+    """The elements of a file by kind and id, and the surfaces of geometries that were read, each with the symbol of
+    its material.
+    """
 
     elements: dict[tuple[str, str], Tag]
-    read: dict[int, Array] = field(default_factory=dict)
+    read: dict[int, list[tuple[Surface, str]]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, root: Tag) -> "_Scene":
@@ -288,8 +306,8 @@ class _Scene:
             raise tag.wrong(f"{attribute}={cut(name)} names no <{kind}> of this file")
         return found
 
-    def placed(self, root: Tag) -> Iterator[tuple[Tag, Array]]:
-        """Each `<geometry>` of the scene, and its 4 x 4 frame."""
+    def placed(self, root: Tag) -> Iterator[tuple[Tag, Array, Tag]]:
+        """Each `<geometry>` of the scene, its 4 x 4 frame, and the element that places it there."""
         scene = root.first("scene") or Tag("scene", {}, root.place, root)
         waiting = [(self.named("visual_scene", tag), np.eye(4)) for tag in scene.all("instance_visual_scene")]
         for _ in range(MOST_NODES):
@@ -297,41 +315,54 @@ class _Scene:
                 return
             node, above = waiting.pop()
             frame = above @ _transform(node)
-            yield from ((self.named("geometry", tag), frame) for tag in node.all("instance_geometry"))
+            yield from ((self.named("geometry", tag), frame, tag) for tag in node.all("instance_geometry"))
             yield from (self._skin(tag, frame) for tag in node.all("instance_controller"))
             waiting += [(tag, frame) for tag in node.all("node")]
             waiting += [(self.named("node", tag), frame) for tag in node.all("instance_node")]
         raise root.wrong(f"has more than {MOST_NODES} nodes in its scene, or one that contains itself")
 
-    def _skin(self, tag: Tag, frame: Array) -> tuple[Tag, Array]:
+    def _skin(self, tag: Tag, frame: Array) -> tuple[Tag, Array, Tag]:
         controller = self.named("controller", tag)
         skin = controller.first("skin")
         if skin is None:
             raise controller.wrong("has no <skin>; other controllers are not supported")
         bind = skin.first("bind_shape_matrix")
-        return self.named("geometry", skin, "source"), frame if bind is None else frame @ _matrix(bind)
+        return self.named("geometry", skin, "source"), frame if bind is None else frame @ _matrix(bind), tag
 
-    def corners(self, geometry: Tag) -> Array:
-        """The vertices (n, 3) that the faces of a geometry use, in its own frame."""
+    def color(self, instance: Tag, symbol: str) -> tuple[float, float, float, float] | None:
+        """The diffuse colour that a geometry's material has where it is placed; None for a texture, or none."""
+        bound = (tag for tag in instance.below("instance_material") if tag.attributes.get("symbol") == symbol)
+        try:
+            material = self.named("material", next(bound), "target")
+            effect = self.named("effect", next(material.below("instance_effect")))
+            red, green, blue, alpha = color = next(next(effect.below("diffuse")).below("color")).content(4)
+        except (StopIteration, RobotError):
+            return None
+        return (red, green, blue, alpha) if all(0 <= part <= 1 for part in color) else None
+
+    def surfaces(self, geometry: Tag) -> list[tuple[Surface, str]]:
+        """The triangles of a geometry in its own frame, each with the symbol of its material."""
         if id(geometry) not in self.read:
             mesh = geometry.first("mesh") or geometry
-            parts = [self._used(tag) for tag in mesh.children if tag.name in FACES]
-            self.read[id(geometry)] = np.vstack([np.zeros((0, 3)), *parts])
+            found = [(self._surface(tag), tag.attributes.get("material", "")) for tag in mesh.children
+                     if tag.name in _TRIANGLES]  # fmt: skip
+            self.read[id(geometry)] = found
         return self.read[id(geometry)]
 
-    def _used(self, faces: Tag) -> Array:
+    def _surface(self, faces: Tag) -> Surface:
         inputs = {tag.attributes.get("semantic"): tag for tag in faces.all("input")}
         if "VERTEX" not in inputs:
             raise faces.wrong("has no <input semantic='VERTEX'>")
         offsets = [int(tag.number("offset", 0.0)) for tag in inputs.values()]
         offset, stride = int(inputs["VERTEX"].number("offset", 0.0)), max(offsets) + 1
-        texts = [p.text for p in faces.below("p")]
-        used = np.unique(np.concatenate([np.zeros(0, np.int64), *(_numbers(faces, t)[offset::stride] for t in texts)]))
+        parts = [_numbers(faces, p.text)[offset::stride] for p in faces.below("p")]
+        corners = np.concatenate([np.zeros((0, 3)), *(_TRIANGLES[faces.name](faces, part) for part in parts)])
+        used, triangles = np.unique(corners, return_inverse=True)
         points = self._positions(self.named("vertices", inputs["VERTEX"], "source"))
         indexes = used.astype(np.int64)
         if len(indexes) and not 0 <= indexes[0] <= indexes[-1] < len(points):
             raise faces.wrong(f"names vertex {indexes[0] if indexes[0] < 0 else indexes[-1]} of {len(points)}")
-        return points[indexes]
+        return Surface(points[indexes], triangles.reshape(-1, 3))
 
     def _positions(self, vertices: Tag) -> Array:
         inputs = [tag for tag in vertices.all("input") if tag.attributes.get("semantic") == "POSITION"]
@@ -347,6 +378,46 @@ class _Scene:
             raise accessor.wrong(f"has offset {start} and stride {stride}; a position takes 3 numbers")
         numbers = _numbers(values, values.text)[start:]
         return numbers[: len(numbers) // stride * stride].reshape(-1, stride)[:, :3]
+
+
+def _triples(_faces: Tag, corners: Array) -> Array:
+    missing = -len(corners) % 3  # of a triangle that is cut off: its corners count for the hull
+    return np.concatenate([corners, corners[-1:].repeat(missing)]).reshape(-1, 3)
+
+
+def _fan(faces: Tag, corners: Array) -> Array:
+    """The triangles of one convex polygon."""
+    if len(corners) < 3:
+        return _triples(faces, corners)
+    return np.stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]], axis=1)
+
+
+def _strip(faces: Tag, corners: Array) -> Array:
+    if len(corners) < 3:
+        return _triples(faces, corners)
+    found = np.stack([corners[:-2], corners[1:-1], corners[2:]], axis=1)
+    found[1::2] = found[1::2, ::-1]  # every second one is turned round
+    return found
+
+
+def _polygons(faces: Tag, corners: Array) -> Array:
+    """The triangles of polygons, of which `<vcount>` gives the number of corners."""
+    tag = faces.first("vcount")
+    counts = np.zeros(0) if tag is None else _numbers(tag, tag.text)
+    if (len(counts) and counts.min() < 0) or counts.sum() != len(corners):
+        raise faces.wrong(f"has {len(corners)} corners, and <vcount> other numbers of them")
+    whole = counts.astype(np.int64)
+    fans = np.maximum(whole - 2, 0)
+    first = np.repeat(np.cumsum(whole) - whole, fans)
+    next_one = first + 1 + np.arange(fans.sum()) - np.repeat(np.cumsum(fans) - fans, fans)
+    triangles: Array = corners[np.stack([first, next_one, next_one + 1], axis=1)]
+    return triangles
+
+
+_TRIANGLES: dict[str, Callable[[Tag, Array], Array]] = {
+    "triangles": _triples, "polylist": _polygons, "polygons": _fan, "tristrips": _strip, "trifans": _fan,
+}  # fmt: skip
+"""Element -> what makes triangles (m, 3) of the corners in one of its <p>."""
 
 
 def _transform(node: Tag) -> Array:
@@ -414,7 +485,7 @@ UNSCALED = (1.0, 1.0, 1.0)
 MOST_DATA = 1_000_000  # characters of a data: URI; the hull of any mesh takes 6000
 POINTER = b"version https://git-lfs.github.com/spec/v1"  # the content of a placeholder for a file that was not fetched
 
-Reader = Callable[[BinaryIO, int, str], Iterator[Array]]
+Reader = Callable[[BinaryIO, int, str], Iterator[Surface]]
 READERS: dict[str, tuple[Reader, int]] = {
     ".dae": (read_dae, 100_000_000),
     ".obj": (read_obj, 80_000_000),
@@ -483,9 +554,17 @@ def file_in(uri: str) -> tuple[str, bytes]:
     return next(suffix for suffix, kind in KINDS.items() if kind == head[1]), content
 
 
+def surfaces_in(uri: str) -> Iterator[Surface]:
+    """The triangles of what `file_uri` made. Raises RobotError."""
+    suffix, content = file_in(uri)
+    for part in READERS[suffix][0](io.BytesIO(content), len(content), f"the {suffix[1:]} mesh"):
+        _check(part.points, f"the {suffix[1:]} mesh")
+        yield part
+
+
 @lru_cache(maxsize=64)
 def _packed(path: str, _mtime: int, size: int) -> str:
-    kind = KINDS.get(os.path.splitext(path)[1].lower())
+    kind = KINDS.get(os.path.splitext(os.path.realpath(path))[1].lower())  # a link may lead to private data
     if kind is None or not 0 < size <= MOST_SHOWN:
         raise RobotError(f"{path}: a mesh to show is a {', '.join(KINDS)} file of up to {MOST_SHOWN / 1e6:.0f} MB")
     try:
@@ -550,8 +629,8 @@ def _read(path: str, size: int) -> Array:
         raise RobotError(f"{path}: {error.strerror}") from None
 
 
-def _farthest(parts: Iterator[Array], place: str) -> Array:
-    found = extremes(parts, place)
+def _farthest(parts: Iterator[Surface], place: str) -> Array:
+    found = extremes((part.points for part in parts), place)
     if not len(found):
         raise RobotError(f"{place}: has no faces")
     return found

@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from msgspec import Struct
+
 from holozen.robot.elements import Vector
 from holozen.wire import COMMAND_SILENCE
 
@@ -131,18 +133,15 @@ class Force:
     in_link: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Pushed:
+class Pushed(Struct, frozen=True, tag=True):
     """Only the forces of the model move it; cmd_vel does not."""
 
 
-@dataclass(frozen=True, slots=True)
-class Planar:
+class Planar(Struct, frozen=True, tag=True):
     """The whole robot moves over the plane at the commanded body-frame velocity: planar_move, VelocityControl."""
 
 
-@dataclass(frozen=True, slots=True)
-class Differential:
+class Differential(Struct, frozen=True, tag=True):
     """Wheels on two sides: linear.x and angular.z are used, linear.y is ignored. Four or more make a skid-steer.
 
     `left` and `right` name joints. `separation` between the sides and `radius` of the wheels are in metres; 0: measured
@@ -160,8 +159,7 @@ class Differential:
     acceleration: float = math.inf
 
 
-@dataclass(frozen=True, slots=True)
-class Mecanum:
+class Mecanum(Struct, frozen=True, tag=True):
     """Four wheels with rollers at 45 degrees. Joints by position; metres; 0: measured on the robot's links.
     `encoder` as for Differential.
     """
@@ -186,8 +184,7 @@ class Mecanum:
         return self.front_right, self.back_right
 
 
-@dataclass(frozen=True, slots=True)
-class Omni:
+class Omni(Struct, frozen=True, tag=True):
     """Omni or mecanum wheels, three or more: it moves any way. They are the continuous joints with a level axle that
     carry rollers; without such, those with a round collision shape. `encoder` as for Differential.
     """
@@ -195,14 +192,14 @@ class Omni:
     encoder: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Balancing:
+class Balancing(Struct, frozen=True, tag=True):
     """Two wheels that balance the body while it drives: wheely_boi."""
 
     left: str = "jointL"
     right: str = "jointR"
 
 
+PLANAR = Planar()
 Mechanism = Planar | Differential | Mecanum | Omni | Balancing | Pushed
 
 
@@ -240,7 +237,7 @@ class Drive:
     covariance: tuple[float, float, float] = (1e-5, 1e-5, 1e-3)
     odometry_from_start: bool = False
     odometry_noise: float = 0.0
-    mechanism: Mechanism = Planar()
+    mechanism: Mechanism = PLANAR
     max_linear: float = math.inf
     max_angular: float = math.inf
     max_linear_acceleration: float = math.inf
@@ -272,8 +269,7 @@ class Fan:
         return (self.last - self.first) / (self.count - 1) if self.count > 1 else 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Lidar:
+class Lidar(Struct, frozen=True, tag=True):
     """Rays from `near` to `far` metres, at angles to the left of x and upwards. `noise` is added to the ranges.
     `message` is "scan", "points", or "range" for the nearest of all, which is `infrared` or ultrasound.
     """
@@ -287,8 +283,7 @@ class Lidar:
     infrared: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Imu:
+class Imu(Struct, frozen=True, tag=True):
     """Noise of x, y, z of the rotation rate (rad/s) and of the acceleration (m/s^2). `oriented`: whether it measures
     its orientation too.
     """
@@ -298,8 +293,7 @@ class Imu:
     oriented: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Camera:
+class Camera(Struct, frozen=True, tag=True):
     """A pinhole camera that looks along x, y to the left of its picture; `width` and `height` in pixels,
     `field_of_view` across the width in rad, `near` and `far` in m. `encoding` is "rgb8" or "mono8"; `noise` is that of
     a pixel from 0 to 1. Pictures, their CameraInfo and depth are published on the keys `image`, `info` and `depth`;

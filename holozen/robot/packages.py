@@ -184,11 +184,28 @@ def remember_folders() -> None:
     _children, _name_in_package_xml = cache(_children), cache(_name_in_package_xml)
 
 
+def readable(start: Path, given: Mapping[str, Path] = {}) -> list[str]:
+    """The files and folders that a robot or world file `start` may read, its own among them: what its reader may open
+    (see `reader.run`).
+    """
+    around = [start.absolute().parent, *(folder / "models" for folder in folders_above(start))]
+    folders = [*known_folders(start, given), *without_home(around), *_known_folders(given)]
+    models = Path.home() / ".gazebo" / "models"
+    names = [folder / "package.xml" for folder in local_packages(start).values()]
+    return [*dict.fromkeys(map(os.path.abspath, (start, *folders, models, *names)))]
+
+
+def readable_by_strangers(given: Mapping[str, Path] = {}) -> list[str]:
+    """The folders in which text that came over the network may refer to files."""
+    return [*map(os.path.abspath, _known_folders(given))]
+
+
 # Mesh URIs -> files.
 
 
 MOST_FOLDERS = 5000  # searched for a missing mesh in one package; bounds the search if a home folder looks like one
 MODEL_PATHS = ("GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH")
+VARIABLES = ("HOME", "AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", *MODEL_PATHS)  # of the environment, that find packages
 NOWHERE = Path("/")  # the origin of text received over the network: no package is above it
 
 _URI = re.compile(r"(?:([A-Za-z][A-Za-z0-9+.-]+)://)?(.*)", re.DOTALL)

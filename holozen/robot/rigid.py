@@ -328,7 +328,7 @@ LEVEL = (0.0, 0.0, 0.0)
 
 def lowest(model: RobotModel, rpy: Vector = LEVEL) -> float:
     """z in metres of the lowest collision point under the root frame, with all joints at zero and the root turned by
-    `rpy` in radians; 0 without collision shapes. Raises RobotError for a mesh that can no longer be read.
+    `rpy` in radians; 0 without collision shapes.
     """
     turned = Frame.of(Pose(rpy=rpy))
     frames = {name: turned @ frame for name, frame in link_frames(model).items()}

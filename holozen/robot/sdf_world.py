@@ -1,10 +1,13 @@
 """SDF worlds -> physics step, gravity, real-time factor, ground and models."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
+from holozen.robot import reader
 from holozen.robot.elements import Source, Tag, Vector
 from holozen.robot.model import GRAVITY, STEP, RobotModel, WorldSpec
+from holozen.robot.packages import readable
 from holozen.robot.rigid import Frame, link_frames
 from holozen.robot.sdf import (
     Includes,
@@ -22,7 +25,11 @@ LEVEL = 1e-9  # m, and of a unit vector; tolerance for a plane to count as the g
 
 
 def load_world(path: Path, packages: Mapping[str, Path] = {}) -> WorldSpec:
-    """The world in an SDF file. Raises RobotError naming file and line."""
+    """The world in an SDF file, read in a process apart. Raises RobotError naming file and line."""
+    return reader.run(WorldSpec, path, _load_world, path, packages, readable=partial(readable, path, packages))
+
+
+def _load_world(path: Path, packages: Mapping[str, Path]) -> WorldSpec:
     source = Source(path, packages)
     return read_world(read_file(path, source), source)
 

@@ -7,7 +7,8 @@ its ROS message whether it has a plugin or not, and one without an update rate h
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
+
+from msgspec import structs
 
 from holozen.robot.elements import Source, Tag, number
 from holozen.robot.errors import RobotError
@@ -211,7 +212,7 @@ def _devices(about: _About) -> list[tuple[str, Lidar | Imu | Camera]]:
     lidar = _sonar(about) if about.kind == "sonar" else _lidar(about)
     topic = about.topic(lidar.message, "topic_name")
     if lidar.vertical.count > 1 and not about.plugin_kind and about.kind != "sonar":  # gz-sim publishes both
-        return [(topic, lidar), (f"{topic}/points", replace(lidar, message="points"))]
+        return [(topic, lidar), (f"{topic}/points", structs.replace(lidar, message="points"))]
     return [(topic, lidar)]
 
 

@@ -284,11 +284,8 @@ def mesh_shape(tag: Tag, uri: str, pose: Pose, use: str, source: Source, color: 
 
 
 def solid(shape: Shape) -> Shape:
-    """The shape for the sim: the convex hull of a mesh that was found; others unchanged. Raises RobotError."""
-    if shape.kind != "mesh" or shape.path is None:
-        return shape
-    x, y, z = shape.size
-    return replace(shape, kind="hull", size=(), points=hull(shape.path, (x, y, z)))
+    """The shape for the sim: the convex hull of a collision mesh that was found; others unchanged."""
+    return replace(shape, kind="hull", size=()) if shape.kind == "mesh" and shape.points else shape
 
 
 def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Source) -> Shape:
@@ -303,7 +300,7 @@ def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Sour
     if use == "collision":
         if source.confined and os.path.getsize(path) > MOST_BYTES:
             raise RobotError(f"{path}: is too large to be read by the sim; send the mesh itself (holozen spawn does)")
-        hull(path, scale)  # reports an invalid one with its line; `solid` does not read it again
+        return Shape("mesh", scale, pose, path, points=hull(path, scale))
     return Shape("mesh", scale, pose, path)
 
 

@@ -17,9 +17,10 @@ from typing import IO, Any
 from xml.parsers.expat import ExpatError, ParserCreate
 
 from holozen.console import report
+from holozen.robot import reader
 from holozen.robot.elements import MOST_TEXT, check_size, read_xml, repair_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.packages import MODEL_PATHS, find_package
+from holozen.robot.packages import VARIABLES, find_package
 from holozen.suggest import cut
 
 # The result of an expansion, and its inputs: files, wildcards, environment variables and packages.
@@ -175,7 +176,6 @@ main(asked)
 """
 
 
-KEPT = ("HOME", "LD_LIBRARY_PATH", "AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", *MODEL_PATHS)  # of the environment
 MOST_OUTSIDE = 20  # robot files that are included from outside of all known folders
 
 
@@ -230,7 +230,7 @@ def _expand_once(
             "modules": [*map(str, sys.path), _ROOT],
             "note": note.fileno(),
         }
-        kept = {name: os.environ[name] for name in (*KEPT, *allow_env) if name in os.environ}
+        kept = {name: os.environ[name] for name in ("LD_LIBRARY_PATH", *VARIABLES, *allow_env) if name in os.environ}
         code, reply, words = _ask(json.dumps(asked).encode(), note.fileno(), kept)
         with contextlib.suppress(ValueError):
             answer = json.loads(reply)
@@ -380,8 +380,13 @@ def is_xacro(path: Path, text: str) -> bool:
 
 def uses_xacro(text: str) -> bool:
     """Whether any element uses xacro; comments do not count, and broken XML is another error."""
-    if not _XACRO.search(text):
-        return False
+    try:
+        return _XACRO.search(text) is not None and reader.run(bool, "the text", _uses_xacro, text)
+    except RobotError:
+        return False  # it is too much to read, which is reported later
+
+
+def _uses_xacro(text: str) -> bool:
     try:
         tags = [read_xml(repair_xml(text)[0], "")]
     except RobotError:

@@ -30,8 +30,8 @@ from holozen.robot.packages import (
     instead_of,
     known_folders,
     lies_in,
-    local_packages,
     portable_name,
+    readable,
     remember_folders,
     without_home,
 )
@@ -418,13 +418,10 @@ class Expansion:
     def _restrict(self) -> None:
         """Give up all files but those of known folders, and of Python for late imports."""
         remember_folders()
-        robot = self.path.absolute()
-        folders = [*known_folders(self.path, self.packages), *without_home([robot.parent])]
-        names = [folder / "package.xml" for folder in local_packages(self.path).values()]
         libraries = [Path(spec.origin) for name in ("xacro", "yaml") if (spec := find_spec(name)) and spec.origin]
         code = [Path(os.__file__).parent, *(each.parents[1] for each in libraries)]
         included = [path for path, allowed in self._outside.items() if allowed]
-        if lacks := restrict([str(robot), *included, *map(str, (*folders, *names, *code))]):
+        if lacks := restrict([*readable(self.path, self.packages), *included, *map(str, code)]):
             print(
                 f"this kernel lacks {lacks}: only xacro itself keeps {self.path} from files outside of known packages"
             )

@@ -32,7 +32,10 @@ def main(argv: list[str] | None = None) -> int:
     stop = stop_event()
     os.nice(NICE)
     try:
-        from .studio import Studio  # loads numpy and the engine, which --help does not need
+        from holozen.robot import description, reader
+
+        reader.start(description)
+        from .studio import Studio  # loads the engine, which --help does not need
 
         with Bus("camera", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             report(f"camera: renders what comes on {args.exposures}")

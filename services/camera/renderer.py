@@ -1,5 +1,6 @@
 """What a camera sees: the visual shapes of all entities, drawn by pybullet's TinyRenderer without a graphics card."""
 
+import contextlib
 import math
 import tempfile
 from typing import NamedTuple
@@ -9,9 +10,8 @@ import numpy.typing as npt
 
 from holozen.messages import Exposure
 from holozen.process import quiet
-from holozen.robot.description import Appearance
-from holozen.robot.errors import RobotError
-from holozen.robot.meshes import file_in
+from holozen.robot.description import Appearance, Mesh
+from holozen.robot.meshes import write_stl
 from holozen.robot.model import Pose, Shape
 from holozen.robot.rigid import Frame
 from holozen.rotation import Transform, rotate
@@ -61,7 +61,10 @@ class Renderer:
     def add(self, name: str, number: int, looks: Appearance) -> None:
         """Add an entity, or replace the one that had its name."""
         self.remove(name)
-        links = {link.name: [body for shape in link.visuals for body in self._made(shape)] for link in looks.links}
+        links = {
+            link.name: [body for shape, meshes in shapes for body in self._made(shape, meshes)]
+            for link, shapes in looks.shapes()
+        }
         self._bodies[name] = number, links
 
     def remove(self, name: str) -> None:
@@ -105,18 +108,15 @@ class Renderer:
                 for body in links.get(link, ()):
                     bullet.resetBasePositionAndOrientation(body, at.translation, at.rotation, self._world)
 
-    def _made(self, shape: Shape) -> list[int]:
-        """The body of a shape in the frame of its link; none for one that cannot be drawn."""
-        try:
-            visual = self._visual(shape)
-        except (bullet.error, RobotError):
-            return []
-        return [bullet.createMultiBody(0, -1, visual, physicsClientId=self._world)] if visual >= 0 else []
+    def _made(self, shape: Shape, meshes: tuple[Mesh, ...] = ()) -> list[int]:
+        """The bodies of a shape in the frame of its link; none for one that cannot be drawn."""
+        visuals = [self._visual(shape, mesh) for mesh in meshes] if shape.kind == "mesh" else [self._visual(shape)]
+        return [bullet.createMultiBody(0, -1, each, physicsClientId=self._world) for each in visuals if each >= 0]
 
-    def _visual(self, shape: Shape) -> int:
+    def _visual(self, shape: Shape, mesh: Mesh | None = None) -> int:
         frame = Frame.of(shape.pose)
         common = {
-            "rgbaColor": shape.color or GREY, "visualFramePosition": frame.xyz,
+            "rgbaColor": shape.color or (mesh and mesh.color) or GREY, "visualFramePosition": frame.xyz,
             "visualFrameOrientation": frame.quaternion, "physicsClientId": self._world,
         }  # fmt: skip
         match shape.kind:
@@ -127,15 +127,15 @@ class Renderer:
                 return int(bullet.createVisualShape(bullet.GEOM_CYLINDER, radius=radius, length=length, **common))
             case "sphere":
                 return int(bullet.createVisualShape(bullet.GEOM_SPHERE, radius=shape.size[0], **common))
-            case "mesh" if shape.data:
-                suffix, content = file_in(shape.data)
-                with tempfile.NamedTemporaryFile(suffix=suffix) as file:
-                    file.write(content)
+            case "mesh" if mesh:
+                # The engine's own readers, in C++, see nothing but this file of ours.
+                with contextlib.suppress(bullet.error, ValueError), tempfile.NamedTemporaryFile(suffix=".stl") as file:
+                    points, triangles = mesh.arrays()
+                    file.write(write_stl(points[triangles.ravel()].astype(np.float64)))
                     file.flush()
+                    scale = list(shape.size)
                     return int(
-                        bullet.createVisualShape(
-                            bullet.GEOM_MESH, fileName=file.name, meshScale=list(shape.size), **common
-                        )
+                        bullet.createVisualShape(bullet.GEOM_MESH, fileName=file.name, meshScale=scale, **common)
                     )
         return -1
 

@@ -76,8 +76,10 @@ def main(argv: list[str] | None = None) -> int:
         options.error("--shard gives each robot to the shard of its name: use --robot FILE=NAME, and no --join")
     stop = stop_event()
     try:
-        from holozen.robot.sdf_world import load_world  # loads numpy, which --help does not need
+        from holozen.robot import loading, reader  # they load numpy, which --help does not need
+        from holozen.robot.sdf_world import load_world
 
+        reader.start(loading)
         spec = load_world(args.world, dict(args.package))
         mine, bus = _open(args, stop)
         with bus, contextlib.ExitStack() as ending:

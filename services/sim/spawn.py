@@ -40,7 +40,8 @@ def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None =
     belong to it. Raises RobotError.
     """
     robots: list[tuple[Path, str]] = args.robot or [(data.find("urdf", "hb_bot.urdf.xacro"), "")]
-    models = [_read(path, args) for path, _ in robots]
+    read = {path: _read(path, args) for path in dict.fromkeys(path for path, _ in robots)}
+    models = [read[path] for path, _ in robots]
     # Without names, a namespace in each file is as good.
     names = [(name, command_key(model, name)) for model, (_, name) in zip(models, robots, strict=True)]
     for name, key in names:

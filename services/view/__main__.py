@@ -62,8 +62,11 @@ def main(argv: list[str] | None = None) -> int:
     stop = stop_event()
     try:
         _check_port(args.host, args.port)
+        from holozen.robot import description, loading, reader
+
         from .guard import Guard
 
+        reader.start(description, loading)
         guard = Guard(token)
         with _bus(args.bag, where, stop) as bus, contextlib.ExitStack() as ending:
             playback = None

@@ -1,19 +1,16 @@
 """Visual shapes -> triangles with one colour, as a browser draws them."""
 
-import io
+import contextlib
 import math
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-import collada
 import numpy as np
 import numpy.typing as npt
 import trimesh
 
-from holozen.robot.description import Appearance, read
-from holozen.robot.errors import RobotError
-from holozen.robot.meshes import UP, file_in
+from holozen.robot.description import Appearance, Mesh, read
 from holozen.robot.model import Pose, Shape
 
 RGB = tuple[int, int, int]
@@ -42,14 +39,10 @@ def appearance(text: str) -> tuple[Appearance, list[Parts]]:
     A mesh that cannot be read is not shown.
     """
     found = read(text)
-    return found, [[(shape.pose, part) for shape in link.visuals for part in _readable(shape)] for link in found.links]
-
-
-def _readable(shape: Shape) -> list[Part]:
-    try:
-        return list(_parts(shape))
-    except (RobotError, ValueError, TypeError, KeyError, IndexError, AttributeError, collada.common.DaeError):
-        return []  # libraries that read files raise what they come across
+    return found, [
+        [(shape.pose, part) for shape, meshes in shapes for part in _parts(shape, meshes)]
+        for _, shapes in found.shapes()
+    ]
 
 
 def arrow() -> Parts:
@@ -59,15 +52,14 @@ def arrow() -> Parts:
     return [(shape.pose, _part(_solid(shape), ORANGE)) for shape in (shaft, head)]
 
 
-def _parts(shape: Shape) -> Iterator[Part]:
-    color = shape.color
+def _parts(shape: Shape, meshes: tuple[Mesh, ...]) -> Iterator[Part]:
     if shape.kind != "mesh":
-        yield _part(_solid(shape), color or PLAIN)
-    elif shape.data:
-        suffix, content = file_in(shape.data)
-        for vertices, faces, own in _dae(content) if suffix == ".dae" else _other(content, suffix):
-            if np.isfinite(vertices).all() and 0 < len(faces) <= FINEST:
-                yield _part((vertices * shape.size, faces), color or own)
+        yield _part(_solid(shape), shape.color or PLAIN)
+    for mesh in meshes:
+        with contextlib.suppress(ValueError):  # it is left out
+            vertices, faces = mesh.arrays()
+            if 0 < len(faces) <= FINEST:
+                yield _part((vertices * shape.size, faces), shape.color or mesh.color or PLAIN)
 
 
 def _part(mesh: tuple[Any, Any], color: tuple[float, ...]) -> Part:
@@ -87,23 +79,3 @@ def _solid(shape: Shape) -> tuple[Any, Any]:
         case _:
             solid = trimesh.creation.icosphere(subdivisions=3, radius=shape.size[0])
     return solid.vertices, solid.faces
-
-
-def _other(content: bytes, suffix: str) -> Iterator[tuple[Any, Any, tuple[float, ...]]]:
-    mesh = trimesh.load_mesh(io.BytesIO(content), file_type=suffix[1:])
-    yield mesh.vertices, mesh.faces, PLAIN
-
-
-def _dae(content: bytes) -> Iterator[tuple[Any, Any, tuple[float, ...]]]:
-    """The triangles of each material in metres, z up, with its diffuse colour. Textures are not shown."""
-    scene = collada.Collada(io.BytesIO(content), ignore=[collada.common.DaeError])
-    turned = (scene.assetInfo.unitmeter or 1.0) * np.array(UP[scene.assetInfo.upaxis or "Y_UP"], float)
-    for geometry in scene.scene.objects("geometry"):
-        for primitive in geometry.primitives():
-            if hasattr(primitive, "triangleset"):
-                primitive = primitive.triangleset()
-            if isinstance(primitive, collada.triangleset.BoundTriangleSet):
-                effect = getattr(primitive.material, "effect", None)
-                diffuse = getattr(effect, "diffuse", None)
-                color = tuple(map(float, diffuse)) if isinstance(diffuse, tuple) and len(diffuse) == 4 else PLAIN
-                yield primitive.vertex @ turned.T, primitive.vertex_index, color

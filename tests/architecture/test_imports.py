@@ -17,7 +17,7 @@ PLACES = {
     "pybullet": ["services/camera/renderer.py", "services/sim/physics/"],
     "prompt_toolkit": ["services/teleop/app.py", "services/teleop/screen.py"],
     "numpy": ["holozen/robot/", "holozen/ros/", "services/camera/", "services/sim/", "services/view/"],
-    "collada": ["services/view/meshes.py"],
+    "collada": [],
     "viser": ["services/view/"],
     "websockets": ["services/view/guard.py"],
     "xacro": ["holozen/robot/xacro_child.py"],

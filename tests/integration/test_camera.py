@@ -134,7 +134,8 @@ def test_the_camera_moves_with_its_robot_and_forgets_what_is_gone(eye: Eye) -> N
 
 def test_the_end_of_the_camera_is_reported(eye: Eye) -> None:
     process = eye.sim.process
-    (camera,) = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    (camera,) = (child for child in children if b"camera" in Path(f"/proc/{child}/cmdline").read_bytes())
     os.kill(int(camera), signal.SIGKILL)
 
     def is_reported() -> bool:

@@ -1,5 +1,7 @@
 """The services of simulation_interfaces that add, list, move and delete entities."""
 
+import hashlib
+import math
 import re
 import time
 from collections.abc import Mapping
@@ -25,8 +27,8 @@ from holozen.messages import simulation_interfaces as si
 from holozen.messages.message import not_finite
 from holozen.robot.description import written
 from holozen.robot.errors import RobotError
-from holozen.robot.loading import parse
-from holozen.robot.model import RobotModel
+from holozen.robot.loading import received
+from holozen.robot.model import Link, RobotModel
 from holozen.robot.xacro import uses_xacro
 from holozen.rotation import XYZ, Transform
 from holozen.transport.services import answer_in_turn
@@ -38,9 +40,8 @@ from ..shard import Share
 
 MAX_SPEED = 100.0  # m/s and rad/s, of a state to set
 MAX_SPAWNS = 64  # waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
-REUSED = (
-    2.0  # s that a model serves all requests with the same text, as of a fleet; then its meshes are looked for anew
-)
+REUSED = 2.0  # s that a model with meshes in files serves all requests with its text; then they are looked for anew
+MOST_PARSED = 8  # texts whose models are kept, for a fleet, or a robot that is spawned again
 MAX_WARNINGS = 20  # about a robot's text in a reply
 MAX_TAGS = 20_000  # "<" in a text; parsing more of them would stall the steps
 WORLD = ("", "world", "odom", "map")  # frames that mean the world
@@ -49,9 +50,8 @@ _OK = si.Result(si.Result.OK)
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """A robot's text, and its model, which counts `until` a time in s (monotonic)."""
+    """The model of a text, which counts `until` a time in s (monotonic)."""
 
-    text: str
     model: RobotModel
     until: float
 
@@ -71,7 +71,7 @@ class EntityServices:
         share: Share | None = None,
     ) -> None:
         self._entities, self._packages, self._share = entities, packages, share
-        self._last: Parsed | None = None
+        self._parsed: dict[bytes, Parsed] = {}
         serve = partial(bus.serve, shared=share is not None)
         self._servers = [
             serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
@@ -123,9 +123,10 @@ class EntityServices:
 
     def _read(self, request: si.SpawnEntityRequest) -> RobotModel:
         """The robot of a request. No expression in it is evaluated, and only files of known packages are opened."""
-        text, last = request.resource_string, self._last
-        if last and last.text == text and time.monotonic() < last.until:
-            return last.model
+        text, now = request.resource_string, time.monotonic()
+        key = hashlib.sha256(text.encode()).digest()
+        if key in self._parsed and now < self._parsed[key].until:
+            return self._parsed[key].model
         if not text:
             problem = "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn FILE` sends it"
             raise EntityError(
@@ -140,10 +141,12 @@ class EntityServices:
                 "resource_string is xacro; expand it first: `holozen xacro FILE`",
             )
         try:
-            model = parse(text, Path("resource_string"), self._packages, confined=True)
+            model = received(text, self._packages)
         except RobotError as error:
             raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
-        self._last = Parsed(text, model, time.monotonic() + REUSED)
+        lasting = not model.warnings and not any(map(_has_file, model.links.values()))
+        self._parsed = dict([*self._parsed.items()][1 - MOST_PARSED :])
+        self._parsed[key] = Parsed(model, math.inf if lasting else time.monotonic() + REUSED)
         return model
 
     def delete(self, request: si.DeleteEntityRequest) -> si.DeleteEntityReply:
@@ -194,6 +197,10 @@ class EntityServices:
             raise EntityError(si.Result.OPERATION_FAILED, f"{request.entity!r} is static; its velocity cannot be set")
         self._entities.put(entity.name, place, linear, angular)
         return si.SetEntityStateReply(_OK)
+
+
+def _has_file(link: Link) -> bool:
+    return any(shape.path for shape in (*link.collisions, *link.visuals))
 
 
 def _seen(entity: Entity) -> SceneEntity:

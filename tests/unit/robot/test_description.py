@@ -4,13 +4,14 @@ import base64
 import gzip
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from holozen import data
-from holozen.robot.description import read, written
+from holozen.robot.description import Mesh, read, written
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import load, parse, portable
-from holozen.robot.meshes import file_in
+from holozen.robot.meshes import bounds, file_in
 from holozen.robot.packages import NOWHERE
 from holozen.robot.sdf_world import load_world
 
@@ -22,11 +23,14 @@ def test_it_has_the_links_shapes_and_joints_of_the_file(path: Path) -> None:
     model = load(path)
     found = read(written(model))
     assert [link.name for link in found.links] == list(model.links)
-    for link, before in zip(found.links, model.links.values(), strict=True):
-        for shape, own in zip(link.visuals, before.visuals, strict=True):
+    for (_, shapes), before in zip(found.shapes(), model.links.values(), strict=True):
+        for (shape, meshes), own in zip(shapes, before.visuals, strict=True):
             assert (shape.kind, shape.size, shape.pose, shape.color) == (own.kind, own.size, own.pose, own.color)
             if own.path:
-                assert file_in(shape.data) == (own.path.suffix, own.path.read_bytes())
+                corners = np.vstack(
+                    [points[triangles].reshape(-1, 3) for points, triangles in map(Mesh.arrays, meshes)]
+                )
+                assert np.allclose([corners.min(axis=0), corners.max(axis=0)], bounds(own.path), atol=1e-6)
     for joint, same in zip(found.joints, model.joints.values(), strict=True):
         assert (joint.name, joint.kind, joint.parent, joint.child) == (same.name, same.kind, same.parent, same.child)
         assert (joint.pose, joint.axis) == (same.pose, same.axis)

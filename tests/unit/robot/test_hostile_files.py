@@ -2,122 +2,27 @@
 memory, and one that came over the network opens no file outside known packages.
 """
 
-import base64
 import contextlib
 import gzip
 import os
+import re
 import resource
-import struct
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from holozen.check.report import check
+from holozen.robot.description import read
 from holozen.robot.errors import RobotError
-from holozen.robot.loading import parse
+from holozen.robot.loading import both, load, parse, received
 from holozen.robot.meshes import MOST_SHOWN, file_in
+from holozen.robot.sdf_world import load_world
+from holozen.robot.xacro import expand_xacro
+from tests.hostile import MESHES, data, laid_out
 
 MOST_MEMORY = 200e6  # bytes that all of them may take beyond what was taken before
-
-
-def link(inside: str) -> str:
-    return f'<robot name="r"><link name="a">{inside}</link></robot>'
-
-
-def mesh(uri: str) -> str:
-    return link(f'<collision><geometry><mesh filename="{uri}"/></geometry></collision>')
-
-
-def sdf_mesh(uri: str) -> str:
-    shape = f"<collision name='c'><geometry><mesh><uri>{uri}</uri></mesh></geometry></collision>"
-    return f"<sdf version='1.6'><model name='m'><link name='a'>{shape}</link></model></sdf>"
-
-
-ENTITIES = "".join(f'<!ENTITY e{n} "{f"&e{n - 1};" * 10}">' for n in range(1, 12))
-
-
-def data(kind: str, content: bytes) -> str:
-    return f"data:model/{kind};base64,{base64.b64encode(content).decode()}"
-
-
-def stl(count: int, triangles: bytes = b"") -> bytes:
-    return bytes(80) + struct.pack("<I", count) + triangles
-
-
-COLLADA = (
-    '<COLLADA><library_geometries><geometry id="g"><mesh><source id="s"><float_array count="99999999999">0'
-    '</float_array></source><triangles count="99999999999"><input semantic="VERTEX" source="#s" offset="9999999"/>'
-    "<p>0</p></triangles></mesh></geometry></library_geometries></COLLADA>"
-)
-HOSTILE = {
-    "entity bomb": f'<!DOCTYPE r [<!ENTITY e0 "x">{ENTITIES}]><robot name="&e11;"><link name="a"/></robot>',
-    "quadratic entity": f'<!DOCTYPE r [<!ENTITY a "{"x" * 100_000}">]><robot name="{"&a;" * 10_000}"/>',
-    "external entity": '<!DOCTYPE r [<!ENTITY x SYSTEM "file://{secret}">]>' + link("&x;"),
-    "external subset": '<!DOCTYPE robot SYSTEM "file://{secret}">' + link(""),
-    "parameter entity": '<!DOCTYPE r [<!ENTITY % p SYSTEM "file://{secret}"> %p;]>' + link(""),
-    "stylesheet": '<?xml-stylesheet href="file://{secret}"?>' + link(""),
-    "xinclude": link('<x:include xmlns:x="http://www.w3.org/2001/XInclude" href="{secret}" parse="text"/>'),
-    "other encoding": '<?xml version="1.0" encoding="utf-7"?>' + link(""),
-    "many elements": link("<visual/>" * 400_000),
-    "deep elements": link("<a>" * 100_000),
-    "many attributes": "<robot " + " ".join(f"a{n}='1'" for n in range(200_000)) + "/>",
-    "long attribute": f'<robot name="{"n" * 3_900_000}"><link name="a"/></robot>',
-    "long text": f"<robot name='r'>{'x' * 10_000_000}</robot>",
-    "long number": link(f'<inertial><mass value="{"9" * 1_000_000}"/></inertial>'),
-    "many joints": "<robot name='r'><link name='l0'/>" + "".join(
-        f"<link name='l{n}'/><joint name='j{n}' type='fixed'><parent link='l{n - 1}'/><child link='l{n}'/></joint>"
-        for n in range(1, 12_000)) + "</robot>",
-    "cycle of joints": "<robot name='r'><link name='a'/><link name='b'/>" + "".join(
-        f"<joint name='{p}' type='fixed'><parent link='{p}'/><child link='{c}'/></joint>" for p, c in ("ab", "ba"))
-        + "</robot>",
-    "not finite": link('<inertial><mass value="nan"/><inertia ixx="inf" iyy="-1" izz="1e308"/></inertial>'),
-    "huge box": link('<collision><geometry><box size="1e308 1e308 1e308"/></geometry></collision>'),
-    "model in itself": "<sdf version='1.6'><include><uri>model://bot</uri></include></sdf>",
-    "include by path": "<sdf version='1.6'><include><uri>file://{secret}</uri></include></sdf>",
-    "include by the network": "<sdf version='1.6'><include><uri>https://127.0.0.1/m.sdf</uri></include></sdf>",
-    "deep models": "<sdf version='1.6'>" + "<model name='m'>" * 5_000,
-    "mesh by file://": mesh("file://{secret}"),
-    "mesh by path": mesh("{secret}"),
-    "mesh by .. in a package": mesh("package://bot/../secret.stl"),
-    "mesh by .. before a package": mesh("package://../secret.stl"),
-    "mesh by quoted ..": mesh("package://bot/%2e%2e/secret.stl"),
-    "mesh by a link": mesh("package://bot/link.stl"),
-    "mesh by a linked folder": mesh("package://bot/folder/secret.stl"),
-    "mesh by /proc": mesh("package://bot/../../../../../../proc/self/environ"),
-    "mesh by NUL": mesh("package://bot/link.stl&#0;"),
-    "mesh by a device": mesh("file:///dev/zero"),
-    "mesh by a fifo": mesh("package://bot/fifo.stl"),
-    "mesh by the network": mesh("http://127.0.0.1:9/mesh.stl"),
-    "SDF mesh by file://": sdf_mesh("file://{secret}"),
-    "SDF mesh by .. in a model": sdf_mesh("model://bot/../secret.stl"),
-    "STL of 4e9 triangles": mesh(data("stl", stl(2**32 - 1))),
-    "STL of NaN": mesh(data("stl", stl(1, struct.pack("<12fH", *[float("nan")] * 12, 0)))),
-    "STL that is huge": mesh(data("stl", stl(1, struct.pack("<12fH", *[3e38] * 12, 0)))),
-    "texture by path": link(
-        '<visual><geometry><box size="1 1 1"/></geometry><material name="m"><texture filename="{secret}"/></material>'
-        "</visual>"),
-    "name of a path": '<robot name="../../etc"><link name="/etc/passwd"/></robot>',
-    "plugin of a path": link("").replace("</robot>", '<gazebo><plugin name="p" filename="{secret}"/></gazebo></robot>'),
-    "base64 that is none": mesh("data:model/stl;base64,%%%%"),
-}  # fmt: skip
-"""What a text is -> the text."""
-
-MESHES = {
-    "count.stl": stl(2**32 - 1),
-    "far.stl": stl(1, struct.pack("<12fH", *[3e38] * 12, 0)),
-    "endless.stl": b"solid x\n" + b"facet " * 300_000,
-    "words.stl": b"solid x\n facet outer loop vertex 1 a " + b"9" * 300_000 + b" endloop",
-    "far.obj": b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 99999999999999\n",
-    "below.obj": b"v 0 0 0\nf -1 -2 -99999999999999\n",
-    "line.obj": b"f " + b"1 " * 1_000_000,
-    "bomb.dae": f'<!DOCTYPE r [<!ENTITY e0 "x">{ENTITIES}]><COLLADA>&e11;</COLLADA>'.encode(),
-    "external.dae": b'<!DOCTYPE r [<!ENTITY x SYSTEM "file:///etc/passwd">]><COLLADA>&x;</COLLADA>',
-    "count.dae": COLLADA.encode(),
-    "deep.dae": b"<COLLADA>" + b"<node>" * 100_000,
-    "unit.dae": b"<COLLADA><asset><unit meter='1e308'/></asset></COLLADA>",
-}
-"""Files of a known package."""
 
 
 class Watch:
@@ -140,23 +45,14 @@ def watch() -> Iterator[Watch]:
 
 
 def test_a_hostile_text_opens_nothing_takes_little_and_is_reported_in_a_line(tmp_path: Path, watch: Watch) -> None:
-    package, secret = tmp_path / "bot", tmp_path / "secret.stl"
-    secret.write_bytes(stl(2, struct.pack("<12fH", *range(12), 0) * 2))
-    package.mkdir()
-    (package / "package.xml").write_text("<package><name>bot</name></package>")
-    (package / "model.sdf").write_text(HOSTILE["model in itself"])
-    (package / "link.stl").symlink_to(secret)
-    (package / "folder").symlink_to(tmp_path)
-    os.mkfifo(package / "fifo.stl")
+    package, texts = laid_out(tmp_path)
     allowed = [f"open {package / file}" for file in ("package.xml", "model.sdf", *MESHES)]
-    for file, content in MESHES.items():
-        (package / file).write_bytes(content)
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    for name, text in (HOSTILE | {file: mesh(f"package://bot/{file}") for file in MESHES}).items():
+    for name, text in texts:
         watch.opened.clear()
         watch.is_on = True
         try:
-            parse(text.replace("{secret}", str(secret)), Path("resource_string"), {"bot": package}, confined=True)
+            parse(text, Path("resource_string"), {"bot": package}, confined=True)
         except RobotError as error:
             assert "\n" not in str(error) and len(str(error)) < 1000, name
         finally:
@@ -173,3 +69,29 @@ def test_a_packed_mesh_that_unpacks_to_more_than_is_shown_is_refused_before_it_i
         with contextlib.suppress(RobotError):
             assert len(file_in(data("stl+gzip", packed))[1]) <= MOST_SHOWN
     assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MOST_MEMORY
+
+
+WAYS: dict[str, Callable[[Path, Path], object]] = {
+    "spawn": lambda file, package: both(file, {}, {"bot": package}, False, ()),
+    "sim --robot": lambda file, package: load(file, {}, {"bot": package}),
+    "sim --world": lambda file, package: load_world(file, {"bot": package}),
+    "check": lambda file, package: check(file, {}, {"bot": package}),
+    "spawn_entity": lambda file, package: received(file.read_text(), {"bot": package}),
+    "description": lambda file, _package: read(file.read_text()),
+    "xacro": lambda file, package: expand_xacro(file, {}, {"bot": package}),
+}
+
+
+SLOW = pytest.mark.skipif(os.environ.get("HOLOZEN_LONG") != "1", reason="59 interpreters; with --long")
+
+
+@pytest.mark.parametrize("way", [pytest.param(way, marks=[SLOW] if way == "xacro" else []) for way in WAYS])
+def test_a_hostile_file_is_a_robot_or_an_error_of_one_line_wherever_it_is_read(tmp_path: Path, way: str) -> None:
+    package, texts = laid_out(tmp_path)
+    for number, (name, text) in enumerate(texts):
+        file = tmp_path / f"{number}.urdf"
+        file.write_text(text)
+        try:
+            WAYS[way](file, package)
+        except RobotError as error:
+            assert not re.search(r"\n|its reader|it cannot be read", str(error)), name

@@ -83,15 +83,15 @@ def test_a_fixed_joint_may_have_an_axis_without_direction() -> None:
 
 
 def test_each_kind_of_shape_keeps_its_size_in_metres(tmp_path: Path) -> None:
-    shutil.copy(REPO / "meshes" / "base.dae", tmp_path)
+    base = Path(shutil.copy(REPO / "meshes" / "base.dae", tmp_path))
     shapes = {
         '<box size="1 2  3"/>': Shape("box", (1, 2, 3), Pose()),
         '<cylinder length="0.13" radius="0.14"/>': Shape("cylinder", (0.14, 0.13), Pose()),
         '<sphere radius="0.5"/>': Shape("sphere", (0.5,), Pose()),
         '<mesh filename="base.dae" scale="0.01  0.01 -0.01"/>': Shape(
-            "mesh", (0.01, 0.01, -0.01), Pose(), tmp_path / "base.dae"
+            "mesh", (0.01, 0.01, -0.01), Pose(), base, points=hull(base, (0.01, 0.01, -0.01))
         ),
-        '<mesh filename="base.dae"/>': Shape("mesh", (1, 1, 1), Pose(), tmp_path / "base.dae"),
+        '<mesh filename="base.dae"/>': Shape("mesh", (1, 1, 1), Pose(), base, points=hull(base)),
     }
     for text, shape in shapes.items():
         model = parse(f'<robot name="r">{collision(text)}</robot>', tmp_path / "robot.urdf")

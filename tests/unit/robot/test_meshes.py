@@ -14,7 +14,6 @@ import trimesh
 from holozen.robot import meshes
 from holozen.robot.errors import RobotError
 from holozen.robot.meshes import bounds, data_hull, data_uri, hull
-from holozen.robot.rotation import Array
 
 REPO = Path(__file__).parents[3]
 CUBE = trimesh.creation.box((1, 2, 3))
@@ -58,7 +57,7 @@ def reads(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     """The STL files that were read since."""
     seen: list[str] = []
 
-    def counting(file: BinaryIO, size: int, place: str) -> Iterator[Array]:
+    def counting(file: BinaryIO, size: int, place: str) -> Iterator[meshes.Surface]:
         seen.append(place)
         return meshes.read_stl(file, size, place)
 
@@ -135,7 +134,7 @@ def test_many_triangles_are_read_a_part_at_a_time(tmp_path: Path, monkeypatch: p
     points = bytes(50 * (count - 12))  # in the middle
     path.write_bytes(bytes(80) + struct.pack("<I", count) + STL[84:384] + points + STL[384:])
     with path.open("rb") as file:
-        assert [len(part) for part in meshes.read_stl(file, path.stat().st_size, "")] == [300, 300, 150]
+        assert [len(part.points) for part in meshes.read_stl(file, path.stat().st_size, "")] == [300, 300, 150]
     assert bounds(path) == ((-0.5, -1, -1.5), (0.5, 1, 1.5))
 
 

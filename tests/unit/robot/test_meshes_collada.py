@@ -35,7 +35,7 @@ def dae(asset: str = METRES, nodes: str = f"<node>{HERE}</node>", faces: str = T
 
 def points(text: str) -> Any:
     data = text.encode()
-    return np.vstack([np.zeros((0, 3)), *read_dae(io.BytesIO(data), len(data), "a.dae")])
+    return np.vstack([np.zeros((0, 3)), *(part.points for part in read_dae(io.BytesIO(data), len(data), "a.dae"))])
 
 
 def bounds(text: str) -> Any:

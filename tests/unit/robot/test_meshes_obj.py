@@ -12,7 +12,7 @@ POINTS = "v 0 0 0\nv 1 0 0\nv\t0 1e0 0 1.0\n"
 
 def vertices(text: str) -> list[list[float]]:
     data = text.encode()
-    return [point for part in read_obj(io.BytesIO(data), len(data), "a.obj") for point in part.tolist()]
+    return [point for part in read_obj(io.BytesIO(data), len(data), "a.obj") for point in part.points.tolist()]
 
 
 def test_faces_name_vertices_in_every_way_the_format_has() -> None:

@@ -17,7 +17,7 @@ ASCII = BALL.export(file_type="stl_ascii").encode()
 
 
 def corners(data: bytes) -> Any:
-    parts = list(read_stl(io.BytesIO(data), len(data), "a.stl"))
+    parts = [part.points for part in read_stl(io.BytesIO(data), len(data), "a.stl")]
     return np.vstack([np.zeros((0, 3)), *parts])
 
 

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from holozen.robot.loading import load
+from holozen.robot.meshes import hull
 from holozen.robot.model import Joint, Limits, Link, Pose, RobotModel, Shape
 from holozen.robot.rigid import lowest
 
@@ -52,7 +53,8 @@ def test_the_lowest_of_all_shapes_counts() -> None:
 
 def test_a_mesh_is_as_low_as_its_file_has_it(tmp_path: Path) -> None:
     trimesh.creation.box((1, 2, 3)).export(tmp_path / "box.stl")
-    assert lowest(model(Shape("mesh", (1, 1, 2), Pose(), tmp_path / "box.stl"))) == pytest.approx(-2)
+    points = hull(tmp_path / "box.stl", (1, 1, 2))
+    assert lowest(model(Shape("mesh", (1, 1, 2), Pose(), tmp_path / "box.stl", points=points))) == pytest.approx(-2)
 
 
 def test_without_a_collision_shape_the_root_is_the_lowest() -> None:

@@ -56,7 +56,6 @@ def test_a_mesh_is_scaled(tmp_path: Path, kind: str) -> None:
     assert shown(tmp_path, f'<mesh filename="box.{kind}" scale="1 1 0.5"/>', BLUE) == [([1, 2, 1.5], (0, 0, 255), 0.5)]
 
 
-@pytest.mark.filterwarnings("ignore:the matrix subclass:PendingDeprecationWarning")  # pycollada's
 def test_a_collada_mesh_is_in_metres_z_up_and_has_its_own_colour_or_that_of_the_material(tmp_path: Path) -> None:
     (tmp_path / "g.dae").write_text(DAE)
     assert shown(tmp_path, '<mesh filename="g.dae"/>') == [([1, 0, 2], (0, 255, 0), 1.0)]

@@ -1,0 +1,328 @@
+"""Runs a function on a hostile file in a process of its own, with limits of time and memory and no way out.
+
+A lasting process, forked from this one before it has threads, connections or keys, forks one more for each call. So a
+call needs no new interpreter, and the process that reads finds no secret in its memory.
+"""
+
+import ctypes
+import gc
+import importlib
+import os
+import pickle
+import resource
+import select
+import signal
+import socket
+import struct
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn, TypeVar
+
+import msgspec
+
+from holozen.console import report
+from holozen.robot.errors import RobotError
+from holozen.robot.packages import VARIABLES, remember_folders
+from holozen.robot.sandbox import restrict
+
+T = TypeVar("T")
+PROCESSOR_TIME = 20  # s of a call; the largest mesh that is read takes 10 on a slow machine
+PATIENCE = 60.0  # s, of one that waits or that a busy machine holds up
+MOST_MEMORY = 1_500_000_000  # bytes that a call may take beyond what is there: a mesh of 100 MB takes 700 MB
+MOST_REPLY = 200_000_000  # bytes
+MOST_ASKED = 200  # questions of one call
+SUFFIXES = (".stl", ".obj", ".dae", ".sdf", ".world", ".urdf", ".xacro", ".config")
+"""The ends of the names of files outside of the known folders that may be read: a robot's, and no private data."""
+
+_PDEATHSIG = 1  # of prctl
+_HEAD = struct.Struct("=iQ")  # exit code, or 0; bytes that follow
+_CODE = [
+    os.path.dirname(os.__file__),
+    str(Path(__file__).resolve().parents[1]),
+    *(path for path in sys.path if path.endswith("site-packages")),
+]  # for late imports
+
+Handler = Callable[..., Any]
+
+
+class _Reply(NamedTuple):
+    """A value, else an `error`, else a question `asked`; and what the kernel `lacks`."""
+
+    error: str = ""
+    asked: list[Any] | None = None
+    lacks: str = ""
+    value: bytes = b""
+
+
+class _Asked(BaseException):
+    """A question to the process outside. Not an Exception, so that no parser takes it for one of its own."""
+
+    def __init__(self, *question: Any) -> None:
+        self.question = question
+
+
+# In the process that asks.
+
+
+def start(*_modules: object) -> None:
+    """Fork the lasting process, which has the modules that are imported by then. Call it before this process has
+    threads, connections or keys.
+    """
+    _server.start()
+
+
+def run(
+    kind: Any, what: object, function: Callable[..., T], *args: Any, readable: Callable[[], list[str]] = list,
+    only_known: bool = False, seconds: int = PROCESSOR_TIME, handlers: Mapping[str, Handler] = {},
+) -> T:  # fmt: skip
+    """`function(*args)`, a function of a module, in a process that reads nothing but `readable()`, files and folders
+    with all below; unless `only_known` also robot and mesh files elsewhere, by their real names. `kind` is the type of
+    its value, as msgspec checks it. `what` names the input in errors; `seconds` limits the processor's time.
+
+    What the function asks with `ask(name, ...)` is answered by `handlers[name]`, in this process. Raises RobotError,
+    also for the function's own errors, one that takes too long or too much memory, or crashes.
+    """
+    if _inside:
+        return function(*args)
+    answers: dict[bytes, Any] = {}
+    handlers = handlers if only_known else {"open": _may_read, **handlers}
+    while True:
+        reply = _server.call(
+            str(what), seconds, pickle.dumps((what, seconds, function, args, readable, [*handlers], answers))
+        )
+        if reply.lacks:
+            _warn(reply.lacks)
+        if reply.error:
+            raise RobotError(" ".join(reply.error.split()))
+        if reply.asked is None:
+            try:
+                value: T = msgspec.msgpack.decode(reply.value, type=kind, dec_hook=lambda kind, value: kind(value))
+                return value
+            except (msgspec.MsgspecError, TypeError, ValueError):
+                raise RobotError(f"{what}: its reader was taken over, or has a bug: no {kind} was replied") from None
+        name, *rest = reply.asked
+        if len(answers) >= MOST_ASKED:
+            raise RobotError(f"{what}: refers to more than {MOST_ASKED} files outside of its folder and known packages")
+        if name not in handlers:
+            raise RobotError(f"{what}: its reader was taken over: it asked for {name!r}")
+        answers[msgspec.msgpack.encode(reply.asked)] = handlers[name](*rest)
+
+
+def ask(name: str, *rest: Any) -> Any:
+    """For a function that runs in the process apart: what `handlers[name](*rest)` says outside, False without it."""
+    if name not in _names:
+        return False
+    question = msgspec.msgpack.encode([name, *rest])
+    if question not in _answers:
+        raise _Asked(name, *rest)
+    return _answers[question]
+
+
+def _may_read(path: str) -> bool:
+    return path.lower().endswith(SUFFIXES) and os.path.isfile(path) and os.path.realpath(path) == path
+
+
+@lru_cache
+def _warn(lacks: str) -> None:
+    report(f"warning: this kernel lacks {lacks}: a robot file that takes its reader over is not kept from other files")
+
+
+class _Server:
+    """The lasting process, from outside."""
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._socket: socket.socket | None = None
+        self._owner = 0
+
+    def start(self) -> None:
+        if self._socket is not None and self._owner == os.getpid():
+            return
+        here, there = socket.socketpair()
+        if os.fork() == 0:
+            _serve(there)
+        there.close()
+        self._socket, self._owner = here, os.getpid()
+
+    def close(self) -> None:
+        """End the lasting process."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def call(self, what: str, seconds: int, request: bytes) -> _Reply:
+        with self._lock:
+            for _ in range(2):  # it may have been killed since the last call
+                self.start()
+                with suppress(OSError, EOFError):
+                    code, reply = self._exchange(request)
+                    break
+                self.close()
+            else:
+                raise RobotError(f"{what}: the process that reads files was killed")
+        if code:
+            raise RobotError(f"{what}: {_ended(code, seconds)}")
+        with suppress(msgspec.MsgspecError):
+            return msgspec.msgpack.decode(reply, type=_Reply)
+        raise RobotError(f"{what}: its reader ended without a reply")
+
+    def _exchange(self, request: bytes) -> tuple[int, bytes]:
+        assert self._socket is not None
+        self._socket.sendall(_HEAD.pack(0, len(request)) + request)
+        code, size = _HEAD.unpack(_received(self._socket, _HEAD.size))
+        return code, _received(self._socket, size)
+
+
+_server = _Server()
+
+
+def _received(connection: socket.socket, size: int) -> bytes:
+    found = bytearray()
+    while len(found) < size:
+        part = connection.recv(min(size - len(found), 1 << 20))
+        if not part:
+            raise EOFError
+        found += part
+    return bytes(found)
+
+
+def _ended(code: int, seconds: int) -> str:
+    if code == -signal.SIGXCPU:
+        return f"it takes longer than {seconds} s to read"
+    if code == -signal.SIGKILL:
+        return f"its reader was ended after {PATIENCE:g} s, or out of memory"
+    name = signal.Signals(-code).name if -code in [*map(int, signal.Signals)] else f"exit code {code}"
+    return f"its reader crashed ({name})"
+
+
+# In the lasting process.
+
+
+def _serve(connection: socket.socket) -> NoReturn:
+    """Fork a process for each request, until the other end closes."""
+    try:
+        os.setsid()  # Ctrl-C is for the parent
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, signal.SIG_DFL)
+        ctypes.CDLL(None).prctl(_PDEATHSIG, signal.SIGKILL)
+        _keep_only(connection.fileno())
+        gc.disable()  # what the parent had, such as connections, is not to be closed here
+        gc.freeze()
+        with suppress(ImportError):
+            importlib.import_module("numpy.ma")  # numpy's unique would, in every process anew
+        with suppress(OSError, EOFError):
+            while True:
+                _, size = _HEAD.unpack(_received(connection, _HEAD.size))
+                code, reply = _forked(_received(connection, size), connection)
+                connection.sendall(_HEAD.pack(code, len(reply)) + reply)
+    finally:
+        os._exit(0)
+
+
+def _keep_only(number: int) -> None:
+    null = os.open(os.devnull, os.O_RDWR)
+    for standard in range(3):
+        os.dup2(null, standard)
+    os.closerange(3, number)
+    os.closerange(number + 1, 65536)
+
+
+def _forked(request: bytes, connection: socket.socket) -> tuple[int, bytes]:
+    """Exit code (negative: a signal) and reply of a process that works on the request."""
+    end, begin = os.pipe()
+    if (child := os.fork()) == 0:
+        try:
+            connection.close()
+            _keep_only(begin)
+            _work(request, begin)
+        finally:
+            os._exit(1)
+    os.close(begin)
+    found, until, poll = bytearray(), time.monotonic() + PATIENCE, select.poll()
+    poll.register(end, select.POLLIN | select.POLLHUP)
+    while (left := until - time.monotonic()) > 0 and len(found) <= MOST_REPLY and poll.poll(1000 * left):
+        part = os.read(end, 1 << 20)
+        if not part:
+            break
+        found += part
+    else:
+        os.kill(child, signal.SIGKILL)
+    os.close(end)
+    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), bytes(found)
+
+
+# In the process that reads.
+
+
+_inside = False
+_names: list[str] = []
+_answers: Mapping[bytes, Any] = {}
+
+
+def _work(request: bytes, end: int) -> NoReturn:
+    global _inside, _names, _answers
+    what, seconds, function, args, readable, _names, _answers = pickle.loads(request)
+    _inside = True
+    for name in {*os.environ}.difference(VARIABLES):
+        del os.environ[name]
+    _limit(seconds)
+    granted = [path for asked, yes in _answers.items() if yes is True and (path := _opened(asked))]
+    remember_folders()
+    allowed = [*readable(), *granted, *_CODE]
+    lacks = restrict(allowed)
+    sys.addaudithook(_Watch(allowed))
+    try:
+        reply = _Reply(lacks=lacks, value=_packed(function(*args)))
+    except _Asked as asked:
+        reply = _Reply(lacks=lacks, asked=[*asked.question])
+    except RobotError as error:
+        reply = _Reply(lacks=lacks, error=str(error))
+    except MemoryError:
+        reply = _Reply(lacks=lacks, error=f"{what}: it takes more than {MOST_MEMORY >> 20} MB of memory to read")
+    except Exception as error:  # hostile input may cause any, and one of our own bugs must not end the sim
+        reply = _Reply(lacks=lacks, error=f"{what}: it cannot be read: {type(error).__name__}: {error}")
+    with os.fdopen(end, "wb") as file:
+        file.write(msgspec.msgpack.encode(reply))
+    os._exit(0)
+
+
+def _packed(value: Any) -> bytes:
+    return msgspec.msgpack.encode(value, enc_hook=str)  # a Path
+
+
+def _opened(question: bytes) -> str:
+    name, *rest = msgspec.msgpack.decode(question)
+    return rest[0] if name == "open" else ""
+
+
+def _limit(seconds: int) -> None:
+    with open("/proc/self/statm") as file:
+        now = int(file.read().split()[0]) * resource.getpagesize()
+    for kind, most in (
+        (resource.RLIMIT_AS, now + MOST_MEMORY),
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_FSIZE, 0),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        with suppress(OSError, ValueError):
+            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+class _Watch:
+    """An audit hook: asks outside before a file is opened that may not be read."""
+
+    def __init__(self, allowed: list[str]) -> None:
+        self._roots = tuple(os.path.realpath(path) for path in allowed)
+
+    def __call__(self, event: str, args: tuple[Any, ...]) -> None:
+        if event != "open" or not isinstance(args[0], str | os.PathLike):
+            return
+        real = os.path.realpath(args[0])
+        if not any(real == root or real.startswith(root + os.sep) for root in self._roots) and not ask("open", real):
+            raise PermissionError(13, "outside of the robot's folder and all known packages", str(args[0]))
