@@ -73,7 +73,7 @@ def start(*_modules: object) -> None:
     """Fork the lasting process, which has the modules that are imported by then. Call it before this process has
     threads, connections or keys.
     """
-    _server.start()
+    server.start()
 
 
 def run(
@@ -92,7 +92,7 @@ def run(
     answers: dict[bytes, Any] = {}
     handlers = handlers if only_known else {"open": _may_read, **handlers}
     while True:
-        reply = _server.call(
+        reply = server.call(
             str(what), seconds, pickle.dumps((what, seconds, function, args, readable, [*handlers], answers))
         )
         if reply.lacks:
@@ -132,7 +132,7 @@ def _warn(lacks: str) -> None:
     report(f"warning: this kernel lacks {lacks}: a robot file that takes its reader over is not kept from other files")
 
 
-class _Server:
+class Server:
     """The lasting process, from outside."""
 
     def __init__(self) -> None:
@@ -178,7 +178,7 @@ class _Server:
         return code, _received(self._socket, size)
 
 
-_server = _Server()
+server = Server()
 
 
 def _received(connection: socket.socket, size: int) -> bytes:

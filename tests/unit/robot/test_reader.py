@@ -16,8 +16,8 @@ from holozen.robot import reader
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import load, parse
 from holozen.robot.meshes import write_stl
-from tests.unit.robot.test_shapes import CORNERS
 
+BOX = np.array([(x, y, z) for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
 WAYS_OUT: dict[str, Callable[[str], object]] = {
     "read a file": lambda folder: os.open(f"{folder}/secret", os.O_RDONLY),
     "list a folder": os.listdir,
@@ -91,8 +91,8 @@ def wrong() -> int:
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A lasting process of its own."""
-    own = reader._Server()
-    monkeypatch.setattr(reader, "_server", own)
+    own = reader.Server()
+    monkeypatch.setattr(reader, "server", own)
     yield
     own.close()
 
@@ -130,8 +130,8 @@ def test_a_mesh_elsewhere_is_read_but_not_what_a_link_makes_look_like_one(tmp_pa
     home, elsewhere = tmp_path / "home", tmp_path / "elsewhere"
     home.mkdir()
     elsewhere.mkdir()
-    (elsewhere / "box.stl").write_bytes(write_stl(np.array(sorted(CORNERS))))
-    (elsewhere / "private").write_bytes(write_stl(np.array(sorted(CORNERS))))
+    (elsewhere / "box.stl").write_bytes(write_stl(BOX))
+    (elsewhere / "private").write_bytes(write_stl(BOX))
     (home / "link.stl").symlink_to(elsewhere / "private")
     robot = home / "robot.urdf"
     for name, warnings in ((elsewhere / "box.stl", 0), ("link.stl", 1)):

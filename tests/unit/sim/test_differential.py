@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from msgspec import structs
 
 from holozen.limits import STOP, Planar
 from holozen.robot.loading import load
@@ -31,7 +32,7 @@ def rolled(left: float, right: float, separation: float) -> Planar:
 
 def with_wheels(model: RobotModel, **changes: Any) -> RobotModel:
     assert model.drive is not None
-    return replace(model, drive=replace(model.drive, mechanism=replace(mechanism(model), **changes)))
+    return replace(model, drive=replace(model.drive, mechanism=structs.replace(mechanism(model), **changes)))
 
 
 def mechanism(model: RobotModel) -> Differential:

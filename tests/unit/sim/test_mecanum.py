@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from holozen.robot.loading import load
 from holozen.robot.model import Mecanum, RobotModel
@@ -18,7 +19,7 @@ RADIUS, ARM = 0.076, 0.17 + 0.18
 def wheels(model: RobotModel = MODEL, **changes: Any) -> MecanumWheels:
     assert model.drive is not None
     assert isinstance(model.drive.mechanism, Mecanum)
-    return MecanumWheels(model, replace(model.drive.mechanism, **changes))
+    return MecanumWheels(model, structs.replace(model.drive.mechanism, **changes))
 
 
 def rates(rolling: MecanumWheels, velocity: tuple[float, float, float]) -> dict[str, float]:
