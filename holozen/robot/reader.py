@@ -141,6 +141,7 @@ class Server:
         self._owner = 0
 
     def start(self) -> None:
+        """Fork it, unless it is there."""
         if self._socket is not None and self._owner == os.getpid():
             return
         here, there = socket.socketpair()
@@ -156,6 +157,7 @@ class Server:
             self._socket = None
 
     def call(self, what: str, seconds: int, request: bytes) -> _Reply:
+        """The reply to a request. Raises RobotError where none comes."""
         with self._lock:
             for _ in range(2):  # it may have been killed since the last call
                 self.start()
