@@ -12,9 +12,10 @@ from typing import TYPE_CHECKING, Any
 
 from holozen.background import background
 from holozen.bus import Bus
-from holozen.cli.hints import none_found, unknown
+from holozen.cli.hints import unknown
+from holozen.cli.keys import print_list, print_sides
 from holozen.cli.output import CDR, Reader, lines
-from holozen.cli.verb import Noun, Verb, by_name, open_bus
+from holozen.cli.verb import Noun, Verb, by_name, key_argument, list_arguments, open_bus
 from holozen.console import printable, report
 from holozen.flags import add_packages, key, number
 from holozen.process import deferred_interrupt, stop_event
@@ -46,16 +47,7 @@ def list_actions(args: argparse.Namespace) -> int:
     """Print each action once."""
     with open_bus(args) as bus:
         ends, where = bus.endpoints(), bus.where
-    found = sorted({(action.key, action.type) for action in found_in(ends)})
-    if args.count_actions:
-        print(json.dumps({"count": len(found)}) if args.json else len(found))
-        return 0
-    for name, kind in found:
-        shown = f"{name} [{kind}]" if args.show_types else name
-        print(json.dumps({"key": name, "type": kind}) if args.json else printable(shown))
-    if not found:
-        report(none_found("actions", ends, where))
-    return 0
+    return print_list(args, "action", ((action.key, action.type) for action in found_in(ends)), ends, where)
 
 
 def info(args: argparse.Namespace) -> int:
@@ -66,18 +58,9 @@ def info(args: argparse.Namespace) -> int:
     if not mine:
         report(f"holozen action info: {unknown(args.key, sorted({one.key for one in found}), where)}")
         return 1
-    types = sorted({one.type for one in mine})
-    sides = {"clients": [one for one in mine if not one.is_server], "servers": [one for one in mine if one.is_server]}
-    if args.json:
-        rows = {side: [{"node": one.node, "session": one.session} for one in ones] for side, ones in sides.items()}
-        print(json.dumps({"key": args.key, "types": types} | rows))
-        return 0
-    print(printable(f"Type: {', '.join(types)}"))
-    for side, ones in sides.items():
-        print(f"Action {side}: {len(ones)}")
-        for one in ones:
-            print(printable(f"  {one.node} ({one.session[:6]})"))
-    return 0
+    clients, servers = ([one for one in mine if one.is_server == is_server] for is_server in (False, True))
+    sides = {"clients": ("Action clients", clients), "servers": ("Action servers", servers)}
+    return print_sides(args, [one.type for one in mine], sides)
 
 
 def send_goal(args: argparse.Namespace) -> int:
@@ -231,15 +214,6 @@ def _set_after(work: Callable[[], object], done: threading.Event) -> None:
     done.set()
 
 
-def _list_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-t", "--show-types", action="store_true", help="with their types")
-    parser.add_argument("-c", "--count-actions", action="store_true", help="only how many there are")
-
-
-def _key_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("key", type=key)
-
-
 def _send_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("key", type=key)
@@ -252,8 +226,8 @@ def _send_arguments(parser: argparse.ArgumentParser) -> None:
 
 VERBS = by_name(
     Noun("action", "Inspect actions, and send goals.", dict.fromkeys(("list", "info", "send_goal"), "action")),
-    Verb("action list", "the actions that nodes serve or use", "-t", _list_arguments, list_actions),
-    Verb("action info", "an action's type, clients and servers", "navigate_to_pose", _key_arguments, info),
+    Verb("action list", "the actions that nodes serve or use", "-t", list_arguments("action"), list_actions),
+    Verb("action info", "an action's type, clients and servers", "navigate_to_pose", key_argument, info),
     Verb("action send_goal", "send a goal and wait for its result; Ctrl-C cancels the goal",
         """navigate_to_pose '{"pose": {"pose": {"position": {"x": 1.0}}}}' --feedback""", _send_arguments, send_goal),
 )  # fmt: skip

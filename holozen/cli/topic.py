@@ -5,7 +5,18 @@ from __future__ import annotations
 import argparse
 
 from holozen.background import background
-from holozen.cli.verb import PUB_EXAMPLE, PUB_PATIENCE, Noun, Verb, by_name, on_node, open_bus
+from holozen.cli.verb import (
+    PUB_EXAMPLE,
+    PUB_PATIENCE,
+    Noun,
+    Verb,
+    add_count,
+    by_name,
+    key_argument,
+    list_arguments,
+    on_node,
+    open_bus,
+)
 from holozen.flags import add_packages, count, key, number
 from holozen.process import deferred_interrupt
 
@@ -23,9 +34,8 @@ def pub(args: argparse.Namespace) -> int:
 
 
 def _list_arguments(parser: argparse.ArgumentParser) -> None:
+    list_arguments("topic")(parser)
     add = parser.add_argument
-    add("-t", "--show-types", action="store_true", help="with their types")
-    add("-c", "--count-topics", action="store_true", help="only how many there are")
     add("-v", "--verbose", action="store_true", help="with types, and how many publish and subscribe")
     text = "also keys on which a message from any node arrives within S seconds"
     add("--heard", type=number(0.01, 1e6, "s"), metavar="S", help=text)
@@ -37,13 +47,9 @@ def _info_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("-v", "--verbose", action="store_true", help=text)
 
 
-def _type_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("key", type=key)
-
-
 def _find_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("type", help="such as geometry_msgs/msg/Twist, or Twist")
-    parser.add_argument("-c", "--count-topics", action="store_true", help="only how many there are")
+    add_count(parser, "topic")
 
 
 def _echo_arguments(parser: argparse.ArgumentParser) -> None:
@@ -92,11 +98,11 @@ VERBS = by_name(
             "hz": "stats", "bw": "stats", "delay": "stats", "pub": "topic", "plot": "plot",
         },
     ),
-    Verb("topic list", "the keys that nodes read and write", "-t", _list_arguments, on_node("topics", "list_topics")),
+    Verb("topic list", "the keys that nodes read and write", "-t", _list_arguments, on_node("keys", "list_topics")),
     Verb("topic info", "a key's type, publishers and subscribers", "cmd_vel", _info_arguments,
-        on_node("topics", "info")),
-    Verb("topic type", "a key's type", "odom", _type_arguments, on_node("topics", "type_of")),
-    Verb("topic find", "the keys of a type", "nav_msgs/msg/Odometry", _find_arguments, on_node("topics", "find")),
+        on_node("keys", "topic_info")),
+    Verb("topic type", "a key's type", "odom", key_argument, on_node("keys", "topic_type")),
+    Verb("topic find", "the keys of a type", "nav_msgs/msg/Odometry", _find_arguments, on_node("keys", "find_topics")),
     Verb("topic echo", "print the messages of a key", "odom --once", _echo_arguments, on_node("echo", "echo")),
     Verb("topic pub", "write messages to a key", PUB_EXAMPLE, _pub_arguments, pub),
 )  # fmt: skip

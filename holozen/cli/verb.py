@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from holozen.flags import Parser
+from holozen.flags import Parser, key
 from holozen.process import deferred_interrupt
 from holozen.suggest import suggest
 from holozen.transport import connection
@@ -148,6 +148,26 @@ class Service(Noun):
 
 def no_arguments(_parser: argparse.ArgumentParser) -> None:
     """Fill in nothing: for a Verb that has no arguments of its own."""
+
+
+def key_argument(parser: argparse.ArgumentParser) -> None:
+    """Add the argument of a verb about one key."""
+    parser.add_argument("key", type=key)
+
+
+def list_arguments(noun: str) -> Callable[[argparse.ArgumentParser], None]:
+    """A function that adds the flags of the verb `list` of topics, services and actions."""
+
+    def fill(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("-t", "--show-types", action="store_true", help="with their types")
+        add_count(parser, noun)
+
+    return fill
+
+
+def add_count(parser: argparse.ArgumentParser, noun: str) -> None:
+    """Add the flag that has only counted what there is."""
+    parser.add_argument("-c", f"--count-{noun}s", dest="count", action="store_true", help="only how many there are")
 
 
 def by_name(*verbs: Noun | Verb) -> dict[str, Any]:

@@ -50,10 +50,7 @@ def parser() -> argparse.ArgumentParser:
     add("--state", type=Path, metavar="DIR",
         help="keep software stops in files there, for the next sim (default: HOLOZEN_STATE, else none)")  # fmt: skip
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
-    add("--package", type=flags.package, action="append", default=[], metavar="NAME=DIR",
-        help="where $(find NAME) is")  # fmt: skip
-    add("--allow-env", type=flags.variable, action="append", default=[], metavar="NAME",
-        help="an environment variable that a robot's file may read as $(env NAME)")  # fmt: skip
+    flags.add_robot_sources(parser)
     add(
         "--rtf",
         type=flags.number(*pace.FACTORS),

@@ -21,7 +21,7 @@ def loaded_by(code: str) -> set[str]:
 
 
 def test_looking_at_topics_loads_nothing_heavy() -> None:
-    loaded = loaded_by("import holozen.cli, holozen.cli.topics, holozen.cli.echo")
+    loaded = loaded_by("import holozen.cli, holozen.cli.keys, holozen.cli.echo")
     assert "holozen.transport.node" in loaded
     assert loaded & {*HEAVY, "socket"} == set()
 

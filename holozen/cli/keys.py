@@ -1,10 +1,11 @@
-"""What `holozen topic list`, `info`, `type` and `find` do."""
+"""What `list`, `type`, `find` and `info` of topics, services and actions do: which keys there are, and whose."""
 
 from __future__ import annotations
 
 import argparse
 import json
 import time
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from holozen.cli.hints import none_found, unknown
@@ -45,6 +46,103 @@ def topics(endpoints: list[Endpoint]) -> list[Topic]:
     return [topic for topic in found if topic.types or topic.publishers]
 
 
+def print_list(
+    args: argparse.Namespace, noun: str, rows: Iterable[tuple[str, str]], ends: list[Endpoint], where: str
+) -> int:
+    """Print each (key, type) once, or with -c only how many there are; `ends` are all endpoints at `where`."""
+    found = sorted(set(rows))
+    if args.count:
+        print(json.dumps({"count": len(found)}) if args.json else len(found))
+    for key, kind in found if not args.count else ():
+        shown = f"{key} [{kind}]" if args.show_types else key
+        print(json.dumps({"key": key, "type": kind}) if args.json else printable(shown))
+    if not found:
+        report(none_found(f"{noun}s", ends, where))
+    return 0
+
+
+def print_types(args: argparse.Namespace, types: Iterable[str], known: Iterable[str], where: str) -> int:
+    """Print the types of a key; exit code 1 if there are none. `known` are the keys at `where`."""
+    types = sorted(types)
+    for name in types:
+        print(json.dumps({"key": args.key, "type": name}) if args.json else printable(name))
+    if not types:
+        report(f"holozen {args.verb}: {unknown(args.key, sorted(known), where)}")
+    return 0 if types else 1
+
+
+def print_keys_of(args: argparse.Namespace, types: Mapping[str, Iterable[str]]) -> int:
+    """Print the keys of a type; exit code 1 if there are none. `types`: those of each key."""
+    keys = sorted(key for key, its in types.items() if any(f"/{name}".endswith(f"/{args.type}") for name in its))
+    if getattr(args, "count", False):
+        print(json.dumps({"count": len(keys)}) if args.json else len(keys))
+    else:
+        for name in keys:
+            print(json.dumps({"key": name, "type": args.type}) if args.json else printable(name))
+    if not keys:
+        known = sorted({name for its in types.values() for name in its})
+        what = f"{args.verb.partition(' ')[0]} of type {args.type!r}{suggest(args.type, known)}"
+        report(f"holozen {args.verb}: no {what}; types: {listed(known)}")
+    return 0 if keys else 1
+
+
+def print_sides(args: argparse.Namespace, types: Iterable[str], sides: Mapping[str, tuple[str, list[Any]]]) -> int:
+    """Print the types of a key and its nodes; `sides`: name in JSON -> title, and what has a node and a session."""
+    types = sorted(set(types))
+    if args.json:
+        rows = {name: [{"node": one.node, "session": one.session} for one in ones] for name, (_, ones) in sides.items()}
+        print(json.dumps({"key": args.key, "types": types} | rows))
+        return 0
+    print(printable(f"Type: {', '.join(types)}"))
+    for title, ones in sides.values():
+        print(f"{title}: {len(ones)}")
+        for one in ones:
+            print(printable(f"  {one.node} ({one.session[:6]})"))
+    return 0
+
+
+# Services.
+
+
+def _served(ends: list[Endpoint]) -> dict[str, list[Endpoint]]:
+    """Key -> the servers of that service."""
+    found: dict[str, list[Endpoint]] = {}
+    for end in ends:
+        if end.kind == "srv":
+            found.setdefault(end.key, []).append(end)
+    return found
+
+
+def list_services(args: argparse.Namespace, bus: Node) -> int:
+    """Print each service key once."""
+    ends = bus.endpoints()
+    rows = ((end.key, end.type) for end in ends if end.kind == "srv")
+    return print_list(args, "service", rows, ends, bus.where)
+
+
+def service_type(args: argparse.Namespace, bus: Node) -> int:
+    """Print a service's type; exit code 1 if it has no server."""
+    served = _served(bus.endpoints())
+    return print_types(args, {end.type for end in served.get(args.key, ())}, served, bus.where)
+
+
+def find_services(args: argparse.Namespace, bus: Node) -> int:
+    """Print the keys of a type; exit code 1 if there are none."""
+    return print_keys_of(args, {key: [end.type for end in ends] for key, ends in _served(bus.endpoints()).items()})
+
+
+def service_info(args: argparse.Namespace, bus: Node) -> int:
+    """Print a service's type and servers; exit code 1 if it has none."""
+    served = _served(bus.endpoints())
+    if not (servers := served.get(args.key)):
+        report(f"holozen service info: {unknown(args.key, sorted(served), bus.where)}")
+        return 1
+    return print_sides(args, [end.type for end in servers], {"servers": ("Services count", servers)})
+
+
+# Topics.
+
+
 def list_topics(args: argparse.Namespace, bus: Node) -> int:
     """Print each key that nodes read or write, once."""
     heard: set[str] = set()
@@ -58,7 +156,7 @@ def list_topics(args: argparse.Namespace, bus: Node) -> int:
     hint = FORBIDDEN if bus.connected() and not ends else ""
     found = topics(ends)
     found += [Topic(name, []) for name in sorted(heard - {topic.key for topic in found})]
-    if args.count_topics:
+    if args.count:
         print(json.dumps({"count": len(found)}) if args.json else len(found))
     elif args.json:
         for topic in found:
@@ -85,35 +183,22 @@ def _print_verbose(found: list[Topic]) -> None:
             print(printable(topic.line("subscriber", topic.subscriptions)))
 
 
-def type_of(args: argparse.Namespace, bus: Node) -> int:
+def topic_type(args: argparse.Namespace, bus: Node) -> int:
     """Print a key's type; exit code 1 if no node states it."""
     found = topics(bus.endpoints())
     types = next((topic.types for topic in found if topic.key == args.key), [])
     met = None if types else foreign_sample(bus, args.key)
     if met and (found_type := type_in(met[0].encoding)):
         types = [found_type]
-    for name in types:
-        print(json.dumps({"key": args.key, "type": name}) if args.json else printable(name))
     if met and not types:
         report(f"holozen topic type: {args.key!r} has no known type; its samples are {met[0].encoding}")
-    elif not types:
-        report(f"holozen topic type: {unknown(args.key, [topic.key for topic in found], bus.where)}")
-    return 0 if types else 1
+        return 1
+    return print_types(args, types, [topic.key for topic in found], bus.where)
 
 
-def find(args: argparse.Namespace, bus: Node) -> int:
+def find_topics(args: argparse.Namespace, bus: Node) -> int:
     """Print the keys of a type; exit code 1 if there are none."""
-    found = topics(bus.endpoints())
-    keys = [topic.key for topic in found if any(f"/{name}".endswith(f"/{args.type}") for name in topic.types)]
-    if args.count_topics:
-        print(json.dumps({"count": len(keys)}) if args.json else len(keys))
-    else:
-        for name in keys:
-            print(json.dumps({"key": name, "type": args.type}) if args.json else printable(name))
-    if not keys:
-        types = sorted({name for topic in found for name in topic.types})
-        report(f"holozen topic find: no topic of type {args.type!r}{suggest(args.type, types)}; types: {listed(types)}")
-    return 0 if keys else 1
+    return print_keys_of(args, {topic.key: topic.types for topic in topics(bus.endpoints())})
 
 
 Row = dict[str, Any]
@@ -124,7 +209,7 @@ ASK = 0.5  # s
 ENOUGH = 200  # samples, after which `info -v` stops listening
 
 
-def info(args: argparse.Namespace, bus: Node) -> int:
+def topic_info(args: argparse.Namespace, bus: Node) -> int:
     """Print a key's type, publishers and subscribers."""
     endpoints = bus.endpoints()
     publishers = [_row(end) for end in on_key(endpoints, args.key, "pub")]
