@@ -101,6 +101,11 @@ def print_sides(args: argparse.Namespace, types: Iterable[str], sides: Mapping[s
     return 0
 
 
+def is_hidden(key: str) -> bool:
+    """Whether ROS 2 lists a key only when asked to: a part of it begins with _."""
+    return key.startswith("_") or "/_" in key
+
+
 # Services.
 
 
@@ -116,7 +121,7 @@ def _served(ends: list[Endpoint]) -> dict[str, list[Endpoint]]:
 def list_services(args: argparse.Namespace, bus: Node) -> int:
     """Print each service key once."""
     ends = bus.endpoints()
-    rows = ((end.key, end.type) for end in ends if end.kind == "srv")
+    rows = ((end.key, end.type) for end in ends if end.kind == "srv" and (args.hidden or not is_hidden(end.key)))
     return print_list(args, "service", rows, ends, bus.where)
 
 
@@ -156,6 +161,7 @@ def list_topics(args: argparse.Namespace, bus: Node) -> int:
     hint = FORBIDDEN if bus.connected() and not ends else ""
     found = topics(ends)
     found += [Topic(name, []) for name in sorted(heard - {topic.key for topic in found})]
+    found = [topic for topic in found if args.hidden or not is_hidden(topic.key)]
     if args.count:
         print(json.dumps({"count": len(found)}) if args.json else len(found))
     elif args.json:

@@ -30,9 +30,9 @@ _QOS = (
 )  # fmt: skip
 _NODES, _TOPICS, _SERVICES = "--include-hidden-nodes", "--include-hidden-topics", "--include-hidden-services"
 _ROS2 = {
-    "topic list": (_TOPICS,), "topic find": (_TOPICS,), "topic type": (_TOPICS,), "topic info": (_TOPICS,),
+    "topic find": (_TOPICS,), "topic type": (_TOPICS,), "topic info": (_TOPICS,),
     "topic echo": (*_QOS, _TOPICS, "--lost-messages", "--no-lost-messages"), "topic pub": (*_QOS, "--keep-alive S"),
-    "service list": (_SERVICES,), "service find": (_SERVICES,),
+    "service find": (_SERVICES,),
     "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
 }  # fmt: skip
@@ -161,6 +161,9 @@ def list_arguments(noun: str) -> Callable[[argparse.ArgumentParser], None]:
     def fill(parser: argparse.ArgumentParser) -> None:
         parser.add_argument("-t", "--show-types", action="store_true", help="with their types")
         add_count(parser, noun)
+        if noun != "action":
+            text = "also those with a name that begins with _, as those of actions"
+            parser.add_argument(f"--include-hidden-{noun}s", dest="hidden", action="store_true", help=text)
 
     return fill
 

@@ -30,6 +30,8 @@ def test_list_names_every_topic_once(town: Wire, robot: Robot) -> None:
     assert town.run("topic", "list").stdout.split() == sorted(TOPICS)
     lines = town.run("topic", "list", "-t").stdout.splitlines()
     assert lines == [f"{key} [{kind}]" for key, kind in sorted(TOPICS.items())]
+    hidden = "simulate_steps/_action/feedback"
+    assert hidden in town.run("topic", "list", "--include-hidden-topics").stdout.split()
 
 
 def test_info_shows_the_type_and_the_endpoints(town: Wire, robot: Robot) -> None:
