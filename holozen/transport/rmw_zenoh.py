@@ -25,7 +25,7 @@ KINDS = {"MP": "pub", "MS": "sub", "SS": "srv"}
 NO_HASH = "TypeHashNotSupported"  # in the place of hashes in ROS 2 Humble
 _CODES = {kind: code for code, kind in KINDS.items()}
 _ATTACHMENT = struct.Struct("<qqB16s")
-_TYPE = re.compile(r"([A-Za-z]\w*)::(msg|srv)::dds_::([A-Za-z]\w*)_")
+_TYPE = re.compile(r"([A-Za-z]\w*)::(msg|srv|action)::dds_::([A-Za-z]\w*)_")
 
 
 class Endpoint(NamedTuple):

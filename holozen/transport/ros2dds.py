@@ -1,8 +1,8 @@
 """The form that zenoh-bridge-ros2dds gives to ROS 2 on Zenoh: keys as ours, CDR without an Encoding, liveliness tokens.
 
 Each bridge holds a token for what its ROS nodes read, write and serve, and makes a DDS endpoint for each token of
-another. In a token § stands for /. Samples carry no type and no sender: a token states the type, and Zenoh's timestamp
-the bridge's session (zenoh-plugin-ros2dds 1.x, liveliness_mgt.rs).
+another; an action has one token for all its parts. In a token § stands for /. Samples carry no type and no sender: a
+token states the type, and Zenoh's timestamp the bridge's session (zenoh-plugin-ros2dds 1.x, liveliness_mgt.rs).
 """
 
 import re
@@ -14,8 +14,11 @@ from holozen.transport.samples import Sample
 
 QOS = ":1:0:0,10"  # no key; reliable, volatile, the last 10
 LATCHED_QOS = ":1:1:0,1"  # transient local, the last one
-_TYPE = re.compile(r"[A-Za-z]\w*/(msg|srv)/[A-Za-z]\w*")
+_TYPE = re.compile(r"[A-Za-z]\w*/(msg|srv|action)/[A-Za-z]\w*")
 _HASH = re.compile(r"typehash=(RIHS\d+_[0-9a-f]+)")
+ACTION_SERVER, ACTION_CLIENT = "AS", "AC"
+PART = "/_action/"  # between an action and a part of it
+_LENGTHS = {"MP": 7, "MS": 7, "SS": 6, ACTION_CLIENT: 6}  # chunks of the tokens that are read
 _CODES = {kind: code for code, kind in KINDS.items()}
 
 
@@ -28,15 +31,18 @@ class Form:
     def parse(self, token: str) -> Endpoint | None:
         """The endpoint that a token names; None for another kind, and for one that is malformed."""
         parts = token.split("/")
-        start, kind = parts[:3:2], KINDS.get("".join(parts[3:4]), "")
-        if start != ["@", "@ros2_lv"] or not kind or len(parts) != (6 if kind == "srv" else 7):
+        start, code = parts[:3:2], "".join(parts[3:4])
+        if start != ["@", "@ros2_lv"] or code not in _LENGTHS or len(parts) != _LENGTHS[code]:
             return None
         topic, type_name, qos = (part.replace("§", "/") for part in [*parts[4:], ""][:3])
         if not TOPIC.fullmatch(topic) or not _TYPE.fullmatch(type_name):
             return None
         found = _HASH.search(qos)
         hashed, latched = found[1] if found else "", qos.split(":")[2:3] == ["1"]
-        return Endpoint(kind, topic, type_name, hashed, f"bridge_{parts[1][:6]}", parts[1], latched=latched)
+        node = f"bridge_{parts[1][:6]}"
+        if code == ACTION_CLIENT:  # it reads the feedback
+            return Endpoint("sub", f"{topic}{PART}feedback", f"{type_name}_FeedbackMessage", "", node, parts[1])
+        return Endpoint(KINDS[code], topic, type_name, hashed, node, parts[1], latched=latched)
 
     def key(self, endpoint: Endpoint) -> str:
         """The key of its samples or requests."""
@@ -47,9 +53,15 @@ class Form:
         return ""
 
     def token(self, endpoint: Endpoint, node_number: int) -> str:
-        """The key of its liveliness token."""
-        start = f"@/{endpoint.session}/@ros2_lv/{_CODES[endpoint.kind]}"
-        names = "/".join(name.replace("/", "§") for name in (endpoint.topic, endpoint.type))
+        """The key of its liveliness token; empty for a part of an action whose token another part has."""
+        code, topic, type_name = _CODES[endpoint.kind], endpoint.topic, endpoint.type
+        if PART in topic:
+            code, type_name = ACTION_SERVER, type_name.removesuffix("_SendGoal")
+            topic, _, part = topic.partition(PART)
+            if part != "send_goal":
+                return ""
+        start = f"@/{endpoint.session}/@ros2_lv/{code}"
+        names = "/".join(name.replace("/", "§") for name in (topic, type_name))
         if endpoint.kind == "srv":
             return f"{start}/{names}"
         return f"{start}/{names}/{LATCHED_QOS if endpoint.latched else QOS}:typehash={endpoint.hash};"

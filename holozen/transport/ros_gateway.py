@@ -25,9 +25,9 @@ from holozen.console import report
 from holozen.messages import CodecError, cdr, codec
 from holozen.messages.definitions import Interface, InterfaceError
 from holozen.messages.registry import Registry
+from holozen.transport import actions, ros2dds
 from holozen.transport import graph as graphs
 from holozen.transport import rmw_zenoh as rmw
-from holozen.transport import ros2dds
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.samples import Answers, RawSubscriber, Sample, stamps
@@ -43,6 +43,8 @@ DEPTH = 64  # samples that wait in a route; of commands all count, since one may
 MANY = 256  # publishers of a topic whose ages are measured
 CALL = 5.0  # s for a service to answer
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
+
+RESULT, STATUS = (f"/{actions.BELOW}/{part}" for part in (actions.RESULT, actions.STATUS))
 
 Ends = list[Callable[[], object]]
 
@@ -75,6 +77,7 @@ class Gateway:
         self._held: dict[Any, Ends] = {}  # tokens, services and routes, and what ends each
         self._types: dict[str, Interface | None] = {}
         self._reported: set[str] = set()
+        self._closed = threading.Event()
         self._bridges: set[str] = set()  # those with a link
 
     def update(self) -> str:
@@ -104,6 +107,7 @@ class Gateway:
 
     def close(self) -> None:
         """Withdraw what was announced, and carry nothing more."""
+        self._closed.set()
         for ends in self._held.values():
             for end in ends:
                 end()
@@ -174,7 +178,8 @@ class Gateway:
         interface = self._interface(one.type) if rmw.TOPIC.fullmatch(one.key) else None
         if not interface or (interface.kind == "srv") != (one.kind == "srv"):
             return None
-        latched = one.kind == "pub" and one.key.rpartition("/")[2] in wire.LATCHED
+        is_latched = one.key.rpartition("/")[2] in wire.LATCHED or one.key.endswith(STATUS)
+        latched = one.kind == "pub" and is_latched
         number, name = self._numbers.setdefault(f"{one}", len(self._numbers)), self._named(one.node)[1]
         return rmw.Endpoint(
             one.kind, one.key, interface.name, self._form.hash(interface), name, self._id, number, latched
@@ -207,9 +212,11 @@ class Gateway:
         return True
 
     def _may_offer(self, theirs: rmw.Endpoint, ours: list[graphs.Endpoint]) -> bool:
-        """Whether a service of theirs may be called from our side. Most of each node's have types not known here."""
+        """Whether a service of theirs may be called from our side. Most of each node's have types not known here. Those
+        of an action are left out: a result takes longer than CALL.
+        """
         interface = self._interface(theirs.type)
-        if not interface or interface.kind != "srv":
+        if not interface or interface.kind != "srv" or f"/{actions.BELOW}/" in theirs.topic:
             return False
         if why := self._form.mismatch(theirs, interface):
             return self._refuse(theirs.topic, why)
@@ -305,9 +312,12 @@ class Gateway:
 
     def _serve(self, found: rmw.Endpoint) -> Callable[[], object]:
         """Answer ROS 2's calls of one of our services."""
-        return self._answers(self._there, self._form.key(found), partial(self._answer, found))
+        answers = AnswersAtOnce if found.topic.endswith(RESULT) else Answers
+        return self._answers(self._there, self._form.key(found), partial(self._answer, found), answers)
 
-    def _answers(self, session: Any, key: str, reply: Callable[[Any], None]) -> Callable[[], object]:
+    def _answers(
+        self, session: Any, key: str, reply: Callable[[Any], None], answers: type[Answers] = Answers
+    ) -> Callable[[], object]:
         """Answer the queries on a key by `reply`, in a thread, and those with an error for which it raises one."""
         queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=True)
 
@@ -321,7 +331,7 @@ class Gateway:
             except (BusError, zenoh.ZError):  # the session is closed, and with it the queryable
                 pass
 
-        return _quietly(Answers(queryable, answer).close)
+        return _quietly(answers(queryable, answer).close)
 
     def _answer(self, found: rmw.Endpoint, query: Any) -> None:
         interface = self._registry.find(found.type)
@@ -330,7 +340,7 @@ class Gateway:
         attachment = self._form.answered(bytes(query.attachment or b""))
         request = f"application/cdr;{interface.request.name}"
         try:
-            (reply,) = call_bytes(self._bus, found.topic, bytes(query.payload or b""), request, CALL)
+            reply = self._replied(found.topic, bytes(query.payload or b""), request)
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)
         except ServiceError as error:
             names = {field.name for field in interface.response.fields}
@@ -339,6 +349,15 @@ class Gateway:
             # A client of ROS 2 takes no notice of an error reply, and would wait for ever.
             payload = cdr.write(interface.response, {"success": False, "message": str(error)})
         query.reply(self._form.key(found), payload, encoding="application/cdr", attachment=attachment)
+
+    def _replied(self, key: str, payload: bytes, encoding: str) -> Sample:
+        """The reply of a service of ours. That of an action's result is waited for until the goal ends."""
+        if not key.endswith(RESULT):
+            return call_bytes(self._bus, key, payload, encoding, CALL)[0]
+        found = actions.wait_for_result(self._bus, key.removesuffix(RESULT), payload, encoding, self._closed.is_set)
+        if found is None:
+            raise ServiceError("`holozen ros2` ends")
+        return found
 
     def _offer(self, theirs: rmw.Endpoint) -> Ends:
         """Let a service of ROS 2 be called on our side."""
@@ -365,6 +384,26 @@ class Gateway:
         shown = graphs.Endpoint(theirs.topic, "srv", theirs.type, NODES + theirs.node, self._bus.id)
         token = self._hold(self._bus.session, graphs.token(shown))
         return [*token, self._answers(self._bus.session, theirs.topic, answer)]
+
+
+class AnswersAtOnce(Answers):
+    """Answers each query in a thread of its own, as some take long; at most MANY at a time."""
+
+    def _run(self) -> None:
+        room = threading.BoundedSemaphore(MANY)
+
+        def one(query: Any) -> None:
+            with query, room:
+                self._answer(query)
+
+        while True:
+            try:
+                query = self._queries.recv()
+            except Exception:  # as in RawSubscriber.recv
+                return
+            with room:  # waits while there are too many
+                pass
+            threading.Thread(target=one, args=(query,), daemon=True).start()
 
 
 def _moves(type_name: str, key: str) -> bool:

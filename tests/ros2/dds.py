@@ -57,13 +57,14 @@ def hashed(type_hash: str) -> Qos:
 
 
 def dds_type(name: str) -> Any:
-    """The class of a ROS type; of a service's half `std_srvs/srv/Trigger_Request` with the caller before its fields."""
+    """The class of a ROS type; of half a service, `std_srvs/srv/Trigger_Request`, with the caller before its fields."""
     if name not in _made:
         interface = REGISTRY.find(name)
         fields = {field.name: _field(field) for field in interface.fields}
         if not fields:
             fields = {"structure_needs_at_least_one_member": types.uint8}
-        _made[name] = _struct(name, (CALLER if "/srv/" in name else {}) | fields)
+        is_half = name.endswith(("_Request", "_Response"))
+        _made[name] = _struct(name, (CALLER if is_half else {}) | fields)
     return _made[name]
 
 

@@ -28,6 +28,10 @@ from holozen.transport.rmw_zenoh import Endpoint
 TWIST, ODOM, TF = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 STRING, TRIGGER, SET_BOOL = "std_msgs/msg/String", "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
 
+MANY_STEPS = 10_000_000  # the most that the sim takes
+CANCELED = 5  # action_msgs/msg/GoalStatus
+SEND, RESULT = ("send_goal", "SendGoal"), ("get_result", "GetResult")
+
 
 class Bridged:
     """A sim and `holozen ros2` on a wire, a bridge, and a ROS node behind it."""
@@ -196,6 +200,27 @@ def test_a_service_of_ros_is_called_from_here(bridged: Bridged) -> None:
     assert "geschlossen" in calling.out
 
 
+def test_ros_is_a_client_of_our_actions(bridged: Bridged) -> None:
+    """A goal that was sent twice would be rejected."""
+    action, kind = "/simulate_steps/_action", "simulation_interfaces/action/SimulateSteps"
+    assert bridged.wire.run("sim", "pause").returncode == 0
+    node = bridged.dds.Node(bridged.domain, "their_client")
+    send, result = (node.client(f"{action}/{part[0]}", f"{kind}_{part[1]}") for part in (SEND, RESULT))
+    cancel = node.client(f"{action}/cancel_goal", "action_msgs/srv/CancelGoal")
+    status = node.subscriber(f"{action}/status", "action_msgs/msg/GoalStatusArray", bridged.dds.LATCHED)
+    feedback = node.subscriber(f"{action}/feedback", f"{kind}_FeedbackMessage")
+    goal = bridged.dds.dds_type(f"{kind}_Goal")(steps=MANY_STEPS)
+    info = bridged.dds.default("action_msgs/msg/GoalInfo")
+    info.goal_id.uuid = [7] * 16
+    assert bridged.call(send, goal_id=info.goal_id, goal=goal).accepted
+    result.call(goal_id=info.goal_id)
+    assert list(wait_for(lambda: feedback.take(100), what="feedback")[0].goal_id.uuid) == [7] * 16
+    assert bridged.call(cancel, goal_info=info).return_code == 0
+    assert wait_for(result.reply, what="the result").status == CANCELED
+    wait_for(lambda: any(each.status_list[-1].status == CANCELED for each in status.take(10) if each.status_list))
+    assert bridged.wire.run("sim", "play").returncode == 0
+
+
 def test_a_latched_topic_reaches_a_late_reader(bridged: Bridged) -> None:
     static = bridged.wire.bus("statics").publisher("tf_static", TFMessage)
     static.put(TFMessage([TransformStamped(child_frame_id="scanner")]))
@@ -333,6 +358,16 @@ def test_a_token_is_that_of_the_bridge(kind: str, topic: str, type_name: str, la
     endpoint = Endpoint(kind, topic, type_name, hashed, "bridge_ab", "ab", latched=latched)
     assert ros2dds.Form().token(endpoint, 0) == f"@/ab/@ros2_lv/{token}"
     assert ros2dds.Form().parse(f"@/ab/@ros2_lv/{token}") == endpoint
+
+
+def test_an_action_has_one_token_for_its_parts() -> None:
+    form, kind = ros2dds.Form(), "nav2_msgs/action/NavigateToPose"
+    parts = [("srv", "send_goal", "_SendGoal"), ("srv", "get_result", "_GetResult"), ("pub", "feedback", "_Feedback")]
+    ours = [Endpoint(code, f"go/_action/{part}", kind + last, "", "", "ab") for code, part, last in parts]
+    token = "@/ab/@ros2_lv/AS/go/nav2_msgs§action§NavigateToPose"
+    assert [form.token(part, 0) for part in ours] == [token, "", ""]
+    reader = Endpoint("sub", "go/_action/feedback", f"{kind}_FeedbackMessage", "", "bridge_ab", "ab")
+    assert form.parse(token.replace("/AS/", "/AC/")) == reader
 
 
 @pytest.mark.parametrize(
