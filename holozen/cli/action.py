@@ -139,7 +139,10 @@ class Errand:
             self._cancel()  # it may have been accepted all the same
             raise
         answer = self._value(reply, "SendGoal_Response")
-        if not isinstance(answer, dict) or not answer.get("accepted"):
+        if not isinstance(answer, dict):
+            self._cancel()  # it may have been accepted
+            raise BusError(f"{self._key}: the reply could not be decoded: {self._reader.why}")
+        if not answer.get("accepted"):
             reason = reply.attachment.decode(errors="replace") or "its server gives no reason"
             report(f"holozen action send_goal: {self._key}: the goal was rejected: {printable(reason)}")
             return 1

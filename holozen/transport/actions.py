@@ -28,7 +28,7 @@ BELOW = "_action"
 SEND, CANCEL, RESULT, FEEDBACK, STATUS = "send_goal", "cancel_goal", "get_result", "feedback", "status"
 
 KEPT = 10.0  # s that the result of a goal is kept after its end, as in ROS 2
-MOST = 1000  # goals of a server, ended ones included
+MOST = 256  # goals of a server, ended ones included
 MOST_WAITING = 100  # requests for the result of one goal
 LONGEST = 86_400.0  # s of one request for a result
 GONE = 1.0  # s without a server after which the goal is lost

@@ -111,11 +111,11 @@ class Bus(Node):
         from holozen.messages import definitions, registry
 
         interface = getattr(kind, "__interface__", None)
-        if interface is None or kind.ROS in self._defined or registry.table(kind.ROS.partition("/")[0]):
+        if interface is None or interface.name in self._defined or registry.table(interface.package):
             return
-        self._defined.add(kind.ROS)
+        self._defined.add(interface.name)
         text = definitions.whole_text(interface)
-        self._keep(Definition(self.session, zenoh.handlers.RingChannel(16), kind.ROS, text))
+        self._keep(Definition(self.session, zenoh.handlers.RingChannel(16), interface.name, text))
 
     def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> Subscription[M]:
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused, and in the

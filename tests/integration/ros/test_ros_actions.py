@@ -225,6 +225,51 @@ def test_the_verbs_list_it_and_send_it_goals(town: Wire) -> None:
     assert "its type is example_interfaces/action/Fibonacci, not nav2_msgs/action/NavigateToPose" in other.stderr
 
 
+TURNER = """
+import rclpy
+from rclpy.action import ActionServer
+from rclpy.node import Node
+from turner.action import Turn
+
+
+class Turner(Node):
+    def __init__(self):
+        super().__init__('turner')
+        self.server = ActionServer(self, Turn, 'turn', self.execute)
+        print('ready', flush=True)
+
+    async def execute(self, goal_handle):
+        goal_handle.publish_feedback(Turn.Feedback(left=goal_handle.request.angle / 2))
+        goal_handle.succeed()
+        result = Turn.Result(done=True)
+        result.at.x = goal_handle.request.angle
+        return result
+
+
+rclpy.init()
+rclpy.spin(Turner())
+"""
+
+
+@pytest.mark.parametrize("form", ["json", "msgpack", "cdr"])
+def test_an_action_of_a_package_is_known_to_who_does_not_have_it(form: str, wire: Wire, tmp_path: Path) -> None:
+    files = {
+        "package.xml": "<package><name>turner</name></package>",
+        "action/Turn.action": "float64 angle\n---\nbool done\ngeometry_msgs/Point at\n---\nfloat64 left\n",
+        "scripts/turn.py": TURNER,
+    }
+    for name, text in files.items():
+        (tmp_path / "turner" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "turner" / name).write_text(text)
+    wire.start("run", "--wire", form, str(tmp_path / "turner" / "scripts" / "turn.py")).wait_for_line("ready")
+    done = wire.run("action", "send_goal", "turn", "{angle: 1.5}", "--feedback", "--json")
+    assert [json.loads(line) for line in done.stdout.splitlines()[1:]] == [
+        {"feedback": {"left": 0.75}},
+        {"status": "SUCCEEDED", "result": {"done": True, "at": {"x": 1.5, "y": 0.0, "z": 0.0}}},
+    ], done.stderr
+    assert "(did you mean 'angle'?)" in wire.run("action", "send_goal", "turn", "{angl: 1.5}").stderr
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 def test_a_signal_to_the_verb_cancels_its_goal(number: signal.Signals, town: Wire) -> None:
     verb = town.start("action", "send_goal", "fibonacci", "{order: 9999}", "--feedback")
