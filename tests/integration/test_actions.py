@@ -173,3 +173,13 @@ def test_the_sim_makes_steps_and_tells_how_many(wire: Wire) -> None:
     wire.run("sim", "play")
     playing = result(send(wire, "simulate_steps", {"steps": 1}))[1]["result"]["error_message"]
     assert playing.startswith("the sim is playing; pause it to step")
+
+
+def test_the_lists_leave_out_what_an_action_consists_of(town: Wire) -> None:
+    for words, hidden in (
+        (("topic", "list"), "simulate_steps/_action/feedback"),
+        (("service", "list"), "simulate_steps/_action/send_goal"),
+    ):
+        assert "_action" not in town.run(*words).stdout
+        assert hidden in town.run(*words, f"--include-hidden-{words[0]}s").stdout.splitlines()
+    assert town.run("action", "list").stdout == "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"
