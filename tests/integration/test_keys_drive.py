@@ -170,4 +170,4 @@ def test_a_robot_has_one_name_in_list_map_teleop_and_doctor(town: Wire, robot: R
         terminal.wait_for_text("holozen teleop   hb_bot")
     assert town.run("list").stdout.startswith("hb_bot ")
     assert "hb_bot x " in town.run("map", "--once").stdout
-    assert "nothing commands hb_bot;" in town.run("doctor").stdout
+    assert "nothing commands hb_bot now; " in town.run("doctor").stdout
