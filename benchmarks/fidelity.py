@@ -24,6 +24,7 @@ from holozen.robot.model import Link, RobotModel, Shape, WorldSpec, driven
 from holozen.robot.model import Pose as Place
 from holozen.robot.rigid import lowest
 from holozen.rotation import conjugate, from_rpy, multiply, rotate, yaw
+from services.sim.__main__ import ENGINES
 from services.sim.physics.movers import mover_for
 from services.sim.physics.world import World
 
@@ -59,6 +60,7 @@ class Result:
     `start`: what it lost while it sped up.
     """
 
+    engine: str
     drive: str
     ground: str
     mu: float
@@ -73,10 +75,10 @@ class Result:
     def row(self) -> tuple[str, ...]:
         mu = f"{self.mu:g}" if self.drive in SLIDES else "-"
         figures = (f"{self.error:.2f} %", f"{self.aside:.1f} mm", f"{self.heading:+.2f}", f"{self.start:.1f}")
-        return self.drive, self.ground, mu, self.motion, *figures
+        return self.engine, self.drive, self.ground, mu, self.motion, *figures
 
 
-HEAD = ("drive", "ground", "mu", "motion", "error", "aside", "heading", "start")
+HEAD = ("engine", "drive", "ground", "mu", "motion", "error", "aside", "heading", "start")
 
 
 def with_friction(model: RobotModel, mu: float) -> RobotModel:
@@ -94,11 +96,11 @@ def sloped(degrees: float) -> RobotModel:
     return RobotModel("ramp", "ramp", {"ramp": Link("ramp", None, (), (shape,))}, {}, None, static=True)
 
 
-def drive(name: str, ground: str, mu: float, motion: str, seconds: float) -> Result:
+def drive(engine: str, name: str, ground: str, mu: float, motion: str, seconds: float) -> Result:
     """One drive from rest."""
     tilt = from_rpy(0.0, -math.radians(SLOPES[ground]), 0.0)
     model = with_friction(ROBOTS[name], mu) if name in SLIDES else ROBOTS[name]
-    with closing(World(WorldSpec(ground=ground == "floor"))) as world:
+    with closing(World(WorldSpec(ground=ground == "floor"), engine)) as world:
         if ground != "floor":
             mover_for(world, sloped(SLOPES[ground]), (0.0, 0.0, 0.0))
         mover = mover_for(world, model, rotate(tilt, (0.0, 0.0, -lowest(model))), tilt)
@@ -131,7 +133,7 @@ def drive(name: str, ground: str, mu: float, motion: str, seconds: float) -> Res
     error = 100 * gaps[-1] / way if way else 100 * abs(heading) / math.degrees(velocity[2] * seconds)
     every = slice(None, None, 8)
     paths = [[(x, y) for x, y, _ in path[every]] for path in (places, commanded)]
-    return Result(name, ground, mu, motion, error, 1000 * max(gaps), heading, start, *paths)
+    return Result(engine, name, ground, mu, motion, error, 1000 * max(gaps), heading, start, *paths)
 
 
 def ahead(place: Planar, velocity: Planar, seconds: float) -> Planar:
@@ -140,14 +142,14 @@ def ahead(place: Planar, velocity: Planar, seconds: float) -> Planar:
     return place[0] + dx, place[1] + dy, place[2] + velocity[2] * seconds
 
 
-def drives(quick: bool) -> Iterator[Result]:
-    """All of them; with the friction of a robot's file once."""
+def drives(engine: str, quick: bool) -> Iterator[Result]:
+    """All of them in one engine; with the friction of a robot's file once."""
     for name in ROBOTS:
         for ground in SLOPES:
             for mu in FRICTIONS if name in SLIDES and not quick else FRICTIONS[-1:]:
                 for motion, velocity in MOTIONS.items():
                     if name not in TWO_SIDED or not velocity[1]:
-                        yield drive(name, ground, mu, motion, 0.5 if quick else LASTS)
+                        yield drive(engine, name, ground, mu, motion, 0.5 if quick else LASTS)
 
 
 def plot(results: list[Result]) -> Iterator[str]:
@@ -156,14 +158,15 @@ def plot(results: list[Result]) -> Iterator[str]:
     for result in arcs:
         ways = {"driven": result.path, "commanded": result.commanded}
         robots = [Robot(way, *points[-1], 0.0, points) for way, points in ways.items()]
-        yield f"{result.drive} on the {result.ground}, arc, driven and commanded:"
+        yield f"{result.engine}: {result.drive} on the {result.ground}, arc, driven and commanded:"
         yield from draw(Plane(robots), (60, 14))
 
 
 def main() -> None:
     made = parser("fidelity", (__doc__ or "").partition("\n")[0])
+    made.add_argument("--engine", choices=ENGINES, action="append", help="only this one; may be repeated")
     args = made.parse_args()
-    results = list(drives(args.quick))
+    results = [result for engine in args.engine or ENGINES for result in drives(engine, args.quick)]
     rows = [HEAD, *(result.row() for result in results)]
     widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
     for row in rows:

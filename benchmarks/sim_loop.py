@@ -28,7 +28,7 @@ from holozen.robot.xacro import expand
 from holozen.transport.pubsub import Publisher
 from services.sim.entities import Entities
 from services.sim.loop import Loop
-from services.sim.physics.engine import bullet
+from services.sim.physics.bullet import bullet
 from services.sim.physics.world import World
 from services.sim.robot import Robot
 from services.sim.spawn import spawn_all

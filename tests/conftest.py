@@ -59,6 +59,7 @@ def pytest_configure(config: pytest.Config) -> None:
     config.addinivalue_line(
         "markers", "alone: measures time, or needs what keeps it; scripts/test runs it beside no other test"
     )
+    config.addinivalue_line("markers", "engines: tried in each physics engine, by the fixture `engine` or a world")
     config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
 
 

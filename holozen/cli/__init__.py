@@ -76,6 +76,7 @@ EXTRAS = (
     "lz4",
     "matplotlib",
     "mcap",
+    "mujoco",
     "numpy",
     "pybullet",
     "transforms3d",
@@ -174,7 +175,7 @@ def _run(verb: str, words: list[str]) -> int:
         name = (error.name or "").partition(".")[0]
         if name not in EXTRAS:
             raise
-        extra = "secure" if name == "cryptography" else verb  # any verb with --secure needs it
+        extra = {"cryptography": "secure", "mujoco": "mujoco"}.get(name, verb)  # these come with flags of verbs
         report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install -e '.[{extra}]'")
         return 1
 

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .entities import Entities
 
 
+ENGINES = ("pybullet", "mujoco")
 HOW = "holozen sim --join --robot FILE=NAME"
 JOIN = f"end it, or join it with named robots: {HOW}"
 
@@ -50,6 +51,7 @@ def parser() -> argparse.ArgumentParser:
     add("--state", type=Path, metavar="DIR",
         help="keep software stops in files there, for the next sim (default: HOLOZEN_STATE, else none)")  # fmt: skip
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
+    add("--engine", choices=ENGINES, default=ENGINES[0], help="the physics engine (default: %(default)s)")
     flags.add_robot_sources(parser)
     add(
         "--rtf",
@@ -100,7 +102,7 @@ def main(argv: list[str] | None = None) -> int:
             if other and (reason := _cannot_join(args, mine)):
                 report(f"sim: {other} simulates here already; {reason}")
                 return 1
-            world = World(spec)
+            world = World(spec, args.engine)
             where = connection.from_arguments(args).arguments()
             cameras = Cameras(
                 bus, key_for("exposures", "" if not joins else mine.node if mine else args.robot[0][1]), where

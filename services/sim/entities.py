@@ -333,7 +333,7 @@ class Entities:
     def look(self) -> RayCaster:
         """What sensors see now."""
         if self._rays is None:
-            self._rays = RayCaster(self._world.spec.ground)
+            self._rays = self._world.ray_caster()
         for name, number in list(self._traced.items()):
             if name not in self._all or self._all[name].number != number:
                 self._rays.remove(name)

@@ -14,7 +14,8 @@ OTHERS = [path for folder in ("examples", "meshes", "scripts") for path in REPO.
 # Library -> the only places of it in holozen/ and services/.
 PLACES = {
     "zenoh": ["holozen/transport/"],
-    "pybullet": ["services/camera/renderer.py", "services/sim/physics/"],
+    "mujoco": ["services/sim/physics/mujoco.py"],
+    "pybullet": ["services/camera/renderer.py", "services/sim/physics/bullet.py"],
     "prompt_toolkit": ["services/teleop/app.py", "services/teleop/screen.py"],
     "numpy": ["holozen/robot/", "holozen/ros/", "services/camera/", "services/sim/", "services/view/"],
     "collada": [],

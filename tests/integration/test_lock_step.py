@@ -5,6 +5,7 @@ import math
 import re
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -35,8 +36,10 @@ from holozen.messages.simulation_interfaces import SimulationState as State
 from holozen.testing import LockStep, Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Subscription
+from services.sim.__main__ import ENGINES
 
 Sim = Callable[..., LockStep]
+LIBRARIES = {"pybullet": "/pybullet.", "mujoco": "/libmujoco."}  # files of the engines
 WORLD = ("--world", str(find("worlds", "arena.world")))
 BALL = math.hypot(-2.0, -1.8)  # m from the origin
 BALL_URDF = """<robot name="ball"><link name="ball"><inertial><mass value="0.1"/>
@@ -70,16 +73,20 @@ def drive(sim: LockStep) -> str:
     return hash_of_poses(sim.bus)
 
 
+@pytest.mark.parametrize("engine", ENGINES)
 def test_the_same_commands_at_the_same_steps_move_all_to_the_same_bits(
-    lock_step: Sim, trials: Callable[[int, int], int]
+    lock_step: Sim, trials: Callable[[int, int], int], engine: str
 ) -> None:
-    sim = lock_step(*WORLD, *ROBOTS, robot="Planar")
+    flags = ("--engine", engine, *WORLD, *ROBOTS)
+    sim = lock_step(*flags, robot="Planar")
+    loaded = Path(f"/proc/{sim.process.pid}/maps").read_text()
+    assert [name for name, file in LIBRARIES.items() if file in loaded] == [engine]
     hashes = {drive(sim)}
     for _ in range(trials(2, 100)):
         sim.reset()
         hashes.add(drive(sim))
     with Wire() as other:
-        hashes.add(drive(LockStep(other, *WORLD, *ROBOTS, robot="Planar")))
+        hashes.add(drive(LockStep(other, *flags, robot="Planar")))
     assert len(hashes) == 1
 
 

@@ -12,6 +12,7 @@ from holozen.messages import Imu, LaserScan, Message, Odometry, PointCloud2, Pos
 from holozen.messages.geometry_msgs import Point
 from holozen.messages.simulation_interfaces import ResetSimulationRequest as Scope
 from holozen.testing import LockStep, Wire
+from services.sim.__main__ import ENGINES
 
 Sim = Callable[..., LockStep]
 HEIGHT = 0.5  # m; of the lidar above the root
@@ -78,17 +79,12 @@ class Eyes:
         entities.spawn(self.bus, "wall", WALL, pose)
 
 
-@pytest.fixture(scope="module")
-def town() -> Iterator[Wire]:
-    with Wire() as wire:
-        yield wire
-
-
-@pytest.fixture(scope="module")
-def eyes(town: Wire, tmp_path_factory: pytest.TempPathFactory) -> Eyes:
+@pytest.fixture(scope="module", params=ENGINES)
+def eyes(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Eyes]:
     path = tmp_path_factory.mktemp("robot") / "bot.urdf"
     path.write_text(ROBOT)
-    return Eyes(LockStep(town, "--robot", f"{path}"))
+    with Wire() as wire:
+        yield Eyes(LockStep(wire, "--engine", request.param, "--robot", f"{path}"))
 
 
 def to_wall(angle: float, turned: float = 0.0) -> float:

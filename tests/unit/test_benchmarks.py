@@ -5,6 +5,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+from services.sim.__main__ import ENGINES
+
 ROOT = Path(__file__).resolve().parents[2]
 CASES = {
     "cli": {
@@ -76,14 +78,14 @@ WITHIN = {"omni": 0.5, "omni_rollers": 2, "mecanum_rollers": 3, "differential": 
 def test_fidelity_compares_each_drive_with_its_command(tmp_path: Path) -> None:
     lines = run("fidelity", "--json", str(tmp_path / "figures.json")).splitlines()
     found = json.loads((tmp_path / "figures.json").read_text())["cases"]
-    both = {(case["drive"], case["ground"]) for case in found}
-    assert both == {(drive, ground) for drive in WITHIN for ground in ("floor", "ramp")}
+    both = {(case["engine"], case["drive"], case["ground"]) for case in found}
+    assert both == {(engine, drive, ground) for engine in ENGINES for drive in WITHIN for ground in ("floor", "ramp")}
     assert {case["motion"] for case in found} == {"straight", "strafe", "diagonal", "spin", "arc"}
     assert all(case["error"] < WITHIN[case["drive"]] for case in found if case["ground"] == "floor")
     assert all(case["error"] < 20 for case in found), "it drives as commanded"
-    for drive, ground in both:
-        assert any(line.startswith(f"{drive} ") and f" {ground} " in line for line in lines)
-        assert f"{drive} on the {ground}, arc, driven and commanded:" in lines
+    for engine, drive, ground in both:
+        assert any(line.split()[:3] == [engine, drive, ground] for line in lines)
+        assert f"{engine}: {drive} on the {ground}, arc, driven and commanded:" in lines
 
 
 def test_the_one_beside_ros_1_names_its_requirements() -> None:

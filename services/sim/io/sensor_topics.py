@@ -31,7 +31,8 @@ from holozen.wire import key_for
 
 from ..cameras import Cameras
 from ..link_states import LinkState, placed
-from ..physics.ray_caster import Array, RayCaster
+from ..physics.engine import Array
+from ..physics.ray_caster import RayCaster
 from .topics import Schedule
 
 LinkStates = Mapping[str, LinkState]

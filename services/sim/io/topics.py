@@ -36,7 +36,8 @@ from holozen.rotation import XYZ, XYZW, conjugate, from_axis_angle, multiply, ro
 from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
-from ..physics.body import JointStates, Moved
+from ..physics.body import Moved
+from ..physics.engine import JointStates
 from ..physics.movers import Limited
 
 JOINT_RATE = 50.0  # Hz of sim time

@@ -13,8 +13,9 @@ from holozen.robot.rotation import Array
 from holozen.rotation import rotate
 from holozen.rotation import yaw as yaw_of
 
-from .body import JointStates, Moved
+from .body import Moved
 from .dynamics import GRAVITY
+from .engine import JointStates
 from .jointed import JointedBody
 from .wheels import forward_sign, radius_of
 

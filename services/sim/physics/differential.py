@@ -6,7 +6,8 @@ from holozen.limits import Planar, clamp
 from holozen.robot.model import Differential, RobotModel
 from holozen.robot.rigid import joint_axes
 
-from .body import JointStates, Moved
+from .body import Moved
+from .engine import JointStates
 from .jointed import JointedBody
 from .wheels import Odometer, forward_sign, radius_of
 

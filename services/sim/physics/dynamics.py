@@ -1,15 +1,14 @@
-"""The engine's parameters of a part's joint and surface: limits, damping, friction, stiffness."""
+"""The engine's parameters of a part's joint and surface: damping, friction, stiffness."""
 
 import math
-from collections.abc import Iterable
-from typing import Any
+from collections.abc import Sequence
 
 from holozen.robot.model import GRAVITY as GRAVITY_VECTOR
 from holozen.robot.model import Surface
 from holozen.robot.rigid import Part
-from holozen.rotation import XYZ, conjugate, rotate
+from holozen.rotation import XYZ, rotate
 
-from .engine import bullet
+from .engine import Contact
 
 FRICTION = 1.0  # Gazebo's default for mu and mu2
 DRAG = 0.1  # friction of a caster whose file sets none; with more it chatters and lifts the wheels
@@ -18,46 +17,25 @@ SIDEWAYS = 0.2  # share of it along the axles of a skid-steer, unless its file s
 GRAVITY = -GRAVITY_VECTOR[2]  # m/s^2
 GENTLE = 4.0  # steps in which a contact resolves penetration, at the fastest
 SINK = 2e-4  # m that a skid-steer's tyres yield under its weight, so that all of them carry it
+MOST_LOST = 10.0  # time constants of damping in a step; beyond, a joint stands still at once
 RECOVERY = 0.1  # s; time constant of their rebound
 
 
-def set_joint(world: int, body: int, number: int, part: Part, damping: float) -> None:
-    """The part's inertia, the limits of its joint, and the joint's damping in N m s/rad or N s/m. The engine's own
-    damping is off.
-    """
-    settings: dict[str, Any] = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": damping}
-    limits = part.joint.limits if part.joint else None
-    if limits and math.isfinite(limits.lower) and math.isfinite(limits.upper):
-        settings |= {"jointLowerLimit": limits.lower, "jointUpperLimit": limits.upper}
-    bullet.changeDynamics(body, number, **settings, physicsClientId=world)
-    # In a separate call: the engine recomputes inertias when other values change.
-    bullet.changeDynamics(body, number, localInertiaDiagonal=part.body.inertia, physicsClientId=world)
-
-
-def set_surface(
-    world: int, body: int, links: Iterable[int], part: Part, dt: float, load: float = 0.0, drags: bool = False,
-    rolls: bool = False,
-) -> None:  # fmt: skip
-    """Set the contact parameters of a part's shapes, those of `links`, for steps of `dt` seconds. `load` in N is the
-    weight on a wheel that has to slide along its axle, else 0. `drags`: the part is a caster, or the chassis, of a
-    robot that wheels drive. `rolls`: rollers on the part's rim take the motion along its axle.
+def contact_of(part: Part, dt: float, load: float = 0.0, drags: bool = False, rolls: bool = False) -> Contact:
+    """How a part touches the ground, in steps of `dt` seconds. `load` in N is the weight on a wheel that has to slide
+    along its axle, else 0. `drags`: the part is a caster, or the chassis, of a robot that wheels drive. `rolls`:
+    rollers on the part's rim take the motion along its axle.
     """
     mu, across = _friction(part.surface, load > 0, DRAG if drags else FRICTION)
     across = 0.0 if rolls else across
-    settings: dict[str, Any] = {"lateralFriction": min(mu, MAX_FRICTION)}
-    if part.joint and mu and across < mu:
-        # The axle keeps its direction while the wheel turns, so the link's own axes suffice.
-        turns = [abs(component) for component in rotate(conjugate(part.body.axes), part.joint.axis)]
-        axle = turns.index(max(turns))
-        settings["anisotropicFriction"] = [across / mu if index == axle else 1.0 for index in range(3)]
+    share = across / mu if part.joint and mu and across < mu else 1.0
+    stiffness = damping = 0.0
     if part.surface.kp and part.surface.kd:
         # With less damping the engine resolves penetration at once, and throws falling bodies up.
-        least = part.surface.kp * dt * GENTLE
-        settings |= {"contactStiffness": part.surface.kp, "contactDamping": max(part.surface.kd, least)}
+        stiffness, damping = part.surface.kp, max(part.surface.kd, part.surface.kp * dt * GENTLE)
     elif load:
-        settings |= {"contactStiffness": load / SINK, "contactDamping": load / SINK * RECOVERY}
-    for link in links:
-        bullet.changeDynamics(body, link, **settings, physicsClientId=world)
+        stiffness, damping = load / SINK, load / SINK * RECOVERY
+    return Contact(min(mu, MAX_FRICTION), share, stiffness, damping)
 
 
 def load_on(parts: list[Part], wheels: int) -> float:
@@ -65,22 +43,23 @@ def load_on(parts: list[Part], wheels: int) -> float:
     return sum(part.body.mass for part in parts) * GRAVITY / wheels if wheels else 0.0
 
 
-def damping_of(parts: list[Part], number: int, dt: float) -> float:
+def damping_of(parts: Sequence[Part], number: int, dt: float, implicit: bool = False) -> float:
     """The damping to give the engine for steps of `dt` seconds: it slows the joint of part `number` in a step as much
     as the file's damping does in that time.
 
-    The engine applies the damping force of the step's start to the whole step, which makes a light wheel oscillate
-    with growing amplitude where damping * dt is above twice its inertia.
+    An engine applies to the whole step the damping force of its start, which makes a light wheel oscillate with growing
+    amplitude where damping * dt is above twice its inertia; or, if it is `implicit`, that of its end.
     """
     part = parts[number]
     if part.joint is None or part.joint.damping <= 0:
         return 0.0
     beside = sum(other.parent == part.parent for other in parts)  # all of them may turn against the same part
     inertia = 1 / (1 / _inertia(part, part.joint.axis) + beside / _carrier(parts, part))
-    return inertia / dt * -math.expm1(-part.joint.damping * dt / inertia)
+    lost = part.joint.damping * dt / inertia
+    return inertia / dt * (math.expm1(min(lost, MOST_LOST)) if implicit else -math.expm1(-lost))
 
 
-def _carrier(parts: list[Part], part: Part) -> float:
+def _carrier(parts: Sequence[Part], part: Part) -> float:
     """The inertia of the part that carries another, about that one's axis."""
     assert part.joint is not None, "the root is carried by nothing"
     carrier = parts[part.parent].body

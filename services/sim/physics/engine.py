@@ -1,137 +1,162 @@
-"""pybullet, loaded without its greeting, and its shapes and bodies, which are made once and used again.
+"""What a physics engine does for the sim: the verbs of one world of bodies, and what a body is made of.
 
-Of the sim only this folder imports pybullet. Metres, kilograms, seconds; quaternions are x, y, z, w.
+`bullet.py` and `mujoco.py` have them, and only they import an engine. Metres, kilograms, seconds; quaternions are
+x, y, z, w; positions, velocities and forces are along the axes of the world. A body is called by the number that `add`
+gives, its parts by their indices, the root's first.
 """
 
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
 
-from holozen.process import quiet
-from holozen.robot.rigid import PlacedShape
-from holozen.rotation import XYZ, XYZW, multiply, rotate
+import numpy as np
+import numpy.typing as npt
 
-__all__ = ["NOTHING", "UPRIGHT", "Bodies", "Shapes", "bullet"]
+from holozen.robot.rigid import Part, PlacedShape
+from holozen.rotation import XYZ, XYZW
+
+Box = tuple[XYZ, XYZ]
+"""Its corners."""
+JointStates = tuple[list[float], list[float], list[float]]
+"""Positions, rates and efforts: rad, rad/s, N m or m, m/s, N."""
+Array = npt.NDArray[np.float64]
 
 UPRIGHT: XYZW = (0.0, 0.0, 0.0, 1.0)
-MAX_IN_ONE = 16  # pybullet's MAX_COMPOUND_COLLISION_SHAPES; it silently drops the rest
-NOTHING = -1  # pybullet's shape that touches nothing
-MOST_KEPT = 64  # removed bodies; each takes 0.6 us a step
-FAR_AWAY: XYZ = (0.0, 0.0, 1e6)
-ASLEEP, AWAKE = 1 | 8, 2 | 4  # of pybullet's flags: it may sleep, and does; it may not, and is awake
-FREE, FIXED = (1, -1), (2, ~2)  # group, and groups that it touches; the engine's own for bodies and fixed bases
 
 
-with quiet():  # it prints its build time from C while it loads; no flag stops it
-    import pybullet as bullet
-
-KINDS = {"box": bullet.GEOM_BOX, "cylinder": bullet.GEOM_CYLINDER, "sphere": bullet.GEOM_SPHERE}
-
-
-class Shapes:
-    """The collision shapes of one world. The engine never frees one, so equal shapes are shared."""
-
-    def __init__(self, world: int) -> None:
-        self._world = world
-        self._made: dict[Any, int] = {}
-        # Without a visual the engine makes one of every collision shape: 0.5 ms and 14 KB each.
-        self.unseen: int = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=[1e-3] * 3, physicsClientId=world)
-
-    def of(self, placed: tuple[PlacedShape, ...]) -> list[int]:
-        """The engine's ids of shapes in the frame of their part, as few as possible."""
-        simple = [part for part in placed if part.shape.kind in KINDS]
-        chunks = [simple[start : start + MAX_IN_ONE] for start in range(0, len(simple), MAX_IN_ONE)]
-        single = [part for part in placed if part.shape.kind in ("hull", "plane")]
-        return [self._shared(chunk) for chunk in chunks] + [self._shared([part]) for part in single]
-
-    def _shared(self, placed: list[PlacedShape]) -> int:
-        key = tuple((p.shape.kind, p.shape.size, p.shape.points, p.xyz, p.quaternion) for p in placed)
-        if key not in self._made:
-            self._made[key] = _compound(self._world, placed) if placed[0].shape.kind in KINDS else self._one(placed[0])
-        return self._made[key]
-
-    def _one(self, part: PlacedShape) -> int:
-        if part.shape.kind == "plane":
-            normal = rotate(part.quaternion, (0.0, 0.0, 1.0))
-            return int(bullet.createCollisionShape(bullet.GEOM_PLANE, planeNormal=normal, physicsClientId=self._world))
-        return int(
-            bullet.createCollisionShape(
-                bullet.GEOM_MESH,
-                vertices=part.shape.points,
-                collisionFramePosition=part.xyz,
-                collisionFrameOrientation=part.quaternion,
-                physicsClientId=self._world,
-            )
-        )
-
-
-def _compound(world: int, placed: list[PlacedShape]) -> int:
-    arguments: dict[str, Any] = {
-        "shapeTypes": [KINDS[part.shape.kind] for part in placed],
-        "radii": [part.shape.size[0] for part in placed],
-        "lengths": [part.shape.size[-1] for part in placed],
-        "halfExtents": [[edge / 2 for edge in (*part.shape.size, 0, 0)[:3]] for part in placed],
-        "collisionFramePositions": [part.xyz for part in placed],
-        "collisionFrameOrientations": [part.quaternion for part in placed],
-    }
-    return int(bullet.createCollisionShapeArray(**arguments, physicsClientId=world))
-
-
-class Bodies:
-    """The bodies of one world. The engine keeps 1 to 4 KB of each that it removed, for ever. So a removed body is only
-    put to sleep, far away and touching nothing, until another one like it is added; `most` of them are kept.
+@dataclass(frozen=True, slots=True)
+class Contact:
+    """How a part's shapes touch others: their coefficient of friction, which is multiplied by the others', and the
+    share of it along the part's axle. `stiffness` in N/m and `damping` in N s/m; 0: the engine's own.
     """
 
-    def __init__(self, world: int, most: int = MOST_KEPT) -> None:
-        self.world, self.shapes, self._most = world, Shapes(world), most
-        self._kinds: dict[int, object] = {}  # of those that are there
-        self._kept: dict[int, object] = {}  # of those that are not; the first was removed first
+    friction: float
+    along_axle: float = 1.0
+    stiffness: float = 0.0
+    damping: float = 0.0
 
-    def add(
-        self, kind: object, place: tuple[XYZ, XYZW], mass: float, shape: int,
-        inertial: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), UPRIGHT), **arguments: Any,
-    ) -> int:  # fmt: skip
-        """A body that stands, its root frame at `place` and its inertial frame at `inertial` in that; the rest are
-        arguments of createMultiBody. `kind` equals that of another only if both are made, and have their dynamics set,
-        in the same way. Returns the engine's number.
+
+class Engine(Protocol):
+    """One world of bodies. `ground` is the number of its ground, if it has one."""
+
+    ground: int | None
+
+    def add(self, parts: Sequence[Part], contacts: Sequence[Contact], at: XYZ, rotation: XYZW, static: bool) -> int:
+        """A body that stands with its joints at zero, its root frame at a pose; a `static` one is fixed there. Gravity
+        does not pull the weightless share of a part. Returns its number.
         """
-        number = next((number for number, kept in self._kept.items() if kept == kind), None)
-        if number is None:
-            number = int(
-                bullet.createMultiBody(
-                    mass, shape, self.shapes.unseen, basePosition=place[0], baseOrientation=place[1],
-                    baseInertialFramePosition=inertial[0], baseInertialFrameOrientation=inertial[1],
-                    physicsClientId=self.world, **arguments,
-                )
-            )  # fmt: skip
-        else:
-            del self._kept[number]
-            ((x, y, z), rotation), (centre, axes) = place, inertial
-            cx, cy, cz = rotate(rotation, centre)
-            self._place(number, (x + cx, y + cy, z + cz), multiply(rotation, axes))
-            self._touch(number, FREE if mass else FIXED, FREE)
-            bullet.changeDynamics(number, -1, activationState=AWAKE, physicsClientId=self.world)
-        self._kinds[number] = kind
-        return number
+        ...
 
     def remove(self, number: int) -> None:
         """Take a body out of the world."""
-        self._touch(number, (0, 0), (0, 0))
-        self._place(number, FAR_AWAY, UPRIGHT)
-        bullet.changeDynamics(number, -1, activationState=ASLEEP, physicsClientId=self.world)
-        self._kept[number] = self._kinds.pop(number)
-        if len(self._kept) > self._most:
-            oldest = next(iter(self._kept))
-            del self._kept[oldest]
-            bullet.removeBody(oldest, self.world)
+        ...
 
-    def _place(self, number: int, at: XYZ, rotation: XYZW) -> None:
-        """Let it stand, its centre of mass at a pose, and its joints at zero."""
-        bullet.resetBasePositionAndOrientation(number, at, rotation, self.world)
-        bullet.resetBaseVelocity(number, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), self.world)
-        for joint in range(bullet.getNumJoints(number, self.world)):
-            bullet.resetJointState(number, joint, 0.0, 0.0, self.world)
+    def step(self) -> None:
+        """Advance by one step. Raises ValueError or ArithmeticError if the numbers of a body are not finite."""
+        ...
 
-    def _touch(self, number: int, base: tuple[int, int], links: tuple[int, int]) -> None:
-        """Set the groups of the shapes of a body's base and links."""
-        bullet.setCollisionFilterGroupMask(number, -1, *base, self.world)
-        for link in range(bullet.getNumJoints(number, self.world)):
-            bullet.setCollisionFilterGroupMask(number, link, *links, self.world)
+    def close(self) -> None:
+        """Free everything."""
+        ...
+
+    def centre(self, number: int) -> tuple[XYZ, XYZW]:
+        """The root part's centre of mass, and the rotation of the root frame."""
+        ...
+
+    def place(self, number: int, centre: XYZ, rotation: XYZW) -> None:
+        """Move a body: the root part's centre of mass, and the rotation of the root frame."""
+        ...
+
+    def velocity(self, number: int) -> tuple[XYZ, XYZ]:
+        """The velocity of the root part's centre of mass, and its rotation rate."""
+        ...
+
+    def move(self, number: int, linear: XYZ, angular: XYZ) -> None:
+        """Set the velocity of the root part's centre of mass, and its rotation rate."""
+        ...
+
+    def freeze(self, number: int) -> None:
+        """Let a body of one part neither move nor touch anything; it can be placed."""
+        ...
+
+    def thaw(self, number: int) -> None:
+        """Let it move and touch again."""
+        ...
+
+    def box(self, number: int) -> Box:
+        """A box around a body, along the axes of the world."""
+        ...
+
+    def near(self, box: Box) -> set[int]:
+        """The bodies whose boxes overlap this one."""
+        ...
+
+    def gap(self, one: int, other: int, within: float) -> float:
+        """The distance between two bodies, negative where they overlap; `within` if it is larger."""
+        ...
+
+    def touched(self, number: int) -> set[int]:
+        """The bodies that it had contacts with in the last step."""
+        ...
+
+    def is_plane(self, number: int) -> bool:
+        """Whether a body is an endless plane."""
+        ...
+
+    def joints(self, number: int) -> JointStates:
+        """The states of a body's joints, in the order of its parts. The effort is that of motor and friction."""
+        ...
+
+    def joint(self, number: int, part: int) -> tuple[float, float]:
+        """The position and rate of a part's joint."""
+        ...
+
+    def turn(self, number: int, part: int, rate: float, effort: float) -> None:
+        """Let the motor of a part's joint keep a rate from now on, with at most an effort; at rate 0 it is friction."""
+        ...
+
+    def go(self, number: int, part: int, position: float, closing: float, effort: float, rate: float) -> None:
+        """Let the motor move a part's joint to a position from now on, with a time constant of `closing` seconds, at
+        most an effort and a rate.
+        """
+        ...
+
+    def push(self, number: int, part: int, effort: float) -> None:
+        """Apply an effort to a part's joint in the next step, besides its motor's."""
+        ...
+
+    def frame(self, number: int, part: int) -> tuple[XYZ, XYZW]:
+        """The pose of a part's frame."""
+        ...
+
+    def wrench(self, number: int, part: int, force: XYZ, torque: XYZ, point: XYZ) -> None:
+        """Push a part in the next step with a force at a point, and with a torque."""
+        ...
+
+
+class Rays(Protocol):
+    """A world of shapes that rays hit, and nothing else. `ground`: a level plane at z = 0."""
+
+    def __init__(self, ground: bool) -> None: ...
+
+    def add(self, shapes: tuple[PlacedShape, ...]) -> int:
+        """Shapes that are placed together, at the origin at first. Returns their number."""
+        ...
+
+    def remove(self, number: int) -> None:
+        """Remove shapes."""
+        ...
+
+    def place(self, number: int, at: XYZ, rotation: XYZW) -> None:
+        """Move shapes."""
+        ...
+
+    def cast(self, origin: XYZ, directions: Array, near: float, far: float, own: int) -> Array:
+        """The distances (n,) to what is hit first between `near` and `far` by rays along unit vectors (n, 3); infinite
+        for nothing. The shapes `own` are not hit.
+        """
+        ...
+
+    def close(self) -> None:
+        """Free everything."""
+        ...

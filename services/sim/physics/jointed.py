@@ -8,11 +8,10 @@ from holozen.robot.model import Force, Joint, Pose, RobotModel
 from holozen.robot.rigid import Frame, Part, in_parts
 from holozen.rotation import XYZ, XYZW, multiply, rotate
 
-from .body import Body, JointStates, Links
-from .dynamics import damping_of, load_on, set_joint, set_surface
-from .engine import NOTHING, UPRIGHT, Bodies, Shapes, bullet
+from .body import Body
+from .dynamics import contact_of, load_on
+from .engine import UPRIGHT, Engine, JointStates
 
-JOINTS = {"continuous": bullet.JOINT_REVOLUTE, "revolute": bullet.JOINT_REVOLUTE, "prismatic": bullet.JOINT_PRISMATIC}
 MAX_EFFORT = 1e3  # N m or N, of a joint without an effort limit
 MAX_RATE = 1e3  # rad/s or m/s
 CLOSING = 0.1  # s; time constant of a joint that moves to a position
@@ -28,7 +27,8 @@ class JointedBody(Body):
 
     def __init__(
         self,
-        bodies: Bodies,
+        engine: Engine,
+        dt: float,
         parts: list[Part],
         at: XYZ,
         rotation: XYZW = UPRIGHT,
@@ -36,34 +36,16 @@ class JointedBody(Body):
         static: bool = False,
         omni: bool = False,
     ) -> None:
-        root, links, world = parts[0].body, Links(bodies.shapes.unseen), bodies.world
-        first, carrying = _link(links, bodies.shapes, parts)
-        number = bodies.add(
-            (parts, wheels, static, omni),
-            (at, rotation),
-            0.0 if static else root.mass,
-            first,
-            (root.centre, root.axes),
-            flags=bullet.URDF_GLOBAL_VELOCITIES_MB,  # without it a tumbling body turns ever faster
-            **links.arguments,
-        )
-        numbers = links.numbers(number, world)
-        floating = {numbers[own]: part.body.weightless for part, (own, *_) in zip(parts, carrying, strict=True)}
-        super().__init__(bodies, number, root.centre, root.axes, {} if static else floating)
-        self._dt: float = bullet.getPhysicsEngineParameters(world)["fixedTimeStep"]
-        self._joints: dict[str, tuple[int, Joint]] = {}
-        self._numbers_of_parts = [numbers[own] for own, *_ in carrying]
-        self._efforts: dict[int, float] = {}  # what `push` applies, by the engine's number of the joint
         load = load_on(parts, len(wheels)) if len(wheels) > 2 else 0.0
-        for index, (part, (own, *more)) in enumerate(zip(parts, carrying, strict=True)):
+        contacts = []
+        for part in parts:
             drives = part.joint is not None and part.joint.name in wheels
-            touching = [numbers[link] for link in (own, *more)]
-            weight, drags, rolls = load if drives else 0.0, bool(wheels) and not drives, omni and drives
-            set_surface(world, number, touching, part, self._dt, weight, drags, rolls)
-            if part.joint or not static:
-                set_joint(world, number, numbers[own], part, damping_of(parts, index, self._dt))
-            if part.joint:
-                self._joints[part.joint.name] = (numbers[own], part.joint)
+            contacts.append(contact_of(part, dt, load if drives else 0.0, bool(wheels) and not drives, omni and drives))
+        number = engine.add(parts, contacts, at, rotation, static)
+        super().__init__(engine, number, parts[0].body.centre)
+        self._dt = dt
+        self._joints = {part.joint.name: (index, part.joint) for index, part in enumerate(parts) if part.joint}
+        self._efforts: dict[int, float] = {}  # what `push` applies, by the index of the part
         self._begin()
 
     def _begin(self) -> None:
@@ -78,72 +60,53 @@ class JointedBody(Body):
 
     def states(self) -> JointStates:
         """The states of the joints, in the order of `names`. The effort is that of motor and friction."""
-        states = bullet.getJointStates(self._body, self._numbers, self._world) if self._numbers else ()
-        efforts = [self._efforts.get(number, state[3]) for number, state in zip(self._numbers, states, strict=True)]
-        return [state[0] for state in states], [state[1] for state in states], efforts
+        positions, rates, efforts = self._engine.joints(self.number)
+        efforts = [self._efforts.get(index, effort) for index, effort in zip(self._numbers, efforts, strict=True)]
+        return positions, rates, efforts
 
     def wrench(self, part: int, at: Frame, along: bool, force: XYZ, torque: XYZ) -> None:
         """Push with a force (N) and a torque (N m) during the next step, at the point `at` of a part; along the axes of
         that frame, or of the world. `part` is an index of `assemble`.
         """
-        number = self._numbers_of_parts[part]
-        if number < 0:
-            place, rotation = self.pose()
-        else:
-            place, rotation = bullet.getLinkState(
-                self._body, number, computeForwardKinematics=True, physicsClientId=self._world
-            )[4:6]
+        place, rotation = self._engine.frame(self.number, part) if part else self.pose()
         x, y, z = rotate(rotation, at.xyz)
         if along:
             axes = multiply(rotation, at.quaternion)
             force, torque = rotate(axes, force), rotate(axes, torque)
-        point = (place[0] + x, place[1] + y, place[2] + z)
-        bullet.applyExternalForce(self._body, number, force, point, bullet.WORLD_FRAME, self._world)
-        bullet.applyExternalTorque(self._body, number, torque, bullet.WORLD_FRAME, self._world)
+        self._engine.wrench(self.number, part, force, torque, (place[0] + x, place[1] + y, place[2] + z))
 
     def release(self, name: str, friction: float | None = None) -> None:
         """Let a joint turn freely, against its friction (default: the file's)."""
         number, joint = self._joints[name]
-        self._motor(
-            number, bullet.VELOCITY_CONTROL, targetVelocity=0, force=joint.friction if friction is None else friction
-        )
+        self._turn(number, 0.0, joint.friction if friction is None else friction)
 
     def roll(self, name: str, rate: float, effort: float) -> None:
         """Turn a wheel at a rate. The drive's limits apply, not the joint's: exporters write 0 for unknown limits."""
         number, _ = self._joints[name]
-        self._motor(number, bullet.VELOCITY_CONTROL, targetVelocity=rate, force=min(effort, MAX_EFFORT))
+        self._turn(number, rate, min(effort, MAX_EFFORT))
 
     def turn(self, name: str, rate: float, effort: float = math.inf) -> None:
         """Turn a joint at a rate, within its limits. Call it before each step for a joint with position limits."""
         number, joint = self._joints[name]
-        self._motor(
-            number,
-            bullet.VELOCITY_CONTROL,
-            targetVelocity=self._kept(number, joint, rate),
-            force=_effort(joint, effort),
-        )
+        self._turn(number, self._kept(number, joint, rate), _effort(joint, effort))
 
     def go(self, name: str, position: float, closing: float = CLOSING) -> None:
         """Move a joint to a position, within its limits, with a time constant of `closing` seconds."""
         number, joint = self._joints[name]
-        self._motor(
-            number,
-            bullet.POSITION_CONTROL,
-            targetPosition=max(joint.limits.lower, min(joint.limits.upper, position)),
-            positionGain=min(1.0, self._dt / closing),
-            force=_effort(joint),
-            maxVelocity=min(joint.limits.velocity, MAX_RATE),
-        )
+        position = max(joint.limits.lower, min(joint.limits.upper, position))
+        rate = min(joint.limits.velocity, MAX_RATE)
+        self._efforts.pop(number, None)
+        self._engine.go(self.number, number, position, closing, _effort(joint), rate)
 
     def push(self, name: str, effort: float, most: float = math.inf) -> None:
         """Apply a torque or force to a joint for the next step, within its limits. `release` it first."""
         number, joint = self._joints[name]
         effort = clamp(effort, _effort(joint, most))
         if math.isfinite(joint.limits.velocity):
-            rate = bullet.getJointState(self._body, number, self._world)[1]
+            _, rate = self._engine.joint(self.number, number)
             if abs(rate) >= joint.limits.velocity and rate * effort > 0:
                 effort = 0.0
-        self._motor(number, bullet.TORQUE_CONTROL, force=effort)
+        self._engine.push(self.number, number, effort)
         self._efforts[number] = effort
 
     def mimic(self) -> None:
@@ -162,38 +125,14 @@ class JointedBody(Body):
         rate = clamp(rate, limits.velocity)
         if not rate or not (math.isfinite(limits.lower) and math.isfinite(limits.upper)):
             return rate
-        position: float = bullet.getJointState(self._body, number, self._world)[0]
+        position, _ = self._engine.joint(self.number, number)
         if rate < 0:
             return max(rate, min(0.0, (limits.lower - position) / self._dt))
         return min(rate, max(0.0, (limits.upper - position) / self._dt))
 
-    def _motor(self, number: int, mode: int, **values: float) -> None:
+    def _turn(self, number: int, rate: float, effort: float) -> None:
         self._efforts.pop(number, None)
-        bullet.setJointMotorControl2(self._body, number, mode, physicsClientId=self._world, **values)
-
-
-def _link(links: Links, shapes: Shapes, parts: list[Part]) -> tuple[int, list[list[int]]]:
-    """The base's shape, and the links of each part: its own, then those that only carry more shapes."""
-    own = [shapes.of(part.body.collisions) or [NOTHING] for part in parts]
-    indices = [-1]
-    for part, (first, *_) in zip(parts[1:], own[1:], strict=True):
-        indices.append(_add(links, part, indices[part.parent], first))
-    others = [links.carry(index, more) for index, (_, *more) in zip(indices, own, strict=True)]
-    return own[0][0], [[index, *more] for index, more in zip(indices, others, strict=True)]
-
-
-def _add(links: Links, part: Part, parent: int, shape: int) -> int:
-    joint = part.joint
-    assert joint is not None, "only the root's part has none"
-    return links.add(
-        parent,
-        shape,
-        JOINTS[joint.kind],
-        joint.axis,
-        (part.xyz, part.rotation),
-        part.body.mass,
-        (part.body.centre, part.body.axes),
-    )
+        self._engine.turn(self.number, number, rate, effort)
 
 
 def _effort(joint: Joint, effort: float = math.inf) -> float:
@@ -262,7 +201,7 @@ class Forces:
         self._rolls: bool | None = None
 
     def do(self, pushes: list[AppliedForce] | None) -> None:
-        """Push during the next step; None: no source drives."""
+        """AppliedForce during the next step; None: no source drives."""
         rolls = pushes is not None
         if self._brakes and rolls != self._rolls:
             self._brakes.brake(self._turning & self._brakes.names, on=not rolls)

@@ -10,9 +10,9 @@ from holozen.robot.rigid import lump
 from holozen.rotation import XYZ, XYZW
 
 from .balance import BalanceMover
-from .body import Body, JointStates, Moved
+from .body import Body, Moved
 from .differential import WheelMover
-from .engine import UPRIGHT
+from .engine import UPRIGHT, JointStates
 from .jointed import JointedBody
 from .omni import OmniMover, omni_wheels
 from .planar import PlanarMover

@@ -15,7 +15,8 @@ from holozen.robot.model import Omni, RobotModel
 from holozen.robot.rotation import triple
 from holozen.suggest import listed
 
-from .body import JointStates, Moved
+from .body import Moved
+from .engine import JointStates
 from .jointed import JointedBody
 from .wheels import Odometer, has_rollers, rolling_wheels
 

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from holozen.kinematics import to_body, to_world, travelled
 from holozen.limits import STOP, Planar
 from holozen.robot import rigid
+from holozen.robot.model import Surface
 from holozen.rotation import XYZ, XYZW, from_axis_angle, rotate, yaw
 
-from .body import Body, JointStates, Links, Moved
+from .body import Body, Moved
 from .dynamics import GRAVITY
-from .engine import NOTHING, UPRIGHT, Bodies, bullet
+from .engine import UPRIGHT, Box, Contact, Engine, JointStates
 from .wheels import MecanumWheels, Wheels
 
 HOLD_GAIN = 0.1  # share of the distance to its place that it recovers in a step
@@ -32,17 +33,13 @@ LANDED = 0.2  # m/s along its upward axis; with more it falls, or jumps
 STEADY = 1e-3  # m/s and rad/s of deviation from the commanded velocity
 
 
-Box = tuple[XYZ, XYZ]
-"""Its corners."""
-
-
 class Field:
     """The planar bodies of a world, by the engine's numbers. `level` is the number of a level ground below them, if the
     world has one; `steps` counts those of the world, of `step` seconds. `gravity` is in m/s^2.
     """
 
-    def __init__(self, world: int, step: float, level: int | None, gravity: XYZ) -> None:
-        self.world, self.step, self.level, self.gravity = world, step, level, gravity
+    def __init__(self, engine: Engine, step: float, level: int | None, gravity: XYZ) -> None:
+        self.engine, self.step, self.level, self.gravity = engine, step, level, gravity
         self.steps = 0
         self.bodies: dict[int, PlanarBody] = {}
         self._looks: dict[int, list[PlanarBody]] = {}  # step -> the bodies that look around then
@@ -161,16 +158,12 @@ class PlanarBody(Body):
     engine's steps and in closed form, until something comes near or it is moved by other than its drive.
     """
 
-    def __init__(self, field: Field, bodies: Bodies, body: rigid.Body, at: XYZ, rotation: XYZW = UPRIGHT) -> None:
-        world, shapes = field.world, bodies.shapes
-        links, (first, *others) = Links(shapes.unseen), shapes.of(body.collisions) or [NOTHING]
-        links.carry(-1, others)
-        # An engine's base is placed by its inertial frame, which is where its centre of mass is.
-        place, inertial = (at, rotation), (body.centre, body.axes)
-        number = bodies.add(body, place, body.mass, first, inertial, **links.arguments)
-        super().__init__(bodies, number, body.centre, body.axes, {-1: body.weightless})
-        self._field, self._inertia = field, (body.mass, body.inertia)
-        self._may_glide = field.level is not None and not self.weightless
+    def __init__(self, field: Field, body: rigid.Body, at: XYZ, rotation: XYZW = UPRIGHT) -> None:
+        part = rigid.Part("", body, Surface())
+        number = field.engine.add([part], [Contact(friction=0.0)], at, rotation, static=False)
+        super().__init__(field.engine, number, body.centre)
+        self._field, self._floats = field, body.weightless > 0
+        self._may_glide = field.level is not None and not self._floats
         self._glide: Glide | None = None
         self._commanded = STOP  # the last velocity of the drive
         self.speed = 0.0  # m/s that any point of it has had at most since its last look
@@ -180,11 +173,6 @@ class PlanarBody(Body):
         self._held: tuple[float, float] | None = None  # the place to hold
         self._driven: tuple[float, float] | None = None  # the velocity of the centre that was set for the last step
         self._is_blocked = False
-        for link in self._links:
-            bullet.changeDynamics(
-                number, link, lateralFriction=0, linearDamping=0, angularDamping=0, physicsClientId=world
-            )
-        bullet.changeDynamics(number, -1, localInertiaDiagonal=body.inertia, physicsClientId=world)
         self._located_box = low, high = self.box()
         far = (max(here - under, over - here) for here, under, over in zip(at, low, high, strict=True))
         self._reach = math.hypot(*far)  # m from the root frame to any point
@@ -220,8 +208,8 @@ class PlanarBody(Body):
         (x, y, z), (x2, y2, z2) = box = self._located_box if self._glide else self.box()
         margin = self._field.margin(self.speed)
         low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
-        around = {number for number, _ in bullet.getOverlappingObjects(low, high, self._world) or ()}
-        steps = {number: self._steps_to(number, box) for number in around - {self.number, self._field.level}}
+        around = self._engine.near((low, high)) - {self.number, self._field.level}
+        steps = {number: self._steps_to(number, box) for number in around}
         near = [number for number, clear in steps.items() if clear < LOOK]
         for number in near:
             if other := self._field.bodies.get(number):
@@ -248,8 +236,7 @@ class PlanarBody(Body):
     def _gap(self, number: int) -> float:
         """The distance in m from another body, where the engine has it, to what counts as near."""
         within = self._field.margin(self.speed)
-        points = bullet.getClosestPoints(self.number, number, within, physicsClientId=self._world)
-        return min((point[8] for point in points), default=within) - SKIN
+        return self._engine.gap(self.number, number, within) - SKIN
 
     def locate(self) -> None:
         """While it glides, the engine's body is where the last look was: move it to where this one is."""
@@ -259,9 +246,8 @@ class PlanarBody(Body):
 
     def _standing(self) -> tuple[float, ...]:
         """Its height and upward axis, if it only touches the level ground, does not tilt, and moves as commanded."""
-        contacts = bullet.getContactPoints(self.number, physicsClientId=self._world)
-        _, (rolling, pitching, _) = bullet.getBaseVelocity(self.number, self._world)
-        if not self._may_glide or self._is_blocked or {contact[2] for contact in contacts} != {self._field.level}:
+        _, (rolling, pitching, _) = self._engine.velocity(self.number)
+        if not self._may_glide or self._is_blocked or self._engine.touched(self.number) != {self._field.level}:
             return ()
         if max(abs(rolling), abs(pitching), math.dist(self.velocity(self._field.step), self._commanded)) > STEADY:
             return ()
@@ -273,9 +259,7 @@ class PlanarBody(Body):
         self._glide, self.glides = Glide(self._field.time, *self.pose(), self._commanded), True
         self._located, self._located_box = self._field.steps, self.box()
         self._field.gliding += 1
-        bullet.changeDynamics(self.number, -1, mass=0, physicsClientId=self._world)
-        for link in self._links:
-            bullet.setCollisionFilterGroupMask(self.number, link, 0, 0, physicsClientId=self._world)
+        self._engine.freeze(self.number)
 
     def wake(self) -> None:
         """Return to the engine, where it is and as it moves; from the next step on it has contacts again."""
@@ -286,11 +270,7 @@ class PlanarBody(Body):
         self._field.gliding -= 1
         if self.looks_at > self._field.steps + LOOK:
             self._field.let_look(self, LOOK)
-        mass, inertia = self._inertia
-        bullet.changeDynamics(self.number, -1, mass=mass, physicsClientId=self._world)
-        bullet.changeDynamics(self.number, -1, localInertiaDiagonal=inertia, physicsClientId=self._world)
-        for link in self._links:
-            bullet.setCollisionFilterGroupMask(self.number, link, 1, -1, physicsClientId=self._world)
+        self._engine.thaw(self.number)
         self._stood = ()
         self._held, self._driven, self._is_blocked = None, None, False
         super().put(position, rotation, linear, angular)
@@ -321,14 +301,14 @@ class PlanarBody(Body):
 
     def _drive(self, velocity: Planar, dt: float) -> None:
         position, rotation, centre = self._root()
-        (x, y, falling), (roll, pitch, spin) = bullet.getBaseVelocity(self._body, self._world)
+        (x, y, falling), (roll, pitch, spin) = self._engine.velocity(self.number)
         if velocity == STOP:
             vx, vy = self._back(position[0] - centre[0], position[1] - centre[1], dt)
         else:
             vx, vy = to_world(velocity, yaw(rotation), dt)
             self._held = None
         up, axis = _axes(rotation)
-        if axis is up and abs(vx * up[0] + vy * up[1] + falling * up[2]) < LANDED and not self.weightless:
+        if axis is up and abs(vx * up[0] + vy * up[1] + falling * up[2]) < LANDED and not self._floats:
             # On a slope, gravity and contact would take it downhill within the step: its wheels hold that.
             gravity = self._field.gravity
             into = sum(g * u for g, u in zip(gravity, up, strict=True))
@@ -343,7 +323,7 @@ class PlanarBody(Body):
         else:
             tipping = math.hypot(roll - turn * axis[0], pitch - turn * axis[1])
             vx, vy = self._driven = self._pushed((x, y), (vx, vy), tipping, dt)
-        bullet.resetBaseVelocity(self._body, (vx, vy, falling), (roll, pitch, spin), self._world)
+        self._engine.move(self.number, (vx, vy, falling), (roll, pitch, spin))
 
     def _pushed(
         self, now: tuple[float, float], wanted: tuple[float, float], tipping: float, dt: float
@@ -392,7 +372,7 @@ class PlanarBody(Body):
         if self._glide:
             return self._glide.velocity
         _, rotation, centre = self._root()
-        (vx, vy, _), (roll, pitch, spin) = bullet.getBaseVelocity(self._body, self._world)
+        (vx, vy, _), (roll, pitch, spin) = self._engine.velocity(self.number)
         _, axis = _axes(rotation)
         turn = roll * axis[0] + pitch * axis[1] + spin * axis[2]
         ox, oy = _orbit(axis, turn, centre, -dt)

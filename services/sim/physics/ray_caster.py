@@ -4,24 +4,19 @@ There every link is a body, so that a sensor learns which link of its own robot 
 robots that glide, which touch nothing in the engine that moves them.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import Frame, PlacedShape
 from holozen.robot.shapes import solid
 from holozen.rotation import XYZ, XYZW, rotate
 
-from .engine import UPRIGHT, Bodies, bullet
+from .engine import Array, Rays
 
-Array = npt.NDArray[np.float64]
 Pose = tuple[XYZ, XYZW]
-ORIGIN: Pose = ((0.0, 0.0, 0.0), UPRIGHT)
-MOST_KEPT = 1000  # removed bodies; nothing steps here
-OTHERS, OWN, ALL = 1, 1024, -1  # groups of shapes: 1024 is none of the engine's own, those of the sensor that looks
 
 
 class Placed(Protocol):
@@ -39,17 +34,13 @@ class Placed(Protocol):
 
 
 class RayCaster:
-    """The shapes, by the name of their entity. `ground`: a level plane at z = 0."""
+    """The shapes, by the name of their entity."""
 
-    def __init__(self, ground: bool) -> None:
-        self._world: int = bullet.connect(bullet.DIRECT)
-        self._made = Bodies(self._world, MOST_KEPT)
-        self._bodies: dict[str, dict[str, list[int]]] = {}
-        self._at: dict[tuple[str, str], Pose] = {}  # of each link that has shapes
+    def __init__(self, rays: Rays) -> None:
+        self._rays = rays
+        self._bodies: dict[str, dict[str, int]] = {}  # numbers of links
+        self._at: dict[tuple[str, str], Pose] = {}  # of each link
         self._roots: dict[str, Pose] = {}
-        if ground:
-            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._world)
-            bullet.createMultiBody(0, plane, self._made.shapes.unseen, physicsClientId=self._world)
 
     def add(self, name: str, model: RobotModel) -> None:
         """Add an entity."""
@@ -59,17 +50,14 @@ class RayCaster:
             for shape in link.collisions:
                 frame = Frame.of(shape.pose)
                 parts.append(PlacedShape(link.name, solid(shape), frame.xyz, frame.quaternion))
-            self._bodies[name][link.name] = [
-                self._made.add(shape, ORIGIN, 0.0, shape) for shape in self._made.shapes.of(tuple(parts))
-            ]
+            self._bodies[name][link.name] = self._rays.add(tuple(parts))
 
     def remove(self, name: str) -> None:
         """Remove an entity."""
         self._roots.pop(name, None)
-        for link, bodies in self._bodies.pop(name).items():
+        for link, body in self._bodies.pop(name).items():
             self._at.pop((name, link), None)
-            for body in bodies:
-                self._made.remove(body)
+            self._rays.remove(body)
 
     def has_moved(self, name: str, root: Pose) -> bool:
         """Whether the root of an entity is not where it was when it was placed."""
@@ -78,12 +66,11 @@ class RayCaster:
     def place(self, name: str, root: Pose, links: Mapping[str, Placed]) -> None:
         """Move the links of an entity."""
         self._roots[name] = root
-        for link, bodies in self._bodies[name].items():
+        for link, body in self._bodies[name].items():
             at = links[link].xyz, links[link].rotation
-            if bodies and self._at.get((name, link)) != at:
+            if self._at.get((name, link)) != at:
                 self._at[name, link] = at
-                for body in bodies:
-                    bullet.resetBasePositionAndOrientation(body, *at, self._world)
+                self._rays.place(body, *at)
 
     def ranges(
         self, origin: XYZ, rotation: XYZW, directions: Array, near: float, far: float, own: tuple[str, str]
@@ -93,20 +80,8 @@ class RayCaster:
         `directions` (n, 3) are unit vectors in a frame of that rotation. The link `own` of an entity is not hit.
         """
         turned = directions @ np.array([rotate(rotation, axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))])
-        start = np.array(origin)
-        bodies = self._bodies[own[0]][own[1]]
-        self._group(bodies, OWN)
-        hits = bullet.rayTestBatch(
-            start + near * turned, start + far * turned, collisionFilterMask=~OWN, physicsClientId=self._world
-        )
-        self._group(bodies, OTHERS)
-        bodies_hit, fractions = np.array([(hit[0], hit[2]) for hit in hits]).reshape(-1, 2).T
-        return np.where(bodies_hit < 0, np.inf, near + fractions * (far - near))
-
-    def _group(self, bodies: Iterable[int], group: int) -> None:
-        for body in bodies:
-            bullet.setCollisionFilterGroupMask(body, -1, group, ALL, self._world)
+        return self._rays.cast(origin, turned, near, far, self._bodies[own[0]][own[1]])
 
     def close(self) -> None:
         """Free the engine."""
-        bullet.disconnect(self._world)
+        self._rays.close()

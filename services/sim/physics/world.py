@@ -5,7 +5,6 @@ Metres, kilograms, seconds; quaternions are x, y, z, w; positions and velocities
 
 import math
 from collections.abc import Sequence
-from typing import TypeVar
 
 from holozen.kinematics import Wheel
 from holozen.robot import rigid
@@ -13,46 +12,49 @@ from holozen.robot.model import RobotModel, WorldSpec
 from holozen.rotation import XYZ, XYZW
 
 from .body import Body
-from .dynamics import FRICTION
-from .engine import UPRIGHT, Bodies, bullet
+from .engine import UPRIGHT, Engine
 from .jointed import JointedBody
 from .planar import Field, PlanarBody
+from .ray_caster import RayCaster
 from .wheels import on_spheres
 
-Added = TypeVar("Added", PlanarBody, JointedBody)
 OVERLAP = 0.01  # m that bodies may be in each other when they are placed; the engine throws apart what is far deeper
 RINGS = 8  # of places around a taken one, in which a free one is looked for
 
 
 class World:
-    """One world of bodies. `step` advances it by `spec.step` seconds; `time` is the simulated time."""
+    """One world of bodies in an engine: pybullet or mujoco. `step` advances it by `spec.step` seconds; `time` is the
+    simulated time.
+    """
 
-    def __init__(self, spec: WorldSpec) -> None:
-        self.spec = spec
+    def __init__(self, spec: WorldSpec, engine: str = "pybullet") -> None:
+        self.spec, self._engine_name = spec, engine
         self._steps_before = 0  # steps that `steps` counts besides those of the field
         self._begin()
 
     def _begin(self) -> None:
         spec = self.spec
-        self.id: int = bullet.connect(bullet.DIRECT)
-        self._bodies = Bodies(self.id)
-        self._floating: list[Body] = []
-        bullet.setGravity(*spec.gravity, physicsClientId=self.id)
-        bullet.setPhysicsEngineParameter(
-            fixedTimeStep=spec.step,
-            enableFileCaching=0,
-            deterministicOverlappingPairs=1,
-            # With the cone a slipping wheel's grip depends on its heading in the world; with Gazebo's pyramid far less.
-            enableConeFriction=0,
-            physicsClientId=self.id,
-        )
-        level: int | None = None
-        if spec.ground:
-            plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self.id)
-            ground = bullet.createMultiBody(0, plane, physicsClientId=self.id)
-            bullet.changeDynamics(ground, -1, lateralFriction=FRICTION, physicsClientId=self.id)
-            level = None if any(spec.gravity[:2]) or spec.gravity[2] >= 0 else ground
-        self._field = Field(self.id, spec.step, level, spec.gravity)
+        self.engine: Engine
+        if self._engine_name == "mujoco":
+            from .mujoco import MuJoCo  # the other engine stays unloaded
+
+            self.engine = MuJoCo(spec)
+        else:
+            from .bullet import Bullet
+
+            self.engine = Bullet(spec)
+        level = None if any(spec.gravity[:2]) or spec.gravity[2] >= 0 else self.engine.ground
+        self._field = Field(self.engine, spec.step, level, spec.gravity)
+
+    def ray_caster(self) -> RayCaster:
+        """A new world of what sensors see, in the same engine."""
+        if self._engine_name == "mujoco":
+            from .mujoco import MuJoCoRays
+
+            return RayCaster(MuJoCoRays(self.spec.ground))
+        from .bullet import BulletRays
+
+        return RayCaster(BulletRays(self.spec.ground))
 
     @property
     def steps(self) -> int:
@@ -80,16 +82,13 @@ class World:
         """Advance the world by one step. Raises ValueError or ArithmeticError, after it, if a body's numbers are not
         finite.
         """
-        self._floating = [body for body in self._floating if not body.is_removed]
-        for body in self._floating:
-            body.cancel_gravity(self.spec.gravity)
         if not self._field.rests:
-            bullet.stepSimulation(self.id)
+            self.engine.step()
         self._field.stepped()
 
     def add(self, body: rigid.Body, at: XYZ, rotation: XYZW = UPRIGHT) -> PlanarBody:
         """Add a planar base, its root frame at `at`."""
-        return self._added(PlanarBody(self._field, self._bodies, body, at, rotation))
+        return PlanarBody(self._field, body, at, rotation)
 
     def add_jointed(
         self,
@@ -104,7 +103,7 @@ class World:
         """
         parts = on_spheres(rigid.simulated_parts(model), omni)
         names = frozenset(wheel.joint for wheel in omni) or wheels
-        body = self._added(JointedBody(self._bodies, parts, at, rotation, names, model.static, omni=bool(omni)))
+        body = JointedBody(self.engine, self.spec.step, parts, at, rotation, names, model.static, omni=bool(omni))
         if not model.static or len(parts) > 1:
             self._field.others.append(body)
         self._field.hasten()
@@ -118,18 +117,13 @@ class World:
         margin = self._field.margin(0.0)
         low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
         depths = {}
-        for number in {number for number, _ in bullet.getOverlappingObjects(low, high, self.id) or ()} - {body.number}:
+        for number in self.engine.near((low, high)) - {body.number}:
             if other := self._field.bodies.get(number):
                 other.locate()
-            points = bullet.getClosestPoints(body.number, number, 0.0, physicsClientId=self.id)
-            depth = max((-point[8] for point in points), default=0.0)
-            if depth > OVERLAP and not self._is_plane(number):
+            depth = -self.engine.gap(body.number, number, 0.0)
+            if depth > OVERLAP and not self.engine.is_plane(number):
                 depths[number] = depth
         return sorted(depths, key=lambda number: (-depths[number], number))
-
-    def _is_plane(self, number: int) -> bool:
-        shapes = bullet.getCollisionShapeData(number, -1, physicsClientId=self.id)
-        return any(shape[2] == bullet.GEOM_PLANE for shape in shapes)
 
     def free_place(self, body: Body) -> XYZ | None:
         """The nearest free position of its root frame on a grid around `body`, which is moved there; None if all are
@@ -151,11 +145,6 @@ class World:
         body.put(*place, linear, angular)
         self._field.hasten()
 
-    def _added(self, body: Added) -> Added:
-        if body.weightless:
-            self._floating.append(body)
-        return body
-
     def close(self) -> None:
         """Free the engine."""
-        bullet.disconnect(self.id)
+        self.engine.close()

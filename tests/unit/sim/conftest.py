@@ -1,4 +1,8 @@
-"""Worlds with the real engine, and robots of a few lines of URDF."""
+"""Worlds with a real engine: pybullet, and mujoco too for tests that are marked so.
+
+@pytest.mark.engines
+def test_it_drives(ground: World):
+"""
 
 from collections.abc import Iterator
 from contextlib import closing
@@ -6,25 +10,37 @@ from contextlib import closing
 import pytest
 
 from holozen.robot.model import WorldSpec
+from services.sim.__main__ import ENGINES
 from services.sim.physics.world import World
 
 
+def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
+    if metafunc.definition.get_closest_marker("engines"):
+        metafunc.parametrize("engine", ENGINES, indirect=True)
+
+
 @pytest.fixture
-def space() -> Iterator[World]:
+def engine(request: pytest.FixtureRequest) -> str:
+    """The name of the engine of this test's worlds."""
+    return str(getattr(request, "param", ENGINES[0]))
+
+
+@pytest.fixture
+def space(engine: str) -> Iterator[World]:
     """Nothing, and no gravity."""
-    with closing(World(WorldSpec(gravity=(0, 0, 0), ground=False))) as world:
+    with closing(World(WorldSpec(gravity=(0, 0, 0), ground=False), engine)) as world:
         yield world
 
 
 @pytest.fixture
-def air() -> Iterator[World]:
+def air(engine: str) -> Iterator[World]:
     """Gravity, and no ground."""
-    with closing(World(WorldSpec(ground=False))) as world:
+    with closing(World(WorldSpec(ground=False), engine)) as world:
         yield world
 
 
 @pytest.fixture
-def ground() -> Iterator[World]:
+def ground(engine: str) -> Iterator[World]:
     """Gravity and a flat ground."""
-    with closing(World(WorldSpec(ground=True))) as world:
+    with closing(World(WorldSpec(ground=True), engine)) as world:
         yield world

@@ -127,6 +127,7 @@ def test_it_stops_and_stays(rider: Rider, speed: float) -> None:
     assert rider.most < 0.55
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize(("speed", "turn"), [(0.0, 0.2), (0.0, -3.0), (0.5, 1.0)])
 def test_it_turns_where_it_stands_and_while_it_drives(rider: Rider, speed: float, turn: float) -> None:
     rider.drive(3, (speed, 0, turn))

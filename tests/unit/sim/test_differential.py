@@ -89,6 +89,7 @@ def test_forward_is_forward_whichever_way_an_axis_points(ground: World, name: st
     assert robot.turned == pytest.approx(0, abs=1e-2)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("turn", [0.5, -1.0, 3.0])
 def test_two_wheels_turn_as_fast_as_commanded(ground: World, turn: float) -> None:
     robot = Driven(ground, TWO)
@@ -98,6 +99,7 @@ def test_two_wheels_turn_as_fast_as_commanded(ground: World, turn: float) -> Non
     assert robot.turned - begin == pytest.approx(2 * turn, rel=0.01)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("velocity", [(0, 0, 0.2), (0, 0, 0.5), (0, 0, -1), (0, 0, 2), (0, 0, 4), (0.4, 0, 1)], ids=str)
 def test_four_wheels_turn_at_nearly_the_commanded_rate(ground: World, velocity: Planar) -> None:
     robot = Driven(ground, FOUR)
@@ -158,6 +160,7 @@ def test_what_the_file_does_not_measure_is_measured(ground: World) -> None:
     assert robot.mover.body.planar()[0::2] == pytest.approx((0.5, 0.5), abs=0.01)
 
 
+@pytest.mark.engines
 def test_encoders_measure_what_wheels_roll_and_the_world_what_is(ground: World) -> None:
     robot = Driven(ground, TWO)
     for velocity in ((0.5, 0, 0), (0.5, 0, 0.8), (0, 0, -1), (-0.3, 0, 0.2)):

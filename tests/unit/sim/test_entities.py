@@ -37,7 +37,7 @@ from services.sim import entities as entities_module
 from services.sim.entities import Entities, Entity
 from services.sim.io.entity_services import EntityServices
 from services.sim.loop import Loop
-from services.sim.physics.engine import UPRIGHT, bullet
+from services.sim.physics.engine import UPRIGHT
 from services.sim.physics.planar import PlanarBody
 from services.sim.physics.world import World
 from services.sim.stops import StopFiles
@@ -564,7 +564,7 @@ def test_what_fails_in_the_engine_is_taken_out_and_no_other(
     for place, name in enumerate(robots):
         town.spawn(name, x=5.0 * place, entity_namespace=name)
     ball = town.spawn("ball", BALL, z=0.2, x=-5)
-    bullet.resetBaseVelocity(ball.body.number, (math.nan, 0.0, 0.0), physicsClientId=world.id)
+    world.engine.move(ball.body.number, (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0))
     town.loop.run(steps(), 24)
     assert [entity.name for entity in town.entities] == list(robots)
     assert "sim: ball was removed from the world: its pose or velocity is not finite" in capsys.readouterr().err

@@ -10,7 +10,7 @@ import pytest
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
-from services.sim.physics.engine import MOST_KEPT, bullet
+from services.sim.physics.bullet import MOST_KEPT, Bullet, bullet
 from services.sim.physics.jointed import JointedBody
 from services.sim.physics.world import World
 
@@ -150,6 +150,7 @@ def test_friction_in_a_joint_brings_it_to_rest(space: World) -> None:
     assert state(body)[1] == pytest.approx(0, abs=1e-9)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize(("damping", "inertia"), [(1e-3, 1e-3), (0.1, 1e-3), (0.5, 1e-3), (5, 1e-5)])
 @pytest.mark.parametrize("kind", ["continuous", "prismatic"])
 def test_damping_slows_a_joint_down_exponentially(space: World, damping: float, inertia: float, kind: str) -> None:
@@ -171,6 +172,7 @@ def test_damping_that_is_too_strong_for_light_wheels_on_a_light_body_does_not_sh
     assert max(map(abs, body.states()[1])) < 1e-3
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("effort", [0.1, 5, 1000])
 def test_joints_keep_within_their_limits(space: World, effort: float) -> None:
     body = space.add_jointed(on_a_rock(limit(effort, lower=-0.5, upper=0.7), "revolute"), (0, 0, 0))
@@ -222,6 +224,7 @@ def test_a_slide_moves_to_its_commanded_position_and_stays(space: World, effort:
     assert state(body) == pytest.approx((0.3, 0), abs=3e-3)
 
 
+@pytest.mark.engines
 def test_a_joint_that_mimics_another_follows_it(space: World) -> None:
     more = '<mimic joint="j" multiplier="-2" offset="0.1"/>'
     links = (link("base", HEAVY, HEAVY), link("arm"), link("finger", 0.1, 1e-4))
@@ -242,6 +245,7 @@ def pendulum_energy(body: JointedBody) -> float:
     return 0.5 * (1e-3 + 0.25) * rate**2 - G * 0.5 * math.cos(angle)
 
 
+@pytest.mark.engines
 def test_a_pendulum_keeps_its_energy_and_its_period(air: World) -> None:
     arm = link("arm", 1, 1e-3, xyz="0 0 -0.5")
     body = air.add_jointed(fixed(robot(link("base"), arm, joint("j", "base", "arm"))), (0, 0, 0))
@@ -259,6 +263,7 @@ def test_a_pendulum_keeps_its_energy_and_its_period(air: World) -> None:
     assert period == pytest.approx(math.tau * math.sqrt((1e-3 + 0.25) / (G * 0.5)), rel=5e-3)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("spin", [5, 20, 50])
 def test_a_body_that_tumbles_does_not_turn_ever_faster(space: World, spin: float) -> None:
     moments = '<inertia ixx="0.01" iyy="0.02" izz="0.03" ixy="0" ixz="0" iyz="0"/>'
@@ -271,6 +276,7 @@ def test_a_body_that_tumbles_does_not_turn_ever_faster(space: World, spin: float
         assert math.hypot(*body.twist()[1]) < 1.4 * spin
 
 
+@pytest.mark.engines
 def test_a_static_body_stays_where_it_is(air: World) -> None:
     body = air.add_jointed(fixed(robot(link("a", 1, 1, CUBE))), (1, 2, 3))
     run(air, 1)
@@ -278,6 +284,7 @@ def test_a_static_body_stays_where_it_is(air: World) -> None:
     assert body.twist() == ((0, 0, 0), (0, 0, 0))
 
 
+@pytest.mark.engines
 def test_a_robot_rests_on_a_static_body(air: World) -> None:
     table = '<collision><geometry><box size="2 2 0.2"/></geometry></collision>'
     air.add_jointed(fixed(robot(link("t", 1, 1, table))), (0, 0, 0))
@@ -344,10 +351,11 @@ def test_what_touched_a_body_that_was_removed_falls(ground: World) -> None:
 
 def test_a_bounded_number_of_removed_bodies_is_kept(ground: World) -> None:
     model = robot(link("a", 1, 1.7e-3, CUBE))
+    assert isinstance(ground.engine, Bullet)
     for body in [ground.add_jointed(model, (number, 0, 1)) for number in range(MOST_KEPT + 3)]:
         body.remove()
-    assert bullet.getNumBodies(ground.id) == 1 + MOST_KEPT
+    assert bullet.getNumBodies(ground.engine.id) == 1 + MOST_KEPT
     body = ground.add_jointed(model, (0, 0, 1))
-    assert bullet.getNumBodies(ground.id) == 1 + MOST_KEPT
+    assert bullet.getNumBodies(ground.engine.id) == 1 + MOST_KEPT
     run(ground, 1)
     assert body.pose()[0] == pytest.approx((0, 0, 0.05), abs=1e-3)

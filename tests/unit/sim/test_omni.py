@@ -43,6 +43,7 @@ def place(mover: OmniMover) -> Planar:
     return x, y, yaw(rotation)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("velocity", [(0.3, 0, 0), (0, 0.3, 0), (0.2, -0.2, 0), (0, 0, 0.8), (0.3, 0, 0.5)])
 def test_it_goes_where_the_twist_commands(ground: World, velocity: Planar) -> None:
     goes(ground, put(ground), velocity, 2e-3)
@@ -68,6 +69,7 @@ def test_real_rollers_carry_it_where_the_twist_commands(ground: World, file: str
     goes(ground, mover, (0.2, -0.2, 0.3), 0.01)
 
 
+@pytest.mark.engines
 def test_a_wheel_at_its_limit_slows_all_of_them_and_keeps_the_direction(ground: World) -> None:
     mover = put(ground)
     drive(ground, mover, (2.0, 1.0, 0.0), 1.0)
@@ -77,6 +79,7 @@ def test_a_wheel_at_its_limit_slows_all_of_them_and_keeps_the_direction(ground: 
     assert (y / x, turn) == pytest.approx((0.5, 0.0), abs=0.02) and 0.5 < x < 0.71
 
 
+@pytest.mark.engines
 def test_a_limit_of_0_is_unknown_and_a_weak_motor_climbs_nothing(ground: World) -> None:
     def limited(**limits: float) -> OmniMover:
         joints = {name: replace(joint, limits=Limits(**limits)) for name, joint in OMNI.joints.items()}
@@ -106,7 +109,8 @@ def test_encoders_count_the_wheels_and_not_what_is_pushed(ground: World) -> None
     assert mover.moved(2, 1 / 240)[0] == pytest.approx(counted, abs=1e-3)
 
 
-def test_the_same_commands_end_in_the_same_bits_with_contacts_and_after_a_reset() -> None:
+@pytest.mark.engines
+def test_the_same_commands_end_in_the_same_bits_with_contacts_and_after_a_reset(engine: str) -> None:
     ball = parse(
         '<robot name="b"><link name="b"><inertial><mass value="0.1"/><inertia ixx="1e-4" iyy="1e-4" izz="1e-4"'
         ' ixy="0" ixz="0" iyz="0"/></inertial><collision><geometry><sphere radius="0.1"/></geometry></collision></link>'
@@ -122,12 +126,14 @@ def test_the_same_commands_end_in_the_same_bits_with_contacts_and_after_a_reset(
         assert lies.body.pose()[0][0] > 1.25, "it was hit"
         return repr((mover.body.pose(), mover.states(), lies.body.pose()))
 
-    with closing(World(WorldSpec(ground=True))) as one, closing(World(WorldSpec(ground=True))) as other:
+    spec = WorldSpec(ground=True)
+    with closing(World(spec, engine)) as one, closing(World(spec, engine)) as other:
         first = end(one)
         one.clear()
         assert first == end(one) == end(other)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("axis", ["0 1 0", "0.8 0.6 0", "0 0.6 0.8"])
 def test_a_wheel_of_any_frame_is_free_along_its_axle_alone(ground: World, axis: str) -> None:
     """The same robot, with the frames of its wheels turned in their joints."""

@@ -8,10 +8,13 @@ import numpy as np
 import pytest
 
 from holozen.robot.loading import parse
-from holozen.robot.model import RobotModel
+from holozen.robot.model import RobotModel, WorldSpec
 from services.sim.link_states import LinkState, LinkTree
-from services.sim.physics.ray_caster import Array, RayCaster
+from services.sim.physics.engine import Array
+from services.sim.physics.ray_caster import RayCaster
+from services.sim.physics.world import World
 
+pytestmark = pytest.mark.engines
 UPRIGHT = (0.0, 0.0, 0.0, 1.0)
 X, Y, DOWN = np.array([[1.0, 0.0, 0.0]]), np.array([[0.0, 1.0, 0.0]]), np.array([[0.0, 0.0, -1.0]])
 
@@ -28,8 +31,8 @@ def robot() -> RobotModel:
 
 
 @pytest.fixture
-def rays() -> Iterator[RayCaster]:
-    with closing(RayCaster(ground=True)) as rays:
+def rays(engine: str) -> Iterator[RayCaster]:
+    with closing(World(WorldSpec(ground=True), engine).ray_caster()) as rays:
         yield rays
 
 

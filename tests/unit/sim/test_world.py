@@ -46,8 +46,8 @@ BODIES = {"hb_bot": HB_BOT, "off-centre": OFF_CENTRE, "tilted principal axes": T
 
 
 @pytest.fixture
-def world() -> Iterator[World]:
-    with closing(World(GROUND)) as world:
+def world(engine: str) -> Iterator[World]:
+    with closing(World(GROUND, engine)) as world:
         yield world
 
 
@@ -72,6 +72,7 @@ def arc(velocity: Planar, seconds: float) -> tuple[float, float]:
     return (x * s + y * (c - 1)) / turn, (x * (1 - c) + y * s) / turn
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("velocity", [(0.5, 0, 0), (0, -0.5, 0), (0, 0, 2), (0.5, 0.3, 1), (-1, 0.5, -3)], ids=str)
 def test_a_driven_robot_follows_its_closed_form_arc(world: World, name: str, velocity: Planar) -> None:
@@ -88,6 +89,7 @@ def test_a_driven_robot_follows_its_closed_form_arc(world: World, name: str, vel
         assert math.remainder(yaw - turned, math.tau) == pytest.approx(0, abs=2e-4)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("name", ["hb_bot", "off-centre"])
 def test_the_measured_velocity_is_the_commanded_one_as_the_body_sees_it(world: World, name: str) -> None:
     base = world.add(BODIES[name], (0, 0, 0))
@@ -98,6 +100,7 @@ def test_the_measured_velocity_is_the_commanded_one_as_the_body_sees_it(world: W
         assert base.velocity(DT) == pytest.approx(velocity, abs=1e-4)
 
 
+@pytest.mark.engines
 def test_hb_bot_settles_level_where_its_wheels_touch_the_ground(world: World) -> None:
     base = world.add(HB_BOT, (0, 0, 0))
     run(world, (base, STOP), seconds=2)
@@ -107,6 +110,7 @@ def test_hb_bot_settles_level_where_its_wheels_touch_the_ground(world: World) ->
     assert rotation == pytest.approx((0, 0, 0, 1), abs=1e-5)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize(
     "part",
     [
@@ -164,11 +168,12 @@ def test_a_robot_that_is_no_longer_driven_is_stopped_by_the_next_command(world: 
     assert pose(base) == pytest.approx(before, abs=1e-6)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("name", ["hb_bot", "off-centre"])
-def test_a_stopped_robot_holds_its_place_on_a_slope(name: str) -> None:
+def test_a_stopped_robot_holds_its_place_on_a_slope(name: str, engine: str) -> None:
     steep = 0.25  # rad
     gravity = (9.8 * math.sin(steep), 0, -9.8 * math.cos(steep))  # as seen from the slope
-    with closing(World(WorldSpec(gravity=gravity, ground=True))) as world:
+    with closing(World(WorldSpec(gravity=gravity, ground=True), engine)) as world:
         base = world.add(BODIES[name], (0, 0, 0))
         run(world, (base, STOP), seconds=2)
         run(world, (base, (-0.5, 0, 0)), seconds=1)
@@ -179,6 +184,7 @@ def test_a_stopped_robot_holds_its_place_on_a_slope(name: str) -> None:
         assert base.velocity(DT) == pytest.approx(STOP, abs=1e-4)
 
 
+@pytest.mark.engines
 def test_a_robot_pushes_what_is_not_driven(world: World) -> None:
     pusher, pushed = world.add(HB_BOT, (0, 0, 0)), world.add(HB_BOT, (1.7, 0, 0))
     run(world, (pusher, (0.5, 0, 0)), seconds=2)
@@ -194,10 +200,11 @@ def test_two_worlds_know_nothing_of_each_other(world: World) -> None:
         assert there.pose()[0] == pytest.approx((0, 0, 0), abs=1e-6)
 
 
-def test_the_same_commands_end_in_the_same_bits() -> None:
+@pytest.mark.engines
+def test_the_same_commands_end_in_the_same_bits(engine: str) -> None:
     ends = []
     for _ in range(2):
-        with closing(World(GROUND)) as world:
+        with closing(World(GROUND, engine)) as world:
             base = world.add(HB_BOT, (0, 0, 0))
             run(world, (base, (0.5, 0.3, 1)), seconds=2)
             ends.append((base.pose(), base.velocity(DT)))
@@ -248,6 +255,7 @@ def fallen(world: World, text: str, *joints: str) -> float:
     return 18 - z
 
 
+@pytest.mark.engines
 def test_a_link_without_gravity_floats(world: World) -> None:
     for text in (OFF.format("gravity", "false"), OFF.format("gravity", "0"), OFF.format("turnGravityOff", "true")):
         assert fallen(world, CAMERA.format(text)) == pytest.approx(0, abs=1e-6), text
@@ -257,6 +265,7 @@ def test_a_link_without_gravity_floats(world: World) -> None:
     assert fallen(world, CAMERA.format(OFF.format("gravity", "true"))) == pytest.approx(4.9, abs=0.05)
 
 
+@pytest.mark.engines
 def test_gravity_pulls_the_links_of_a_body_that_have_it(world: World) -> None:
     part = CAMERA.split("<link", 1)[1].split("{}")[0].replace('"c"', '"d"').replace('"0.1"', '"0.3"', 1)
     ends = '<parent link="c"/><child link="d"/><origin xyz="0 0 -0.1"/><axis xyz="0 0 1"/>'
@@ -318,10 +327,11 @@ def test_a_robot_that_meets_a_low_edge_climbs_it_or_stands(world: World) -> None
                 base.remove()
 
 
-def test_a_robot_that_meets_the_side_of_the_ramp_stays_upright() -> None:
+@pytest.mark.engines
+def test_a_robot_that_meets_the_side_of_the_ramp_stays_upright(engine: str) -> None:
     spec = load_world(REPO / "worlds" / "arena.world")
     for y in (-0.8, 0.5, 1.3):
-        with closing(World(spec)) as world:
+        with closing(World(spec, engine)) as world:
             for model in spec.models:
                 world.add_jointed(model, model.pose.xyz, from_rpy(*model.pose.rpy))
             base = world.add(HB_BOT, (1.2, y, -0.04))
@@ -335,6 +345,7 @@ def obstacle(world: World, size: str, at: Vector) -> None:
     world.add_jointed(parse(text, Path("b.urdf")), at)
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("speed", [2.0, 5.0])
 def test_a_thin_wall_stops_a_robot_at_any_speed(world: World, speed: float) -> None:
     obstacle(world, "0.02 6 0.5", (2, 0, 0.25))
@@ -345,6 +356,7 @@ def test_a_thin_wall_stops_a_robot_at_any_speed(world: World, speed: float) -> N
     assert z == pytest.approx(-0.04, abs=0.005) and rotate(rotation, (0, 0, 1))[2] > 0.999
 
 
+@pytest.mark.engines
 def test_a_robot_that_drives_over_an_edge_falls_and_drives_on(world: World) -> None:
     obstacle(world, "3 3 0.3", (0, 0, 0.15))
     robot = world.add(HB_BOT, (0, 0, 0.3))
@@ -354,13 +366,14 @@ def test_a_robot_that_drives_over_an_edge_falls_and_drives_on(world: World) -> N
     assert robot.pose()[0][2] < 0.1 and robot.pose()[0][0] > 1.5
 
 
+@pytest.mark.engines
 @pytest.mark.parametrize("velocity", [(0, 0, 0.8), (0, 0.3, 0), (0, 0, 0)], ids=["spin", "strafe", "stop"])
-def test_a_slope_moves_no_robot_that_drives_or_stands_on_it(velocity: Planar) -> None:
+def test_a_slope_moves_no_robot_that_drives_or_stands_on_it(velocity: Planar, engine: str) -> None:
     slope = math.radians(5)
     normal, tilt = (-math.sin(slope), 0.0, math.cos(slope)), from_rpy(0, -slope, 0)
     plane = "<collision><geometry><plane><normal>{} {} {}</normal></plane></geometry></collision>".format(*normal)
     spec = WorldSpec(ground=False)
-    with closing(World(spec)) as world:
+    with closing(World(spec, engine)) as world:
         text = f"<sdf version='1.6'><model name='m'><static>true</static><link name='l'>{plane}</link></model></sdf>"
         world.add_jointed(parse(text, Path("m.sdf")), (0, 0, 0))
         robot = world.add(HB_BOT, rotate(tilt, (0, 0, -0.04)), tilt)
