@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from holozen.messages.builtin_interfaces import *
+    from holozen.messages.gazebo_msgs import *
     from holozen.messages.geometry_msgs import *
     from holozen.messages.holozen import *
     from holozen.messages.message import *
@@ -21,7 +22,7 @@ else:
     # Loaded on first use: definitions and CDR alone need no msgspec, which takes 15 ms of the start of an echo.
     MODULES = (
         "message", "builtin_interfaces", "std_msgs", "geometry_msgs", "nav_msgs", "sensor_msgs", "tf2_msgs",
-        "rosgraph_msgs", "std_srvs", "holozen",
+        "rosgraph_msgs", "std_srvs", "gazebo_msgs", "holozen",
     )  # fmt: skip
 
     def __getattr__(name: str) -> Any:

@@ -293,6 +293,10 @@ class Imu(Struct, frozen=True, tag=True):
     oriented: bool = True
 
 
+class Bumper(Struct, frozen=True, tag=True):
+    """Reports what touches the link."""
+
+
 class Camera(Struct, frozen=True, tag=True):
     """A pinhole camera that looks along x, y to the left of its picture; `width` and `height` in pixels,
     `field_of_view` across the width in rad, `near` and `far` in m. `encoding` is "rgb8" or "mono8"; `noise` is that of
@@ -330,7 +334,7 @@ class Sensor:
     mount: Pose | None
     topic: str
     rate: float
-    device: Lidar | Imu | Camera
+    device: Lidar | Imu | Bumper | Camera
 
     @property
     def topics(self) -> tuple[str, ...]:

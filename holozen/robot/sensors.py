@@ -16,6 +16,7 @@ from holozen.robot.gazebo_plugins import SENSING, Settings, kind_of, plugins_out
 from holozen.robot.model import (
     HERE,
     NO_NOISE,
+    Bumper,
     Camera,
     Fan,
     Imu,
@@ -35,10 +36,12 @@ FASTEST = 1000.0  # Hz
 OPTICAL = (-math.pi / 2, 0.0, -math.pi / 2)  # rpy of a camera's optical frame (REP 103): x right, y down, z forward
 SONAR_RAYS = 5  # across and up a sonar's cone
 
+WORLD = "world"  # the frame of contacts, unless a link is tagged
+
 RAYS = ("ray", "gpu_ray", "lidar", "gpu_lidar")
 CAMERAS = ("camera", "depth", "depth_camera", "rgbd_camera", "rgbd")
-SIMULATED = (*RAYS, "sonar", "imu", *CAMERAS)
-RATES = {"scan": 10.0, "points": 10.0, "range": 10.0, "imu": 100.0, "camera": 10.0}  # Hz
+SIMULATED = (*RAYS, "sonar", "imu", "contact", *CAMERAS)
+RATES = {"scan": 10.0, "points": 10.0, "range": 10.0, "imu": 100.0, "contact": 50.0, "camera": 10.0}  # Hz
 
 
 def read_sensors(robot: Tag, links: Mapping[str, Link], names: Iterable[str], source: Source) -> list[Sensor]:
@@ -149,6 +152,8 @@ class _Reading:
             "gz_frame_id", "ignition_frame_id", "optical_frame_id"
         )
         tagged = tagged.rpartition("/")[2]
+        if about.kind == "contact":
+            return HERE, tagged if tagged in self._links else WORLD, None
         if tagged in self._links or (not tagged and pose == HERE):
             return pose, tagged or link, None
         if about.kind in CAMERAS and "optical" in tagged:
@@ -202,10 +207,13 @@ class _About:
         return self.plugin.topic(default, *names) if self.plugin_kind else self.own.topic(default, "topic")
 
 
-def _devices(about: _About) -> list[tuple[str, Lidar | Imu | Camera]]:
+def _devices(about: _About) -> list[tuple[str, Lidar | Imu | Bumper | Camera]]:
     """What a sensor consists of, each with its key."""
     if about.kind == "imu":
         return [(about.topic("imu", "topic_name"), _imu(about))]
+    if about.kind == "contact":
+        default = about.inside("contact").topic("bumper_states", "topic")  # gz-sim's
+        return [(about.plugin.topic(default, "bumper_topic_name") if about.plugin_kind else default, Bumper())]
     if about.kind in CAMERAS:
         camera = _camera(about)
         return [(camera.image or camera.depth, camera)]
@@ -216,8 +224,15 @@ def _devices(about: _About) -> list[tuple[str, Lidar | Imu | Camera]]:
     return [(topic, lidar)]
 
 
-def _rate_of(device: Lidar | Imu | Camera) -> float:
-    return RATES[device.message if isinstance(device, Lidar) else ("imu" if isinstance(device, Imu) else "camera")]
+def _rate_of(device: Lidar | Imu | Bumper | Camera) -> float:
+    match device:
+        case Lidar():
+            return RATES[device.message]
+        case Imu():
+            return RATES["imu"]
+        case Bumper():
+            return RATES["contact"]
+    return RATES["camera"]
 
 
 def _pose(about: _About) -> Pose:

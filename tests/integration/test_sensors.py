@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from holozen import entities
-from holozen.messages import Imu, LaserScan, Message, Odometry, PointCloud2, Pose, Quaternion, Range
+from holozen.messages import ContactsState, Imu, LaserScan, Message, Odometry, PointCloud2, Pose, Quaternion, Range
 from holozen.messages.geometry_msgs import Point
 from holozen.messages.simulation_interfaces import ResetSimulationRequest as Scope
 from holozen.testing import LockStep, Wire
@@ -43,6 +43,8 @@ ROBOT = f"""<robot name="bot"><link name="base">{CUBE}</link>
 {lidar("noisy", NOISE, plugin("laser", "<topicName>noisy</topicName>"))}
 {lidar("cloud", 0.0, plugin("block_laser", "<topicName>points</topicName>"))}
 {lidar("near", 0.0, plugin("range", "<topicName>range</topicName>"))}
+<sensor type="contact" name="bumper"><update_rate>10</update_rate><contact><collision>c</collision></contact>
+{plugin("bumper", "<ros><remapping>bumper_states:=bumper</remapping></ros><frame_name>mast</frame_name>")}</sensor>
 <sensor type="imu" name="imu"><pose>0.1 0 0 0 0 {math.pi / 2}</pose><update_rate>60</update_rate></sensor></gazebo>
 <gazebo><plugin name="drive" filename="libgazebo_ros_planar_move.so"><robotBaseFrame>base</robotBaseFrame></plugin>
 </gazebo></robot>"""
@@ -57,6 +59,7 @@ class Eyes:
         self.sim, self.bus = sim, sim.bus
         kinds: dict[str, type[Message]] = {
             "scan": LaserScan, "noisy": LaserScan, "points": PointCloud2, "range": Range, "imu": Imu,
+            "bumper": ContactsState,
         }  # fmt: skip
         self._read = {key: self.bus.subscribe(key, kind, depth=5000) for key, kind in kinds.items()}
 
@@ -142,6 +145,28 @@ def test_points_and_range_agree_with_the_scan(eyes: Eyes) -> None:
         assert (x, y, z) == pytest.approx((distance * math.cos(angle), distance * math.sin(angle), 0), abs=1e-5)
     assert near.range == pytest.approx(min(scan.ranges))
     assert (near.radiation_type, near.min_range, near.max_range) == (Range.INFRARED, pytest.approx(0.1), 8)
+
+
+def test_a_bumper_reports_what_touches_its_link_and_where(eyes: Eyes) -> None:
+    eyes.wall()
+    eyes.sim.reset(POSES)
+    free = eyes.after()["bumper"][-1]
+    assert (free.header.frame_id, free.states) == ("mast", []), "its own robot's links do not count"
+    post = WALL.replace("wall", "post").replace("0.2 20 4", "0.2 0.1 4")
+    entities.spawn(eyes.bus, "post", post, Pose(Point(0.3, 0.05, 2.0)))  # its face 0.2 m ahead, where the base stops
+    eyes.sim.drive(x=0.2)
+    eyes.sim.step(60)
+    assert eyes.after()["bumper"][-1].states == [], "the base touches it, the mast does not"
+    entities.delete(eyes.bus, "post")
+    entities.spawn(eyes.bus, "post", post, Pose(Point(0.3, 0.05, 2.3)))
+    eyes.sim.drive(x=0.4)
+    eyes.sim.step(3 * STEPS)
+    (state,) = eyes.after()["bumper"][-1].states
+    assert (state.collision1_name, state.collision2_name) == ("bot::mast", "post::post")
+    for point, normal, depth in zip(state.contact_positions, state.contact_normals, state.depths, strict=True):
+        assert (point.x, normal.x, depth) == pytest.approx((0.1, -1, 0), abs=5e-3), "at the front of the mast"
+        assert -0.01 < point.y < 0.11
+    entities.delete(eyes.bus, "post")
 
 
 def test_robots_that_glide_see_and_are_seen_where_they_are(eyes: Eyes) -> None:

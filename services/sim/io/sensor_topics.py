@@ -10,6 +10,8 @@ import numpy as np
 
 from holozen.bus import Bus
 from holozen.messages import (
+    ContactsState,
+    ContactState,
     Exposure,
     Header,
     LaserScan,
@@ -24,7 +26,8 @@ from holozen.messages import (
     Vector3,
 )
 from holozen.messages import Imu as ImuMessage
-from holozen.robot.model import Camera, Imu, Lidar, Noise, Sensor, WorldSpec
+from holozen.robot.model import Bumper, Camera, Imu, Lidar, Noise, Sensor, WorldSpec
+from holozen.robot.sensors import WORLD
 from holozen.rotation import XYZ, conjugate, rotate
 from holozen.transport.pubsub import Publisher
 from holozen.wire import key_for
@@ -65,7 +68,7 @@ class SensorTopics:
         self, bus: Bus, name: str, prefix: str, sensors: Iterable[Sensor], around: Surroundings, phase: float
     ) -> None:
         self._phase = phase
-        self._all: list[tuple[LidarTopic | ImuTopic | CameraTopic, Schedule]] = []
+        self._all: list[tuple[LidarTopic | ImuTopic | BumperTopic | CameraTopic, Schedule]] = []
         for sensor in sensors:
             draw = Draw(around.seed, f"{name}/{sensor.name}")
             match sensor.device:
@@ -73,11 +76,13 @@ class SensorTopics:
                     self._add(LidarTopic(bus, name, prefix, sensor, sensor.device, around, draw))
                 case Imu():
                     self._add(ImuTopic(bus, prefix, sensor, sensor.device, around, draw))
+                case Bumper():
+                    self._add(BumperTopic(bus, name, prefix, sensor, around))
                 case Camera() if around.cameras:
                     self._add(CameraTopic(prefix, sensor, sensor.device, around, around.cameras))
         self.next = -math.inf  # s of sim time from when on `publish` has something to do
 
-    def _add(self, topic: "LidarTopic | ImuTopic | CameraTopic") -> None:
+    def _add(self, topic: "LidarTopic | ImuTopic | BumperTopic | CameraTopic") -> None:
         self._all.append((topic, Schedule(topic.sensor.rate, self._phase)))
 
     def publish(self, step: Step, links: Callable[[], LinkStates]) -> None:
@@ -236,6 +241,50 @@ class ImuTopic:
     def start_anew(self) -> None:
         """Forget the velocity of before."""
         self._before = None
+
+    def close(self) -> None:
+        """Close the key."""
+        self._publisher.close()
+
+
+class BumperTopic:
+    """A bumper: what touches its link. Forces are not measured."""
+
+    def __init__(self, bus: Bus, name: str, prefix: str, sensor: Sensor, around: Surroundings) -> None:
+        self.sensor, self._around, self._own = sensor, around, (name, sensor.link)
+        self._frame = sensor.frame if sensor.frame == WORLD else key_for(sensor.frame, prefix)
+        self._publisher: Publisher[ContactsState] = bus.publisher(key_for(sensor.topic, prefix), ContactsState)
+
+    @property
+    def wanted(self) -> bool:
+        """Whether anyone wants what `publish` sends."""
+        return self._publisher.wanted
+
+    def publish(self, step: Step, links: LinkStates) -> None:
+        """Publish what touches it now."""
+        own = "::".join(self._own)
+        states = [
+            ContactState(
+                f"{len(touch.points)} contacts", own, "::".join(touch.other),
+                contact_positions=[Vector3(*self._in_frame(point, links, place=True)) for point in touch.points],
+                contact_normals=[Vector3(*self._in_frame(normal, links)) for normal in touch.normals],
+                depths=touch.depths,
+            )
+            for touch in self._around.look().touches(*self._own)
+        ]  # fmt: skip
+        self._publisher.put(ContactsState(Header(Time.of(step.time), self._frame), states))
+
+    def _in_frame(self, vector: XYZ, links: LinkStates, place: bool = False) -> XYZ:
+        if self.sensor.frame == WORLD:
+            return vector
+        at = links[self.sensor.frame]
+        if place:
+            x, y, z = (value - origin for value, origin in zip(vector, at.xyz, strict=True))
+            vector = x, y, z
+        return rotate(conjugate(at.rotation), vector)
+
+    def start_anew(self) -> None:
+        """Nothing is kept."""
 
     def close(self) -> None:
         """Close the key."""

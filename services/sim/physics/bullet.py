@@ -4,7 +4,7 @@ Its shapes and bodies are made once and used again.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -235,10 +235,12 @@ class BulletRays(Rays):
         self._world: int = bullet.connect(bullet.DIRECT)
         self._made = Bodies(self._world, MOST_SEEN)
         self._bodies: dict[int, list[int]] = {}
+        self._owners: dict[int, int] = {}  # of the engine's bodies
         self._added = 0
         if ground:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._world)
-            bullet.createMultiBody(0, plane, self._made.shapes.unseen, physicsClientId=self._world)
+            body = bullet.createMultiBody(0, plane, self._made.shapes.unseen, physicsClientId=self._world)
+            self._owners[body] = 0
 
     def add(self, shapes: tuple[PlacedShape, ...]) -> int:
         self._added += 1
@@ -246,10 +248,12 @@ class BulletRays(Rays):
         self._bodies[self._added] = [
             self._made.add(shape, origin, 0.0, shape) for shape in self._made.shapes.of(shapes)
         ]
+        self._owners |= dict.fromkeys(self._bodies[self._added], self._added)
         return self._added
 
     def remove(self, number: int) -> None:
         for body in self._bodies.pop(number):
+            del self._owners[body]
             self._made.remove(body)
 
     def place(self, number: int, at: XYZ, rotation: XYZW) -> None:
@@ -265,6 +269,15 @@ class BulletRays(Rays):
         self._group(own, OTHERS)
         bodies_hit, fractions = np.array([(hit[0], hit[2]) for hit in hits]).reshape(-1, 2).T
         return np.where(bodies_hit < 0, np.inf, near + fractions * (far - near))
+
+    def touched(self, number: int, within: float, but: Collection[int]) -> Iterator[tuple[int, XYZ, XYZ, float]]:
+        for body in self._bodies[number]:
+            low, high = bullet.getAABB(body, -1, self._world)
+            box = [value - within for value in low], [value + within for value in high]
+            for other in sorted({other for other, _ in bullet.getOverlappingObjects(*box, self._world) or ()}):
+                if (owner := self._owners.get(other, number)) not in (number, *but):
+                    for point in bullet.getClosestPoints(body, other, within, physicsClientId=self._world):
+                        yield owner, point[6], point[7], point[8]
 
     def _group(self, number: int, group: int) -> None:
         for body in self._bodies[number]:

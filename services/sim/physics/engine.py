@@ -5,7 +5,7 @@ x, y, z, w; positions, velocities and forces are along the axes of the world. A 
 gives, its parts by their indices, the root's first.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -154,6 +154,12 @@ class Rays(Protocol):
     def cast(self, origin: XYZ, directions: Array, near: float, far: float, own: int) -> Array:
         """The distances (n,) to what is hit first between `near` and `far` by rays along unit vectors (n, 3); infinite
         for nothing. The shapes `own` are not hit.
+        """
+        ...
+
+    def touched(self, number: int, within: float, but: Collection[int]) -> Iterator[tuple[int, XYZ, XYZ, float]]:
+        """What is nearer than `within` (m) to some shapes, the shapes `but` excepted: their number, 0 for the ground, a
+        point on them, the unit vector from there out of them, and the distance, below 0 in them.
         """
         ...
 

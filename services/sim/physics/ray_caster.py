@@ -5,7 +5,7 @@ robots that glide, which touch nothing in the engine that moves them.
 """
 
 from collections.abc import Mapping
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from holozen.rotation import XYZ, XYZW, rotate
 from .engine import Array, Rays
 
 Pose = tuple[XYZ, XYZW]
+TOUCHING = 2e-3  # m; what is nearer touches: the engine that moves bodies keeps them apart by less
+GROUND = ("ground_plane", "link")
 
 
 class Placed(Protocol):
@@ -31,6 +33,17 @@ class Placed(Protocol):
     def rotation(self) -> XYZW:
         """Its rotation."""
         ...
+
+
+class Touch(NamedTuple):
+    """Where a link touches another one, of the entity and link `other`: points (m) on that one, unit vectors out of it,
+    and how deep the link is in it (m).
+    """
+
+    other: tuple[str, str]
+    points: list[XYZ]
+    normals: list[XYZ]
+    depths: list[float]
 
 
 class RayCaster:
@@ -81,6 +94,19 @@ class RayCaster:
         """
         turned = directions @ np.array([rotate(rotation, axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))])
         return self._rays.cast(origin, turned, near, far, self._bodies[own[0]][own[1]])
+
+    def touches(self, name: str, link: str) -> list[Touch]:
+        """What touches a link of an entity, but for its own other links."""
+        own = self._bodies[name]
+        owners = {body: (entity, part) for entity, links in self._bodies.items() for part, body in links.items()}
+        found: dict[tuple[str, str], Touch] = {}
+        for number, point, normal, distance in self._rays.touched(own[link], TOUCHING, own.values()):
+            other = owners.get(number, GROUND)
+            touch = found.setdefault(other, Touch(other, [], [], []))
+            touch.points.append(point)
+            touch.normals.append(normal)
+            touch.depths.append(max(0.0, -distance))
+        return list(found.values())
 
     def close(self) -> None:
         """Free the engine."""

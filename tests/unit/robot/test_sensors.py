@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from holozen.robot.loading import parse
-from holozen.robot.model import HERE, Camera, Fan, Imu, Lidar, Noise, Pose, RobotModel, Sensor
+from holozen.robot.model import HERE, Bumper, Camera, Fan, Imu, Lidar, Noise, Pose, RobotModel, Sensor
 
 ORIGIN = Path("somewhere/robot.urdf")
 PARTS = """<link name="base"/><link name="eye"/><joint name="j" type="fixed"><origin xyz="0 0 1"/><parent link="base"/>
@@ -62,6 +62,19 @@ def test_the_plugin_chooses_the_message() -> None:
     two = "<output_type>sensor_msgs/Range</output_type><ros><remapping>~/out:=near</remapping></ros>"
     assert message("libgazebo_ros_ray_sensor.so", two) == ("range", "near")
     assert message("libgazebo_ros_block_laser.so") == ("points", "points")
+
+
+def test_a_bumper_is_read_in_the_spellings_of_ros_1_ros_2_and_gz_sim() -> None:
+    touch = "<contact><collision>eye_collision</collision></contact>"
+    ros1 = plugin("libgazebo_ros_bumper.so", "<bumperTopicName>hit</bumperTopicName><frameName>base</frameName>")
+    one = sensor("contact", f"<update_rate>20</update_rate>{touch}", ros1)
+    assert one == Sensor("s", "eye", HERE, "base", None, "hit", 20.0, Bumper())
+    ros = "<ros><namespace>/a</namespace><remapping>bumper_states:=hit</remapping></ros><frame_name>world</frame_name>"
+    two = sensor("contact", touch, plugin("libgazebo_ros_bumper.so", ros))
+    assert (two.topic, two.frame, two.rate) == ("a/hit", "world", 50.0)
+    three = sensor("contact", "<contact><collision>c</collision><topic>/touched</topic></contact>")
+    assert (three.topic, three.frame) == ("touched", "world")
+    assert sensor("contact", touch).topic == "bumper_states"
 
 
 def test_an_imu_is_read_with_its_noise_by_axis_by_plugin_or_alone() -> None:

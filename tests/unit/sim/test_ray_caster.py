@@ -70,3 +70,26 @@ def test_an_entity_is_seen_where_it_is_until_it_is_removed(rays: RayCaster) -> N
     assert looks() == pytest.approx([3.75])
     rays.remove("other")
     assert looks() == [np.inf]
+
+
+def test_what_touches_a_link_is_named_with_place_normal_and_depth(rays: RayCaster) -> None:
+    model = robot()
+    for name in ("own", "other"):
+        rays.add(name, model)
+    place(rays, "own", model, 0.0, 0.0, arm=-0.8)  # its arm is in its head
+    place(rays, "other", model, 0.501, 0.1)
+    (touch,) = rays.touches("own", "head")
+    assert touch.other == ("other", "head")
+    for point, normal in zip(touch.points, touch.normals, strict=True):
+        assert (point[0], *normal) == pytest.approx((0.251, -1, 0, 0), abs=1e-3)
+    assert touch.depths == pytest.approx([0.0] * len(touch.points))
+    place(rays, "other", model, 0.49, 0.1)
+    (touch,) = rays.touches("own", "head")
+    assert touch.depths == pytest.approx([0.01] * len(touch.points), abs=1e-3)
+    assert touch.normals == [pytest.approx((-1, 0, 0), abs=1e-3)] * len(touch.points)
+    place(rays, "other", model, 0.51, 0.1)
+    assert rays.touches("own", "head") == []
+    rays.place("own", ((0.0, 0.0, 0.25), UPRIGHT), LinkTree(model).states(LinkState((0.0, 0.0, 0.25), UPRIGHT), {}))
+    (touch,) = rays.touches("own", "head")
+    assert touch.other == ("ground_plane", "link")
+    assert touch.normals == [pytest.approx((0, 0, 1), abs=1e-3)] * len(touch.points)
