@@ -137,11 +137,9 @@ def _rim(model: RobotModel, wheel: Axis, rollers: list[str]) -> tuple[float, flo
     axis, link = joint_axes(model)[rollers[0]], model.links[model.joints[rollers[0]].child]
     along, axle = np.array(axis.direction), np.array(wheel.direction)
     out = np.cross(along, axle)  # along the radius to where the roller's axis is nearest to the axle
-    round_radii = [shape.size[0] for shape in link.collisions if shape.kind in ROUND]
-    sine, thick = (
-        float(np.linalg.norm(out)),
-        max(round_radii, default=radius_across(link, model.joints[rollers[0]].axis)),
-    )
+    radii = [shape.size[0] for shape in link.collisions if shape.kind in ROUND]
+    thick = max(radii, default=radius_across(link, model.joints[rollers[0]].axis))
+    sine = float(np.linalg.norm(out))
     if sine < FLAT or not thick:
         return 0.0, 0.0
     away = float((np.array(axis.xyz) - np.array(wheel.xyz)) @ out) / sine
