@@ -502,10 +502,10 @@ def _add_shape(spec: mj.MjSpec, body: mj.MjsBody, placed: PlacedShape) -> mj.Mjs
         return body.add_geom(type=mj.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **at)
     if shape.kind != "hull":
         return None
-    name = f"hull {len(spec.meshes)} {id(placed)}"
-    spec.add_mesh(
-        name=name, uservert=_thick(np.array(shape.points)).ravel(), inertia=mj.mjtMeshInertia.mjMESH_INERTIA_CONVEX
-    )
+    name = f"hull {hash(shape.points)}"  # equal ones are shared, and stay when their bodies go
+    if spec.mesh(name) is None:
+        inertia = mj.mjtMeshInertia.mjMESH_INERTIA_CONVEX
+        spec.add_mesh(name=name, uservert=_thick(np.array(shape.points)).ravel(), inertia=inertia)
     return body.add_geom(type=mj.mjtGeom.mjGEOM_MESH, meshname=name, **at)
 
 
