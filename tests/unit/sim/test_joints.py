@@ -41,10 +41,11 @@ class Bench:
 
 @pytest.mark.engines
 @pytest.mark.parametrize("name", sorted(WHEELS))
-def test_a_rate_turns_the_joint_that_is_named_and_no_other(space: World, name: str) -> None:
+def test_a_rate_turns_the_joint_that_is_named_and_no_other(space: World, engine: str, name: str) -> None:
     bench = Bench(space)
     bench.do(JointMotion("velocity", ((name, 3.0),)))
-    assert bench.rates()[name] == pytest.approx(3, rel=1e-5)
+    yielding = 1e-5 if engine == "mujoco" else None
+    assert bench.rates()[name] == pytest.approx(3, rel=yielding)
     assert bench.angles()[name] > 1
     assert max(abs(angle) for other, angle in bench.angles().items() if other != name) < 0.1
 
