@@ -32,10 +32,12 @@ ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
 MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
-OPTIONAL = ("matplotlib", "viser")  # not in requirements.lock: only `bag plot` and `view` need them
+OPTIONAL = ("matplotlib", "mujoco-core")  # not in requirements.lock, for `bag plot` and `sim --engine mujoco`
+USERS = {"mujoco": "sim --engine mujoco"}  # of extras that are no verbs
 SHARED = (
     "delete_entity", "get_entities", "get_entity_state", "set_entity_state", "get_simulation_state",
     "set_simulation_state", "step_simulation", "reset_simulation", "get_scene", "robot_description",
+    *(f"simulate_steps/_action/{part}" for part in ("send_goal", "get_result", "cancel_goal")),
 )  # fmt: skip
 """Served by joined sims too."""
 SHARD = re.compile(r"sim_\d+_of_\d+")  # the node of a sim that adds its share of the entities
@@ -89,7 +91,7 @@ def packages() -> Iterator[Finding]:
         if not version(name := text.replace("<", ">").partition(">")[0].partition(";")[0].strip()):
             missing.setdefault(name, []).extend(text.partition('extra == "')[2].strip('"').split())
     for name, extras in missing.items():
-        users = ", ".join(f"`holozen {extra}`" for extra in extras) or "every command"
+        users = ", ".join(f"`holozen {USERS.get(extra, extra)}`" for extra in extras) or "every command"
         by_hand = f"{sys.executable} -m pip install {name}"
         fix = by_hand if name in OPTIONAL else f"run scripts/venv, or: {by_hand}"
         yield Finding("packages", WARNING if extras else ERROR, f"{name} is missing, which {users} needs", fix)

@@ -10,6 +10,7 @@ STORE = get_typestore(Stores.ROS2_JAZZY)
 ELSEWHERE = {
     "action_tutorials_interfaces",
     "example_interfaces",
+    "gazebo_msgs",
     "holozen",
     "nav2_msgs",
     "simulation_interfaces",
