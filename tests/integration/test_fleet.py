@@ -80,7 +80,7 @@ def test_it_stops_by_itself_obeys_a_person_first_and_is_stopped_alone(fleet: Wir
         return obeyed.startswith("person@") and speeds(robot.newest())[1] * y > 0
 
     wait_for(person_drives)
-    done = fleet.run("stop", name, within=LONG)
+    done = fleet.run("stop", name, "--timeout", "60", within=LONG)
     assert done.stdout == f"{name} is stopped\n", done.stderr
     robot.stands()
     moved = robot.odom.from_now()
