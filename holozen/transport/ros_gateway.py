@@ -42,6 +42,7 @@ NODES = f"{NODE}/"  # before the names of ROS nodes on our side
 DEPTH = 64  # samples that wait in a route; of commands all count, since one may be a stop
 MANY = 256  # publishers of a topic whose ages are measured
 CALL = 5.0  # s for a service to answer
+FAILED = 4  # OPERATION_FAILED of simulation_interfaces/msg/Result
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
 
 RESULT, STATUS = (f"/{actions.BELOW}/{part}" for part in (actions.RESULT, actions.STATUS))
@@ -268,7 +269,8 @@ class Gateway:
             publisher.put(payload, encoding="application/cdr", attachment=self._form.attachment(number, gid))
 
         ends = [self._reader(self._bus.session, found.topic, put), _quietly(publisher.undeclare)]
-        for sample in self._bus.ask(found.topic, 0.5) if found.latched else ():
+        # All of them: alone, a service of the same name, such as the sim's robot_description, would be asked.
+        for sample in self._bus.ask_all(found.topic, 0.5) if found.latched else ():
             if isinstance(sample, Sample):
                 put(sample)
         return ends
@@ -343,11 +345,8 @@ class Gateway:
             reply = self._replied(found.topic, bytes(query.payload or b""), request)
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)
         except ServiceError as error:
-            names = {field.name for field in interface.response.fields}
-            if not names >= {"success", "message"}:
-                raise
             # A client of ROS 2 takes no notice of an error reply, and would wait for ever.
-            payload = cdr.write(interface.response, {"success": False, "message": str(error)})
+            payload = cdr.write(interface.response, _refused(interface.response, error))
         query.reply(self._form.key(found), payload, encoding="application/cdr", attachment=attachment)
 
     def _replied(self, key: str, payload: bytes, encoding: str) -> Sample:
@@ -404,6 +403,16 @@ class AnswersAtOnce(Answers):
             with room:  # waits while there are too many
                 pass
             threading.Thread(target=one, args=(query,), daemon=True).start()
+
+
+def _refused(response: Interface, error: ServiceError) -> dict[str, Any]:
+    """A reply that tells ROS 2 of an error. Raises the error if the type has no place for it."""
+    kinds = {field.name: field.nested.name if field.nested else field.type for field in response.fields}
+    if kinds.keys() >= {"success", "message"}:
+        return {"success": False, "message": str(error)}
+    if kinds.get("result") == "simulation_interfaces/msg/Result":
+        return {"result": error.fields.get("result") or {"result": FAILED, "error_message": str(error)}}
+    raise error
 
 
 def _moves(type_name: str, key: str) -> bool:

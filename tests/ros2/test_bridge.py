@@ -1,6 +1,9 @@
 """`holozen ros2 --bridge`, with the real zenoh-bridge-ros2dds and nodes of cyclonedds as the other side."""
 
 import json
+import os
+import threading
+from collections import deque
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -8,6 +11,7 @@ from typing import Any
 import pytest
 import zenoh
 
+from holozen import entities
 from holozen.bus import ServiceError
 from holozen.messages import (
     CommandStatus,
@@ -19,18 +23,25 @@ from holozen.messages import (
     Twist,
     codec,
 )
+from holozen.messages.rcl_interfaces import DOUBLE
+from holozen.messages.simulation_interfaces import Result, SimulateSteps, SimulateStepsGoal, SimulateStepsResult
+from holozen.messages.unique_identifier_msgs import UUID
+from holozen.ros.generated import find
 from holozen.testing import Wire, wait_for
 from holozen.testing.process import Process
 from holozen.testing.wire import free_port
 from holozen.transport import ros2dds
+from holozen.transport.actions import ActionServer, Goal, State, key_of
 from holozen.transport.rmw_zenoh import Endpoint
+from holozen.transport.ros_gateway import CALL
 
 TWIST, ODOM, TF = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 STRING, TRIGGER, SET_BOOL = "std_msgs/msg/String", "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
 
+LONG = CALL + 1.0 if os.environ.get("HOLOZEN_LONG") == "1" else 0.0  # s that a goal takes
+SIM = "simulation_interfaces"
 MANY_STEPS = 10_000_000  # the most that the sim takes
-CANCELED = 5  # action_msgs/msg/GoalStatus
-SEND, RESULT = ("send_goal", "SendGoal"), ("get_result", "GetResult")
+ACCEPTED, CANCELED = 1, 5  # action_msgs/msg/GoalStatus
 
 
 class Bridged:
@@ -97,6 +108,17 @@ class Bridged:
             return wait_for(client.reply, 2.0)
 
         return eventually(replied)
+
+    def action_client(self, action: str, kind: str) -> tuple[Any, ...]:
+        """Clients of send_goal, get_result and cancel_goal, readers of status and feedback. A bridge maps no less."""
+        node, below = self.dds.Node(self.domain, "their_client"), f"/{action}/_action"
+        return (
+            node.client(f"{below}/send_goal", f"{kind}_SendGoal"),
+            node.client(f"{below}/get_result", f"{kind}_GetResult"),
+            node.client(f"{below}/cancel_goal", "action_msgs/srv/CancelGoal"),
+            node.subscriber(f"{below}/status", "action_msgs/msg/GoalStatusArray", self.dds.LATCHED),
+            node.subscriber(f"{below}/feedback", f"{kind}_FeedbackMessage"),
+        )
 
     def close(self) -> None:
         """End the bridges."""
@@ -179,6 +201,45 @@ def test_ros_calls_our_services(bridged: Bridged) -> None:
     assert bridged.call(entities, filters=filters).entities
 
 
+def test_ros_asks_the_pose_service_for_a_goal(bridged: Bridged) -> None:
+    bridged.wire.start("pose-service", "--shape", "square", "--size", "2")
+    goal = bridged.call(bridged.node.client("/next_goal", "holozen/srv/NextGoal"), request_goal=0)
+    assert (goal.x_goal, goal.y_goal) == (2.0, 0.0)
+
+
+def test_ros_spawns_an_entity_and_deletes_it(bridged: Bridged) -> None:
+    """A request that is repeated finds the name taken, or nothing to delete."""
+    bus, spawn = bridged.wire.bus("looks"), bridged.node.client("/spawn_entity", f"{SIM}/srv/SpawnEntity")
+    where = bridged.dds.default("geometry_msgs/msg/PoseStamped")
+    where.pose.position.x, where.pose.orientation.w = 5.0, 1.0
+    asked = {"name": "theirs", "allow_renaming": False, "uri": "", "entity_namespace": "", "initial_pose": where}
+    inertial = '<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+    urdf = f'<robot name="box"><link name="box">{inertial}</link></robot>'
+    result = bridged.call(spawn, resource_string=urdf, **asked).result
+    assert "theirs" in entities.names(bus), result.error_message
+    bridged.call(bridged.node.client("/delete_entity", f"{SIM}/srv/DeleteEntity"), entity="theirs")
+    assert "theirs" not in entities.names(bus)
+
+
+def test_ros_sets_a_parameter(bridged: Bridged) -> None:
+    client = bridged.node.client("/sim/set_parameters", "rcl_interfaces/srv/SetParameters")
+    parameter = bridged.dds.default("rcl_interfaces/msg/Parameter")
+    parameter.name, parameter.value.type, parameter.value.double_value = "max_linear", DOUBLE, 0.1
+    assert [one.successful for one in bridged.call(client, parameters=[parameter]).results] == [True]
+    speeds = deque[float](maxlen=20)
+
+    def limited() -> bool:
+        bridged.commands.write(bridged.twist(0.3))
+        speeds.extend(one.twist.twist.linear.x for one in bridged.odom.take(100))
+        return len(speeds) == speeds.maxlen and all(abs(speed - 0.1) < 0.02 for speed in speeds)
+
+    wait_for(limited, what=lambda: f"0.1 m/s: {speeds}")
+    parameter.value.double_value = 5.0
+    assert [one.successful for one in bridged.call(client, parameters=[parameter]).results] == [True]
+    bridged.drives()
+    bridged.stands()
+
+
 def test_an_error_of_a_service_is_a_reply_with_the_reason(bridged: Bridged) -> None:
     def refused(_request: TriggerRequest) -> TriggerReply:
         raise ServiceError("the arm is stuck")
@@ -186,6 +247,24 @@ def test_an_error_of_a_service_is_a_reply_with_the_reason(bridged: Bridged) -> N
     bridged.wire.bus("arm").serve("arm/lift", TriggerRequest, TriggerReply, refused).start()
     reply = bridged.call(bridged.node.client("/arm/lift", TRIGGER))
     assert (reply.success, "the arm is stuck" in reply.message) == (False, True)
+
+
+def test_a_description_of_a_robot_reaches_a_late_reader(bridged: Bridged) -> None:
+    """Also one that was put before the gateway knew of its publisher, while the sim serves this key."""
+    kind = find(STRING)
+    bridged.wire.bus("publishes").publisher("robot_description", kind).put(kind(data="<robot/>"))
+
+    def late() -> Any:
+        reader = bridged.node.subscriber("/robot_description", STRING, bridged.dds.LATCHED)
+        return wait_for(lambda: reader.take(1), 2.0)
+
+    assert eventually(late)[0].data == "<robot/>"
+
+
+def test_a_refusal_by_the_sim_is_a_reply_with_its_code(bridged: Bridged) -> None:
+    delete = bridged.node.client("/delete_entity", f"{SIM}/srv/DeleteEntity")
+    result = bridged.call(delete, entity="nobody").result
+    assert (result.result, "no entity 'nobody'" in result.error_message) == (Result.NOT_FOUND, True)
 
 
 def test_a_service_of_ros_is_called_from_here(bridged: Bridged) -> None:
@@ -202,16 +281,12 @@ def test_a_service_of_ros_is_called_from_here(bridged: Bridged) -> None:
 
 def test_ros_is_a_client_of_our_actions(bridged: Bridged) -> None:
     """A goal that was sent twice would be rejected."""
-    action, kind = "/simulate_steps/_action", "simulation_interfaces/action/SimulateSteps"
-    assert bridged.wire.run("sim", "pause").returncode == 0
-    node = bridged.dds.Node(bridged.domain, "their_client")
-    send, result = (node.client(f"{action}/{part[0]}", f"{kind}_{part[1]}") for part in (SEND, RESULT))
-    cancel = node.client(f"{action}/cancel_goal", "action_msgs/srv/CancelGoal")
-    status = node.subscriber(f"{action}/status", "action_msgs/msg/GoalStatusArray", bridged.dds.LATCHED)
-    feedback = node.subscriber(f"{action}/feedback", f"{kind}_FeedbackMessage")
+    kind = f"{SIM}/action/SimulateSteps"
+    send, result, cancel, status, feedback = bridged.action_client("simulate_steps", kind)
     goal = bridged.dds.dds_type(f"{kind}_Goal")(steps=MANY_STEPS)
     info = bridged.dds.default("action_msgs/msg/GoalInfo")
     info.goal_id.uuid = [7] * 16
+    assert bridged.wire.run("sim", "pause").returncode == 0
     assert bridged.call(send, goal_id=info.goal_id, goal=goal).accepted
     result.call(goal_id=info.goal_id)
     assert list(wait_for(lambda: feedback.take(100), what="feedback")[0].goal_id.uuid) == [7] * 16
@@ -219,6 +294,29 @@ def test_ros_is_a_client_of_our_actions(bridged: Bridged) -> None:
     assert wait_for(result.reply, what="the result").status == CANCELED
     wait_for(lambda: any(each.status_list[-1].status == CANCELED for each in status.take(10) if each.status_list))
     assert bridged.wire.run("sim", "play").returncode == 0
+
+
+def test_a_late_reader_gets_the_states_of_goals_and_a_result_that_takes_long(bridged: Bridged) -> None:
+    """With --long it takes longer than the gateway waits for other services."""
+    begun: list[Goal] = []
+    bus, part = bridged.wire.bus("dock"), SimulateSteps.Impl.SendGoalService
+    server = ActionServer(bus, "dock", SimulateSteps, lambda _: "", lambda _, goal: begun.append(goal))
+    server.start()
+    identity = bridged.dds.default("unique_identifier_msgs/msg/UUID")
+    identity.uuid = [8] * 16
+    request = part.Request(UUID([8] * 16), SimulateStepsGoal(1))
+    assert bridged.wire.bus().call(key_of("dock", "send_goal"), request, part.Response).accepted
+
+    def late() -> tuple[Any, Any]:
+        _, result, _, status, _ = bridged.action_client("dock", f"{SIM}/action/SimulateSteps")
+        return wait_for(lambda: status.take(1), 2.0), result
+
+    (states,), result = eventually(late)
+    assert [(one.status, list(one.goal_info.goal_id.uuid)) for one in states.status_list] == [(ACCEPTED, [8] * 16)]
+    result.call(goal_id=identity)
+    wait_for(lambda: begun[0].waiting, what="the request for the result")
+    threading.Timer(LONG, server.finish, (begun[0], State.SUCCEEDED, SimulateStepsResult())).start()
+    assert wait_for(result.reply, what="the result").status == State.SUCCEEDED
 
 
 def test_a_latched_topic_reaches_a_late_reader(bridged: Bridged) -> None:
