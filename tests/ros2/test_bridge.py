@@ -53,6 +53,7 @@ class Bridged:
         self.dds, self.wire, self.domain = dds, wire, dds.loopback()
         self._program, self._folder, self.port = program, folder, free_port()
         self.bridges: list[Process] = []
+        self.nodes: list[Any] = []
         self.start(self.domain, self.port)
         self.sim = wire.start("sim")
         self.gateway = wire.start("ros2", "--bridge", self.endpoint)
@@ -112,6 +113,7 @@ class Bridged:
     def action_client(self, action: str, kind: str) -> tuple[Any, ...]:
         """Clients of send_goal, get_result and cancel_goal, readers of status and feedback. A bridge maps no less."""
         node, below = self.dds.Node(self.domain, "their_client"), f"/{action}/_action"
+        self.nodes.append(node)  # as long as it is there, so is the client
         return (
             node.client(f"{below}/send_goal", f"{kind}_SendGoal"),
             node.client(f"{below}/get_result", f"{kind}_GetResult"),
