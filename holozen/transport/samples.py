@@ -13,7 +13,7 @@ from holozen.transport.errors import BusError
 
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
-TRIM_AFTER = (1.0, 2.0, 4.0)  # s
+TRIM_AFTER = (1.0, 2.0, 4.0, 8.0)  # s
 M_TRIM_THRESHOLD = -1  # mallopt(3)
 PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
 """Zenoh's priorities, the strongest first; Zenoh counts them from 1."""

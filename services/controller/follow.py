@@ -265,7 +265,9 @@ class Follower:
 
     def _no_odom(self) -> str:
         """Why it waits for odom; where none came for NOTICE seconds since its start, with the robots that there are."""
-        if not self._others and not self._odom.count and time.monotonic() - self._began > NOTICE:
+        if self._odom.count:
+            self._others = ""
+        elif not self._others and time.monotonic() - self._began > NOTICE:
             robots = {end.key.removesuffix("odom").rstrip("/") for end in self._bus.endpoints() if _is_odom(end)}
             names = [robot or "the one at the root of the keys" for robot in robots]
             name = self._robot or "robot"

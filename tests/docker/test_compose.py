@@ -2,6 +2,7 @@
 
 import json
 import sys
+from functools import partial
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -155,7 +156,8 @@ def test_a_sim_that_is_killed_is_started_again_and_the_others_carry_on(stack: St
 def test_a_sim_that_was_killed_by_docker_stays_down_until_it_is_started(stack: Stack, watcher: Watcher) -> None:
     others = stack.starts("router", "pose_service", "controller")
     docker("kill", stack.container("sim"))
-    wait_for(lambda: "waiting for odom" in stack.logs("controller").splitlines()[-1], what="a controller that waits")
+    logs = partial(stack.logs, "controller")
+    wait_for(lambda: "waiting for odom" in logs().splitlines()[-1], what=logs)
     assert not stack.inspect("sim")["State"]["Running"]
     stack.compose("start", "sim")
     wait_for(lambda: watcher.driven_by("controller"), within=30, what="the controller to drive")

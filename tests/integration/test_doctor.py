@@ -110,6 +110,7 @@ def test_two_sims_on_one_key_are_reported_with_their_processes(wire: Wire) -> No
     sim = wire.start("sim", "--empty")
     sim.wait_for_line("no robot yet")
     clock = wire.bus("other", lasting=True).publisher("clock", Clock)  # our own sim would refuse
+    wait_for(lambda: bad(doctor(wire)[1], "duplicates"))  # a busy machine shows a node late
     code, rows = doctor(wire)
     (text,) = bad(rows, "duplicates")
     assert code == 1

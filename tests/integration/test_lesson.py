@@ -144,7 +144,7 @@ def test_names_are_remapped_as_in_ros(wire: Wire) -> None:
     commands = record(wire.bus(), "class/Fred/cmd_vel", find("geometry_msgs/msg/Twist"))
     with Process(words(wire, "square.py", *rest)):
         assert commands.next().linear.x == 0.3
-        assert "class/quadrat" in wire.run("node", "list").stdout.split()
+        wait_for(lambda: "class/quadrat" in wire.run("node", "list").stdout.split())
 
 
 def test_without_holozen_run_they_fail_as_ever(tmp_path: Path) -> None:
