@@ -108,7 +108,10 @@ def main(argv: list[str] | None = None) -> int:
         code = _guarded(sys.argv[1:])
     except SystemExit as end:  # of argparse, or of a script
         code = end.code
-    ending.leave(code)
+    try:
+        ending.leave(code)
+    except KeyboardInterrupt:  # just before it ignores signals
+        ending.leave(code)
 
 
 def _guarded(words: list[str]) -> int:

@@ -57,8 +57,7 @@ def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> 
 
 @pytest.mark.parametrize("key", ["k", " ", "y", "\t", f"{ESCAPE}[15~", "ä"])
 def test_k_and_every_unknown_key_stop_the_robot(shared_teleop: Terminal, robot: Robot, key: str) -> None:
-    after(robot.commands, shared_teleop, "i")
-    robot.odom.next(lambda odom: moves(odom, V, 0, 0))
+    type_until(lambda: moves(robot.newest(), V, 0, 0), shared_teleop, "i")
     shared_teleop.type(key)
     robot.wait_for_stop_command()
     robot.stands()
