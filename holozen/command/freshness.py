@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from holozen.messages import Message
+from holozen.transport.peer_clocks import PROMPT
 from holozen.transport.pubsub import Received
 from holozen.transport.samples import Stamp
 from holozen.wire import COMMAND_SILENCE
@@ -18,7 +19,6 @@ from holozen.wire import COMMAND_SILENCE
 M = TypeVar("M", bound=Message)
 T = TypeVar("T")
 
-PROMPT = 0.05  # s; a robot at rest obeys a command that took longer only after its sender has answered
 MAX_WAITING = 32  # commands from senders whose clock is not known yet
 MAX_KNOWN = 256  # senders; of more, the one that commanded the longest ago is forgotten
 AGES = (0.05, COMMAND_SILENCE)  # s; the range of `max_age`

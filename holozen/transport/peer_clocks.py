@@ -4,6 +4,9 @@ The offset is the sender's clock minus ours. A round trip that began at t0, that
 answer we read at t1 gives: s - t1 <= offset <= s - t0. A sample with stamp s that was read at a gives: s - a <= offset,
 since it cannot arrive before it is sent. The tightest bounds are kept, and loosened by DRIFT as they age.
 
+A first round trip that took longer than PROMPT may have been held up together with the commands that wait for it, and
+they would count as prompt. So a second one, which began after it had ended, has to confirm it.
+
 In the secure set-up an answer is signed, together with a number that was made for its question: a session's id is no
 proof, since anyone may open one under an id that was used before, and so make old commands look new.
 """
@@ -19,6 +22,7 @@ from holozen.transport.errors import BusError
 from holozen.transport.samples import Sample
 
 DRIFT = 1e-3  # s a second; a quartz is good to 1e-4, and NTP slews a clock by up to 5e-4
+PROMPT = 0.05  # s; what took longer may have been held up
 CONTRADICTION = 0.002  # s; bounds that contradict each other by more: a clock jumped, or a computer was suspended
 AGAIN = 1.0  # s between two round trips with one peer
 FIRST = 5  # round trips back to back, for a tight bound from the start
@@ -35,15 +39,19 @@ def clock_key(session: str) -> str:
 
 class _Peer:
     """The bounds of one session's clock. `confirmed` is when its last completed round trip began, `member` signed its
-    answer, `nonce` the number that the next one has to sign.
+    answer, `nonce` the number that the next one has to sign. `is_bounded`: once they count.
     """
 
-    __slots__ = ("asked", "commands", "confirmed", "due", "highest", "left", "lowest", "member", "nonce", "replies")
+    __slots__ = (
+        "asked", "commands", "confirmed", "due", "highest", "is_bounded", "left", "lowest", "member", "nonce",
+        "replies",
+    )  # fmt: skip
 
     def __init__(self, now: float) -> None:
         self.lowest: tuple[float, float] | None = None  # a bound of the offset, and when it was found
         self.highest: tuple[float, float] | None = None
         self.confirmed = -1.0
+        self.is_bounded = False
         self.commands = False  # whether a command of it has been seen
         self.replies: Any = None
         self.member, self.nonce = "", b""
@@ -61,6 +69,7 @@ class _Peer:
         """Apply the bounds of a round trip, and start over if they contradict the known ones."""
         if low > self.at_most(now) + CONTRADICTION or high < self.at_least(now) - CONTRADICTION:
             self.lowest = self.highest = None
+        self.is_bounded = self.highest is not None or high - low <= PROMPT
         if low >= self.at_least(now):
             self.lowest = (low, now)
         if high <= self.at_most(now):
@@ -113,7 +122,7 @@ class PeerClocks:
         sample refines the lower bound, within those of round trips.
         """
         peer = self._peers.get(session)
-        if peer is None or peer.highest is None or (self._signer and member != peer.member):
+        if peer is None or not peer.is_bounded or (self._signer and member != peer.member):
             return None
         if sent - now > peer.at_least(now):  # it may have come after `now`
             now = max(now, self._clock())
@@ -167,12 +176,14 @@ class PeerClocks:
             if not (member := self._signer(session, peer.nonce, reply.payload)):
                 return  # the one that counts may follow
             if member != peer.member:
-                peer.member, peer.lowest, peer.highest = member, None, None
+                peer.member, peer.lowest, peer.highest, peer.is_bounded = member, None, None, False
         peer.replies = None
         if answered is not None:
             peer.confirmed = peer.asked
             read = self._clock()
             peer.narrow(answered - read, answered - peer.asked, max(now, read))
+            if not peer.is_bounded:
+                peer.due = now
 
 
 def _seconds(reply: Sample | bytes) -> float | None:

@@ -2,8 +2,9 @@
 
 import pytest
 
-from holozen.command.freshness import MAX_KNOWN, MAX_WAITING, PROMPT, Freshness
+from holozen.command.freshness import MAX_KNOWN, MAX_WAITING, Freshness
 from holozen.messages import Twist
+from holozen.transport.peer_clocks import PROMPT
 from holozen.transport.pubsub import Received
 from tests.unit.sim.fakes import FakeSenders, received
 
