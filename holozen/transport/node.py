@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Declared)
 
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
-MOST_TOKENS = 1 << 16  # that wait
+MOST_TOKENS = 1 << 15  # that wait; Zenoh sets aside 240 bytes for each, and a process fills them in its first hours
 DEFINITION_WAIT = 0.5  # s for a node to be found that answers
 DEFINITION_TIMEOUT = 2.0  # s for its answer
 

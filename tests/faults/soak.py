@@ -1,10 +1,11 @@
 """Drives, spawns, deletes, cuts, kills, stops and reconnects at random, and checks the whole history afterwards.
 
-python -m tests.faults.soak MINUTES [SEED]
+python -m tests.faults.soak MINUTES [SEED] [--plot FILE]
 
 The link between drivers and sim is the tests' proxy. Figures are those of the sim's process.
 """
 
+import argparse
 import contextlib
 import os
 import random
@@ -32,6 +33,7 @@ from .proxy import Proxy
 
 HERE = Path(__file__).parent
 EVERY = 5.0  # s between two figures
+BURST = 20  # robots that come and go in a row
 NAMES = [f"bot{number}" for number in range(8)]
 """Of spawned robots. Few, since Zenoh keeps each key that it has told over a link until that link ends."""
 BEFORE, AFTER = 2.0, 0.2  # s around a violation that are printed
@@ -80,6 +82,7 @@ class Soak:
         self.stopped: list[tuple[float, float]] = []  # from the reply of a stop to the release
         self.figures: list[Figures] = []
         self.done: Counter[str] = Counter()
+        self.spawned = 0
         self.wrong: list[str] = []
         self._bus.session.declare_subscriber("cmd_vel", self._pass)
 
@@ -90,7 +93,7 @@ class Soak:
     def run(self, seconds: float) -> None:
         acts: list[Callable[[], None]] = [
             self.drive, self.drive, self.drive, self.kill, self.suspend, self.stall, self.lose, self.reset, self.delay,
-            self.stop, self.spawn, self.spawn, self.delete, self.malform, self.look,
+            self.stop, self.spawn, self.spawn, self.spawn_many, self.spawn_many, self.delete, self.malform, self.look,
         ]  # fmt: skip
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -165,12 +168,22 @@ class Soak:
         unused = sorted({*NAMES} - {*self.names})
         if not unused:
             return self.delete()
-        name = self.random.choice(unused)
+        self._spawn(self.random.choice(unused))
+
+    def _spawn(self, name: str) -> None:
         x, y = (self.random.uniform(20, 60) for _ in "xy")
         request = si.SpawnEntityRequest(name, resource_string=BOT)
         request.initial_pose.pose.position.x, request.initial_pose.pose.position.y = x, y
         self._bus.call("spawn_entity", request, si.SpawnEntityReply, 20.0)
         self.names.append(name)
+        self.spawned += 1
+
+    def spawn_many(self) -> None:
+        """Robots that are deleted at once."""
+        self.delete()
+        for _ in range(BURST):
+            self.spawn()
+            self.delete()
 
     def delete(self) -> None:
         if self.names:
@@ -252,20 +265,44 @@ def soak(minutes: float, seed: int) -> tuple[Soak, History]:
         return run, run.check()
 
 
-def main(minutes: float, seed: int) -> int:
+def plot(figures: list[Figures], file: Path) -> None:
+    """Draw the memory, threads and descriptors over the time."""
+    from matplotlib import pyplot
+
+    minutes = [(each.at - figures[0].at) / 60 for each in figures]
+    drawing, (memory, counts) = pyplot.subplots(2, sharex=True, figsize=(6, 3.6), layout="constrained")
+    memory.plot(minutes, [each.memory for each in figures], linewidth=1)
+    memory.set(ylabel="memory in MB", ylim=0)
+    counts.plot(minutes, [each.threads for each in figures], linewidth=1, label="threads")
+    counts.plot(minutes, [each.descriptors for each in figures], linewidth=1, label="descriptors")
+    counts.set(xlabel="minutes", ylim=0)
+    counts.legend()
+    drawing.savefig(file, metadata={"Date": None} if file.suffix == ".svg" else None)
+
+
+def main(minutes: float, seed: int, file: Path | None) -> int:
     print(f"seed {seed}", flush=True)
     run, history = soak(minutes, seed)
     moved = sum(row.end - row.begin for row in history.odom if row.moves)
     print(", ".join(f"{count} {name}" for name, count in sorted(run.done.items())))
-    print(f"{len(history.commands)} commands, {len(history.odom)} odom; it moved for {moved:.0f} s")
+    print(
+        f"{len(history.commands)} commands, {len(history.odom)} odom; it moved for {moved:.0f} s; {run.spawned} robots came"
+    )
     print(f"it moved on after the last command for at most {history.longest():.3f} s")
     first, last, (memory, threads, descriptors) = run.figures[0], run.figures[-1], run.growth()
     print(f"memory {first.memory:.1f} to {last.memory:.1f} MB ({memory:+.1f} MB/h from the second quarter on), "
           f"threads {first.threads} to {last.threads} ({threads:+g}), "
           f"descriptors {first.descriptors} to {last.descriptors} ({descriptors:+g})")  # fmt: skip
     print(f"{len(run.wrong)} violations", *run.wrong[:20], sep="\n")
+    if file:
+        plot(run.figures, file)
     return 1 if run.wrong else 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(float(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else random.randrange(10**6)))
+    flags = argparse.ArgumentParser("scripts/soak", description=__doc__.splitlines()[0])
+    flags.add_argument("minutes", type=float, metavar="MINUTES")
+    flags.add_argument("seed", type=int, nargs="?", default=random.randrange(10**6), metavar="SEED")
+    flags.add_argument("--plot", type=Path, metavar="FILE", help="draw memory, threads and descriptors")
+    given = flags.parse_args()
+    sys.exit(main(given.minutes, given.seed, given.plot))
