@@ -285,9 +285,8 @@ def main(minutes: float, seed: int, file: Path | None) -> int:
     run, history = soak(minutes, seed)
     moved = sum(row.end - row.begin for row in history.odom if row.moves)
     print(", ".join(f"{count} {name}" for name, count in sorted(run.done.items())))
-    print(
-        f"{len(history.commands)} commands, {len(history.odom)} odom; it moved for {moved:.0f} s; {run.spawned} robots came"
-    )
+    came = f"{len(history.commands)} commands, {len(history.odom)} odom, {run.spawned} spawned"
+    print(f"{came}; it moved for {moved:.0f} s")
     print(f"it moved on after the last command for at most {history.longest():.3f} s")
     first, last, (memory, threads, descriptors) = run.figures[0], run.figures[-1], run.growth()
     print(f"memory {first.memory:.1f} to {last.memory:.1f} MB ({memory:+.1f} MB/h from the second quarter on), "
