@@ -157,12 +157,13 @@ class Robot(NamedTuple):
 
 
 class Plane(NamedTuple):
-    """The content of a map. `note` is shown below it."""
+    """The content of a map. `note` is shown below it, `seen` are the points that sensors see."""
 
     robots: Sequence[Robot] = ()
     goals: Sequence[Point] = ()
     objects: Mapping[str, Point] = {}
     note: str = ""
+    seen: Sequence[Point] = ()
 
 
 def draw(plane: Plane, size: tuple[int, int], ascii: bool = False) -> list[str]:
@@ -186,6 +187,9 @@ def drawn(plane: Plane, size: tuple[int, int], ascii: bool = False, grid: bool =
             trails.line(*start, *end)
         if grid and not ascii and _is_near((robot.x, robot.y)) and math.isfinite(robot.yaw):
             _arrow(arrows, *view.place((robot.x, robot.y)), robot.yaw)
+    for point in filter(_is_near, plane.seen):
+        x, y = view.place(point)
+        trails.dot(round(x), round(y))
     layers = zip(arrows.cells, trails.cells, points.cells, strict=True)
     cells = [_cell(arrow, trail, point, ascii) for arrow, trail, point in layers]
     lines = [cells[row * columns : (row + 1) * columns] for row in range(rows)]
@@ -257,6 +261,7 @@ def _cell(arrow: int, trail: int, grid: int, ascii: bool) -> Cell:
 
 def _points(plane: Plane) -> Iterable[Point]:
     everything = [*plane.goals, *plane.objects.values(), *((robot.x, robot.y) for robot in plane.robots)]
+    everything += plane.seen
     for robot in plane.robots:
         everything += robot.trail
     return filter(_is_near, everything)

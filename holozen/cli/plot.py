@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import threading
 import time
 from collections import deque
@@ -18,10 +19,12 @@ from holozen.cli.output import Reader
 from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import Screen, printable, report
 from holozen.flags import add_packages, number
+from holozen.frames import RobotFrames
 from holozen.plotting import Plane, Point, Robot, draw, panels
 from holozen.process import stop_event
 from holozen.transport.errors import ServiceError
 from holozen.transport.samples import RawSubscriber
+from holozen.wire import key_for
 
 Field = tuple[str, str, tuple[str | int, ...]]
 """A field as written on the command line, its key, and its path in the messages."""
@@ -174,7 +177,36 @@ def _watch(watcher: Watcher, args: argparse.Namespace, stop: threading.Event) ->
 
 def _plane_as_json(plane: Plane) -> dict[str, object]:
     robots = [{"name": one.name, "x": one.x, "y": one.y, "yaw": one.yaw} for one in plane.robots]
-    return {"robots": robots, "goals": plane.goals, "objects": plane.objects}
+    seen = [[round(x, 3), round(y, 3)] for x, y in plane.seen]
+    return {"robots": robots, "goals": plane.goals, "objects": plane.objects, "seen": seen}
+
+
+class Scanner:
+    """What a lidar sees, in the frame of its robot's odometry."""
+
+    def __init__(self, bus: Bus, key: str, namespace: str) -> None:
+        from holozen.messages import LaserScan
+
+        self._scans = bus.state(key, LaserScan)
+        self._frames = RobotFrames(bus, namespace, key_for("odom", namespace))
+        self.points: list[Point] = []  # of the newest scan
+
+    def take(self) -> None:
+        """Take in the newest scan."""
+        self._frames.update()
+        if (received := self._scans.try_recv()) and (scan := received.message):
+            if (at := self._frames.of(scan.header.frame_id, self._frames.root)) is None:
+                return
+            self.points = []
+            for index, far in enumerate(scan.ranges):
+                if scan.range_min <= far <= scan.range_max:
+                    angle = scan.angle_min + index * scan.angle_increment
+                    self.points.append(at.apply((far * math.cos(angle), far * math.sin(angle), 0.0))[:2])
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._scans.close()
+        self._frames.close()
 
 
 class Watcher:
@@ -185,8 +217,10 @@ class Watcher:
 
         self.poses: dict[str, tuple[float, float, float]] = {}  # x, y, yaw by a robot's name
         self.goals: list[Point] = []
+        self._changes = 0  # of the graph, when it was looked at for lidars
         self.objects: dict[str, Point] = {}
-        self._graph = bus.graph()
+        self._graph, self._scanners = bus.graph(), dict[str, Scanner]()
+        self._ends = self._graph.settled(bus.connected)
         self._bus, self._odom = bus, bus.subscribe("**/odom", Odometry, depth=1024)
         self._trails: dict[str, deque[Point]] = {}
         self._status = bus.latest("cmd_vel_status", CommandStatus)  # knows the name of the robot at the root
@@ -195,7 +229,13 @@ class Watcher:
         self._asking.start()
 
     def take(self) -> None:
-        """Take in the odom messages that wait."""
+        """Take in the odometry and scans that wait."""
+        self._ends = self._graph.endpoints()
+        if self._changes != self._graph.changes:
+            self._changes = self._graph.changes
+            self._follow_scanners()
+        for scanner in self._scanners.values():
+            scanner.take()
         while (received := self._odom.try_recv()) is not None:
             if received.message is not None:
                 name = received.sample.key.removesuffix("odom").removesuffix("/")
@@ -212,12 +252,25 @@ class Watcher:
         others = {name: at for name, at in self.objects.items() if name not in self.poses and name != root}
         first = ", ".join(map(_place, robots[:MOST_PLACES]))
         more = f" and {len(robots) - MOST_PLACES} more" if len(robots) > MOST_PLACES else ""
-        return Plane(robots, self.goals, others, first + more)
+        seen = [point for scanner in self._scanners.values() for point in scanner.points]
+        return Plane(robots, self.goals, others, first + more, seen)
 
     def join(self) -> None:
         """Wait for the polling thread once the bus is closed: no thread may be inside Zenoh at exit."""
         self._ended.set()
         self._asking.join(ASK_EVERY + PATIENCE)
+
+    def _follow_scanners(self) -> None:
+        from holozen.messages import LaserScan
+
+        keys = {one.key for one in self._ends if one.kind == "pub" and one.type == LaserScan.ROS and "*" not in one.key}
+        for gone in self._scanners.keys() - keys:
+            self._scanners.pop(gone).close()
+        robots = {one.key.removesuffix("odom") for one in self._ends if one.kind == "pub" and one.key.endswith("odom")}
+        for new in keys - self._scanners.keys():
+            owners = [start for start in robots if new.startswith(start)]
+            if owners:
+                self._scanners[new] = Scanner(self._bus, new, max(owners, key=len).removesuffix("/"))
 
     def _move(self, name: str, x: float, y: float, yaw: float) -> None:
         trail = self._trails.setdefault(name, deque(maxlen=TRAIL))
@@ -238,7 +291,7 @@ class Watcher:
 
     def _ask_goals(self) -> list[Point]:
         """All goals of all next_goal services."""
-        served = {one.key for one in self._graph.endpoints() if one.kind == "srv"}
+        served = {one.key for one in self._ends if one.kind == "srv"}
         keys = [key for key in sorted(served) if key.rpartition("/")[2] == "next_goal"]
         return [goal for key in keys for goal in self._goals_of(key)]
 
@@ -300,8 +353,8 @@ _PLOT = partial(
     json="the numbers as they arrive, one JSON object a line",
 )  # fmt: skip
 ABOUT_MAP = (
-    "Draw the robots, their paths and their goals in the terminal, until Ctrl-C. East is x, north is y. "
-    "Positions are those of odom: with encoders, relative to where a robot started."
+    "Draw the robots, their paths, their goals and what their lidars see in the terminal, until Ctrl-C. "
+    "East is x, north is y. Positions are those of odom: with encoders, relative to where a robot started."
 )
 VERBS = by_name(
     _PLOT("plot"),

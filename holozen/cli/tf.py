@@ -14,9 +14,9 @@ from holozen.cli.hints import no_nodes
 from holozen.cli.verb import Noun, Verb, by_name, open_bus
 from holozen.console import printable, report
 from holozen.flags import number, robot
+from holozen.frames import Frames
 from holozen.process import stop_event
 from holozen.rotation import Transform, to_rpy
-from holozen.suggest import listed, suggest
 from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
@@ -25,50 +25,6 @@ if TYPE_CHECKING:
 TICK = 0.01  # s between two polls
 ASK = 0.3  # s to wait for replies with static transforms
 WAITING = 1.0  # s without a transform until that is reported
-
-
-class Frames:
-    """The latest transform from each frame to its parent. Metres, radians, seconds."""
-
-    def __init__(self) -> None:
-        self._parents: dict[str, tuple[str, Transform, float]] = {}  # by child; with the stamp, 0 for a static one
-
-    def take(self, message: TFMessage, static: bool) -> None:
-        """Take in a message of `tf` or `tf_static`."""
-        for each in message.transforms:
-            rigid = Transform.of(each.transform.translation, each.transform.rotation)
-            seconds = 0.0 if static else each.header.stamp.seconds()
-            parent, child = (name.removeprefix("/") for name in (each.header.frame_id, each.child_frame_id))
-            self._parents[child] = parent, rigid, seconds
-
-    def names(self) -> list[str]:
-        """All frames, sorted."""
-        return sorted({*self._parents, *(parent for parent, _, _ in self._parents.values())})
-
-    def lookup(self, source: str, target: str) -> tuple[Transform, float]:
-        """The pose of `target` in the frame `source`, and the stamp of the newest transform between them.
-
-        Raises LookupError with the reason.
-        """
-        for name in (source, target):
-            if name not in (names := self.names()):
-                raise LookupError(f"no frame {name!r}{suggest(name, names)}; frames: {listed(names)}")
-        root, to_source, first = self._to_root(source)
-        other, to_target, second = self._to_root(target)
-        if root != other:
-            raise LookupError(f"nothing connects {source!r} and {target!r}: their roots are {root!r} and {other!r}")
-        return to_source.inverse() @ to_target, max(first, second)
-
-    def _to_root(self, frame: str) -> tuple[str, Transform, float]:
-        """The root above a frame, the frame's pose there, and the newest stamp on the way."""
-        pose, newest, seen = Transform(), 0.0, {frame}
-        while frame in self._parents:
-            frame, rigid, stamp = self._parents[frame]
-            if frame in seen:
-                raise LookupError(f"the frames form a loop at {frame!r}")
-            seen.add(frame)
-            pose, newest = rigid @ pose, max(newest, stamp)
-        return frame, pose, newest
 
 
 def echo(args: argparse.Namespace) -> int:

@@ -9,7 +9,8 @@ import numpy as np
 import viser
 
 from holozen.bus import Bus, Subscription
-from holozen.messages import Image, LaserScan, Message, Odometry, Path, PointCloud2, PointField, TFMessage
+from holozen.frames import RobotFrames
+from holozen.messages import Image, LaserScan, Message, Odometry, Path, PointCloud2, PointField
 from holozen.rotation import Transform
 from holozen.wire import key_for
 
@@ -18,8 +19,6 @@ from .scene import SEEN, Scene, Shown, wxyz
 KINDS: dict[str, type[Message]] = {kind.ROS: kind for kind in (LaserScan, PointCloud2, Image, Path, Odometry)}
 DRAW_EVERY = 4  # frames of the page
 LARGEST = 16_000_000  # bytes of a message that is shown
-WAITING = 256  # transforms
-DEEPEST = 100  # frames from one to the root
 RED, YELLOW, GREEN = (230, 0, 0), (235, 200, 0), (0, 150, 0)
 POINT = 0.02  # m
 LINE = 0.015  # m
@@ -36,60 +35,11 @@ Place = viser.GuiFolderHandle | viser.GuiTabHandle
 """Where in the panel."""
 
 
-class Frames:
-    """The newest transforms between a robot's frames, by `tf`, `tf_static` and its odometry."""
-
-    def __init__(self, bus: Bus, namespace: str, odometry: str) -> None:
-        self._tf = [
-            bus.subscribe(key_for(key, namespace), TFMessage, depth=WAITING, limit=LARGEST)
-            for key in ("tf", "tf_static")
-        ]
-        self._odometry = bus.state(odometry, Odometry)
-        self._parents: dict[str, tuple[str, Transform]] = {}
-        self.body = ""  # the frame that odometry moves
-
-    def update(self) -> None:
-        """Take in what has arrived."""
-        for reader in self._tf:
-            while received := reader.try_recv():
-                for one in received.message.transforms if received.message else ():
-                    at = Transform.of(one.transform.translation, one.transform.rotation)
-                    self._parents[one.child_frame_id] = one.header.frame_id, at
-        if (newest := self._odometry.try_recv()) and (odom := newest.message):
-            pose = odom.pose.pose
-            self.body = odom.child_frame_id
-            self._parents[self.body] = odom.header.frame_id, Transform.of(pose.position, pose.orientation)
-
-    def names(self) -> list[str]:
-        """All frames, sorted."""
-        return sorted({*self._parents, *(parent for parent, _ in self._parents.values())})
-
-    def of(self, frame: str) -> Transform | None:
-        """Where a frame is in that of the robot's body; None if no transforms lead there."""
-        (root, body), (other, there) = self._from_root(self.body), self._from_root(frame.removeprefix("/"))
-        return body.inverse() @ there if root == other else None
-
-    def close(self) -> None:
-        """Stop listening."""
-        for reader in self._tf:
-            reader.close()
-        self._odometry.close()
-
-    def _from_root(self, frame: str) -> tuple[str, Transform]:
-        at = Transform()
-        for _ in range(DEEPEST):
-            if frame not in self._parents:
-                break
-            frame, step = self._parents[frame]
-            at = step @ at
-        return frame, at
-
-
 class Display:
     """The newest message of a topic, drawn in its frame below the robot's node `root`, or in the panel."""
 
     def __init__(
-        self, client: viser.ClientHandle, place: Place, bus: Bus, frames: Frames, root: str, key: str, kind: str
+        self, client: viser.ClientHandle, place: Place, bus: Bus, frames: RobotFrames, root: str, key: str, kind: str
     ) -> None:  # fmt: skip
         self._client, self._place, self._frames, self._key = client, place, frames, key
         self._path = f"{root}/displays/{key.replace('/', '_')}"
@@ -153,7 +103,7 @@ class Displays:
         self, client: viser.ClientHandle, place: Place, bus: Bus, scene: Scene, chosen: Callable[[], Shown | None]
     ) -> None:
         self._client, self._place, self._bus, self._scene, self._chosen = client, place, bus, scene, chosen
-        self._frames: Frames | None = None
+        self._frames: RobotFrames | None = None
         self._robot: Shown | None = None
         self._topics: Mapping[str, str] = {}
         self._boxes: list[Any] = []
@@ -202,7 +152,7 @@ class Displays:
             return
         entity = robot.entity
         place, odometry = entity.command.rpartition("/")[0], entity.odometry or key_for("odom", entity.name)
-        self._frames = self._frames or Frames(self._bus, place, odometry)
+        self._frames = self._frames or RobotFrames(self._bus, place, odometry)
         others = {shown.entity.command.rpartition("/")[0] for shown in self._scene.shown.values()} - {place, ""}
         with self._place:
             self._box("TF", self._axes is not None, self._switch_axes)
@@ -233,7 +183,7 @@ class Displays:
             handle.remove()
         self._axes = {} if is_on else None
 
-    def _draw_axes(self, frames: Frames, path: str) -> None:
+    def _draw_axes(self, frames: RobotFrames, path: str) -> None:
         axes, add = self._axes, self._client.scene
         for name in frames.names():
             if axes is None or (at := frames.of(name)) is None:

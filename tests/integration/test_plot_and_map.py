@@ -5,11 +5,14 @@ import subprocess
 
 import pytest
 
-from holozen.messages import Odometry, Twist, codec
+from holozen.messages import Odometry, Pose, Quaternion, Twist, codec
+from holozen.messages.geometry_msgs import Point
+from holozen.messages.simulation_interfaces import EntityState, SetEntityStateReply, SetEntityStateRequest
+from holozen.rotation import from_rpy
 from holozen.testing import Wire, wait_for
 from holozen.testing.wire import command
 
-from .robots import Robot
+from .robots import URDF, Robot
 
 FIELD = "odom.pose.pose.position.x"
 
@@ -123,3 +126,22 @@ def test_the_map_shows_the_robot_and_the_goals(town: Wire, robot: Robot) -> None
         return len(output["goals"])
 
     wait_for(lambda: goals() == 4, what="the four corners of the square")
+
+
+def test_the_map_shows_what_a_lidar_sees_where_it_is(wire: Wire) -> None:
+    """The arena's walls are 5 m from its middle, whichever way the robot looks."""
+    sim = wire.start(
+        "sim", "--robot", str(URDF / "explorer.urdf.xacro"), "--world", str(URDF.parent / "worlds/arena.world")
+    )
+    sim.wait_for_line("listens on cmd_vel", 60)
+    turned = Pose(Point(0.5, -0.5, 0.2), Quaternion(*from_rpy(0.0, 0.0, 0.8)))
+    request = SetEntityStateRequest("explorer", state=EntityState(pose=turned))
+    wire.bus().call("set_entity_state", request, SetEntityStateReply)
+
+    def walls() -> bool:
+        output = json.loads(wire.run("map", "--json").stdout)
+        (robot,), seen = output["robots"], output["seen"]
+        at = [max(abs(x), abs(y)) for x, y in seen]
+        return abs(robot["yaw"] - 0.8) < 0.05 and len(at) > 100 and max(at) < 5.1 and sum(far > 4.9 for far in at) > 100
+
+    wait_for(walls, 30, what="the walls")

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from holozen.cli.tf import Frames
+from holozen.frames import Frames
 from holozen.messages import Header, Quaternion, TFMessage, Time, Transform, TransformStamped, Vector3
 from holozen.rotation import from_rpy
 from holozen.testing import Wire
