@@ -266,7 +266,7 @@ class ActionServer(Goals):
             if goal.state is State.ACCEPTED:
                 self.move(goal, State.EXECUTING)
             self.move(goal, state)
-            goal.result = self._result_type(int(state), result)
+            goal.result = self._result_type(status=int(state), result=result)
             waiting, goal.waiting = goal.waiting, []
         for query in waiting:
             self._reply(query, goal.result)

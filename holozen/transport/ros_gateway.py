@@ -22,7 +22,16 @@ import zenoh
 
 from holozen import wire
 from holozen.console import report
-from holozen.messages import CodecError, cdr, codec
+from holozen.messages import (
+    CodecError,
+    GetSceneReply,
+    GetSceneRequest,
+    RobotDescriptionReply,
+    RobotDescriptionRequest,
+    SceneEntity,
+    cdr,
+    codec,
+)
 from holozen.messages.definitions import Interface, InterfaceError
 from holozen.messages.registry import Registry
 from holozen.transport import actions, ros2dds
@@ -44,6 +53,7 @@ MANY = 256  # publishers of a topic whose ages are measured
 CALL = 5.0  # s for a service to answer
 FAILED = 4  # OPERATION_FAILED of simulation_interfaces/msg/Result
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
+DESCRIPTION, STRING = "robot_description", "std_msgs/msg/String"
 
 RESULT, STATUS = (f"/{actions.BELOW}/{part}" for part in (actions.RESULT, actions.STATUS))
 
@@ -80,6 +90,8 @@ class Gateway:
         self._reported: set[str] = set()
         self._closed = threading.Event()
         self._bridges: set[str] = set()  # those with a link
+        self._robots: list[SceneEntity] = []  # of sims
+        self._changes = -1  # of our graph, when the sims were asked for them
 
     def update(self) -> str:
         """Follow both graphs."""
@@ -98,7 +110,7 @@ class Gateway:
         if self._same and self._same.try_recv():
             return "the bridge is on our own network, where what is carried would go round: give it one of its own"
         ours = [one for one in everything if one.session != self._bus.id and not one.node.startswith(NODES)]
-        wanted = {**self._announced(ours), **self._routes(ours)}
+        wanted = {**self._announced(ours), **self._routes(ours), **self._descriptions(ours)}
         for gone in self._held.keys() - wanted.keys():
             for end in self._held.pop(gone):
                 end()
@@ -174,6 +186,47 @@ class Gateway:
                 wanted["in", theirs.topic, theirs.type] = partial(self._carry_in, theirs)
         return wanted
 
+    def _descriptions(self, ours: list[graphs.Endpoint]) -> dict[Any, Callable[[], Ends]]:
+        """The robots whose description ROS 2 is shown, as by a robot_state_publisher, with a function that shows it.
+
+        On our side the key is a service of the sim. Where a node publishes the topic, on either side, that counts.
+        """
+        if self._changes != self._ours.changes:
+            self._changes, scenes = self._ours.changes, []
+            if graphs.on_key(ours, "get_scene", "srv"):
+                try:
+                    scenes = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, CALL)
+                except BusError:  # it may have left
+                    self._changes = -1
+            self._robots = [one for scene in scenes for one in scene.entities if one.odometry]
+        taken = {one.key for one in ours if one.kind == "pub"} | {
+            one.topic for one in self._theirs.values() if one.kind == "pub"
+        }
+        return {
+            (topic, robot.number): partial(self._describe, topic, robot)
+            for robot in self._robots
+            if (topic := f"{robot.odometry.rpartition('/')[0]}/{DESCRIPTION}".lstrip("/")) not in taken
+        }
+
+    def _describe(self, topic: str, robot: SceneEntity) -> Ends:
+        """Publish a robot's URDF on ROS 2's side."""
+        found = self._exported(graphs.Endpoint(topic, "pub", STRING, NODE, self._bus.id))
+        if not found:
+            return []
+        try:
+            request = RobotDescriptionRequest(robot.name)
+            replies = self._bus.call_all(DESCRIPTION, request, RobotDescriptionReply, CALL)
+        except BusError as error:
+            self._refuse(topic, str(error))
+            return []
+        text = next((reply.description for reply in replies if reply.number == robot.number), "")
+        if not text:  # it has left
+            return []
+        ends = self._hold(self._there, self._form.token(found, self._named(NODE)[0]))
+        publisher, put = self._publisher(found)
+        put(cdr.write(self._registry.find(STRING), {"data": text}))
+        return [*ends, _quietly(publisher.undeclare)]
+
     def _exported(self, one: graphs.Endpoint) -> rmw.Endpoint | None:
         """How one of our endpoints stands in the ROS graph; None if it cannot."""
         interface = self._interface(one.type) if rmw.TOPIC.fullmatch(one.key) else None
@@ -231,11 +284,14 @@ class Gateway:
 
     def _refuse(self, topic: str, why: str) -> bool:
         """Report once why something of a topic is not carried. Returns False."""
-        text = f"/{topic} is not carried: {why}"
+        self._report(f"/{topic} is not carried: {why}")
+        return False
+
+    def _report(self, text: str) -> None:
+        """Report it once."""
         if text not in self._reported and len(self._reported) < MANY:
             self._reported.add(text)
             report(f"{NODE}: {text}")
-        return False
 
     def _reader(self, session: Any, key: str, work: Callable[[Sample], None]) -> Callable[[], object]:
         """Do `work` with each sample of other sessions on a key, in a thread."""
@@ -248,8 +304,28 @@ class Gateway:
 
     def _carry_out(self, found: rmw.Endpoint) -> Ends:
         """Our samples, in CDR, to ROS 2."""
-        session, interface = self._there, self._registry.find(found.type)
-        key, gid, number = self._form.key(found), rmw.gid(self._form.token(found, 0)), 0
+        interface = self._registry.find(found.type)
+        publisher, put_bytes = self._publisher(found)
+
+        def put(sample: Sample) -> None:
+            try:
+                payload = codec.transcoded(interface, sample.payload, sample.encoding)
+            except (CodecError, InterfaceError) as error:
+                self._refuse(found.topic, str(error))
+                return
+            put_bytes(payload)
+
+        ends = [self._reader(self._bus.session, found.topic, put), _quietly(publisher.undeclare)]
+        # All of them: alone, a service of the same name, such as the sim's robot_description, would be asked.
+        for sample in self._bus.ask_all(found.topic, 0.5) if found.latched else ():
+            if isinstance(sample, Sample):
+                put(sample)
+        return ends
+
+    def _publisher(self, found: rmw.Endpoint) -> tuple[Any, Callable[[bytes], None]]:
+        """A publisher on ROS 2's side, and what puts bytes of CDR by it."""
+        session, numbers = self._there, count(1)
+        key, gid = self._form.key(found), rmw.gid(self._form.token(found, 0))
         if found.latched:
             from zenoh.ext import CacheConfig, declare_advanced_publisher
 
@@ -258,22 +334,11 @@ class Gateway:
         else:
             publisher = session.declare_publisher(key)
 
-        def put(sample: Sample) -> None:
-            nonlocal number
-            try:
-                payload = codec.transcoded(interface, sample.payload, sample.encoding)
-            except (CodecError, InterfaceError) as error:
-                self._refuse(found.topic, str(error))
-                return
-            number += 1
-            publisher.put(payload, encoding="application/cdr", attachment=self._form.attachment(number, gid))
+        def put(payload: bytes) -> None:
+            attachment = self._form.attachment(next(numbers), gid)
+            publisher.put(payload, encoding="application/cdr", attachment=attachment)
 
-        ends = [self._reader(self._bus.session, found.topic, put), _quietly(publisher.undeclare)]
-        # All of them: alone, a service of the same name, such as the sim's robot_description, would be asked.
-        for sample in self._bus.ask_all(found.topic, 0.5) if found.latched else ():
-            if isinstance(sample, Sample):
-                put(sample)
-        return ends
+        return publisher, put
 
     def _carry_in(self, theirs: rmw.Endpoint) -> Ends:
         """Samples of ROS 2 to our side, with a stamp of this session and the priority of plain data.
@@ -346,7 +411,11 @@ class Gateway:
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)
         except ServiceError as error:
             # A client of ROS 2 takes no notice of an error reply, and would wait for ever.
-            payload = cdr.write(interface.response, _refused(interface.response, error))
+            fields = _refused(interface.response, error)
+            if fields is None:
+                self._report(f"/{found.topic}: a caller waits, as {found.type} has no place for an error: {error}")
+                raise
+            payload = cdr.write(interface.response, fields)
         query.reply(self._form.key(found), payload, encoding="application/cdr", attachment=attachment)
 
     def _replied(self, key: str, payload: bytes, encoding: str) -> Sample:
@@ -405,14 +474,14 @@ class AnswersAtOnce(Answers):
             threading.Thread(target=one, args=(query,), daemon=True).start()
 
 
-def _refused(response: Interface, error: ServiceError) -> dict[str, Any]:
-    """A reply that tells ROS 2 of an error. Raises the error if the type has no place for it."""
+def _refused(response: Interface, error: ServiceError) -> dict[str, Any] | None:
+    """A reply that tells ROS 2 of an error; None if the type has no place for it."""
     kinds = {field.name: field.nested.name if field.nested else field.type for field in response.fields}
     if kinds.keys() >= {"success", "message"}:
         return {"success": False, "message": str(error)}
     if kinds.get("result") == "simulation_interfaces/msg/Result":
         return {"result": error.fields.get("result") or {"result": FAILED, "error_message": str(error)}}
-    raise error
+    return None
 
 
 def _moves(type_name: str, key: str) -> bool:

@@ -66,6 +66,14 @@ class Theirs:
         """A client of a service with the type Trigger: `call()`."""
         return self._made("ROS2ServiceClient", name, "std_srvs/srv/Trigger", timeout=10.0, **TRIGGER)
 
+    def client(self, name: str, kind: str) -> Any:
+        """A client of a service, also of a part of an action: `call(field=value, ...)`."""
+        found = Registry().find(kind)
+        assert found.request
+        assert found.response
+        texts = {"request_definition": whole_text(found.request), "response_definition": whole_text(found.response)}
+        return self._made("ROS2ServiceClient", name, kind, timeout=20.0, **texts)
+
     def serve_trigger(self, name: str, message: str) -> Any:
         """A server of a service with the type Trigger, which replies with `message`."""
 

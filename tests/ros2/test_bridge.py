@@ -37,6 +37,7 @@ from holozen.transport.ros_gateway import CALL
 
 TWIST, ODOM, TF = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry", "tf2_msgs/msg/TFMessage"
 STRING, TRIGGER, SET_BOOL = "std_msgs/msg/String", "std_srvs/srv/Trigger", "std_srvs/srv/SetBool"
+ADD = "example_interfaces/srv/AddTwoInts"
 
 LONG = CALL + 1.0 if os.environ.get("HOLOZEN_LONG") == "1" else 0.0  # s that a goal takes
 SIM = "simulation_interfaces"
@@ -251,16 +252,37 @@ def test_an_error_of_a_service_is_a_reply_with_the_reason(bridged: Bridged) -> N
     assert (reply.success, "the arm is stuck" in reply.message) == (False, True)
 
 
+def test_an_error_that_has_no_place_in_the_reply_is_reported(bridged: Bridged) -> None:
+    kind = find(ADD)
+
+    def refused(_request: Any) -> Any:
+        raise ServiceError("too large")
+
+    bridged.wire.bus("maths").serve("add", kind.Request, kind.Response, refused).start()
+    client, line = (
+        bridged.node.client("/add", ADD),
+        f"/add: a caller waits, as {ADD} has no place for an error: too large",
+    )
+
+    def reported() -> bool:
+        client.call(a=1, b=2)
+        return line in bridged.gateway.err
+
+    wait_for(reported, what=line)
+
+
 def test_a_description_of_a_robot_reaches_a_late_reader(bridged: Bridged) -> None:
-    """Also one that was put before the gateway knew of its publisher, while the sim serves this key."""
+    """That of the sim, and in its place that of a node, also if it was put before the gateway knew of its publisher."""
     kind = find(STRING)
-    bridged.wire.bus("publishes").publisher("robot_description", kind).put(kind(data="<robot/>"))
 
-    def late() -> Any:
+    def late(text: str) -> None:
         reader = bridged.node.subscriber("/robot_description", STRING, bridged.dds.LATCHED)
-        return wait_for(lambda: reader.take(1), 2.0)
+        found = wait_for(lambda: reader.take(1), 2.0)
+        assert text in found[0].data
 
-    assert eventually(late)[0].data == "<robot/>"
+    eventually(lambda: late('<link name="base'))
+    bridged.wire.bus("publishes").publisher("robot_description", kind).put(kind(data="<robot/>"))
+    eventually(lambda: late("<robot/>"))
 
 
 def test_a_refusal_by_the_sim_is_a_reply_with_its_code(bridged: Bridged) -> None:

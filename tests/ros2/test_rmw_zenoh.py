@@ -3,6 +3,7 @@
 import time
 from typing import TYPE_CHECKING, Any
 
+import numpy
 import pytest
 
 from holozen.messages import (
@@ -15,14 +16,17 @@ from holozen.messages import (
     Twist,
     codec,
 )
+from holozen.ros.generated import find
 from holozen.testing import Wire, wait_for
 from holozen.transport import rmw_zenoh as rmw
+from holozen.transport.actions import ActionServer, Goal, State
 from holozen.transport.rmw_zenoh import Ages, Attachment
 
 if TYPE_CHECKING:
     from .conftest import Theirs
 
 TWIST, ODOM = "geometry_msgs/msg/Twist", "nav_msgs/msg/Odometry"
+FIBONACCI = "example_interfaces/action/Fibonacci"
 
 
 def joined(wire: Wire, *words: str) -> Any:
@@ -32,6 +36,8 @@ def joined(wire: Wire, *words: str) -> Any:
 
 
 def test_a_ros_node_sees_reads_drives_and_stops_our_robot(wire: Wire, theirs: "Theirs") -> None:
+    from zenoh_ros2_sdk.qos import QosDurability, QosProfile  # type: ignore[import-untyped]
+
     wire.start("sim").wait_for_line("listens on cmd_vel", 60)
     joined(wire)
     odom: list[Any] = []
@@ -44,6 +50,12 @@ def test_a_ros_node_sees_reads_drives_and_stops_our_robot(wire: Wire, theirs: "T
         "/clock": ["rosgraph_msgs/msg/Clock"],
     }
     wait_for(lambda: theirs.topics().items() >= expected.items(), what=lambda: f"our topics in {theirs.topics()}")
+
+    shown: list[Any] = []
+    transient = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+    theirs.subscriber("/robot_description", "std_msgs/msg/String", shown.append, qos=transient)
+    wait_for(lambda: shown, what="the robot's description")
+    assert '<link name="base' in shown[0].data
 
     status = wire.bus().latest("cmd_vel_status", CommandStatus)
     commands = theirs.publisher("/cmd_vel", TWIST, "their_teleop")
@@ -130,7 +142,7 @@ def test_a_node_of_humble_is_reported_without_the_flag(wire: Wire, theirs: "Thei
 
 
 def test_a_latched_topic_reaches_a_late_subscriber(wire: Wire, theirs: "Theirs") -> None:
-    from zenoh_ros2_sdk.qos import QosDurability, QosProfile  # type: ignore[import-untyped]
+    from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 
     static = wire.bus("statics").publisher("tf_static", TFMessage)
     static.put(TFMessage([TransformStamped(child_frame_id="scanner")]))
@@ -145,6 +157,31 @@ def test_a_latched_topic_reaches_a_late_subscriber(wire: Wire, theirs: "Theirs")
 
     wait_for(got, 20)
     assert found[0].transforms[0].child_frame_id == "scanner"
+
+
+def test_a_ros_node_is_a_client_of_our_actions(wire: Wire, theirs: "Theirs") -> None:
+    fibonacci, begun, feedback = find(FIBONACCI), list[Goal](), list[Any]()
+    server = ActionServer(wire.bus("maths"), "fibonacci", fibonacci, lambda _: "", lambda _, goal: begun.append(goal))
+    server.start()
+    joined(wire)
+    wait_for(lambda: "/fibonacci/_action/feedback" in theirs.topics())
+    theirs.subscriber("/fibonacci/_action/feedback", f"{FIBONACCI}_FeedbackMessage", feedback.append)
+    send = theirs.client("/fibonacci/_action/send_goal", f"{FIBONACCI}_SendGoal")
+    result = theirs.client("/fibonacci/_action/get_result", f"{FIBONACCI}_GetResult")
+    identity = theirs.type("unique_identifier_msgs/msg/UUID")(uuid=numpy.full(16, 7, numpy.uint8))
+    assert send.call(goal_id=identity, goal=theirs.type(f"{FIBONACCI}_Goal")(order=3)).accepted
+    (goal,) = begun
+    assert goal.request.order == 3
+
+    def heard() -> bool:
+        server.feedback(goal, fibonacci.Feedback(sequence=[0, 1]))
+        return bool(feedback)
+
+    wait_for(heard, what="feedback")
+    assert list(feedback[0].feedback.sequence) == [0, 1]
+    server.finish(goal, State.SUCCEEDED, fibonacci.Result(sequence=[0, 1, 1]))
+    found = result.call(goal_id=identity)
+    assert (found.status, list(found.result.sequence)) == (State.SUCCEEDED, [0, 1, 1])
 
 
 def test_beside_our_robot_no_odometry_of_theirs_comes_in(wire: Wire, theirs: "Theirs") -> None:

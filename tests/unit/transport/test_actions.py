@@ -98,5 +98,11 @@ def test_a_result_is_given_to_all_who_wait_and_then_forgotten(case: Case, monkey
 
 
 def test_a_reason_for_a_rejection_is_attached_to_the_reply(case: Case) -> None:
-    found: list[Any] = [*case.client.ask(key_of("act", "send_goal"), 5, payload=b"{}", encoding="application/json")]
+    key, found = key_of("act", "send_goal"), list[Any]()
+
+    def asked() -> bool:  # until both know each other
+        found.extend(case.client.ask(key, 5, payload=b"{}", encoding="application/json"))
+        return bool(found)
+
+    wait_for(asked)
     assert [one.attachment for one in found] == [b"no steps"]
