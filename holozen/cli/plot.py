@@ -19,12 +19,10 @@ from holozen.cli.output import Reader
 from holozen.cli.verb import Verb, by_name, open_bus
 from holozen.console import Screen, printable, report
 from holozen.flags import add_packages, number
-from holozen.frames import RobotFrames
 from holozen.plotting import Plane, Point, Robot, draw, panels
 from holozen.process import stop_event
 from holozen.transport.errors import ServiceError
 from holozen.transport.samples import RawSubscriber
-from holozen.wire import key_for
 
 Field = tuple[str, str, tuple[str | int, ...]]
 """A field as written on the command line, its key, and its path in the messages."""
@@ -185,7 +183,9 @@ class Scanner:
     """What a lidar sees, in the frame of its robot's odometry."""
 
     def __init__(self, bus: Bus, key: str, namespace: str) -> None:
+        from holozen.frames import RobotFrames  # while the session opens
         from holozen.messages import LaserScan
+        from holozen.wire import key_for
 
         self._scans = bus.state(key, LaserScan)
         self._frames = RobotFrames(bus, namespace, key_for("odom", namespace))
