@@ -338,6 +338,17 @@ def lowest(model: RobotModel, rpy: Vector = LEVEL) -> float:
     return low + 0.0 if math.isfinite(low) else 0.0
 
 
+def reach(part: PlacedShape) -> float:
+    """The distance in m from the root frame to the farthest point of a shape, or an upper bound."""
+    if part.shape.points:
+        return max(math.dist(part.xyz, rotate(part.quaternion, (-x, -y, -z))) for x, y, z in part.shape.points)
+    if part.shape.kind == "cylinder":
+        radius, length = part.shape.size
+        x, y, z = rotate(conjugate(part.quaternion), part.xyz)
+        return math.hypot(math.hypot(x, y) + radius, abs(z) + length / 2)
+    return math.hypot(*part.xyz) + math.hypot(*part.shape.size) / (2 if part.shape.kind == "box" else 1)
+
+
 def _bottom(frame: Frame, shape: Shape) -> float:
     """z of the lowest point of a shape. Infinity for planes and missing meshes, which support nothing."""
     reach = _REACHES.get(shape.kind)

@@ -12,7 +12,7 @@ from holozen.rotation import XYZ, XYZW, from_axis_angle, rotate, yaw
 
 from .body import Body, Moved
 from .dynamics import GRAVITY
-from .engine import UPRIGHT, Box, Contact, Engine, JointStates
+from .engine import UPRIGHT, Contact, Engine, JointStates
 from .wheels import MecanumWheels, Wheels
 
 HOLD_GAIN = 0.1  # share of the distance to its place that it recovers in a step
@@ -22,7 +22,6 @@ PUSH = 3.0  # m/s^2 with which it pushes an obstacle at most
 TIPPING = 0.2  # rad/s; an obstacle that tips it faster takes the load, and so the grip, from its wheels
 UPRIGHT_PUSH = 0.3  # share of the push at its centre of mass that would begin to tip it
 LOOK = 12  # steps between two looks of a body around itself
-ENOUGH = 4 * LOOK  # steps without anything near that need no closer look
 FAR = 8 * LOOK  # steps until the next look of one that glides, at most: where nothing can come near it before
 SKIN = 0.03  # m; what is closer counts as near, however slow
 BRISK = 1.0  # m/s that parts of other robots may be faster than their bodies
@@ -117,12 +116,6 @@ class Field:
         return SKIN + (self.closing(speed) + self._fastest) * FAR * self.step
 
 
-def _apart(one: Box, other: Box) -> float:
-    """The distance in m between two boxes."""
-    ((x, y, z), (x2, y2, z2)), ((u, v, w), (u2, v2, w2)) = one, other
-    return math.hypot(max(0.0, u - x2, x - u2), max(0.0, v - y2, y - v2), max(0.0, w - z2, z - w2))
-
-
 def _within(distance: float, way: float) -> int:
     """The steps of that `way` in a distance, at most FAR."""
     return int(min(FAR, max(0.0, distance) / way))
@@ -168,14 +161,12 @@ class PlanarBody(Body):
         self._commanded = STOP  # the last velocity of the drive
         self.speed = 0.0  # m/s that any point of it has had at most since its last look
         self.looks_at = -1  # the step at which it looks around next
-        self._located = 0  # since which step the engine has it where it is, while it glides
         self._stood: tuple[float, ...] = ()  # height and upward axis at the last look
         self._held: tuple[float, float] | None = None  # the place to hold
         self._driven: tuple[float, float] | None = None  # the velocity of the centre that was set for the last step
         self._is_blocked = False
-        self._located_box = low, high = self.box()
-        far = (max(here - under, over - here) for here, under, over in zip(at, low, high, strict=True))
-        self._reach = math.hypot(*far)  # m from the root frame to any point
+        low, high = self.box()
+        self._reach = max(map(rigid.reach, body.collisions), default=0.0)  # m from the root frame to any point
         x, y, z = (place + centre for place, centre in zip(at, body.centre, strict=True))
         edge = max(0.0, min(x - low[0], high[0] - x, y - low[1], high[1] - y))  # of what it stands on
         self._push = min(PUSH, UPRIGHT_PUSH * GRAVITY * edge / max(z - low[2], 1e-3))
@@ -202,14 +193,14 @@ class PlanarBody(Body):
         """The steps, at most FAR, in which nothing but the ground can come near it. Fewer than LOOK: something is near,
         and no planar body there glides any more, nor does this one.
         """
-        self.locate()
+        here = self.locate()
         if not self._glide:
             self.speed = max(self.speed, math.hypot(*super().twist()[0]))
-        (x, y, z), (x2, y2, z2) = box = self._located_box if self._glide else self.box()
+        (x, y, z), (x2, y2, z2) = self.box()
         margin = self._field.margin(self.speed)
         low, high = (x - margin, y - margin, z - margin), (x2 + margin, y2 + margin, z2 + margin)
         around = self._engine.near((low, high)) - {self.number, self._field.level}
-        steps = {number: self._steps_to(number, box) for number in around}
+        steps = {number: self._steps_to(number, here) for number in around}
         near = [number for number, clear in steps.items() if clear < LOOK]
         for number in near:
             if other := self._field.bodies.get(number):
@@ -218,19 +209,17 @@ class PlanarBody(Body):
             self.wake()
         return min(steps.values(), default=FAR)
 
-    def _steps_to(self, number: int, box: Box) -> int:
-        """The steps, at most FAR, in which another body of the engine cannot come near this one, which is in `box`."""
+    def _steps_to(self, number: int, here: XYZ) -> int:
+        """The steps, at most FAR, in which another body of the engine cannot come near this one, whose root frame is
+        `here`.
+        """
         field, other = self._field, self._field.bodies.get(number)
         way = max(field.closing(self.speed) * field.step, 1e-9)  # in a step
-        strayed = 0.0
         if other and other.glides:
-            strayed = other.speed * (field.steps - other._located) * field.step
-            if (steps := _within(_apart(box, other._located_box) - SKIN - strayed, way)) >= ENOUGH:
+            apart = math.dist(here, other.pose()[0]) - self._reach - other._reach
+            if (steps := _within(apart - SKIN, way)) >= LOOK:
                 return steps
-        steps = _within(self._gap(number) - strayed, way)
-        if steps >= LOOK or not strayed or not other:
-            return steps
-        other.locate()
+            other.locate()
         return _within(self._gap(number), way)
 
     def _gap(self, number: int) -> float:
@@ -238,11 +227,14 @@ class PlanarBody(Body):
         within = self._field.margin(self.speed)
         return self._engine.gap(self.number, number, within) - SKIN
 
-    def locate(self) -> None:
-        """While it glides, the engine's body is where the last look was: move it to where this one is."""
+    def locate(self) -> XYZ:
+        """While it glides, the engine's body is where the last look was: move it to where this one is. Returns where
+        its root frame is.
+        """
+        position, rotation = self.pose()
         if self._glide:
-            self._place(*self.pose())
-            self._located, self._located_box = self._field.steps, self.box()
+            self._place(position, rotation)
+        return position
 
     def _standing(self) -> tuple[float, ...]:
         """Its height and upward axis, if it only touches the level ground, does not tilt, and moves as commanded."""
@@ -257,7 +249,6 @@ class PlanarBody(Body):
     def _glide_on(self) -> None:
         """Glide from here at the drive's velocity; the engine keeps a body that neither moves nor touches anything."""
         self._glide, self.glides = Glide(self._field.time, *self.pose(), self._commanded), True
-        self._located, self._located_box = self._field.steps, self.box()
         self._field.gliding += 1
         self._engine.freeze(self.number)
 
