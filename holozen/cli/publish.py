@@ -25,7 +25,7 @@ from holozen.messages import CodecError, CommandStatus, Message, codec
 from holozen.messages.message import not_finite
 from holozen.process import stop_event
 from holozen.suggest import suggest
-from holozen.transport.graph import Endpoint, on_key
+from holozen.transport.graph import Endpoint, on_key, subscribers
 from holozen.transport.pubsub import Publisher
 
 if TYPE_CHECKING:
@@ -170,10 +170,10 @@ def _matched(
         while not publisher.matched and (deadline is None or time.monotonic() < deadline):
             if stop.wait(0.002):
                 return 0
-        if len(ends := on_key(looking(), args.key, "sub")) < wanted:  # the first query was too early
+        if len(on_key(ends := looking(), args.key, "sub")) < wanted:  # the first query was too early
             graph = graph or bus.graph()
-            ends = on_key(graph.settled(bus.connected), args.key, "sub")
-        found = max(len(ends), int(publisher.matched))
+            ends = graph.settled(bus.connected)
+        found = subscribers(ends, args.key, publisher.matched)
         if found >= wanted or (deadline and time.monotonic() > deadline) or stop.wait(0.01):
             return found
         if not reported:

@@ -70,7 +70,7 @@ class Base:
         self._status = bus.publisher(f"{key}_status", CommandStatus)
         services = RobotServices(bus, key, (self._arbiter,), self._publish_status, bus.node)
         self._inputs = WaitSet()
-        self._inputs.add([Reader(self._commands.raw.listen, self._read), *services.stop, *services.others])
+        self._inputs.add([Reader(self._commands.raw.channel, self._read), *services.stop, *services.others])
         self._reads, self._key, self._name = Reads(now), key, robot or bus.node
         self._frames = key_for(frame, robot), key_for(base_frame, robot)
         self._pose, self._moved_at, self._status_at = (0.0, 0.0, 0.0), now, -math.inf

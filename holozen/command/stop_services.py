@@ -35,11 +35,11 @@ class RobotServices:
         answers = (self._on_release, self._on_resume, self._on_stop)
         self._namespace = namespace = command.rpartition("/")[0]
         self._release, self._resume, self._stop = self._servers = tuple(
-            bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer)
+            bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer, dealt=True)
             for verb, answer in zip(self.VERBS, answers, strict=True)
         )
         in_order = (self._stop, self._release, self._resume)
-        readers = [Reader(server.listen, partial(self._read, server)) for server in in_order]
+        readers = [Reader(server.channel, partial(self._read, server)) for server in in_order]
         self.stop, self.others = readers[:1], readers[1:]
         self._now = 0.0
 

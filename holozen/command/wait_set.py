@@ -3,6 +3,8 @@
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
+from holozen.transport.samples import Dealer, Ring
+
 
 class Moment(NamedTuple):
     """When keys are read. What waits there came at or after `since`; its stamps may be measured by any of `clocks`. All
@@ -15,45 +17,54 @@ class Moment(NamedTuple):
 
 
 class Reader(NamedTuple):
-    """`listen` takes the first sample or request that waits at a key, or returns None. `read` processes it, if there is
+    """Of a `channel` of Zenoh, or a Ring. `read` processes the first sample or request that waits there, if there is
     one, and all others; it returns whether it has to be called again even if nothing more arrives.
     """
 
-    listen: Callable[[], Any]
+    channel: Any
     read: Callable[[Any, Moment], bool]
 
 
 class WaitSet:
-    """The readers of many keys, of which few have anything to read at a time.
-
-    Each key has a ring of its own, so that a flood at one pushes nothing out of another.
-    """
+    """The readers of many keys, of which few have anything to read at a time."""
 
     def __init__(self) -> None:
-        self._readers: list[Reader] = []
-        self._listens: list[Callable[[], Any]] = []  # theirs, apart: hundreds are called every few milliseconds
+        self._polled: list[Reader] = []
+        self._dealt: dict[Ring, Reader] = {}
+        self._dealers: dict[Dealer, None] = {}
         self._unfinished: list[Reader] = []
 
     def add(self, readers: Iterable[Reader]) -> None:
         """Read these from now on."""
-        self._set([*self._readers, *readers])
+        for reader in readers:
+            if isinstance(reader.channel, Ring):
+                self._dealt[reader.channel] = reader
+                self._dealers[reader.channel.dealer] = None
+            else:
+                self._polled.append(reader)
 
     def remove(self, readers: Iterable[Reader]) -> None:
         """Read these no longer."""
-        gone = set(readers)
-        self._set([reader for reader in self._readers if reader not in gone])
-        self._unfinished = [reader for reader in self._unfinished if reader not in gone]
-
-    def _set(self, readers: list[Reader]) -> None:
-        self._readers, self._listens = readers, [reader.listen for reader in readers]
+        gone = {id(reader.channel) for reader in readers}
+        self._polled = [reader for reader in self._polled if id(reader.channel) not in gone]
+        self._dealt = {ring: reader for ring, reader in self._dealt.items() if id(ring) not in gone}
+        self._dealers = dict.fromkeys(ring.dealer for ring in self._dealt)
+        self._unfinished = [reader for reader in self._unfinished if id(reader.channel) not in gone]
 
     def read(self, moment: Moment) -> None:
-        """Read what waits, in the order of the readers. Each is read as it is found: a request may depend on another
-        that arrives in between.
+        """Read what waits, in the order in which the keys were added. Each is read as it is found: a request may depend
+        on another that arrives in between.
         """
         self._unfinished = [reader for reader in self._unfinished if reader.read(None, moment)]
-        for index, listen in enumerate(self._listens):
-            if (first := listen()) is not None:
-                reader = self._readers[index]
-                if reader.read(first, moment) and reader not in self._unfinished:
-                    self._unfinished.append(reader)
+        for dealer in list(self._dealers):
+            dealer.deal()
+            for ring in [ring for ring in dealer.ready if ring in self._dealt]:
+                del dealer.ready[ring]
+                self._read(self._dealt[ring], moment)
+        for reader in self._polled:
+            self._read(reader, moment)
+
+    def _read(self, reader: Reader, moment: Moment) -> None:
+        first = reader.channel.try_recv()
+        if first is not None and reader.read(first, moment) and reader not in self._unfinished:
+            self._unfinished.append(reader)

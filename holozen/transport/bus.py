@@ -15,7 +15,7 @@ from holozen.transport.graph import Definition
 from holozen.transport.node import Node
 from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, Subscription
-from holozen.transport.samples import Declared, Replies, Sample, stamps
+from holozen.transport.samples import Dealer, Declared, RawSubscriber, Replies, Ring, Sample, stamps
 from holozen.transport.services import RING, ROOM, Server
 from holozen.transport.session import one_line
 
@@ -31,6 +31,7 @@ NO_ENCODING = "zenoh/bytes"  # Zenoh's default
 UNTYPED = (
     "CDR without an Encoding, so of no certain type; what a bridge to ROS 2 sends comes in by `holozen ros2 --bridge`"
 )
+DEALT = 1 << 14  # samples, or requests, of all keys of a Dealer that wait for it
 GETS = 256  # waiting queries for a publisher's last value; beyond, the oldest get no reply
 
 
@@ -95,10 +96,40 @@ class Bus(Node):
         writer.ends.append(self.announce("pub", kind.ROS, key))
         return self._keep(writer)
 
+    @cached_property
+    def _dealers(self) -> dict[tuple[str, bool], Dealer]:
+        """What deals samples, or requests, by key expression."""
+        return {}
+
+    @cached_property
+    def _known(self) -> dict[str, Any]:
+        """The keys of rings that were declared to Zenoh."""
+        return {}
+
+    def _ring(self, key: str, depth: int, is_queryable: bool = False) -> Ring | None:
+        """A ring for a robot's key, `Fred/cmd_vel`, of what comes on those of all robots, `*/cmd_vel`; None for a key
+        without a robot's name.
+        """
+        if (expression := _of_all(key)) == key:
+            return None
+        dealer = self._dealers.get((expression, is_queryable))
+        if not dealer or not dealer.ends:
+            channel: Any = zenoh.handlers.RingChannel(DEALT)
+            with one_line(f"key {key!r}"):
+                if is_queryable:  # not complete: others may serve some of these keys
+                    declared: Any = self.session.declare_queryable(expression, channel)
+                else:
+                    declared = self.session.declare_subscriber(expression, channel)
+            dealer = self._dealers[expression, is_queryable] = self._keep(Dealer(declared, is_queryable))
+        if not is_queryable and key not in self._known:
+            # Zenoh looks up its way once for a key that is declared here, and for any other with each sample. It is
+            # never undeclared: senders may still use its number.
+            self._known[key] = self.session.declare_keyexpr(key)
+        return dealer.ring(key, depth)
+
     def _answer_gets(self, writer: Publisher[Any], key: str) -> None:
         """Robots share a thread: that of `Fred/odom` answers on `*/odom`."""
-        first, _, rest = key.partition("/")
-        expression = f"*/{rest}" if rest and not first.startswith("@") else key
+        expression = _of_all(key)
         writer.gets = self._gets.get(expression)
         if not writer.gets or not writer.gets.add(writer):
             # A callback's queue would, when full, block Zenoh's thread and with it this link.
@@ -117,13 +148,17 @@ class Bus(Node):
         text = definitions.whole_text(interface)
         self._keep(Definition(self.session, zenoh.handlers.RingChannel(16), interface.name, text))
 
-    def subscribe(self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0) -> Subscription[M]:
+    def subscribe(
+        self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0, dealt: bool = False
+    ) -> Subscription[M]:
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused, and in the
-        secure set-up commands without proof.
+        secure set-up commands without proof. `dealt`: all robots' keys of that name share a subscriber, which a WaitSet
+        reads.
         """
         from holozen import wire
 
-        raw = self.subscribe_raw(key, depth, limit)
+        ring = self._ring(key, depth) if dealt else None
+        raw = self._keep(RawSubscriber(ring, limit)) if ring else self.subscribe_raw(key, depth, limit)
         raw.ends.append(self.announce("sub", kinds[0].ROS, key))
         is_command = wire.is_command(key, kinds)
         return Subscription(raw, kinds, tolerant=not is_command, refusal=self._refusal if is_command else None)
@@ -158,15 +193,18 @@ class Bus(Node):
 
     def serve(
         self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R], room: int = ROOM,
-        shared: bool = False,
+        shared: bool = False, dealt: bool = False,
     ) -> Server:  # fmt: skip
         """Answer requests on `key`. The caller runs it: `answer_pending()` in a loop, or `start()`.
 
         At most `room` requests wait; more are refused as busy. A request on a `shared` key goes to all of its servers;
-        those that have no part in it raise Elsewhere.
+        those that have no part in it raise Elsewhere. `dealt`: all robots' keys of that name share a queryable, which a
+        WaitSet reads.
         """
         token = self.announce("srv", reply.ROS, key)
-        queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=not shared)
+        queryable: Any = self._ring(key, RING, is_queryable=True) if dealt else None
+        if not queryable:
+            queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=not shared)
         server = self._keep(Server(queryable, key, request, answer, self.wire, room))
         server.ends.append(token)
         return server
@@ -193,3 +231,9 @@ class Bus(Node):
             )  # fmt: skip
 
         return PeerClocks(ask, has, signer=self._verifier.answerer if self._verifier else None)
+
+
+def _of_all(key: str) -> str:
+    """The key expression of all robots' keys of that name: `*/odom` for `Fred/odom`, and `odom` for `odom`."""
+    first, _, rest = key.partition("/")
+    return f"*/{rest}" if rest and not first.startswith("@") else key

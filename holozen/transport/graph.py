@@ -72,6 +72,19 @@ def on_key(endpoints: Iterable[Endpoint], key: str, kind: str) -> list[Endpoint]
     return [endpoint for endpoint in endpoints if endpoint.kind == kind and includes(endpoint.key, key)]
 
 
+def subscribers(endpoints: Iterable[Endpoint], key: str, matched: bool) -> int:
+    """How many subscribe to a key; if it is `matched`, by one at least. Foreign nodes only show that there are any.
+
+    A sim subscribes to `*/cmd_vel`. So where a robot listens on `Fred/cmd_vel`, a match of `Ghost/cmd_vel` means
+    nothing.
+    """
+    listed = [*endpoints]
+    _, _, rest = key.partition("/")
+    if on_key(listed, key, "sub") or not rest:
+        return max(len(on_key(listed, key, "sub")), int(matched))
+    return int(matched and not any(end.kind == "sub" and end.key.partition("/")[2] == rest for end in listed))
+
+
 def includes(expression: str, key: str) -> bool:
     """Whether a key expression with whole-chunk wildcards (`*`, `**`) includes a key."""
     return _includes(expression.split("/"), key.split("/"))

@@ -167,6 +167,8 @@ class Node:
         request that was sent before, and may have been answered, has the same.
         """
         attachment = f"{self.source};{number}" if number else self.source
+        # Each reply as it comes: by default the first waits for all that might answer.
+        request = {"consolidation": zenoh.ConsolidationMode.NONE} | request
         with one_line(f"key {key!r}"):
             replies = self.session.get(key, timeout=timeout, attachment=attachment, **request)
         return Replies(replies, replier)

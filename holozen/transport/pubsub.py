@@ -174,7 +174,7 @@ class Subscription(Generic[M]):
         return None if sample is None else self._received(sample)
 
     def waiting(self, first: Any) -> list[Received[M]]:
-        """The messages that wait, after the sample `first` that `raw.listen` returned; None: nothing waited."""
+        """The messages that wait, after the sample `first` of `raw.channel`; None: nothing waited."""
         samples = [] if first is None else [Sample(first, self.raw.limit), *iter(self.raw.try_recv, None)]
         return [self._received(sample) for sample in samples]
 

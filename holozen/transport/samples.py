@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from itertools import count
 from typing import Any, NamedTuple
@@ -13,6 +14,7 @@ from holozen.transport.errors import BusError
 
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
+MOST_DEALT = 4096  # samples at a time
 TRIM_AFTER = (1.0, 2.0, 4.0, 8.0)  # s
 M_TRIM_THRESHOLD = -1  # mallopt(3)
 PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
@@ -214,6 +216,68 @@ class Answers(Declared):
                 self._answer(query)
 
 
+class Ring:
+    """What came on one key of a Dealer, the newest `depth`; it stands for a ring channel of Zenoh and its declaration.
+
+    Each key has a ring of its own, so that a flood at one pushes nothing out of another.
+    """
+
+    def __init__(self, dealer: Dealer, key: str, depth: int) -> None:
+        self.dealer, self.key, self.handler = dealer, key, self
+        self._waiting: deque[Any] = deque(maxlen=depth)
+        self.append = self._waiting.append
+
+    def try_recv(self) -> Any:
+        """The next that waits, or None."""
+        return self._waiting.popleft() if self._waiting else None
+
+    def undeclare(self) -> None:
+        """Get nothing more."""
+        self.dealer.remove(self)
+
+
+class Dealer(Declared):
+    """Deals what comes on a key expression, such as `*/cmd_vel`, to the rings of its keys: of hundreds of robots, who
+    got something is known without asking each.
+
+    `declared` is Zenoh's subscriber, or its queryable, whose requests for several keys are for none.
+    """
+
+    def __init__(self, declared: Any, is_queryable: bool) -> None:
+        super().__init__(declared)
+        self._recv, self._is_queryable = declared.handler.try_recv, is_queryable
+        self._rings: dict[str, Ring] = {}
+        self.ready: dict[Ring, None] = {}  # those that got something, in order; the reader takes them out
+
+    def ring(self, key: str, depth: int) -> Ring:
+        """A ring for a key."""
+        self._rings[key] = ring = Ring(self, key, depth)
+        return ring
+
+    def remove(self, ring: Ring) -> None:
+        """Deal to a ring no longer. The last one ends the declaration."""
+        if self._rings.get(ring.key) is ring:
+            del self._rings[ring.key]
+        self.ready.pop(ring, None)
+        if not self._rings:
+            self.close()
+
+    def deal(self) -> None:
+        """Deal what waits, but no more than MOST_DEALT."""
+        for _ in range(MOST_DEALT):
+            if (one := self._recv()) is None:
+                return
+            for ring in self._rings_of(one.key_expr):
+                ring.append(one)
+                self.ready[ring] = None
+
+    def _rings_of(self, key_expr: Any) -> Iterable[Ring]:
+        ring = self._rings.get(key := str(key_expr))
+        if ring or self._is_queryable or "*" not in key:
+            return (ring,) if ring else ()
+        return [ring for key, ring in self._rings.items() if key_expr.intersects(key)]
+
+
 class RawSubscriber(Declared):
     """Raw samples; if too many wait, the oldest are dropped."""
 
@@ -221,7 +285,7 @@ class RawSubscriber(Declared):
         super().__init__(subscriber)
         # Reading from the handler leaves the subscriber free to be undeclared at the same time.
         self._samples, self.limit = subscriber.handler, limit
-        self.listen = subscriber.handler.try_recv  # Zenoh's next sample or None, for `Subscription.waiting`
+        self.channel = subscriber.handler  # of Zenoh's samples, for `Subscription.waiting`
 
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""

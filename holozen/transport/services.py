@@ -16,6 +16,7 @@ from holozen.transport.samples import (
     MAX_ATTACHMENT_BYTES,
     Declared,
     Replies,
+    Ring,
     Sample,
     release_memory,
     source_in,
@@ -96,7 +97,7 @@ class Server(Declared):
         super().__init__(queryable)
         # Reading from the handler leaves the queryable free to be undeclared at the same time.
         self._queries = queryable.handler
-        self.listen = queryable.handler.try_recv  # Zenoh's next request or None, for `keep`
+        self.channel = queryable.handler  # of Zenoh's requests, for `keep`
         self._waiting, self._room = Waiting(room), room
         self.caller = ""  # the claimed sender of the request that is being answered
         self._kept: dict[bytes, tuple[bytes, str, str]] = {}  # number of a request -> its reply, in order
@@ -104,6 +105,8 @@ class Server(Declared):
 
     def take_in(self, most: int = BATCH) -> int:
         """Read at most `most` requests from Zenoh's ring; returns how many wait."""
+        if isinstance(self.channel, Ring):
+            self.channel.dealer.deal()
         while most > 0 and (query := self.try_recv()) is not None:
             self.keep(query)
             most -= 1

@@ -156,6 +156,7 @@ class Entities:
             self.robots.append(entity.robot)
             self.commands.add(entity.robot.command_readers)
             self.requests.add(entity.robot.request_readers)
+            entity.robot.publish_status(time.monotonic())  # who knew one of that name sees a new one
         return entity
 
     def put(self, name: str, place: Place, linear: XYZ, angular: XYZ) -> None:

@@ -28,7 +28,6 @@ MEASURED = 1.0  # s of real time over which the real-time factor is measured
 REPORT_EVERY = 60.0  # s between two reports of overruns
 POLL = 0.02  # s; how often requests are read, and commands while no step is due
 READ_EVERY = 0.003  # s between two looks for commands and stops, and for nodes that left, however short the steps
-READ_SHARE = 0.05  # of the time that these looks take at most, unless they would be more than POLL apart
 FAULTS = (ArithmeticError, ValueError)  # of a body whose position became NaN
 
 
@@ -52,7 +51,7 @@ class Loop:
         self._status: Publisher[SimulationStatus] | None = None
         if is_clock:
             self._status = bus.publisher("simulation_status", SimulationStatus)
-        self._status_at = self._shown_at = self._reported_at = -math.inf
+        self._status_at = self._told_at = self._shown_at = self._reported_at = -math.inf
         self._reported = 0  # overruns
         self._marks: deque[tuple[float, float]] = deque()  # real and sim time of past statuses
         self.simulation = Simulation(world, entities, self.pace, self.publish_all)
@@ -131,9 +130,10 @@ class Loop:
         since = self._reads.since(now)
         moment = Moment(now, since, (time.time(), self._world.time))
         self._entities.commands.read(moment)
-        for robot in self._robots:
-            if now >= robot.status_at:
+        if now >= self._told_at:
+            for robot in self._robots:
                 robot.publish_status(now)
+            self._told_at = now + 1 / STATUS_RATE
         self._entities.watch_senders(moment)  # after their last commands were read
         if is_asked or now - self.polled >= POLL:
             self._entities.requests.read(moment._replace(since=min(since, self.polled or since)))
@@ -143,8 +143,7 @@ class Loop:
         if now - self._served >= (HELD_POLL if self.simulation.is_held else POLL):
             self._more_wait = sum(answer() for answer in self.answers) > 0  # each of them answers
             self._served = -math.inf if self._more_wait else now
-        took = time.monotonic() - now
-        self._reads_at = now + max(READ_EVERY, min(took / READ_SHARE, POLL))
+        self._reads_at = now + READ_EVERY
 
     def _step(self, now: float) -> None:
         world, dt = self._world, self._world.spec.step

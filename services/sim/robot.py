@@ -24,7 +24,7 @@ from .link_states import LinkState, link_tree
 from .physics.jointed import Forces, JointedBody, Motors
 from .physics.movers import Mover
 
-IDLE = 0.06  # s of sim time between two looks for readers of the joints, while there are none
+IDLE = 0.2  # s of sim time between two looks for readers of the joints, while there are none
 
 Memory = tuple[Arbiter, Arbiter, Arbiter]
 NO_DRIVE = "no drive: this robot is moved by forces, on {keys}"
@@ -110,13 +110,8 @@ class Robot:
         """Those of its other services; joint commands, where no joint obeys any, are refused with them."""
         return [*self._joints.readers * (not self._obeys), *self._services.others]
 
-    @property
-    def status_at(self) -> float:
-        """From when on `publish_status` has something to do, in s."""
-        return self._drive.status_at if self._drive else math.inf
-
     def publish_status(self, now: float, at_once: bool = False) -> None:
-        """Publish the command status, when it is due at `now` (s) and wanted, or `at_once`."""
+        """Publish the command status at `now` (s), if it is wanted, or `at_once`."""
         if self._drive:
             self._drive.publish_status(now, at_once)
 

@@ -7,6 +7,7 @@ from holozen.ros.rclpy.exceptions import InvalidHandle
 from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import HistoryPolicy, QoSProfile
+from holozen.transport.graph import subscribers
 
 __all__ = ["Publisher"]
 
@@ -54,7 +55,7 @@ class Publisher(Owned):
         self._handle.context.check_can_publish(f"count the subscriptions of {self.topic}")
         if self._writer is None or not self._writer.matched:
             return 0  # a subscription may be in the graph before the route to it is established
-        return max(1, len(self._handle.endpoints_on(self.topic, "sub")))
+        return subscribers(self._handle.endpoints(), key(self.topic), matched=True)
 
     def assert_liveliness(self) -> None:
         """Does nothing: Zenoh tracks liveliness."""

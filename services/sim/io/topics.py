@@ -52,8 +52,8 @@ class JointTopics:
     ) -> None:  # fmt: skip
         self._input, self._tf, self.names = joint_input, tf, names
         self._frames = JointFrames(model, key_for("", prefix))
-        self._commands = bus.subscribe(joint_input.key, JointState, limit=MAX_COMMAND_BYTES)
-        self.readers = [Reader(self._commands.raw.listen, self._read)]
+        self._commands = bus.subscribe(joint_input.key, JointState, limit=MAX_COMMAND_BYTES, dealt=True)
+        self.readers = [Reader(self._commands.raw.channel, self._read)]
         self._states: Publisher[JointState] = bus.publisher(key_for("joint_states", place), JointState)
 
     @property
@@ -91,8 +91,8 @@ class ForceTopics:
 
     def __init__(self, bus: Bus, force_input: ForceInput) -> None:
         self._input = force_input
-        self._commands = [bus.subscribe(key, Wrench, limit=MAX_COMMAND_BYTES) for key in force_input.keys]
-        self.readers = [Reader(commands.raw.listen, partial(self._read, commands)) for commands in self._commands]
+        self._commands = [bus.subscribe(key, Wrench, limit=MAX_COMMAND_BYTES, dealt=True) for key in force_input.keys]
+        self.readers = [Reader(commands.raw.channel, partial(self._read, commands)) for commands in self._commands]
 
     def _read(self, commands: Subscription[Wrench], first: Any, moment: Moment) -> bool:
         """Process those `commands` that wait, after the sample `first`; returns whether any waits for a clock."""
@@ -186,7 +186,6 @@ def _places(model: RobotModel) -> list[tuple[XYZ, XYZW]]:
 
 
 NONE = (False, False)
-STATUS_RATE = 10.0  # Hz of real time: people read it
 
 
 class DriveTopics:
@@ -202,13 +201,11 @@ class DriveTopics:
         self._variances = covariance(drive)
         command = twist_input.keys[0]
         self._commands: list[Subscription[Twist | TwistStamped]] = [
-            bus.subscribe(key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES) for key in twist_input.keys
+            bus.subscribe(key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES, dealt=True) for key in twist_input.keys
         ]
-        self.readers = [Reader(commands.raw.listen, partial(self._read, commands)) for commands in self._commands]
+        self.readers = [Reader(commands.raw.channel, partial(self._read, commands)) for commands in self._commands]
         self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, prefix), Odometry)
         self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
-        self._status_due = Schedule(STATUS_RATE)
-        self.status_at = -math.inf  # s from when on a status is due
 
     def _read(self, commands: Subscription[Twist | TwistStamped], first: Any, moment: Moment) -> bool:
         """Process those `commands` that wait, after the sample `first`; returns whether any waits for its sender's
@@ -217,18 +214,17 @@ class DriveTopics:
         now, since, clocks = moment
         self._input.take(commands.waiting(first), now, clocks, since)
         if self._input.has_news:
-            self.status_at = now
+            self.publish_status(now)
         return self._input.freshness.is_waiting
 
     def publish_status(self, now: float, at_once: bool = False) -> None:
-        """Publish the command status, when it is due or names a new source, and is wanted, or `at_once`."""
-        if at_once or ((self._status_due.due(now) or self._input.has_news) and self._status.wanted):
+        """Publish the command status, if it is wanted, or `at_once`."""
+        if at_once or self._status.wanted:
             status, drive = self._input.status(now), self._drive
             status.name, status.strafes = self._name, self._strafes
             status.max_linear = min(self._input.linear, drive.max_linear)
             status.max_angular = min(self._input.angular, drive.max_angular)
             self._status.put(status)
-        self.status_at = self._status_due.next
 
     @property
     def wanted(self) -> tuple[bool, bool]:
