@@ -4,6 +4,7 @@ No clock, no socket.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
@@ -143,6 +144,7 @@ class Arbiter:
         self.timeout, self.software_stop = timeout, SoftwareStop(timeout)
         self.resumed = 0  # how often `resume` succeeded
         self.due = -math.inf  # s; `motion` stays as it was last asked for until then, or until an event sets this back
+        self.changed: Callable[[], None] = lambda: None  # called by each such event
         self._driver: Driver | None = None
         self._held: dict[int, Held] = {}  # by rank
         self._highest = AUTOPILOT + 1  # the best rank that drove since the last resume
@@ -228,12 +230,18 @@ class Arbiter:
         """Forget the driver, so that only a new command moves the robot; of drivers whose silence never ends, only if
         `lasting`. Held sources and the software stop remain.
         """
-        self.due = -math.inf
+        self.ask_again()
         if self._driver and (lasting or self._patience(self._driver) >= 0):
             self._drive(None)
 
     def _drive(self, driver: Driver | None) -> None:
-        self._driver, self.due = driver, -math.inf
+        self._driver = driver
+        self.ask_again()
+
+    def ask_again(self) -> None:
+        """An event may have changed the motion."""
+        self.due = -math.inf
+        self.changed()
 
     def stop(self, by: str, now: float) -> None:
         """Set the software stop: no source drives until it is released, and no autopilot before `resume`."""

@@ -90,6 +90,7 @@ class Bus(Node):
         if self.member and is_command(key, (kind,)):
             sign = partial(self.member.attachment, key, priority)
         writer: Publisher[M] = Publisher(publisher, wire or self.wire, self.stamp, number, watch, sign)
+        writer.queued = self._queued
         self._answer_gets(writer, key)
         self.define(kind)
         # Last, so that nodes that discover it can query it at once.
@@ -126,6 +127,17 @@ class Bus(Node):
             # never undeclared: senders may still use its number.
             self._known[key] = self.session.declare_keyexpr(key)
         return dealer.ring(key, depth)
+
+    @cached_property
+    def _queued(self) -> list[tuple[Publisher[Any], bytes, str | None]]:
+        """The messages that `send_queued` sends."""
+        return []
+
+    def send_queued(self) -> None:
+        """Send what publishers have queued."""
+        for publisher, payload, encoding in self._queued:
+            publisher.put_bytes(payload, encoding)
+        self._queued.clear()
 
     def _answer_gets(self, writer: Publisher[Any], key: str) -> None:
         """Robots share a thread: that of `Fred/odom` answers on `*/odom`."""

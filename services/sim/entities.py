@@ -23,6 +23,7 @@ from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Endpoint, on_key
 from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name
 
+from .agenda import Agenda
 from .cameras import Cameras
 from .io.sensor_topics import LinkStates, Surroundings
 from .link_states import LinkState, link_tree
@@ -85,6 +86,7 @@ class Entities:
         self._stops: StopFiles | None = None
         self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
         self.robots: list[Robot] = []
+        self.agenda = Agenda()
         self._rays: RayCaster | None = None  # made when the first sensor looks
         self._traced: dict[str, int] = {}  # number of the entity of that name
         self._cameras = cameras
@@ -154,9 +156,9 @@ class Entities:
             self._keys |= dict.fromkeys(keys_of(model, prefix), name)
             self._remember(_place_of(model, prefix), entity.robot)
             self.robots.append(entity.robot)
+            entity.robot.attend(self.agenda)
             self.commands.add(entity.robot.command_readers)
             self.requests.add(entity.robot.request_readers)
-            entity.robot.publish_status(time.monotonic())  # who knew one of that name sees a new one
         return entity
 
     def put(self, name: str, place: Place, linear: XYZ, angular: XYZ) -> None:

@@ -41,7 +41,7 @@ class Loop:
         self, bus: Bus, world: World, entities: Entities, rtf: float, services: EntityServices | None = None,
         is_clock: bool = True,
     ) -> None:  # fmt: skip
-        self._world, self._entities, self._robots = world, entities, entities.robots
+        self._bus, self._world, self._entities, self._robots = bus, world, entities, entities.robots
         self.pace = Pace(world.spec.step, rtf, time.monotonic())
         self.answers = [services.answer] if services else []  # called between steps
         self._served = self.polled = 0.0
@@ -51,7 +51,7 @@ class Loop:
         self._status: Publisher[SimulationStatus] | None = None
         if is_clock:
             self._status = bus.publisher("simulation_status", SimulationStatus)
-        self._status_at = self._told_at = self._shown_at = self._reported_at = -math.inf
+        self._status_at = self._shown_at = self._reported_at = -math.inf
         self._reported = 0  # overruns
         self._marks: deque[tuple[float, float]] = deque()  # real and sim time of past statuses
         self.simulation = Simulation(world, entities, self.pace, self.publish_all)
@@ -96,6 +96,7 @@ class Loop:
                 robot.publish(self._world.time, self._world.spec.step, at_once=True)
             except FAULTS as error:
                 self._entities.fail(robot, error)
+        self._bus.send_queued()
         if self._clock:
             self._clock.put(Clock(Time.of(self._world.time)))
         self._publish_status(time.monotonic())
@@ -130,10 +131,10 @@ class Loop:
         since = self._reads.since(now)
         moment = Moment(now, since, (time.time(), self._world.time))
         self._entities.commands.read(moment)
-        if now >= self._told_at:
-            for robot in self._robots:
-                robot.publish_status(now)
-            self._told_at = now + 1 / STATUS_RATE
+        statuses = self._entities.agenda.statuses
+        for robot in statuses.due(now):
+            robot.publish_status(now)
+            statuses.set(robot, now + 1 / STATUS_RATE)
         self._entities.watch_senders(moment)  # after their last commands were read
         if is_asked or now - self.polled >= POLL:
             self._entities.requests.read(moment._replace(since=min(since, self.polled or since)))
@@ -146,25 +147,27 @@ class Loop:
         self._reads_at = now + READ_EVERY
 
     def _step(self, now: float) -> None:
-        world, dt = self._world, self._world.spec.step
+        world, dt, agenda = self._world, self._world.spec.step, self._entities.agenda
         failed: dict[Robot, Exception] = {}
-        for robot in self._robots:
-            if now > robot.arbiter.due or not robot.body.glides:  # else it continues as last commanded
-                try:
-                    robot.move(now, dt)
-                except FAULTS as error:
-                    failed[robot] = error
+        agenda.restless.update(dict.fromkeys(agenda.moves.due(now)))
+        for robot in list(agenda.restless):
+            try:
+                robot.move(now, dt)
+            except FAULTS as error:
+                failed[robot] = error
+            if robot.body.glides and robot.arbiter.due > now:  # it continues as commanded
+                del agenda.restless[robot]
+                agenda.moves.set(robot, robot.arbiter.due)
         try:
             world.step()
         except FAULTS as error:
             self._entities.remove_lost(error)
-        sim_time = world.time
-        for robot in self._robots:
-            if sim_time >= robot.publishes_at:
-                try:
-                    robot.publish(sim_time, dt)
-                except FAULTS as error:
-                    failed[robot] = error
+        for robot in agenda.publishes.due(world.time):
+            try:
+                robot.publish(world.time, dt)
+            except FAULTS as error:
+                failed[robot] = error
+        self._bus.send_queued()
         for robot, why in failed.items():
             if robot in self._robots:
                 self._entities.fail(robot, why)

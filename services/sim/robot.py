@@ -18,6 +18,7 @@ from holozen.suggest import listed
 from holozen.transport.pubsub import Publisher
 from holozen.wire import COMMAND_SILENCE, key_for
 
+from .agenda import Agenda
 from .io.sensor_topics import LinkStates, SensorTopics, Step, Surroundings
 from .io.topics import JOINT_RATE, NONE, DriveTopics, ForceTopics, JointTopics, Schedule
 from .link_states import LinkState, link_tree
@@ -43,11 +44,13 @@ class Robot:
         keep_stop: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
+        self._agenda = Agenda()  # which nobody reads, until `attend`
         self._embody(mover)
         drive = model.drive
         command = command_key(model, prefix)
         namespace = command.rpartition("/")[0]  # a namespace in the robot's file serves as a name
         self.arbiter = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE, time)
+        self.arbiter.changed = self._be_restless
         self.joint_arbiter = Arbiter(COMMAND_SILENCE, time)
         self._spare = Arbiter(COMMAND_SILENCE, time)
         # Where forces alone move a robot, a stop on cmd_vel ends them. Elsewhere they disturb one that drives.
@@ -75,9 +78,16 @@ class Robot:
         self._odom_due = Schedule(drive.odometry_rate if drive else 0.0, phase)
         self._joints_due = Schedule(JOINT_RATE, phase)
         self._joints_at = -math.inf  # s of sim time until when no readers of the joints are looked for
-        self.publishes_at = -math.inf  # s of sim time from when on `publish` has something to do
         self._sensors: SensorTopics | None = None
         self._tree = link_tree(model)
+
+    def attend(self, agenda: Agenda) -> None:
+        """Tell an agenda when it has to be moved and to publish: all at once."""
+        self._agenda.forget(self)
+        self._agenda = agenda
+        self._be_restless()
+        agenda.publishes.set(self, -math.inf)
+        agenda.statuses.set(self, -math.inf)
 
     def sense(self, bus: Bus, name: str, around: Surroundings, phase: float) -> None:
         """Publish what its sensors measure in a world."""
@@ -132,17 +142,23 @@ class Robot:
 
     def _embody(self, mover: Mover) -> None:
         self.mover, self.body = mover, mover.body
+        self.body.woken = self._be_restless
+        self._be_restless()
         self._wheels, self._others = _motors(mover, self._model)
         self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
         brakes = None if self.drives else self._others
         forces = _forces(self._model, self.prefix)
         self._forces = Forces(self._jointed, forces, self._model, brakes) if self._jointed and forces else None
 
+    def _be_restless(self) -> None:
+        self._agenda.restless[self] = None
+
     def start_anew(self) -> None:
         """The world was reset: only a new command moves it, and what it publishes is due at once."""
         for arbiter in self.memory:
             arbiter.start_anew()
-        self.publishes_at = self._joints_at = -math.inf
+        self._joints_at = -math.inf
+        self._agenda.publishes.set(self, -math.inf)
         if self._sensors:
             self._sensors.start_anew()
 
@@ -215,10 +231,11 @@ class Robot:
     def set_odometry_rate(self, rate: float) -> None:
         """Set the rate of odometry in Hz of sim time."""
         self._odom_due.set_rate(rate)
-        self.publishes_at = self._joints_at = -math.inf
+        self._joints_at = -math.inf
+        self._agenda.publishes.set(self, -math.inf)
 
     def publish(self, time: float, dt: float, at_once: bool = False) -> None:
-        """Publish what is due at the sim time `time`, after a step of `dt` seconds, or `at_once`, and wanted."""
+        """Queue what is due at the sim time `time`, after a step of `dt` seconds, or `at_once`, and wanted."""
         drive = self._drive if self._odom_due.due(time) or at_once else None
         wanted = drive.wanted if drive else NONE
         joints = None
@@ -226,11 +243,12 @@ class Robot:
             joints = self._joints if self._joints_due.due(time) or at_once else None
             if joints and not joints.wanted:
                 joints, self._joints_at = None, min(self._odom_due.next, time + IDLE)
-        self.publishes_at = min(self._odom_due.next, max(self._joints_due.next, self._joints_at))
+        next_at = min(self._odom_due.next, max(self._joints_due.next, self._joints_at))
         if self._sensors:
             if time >= self._sensors.next and not at_once:  # while time does not pass there is nothing new to see
                 self._sensors.publish(Step(time, round(time / dt)), self.link_states)
-            self.publishes_at = min(self.publishes_at, self._sensors.next)
+            next_at = min(next_at, self._sensors.next)
+        self._agenda.publishes.set(self, next_at)
         if self.body.glides and not joints and wanted == NONE:
             return  # else encoders, and the wheels for the eye, count on observers
         stamp, moved = Time.of(time), self.mover.moved(time, dt)
@@ -243,6 +261,7 @@ class Robot:
 
     def close(self) -> None:
         """Close its keys."""
+        self.attend(Agenda())
         if self._drive:
             self._drive.close()
         self._joints.close()

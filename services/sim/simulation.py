@@ -69,7 +69,7 @@ class Simulation:
         self._entities.command_time.hold(now)
         for robot in self._entities.robots:
             for arbiter in robot.memory:
-                arbiter.due = -1.0  # a time of before
+                arbiter.ask_again()
 
     def step(self, count: int, done: Callable[[str], None]) -> None:
         """Make steps, and then call `done`. Raises EntityError."""

@@ -75,10 +75,10 @@ class JointTopics:
         """Publish the joints' positions, rates and efforts, and the transforms of the links, if anyone wants them."""
         positions, rates, efforts = states
         if self._states.wanted:
-            self._states.put(JointState(Header(stamp), self.names, positions, rates, efforts))
+            self._states.queue(JointState(Header(stamp), self.names, positions, rates, efforts))
         if self._tf.wanted:
             transforms = self._frames.transforms(stamp, dict(zip(self.names, positions, strict=True)))
-            self._tf.put(TFMessage(transforms))
+            self._tf.queue(TFMessage(transforms))
 
     def close(self) -> None:
         """Close the keys."""
@@ -253,9 +253,9 @@ class DriveTopics:
         position, rotation, velocity = self._measured(stamp, moved)
         header = Header(stamp, self._frame)
         if wanted[0]:
-            self._odom.put(odometry(header, self._base, position, rotation, velocity, self._variances))
+            self._odom.queue(odometry(header, self._base, position, rotation, velocity, self._variances))
         if wanted[1]:
-            self._tf.put(TFMessage([transform(header, self._base, position, rotation)]))
+            self._tf.queue(TFMessage([transform(header, self._base, position, rotation)]))
 
     def _measured(self, stamp: Time, moved: Moved) -> Moved:
         """The pose since the start and with noise, as the file says. The noise of a time is the same whoever reads, and

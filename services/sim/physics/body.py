@@ -1,5 +1,7 @@
 """A body in the engine: its pose and velocity, and how it is placed or removed."""
 
+from collections.abc import Callable
+
 from holozen.kinematics import to_body
 from holozen.limits import Planar
 from holozen.rotation import XYZ, XYZW, rotate, yaw
@@ -19,6 +21,7 @@ class Body:
     def __init__(self, engine: Engine, number: int, centre: XYZ) -> None:
         self._engine, self.number, self._centre = engine, number, centre
         self.is_removed = False
+        self.woken: Callable[[], None] = lambda: None  # called when it glides no longer
         self.glides = False  # whether it keeps the velocity that was set, without being set again at each step
 
     def pose(self) -> tuple[XYZ, XYZW]:

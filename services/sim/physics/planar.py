@@ -259,6 +259,7 @@ class PlanarBody(Body):
         (position, rotation), (linear, angular) = self.pose(), self.twist()
         self._glide, self.glides = None, False
         self._field.gliding -= 1
+        self.woken()
         if self.looks_at > self._field.steps + LOOK:
             self._field.let_look(self, LOOK)
         self._engine.thaw(self.number)
