@@ -38,7 +38,7 @@ MAX_ENTITIES = 1000  # each takes time at every step
 MAX_REASON = 300  # characters
 GRAPH_SCAN = 0.02  # s between two scans of all tokens for the senders of commands
 MAX_DISTANCE = 1e4  # m from the origin; far beyond, the engine's numbers are too coarse for contacts
-SPREAD = 0.618  # of a period between the telemetry of a robot and that of the next; the golden ratio spreads any number
+BURSTS = 4  # in a period, in which the robots' telemetry is sent: Zenoh takes less time for many messages at once
 KEYS = {"clock", "simulation_status"}  # of the sim itself
 Place = tuple[XYZ, XYZW]
 
@@ -130,7 +130,7 @@ class Entities:
             self._check_unique(name, prefix, model)
             entity = Entity(name, model, mover.body, place, prefix=prefix)
             if model.drive or mover.names or model.sensors:
-                phase = len(self.robots) * SPREAD % 1.0
+                phase = len(self.robots) % BURSTS / BURSTS
                 entity.robot = Robot(
                     self._bus,
                     name,

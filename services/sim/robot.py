@@ -25,7 +25,7 @@ from .link_states import LinkState, link_tree
 from .physics.jointed import Forces, JointedBody, Motors
 from .physics.movers import Mover
 
-IDLE = 0.2  # s of sim time between two looks for readers of the joints, while there are none
+IDLE = 0.1  # s of sim time between two looks for readers of the joints, while there are none
 
 Memory = tuple[Arbiter, Arbiter, Arbiter]
 NO_DRIVE = "no drive: this robot is moved by forces, on {keys}"
@@ -242,7 +242,7 @@ class Robot:
         if time >= self._joints_at or at_once:
             joints = self._joints if self._joints_due.due(time) or at_once else None
             if joints and not joints.wanted:
-                joints, self._joints_at = None, min(self._odom_due.next, time + IDLE)
+                joints, self._joints_at = None, time + IDLE
         next_at = min(self._odom_due.next, max(self._joints_due.next, self._joints_at))
         if self._sensors:
             if time >= self._sensors.next and not at_once:  # while time does not pass there is nothing new to see

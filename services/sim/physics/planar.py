@@ -133,14 +133,20 @@ class Glide:
     position: XYZ
     rotation: XYZW
     velocity: Planar
+    heading: float  # rad, at the start
+
+    def at(self, time: float) -> XYZ:
+        """The position of the root frame; its height stays as it is."""
+        x, y, z = self.position
+        dx, dy = travelled(self.velocity, self.heading, time - self.start)
+        return x + dx, y + dy, z
 
     def pose(self, time: float) -> tuple[XYZ, XYZW]:
-        """The pose of the root frame; its height and tilt stay as they are."""
-        seconds, (x, y, z), (i, j, k, w) = time - self.start, self.position, self.rotation
-        dx, dy = travelled(self.velocity, yaw(self.rotation), seconds)
-        half = self.velocity[2] * seconds / 2
+        """The pose of the root frame; its tilt stays as it is."""
+        i, j, k, w = self.rotation
+        half = self.velocity[2] * (time - self.start) / 2
         c, s = math.cos(half), math.sin(half)
-        return (x + dx, y + dy, z), (c * i - s * j, c * j + s * i, c * k + s * w, c * w - s * k)
+        return self.at(time), (c * i - s * j, c * j + s * i, c * k + s * w, c * w - s * k)
 
 
 class PlanarBody(Body):
@@ -215,8 +221,8 @@ class PlanarBody(Body):
         """
         field, other = self._field, self._field.bodies.get(number)
         way = max(field.closing(self.speed) * field.step, 1e-9)  # in a step
-        if other and other.glides:
-            apart = math.dist(here, other.pose()[0]) - self._reach - other._reach
+        if other and other._glide:
+            apart = math.dist(here, other._glide.at(field.time)) - self._reach - other._reach
             if (steps := _within(apart - SKIN, way)) >= LOOK:
                 return steps
             other.locate()
@@ -248,9 +254,14 @@ class PlanarBody(Body):
 
     def _glide_on(self) -> None:
         """Glide from here at the drive's velocity; the engine keeps a body that neither moves nor touches anything."""
-        self._glide, self.glides = Glide(self._field.time, *self.pose(), self._commanded), True
+        self._glide_from(self._commanded)
+        self.glides = True
         self._field.gliding += 1
         self._engine.freeze(self.number)
+
+    def _glide_from(self, velocity: Planar) -> None:
+        position, rotation = self.pose()
+        self._glide = Glide(self._field.time, position, rotation, velocity, yaw(rotation))
 
     def wake(self) -> None:
         """Return to the engine, where it is and as it moves; from the next step on it has contacts again."""
@@ -287,7 +298,7 @@ class PlanarBody(Body):
                 self.speed = speed
                 self._look_after(self._clear())
             if self._glide:
-                self._glide = Glide(self._field.time, *self.pose(), velocity)
+                self._glide_from(velocity)
         if not self._glide:
             self._drive(velocity, dt)
 

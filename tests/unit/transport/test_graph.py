@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.transport import graph
-from holozen.transport.graph import ALL, MAX_GONE, Endpoint, Graph, includes, on_key, parse, token
+from holozen.transport.graph import ALL, MAX_GONE, Endpoint, Graph, includes, on_key, parse, subscribers, token
 
 chunks = st.text("ab%*$2A4.-_é", min_size=1, max_size=6).filter(lambda chunk: "*" not in chunk and "$" not in chunk)
 wild = chunks | st.sampled_from(["*", "**", "a$*b", "%2A", "%24", "%25"])
@@ -63,6 +63,14 @@ def test_a_token_of_an_unknown_kind_is_none() -> None:
     assert parse("@holozen/a1/sim") is None
     assert parse("@holozen/a1/sim/pub/nav_msgs/msg/Odometry") is None
     assert parse(token(ODOM).removeprefix("@")) is None
+
+
+def test_where_one_robot_listens_a_match_of_another_name_counts_no_subscriber() -> None:
+    fred = Endpoint("Fred/cmd_vel", "sub", "geometry_msgs/msg/Twist", "sim", "b2")
+    assert subscribers([fred], "Ghost/cmd_vel", matched=True) == 0
+    assert subscribers([], "Ghost/cmd_vel", matched=True) == 1, "a foreign node"
+    assert subscribers([fred], "cmd_vel", matched=True) == 1
+    assert subscribers([fred], "Fred/cmd_vel", matched=False) == 1
 
 
 @given(st.lists(st.sampled_from(["a", "b", "ab", "*", "**"]), min_size=1, max_size=5),
