@@ -319,6 +319,14 @@ def test_a_flood_of_commands_at_one_robot_pushes_out_no_stop_of_another(clock: l
     assert sim.arbiter.motion(clock[0]) == STOP
 
 
+def test_a_drive_brakes_a_robot_that_glided_and_is_set_in_motion(sim: Sim) -> None:
+    sim.run(240)
+    assert sim.robot.body.glides
+    sim.entities.put("Fred", ((0, 0, -0.04), UPRIGHT), (2.0, 0, 0), (0, 0, 0))
+    sim.run(60)
+    assert sim.robot.body.pose()[0][0] < 0.1
+
+
 def test_the_first_and_the_300th_robot_stand_when_their_drivers_fall_silent_and_when_they_are_stopped(
     clock: list[float], sim: Sim, wire: Wire
 ) -> None:
