@@ -2,28 +2,28 @@
 
 import heapq
 import math
+from collections.abc import Hashable
 from itertools import count
-from typing import TYPE_CHECKING
+from typing import Generic, TypeVar
 
-if TYPE_CHECKING:
-    from .robot import Robot
+R = TypeVar("R", bound=Hashable)  # a robot
 
 
-class Times:
+class Times(Generic[R]):
     """When each robot is due: at the time that was set last."""
 
     def __init__(self) -> None:
-        self._at: dict[Robot, float] = {}
-        self._all: list[tuple[float, int, Robot]] = []  # a heap, also of times that have been replaced
+        self._at: dict[R, float] = {}
+        self._all: list[tuple[float, int, R]] = []  # a heap, also of times that have been replaced
         self._count = count()
 
-    def set(self, robot: "Robot", at: float) -> None:
+    def set(self, robot: R, at: float) -> None:
         """It is due at `at`, in s."""
         self._at[robot] = at
         if at < math.inf:
             heapq.heappush(self._all, (at, next(self._count), robot))
 
-    def due(self, now: float) -> list["Robot"]:
+    def due(self, now: float) -> list[R]:
         """The robots that are due by `now`, the earliest first. They are not due again until that is set."""
         found = []
         while self._all and self._all[0][0] <= now:
@@ -33,23 +33,25 @@ class Times:
                 found.append(robot)
         return found
 
-    def forget(self, robot: "Robot") -> None:
+    def forget(self, robot: R) -> None:
         """It is never due."""
         self._at.pop(robot, None)
         self._all = [one for one in self._all if one[2] is not robot]
         heapq.heapify(self._all)
 
 
-class Agenda:
+class Agenda(Generic[R]):
     """Who is `restless`: has to be moved at each step. The others go on as they were commanded until a time, which is
     real and in `moves`, as are those of `statuses`. Those in `publishes` are sim times.
     """
 
     def __init__(self) -> None:
-        self.restless: dict[Robot, None] = {}
-        self.moves, self.publishes, self.statuses = Times(), Times(), Times()
+        self.restless: dict[R, None] = {}
+        self.moves: Times[R] = Times()
+        self.publishes: Times[R] = Times()
+        self.statuses: Times[R] = Times()
 
-    def forget(self, robot: "Robot") -> None:
+    def forget(self, robot: R) -> None:
         """It was removed."""
         self.restless.pop(robot, None)
         self.moves.forget(robot)

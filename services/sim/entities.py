@@ -86,7 +86,7 @@ class Entities:
         self._stops: StopFiles | None = None
         self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
         self.robots: list[Robot] = []
-        self.agenda = Agenda()
+        self.agenda: Agenda[Robot] = Agenda()
         self._rays: RayCaster | None = None  # made when the first sensor looks
         self._traced: dict[str, int] = {}  # number of the entity of that name
         self._cameras = cameras

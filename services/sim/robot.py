@@ -44,7 +44,7 @@ class Robot:
         keep_stop: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
-        self._agenda = Agenda()  # which nobody reads, until `attend`
+        self._agenda: Agenda[Robot] = Agenda()  # which nobody reads, until `attend`
         self._embody(mover)
         drive = model.drive
         command = command_key(model, prefix)
@@ -81,7 +81,7 @@ class Robot:
         self._sensors: SensorTopics | None = None
         self._tree = link_tree(model)
 
-    def attend(self, agenda: Agenda) -> None:
+    def attend(self, agenda: "Agenda[Robot]") -> None:
         """Tell an agenda when it has to be moved and to publish: all at once."""
         self._agenda.forget(self)
         self._agenda = agenda
