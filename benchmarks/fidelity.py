@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from benchmarks.report import parser
+from holozen.flags import ENGINES
 from holozen.kinematics import travelled
 from holozen.limits import STOP, Planar
 from holozen.plotting import Plane, Robot, draw
@@ -24,7 +25,6 @@ from holozen.robot.model import Link, RobotModel, Shape, WorldSpec, driven
 from holozen.robot.model import Pose as Place
 from holozen.robot.rigid import lowest
 from holozen.rotation import conjugate, from_rpy, multiply, rotate, yaw
-from services.sim.__main__ import ENGINES
 from services.sim.physics.movers import mover_for
 from services.sim.physics.world import World
 

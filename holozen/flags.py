@@ -16,6 +16,8 @@ if TYPE_CHECKING:
 
 DRIVES = ("planar_move", "omni")
 DRIVE = "planar_move for a robot whose file has no drive; omni: on its own wheels, instead of planar_move"
+ENGINES = ("pybullet", "mujoco")
+ENGINE = f"the physics engine (default: {ENGINES[0]})"
 WIDTH = 100  # characters of a line of help where there is no terminal
 
 

@@ -74,7 +74,7 @@ def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]
             parser = command(verb).parser()
             parser.prog = f"holozen {args.verb}"
             parser.parse_args(words)
-    sim = [*robot, *sources, *pace, *_flags(args, "world", "drive"), *_state(args.state)]
+    sim = [*robot, *sources, *pace, *_flags(args, "world", "drive", "engine"), *_state(args.state)]
     shards = [f"{shard}/{args.shards}" for shard in range(1, args.shards + 1)]
     parts = {f"sim {shard}": [*sim, "--shard", shard] for shard in shards} if args.shards > 1 else {"sim": sim}
     driven = args.shards == 1 or args.robot  # else there is no robot yet
@@ -264,6 +264,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--world", type=flags.file, metavar="FILE", help="an SDF file (default: gazebo.world)")
     add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
+    add("--engine", choices=flags.ENGINES, help=flags.ENGINE)
     flags.add_robot_sources(parser)
     add("--shape", metavar="SHAPE",
         help="of the goals: square, triangle, rectangle, infinity or hexagon (default: square)")  # fmt: skip

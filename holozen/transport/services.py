@@ -28,14 +28,12 @@ if TYPE_CHECKING:
 R = TypeVar("R", bound="Message")
 
 FIRST_PAUSE, LONGEST_PAUSE = 0.001, 0.02  # s before a retry
-RING = 4096  # requests in Zenoh's ring; beyond, the oldest get no reply
+RING = 2048  # requests in Zenoh's ring, of some 770 bytes each; beyond, the oldest get no reply
 ROOM = 1000  # waiting requests of one service, by default
 BATCH = 200  # requests read at once; to refuse as many takes 5 ms
 BUDGET = 0.002  # s for replies per poll of a thread with other work
-KEPT, KEPT_BYTES = (
-    256,
-    4096,
-)  # replies that are kept, and the largest; those that are larger are of requests that only read
+KEPT = 256  # replies that are kept
+KEPT_BYTES = 4096  # the largest of them; those that are larger are of requests that only read
 MAX_REQUEST_BYTES = 5_000_000  # a robot's URDF has at most 4 MB; larger ones are refused unread
 
 

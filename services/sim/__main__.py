@@ -27,7 +27,6 @@ if TYPE_CHECKING:
     from .entities import Entities
 
 
-ENGINES = ("pybullet", "mujoco")
 HOW = "holozen sim --join --robot FILE=NAME"
 JOIN = f"end it, or join it with named robots: {HOW}"
 
@@ -51,7 +50,7 @@ def parser() -> argparse.ArgumentParser:
     add("--state", type=Path, metavar="DIR",
         help="keep software stops in files there, for the next sim (default: HOLOZEN_STATE, else none)")  # fmt: skip
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
-    add("--engine", choices=ENGINES, default=ENGINES[0], help="the physics engine (default: %(default)s)")
+    add("--engine", choices=flags.ENGINES, default=flags.ENGINES[0], help=flags.ENGINE)
     flags.add_robot_sources(parser)
     add(
         "--rtf",

@@ -171,9 +171,8 @@ class Soak:
         self._spawn(self.random.choice(unused))
 
     def _spawn(self, name: str) -> None:
-        x, y = (self.random.uniform(20, 60) for _ in "xy")
         request = si.SpawnEntityRequest(name, resource_string=BOT)
-        request.initial_pose.pose.position.x, request.initial_pose.pose.position.y = x, y
+        request.initial_pose.pose.position.x = 20.0 + 5.0 * NAMES.index(name)
         self._bus.call("spawn_entity", request, si.SpawnEntityReply, 20.0)
         self.names.append(name)
         self.spawned += 1

@@ -13,6 +13,7 @@ import pytest
 from holozen import entities
 from holozen.bus import Bus
 from holozen.data import find
+from holozen.flags import ENGINES
 from holozen.messages import (
     Clock,
     CommandStatus,
@@ -36,7 +37,6 @@ from holozen.messages.simulation_interfaces import SimulationState as State
 from holozen.testing import LockStep, Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Subscription
-from services.sim.__main__ import ENGINES
 
 Sim = Callable[..., LockStep]
 LIBRARIES = {"pybullet": "/pybullet.", "mujoco": "/libmujoco."}  # files of the engines

@@ -8,11 +8,11 @@ from typing import Any
 import pytest
 
 from holozen import entities
+from holozen.flags import ENGINES
 from holozen.messages import ContactsState, Imu, LaserScan, Message, Odometry, PointCloud2, Pose, Quaternion, Range
 from holozen.messages.geometry_msgs import Point
 from holozen.messages.simulation_interfaces import ResetSimulationRequest as Scope
 from holozen.testing import LockStep, Wire
-from services.sim.__main__ import ENGINES
 
 Sim = Callable[..., LockStep]
 HEIGHT = 0.5  # m; of the lidar above the root

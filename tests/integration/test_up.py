@@ -166,9 +166,10 @@ def test_a_wrong_flag_is_one_line_and_nothing_starts(wire: Wire, words: list[str
     assert_one_line(wire.run("up", *words), 2, "holozen up: ", reason)
 
 
-def test_a_robot_with_a_name_is_driven_by_that_name(wire: Wire) -> None:
-    wire.start("up", "--robot", f"{data.find('urdf', 'hb_bot.urdf.xacro')}=Fred")
+def test_a_robot_with_a_name_is_driven_by_that_name_in_the_engine_of_ones_choice(wire: Wire) -> None:
+    wire.start("up", "--robot", f"{data.find('urdf', 'hb_bot.urdf.xacro')}=Fred", "--engine", "mujoco")
     driven(Robot(wire.bus(), "Fred"))
+    assert "mujoco" in Path(f"/proc/{parts_at(wire)['sim']}/maps").read_text()
 
 
 def test_a_killed_sim_is_reported_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:

@@ -5,7 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from services.sim.__main__ import ENGINES
+from holozen.flags import ENGINES
 
 ROOT = Path(__file__).resolve().parents[2]
 CASES = {

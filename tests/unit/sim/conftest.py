@@ -9,8 +9,8 @@ from contextlib import closing
 
 import pytest
 
+from holozen.flags import ENGINES
 from holozen.robot.model import WorldSpec
-from services.sim.__main__ import ENGINES
 from services.sim.physics.world import World
 
 
