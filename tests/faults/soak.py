@@ -33,7 +33,7 @@ from .proxy import Proxy
 
 HERE = Path(__file__).parent
 EVERY = 5.0  # s between two figures
-BURST = 20  # robots that come and go in a row
+BURST = 40  # robots that come and go in a row
 NAMES = [f"bot{number}" for number in range(8)]
 """Of spawned robots. Few, since Zenoh keeps each key that it has told over a link until that link ends."""
 BEFORE, AFTER = 2.0, 0.2  # s around a violation that are printed

@@ -21,7 +21,7 @@ ORDERS = [
     ("pose-service", "controller", "sim"),
     ("controller", "sim", "pose-service"),
 ]
-FAST = ("--rtf", "4")  # at 8, a stop that a busy machine delays by 6 ms turned the robot too far
+FAST = ("--rtf", "2")  # faster, a stop that a busy machine delays by some ms turns the robot too far
 GOALS = ("--size", "0.5")
 
 

@@ -123,6 +123,7 @@ def test_two_sims_on_one_key_are_reported_with_their_processes(wire: Wire) -> No
 
 def test_odom_that_does_not_come_is_stale(wire: Wire, door: Bus) -> None:
     publisher = wire.bus("sim").publisher("Fred/odom", Odometry)
+    wait_for(lambda: bad(doctor(wire)[1], "odom"))  # a busy machine shows a topic late
     code, rows = doctor(wire)
     (text,) = bad(rows, "odom")
     assert re.match(r"error: Fred/odom is stale: nothing from sim for \d+\.\d s", text)
