@@ -2,6 +2,8 @@
 
 from typing import Any
 
+import zenoh
+
 from holozen.bus import Bus
 from holozen.command.wait_set import Moment, Reader, WaitSet
 from holozen.messages import TriggerReply, TriggerRequest, Twist
@@ -44,12 +46,18 @@ class Heard:
 def test_each_hears_its_own_key_the_newest_of_a_flood_and_what_is_for_all(wire: Wire) -> None:
     heard, sender = Heard(wire.bus("sim"), "Fred", "Ann"), wire.bus("sender")
     keys = {name: sender.publisher(f"{name}/cmd_vel", Twist) for name in ("Fred", "Ann", "Ghost")}
-    wait_for(lambda: keys["Ann"].matched and keys["Ghost"].matched)
-    keys["Ann"].put(Twist.planar(1.0))
+    wait_for(lambda: keys["Fred"].matched and keys["Ann"].matched and keys["Ghost"].matched)
+
+    def put(name: str, value: int) -> None:
+        """However full the link is."""
+        payload = b'{"linear": {"x": %d}}' % value
+        sender.session.put(f"{name}/cmd_vel", payload, congestion_control=zenoh.CongestionControl.BLOCK)
+
+    put("Ann", 1)
     for value in range(100):
-        keys["Fred"].put(Twist.planar(value))
-        keys["Ghost"].put(Twist.planar(value))
-    sender.session.put("*/cmd_vel", b"{}")
+        put("Fred", value)
+        put("Ghost", value)
+    put("*", 0)
     wait_for(lambda: heard.has("Ann", 1.0, 0.0))
     assert heard.all["Fred"][-4:] == [97.0, 98.0, 99.0, 0.0]
 
