@@ -53,6 +53,8 @@ class Parser(argparse.ArgumentParser):
         before, _, left = message.partition("unrecognized arguments: ")
         if left and not before:
             message = f"unexpected argument {left!r}"
+            if "--robot" in self._option_string_actions and not left.startswith("-"):
+                message += "; a robot's file goes after --robot"
         if not verbs and (flag := self._unknown_flag(message, [] if before else left.split())):
             message = f"no flag {flag!r}{suggest(flag, self._option_string_actions)}"
         report(f"{self.prog}: {message}; see `{self.prog} --help`")

@@ -28,7 +28,11 @@ def suggest(word: str, known: Iterable[str], part: Callable[[str], str] = str, a
                 found = max(found, share * matcher.ratio())
         return found
 
-    best = max(islice(known, MOST), key=likeness, default="")
+    def rank(name: str) -> tuple[float, bool]:
+        """Of equals, the one with the same letters: two were swapped."""
+        return likeness(name), sorted(part(name).casefold()) == sorted(plain)
+
+    best = max(islice(known, MOST), key=rank, default="")
     return f" (did you mean {shorten(best)!r}?)" if best and likeness(best) > alike else ""
 
 

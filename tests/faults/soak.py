@@ -172,7 +172,7 @@ class Soak:
 
     def _spawn(self, name: str) -> None:
         request = si.SpawnEntityRequest(name, resource_string=BOT)
-        request.initial_pose.pose.position.x = 20.0 + 5.0 * NAMES.index(name)
+        request.initial_pose.pose.position.x = 500.0 + 5.0 * NAMES.index(name)
         self._bus.call("spawn_entity", request, si.SpawnEntityReply, 20.0)
         self.names.append(name)
         self.spawned += 1

@@ -18,15 +18,8 @@ REPO = Path(__file__).parents[2]
 LASTING = {
     "topic echo": "pose:",
     "topic pub": "subscriber of cmd_vel",
-    "record": "messages,",
-    "plot": "x: ",
-    "map": "hb_bot x",
     "view": "http://127.0.0.1:",
     "teleop": "listening sim",
-    "xacro my_bot.urdf.xacro --watch": "Fred",
-    "sim": "listens on cmd_vel",
-    "run examples/lesson/hb_control/scripts/service_node.py": "the shape is a",
-    "run examples/lesson/hb_control/scripts/controller.py": "goal 1",
     "launch": "goal 1",
 }
 
@@ -93,28 +86,17 @@ def test_what_watches_a_robot_watches_it(wire: Wire) -> None:
     up.wait_for_line("goals")
     wait_for(lambda: "controller" in wire.run("node", "list").stdout, 20)
     for line in commands("Watch it"):
-        if line.startswith("holozen replay"):
-            up.signal(signal.SIGINT)
-            assert up.wait() == 0
-            ends(line)
-            up = wire.start("up")
-            up.wait_for_line("goals")
-            wire.run("topic", "echo", "odom", "--once")
-        else:
-            runs(line)
+        runs(line)
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_robot_of_ones_own_is_checked_spawned_driven_and_deleted(wire: Wire) -> None:
+def test_a_robot_of_ones_own_is_checked_spawned_and_driven(wire: Wire) -> None:
     wire.start("sim", "--empty").wait_for_line("no robot yet")
     for line in commands("Your own robot"):
         runs(line)
-    assert os.path.exists("my_bot.urdf")
 
 
 @pytest.mark.usefixtures("folder")
-def test_scripts_and_launch_files_for_ros_run() -> None:
-    sim, service, controller, launch = commands("Scripts for ROS 2")
-    with begun(sim), begun(service):
-        runs(controller)
-    runs(launch)
+def test_a_launch_file_for_ros_runs() -> None:
+    for line in commands("Scripts for ROS 2"):
+        runs(line)

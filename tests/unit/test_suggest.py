@@ -7,6 +7,7 @@ def test_a_hint_names_what_is_there() -> None:
     assert suggest("whel", ["arm", "wheel"]) == " (did you mean 'wheel'?)"
     assert suggest("arm", ["wheel", "left_arm_link"]) == " (did you mean 'left_arm_link'?)"
     assert suggest("odo", ["cmd_vel", "ODOM"]) == " (did you mean 'ODOM'?)"
+    assert suggest("jLF", ["jBL", "jFL"]) == " (did you mean 'jFL'?)"
     assert suggest("zzz", ["wheel"]) == suggest("zzz", []) == suggest("", ["wheel"]) == ""
 
 

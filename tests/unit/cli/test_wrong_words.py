@@ -17,6 +17,7 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
             "topic list --shwo",
             "holozen topic list: no flag '--shwo' (did you mean '--show-types'?); see `holozen topic list ",
         ),
+        ("sim my.urdf", "holozen sim: unexpected argument 'my.urdf'; a robot's file goes after --robot; "),
         ("topic list odom", "holozen topic list: unexpected argument 'odom'; "),
         (
             "topic list --mode pere",

@@ -1,0 +1,39 @@
+"""The documentation as a site: built strictly, it loads nothing from elsewhere, and its search needs no server."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser
+
+REPO = Path(__file__).parents[2]
+
+pytestmark = pytest.mark.needs("chromium")
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    words = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    done = subprocess.run(words, cwd=REPO, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def test_a_page_from_the_disk_loads_nothing_from_elsewhere_and_finds_words(site: Path, chromium: Browser) -> None:
+    page = chromium.new_page()
+    requests, errors = list[str](), list[str]()
+    page.on("request", lambda request: requests.append(request.url))
+    page.on("console", lambda message: errors.append(f"{message.text} {message.location}"))
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto((site / "index.html").as_uri())
+    page.click("input[name=query]")
+    page.keyboard.type("planar_move")
+    page.wait_for_selector(".md-search-result__item")
+    assert "hb_bot" in page.inner_text(".md-search-result__list")
+    for other in sorted(set(site.rglob("*.html")) - {site / "404.html"}):  # which is for servers
+        page.goto(other.as_uri())
+    assert [url for url in requests if not url.startswith("file:")] == []
+    assert errors == []
+    page.close()

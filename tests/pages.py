@@ -1,0 +1,153 @@
+"""Follows a page of the tutorial: writes its files, runs its commands, and compares what they print.
+
+python -m tests.pages NAME FOLDER
+
+- A code block with the title `FILE` is the file's content. `FILE, before TEXT` and `FILE, after TEXT` insert it before or after the one
+  line of the file that holds TEXT; `FILE, instead of TEXT` replaces that line.
+- A `console` block has commands after `$ `, each followed by what it prints; `...` stands for anything. Without a title each runs
+  to its end, with exit code 0 unless an `error:` is shown. With a title, of a terminal, it goes on until a line `^C`,
+  and the page goes on once it has printed what is shown.
+- `<!-- TERMINAL: hold KEY -->` holds a key there for a second; `<!-- TERMINAL: type KEYS -->` types.
+"""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import partial
+from pathlib import Path
+from typing import NamedTuple, Self
+
+from holozen.testing import Terminal, wait_for
+
+REPO = Path(__file__).parents[1]
+TUTORIAL = REPO / "docs" / "tutorial"
+STEP = re.compile(
+    r'^```(?P<language>\w+)(?: title="(?P<title>[^"]+)")?\n(?P<text>.*?)^```$'
+    r"|^<!-- (?P<terminal>[^:\n]+): (?P<verb>hold|type) (?P<keys>\S+) -->$",
+    re.M | re.S,
+)
+EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<where>.+))?")
+WITHIN = 60.0  # s for a command
+
+
+class Command(NamedTuple):
+    line: str
+    shown: str  # what the page says that it prints
+
+
+def commands(block: str) -> Iterator[Command]:
+    for part in re.split(r"^\$ ", block, flags=re.M):
+        line, _, shown = part.partition("\n")
+        if part:
+            yield Command(line.partition("  #")[0].strip(), shown.strip())
+
+
+def same(shown: str, printed: str) -> bool:
+    """Whether the lines shown are among the lines printed, in this order."""
+    left = iter(plain(printed).replace("\r", "\n").splitlines())
+    return all(any(pattern(line).fullmatch(" ".join(one.split())) for one in left) for line in shown.splitlines())
+
+
+def pattern(line: str) -> re.Pattern[str]:
+    """What a line that is shown stands for: `...` for anything, one space for any number."""
+    return re.compile(".*".join(re.escape(part) for part in " ".join(line.split()).split("...")))
+
+
+class Reader:
+    """Someone who follows a page in an empty folder of a checkout."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.terminals = folder, dict[str, Terminal]()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_error: object) -> None:
+        for terminal in self.terminals.values():
+            terminal.close()
+
+    def follow(self, page: Path) -> int:
+        """Do each step; their number. AssertionError with the step that does not do what the page says."""
+        steps = list(STEP.finditer(page.read_text()))
+        for step in steps:
+            if step["verb"]:
+                self.press(step["terminal"], step["verb"], step["keys"])
+            elif step["language"] == "console" and step["title"]:
+                self.attend(step["title"], step["text"])
+            elif step["language"] == "console":
+                for command in commands(step["text"]):
+                    self.run(command)
+            elif step["title"]:
+                self.write(step["title"], step["text"])
+        return len(steps)
+
+    def write(self, title: str, text: str) -> None:
+        edit = EDIT.fullmatch(title)
+        assert edit, title
+        file = self.folder / edit["file"]
+        if edit["how"]:
+            lines = file.read_text().splitlines(keepends=True)
+            (at,) = (number for number, line in enumerate(lines) if edit["where"] in line)
+            first, last = {"before": (at, at), "after": (at + 1, at + 1), "instead of": (at, at + 1)}[edit["how"]]
+            text = "".join(lines[:first]) + text + "".join(lines[last:])
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(text)
+
+    def run(self, command: Command) -> None:
+        if command.line.startswith("cd "):
+            self.folder = self.folder / command.line.removeprefix("cd ")
+            return
+        done = subprocess.run(
+            ["bash", "-c", command.line], cwd=self.folder, stdin=subprocess.DEVNULL, text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, timeout=WITHIN,
+        )  # fmt: skip
+        wrong = "error" in command.shown
+        assert (done.returncode != 0) == wrong, f"$ {command.line}\n{done.stdout}exit code {done.returncode}"
+        assert same(command.shown, done.stdout), f"$ {command.line}\n{done.stdout}\ninstead of\n{command.shown}"
+
+    def attend(self, name: str, text: str) -> None:
+        for line, shown in commands(text.replace("^C", "$ ^C")):
+            if line == "^C":
+                terminal = self.terminals.pop(name)
+                terminal.process.signal(signal.SIGINT)
+                assert terminal.process.wait() in (0, 130), terminal.raw
+                terminal.close()
+                continue
+            assert name not in self.terminals, f"{name} is busy: $ {line}"
+            here = f"cd '{self.folder}' && exec {line}"
+            terminal = self.terminals[name] = Terminal(["bash", "-c", here], env={"NO_COLOR": "1"})
+            wait_for(partial(has, terminal, shown), WITHIN, lambda shown=shown: shown)
+
+    def press(self, name: str, verb: str, keys: str) -> None:
+        terminal = self.terminals[name]
+        if verb == "hold":
+            terminal.hold(keys, 1.0)
+        else:
+            terminal.type(keys)
+
+
+def has(terminal: Terminal, shown: str) -> bool:
+    """Whether a terminal shows it. AssertionError if its command ended without."""
+    ended = terminal.process.returncode is not None
+    found = same(shown, terminal.raw)
+    assert found or not ended, f"{plain(terminal.raw)}\ninstead of\n{shown}"
+    return found
+
+
+def plain(text: str) -> str:
+    """A terminal's output without control sequences."""
+    return re.sub(r"\x1b(?:\[[0-?]*[ -/]*[@-~]|\][^\x07\x1b]*(?:\x07|\x1b\\)|.)", "", text)
+
+
+def main(name: str, folder: Path) -> None:
+    """Follow a page of the tutorial, in a shell in which .venv is active."""
+    os.environ["PATH"] = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    with Reader(folder) as reader:
+        print(f"{reader.follow(TUTORIAL / f'{name}.md')} steps")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], Path(sys.argv[2]))
