@@ -54,16 +54,16 @@ def on_files(files: Files, config: MkDocsConfig) -> None:
         files.append(File.generated(config, uri, content=(REPO / path).read_text()))
     files.append(File.generated(config, "files/meshes/logo.png", content=(REPO / "meshes/logo.png").read_bytes()))
     for page in list(files.documentation_pages()):
-        for _, path in targets(page.content_string, source(page).parent):
-            uri, file = place(path), REPO / path
+        for _, target in targets(page.content_string, source(page).parent):
+            uri, file = place(target), REPO / target
             if uri.startswith("files/") and not files.get_file_from_path(uri):
                 if not file.is_file():
-                    raise PluginError(f"{source(page)} links to {path}, which is not a file")
+                    raise PluginError(f"{source(page)} links to {target}, which is not a file")
                 if file.suffix == ".png":
                     content: str | bytes = file.read_bytes()
                 else:
                     language = LANGUAGES.get(file.suffix, file.suffix[1:])
-                    content = f"{UNSEARCHED}# {path}\n\n````{language}\n{file.read_text()}````\n"
+                    content = f"{UNSEARCHED}# {target}\n\n````{language}\n{file.read_text()}````\n"
                 files.append(File.generated(config, uri, content=content))
 
 

@@ -2,11 +2,11 @@
 
 python -m tests.pages NAME FOLDER
 
-- A code block with the title `FILE` is the file's content. `FILE, before TEXT` and `FILE, after TEXT` insert it before or after the one
-  line of the file that holds TEXT; `FILE, instead of TEXT` replaces that line.
-- A `console` block has commands after `$ `, each followed by what it prints; `...` stands for anything. Without a title each runs
-  to its end, with exit code 0 unless an `error:` is shown. With a title, of a terminal, it goes on until a line `^C`,
-  and the page goes on once it has printed what is shown.
+- A code block with the title `FILE` is the file's content. `FILE, before TEXT` and `FILE, after TEXT` insert it before
+  or after the one line of the file that holds TEXT; `FILE, instead of TEXT` replaces that line.
+- A `console` block has commands after `$ `, each followed by what it prints; `...` stands for anything. Without a title
+  each runs to its end, with exit code 0 unless an `error:` is shown. With a title, of a terminal, it goes on until a
+  line `^C`, and the page goes on once it has printed what is shown.
 - `<!-- TERMINAL: hold KEY -->` holds a key there for a second; `<!-- TERMINAL: type KEYS -->` types.
 """
 
@@ -119,7 +119,7 @@ class Reader:
             assert name not in self.terminals, f"{name} is busy: $ {line}"
             here = f"cd '{self.folder}' && exec {line}"
             terminal = self.terminals[name] = Terminal(["bash", "-c", here], env={"NO_COLOR": "1"})
-            wait_for(partial(has, terminal, shown), WITHIN, lambda shown=shown: shown)
+            wait_for(partial(has, terminal, shown), WITHIN, f"{name} to show {shown!r}")
 
     def press(self, name: str, verb: str, keys: str) -> None:
         terminal = self.terminals[name]

@@ -1,7 +1,6 @@
 """The commands of the README do what it promises, as they stand there."""
 
 import contextlib
-import os
 import re
 import shlex
 import signal

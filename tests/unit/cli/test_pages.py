@@ -43,7 +43,7 @@ def parse(line: str) -> None:
         parser.parse_intermixed_args(words)
 
 
-def test_the_commands_on_the_pages_are_taken(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_commands_on_pages_are_taken(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(REPO)
     wrong, seen = [], 0
     for page in [REPO / "README.md", *REPO.glob("docs/**/*.md")]:
