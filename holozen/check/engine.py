@@ -36,12 +36,24 @@ class Place:
 
 
 @dataclass(frozen=True, slots=True)
+class Edit:
+    """A correction that needs no judgement. `kind`: the name of an "element" or an "attribute" is `new` instead of
+    `old`; or `new` is the <inertia> of a link, instead of the `old` one or, if that is empty, beside the mass.
+    """
+
+    kind: Literal["element", "attribute", "inertia"]
+    old: str
+    new: str
+
+
+@dataclass(frozen=True, slots=True)
 class Mistake:
     """A finding of a rule: at an element, at a place, or (None) in the file as a whole."""
 
     at: Tag | Place | None
     problem: str
     fix: str
+    edit: Edit | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,6 +87,7 @@ class Finding:
     problem: str
     why: str
     fix: str
+    edit: Edit | None = None
 
     def __str__(self) -> str:
         return f"{self.place}: {self.severity}: {self.problem} [{self.rule}]\n    {self.why}; {self.fix}"

@@ -5,6 +5,8 @@ from collections.abc import Collection, Iterable, Mapping
 from functools import partial
 from itertools import islice
 from pathlib import Path
+from textwrap import indent
+from urllib.parse import quote
 
 from holozen.check import (
     requirements,
@@ -29,6 +31,7 @@ from holozen.check.engine import (
     read,
     split,
 )
+from holozen.check.examples import EXAMPLES
 from holozen.check.sources import expand_marked
 from holozen.robot import reader
 from holozen.robot.elements import Tag
@@ -83,10 +86,64 @@ RULES = [value for module in MODULES for value in vars(module).values() if isins
 """All rules, in the order in which their findings are best fixed."""
 
 
+EVERY = (FATAL, LOAD, NOTE, *RULES)
+
+
 def table() -> str:
     """The rules as a table in Markdown."""
-    rows = [f"| `{rule.name}` | {rule.severity} | {rule.finds} | {rule.why} |" for rule in (FATAL, LOAD, NOTE, *RULES)]
+    rows = [
+        f"| [`{rule.name}`](rules.md#{rule.name}) | {rule.severity} | {rule.finds} | {rule.why} |" for rule in EVERY
+    ]
     return "\n".join(["| rule | severity | finds | since |", "|---|---|---|---|", *rows]) + "\n"
+
+
+def page() -> str:
+    """The rules as sections in Markdown, with an example each."""
+    return "\n".join(
+        f"## {rule.name}\n\n{rule.severity.capitalize()}: {rule.finds}, since {rule.why}. Wrong:\n\n"
+        f"```xml\n{wrong.rstrip()}\n```\n\nRight:\n\n```xml\n{right.rstrip()}\n```\n"
+        for rule in EVERY
+        for wrong, right in [EXAMPLES[rule.name]]
+    )
+
+
+def explain(rule: Rule) -> str:
+    """A rule as text: what it finds, why, and an example."""
+    wrong, right = (indent(part.rstrip(), "    ") for part in EXAMPLES[rule.name])
+    return f"{rule.name} ({rule.severity}): {rule.finds}\n  since {rule.why}\n  wrong:\n{wrong}\n  right:\n{right}"
+
+
+def sarif(findings: Iterable[Finding], version: str) -> dict[str, object]:
+    """The findings for editors and CI, as a log in SARIF 2.1.0 (OASIS)."""
+    rules = [
+        {
+            "id": rule.name,
+            "shortDescription": {"text": rule.finds},
+            "fullDescription": {"text": f"{rule.finds}, since {rule.why}"},
+            "help": {"text": explain(rule)},
+            "defaultConfiguration": {"level": rule.severity},
+        }
+        for rule in EVERY
+    ]
+    results = []
+    for finding in findings:
+        place = finding.place
+        location: dict[str, object] = {"artifactLocation": {"uri": quote(Path(place.file).as_posix())}}
+        if place.line and not place.expanded:
+            location["region"] = {"startLine": place.line}
+        results.append(
+            {
+                "ruleId": finding.rule,
+                "level": finding.severity,
+                "message": {"text": f"{finding.problem}; {finding.why}; {finding.fix}"},
+                "locations": [{"physicalLocation": location}],
+            }
+        )
+    tool = {"driver": {"name": "holozen check", "version": version, "rules": rules}}
+    return {"version": "2.1.0", "$schema": SARIF, "runs": [{"tool": tool, "results": results}]}
+
+
+SARIF = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 # The findings.
@@ -217,7 +274,9 @@ def _inertial(tag: Tag) -> Tag:
 
 def _finding(rule: Rule, mistake: Mistake, subject: Subject) -> Finding:
     place: Place = subject.place(mistake.at)
-    return Finding(rule.name, rule.severity, place, _short(mistake.problem), rule.why, _short(mistake.fix))
+    return Finding(
+        rule.name, rule.severity, place, _short(mistake.problem), rule.why, _short(mistake.fix), mistake.edit
+    )
 
 
 def _short(text: str) -> str:

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from holozen.check.engine import Mistake, Subject, rule
+from holozen.check.engine import Edit, Mistake, Subject, rule
 from holozen.check.geometry import MOVING, box_of, fixed_bodies, half_sizes, size_of
 from holozen.robot.elements import Tag, Vector, number
-from holozen.robot.inertia import positive_definite
+from holozen.robot.inertia import of_shapes, positive_definite
 from holozen.robot.model import Link, Shape
 from holozen.robot.rigid import FALLS, falls_through
 from holozen.suggest import listed
@@ -16,6 +16,8 @@ MINOR = 0.1  # of the mass of what a link is fixed to; the inertia of a smaller 
 DENSEST = 25_000.0  # kg/m^3; osmium has 22 600
 STEEL = 8_000.0  # kg/m^3
 ROUNDING = 0.01  # of the trace: numbers are written with few digits
+
+COMPUTE = "compute it from the shape"
 
 Tensor = tuple[float, float, float, float, float, float]
 WORDS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -90,7 +92,8 @@ def no_mass(subject: Subject) -> Iterator[Mistake]:
             fix = "give it its mass in kg, or remove the <inertial> if it is only a frame"
             yield Mistake(given.mass_tag, f"link {name!r} has a mass of 0 kg", fix)
         elif given and given.mass and given.inertia and not any(given.inertia):
-            yield Mistake(given.inertia_tag, f"the inertia of link {name!r} is zero", "compute it from the shape")
+            problem = f"the inertia of link {name!r} is zero"
+            yield Mistake(given.inertia_tag, problem, COMPUTE, _computed(name, given, subject))
 
 
 @rule("heavy", "warning", "a mass impossible for its size", "motors and contacts fail")
@@ -120,12 +123,14 @@ def impossible_inertia(subject: Subject) -> Iterator[Mistake]:
         if given is None or given.mass == 0 or (given.inertia_tag is None and (subject.sdf or not given.mass)):
             continue
         if given.inertia_tag is None:
-            yield Mistake(given.tag, f"link {name!r} has a mass and no <inertia>", "add one")
+            problem = f"link {name!r} has a mass and no <inertia>"
+            yield Mistake(given.tag, problem, "add one", _computed(name, given, subject))
         elif not subject.sdf and any(given.inertia or ()) and (left_out := _left_out(given.inertia_tag)):
             problem = f"the inertia of link {name!r} has no {' and no '.join(left_out)}, and what is left out is 0"
-            yield Mistake(given.inertia_tag, problem, "compute it from the shape")
+            yield Mistake(given.inertia_tag, problem, COMPUTE, _computed(name, given, subject))
         elif given.inertia and any(given.inertia) and (problem := impossible(given.inertia)):
-            yield Mistake(given.inertia_tag, f"the inertia of link {name!r} {problem}", "compute it from the shape")
+            problem = f"the inertia of link {name!r} {problem}"
+            yield Mistake(given.inertia_tag, problem, COMPUTE, _computed(name, given, subject))
 
 
 @rule(
@@ -225,6 +230,18 @@ def _moment(shape: Shape, mass: float) -> float:
     if shape.kind == "cylinder":
         return mass * max(x / 2, x / 4 + z / 3)
     return mass * (x + y + z - min(x, y, z)) / 3
+
+
+def _computed(name: str, given: Given, subject: Subject) -> Edit | None:
+    """The <inertia> of a link's solid collision shapes; None where axes of its own, or no shape, leave it open."""
+    link = subject.model.links.get(name) if subject.model and not subject.sdf else None
+    origin = given.tag.first("origin")
+    turned = bool(origin and any(number(word) for word in origin.attributes.get("rpy", "").split()))
+    per_mass = of_shapes(link) if link and not turned else None
+    if per_mass is None or not given.mass:
+        return None
+    moments = " ".join(f'{word}="{value * given.mass:.4g}"' for word, value in zip(WORDS, per_mass, strict=True))
+    return Edit("inertia", "<inertia>" if given.inertia_tag else "", f"<inertia {moments}/>")
 
 
 def _left_out(inertia: Tag) -> list[str]:

@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from holozen.check.engine import Mistake, Subject, rule, split
+from holozen.check.engine import Edit, Mistake, Subject, rule, split
 from holozen.check.spelling import nearest
 from holozen.robot.elements import LARGEST, Tag
 from holozen.robot.errors import RobotError
@@ -170,12 +170,13 @@ def misspelt_tags(subject: Subject) -> Iterator[Mistake]:
         suggestion = guessed[tag.name, known]
         if shortest >= 4 and suggestion and tag.name.startswith(suggestion):
             continue  # another word with the same beginning, as some plugin may have
-        if suggestion and suggestion.lower() != tag.name.replace("_", "").lower():
-            yield Mistake(tag, f"there is no element <{tag.name}>", f"write <{suggestion}>")
-        elif suggestion and shortest < 4:
-            yield Mistake(
-                tag, f"<{tag.name}> is not <{suggestion}>: case and underscores matter", f"write <{suggestion}>"
-            )
+        if not suggestion:
+            continue
+        fix, edit = f"write <{suggestion}>", Edit("element", tag.name, suggestion)
+        if suggestion.lower() != tag.name.replace("_", "").lower():
+            yield Mistake(tag, f"there is no element <{tag.name}>", fix, edit)
+        elif shortest < 4:
+            yield Mistake(tag, f"<{tag.name}> is not <{suggestion}>: case and underscores matter", fix, edit)
 
 
 @rule("attribute", "error", "a misspelt attribute", "it is silently ignored")
@@ -188,7 +189,8 @@ def misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
             # Of equally similar words, prefer one that is missing.
             suggestion = None if ":" in word else nearest(word, sorted(known - given)) or nearest(word, sorted(known))
             if suggestion:
-                yield Mistake(tag, f"{tag} has no attribute {word!r}", f"write {suggestion}=")
+                edit = Edit("attribute", word, suggestion) if suggestion not in given else None
+                yield Mistake(tag, f"{tag} has no attribute {word!r}", f"write {suggestion}=", edit)
 
 
 @rule("place", "error", "an element in a place where it is not read", "it is silently ignored")

@@ -2,11 +2,22 @@
 
 import argparse
 import json
+import os
 import re
+import shutil
+import tempfile
+from contextlib import suppress
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 from holozen import flags
 from holozen.cli.verb import Verb, by_name
-from holozen.console import printable
+from holozen.console import Failure, printable, report
+from holozen.suggest import suggest
+
+if TYPE_CHECKING:
+    from holozen.check.engine import Finding
 
 NOTES = """Without an error the last line summarizes the file. The exit code is 1 if there is an error, 0 if
 there are no findings or only warnings, 2 for wrong usage. The lines of the --require file are `link NAME` or
@@ -15,18 +26,94 @@ there are no findings or only warnings, 2 for wrong usage. The lines of the --re
 
 def run(args: argparse.Namespace) -> int:
     """Print what is wrong with a file; exit code 1 if there is an error."""
+    if args.explain is not None:
+        return _explain(args.explain)
+    if args.file is None:
+        args.error("give a FILE, or --explain")
+    if args.fix:
+        findings, _ = _findings(args)
+        if not _fix(args.file, findings, args.write):
+            return 1
+        if not args.write:
+            return 0
+    elif args.write:
+        args.error("--write is for --fix")
+    findings, summary = _findings(args)
+    if args.sarif:
+        from importlib.metadata import version
+
+        from holozen.check.report import sarif
+
+        print(json.dumps(sarif(findings, version("holozen")), indent=2))
+    for finding in findings if not args.sarif else ():
+        text = json.dumps(finding.fields()) if args.json else "\n".join(map(printable, str(finding).split("\n")))
+        print(text)
+    failed = any(finding.severity == "error" for finding in findings)
+    if not failed and not args.json and not args.sarif:
+        print(printable(f"ok: {summary}"))
+    return int(failed)
+
+
+def _findings(args: argparse.Namespace) -> "tuple[list[Finding], str]":
     from holozen.check.engine import Requirements
     from holozen.check.report import check
 
     requirements = Requirements(args.fits, args.require)
-    findings, summary = check(args.file, dict(args.args), dict(args.package), requirements, args.allow_env)
-    for finding in findings:
-        text = json.dumps(finding.fields()) if args.json else "\n".join(map(printable, str(finding).split("\n")))
-        print(text)
-    failed = any(finding.severity == "error" for finding in findings)
-    if not failed and not args.json:
-        print(printable(f"ok: {summary}"))
-    return int(failed)
+    return check(args.file, dict(args.args), dict(args.package), requirements, args.allow_env)
+
+
+def _explain(name: str) -> int:
+    from holozen.check.report import EVERY, explain
+
+    rules = {rule.name: rule for rule in EVERY}
+    if name and name not in rules:
+        report(f"holozen check: there is no rule {name!r}{suggest(name, rules)}; --explain without one lists them")
+        return 2
+    print(explain(rules[name]) if name else "\n".join(f"{rule.name:<16}{rule.finds}" for rule in EVERY))
+    return 0
+
+
+def _fix(path: Path, findings: "list[Finding]", write: bool) -> bool:
+    """Show what can be corrected in a file, and `write` it, keeping the old one; returns whether it could."""
+    from difflib import unified_diff
+
+    from holozen.check.corrections import correct
+
+    try:
+        old = path.read_bytes()
+        text = old.decode()
+    except (OSError, UnicodeDecodeError) as error:
+        raise Failure(f"{path}: {getattr(error, 'strerror', '') or 'is not UTF-8'}") from None
+    new, done = correct(text, str(path), findings)
+    if not done:
+        report("holozen check: nothing that --fix can correct; without it, all findings are shown")
+        return not any(finding.severity == "error" for finding in findings)
+    for line in unified_diff(text.splitlines(), new.splitlines(), str(path), f"{path} (corrected)", lineterm=""):
+        print(printable(line))
+    if not write:
+        report("holozen check: nothing is written yet; --fix --write does")
+        return True
+    path = path.resolve()
+    try:
+        kept = _keep(path, old)
+        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}-", delete=False) as file:
+            file.write(new.encode())
+        shutil.copymode(path, file.name)
+        os.replace(file.name, path)
+    except OSError as error:
+        raise Failure(f"{path}: cannot be written: {error.strerror}") from None
+    report(f"holozen check: {path} is corrected; as it was it is {kept}")
+    return True
+
+
+def _keep(path: Path, content: bytes) -> Path:
+    """A new file beside `path` with the content it has."""
+    for number in count(1):
+        kept = path.with_name(f"{path.name}.orig{number if number > 1 else ''}")
+        with suppress(FileExistsError), kept.open("xb") as file:
+            file.write(content)
+            return kept
+    raise AssertionError("there is always a free name")
 
 
 def _size(text: str) -> tuple[float, ...]:
@@ -42,10 +129,14 @@ def _size(text: str) -> tuple[float, ...]:
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("file", type=flags.path, help="a xacro, URDF or SDF file")
+    add("file", type=flags.path, nargs="?", help="a xacro, URDF or SDF file")
     add("args", type=flags.pair, nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg")
     flags.add_robot_sources(parser)
     add("--fits", type=_size, default=(), metavar="LxW[xH]", help="most metres along x, y, z: 0.4x0.2")
+    add("--explain", nargs="?", const="", metavar="RULE", help="explain a rule with an example; without RULE, list all")
+    add("--fix", action="store_true", help="show a diff that corrects misspelt names and missing inertia")
+    add("--write", action="store_true", help="with --fix: write it; the file as it was is FILE.orig")
+    add("--sarif", action="store_true", help="print SARIF 2.1.0, for editors and CI")
     add("--require", type=flags.path, metavar="FILE", help="links and joints that the robot must have")
 
 

@@ -98,7 +98,7 @@ def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool 
     part = link.inertial
     if inertial is None or part is None or not part.mass or not (link.collisions or part.inertia == NO_INERTIA):
         return link
-    least = _of_shapes(link)
+    least = of_shapes(link)
     if part.inertia != NO_INERTIA and (least is None or not _is_absurd(link, least)):
         return link
     if not silent:
@@ -120,8 +120,10 @@ def _warn(link: Link, inertial: Tag, shaped: bool, source: Source) -> None:
     source.warn(given or inertial, f"{wrong}; {taken}")
 
 
-def _of_shapes(link: Link) -> tuple[float, float, float, float, float, float] | None:
-    """m^2, in the link's axes."""
+def of_shapes(link: Link) -> tuple[float, float, float, float, float, float] | None:
+    """The moments per mass of a link's solid collision shapes, (ixx, ixy, ixz, iyy, iyz, izz) in m^2 about their
+    centre, in the link's axes; None without any.
+    """
     if not link.collisions:
         return None
     placed = ((shape, np.array(shape.pose.xyz), matrix_of(shape.pose.rpy)) for shape in link.collisions)

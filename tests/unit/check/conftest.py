@@ -1,5 +1,6 @@
 """A good robot, of which each test breaks one part, and its findings."""
 
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -42,3 +43,11 @@ def findings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Findings:
 def rules(findings: Findings) -> Callable[..., list[str]]:
     """The names of the rules that a text breaks."""
     return lambda *args, **options: sorted({finding.rule for finding in findings(*args, **options)})
+
+
+def stl(path: Path, size: float) -> None:
+    """A tetrahedron with edges of `size` along the axes."""
+    corners = [(0.0, 0.0, 0.0), (size, 0.0, 0.0), (0.0, size, 0.0), (0.0, 0.0, size)]
+    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
+    rows = [struct.pack("<12fH", 0, 0, 0, *(x for i in face for x in corners[i]), 0) for face in faces]
+    path.write_bytes(b"\0" * 80 + struct.pack("<I", len(rows)) + b"".join(rows))

@@ -1,24 +1,15 @@
 """Meshes that are lost, empty, or in the wrong unit."""
 
-import struct
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from holozen.check.engine import Requirements
-from tests.unit.check.conftest import Findings
+from tests.unit.check.conftest import Findings, stl
 
 BOX = '<visual><geometry><box size="0.3 0.2 0.1"/></geometry>'
 Rules = Callable[..., list[str]]
-
-
-def stl(path: Path, size: float) -> None:
-    """A tetrahedron with edges of `size` along the axes."""
-    corners = [(0.0, 0.0, 0.0), (size, 0.0, 0.0), (0.0, size, 0.0), (0.0, 0.0, size)]
-    faces = [(0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3)]
-    rows = [struct.pack("<12fH", 0, 0, 0, *(x for i in face for x in corners[i]), 0) for face in faces]
-    path.write_bytes(b"\0" * 80 + struct.pack("<I", len(rows)) + b"".join(rows))
 
 
 def with_mesh(good: str, uri: str, scale: str = "1 1 1") -> str:

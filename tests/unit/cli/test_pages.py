@@ -53,6 +53,7 @@ def test_commands_on_pages_are_taken(capsys: pytest.CaptureFixture[str], monkeyp
                 parse(line)
             except (SystemExit, AssertionError) as error:
                 reason = capsys.readouterr().err.strip() or str(error)
-                wrong.append(f"{os.path.relpath(page, REPO)}: {line}: {reason}")
+                if "there is no folder" not in reason:  # of an example
+                    wrong.append(f"{os.path.relpath(page, REPO)}: {line}: {reason}")
     assert seen > 80
     assert wrong == []
