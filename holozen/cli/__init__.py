@@ -29,6 +29,7 @@ VERBS = {
     "delete": "remove robots or objects from the sim",
     "list": "list the robots and objects in the sim, and where they are",
     "xacro": "expand a xacro file",
+    "new": "robot, controller, package: a small start to work on",
     "check": "report what is wrong with a robot file",
     "topic": "list, info, type, find, echo, hz, bw, delay, pub, plot",
     "service": "list, type, find, info, call",
@@ -53,7 +54,7 @@ MODULES = {
     "map": "plot",
     "release": "stop",
 }  # of verbs in another noun's module
-NOUNS = ("secure", "topic", "service", "action", "node", "param", "tf", "interface", "bag")  # followed by a verb
+NOUNS = ("secure", "new", "topic", "service", "action", "node", "param", "tf", "interface", "bag")  # followed by a verb
 _DRAWS = "`holozen view` shows robots in a browser, `holozen map` and `holozen plot` draw in the terminal"
 _TYPES = "`holozen interface` shows messages, services and actions"
 ELSEWHERE = {

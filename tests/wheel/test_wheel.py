@@ -6,6 +6,7 @@ Nothing is downloaded: what the lock file already brought is lent to the new env
 import json
 import os
 import re
+import signal
 import subprocess
 import sys
 import sysconfig
@@ -171,6 +172,40 @@ def test_the_sim_starts_from_the_wheel_and_publishes_odom(full: Path, wire: Wire
         wait_for(lambda: odom.count > 3, what=lambda: sim.err)
         assert sim.terminate() == 0
         assert sim.err == "sim: hb_bot listens on cmd_vel\n"
+
+
+SCRIPT = """
+import rclpy
+from nav_msgs.msg import Odometry
+from rclpy.node import Node
+
+rclpy.init()
+node = Node("listener")
+node.create_subscription(Odometry, "odom", lambda odom: (print("heard", odom.child_frame_id), rclpy.shutdown()), 10)
+rclpy.spin(node)
+"""
+
+
+def test_a_first_hour_with_the_wheel(full: Path, wire: Wire, tmp_path: Path) -> None:
+    """up, view, new, check, run and record."""
+    with Process([str(holozen(full)), "up", *wire.flags], env=CLEAN) as up:
+        up.wait_for_line("4 goals from square")
+        with Process([str(holozen(full)), "view", "--port", "0", *wire.flags], env=CLEAN) as view:
+            view.wait_for_line("http://127.0.0.1:")
+            assert view.terminate() == 0
+        good(holozen(full), "new", "robot", "rosie", cwd=tmp_path)
+        assert good(holozen(full), "check", "rosie.urdf.xacro", cwd=tmp_path).startswith("ok: 4 links, 3 wheels")
+        (tmp_path / "listener.py").write_text(SCRIPT)
+        assert "heard footprint_link" in good(holozen(full), "run", *wire.flags, "listener.py", cwd=tmp_path)
+        good(holozen(full), "record", "odom", "-o", "drive", "--max-duration", "1", *wire.flags, cwd=tmp_path)
+        assert "odom" in good(holozen(full), "bag", "info", "drive.mcap", cwd=tmp_path)
+        up.signal(signal.SIGINT)
+        assert up.wait() == 0
+
+
+def test_templates_are_in_the_wheel(bare: Path, tmp_path: Path) -> None:
+    good(holozen(bare), "new", "package", "ours", cwd=tmp_path)
+    assert "float32 voltage" in good(holozen(bare), "interface", "show", "ours/msg/Battery", cwd=tmp_path)
 
 
 def test_the_sim_without_its_extra_names_it(bare: Path, wire: Wire) -> None:

@@ -58,7 +58,7 @@ def test_what_there_is_instead_of_a_verb_is_there() -> None:
             assert verb in cli.VERBS
 
 
-NOUNS = ("secure", "topic", "service", "action", "node", "param", "tf", "interface", "bag")
+NOUNS = cli.NOUNS
 
 
 def test_every_verb_has_help(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,0 +1,96 @@
+"""`holozen new`: a small robot, controller or interfaces package to start from."""
+
+import argparse
+import json
+import re
+from collections.abc import Callable
+from functools import partial
+
+from holozen.cli.verb import Noun, Verb, by_name
+from holozen.console import Failure
+from holozen.flags import number, refused
+
+NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
+Make = Callable[[argparse.Namespace], tuple[dict[str, str], str]]
+"""Files by their paths, and what one does next."""
+More = Callable[[argparse.ArgumentParser], None]
+
+
+def _robot(args: argparse.Namespace) -> tuple[dict[str, str], str]:
+    file = f"{args.name}.urdf.xacro"
+    wheel = args.wheel_radius or args.radius / 4
+    if wheel > args.radius / 2:
+        args.error(f"--wheel-radius {wheel:g}: the wheels would be inside each other; at most half of --radius")
+    numbers = {"RADIUS": f"{args.radius:g}", "WHEEL": f"{wheel:g}", "MASS": f"{args.mass:g}"}
+    return {file: _filled("robot.urdf.xacro", args.name, numbers)}, f"holozen sim --robot {file}"
+
+
+def _controller(args: argparse.Namespace) -> tuple[dict[str, str], str]:
+    file, test = f"{args.name}.py", f"test_{args.name}.py"
+    files = {file: _filled("controller.py.txt", args.name), test: _filled("test_controller.py.txt", args.name)}
+    return files, f"python {file}, beside `holozen sim`; python -m pytest {test}"
+
+
+def _package(args: argparse.Namespace) -> tuple[dict[str, str], str]:
+    places = {"package.xml": "", "CMakeLists.txt": "", "Battery.msg": "msg/", "NextGoal.srv": "srv/"}
+    files = {f"{args.name}/{folder}{file}": _filled(file, args.name) for file, folder in places.items()}
+    return files, f"holozen interface show {args.name}/srv/NextGoal"
+
+
+def _filled(template: str, name: str, words: dict[str, str] = {}) -> str:
+    """A template with its words in capitals replaced."""
+    from holozen.data import find
+
+    text = find("templates", template).read_text()
+    for word, value in {"NAME": name, **words}.items():
+        text = re.sub(rf"\b{word}\b", value, text)
+    return text
+
+
+def _run(make: Make, args: argparse.Namespace) -> int:
+    """Write the files that `make` gives, none of which may be there."""
+    from pathlib import Path
+
+    files, following = make(args)
+    if taken := next((name for name in files if Path(name).exists()), None):
+        raise Failure(f"{taken} is there already, and is left as it is; choose another name, or another folder")
+    for name, text in files.items():
+        try:
+            Path(name).parent.mkdir(parents=True, exist_ok=True)
+            with Path(name).open("x") as file:
+                file.write(text)
+        except OSError as error:
+            raise Failure(f"{name}: {error.strerror}") from None
+        print(json.dumps({"file": name}) if args.json else name)
+    if not args.json:
+        print(f"next: {following}")
+    return 0
+
+
+def _name(text: str) -> str:
+    if not NAME.fullmatch(text):
+        raise refused(f"{text!r}: use lower-case letters, digits and _, with a letter first")
+    return text
+
+
+def _verb(thing: str, about: str, example: str, make: Make, more: More | None = None) -> Verb:
+    def arguments(parser: argparse.ArgumentParser) -> None:
+        parser.add_argument("name", type=_name, metavar="NAME")
+        _ = more and more(parser)
+
+    return Verb(f"new {thing}", about, example, arguments, partial(_run, make), "each file as a JSON object", bus=False)
+
+
+def _sizes(parser: argparse.ArgumentParser) -> None:
+    add = parser.add_argument
+    add("--radius", type=number(0.02, 5, "m"), default=0.2, metavar="M", help="to the wheels (default: 0.2)")
+    add("--wheel-radius", type=number(0.005, 2, "m"), metavar="M", help="(default: a quarter of --radius)")
+    add("--mass", type=number(0.01, 500, "kg"), default=3.0, metavar="KG", help="of the base (default: 3)")
+
+
+VERBS = by_name(
+    Noun("new", "Write a small start to work on.", dict.fromkeys(("robot", "controller", "package"), "new")),
+    _verb("robot", "Write NAME.urdf.xacro: a base on three omni wheels.", "rosie --radius 0.3", _robot, _sizes),
+    _verb("controller", "Write NAME.py, which drives a robot to a place, and a test of it.", "go_there", _controller),
+    _verb("package", "Write NAME, a package with a message and a service.", "our_interfaces", _package),
+)

@@ -1,0 +1,58 @@
+"""What `holozen new` writes works at once, and what is there is never touched."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from holozen.testing import LockStep
+from holozen.testing.wire import command
+
+Run = Callable[..., subprocess.CompletedProcess[str]]
+
+
+@pytest.fixture
+def run(tmp_path: Path) -> Run:
+    """Run a command in an empty folder."""
+    return lambda *words: subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+
+
+def test_a_new_robot_passes_check_and_drives_on_its_body_or_its_wheels(
+    run: Run, tmp_path: Path, lock_step: Callable[..., LockStep]
+) -> None:
+    written = run(*command("new", "robot", "rosie", "--radius", "0.3", "--mass", "5"))
+    assert written.stdout.splitlines()[0] == "rosie.urdf.xacro"
+    file = str(tmp_path / "rosie.urdf.xacro")
+    checked = run(*command("check", file))
+    assert checked.stdout == "ok: 4 links, 3 wheels, planar_move on cmd_vel\n"
+    for flags in ((), ("--drive", "omni")):
+        sim = lock_step("--robot", file, *flags)
+        for _ in range(5):
+            sim.drive(y=0.3)
+            sim.step(48)
+        x, y, _ = sim.odom.pose.pose.planar()
+        assert abs(x) < 0.02 and abs(y - 0.3) < 0.03
+        sim.process.close()
+        sim.bus.close()
+
+
+def test_a_new_controller_passes_the_test_that_comes_with_it(run: Run) -> None:
+    assert run(*command("new", "controller", "go_there")).returncode == 0
+    done = run(sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider")
+    assert "1 passed" in done.stdout, done.stdout + done.stderr
+
+
+def test_a_new_package_has_a_message_and_a_service(run: Run) -> None:
+    assert run(*command("new", "package", "our_msgs")).returncode == 0
+    for name, field in (("our_msgs/msg/Battery", "float32 voltage"), ("our_msgs/srv/NextGoal", "int32 request_goal")):
+        assert field in run(*command("interface", "show", name)).stdout
+
+
+def test_what_is_there_is_left_as_it_is(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "test_mine.py").write_text("mine")
+    done = run(*command("new", "controller", "mine"))
+    assert done.returncode == 1 and "test_mine.py is there already" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["test_mine.py"]
+    assert (tmp_path / "test_mine.py").read_text() == "mine"
