@@ -29,7 +29,7 @@ VERBS = {
     "delete": "remove robots or objects from the sim",
     "list": "list the robots and objects in the sim, and where they are",
     "xacro": "expand a xacro file",
-    "new": "robot, controller, package: a small start to work on",
+    "new": "robot, controller, package",
     "check": "report what is wrong with a robot file",
     "topic": "list, info, type, find, echo, hz, bw, delay, pub, plot",
     "service": "list, type, find, info, call",
