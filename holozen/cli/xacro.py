@@ -91,7 +91,9 @@ def watch(
         bus = None
         if args.name is not None or not args.output:
             from holozen.bus import Bus
+            from holozen.robot import loading, reader
 
+            reader.start(loading)
             bus = ends.enter_context(Bus("xacro", connection.from_arguments(args), lasting=True, stop=stop))
         inputs: Inputs = {"file": {str(args.file): None}}
         while not stop.is_set():

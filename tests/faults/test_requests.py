@@ -1,12 +1,14 @@
 """A request is applied once, or its caller learns that it was not: its service dies, its reply is lost, many wait."""
 
+import os
 import sys
+import threading
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
 from holozen.bus import Bus
-from holozen.messages import TriggerReply, TriggerRequest
+from holozen.messages import NextGoalReply, NextGoalRequest, Odometry, TriggerReply, TriggerRequest
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.connection import Connection
 from holozen.transport.errors import BusError, NoReply
@@ -15,6 +17,7 @@ from holozen.transport.services import RING
 
 from .proxy import Proxy
 
+SLOW = 30.0 if os.environ.get("HOLOZEN_LONG") == "1" else 1.0  # s that a service takes
 DIES = """
 import os, sys
 from holozen.bus import Bus, Connection
@@ -43,6 +46,51 @@ def test_a_caller_learns_that_its_service_died_and_the_next_one_answers(wire: Wi
     wire.bus("next").serve("stop", TriggerRequest, TriggerReply, answer).start()
     assert caller.call("stop", TriggerRequest(), TriggerReply).success
     assert len(answers) == 1, "the request that was given up is not made again"
+
+
+def test_a_slow_service_is_given_up_by_who_waits_no_longer_and_delays_no_other(wire: Wire) -> None:
+    begun, go = threading.Event(), threading.Event()
+
+    def answer(_request: TriggerRequest) -> TriggerReply:
+        begun.set()
+        go.wait(60.0)
+        return TriggerReply(True)
+
+    server, caller = wire.bus("server", lasting=True), wire.bus("caller")
+    server.serve("slow", TriggerRequest, TriggerReply, answer).start()
+    server.serve("quick", TriggerRequest, TriggerReply, lambda _: TriggerReply(True)).start()
+    with ThreadPoolExecutor() as pool:
+        patient = pool.submit(caller.call, "slow", TriggerRequest(), TriggerReply, SLOW + 60.0)
+        assert begun.wait(30.0)
+        with pytest.raises(NoReply, match=r"no reply from 'slow' within 0.2 s"):
+            caller.call("slow", TriggerRequest(), TriggerReply, 0.2)
+        go.wait(SLOW)
+        assert caller.call("quick", TriggerRequest(), TriggerReply).success
+        assert not patient.done()
+        go.set()
+        assert patient.result() == TriggerReply(True)
+
+
+def test_a_robot_stands_while_its_next_goal_is_slow_to_come_and_then_drives_there(wire: Wire) -> None:
+    asked, go = list[int](), threading.Event()
+
+    def answer(request: NextGoalRequest) -> NextGoalReply:
+        asked.append(request.request_goal)
+        go.wait(60.0)
+        return NextGoalReply(0.3, 0.0, 0.0, 1)
+
+    bus = wire.bus("pose_service", lasting=True)
+    server, odom = bus.serve("next_goal", NextGoalRequest, NextGoalReply, answer), bus.latest("odom", Odometry)
+    wire.start("sim").wait_for_line("listens on")
+    controller = wire.start("controller", "--laps", "1")
+    server.start()
+    wait_for(lambda: asked)
+    go.wait(SLOW)
+    before = odom.read()[0]
+    assert before and before.twist.twist.is_slow(0.001)
+    go.set()
+    controller.wait_for_line("goal 0: (0.30, 0.00")
+    wait_for(lambda: (now := odom.read()[0]) and abs(now.pose.pose.position.x - 0.3) < 0.05)
 
 
 def test_a_request_whose_reply_is_lost_is_applied_once_and_its_caller_gets_the_reply(wire: Wire, proxy: Proxy) -> None:
