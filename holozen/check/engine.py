@@ -38,12 +38,14 @@ class Place:
 @dataclass(frozen=True, slots=True)
 class Edit:
     """A correction that needs no judgement. `kind`: the name of an "element" or an "attribute" is `new` instead of
-    `old`; or `new` is the <inertia> of a link, instead of the `old` one or, if that is empty, beside the mass.
+    `old`; or `new` is the <inertia> of a link, instead of the `old` one or, if that is empty, beside the mass. `owner`
+    is the name of the element that has the attribute, or that of the link.
     """
 
     kind: Literal["element", "attribute", "inertia"]
     old: str
     new: str
+    owner: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,8 +203,8 @@ class Subject:
 
 
 def named(tags: list[Tag]) -> dict[str, Tag]:
-    """Name -> element; the first of duplicates, none without a name."""
-    return {name: tag for tag in reversed(tags) if (name := tag.attributes.get("name", "").strip())}
+    """Name -> element; the first of duplicates, none without a name. Names count to the letter, as in the loader."""
+    return {name: tag for tag in reversed(tags) if (name := tag.attributes.get("name", "")).strip()}
 
 
 def read_place(text: str) -> Place:

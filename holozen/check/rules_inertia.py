@@ -233,15 +233,17 @@ def _moment(shape: Shape, mass: float) -> float:
 
 
 def _computed(name: str, given: Given, subject: Subject) -> Edit | None:
-    """The <inertia> of a link's solid collision shapes; None where axes of its own, or no shape, leave it open."""
+    """The <inertia> of a link's solid collision shapes; None where axes of its own, no shape, or a mesh
+    that is not there leave it open.
+    """
     link = subject.model.links.get(name) if subject.model and not subject.sdf else None
     origin = given.tag.first("origin")
     turned = bool(origin and any(number(word) for word in origin.attributes.get("rpy", "").split()))
-    per_mass = of_shapes(link) if link and not turned else None
+    per_mass = of_shapes(link) if link and not turned and not subject.guessed else None
     if per_mass is None or not given.mass:
         return None
     moments = " ".join(f'{word}="{value * given.mass:.4g}"' for word, value in zip(WORDS, per_mass, strict=True))
-    return Edit("inertia", "<inertia>" if given.inertia_tag else "", f"<inertia {moments}/>")
+    return Edit("inertia", "<inertia>" if given.inertia_tag else "", f"<inertia {moments}/>", name)
 
 
 def _left_out(inertia: Tag) -> list[str]:

@@ -18,7 +18,7 @@ def duplicates(subject: Subject) -> Iterator[Mistake]:
     for kind in ("link", "joint"):
         seen: dict[str, Tag] = {}
         for tag in subject.root.all(kind):
-            name = tag.attributes.get("name", "").strip()
+            name = tag.attributes.get("name", "")
             first = seen.setdefault(name, tag)
             if name and first is not tag:
                 yield Mistake(
@@ -156,7 +156,7 @@ def _words(source: SourceFile) -> list[str]:
 
 
 def _end(tag: Tag) -> str:
-    return (tag.text if tag.sdf else tag.attributes.get("link", "")).strip()
+    return tag.text.strip() if tag.sdf else tag.attributes.get("link", "")
 
 
 def _is_link(name: str, subject: Subject) -> bool:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
 from holozen.check.engine import Edit, Mistake, Subject, rule, split
-from holozen.check.spelling import nearest
+from holozen.check.spelling import is_clear, nearest
 from holozen.robot.elements import LARGEST, Tag
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import KNOWN, kind_of
@@ -172,7 +172,8 @@ def misspelt_tags(subject: Subject) -> Iterator[Mistake]:
             continue  # another word with the same beginning, as some plugin may have
         if not suggestion:
             continue
-        fix, edit = f"write <{suggestion}>", Edit("element", tag.name, suggestion)
+        fix = f"write <{suggestion}>"
+        edit = Edit("element", tag.name, suggestion) if is_clear(tag.name, suggestion, known) else None
         if suggestion.lower() != tag.name.replace("_", "").lower():
             yield Mistake(tag, f"there is no element <{tag.name}>", fix, edit)
         elif shortest < 4:
@@ -189,7 +190,8 @@ def misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
             # Of equally similar words, prefer one that is missing.
             suggestion = None if ":" in word else nearest(word, sorted(known - given)) or nearest(word, sorted(known))
             if suggestion:
-                edit = Edit("attribute", word, suggestion) if suggestion not in given else None
+                sure = suggestion not in given and is_clear(word, suggestion, known - given)
+                edit = Edit("attribute", word, suggestion, tag.name) if sure else None
                 yield Mistake(tag, f"{tag} has no attribute {word!r}", f"write {suggestion}=", edit)
 
 

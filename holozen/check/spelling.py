@@ -57,5 +57,12 @@ def nearest(word: str, known: Iterable[str], shortest: int = 2) -> str | None:
     return min(near, key=lambda other: (distance(plain, _plain(other)), distance(word, other)), default=None)
 
 
+def is_clear(word: str, suggestion: str, known: Iterable[str]) -> bool:
+    """Whether no other known word is as near to `word` as the one that `nearest` suggests."""
+    plain, meant = _plain(word), _plain(suggestion)
+    others = {_plain(other) for other in known} - {meant}
+    return ALIASES.get(plain) == suggestion or all(distance(plain, other) > distance(plain, meant) for other in others)
+
+
 def _plain(word: str) -> str:
     return word.lower().replace("_", "").replace("-", "")

@@ -30,6 +30,10 @@ def run(args: argparse.Namespace) -> int:
         return _explain(args.explain)
     if args.file is None:
         args.error("give a FILE, or --explain")
+    if args.sarif and args.json:
+        args.error("give --sarif or --json, not both")
+    if args.fix and (args.sarif or args.json):
+        args.error("--fix prints a diff; leave out --sarif and --json")
     if args.fix:
         findings, _ = _findings(args)
         if not _fix(args.file, findings, args.write):
@@ -96,10 +100,11 @@ def _fix(path: Path, findings: "list[Finding]", write: bool) -> bool:
     path = path.resolve()
     try:
         kept = _keep(path, old)
-        with tempfile.NamedTemporaryFile(dir=path.parent, prefix=f".{path.name}-", delete=False) as file:
-            file.write(new.encode())
-        shutil.copymode(path, file.name)
-        os.replace(file.name, path)
+        with tempfile.TemporaryDirectory(dir=path.parent, prefix=f".{path.name[:100]}-") as folder:
+            whole = Path(folder, "corrected")
+            whole.write_bytes(new.encode())
+            shutil.copymode(path, whole)
+            os.replace(whole, path)
     except OSError as error:
         raise Failure(f"{path}: cannot be written: {error.strerror}") from None
     report(f"holozen check: {path} is corrected; as it was it is {kept}")

@@ -43,6 +43,7 @@ BROKEN = [
     ("joint-type", 'name="arm_joint" type="revolute"', 'name="arm_joint" type="revolut"', 'type="revolute"'),
     ("twice", "</robot>", '<link name="ball"/></robot>', "first at"),
     ("no-link", '<parent link="arm"/><child link="thumb"/>', '<parent link="amr"/><child link="thumb"/>', "'arm'"),
+    ("no-link", '<parent link="arm"/><child link="thumb"/>', '<parent link="arm "/><child link="thumb"/>', "'arm '"),
     ("gazebo-link", 'reference="left_wheel"', 'reference="lef_wheel"', "'left_wheel'"),
     ("ignored", '<sphere radius="0.015"/></geometry>', '<sphere radius="0.015"/></geometry><surface/>', "<mu1>"),
     ("ignored", '<link name="arm">', '<link name="arm"><pose>0 0 1 0 0 0</pose>', "<origin"),
@@ -388,3 +389,10 @@ def test_names_are_required_by_a_file(good: str, findings: Findings, tmp_path: P
 
 def test_a_file_of_names_that_is_not_there_is_reported(good: str, rules: Rules, tmp_path: Path) -> None:
     assert rules(good, requirements=Requirements(require=tmp_path / "nowhere.txt")) == ["require-file"]
+
+
+def test_a_name_that_ends_with_a_space_is_one_like_any_other(rules: Rules) -> None:
+    box = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+    assert rules(f'<robot name="r"><link name="a "><inertial><mass value="1"/></inertial>{box}</link></robot>') == [
+        "inertia"
+    ]

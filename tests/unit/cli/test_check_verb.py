@@ -116,3 +116,13 @@ def test_editors_get_the_line_of_the_source(run: Run, robot: Path) -> None:
     }
     assert found["tag"] == ROBOT[: ROBOT.index("<colision>")].count("\n") + 1
     assert {result["level"] for result in one["results"]} <= {"error", "warning"}
+
+
+@pytest.mark.parametrize("flags", ["--fix --json", "--fix --sarif", "--json --sarif", "--write"])
+def test_outputs_are_not_mixed(run: Run, robot: Path, flags: str, capsys: pytest.CaptureFixture[str]) -> None:
+    before = robot.read_bytes()
+    with pytest.raises(SystemExit) as end:
+        run(f"check {robot} {flags}")
+    out, err = capsys.readouterr()
+    assert end.value.code == 2 and out == "" and len(err.splitlines()) == 1
+    assert list(robot.parent.iterdir()) == [robot] and robot.read_bytes() == before
