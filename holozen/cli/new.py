@@ -2,9 +2,12 @@
 
 import argparse
 import json
+import os
 import re
+import sys
 from collections.abc import Callable
 from functools import partial
+from keyword import iskeyword
 
 from holozen.cli.verb import Noun, Verb, by_name
 from holozen.console import Failure
@@ -52,7 +55,7 @@ def _run(make: Make, args: argparse.Namespace) -> int:
     from pathlib import Path
 
     files, following = make(args)
-    if taken := next((name for name in files if Path(name).exists()), None):
+    if taken := next((place for name in files if (place := _taken(name))), None):
         raise Failure(f"{taken} is there already, and is left as it is; choose another name, or another folder")
     for name, text in files.items():
         try:
@@ -67,6 +70,27 @@ def _run(make: Make, args: argparse.Namespace) -> int:
     return 0
 
 
+def _taken(name: str) -> str:
+    """What is where a file, or a folder that it lies in, has to be; empty if nothing is in the way."""
+    from pathlib import Path
+
+    path = Path(name)
+    ways = [path, *(folder for folder in path.parents if not folder.is_dir())]
+    return next((str(way) for way in ways if os.path.lexists(way)), "")
+
+
+def _module(text: str) -> str:
+    """A name that Python can import, and that hides no module which is there."""
+    from importlib.util import find_spec
+
+    name = _name(text)
+    if iskeyword(name):
+        raise refused(f"{text!r}: is a word of Python itself, which cannot import it; choose another name")
+    if (name in sys.stdlib_module_names or find_spec(name)) and not _taken(f"{name}.py") and not _taken(name):
+        raise refused(f"{text!r}: would hide the Python module of that name; choose another one, such as my_{name}")
+    return name
+
+
 def _name(text: str) -> str:
     if not NAME.fullmatch(text):
         raise refused(f"{text!r}: use lower-case letters, digits and _, with a letter first")
@@ -74,8 +98,10 @@ def _name(text: str) -> str:
 
 
 def _verb(thing: str, about: str, example: str, make: Make, more: More | None = None) -> Verb:
+    kind = _name if thing == "robot" else _module
+
     def arguments(parser: argparse.ArgumentParser) -> None:
-        parser.add_argument("name", type=_name, metavar="NAME")
+        parser.add_argument("name", type=kind, metavar="NAME")
         _ = more and more(parser)
 
     return Verb(f"new {thing}", about, example, arguments, partial(_run, make), "each file as a JSON object", bus=False)

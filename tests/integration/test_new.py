@@ -56,3 +56,21 @@ def test_what_is_there_is_left_as_it_is(run: Run, tmp_path: Path) -> None:
     assert done.returncode == 1 and "test_mine.py is there already" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["test_mine.py"]
     assert (tmp_path / "test_mine.py").read_text() == "mine"
+
+
+@pytest.mark.parametrize("thing", ["controller", "package"])
+@pytest.mark.parametrize("name", ["class", "holozen", "numpy", "math"])
+def test_a_name_that_python_could_not_use_is_refused(run: Run, tmp_path: Path, thing: str, name: str) -> None:
+    done = run(*command("new", thing, name))
+    assert done.returncode == 2 and f"'{name}'" in done.stderr and "choose another" in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_nothing_is_written_where_a_part_is_in_the_way(run: Run, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "srv").write_text("mine")
+    (tmp_path / "far.py").symlink_to("nowhere")
+    for words, place in ((("package", "mine"), "mine/srv"), (("controller", "far"), "far.py")):
+        done = run(*command("new", *words))
+        assert done.returncode == 1 and f"{place} is there already" in done.stderr
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["far.py", "mine", "srv"]
