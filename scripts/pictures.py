@@ -12,7 +12,7 @@ SHOWN = (
     "scripts/pictures.py", "services/view/*.py", "urdf/explorer.urdf.xacro", "urdf/materials.xacro",
     WORLD, "meshes/base.dae", "meshes/wheel.stl",
 )  # fmt: skip
-UNSEEN = ("__init__", "__main__", "drive", "guard", "pad", "playback")
+UNSEEN = ("__init__", "__main__", "drive", "foxglove_server", "guard", "pad", "playback")
 """The modules of the view that are not in the picture."""
 WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 SETTLED = 3000  # ms for a software renderer

@@ -74,6 +74,7 @@ ELSEWHERE = {
 EXTRAS = (
     "PIL",
     "cryptography",
+    "foxglove",
     "lz4",
     "matplotlib",
     "mcap",
@@ -86,6 +87,7 @@ EXTRAS = (
     "xacro",
     "zstandard",
 )  # libraries that only some verbs need
+OF_FLAGS = {"cryptography": "secure", "foxglove": "foxglove", "mujoco": "mujoco"}  # libraries and their extras
 OF_SERVICES = {"sim": dict.fromkeys(("pause", "play", "step", "reset"), "simulation")}  # verbs and their modules
 SERVICES = {
     "sim": "sim",
@@ -179,7 +181,7 @@ def _run(verb: str, words: list[str]) -> int:
         name = (error.name or "").partition(".")[0]
         if name not in EXTRAS:
             raise
-        extra = {"cryptography": "secure", "mujoco": "mujoco"}.get(name, verb)  # these come with flags of verbs
+        extra = OF_FLAGS.get(name, verb)
         report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install -e '.[{extra}]'")
         return 1
 

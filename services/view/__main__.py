@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .guard import Guard
     from .playback import Playback
 
-PORT = 8080
+PORT, FOXGLOVE_PORT = 8080, 8765
 NO_TOKEN = "none"
 
 
@@ -46,7 +46,9 @@ def parser() -> argparse.ArgumentParser:
     )
     add("--host", default="127.0.0.1", metavar="ADDRESS",
         help="where to listen (default: %(default)s)")  # fmt: skip
-    add("--port", type=flags.count(), default=PORT, metavar="N", help="0: a free one (default: %(default)s)")
+    add("--port", type=flags.count(), metavar="N",
+        help=f"0: a free one (default: {PORT}; with --foxglove {FOXGLOVE_PORT}, Foxglove's own)")  # fmt: skip
+    add("--foxglove", action="store_true", help="serve Foxglove and Lichtblick instead of a page")
     add("--token", type=_word, metavar="WORD",
         help="the token of the page's address (default: a random one with --private, --secure or a --host beyond this "
         "machine, else none); none: no token, where all who reach the port may drive")  # fmt: skip
@@ -59,6 +61,10 @@ def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
     where = connection.from_arguments(args)
     token = random_token(args.host, where) if args.token is None else "" if args.token == NO_TOKEN else args.token
+    if args.port is None:
+        args.port = FOXGLOVE_PORT if args.foxglove else PORT
+    if args.foxglove:
+        return _serve_foxglove(args, where, token)
     stop = stop_event()
     try:
         _check_port(args.host, args.port)
@@ -89,6 +95,36 @@ def main(argv: list[str] | None = None) -> int:
     return 0
 
 
+def _serve_foxglove(args: argparse.Namespace, where: connection.Connection, token: str) -> int:
+    """Serve Foxglove until a signal."""
+    if args.bag:
+        report(f"view: Foxglove opens {args.bag} itself; --foxglove serves what is on the network")
+        return 2
+    if where.private or where.secure:
+        report("view: every user of this machine can read what --foxglove serves; leave out --private and --secure")
+        return 2
+    if args.token is None:  # a page of any web site could connect else
+        token = secrets.token_urlsafe(16)
+    stop = stop_event()
+    try:
+        _check_port(args.host, args.port)
+        from .foxglove_server import Relay, Server, publishes
+        from .guard import Guard
+
+        with Bus("view", where, lasting=True, stop=stop) as bus, contextlib.ExitStack() as ending:
+            server = Server(bus, args.look_only)
+            ending.callback(server.close)
+            relay = Relay(Guard(token, publishes, apps=True), args.host, args.port, server.port, server.secret)
+            ending.callback(relay.close)
+            for line in _addresses(args, relay.port, token, "ws"):
+                report(f"view: {line}")
+            server.run(stop)
+    except (BusError, OSError) as error:
+        report(f"view: {error}")
+        return 1
+    return 0
+
+
 def _bus(bag: str | None, where: connection.Connection, stop: threading.Event) -> Bus:
     if not bag:
         return Bus("view", where, lasting=True, stop=stop)
@@ -111,7 +147,7 @@ def _word(text: str) -> str:
     return text
 
 
-def _addresses(args: argparse.Namespace, port: int, token: str) -> Iterator[str]:
+def _addresses(args: argparse.Namespace, port: int, token: str, scheme: str = "http") -> Iterator[str]:
     """Where the page is, and what that exposes."""
     from .guard import is_loopback
 
@@ -120,11 +156,11 @@ def _addresses(args: argparse.Namespace, port: int, token: str) -> Iterator[str]
         may = "see" if args.look_only else "see and drive"
         if not token:
             yield f"port {port} of {args.host} has no token: anyone who reaches it may {may} the robots"
-            yield f"http://127.0.0.1:{port}/"
+            yield f"{scheme}://127.0.0.1:{port}/"
             return
         yield f"port {port} of {args.host} is open to the network; anyone with this address may {may} the robots:"
         host = host if args.host not in ("0.0.0.0", "::") else socket.gethostname()
-    yield f"http://{host}:{port}/{token and f'?token={token}'}"
+    yield f"{scheme}://{host}:{port}/{token and f'?token={token}'}"
 
 
 def _check_port(host: str, port: int) -> None:

@@ -32,11 +32,21 @@ addEventListener("blur", () => document.querySelectorAll("button").forEach(
 MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage")  # in viser's messages that may move a robot
 
 
-class Guard:
-    """Refuses requests without `token` (if it is not empty), from another web site's page, and for another host."""
+def moves(data: bytes) -> bool:
+    """Whether a message of viser's page may move a robot."""
+    return any(name in data for name in MOVING)
 
-    def __init__(self, token: str) -> None:
-        self._token = token
+
+class Guard:
+    """Refuses requests without `token` (if it is not empty), from another web site's page, and for another host.
+
+    `moves`: whether the data of a frame may move a robot. `apps`: pages of web sites that have the token may connect.
+    """
+
+    def __init__(self, token: str, moves: Callable[[bytes], bool] = moves, apps: bool = False) -> None:
+        self._token, self.moves, self._apps = token, moves, apps
+        self.quiet = logging.getLogger("holozen.view")  # each refused request would be a traceback
+        self.quiet.setLevel(logging.CRITICAL)
         self.installed = False
         self.late_at = -1e9  # s, monotonic; when the last message came too late to move a robot
 
@@ -46,7 +56,7 @@ class Guard:
         if not self._token and not is_loopback(urlsplit(f"//{host}").hostname or ""):
             # Else a web site whose name leads to 127.0.0.1 could read and send what it likes.
             return f"{host!r} is not this machine; open http://127.0.0.1 with the port that `holozen view` printed"
-        if origin is not None and urlsplit(origin).netloc != host:
+        if origin is not None and urlsplit(origin).netloc != host and not (self._apps and self._token):
             return f"a page of {origin} may not connect here"
         if self._token and not any(hmac.compare_digest(self._token.encode(), one.encode()) for one in _tokens(request)):
             return "the address needs the token that `holozen view` printed: ?token=..."
@@ -92,10 +102,8 @@ class Guard:
                 pinging.cancel()
 
         self.installed = True
-        quiet = logging.getLogger("holozen.view")  # each refused request would be a traceback
-        quiet.setLevel(logging.CRITICAL)
         make = partial(TimedConnection, self)
-        return real(timed, *place, process_request=check, create_connection=make, logger=quiet, **options)
+        return real(timed, *place, process_request=check, create_connection=make, logger=self.quiet, **options)
 
 
 class TimedConnection(websockets.ServerConnection):
@@ -123,7 +131,7 @@ class TimedConnection(websockets.ServerConnection):
                     self._answered = max(self._answered, int(bytes(event.data), 16) * 1e-9)
             if event.opcode in DATA_OPCODES and now - self._answered > MAX_AGE:
                 data = bytes(event.data)
-                if any(name in data for name in MOVING):
+                if self._guard.moves(data):
                     self._guard.late_at = now
                     return
         super().process_event(event)

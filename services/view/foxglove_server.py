@@ -1,0 +1,354 @@
+"""The topics, parameters and services of the network for Foxglove and Lichtblick, by foxglove-sdk's server.
+
+That server knows neither tokens nor the age of a message, so it stays on loopback behind a relay of ours. It takes
+commands, services and parameters only of clients for which the relay vouches.
+"""
+
+import asyncio
+import contextlib
+import json
+import secrets
+import threading
+from collections.abc import Callable, Iterator
+from functools import partial
+from typing import Any
+
+import foxglove
+import websockets.asyncio.client as to_server
+import websockets.asyncio.server as for_clients
+from foxglove.websocket import Capability, ServerListener
+from websockets.exceptions import ConnectionClosed
+from websockets.http11 import Request, Response
+from websockets.typing import Subprotocol
+
+from holozen.bag import formats
+from holozen.bus import Bus, BusError, Publisher, ServiceError
+from holozen.cli.param import Nodes
+from holozen.console import report
+from holozen.messages import Message, Twist, codec
+from holozen.messages.definitions import Interface, InterfaceError, whole_text
+from holozen.messages.registry import Registry
+from holozen.transport.graph import Endpoint
+from holozen.transport.samples import RawSubscriber
+from holozen.transport.services import call_bytes
+from holozen.wire import PRIORITY_OF, is_command
+
+from .guard import Guard, TimedConnection
+
+PROTOCOL = Subprotocol("foxglove.sdk.v1")
+OLDER = Subprotocol("foxglove.websocket.v1")  # the same by another name, which older clients ask for
+MESSAGE = b"\x01"  # the first byte of what a client publishes
+LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s, for nodes that come and go, and for messages
+DEPTH = 64  # messages of a topic that wait
+CALL = 5.0  # s for a service
+VOUCHED = 0xFFFF_FFFF  # the number of the channel by which the relay vouches for a client
+LOOK_ONLY = "this view only looks: it was started with --look-only"
+
+
+def publishes(data: bytes) -> bool:
+    """Whether a client's frame publishes a message, which moves a robot if it is a command."""
+    return data[:1] == MESSAGE
+
+
+class Relay:
+    """A WebSocket server at an address that lets the clients whom `guard` admits through to one on loopback."""
+
+    def __init__(self, guard: Guard, host: str, port: int, inner: int, secret: str) -> None:
+        self._guard, self._inner, self._secret = guard, f"ws://127.0.0.1:{inner}", secret
+        self._loop = asyncio.new_event_loop()
+        self._thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+        self._thread.start()
+        self._server = asyncio.run_coroutine_threadsafe(self._serve(host, port), self._loop).result()
+        self.port = int(next(iter(self._server.sockets)).getsockname()[1])
+
+    async def _serve(self, host: str, port: int) -> for_clients.Server:
+        return await for_clients.serve(
+            self._pass, host, port, subprotocols=[PROTOCOL, OLDER], process_request=self._check,
+            create_connection=partial(TimedConnection, self._guard),  # type: ignore[arg-type]
+            max_size=None, compression=None,
+            logger=self._guard.quiet,
+        )  # fmt: skip
+
+    def _check(self, connection: for_clients.ServerConnection, request: Request) -> Response | None:
+        reason = self._guard.refusal(request)
+        return connection.respond(403, f"{reason}\n") if reason else None
+
+    async def _pass(self, client: for_clients.ServerConnection) -> None:
+        assert isinstance(client, TimedConnection)
+        async with to_server.connect(self._inner, subprotocols=[PROTOCOL], max_size=None, compression=None) as server:
+            channel = {"id": VOUCHED, "topic": self._secret, "encoding": "json", "schemaName": ""}
+            await server.send(json.dumps({"op": "advertise", "channels": [channel]}))
+            tasks = [
+                asyncio.create_task(task)
+                for task in (client.ping_often(), _copy(client, server), _copy(server, client))
+            ]
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in tasks:
+                task.cancel()
+
+    def close(self) -> None:
+        """Part with all clients."""
+
+        async def end() -> None:
+            self._server.close()
+            await self._server.wait_closed()
+
+        asyncio.run_coroutine_threadsafe(end(), self._loop).result(2.0)
+        self._loop.call_soon_threadsafe(self._loop.stop)
+
+
+async def _copy(source: Any, target: Any) -> None:
+    with contextlib.suppress(ConnectionClosed):
+        async for message in source:
+            await target.send(message)
+
+
+class Topic:
+    """A topic of the network as a channel: read while a client subscribes to it."""
+
+    def __init__(self, bus: Bus, context: foxglove.Context, key: str, interface: Interface) -> None:
+        self.key, self._bus, self._interface = key, bus, interface
+        schema = foxglove.Schema(name=interface.name, encoding="ros2msg", data=whole_text(interface).encode())
+        self.channel = foxglove.Channel(f"/{key}", message_encoding="cdr", schema=schema, context=context)
+        self.clients = 0
+        self._raw: RawSubscriber | None = None
+        self._reported = False
+
+    def drain(self) -> None:
+        """Hand over what has come, in the thread that calls it."""
+        if not self.clients:
+            self.close()
+            return
+        if not self._raw:
+            self._raw = self._bus.subscribe_raw(self.key, DEPTH)
+            for reply in self._bus.session.get(self.key, timeout=1.0):  # the last one of a topic that seldom speaks
+                if reply.ok:
+                    self._log(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
+        while sample := self._raw.try_recv():
+            self._log(sample.payload, sample.encoding)
+
+    def _log(self, payload: bytes, encoding: str) -> None:
+        try:
+            self.channel.log(codec.transcoded(self._interface, payload, encoding))
+        except codec.CodecError as error:
+            if not self._reported:
+                report(f"view: {self.key} is not as {self._interface.name}: {error}")
+            self._reported = True
+
+    def close(self) -> None:
+        """Read it no longer."""
+        if self._raw:
+            self._raw.close()
+            self._raw = None
+
+
+class Commands:
+    """What clients publish on the network, by the rules of the page: a person's priority, and `stop` at the end."""
+
+    def __init__(self, bus: Bus, endpoints: Callable[[], list[Endpoint]]) -> None:
+        self._bus, self._endpoints = bus, endpoints
+        self._lock = threading.Lock()
+        self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str]]()
+
+    def open(self, client: int, channel: Any) -> None:
+        """Let a client publish on a channel. ValueError with the reason if no node reads that."""
+        key, name = channel.topic.strip("/"), _full_name(channel.schema_name)
+        readers = {one.type for one in self._endpoints() if one.kind == "sub" and one.key == key}
+        if name not in readers or name not in formats.known():
+            reads = f"it is read as {', '.join(sorted(readers))}" if readers else "no node reads it"
+            raise ValueError(f"/{key} cannot be published as {name or 'nothing'}: {reads}")
+        if channel.encoding not in ("json", "cdr"):
+            raise ValueError(f"/{key} cannot be published in {channel.encoding!r}; use json or cdr")
+        kind = formats.known()[name]
+        priority = PRIORITY_OF["view"] if is_command(key, (kind,)) else "DATA"
+        encoding = codec.encoding(channel.encoding, kind)
+        with self._lock:
+            self._open[client, channel.id] = self._bus.publisher(key, kind, priority), kind, encoding
+
+    def put(self, client: int, channel: int, data: bytes) -> None:
+        """Publish a client's message. ValueError with the reason if it is malformed."""
+        with self._lock:
+            if not (found := self._open.get((client, channel))):
+                return
+            publisher, kind, encoding = found
+            try:
+                publisher.put(codec.decode(data, encoding, (kind,)))
+            except codec.CodecError as error:
+                raise ValueError(f"/{publisher.key}: {error}") from None
+
+    def close(self, client: int, channel: int) -> None:
+        """A client publishes on a channel no longer: what it drives stops."""
+        with self._lock:
+            if found := self._open.pop((client, channel), None):
+                publisher, kind, _ = found
+                if kind is Twist:
+                    publisher.put(Twist())
+                publisher.close()
+
+    def halt(self) -> None:
+        """Stop what is driven from here."""
+        for client, channel in list(self._open):
+            self.close(client, channel)
+
+
+class Server(ServerListener):
+    """foxglove-sdk's server with what is on the network. Its callbacks run in the library's threads."""
+
+    def __init__(self, bus: Bus, look_only: bool) -> None:
+        self.secret = f"/{secrets.token_urlsafe(16)}"
+        self._bus, self._look_only = bus, look_only
+        self._context, self._registry = foxglove.Context(), Registry()
+        self._graph = bus.graph()
+        self._topics, self._services = dict[str, Topic](), set[str]()
+        self._vouched = set[int]()
+        self._commands = Commands(bus, self._graph.endpoints)
+        capabilities = [Capability.Parameters]
+        if not look_only:
+            capabilities += [Capability.ClientPublish, Capability.Services]
+        self._server = foxglove.start_server(
+            name="holozen", host="127.0.0.1", port=0, context=self._context, capabilities=capabilities,
+            server_listener=self, supported_encodings=["cdr", "json"],
+        )  # fmt: skip
+        self.port = self._server.port
+
+    def run(self, stop: threading.Event) -> None:
+        """Serve until `stop`."""
+        waited = LOOK_EVERY
+        while not stop.wait(DRAIN_EVERY):
+            waited += DRAIN_EVERY
+            if waited >= LOOK_EVERY:
+                waited = 0.0
+                self._look()
+            for topic in list(self._topics.values()):
+                topic.drain()
+
+    def close(self) -> None:
+        """End it; what is driven from here stops."""
+        self._commands.halt()
+        self._server.stop()
+        self._graph.close()
+
+    def _look(self) -> None:
+        """Show the topics and services that there are now."""
+        endpoints = self._graph.endpoints()
+        topics = {one.key: one.type for one in endpoints if one.kind == "pub" and "*" not in one.key}
+        for key in self._topics.keys() - topics:
+            topic = self._topics.pop(key)
+            topic.close()
+            topic.channel.close()
+        for key in topics.keys() - self._topics:
+            if interface := self._find(topics[key]):
+                self._topics[key] = Topic(self._bus, self._context, key, interface)
+        if self._look_only:
+            return
+        services = {one.key: one.type for one in endpoints if one.kind == "srv" and "*" not in one.key}
+        if gone := self._services - services.keys():
+            self._server.remove_services([f"/{key}" for key in gone])
+            self._services -= gone
+        for key in services.keys() - self._services:
+            if (interface := self._find(services[key])) and interface.request and interface.response:
+                self._server.add_services([_service(key, interface, partial(self._call, key, interface))])
+                self._services.add(key)
+
+    def _find(self, name: str) -> Interface | None:
+        try:
+            return self._registry.find(name)
+        except InterfaceError:
+            return None
+
+    @contextlib.contextmanager
+    def _telling(self) -> Iterator[None]:
+        """Show clients why something was refused."""
+        try:
+            yield
+        except (ValueError, BusError, ServiceError) as error:
+            self._server.publish_status(str(error), foxglove.StatusLevel.Error)
+
+    # The listener.
+
+    def on_subscribe(self, client: Any, channel: Any) -> None:
+        """A client reads a topic."""
+        if topic := self._topics.get(channel.topic.strip("/")):
+            topic.clients += 1
+
+    def on_unsubscribe(self, client: Any, channel: Any) -> None:
+        """A client reads a topic no longer."""
+        if topic := self._topics.get(channel.topic.strip("/")):
+            topic.clients -= 1
+
+    def on_client_advertise(self, client: Any, channel: Any) -> None:
+        """A client is about to publish, or the relay vouches for it."""
+        if channel.topic == self.secret:
+            self._vouched.add(client.id)
+        elif client.id in self._vouched:
+            with self._telling():
+                self._commands.open(client.id, channel)
+
+    def on_client_unadvertise(self, client: Any, client_channel_id: int) -> None:
+        """A client publishes no longer, or is gone."""
+        if client_channel_id == VOUCHED:
+            self._vouched.discard(client.id)
+        self._commands.close(client.id, client_channel_id)
+
+    def on_message_data(self, client: Any, client_channel_id: int, data: bytes) -> None:
+        """A client publishes."""
+        if client.id in self._vouched:
+            with self._telling():
+                self._commands.put(client.id, client_channel_id, data)
+
+    def on_get_parameters(
+        self, client: Any, param_names: list[str], request_id: str | None = None
+    ) -> list[foxglove.Parameter]:
+        """The named parameters, or all, as `node.name`."""
+        found = []
+        with self._telling():
+            nodes = Nodes(self._bus, CALL)
+            for node in sorted(nodes.sessions):
+                names = nodes.names(node)
+                for name, value in zip(names, nodes.values(node, names), strict=True):
+                    if not param_names or f"{node}.{name}" in param_names:
+                        found.append(foxglove.Parameter(f"{node}.{name}", value=value.plain()))  # type: ignore[arg-type]
+        return found
+
+    def on_set_parameters(
+        self, client: Any, parameters: list[foxglove.Parameter], request_id: str | None = None
+    ) -> list[foxglove.Parameter]:
+        """Set parameters; returns what they are then."""
+        with self._telling():
+            if self._look_only or client.id not in self._vouched:
+                raise ValueError(LOOK_ONLY)
+            nodes = Nodes(self._bus, CALL)
+            for parameter in parameters:
+                node, _, name = parameter.name.partition(".")
+                (result,) = nodes.set(nodes.only(node), {name: parameter.get_value()})
+                if not result.successful:
+                    raise ValueError(result.reason)
+        return self.on_get_parameters(client, [parameter.name for parameter in parameters])
+
+    def _call(self, key: str, interface: Interface, request: Any) -> bytes:
+        """The reply of a service of the network, in CDR."""
+        if request.client_id not in self._vouched:
+            raise ValueError(LOOK_ONLY)
+        assert interface.request and interface.response
+        encoding = f"application/cdr;{interface.request.name}" if request.encoding == "cdr" else "application/json"
+        payload = codec.transcoded(interface.request, request.payload, encoding)
+        reply = call_bytes(self._bus, key, payload, f"application/cdr;{interface.request.name}", CALL)[0]
+        return codec.transcoded(interface.response, reply.payload, reply.encoding)
+
+
+def _service(key: str, interface: Interface, handler: Callable[[Any], bytes]) -> foxglove.Service:
+    def described(part: Interface | None) -> foxglove.MessageSchema:
+        assert part
+        schema = foxglove.Schema(name=part.name, encoding="ros2msg", data=whole_text(part).encode())
+        return foxglove.MessageSchema(encoding="cdr", schema=schema)
+
+    schema = foxglove.ServiceSchema(
+        interface.name, request=described(interface.request), response=described(interface.response)
+    )
+    return foxglove.Service(f"/{key}", schema=schema, handler=handler)
+
+
+def _full_name(name: str) -> str:
+    """ROS 2's name of a type, which ROS 1 writes without `msg`."""
+    package, _, rest = name.partition("/")
+    return f"{package}/msg/{rest}" if rest and "/" not in rest else name

@@ -1,0 +1,201 @@
+"""`holozen view --foxglove`, by a client of its protocol: topics, parameters, services, and commands by the rules."""
+
+import asyncio
+import json
+import struct
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+from websockets.asyncio.client import ClientConnection, connect
+from websockets.exceptions import InvalidStatus
+from websockets.typing import Subprotocol
+
+from holozen.messages import CommandStatus, Odometry, TriggerReply, Twist, codec
+from holozen.testing import Process, Wire, wait_for
+
+TOKEN = "sesame"
+MESSAGE, SERVICE_RESPONSE = 1, 3  # the first byte of what the server sends in binary
+
+
+class Client:
+    """Foxglove's side of a connection: what the server has advertised, and the messages that came."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self._connection = connection
+        self.channels, self.services = dict[str, Any](), dict[str, Any]()
+        self.statuses, self.parameters = list[str](), dict[str, Any]()
+        self.messages, self.replies = list[tuple[int, bytes]](), list[bytes]()
+
+    async def until(self, condition: Callable[[], Any]) -> Any:
+        """Read until a condition holds."""
+        async with asyncio.timeout(30):
+            while not (found := condition()):
+                self._take(await self._connection.recv())
+        return found
+
+    def _take(self, data: str | bytes) -> None:
+        if isinstance(data, bytes):
+            if data[0] == MESSAGE:
+                (number,) = struct.unpack_from("<I", data, 1)
+                self.messages.append((number, data[13:]))
+            elif data[0] == SERVICE_RESPONSE:
+                (length,) = struct.unpack_from("<I", data, 9)
+                self.replies.append(data[13 + length :])
+            return
+        message = json.loads(data)
+        match message["op"]:
+            case "advertise":
+                self.channels |= {one["topic"]: one for one in message["channels"]}
+            case "advertiseServices":
+                self.services |= {one["name"]: one for one in message["services"]}
+            case "status" | "serviceCallFailure":
+                self.statuses.append(message["message"])
+            case "parameterValues":
+                self.parameters |= {one["name"]: one["value"] for one in message["parameters"]}
+
+    async def send(self, **fields: Any) -> None:
+        await self._connection.send(json.dumps(fields))
+
+    async def publish(self, channel: int, payload: bytes) -> None:
+        await self._connection.send(struct.pack("<BI", 1, channel) + payload)
+
+    async def call(self, service: int, payload: bytes) -> None:
+        await self._connection.send(struct.pack("<BIII", 2, service, 1, 3) + b"cdr" + payload)
+
+
+@asynccontextmanager
+async def client(address: str, **options: Any) -> AsyncIterator[Client]:
+    async with connect(address, subprotocols=[Subprotocol("foxglove.sdk.v1")], max_size=None, **options) as connection:
+        yield Client(connection)
+
+
+@pytest.fixture
+def view(wire: Wire) -> Callable[..., str]:
+    """Start a sim and a view for Foxglove; its address."""
+
+    def start(*flags: str) -> str:
+        wire.start("sim").wait_for_line("listens on")
+        view = wire.start("view", "--foxglove", "--port", "0", "--token", TOKEN, *flags)
+        return address(view)
+
+    return start
+
+
+def address(view: Process) -> str:
+    view.wait_for_line("ws://")
+    return next(word for word in view.err.split() if word.startswith("ws://"))
+
+
+def test_topics_services_and_parameters_come_with_their_schemas(view: Callable[..., str]) -> None:
+    async def look() -> None:
+        async with client(view()) as foxglove:
+            odom = await foxglove.until(lambda: foxglove.channels.get("/odom"))
+            assert (odom["encoding"], odom["schemaName"], odom["schemaEncoding"]) == (
+                "cdr", "nav_msgs/msg/Odometry", "ros2msg",
+            )  # fmt: skip
+            assert "geometry_msgs/PoseWithCovariance pose" in odom["schema"]
+            await foxglove.send(op="subscribe", subscriptions=[{"id": 0, "channelId": odom["id"]}])
+            await foxglove.until(lambda: len(foxglove.messages) > 3)
+            read = codec.decode(foxglove.messages[0][1], "application/cdr;nav_msgs/msg/Odometry", (Odometry,))
+            assert read.child_frame_id == "footprint_link"
+
+            service = await foxglove.until(lambda: foxglove.services.get("/stop"))
+            assert service["type"] == "std_srvs/srv/Trigger"
+            await foxglove.call(service["id"], b"\0\1\0\0\0")
+            await foxglove.until(lambda: foxglove.replies)
+            reply = codec.decode(foxglove.replies[0], "application/cdr;std_srvs/srv/Trigger_Response", (TriggerReply,))
+            assert reply.success
+
+            await foxglove.send(op="getParameters", parameterNames=[], id="1")
+            await foxglove.until(lambda: foxglove.parameters)
+            assert foxglove.parameters["sim.max_linear"] == 5.0
+            await foxglove.send(op="setParameters", parameters=[{"name": "sim.max_linear", "value": 0.5}], id="2")
+            await foxglove.until(lambda: foxglove.parameters["sim.max_linear"] == 0.5)
+            await foxglove.send(op="setParameters", parameters=[{"name": "sim.max_linear", "value": 1e9}], id="3")
+            await foxglove.until(lambda: any("max_linear" in text for text in foxglove.statuses))
+
+    asyncio.run(look())
+
+
+def test_a_person_drives_and_the_robot_stops_when_the_connection_ends(wire: Wire, view: Callable[..., str]) -> None:
+    async def drive(address: str) -> None:
+        async with client(address) as foxglove:
+            channels = [
+                {"id": 7, "topic": "/cmd_vel", "encoding": "json", "schemaName": "geometry_msgs/Twist"},
+                {"id": 8, "topic": "/nobody", "encoding": "json", "schemaName": "geometry_msgs/msg/Twist"},
+            ]
+            await foxglove.send(op="advertise", channels=channels)
+            await foxglove.until(lambda: any("/nobody" in text for text in foxglove.statuses))
+            await foxglove.publish(7, b'{"linear": {"x": "fast"}}')
+            await foxglove.until(lambda: any("/cmd_vel" in text for text in foxglove.statuses))
+            while not moves():
+                await foxglove.publish(7, json.dumps({"linear": {"x": 0.3}}).encode())
+                await asyncio.sleep(0.05)
+            driver = status.read()[0]
+            assert driver and "view" in driver.obeyed and driver.priority == "INTERACTIVE_HIGH"
+
+    where = view()
+    bus = wire.bus("watcher")
+    odom, status = bus.latest("odom", Odometry), bus.latest("cmd_vel_status", CommandStatus)
+
+    def moves() -> bool:
+        newest = odom.read()[0]
+        return bool(newest and newest.twist.twist.linear.x > 0.2)
+
+    asyncio.run(drive(where))
+    wait_for(lambda: not moves())
+
+
+def test_a_view_that_only_looks_takes_nothing(wire: Wire, view: Callable[..., str]) -> None:
+    async def look(address: str) -> None:
+        async with client(address) as foxglove:
+            await foxglove.until(lambda: foxglove.channels.get("/odom"))
+            assert foxglove.services == {}
+            await foxglove.send(op="setParameters", parameters=[{"name": "sim.max_linear", "value": 0.5}], id="1")
+            await foxglove.until(lambda: any("--look-only" in text for text in foxglove.statuses))
+
+    asyncio.run(look(view("--look-only")))
+    assert wire.run("param", "get", "sim", "max_linear").stdout.split()[-1] == "5.0"
+
+
+def test_a_token_is_needed_and_then_any_page_may_connect(view: Callable[..., str]) -> None:
+    async def refused(address: str, **options: Any) -> None:
+        with pytest.raises(InvalidStatus, match="403"):
+            async with client(address, **options):
+                pass
+
+    async def look(where: str) -> None:
+        assert where.endswith(f"/?token={TOKEN}")
+        await refused(where.replace(TOKEN, "wrong"))
+        await refused(where.partition("?")[0])
+        async with client(where, origin="https://app.foxglove.dev") as foxglove:
+            await foxglove.until(lambda: foxglove.channels)
+        async with connect(where, subprotocols=[Subprotocol("foxglove.websocket.v1")]) as older:
+            assert "serverInfo" in str(await older.recv())
+
+    asyncio.run(look(view()))
+
+
+def test_what_did_not_come_through_the_relay_moves_nothing(wire: Wire) -> None:
+    """The library's own server on loopback has no token."""
+    from services.view.foxglove_server import Server
+
+    bus = wire.bus("view", lasting=True)
+    heard = wire.bus("sim", lasting=True).subscribe("cmd_vel", Twist)
+    server = Server(bus, look_only=False)
+
+    async def push() -> None:
+        async with client(f"ws://127.0.0.1:{server.port}") as foxglove:
+            channel = {"id": 7, "topic": "/cmd_vel", "encoding": "json", "schemaName": "geometry_msgs/msg/Twist"}
+            await foxglove.send(op="advertise", channels=[channel])
+            await foxglove.publish(7, b'{"linear": {"x": 1.0}}')
+            await foxglove.send(op="setParameters", parameters=[{"name": "sim.max_linear", "value": 0.5}], id="1")
+            await foxglove.until(lambda: foxglove.statuses)
+
+    asyncio.run(push())
+    bus.publisher("cmd_vel", Twist).put(Twist.planar(0.1))
+    first = heard.recv().message
+    assert first and first.linear.x == 0.1
+    server.close()
