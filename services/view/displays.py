@@ -1,5 +1,6 @@
 """What RViz calls displays, of the robot that a page has chosen: its frames, and what its topics hold in them."""
 
+import io
 import math
 from collections.abc import Callable, Mapping
 from functools import partial
@@ -10,16 +11,29 @@ import viser
 
 from holozen.bus import Bus, Subscription
 from holozen.frames import RobotFrames
-from holozen.messages import Image, LaserScan, Message, Odometry, Path, PointCloud2, PointField
+from holozen.messages import (
+    CompressedImage,
+    Image,
+    LaserScan,
+    Message,
+    Odometry,
+    Path,
+    PointCloud2,
+    PointField,
+    Range,
+)
 from holozen.rotation import Transform
 from holozen.wire import key_for
 
 from .scene import SEEN, Scene, Shown, wxyz
 
-KINDS: dict[str, type[Message]] = {kind.ROS: kind for kind in (LaserScan, PointCloud2, Image, Path, Odometry)}
+KINDS: dict[str, type[Message]] = {
+    kind.ROS: kind for kind in (LaserScan, PointCloud2, Range, Image, CompressedImage, Path, Odometry)
+}
+WORLD = "world"  # the fixed frame in which robots are where they truly are
 DRAW_EVERY = 4  # frames of the page
 LARGEST = 16_000_000  # bytes of a message that is shown
-RED, YELLOW, GREEN = (230, 0, 0), (235, 200, 0), (0, 150, 0)
+RED, YELLOW, GREEN, BLUE = (230, 0, 0), (235, 200, 0), (0, 150, 0), (0, 90, 220)
 POINT = 0.02  # m
 LINE = 0.015  # m
 AXES = 0.25  # m
@@ -36,12 +50,15 @@ Place = viser.GuiFolderHandle | viser.GuiTabHandle
 
 
 class Display:
-    """The newest message of a topic, drawn in its frame below the robot's node `root`, or in the panel."""
+    """The newest message of a topic, drawn in its frame below the node `root`, which is the frame `fixed` (empty: the
+    robot's body), or in the panel.
+    """
 
     def __init__(
-        self, client: viser.ClientHandle, place: Place, bus: Bus, frames: RobotFrames, root: str, key: str, kind: str
+        self, client: viser.ClientHandle, place: Place, bus: Bus, frames: RobotFrames, root: str, fixed: str, key: str,
+        kind: str,
     ) -> None:  # fmt: skip
-        self._client, self._place, self._frames, self._key = client, place, frames, key
+        self._client, self._place, self._frames, self._fixed, self._key = client, place, frames, fixed, key
         self._path = f"{root}/displays/{key.replace('/', '_')}"
         self._reader: Subscription[Any] = bus.subscribe(key, KINDS[kind], depth=1, limit=LARGEST)
         self._handles: list[Any] = []
@@ -56,12 +73,14 @@ class Display:
             self.problem = received.error
             return
         message = received.message
-        at = self._frames.of(message.header.frame_id)
-        if at is None and not isinstance(message, Image):
-            self.problem = f"no transform from {message.header.frame_id or 'no frame'} to {self._frames.body}"
+        is_picture = isinstance(message, Image | CompressedImage)
+        at = self._frames.of(message.header.frame_id, self._fixed)
+        if at is None and not is_picture:
+            to = self._fixed or self._frames.body
+            self.problem = f"no transform from {message.header.frame_id or 'no frame'} to {to}"
             return
         self.problem = ""
-        if isinstance(message, Image):
+        if is_picture:
             self._draw_image(message)
         else:
             self._draw(message, at or Transform())
@@ -72,10 +91,13 @@ class Display:
         for handle in self._handles:
             handle.remove()
 
-    def _draw_image(self, image: Image) -> None:
-        pixels = picture(image)
+    def _draw_image(self, image: Image | CompressedImage) -> None:
+        pixels = picture(image) if isinstance(image, Image) else decompressed(image)
         if pixels is None:
-            self.problem = f"images of {image.width} x {image.height} {image.encoding!r} are not shown"
+            if isinstance(image, Image):
+                self.problem = f"images of {image.width} x {image.height} {image.encoding!r} are not shown"
+            else:
+                self.problem = f"{len(image.data)} bytes of {image.format!r} are no JPEG or PNG that is shown"
         elif self._handles:
             self._handles[0].image = pixels
         else:
@@ -87,6 +109,8 @@ class Display:
         if isinstance(message, LaserScan | PointCloud2):
             points = scan_points(message) if isinstance(message, LaserScan) else cloud_points(message)
             handle: Any = add.add_point_cloud(self._path, points, RED, point_size=POINT, precision="float32")
+        elif isinstance(message, Range):
+            handle = add.add_line_segments(self._path, segments(fan(message)), BLUE, thickness=LINE)
         elif isinstance(message, Path):
             line = [(one.pose.position.x, one.pose.position.y, one.pose.position.z) for one in message.poses]
             handle = add.add_line_segments(self._path, segments(np.array(line)), GREEN, thickness=LINE)
@@ -111,7 +135,13 @@ class Displays:
         self._axes: dict[str, tuple[Any, Transform]] | None = None
         self._updates = 0
         with place:
+            self._fixed = client.gui.add_dropdown("Fixed frame", [WORLD], hint="the frame in which displays are drawn")
             self._problems = client.gui.add_markdown("")
+
+        async def changed(_event: Any) -> None:
+            self._draw_anew()
+
+        self._fixed.on_update(changed)
 
     def update(self) -> None:
         """Draw what is switched on, of the robot that is chosen now."""
@@ -121,10 +151,12 @@ class Displays:
         if self._updates % DRAW_EVERY or not self._frames:
             return
         self._frames.update()
+        if (names := (WORLD, *self._frames.names())) != self._fixed.options and self._fixed.value in names:
+            self._fixed.options = names
         for display in self._on.values():
             display.update()
         if self._axes is not None and self._robot:
-            self._draw_axes(self._frames, f"{self._robot.root}/displays/tf")
+            self._draw_axes(self._frames, f"{self._root}/displays/tf")
         problems = "  \n".join(f"{key}: {one.problem}" for key, one in self._on.items() if one.problem)
         if problems != self._problems.content:
             self._problems.content = problems
@@ -139,11 +171,26 @@ class Displays:
             self._frames.close()
         self._frames = None
 
+    @property
+    def _root(self) -> str:
+        """The node that is the fixed frame: a robot's own, or the origin of the world."""
+        assert self._robot
+        return self._robot.root if self._fixed.value == WORLD else f"/fixed{self._robot.root}"
+
+    def _draw_anew(self) -> None:
+        """Draw everything in the fixed frame that was chosen."""
+        for key in list(self._on):
+            self._switch(key, self._topics[key], True)
+        if self._axes is not None:
+            self._switch_axes(False)
+            self._switch_axes(True)
+
     def _offer(self) -> None:
         """A box for each topic of the robot; what was on stays on while it is the same robot."""
         robot, self._topics = self._chosen(), self._scene.topics
         if robot is not self._robot:
             self.close()
+            self._fixed.options = (WORLD,)
         self._robot = robot
         for box in self._boxes:
             box.remove()
@@ -175,8 +222,8 @@ class Displays:
         if display := self._on.pop(key, None):
             display.close()
         if is_on and self._frames and self._robot:
-            root = self._robot.root
-            self._on[key] = Display(self._client, self._place, self._bus, self._frames, root, key, kind)
+            fixed = "" if self._fixed.value == WORLD else self._fixed.value
+            self._on[key] = Display(self._client, self._place, self._bus, self._frames, self._root, fixed, key, kind)
 
     def _switch_axes(self, is_on: bool) -> None:
         for handle, _ in (self._axes or {}).values():
@@ -186,7 +233,8 @@ class Displays:
     def _draw_axes(self, frames: RobotFrames, path: str) -> None:
         axes, add = self._axes, self._client.scene
         for name in frames.names():
-            if axes is None or (at := frames.of(name)) is None:
+            fixed = "" if self._fixed.value == WORLD else self._fixed.value
+            if axes is None or (at := frames.of(name, fixed)) is None:
                 continue
             handle, before = axes.get(name, (None, at))
             if handle is None:
@@ -245,6 +293,25 @@ def picture(image: Image) -> Any:
         grey = np.where(known, 255 * (1 - 0.9 * depths / farthest), 0).astype(np.uint8)
         return np.repeat(grey[:, :, None], 3, axis=2)
     return None
+
+
+def decompressed(image: CompressedImage) -> Any:
+    """The pixels (height, width, 3) of a JPEG or PNG; None if it is neither, or too large."""
+    from PIL import Image as Pictures  # comes with viser
+
+    try:
+        with Pictures.open(io.BytesIO(bytes(image.data)), formats=("JPEG", "PNG")) as found:
+            return np.asarray(found.convert("RGB")) if 3 * math.prod(found.size) <= LARGEST else None
+    except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError):
+        return None
+
+
+def fan(measured: Range) -> Any:
+    """The outline (n, 3) of what a distance sensor sees, up to what it has hit, in m in its frame."""
+    distance = measured.range if math.isfinite(measured.range) else measured.max_range
+    turn = np.linspace(-measured.field_of_view / 2, measured.field_of_view / 2, ELLIPSE)
+    arc = np.stack((distance * np.cos(turn), distance * np.sin(turn), np.zeros_like(turn)), axis=1)
+    return np.concatenate((np.zeros((1, 3)), arc, np.zeros((1, 3))))
 
 
 def ellipse(odom: Odometry) -> Any:

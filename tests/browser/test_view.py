@@ -318,17 +318,22 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
     assert message is not None
     turned = yaw(Transform.of(Point(), message.pose.pose.orientation).rotation)
 
-    def shown() -> bool:
+    def shown(drift: float = 0.0) -> bool:
         at = TransformMessage(Vector3(0.0, 0.0, 0.1))
-        frames.put(TFMessage([TransformStamped(Header(frame_id=message.child_frame_id), "laser", at)]))
+        there = TransformStamped(Header(frame_id="map"), message.header.frame_id, TransformMessage(Vector3(0.3)))
+        frames.put(TFMessage([TransformStamped(Header(frame_id=message.child_frame_id), "laser", at), there]))
         first, many = -turned - math.pi / 2 - 0.05, [0.8] * 11
         scans.put(LaserScan(Header(frame_id="laser"), first, angle_increment=0.01, range_max=5.0, ranges=many))
         images.put(Image(height=2, width=2, encoding="rgb8", step=6, data=[0, 0, 255] * 4))
         found = colored(page, lambda r, g, b: (r > 180) & (g < 60) & (b < 60))
-        return bool(found) and math.dist(np.mean(found, axis=0), pixel(x, y - 0.8, 0.1)) < NEAR
+        return bool(found) and math.dist(np.mean(found, axis=0), pixel(x + drift, y - 0.8, 0.1)) < NEAR
 
     wait_for(shown, 20, "the wall that the scan hit")
     page.locator("img[src^=blob]").wait_for()
+    choose(page, "Fixed frame", "map")
+    wait_for(lambda: shown(0.3), 20, "the wall where it is in that frame")
+    choose(page, "Fixed frame", "world")
+    wait_for(shown, 20, "the wall where the robot truly is")
     for name in ("LaserScan: scan", "Image: eye"):
         page.get_by_text(name, exact=True).click()
     wait_for(lambda: not colored(page, lambda r, g, b: (r > 180) & (g < 60) & (b < 60)), what="no scan")

@@ -1,14 +1,27 @@
 """What messages look like in the page."""
 
+import io
 import math
 import struct
 from array import array
 
 import numpy as np
 import pytest
+from PIL import Image as Picture
 
-from holozen.messages import Image, LaserScan, Odometry, Point, PointCloud2, PointField, Pose, PoseWithCovariance
-from services.view.displays import cloud_points, ellipse, picture, scan_points
+from holozen.messages import (
+    CompressedImage,
+    Image,
+    LaserScan,
+    Odometry,
+    Point,
+    PointCloud2,
+    PointField,
+    Pose,
+    PoseWithCovariance,
+    Range,
+)
+from services.view.displays import cloud_points, decompressed, ellipse, fan, picture, scan_points
 from services.view.plots import fields
 
 
@@ -44,6 +57,27 @@ def test_a_picture_has_the_colours_of_its_encoding(encoding: str, data: "list[in
 @pytest.mark.parametrize(("encoding", "size"), [("yuv422", 2), ("rgb8", 2), ("rgb8", 0), ("32FC1", 3)])
 def test_what_is_no_picture_is_not_shown(encoding: str, size: int) -> None:
     assert picture(Image(height=1, width=1, encoding=encoding, data=[0] * size)) is None
+
+
+def test_a_compressed_picture_is_decoded_unless_it_is_none_or_too_large() -> None:
+    def compressed(size: tuple[int, int], form: str) -> CompressedImage:
+        file = io.BytesIO()
+        Picture.new("RGB", size, (250, 10, 20)).save(file, form)
+        return CompressedImage(data=array("B", file.getvalue()))
+
+    for form in ("PNG", "JPEG"):
+        pixels = decompressed(compressed((4, 2), form))
+        assert pixels.shape == (2, 4, 3) and abs(pixels[0, 0].astype(int) - (250, 10, 20)).max() < 6
+    assert decompressed(compressed((4000, 4000), "PNG")) is None
+    assert decompressed(compressed((4, 2), "GIF")) is None
+    assert decompressed(CompressedImage(data=array("B", b"\xff\xd8\xff nothing"))) is None
+
+
+def test_a_distance_is_shown_as_far_as_it_was_measured() -> None:
+    outline = fan(Range(field_of_view=math.pi / 2, max_range=4.0, range=2.0))
+    assert outline[0].tolist() == [0, 0, 0] and outline[:, 0].max() == pytest.approx(2.0, rel=0.01)
+    assert outline[1, :2] == pytest.approx([math.sqrt(2), -math.sqrt(2)])
+    assert fan(Range(field_of_view=0.1, max_range=4.0, range=math.inf))[:, 0].max() == pytest.approx(4.0, rel=0.01)
 
 
 def test_a_covariance_is_an_ellipse_of_one_standard_deviation() -> None:
