@@ -9,6 +9,7 @@ import contextlib
 import json
 import secrets
 import threading
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any
@@ -41,6 +42,8 @@ MESSAGE = b"\x01"  # the first byte of what a client publishes
 LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s, for nodes that come and go, and for messages
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
+LARGEST = 16_000_000  # bytes that a client may send at once
+TURN = 0.5  # s without a motion by the client that drives a robot, until another one may
 VOUCHED = 0xFFFF_FFFF  # the number of the channel by which the relay vouches for a client
 LOOK_ONLY = "this view only looks: it was started with --look-only"
 
@@ -65,7 +68,7 @@ class Relay:
         return await for_clients.serve(
             self._pass, host, port, subprotocols=[PROTOCOL, OLDER], process_request=self._check,
             create_connection=partial(TimedConnection, self._guard),  # type: ignore[arg-type]
-            max_size=None, compression=None,
+            max_size=LARGEST, compression=None,
             logger=self._guard.quiet,
         )  # fmt: skip
 
@@ -149,6 +152,7 @@ class Commands:
         self._bus, self._endpoints = bus, endpoints
         self._lock = threading.Lock()
         self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str]]()
+        self._drivers = dict[str, tuple[int, float]]()  # by key: the client that moved the robot last, and when
 
     def open(self, client: int, channel: Any) -> None:
         """Let a client publish on a channel. ValueError with the reason if no node reads that."""
@@ -172,9 +176,22 @@ class Commands:
                 return
             publisher, kind, encoding = found
             try:
-                publisher.put(codec.decode(data, encoding, (kind,)))
+                message = codec.decode(data, encoding, (kind,))
+                if kind is Twist and message != Twist():
+                    self._take_turn(str(publisher.key), client)
+                publisher.put(message)
             except codec.CodecError as error:
                 raise ValueError(f"/{publisher.key}: {error}") from None
+
+    def _take_turn(self, key: str, client: int) -> None:
+        """The clients are one source to the robot, so they take turns here. ValueError while another one drives; a stop
+        is everybody's.
+        """
+        now = time.monotonic()
+        driver, since = self._drivers.get(key, (client, now))
+        if driver != client and now - since < TURN:
+            raise ValueError(f"/{key}: somebody else drives")
+        self._drivers[key] = client, now
 
     def close(self, client: int, channel: int) -> None:
         """A client publishes on a channel no longer: what it drives stops."""

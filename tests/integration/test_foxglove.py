@@ -133,6 +133,11 @@ def test_a_person_drives_and_the_robot_stops_when_the_connection_ends(wire: Wire
             while not moves():
                 await foxglove.publish(7, json.dumps({"linear": {"x": 0.3}}).encode())
                 await asyncio.sleep(0.05)
+            async with client(address) as other:
+                await other.send(op="advertise", channels=channels[:1])
+                await other.publish(7, b'{"linear": {"x": -0.3}}')
+                await foxglove.publish(7, json.dumps({"linear": {"x": 0.3}}).encode())
+                await other.until(lambda: any("somebody else drives" in text for text in other.statuses))
             driver = status.read()[0]
             assert driver and "view" in driver.obeyed and driver.priority == "INTERACTIVE_HIGH"
 
