@@ -32,8 +32,12 @@ ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
 MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
-OPTIONAL = ("matplotlib", "mujoco-core")  # not in requirements.lock, for `bag plot` and `sim --engine mujoco`
-USERS = {"mujoco": "sim --engine mujoco"}  # of extras that are no verbs
+OPTIONAL = ("foxglove-sdk", "matplotlib", "mujoco-core")  # not in requirements.lock
+USERS = {
+    "foxglove": "view --foxglove",
+    "mujoco": "sim --engine mujoco",
+    "bag": "bag plot",
+}  # of extras that are no verbs
 SHARED = (
     "delete_entity", "get_entities", "get_entity_state", "set_entity_state", "get_simulation_state",
     "set_simulation_state", "step_simulation", "reset_simulation", "get_scene", "robot_description",
@@ -80,7 +84,8 @@ def packages() -> Iterator[Finding]:
     fix = "" if runs_sim else "use Python 3.11 on x86-64 for `holozen sim`; all other commands run here"
     yield Finding("python", OK if runs_sim else WARNING, running, fix)
     try:
-        requirements = [text for text in metadata.requires("holozen") or () if 'extra == "test"' not in text]
+        declared = metadata.requires("holozen") or ()
+        requirements = [one for one in declared if 'extra == "test"' not in one and not one.startswith("holozen[")]
     except metadata.PackageNotFoundError:
         yield Finding(
             "packages", WARNING, "holozen is not installed; it runs from its source folder", "run scripts/venv"
