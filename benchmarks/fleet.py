@@ -44,15 +44,15 @@ def places(robots: int) -> list[tuple[float, float, float]]:
     return [(GRID * (i % side), GRID * (i // side), REST) for i in range(robots)]
 
 
-def drive(endpoint: str, robots: int) -> None:
-    """The pilot of them all."""
+def drive(endpoint: str, robots: int, rate: float = COMMANDED) -> None:
+    """The pilot of them all, who commands each `rate` times a second of sim time."""
     with Bus("pilot", guest(endpoint)) as bus:
         commands = [bus.publisher(f"bot{i}/cmd_vel", Twist) for i in range(robots)]
         clock, sent = bus.subscribe("clock", Clock, depth=1), 0
         while True:
             if (message := clock.recv().message) is None:
                 continue
-            due = int(message.clock.seconds() * COMMANDED * robots)
+            due = int(message.clock.seconds() * rate * robots)
             for number in range(max(sent, due - robots), due):
                 commands[number % robots].put(COMMAND)
             sent = due
