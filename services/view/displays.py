@@ -2,6 +2,7 @@
 
 import io
 import math
+from array import array
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -59,6 +60,7 @@ class Display:
         kind: str,
     ) -> None:  # fmt: skip
         self._client, self._place, self._frames, self._fixed, self._key = client, place, frames, fixed, key
+        self.kind = kind
         self._path = f"{root}/displays/{key.replace('/', '_')}"
         self._reader: Subscription[Any] = bus.subscribe(key, KINDS[kind], depth=1, limit=LARGEST)
         self._handles: list[Any] = []
@@ -151,7 +153,9 @@ class Displays:
         if self._updates % DRAW_EVERY or not self._frames:
             return
         self._frames.update()
-        if (names := (WORLD, *self._frames.names())) != self._fixed.options and self._fixed.value in names:
+        if (
+            names := tuple(dict.fromkeys((WORLD, *self._frames.names())))
+        ) != self._fixed.options and self._fixed.value in names:
             self._fixed.options = names
         for display in self._on.values():
             display.update()
@@ -179,8 +183,8 @@ class Displays:
 
     def _draw_anew(self) -> None:
         """Draw everything in the fixed frame that was chosen."""
-        for key in list(self._on):
-            self._switch(key, self._topics[key], True)
+        for key, display in list(self._on.items()):  # also of a topic that has gone
+            self._switch(key, display.kind, True)
         if self._axes is not None:
             self._switch_axes(False)
             self._switch_axes(True)
@@ -301,14 +305,24 @@ def decompressed(image: CompressedImage) -> Any:
 
     try:
         with Pictures.open(io.BytesIO(bytes(image.data)), formats=("JPEG", "PNG")) as found:
-            return np.asarray(found.convert("RGB")) if 3 * math.prod(found.size) <= LARGEST else None
+            if 3 * math.prod(found.size) > LARGEST:
+                return None
+            if not found.mode.startswith("I"):
+                return np.asarray(found.convert("RGB"))
+            depths = np.asarray(found).astype("<u2")  # 16 bits
+            data = array("B", depths.tobytes())
+            return picture(Image(height=found.height, width=found.width, encoding="16UC1", data=data))
     except (OSError, ValueError, SyntaxError, Pictures.DecompressionBombError):
         return None
 
 
 def fan(measured: Range) -> Any:
-    """The outline (n, 3) of what a distance sensor sees, up to what it has hit, in m in its frame."""
-    distance = measured.range if math.isfinite(measured.range) else measured.max_range
+    """The outline (n, 3) of what a distance sensor sees, up to what it has hit, in m in its frame: to its limit where
+    nothing is near (inf), its nearest where something is too near (-inf); empty if it has not measured.
+    """
+    distance = min(max(measured.range, measured.min_range), measured.max_range)
+    if math.isnan(measured.range) or not math.isfinite(distance) or not math.isfinite(measured.field_of_view):
+        return np.zeros((0, 3))
     turn = np.linspace(-measured.field_of_view / 2, measured.field_of_view / 2, ELLIPSE)
     arc = np.stack((distance * np.cos(turn), distance * np.sin(turn), np.zeros_like(turn)), axis=1)
     return np.concatenate((np.zeros((1, 3)), arc, np.zeros((1, 3))))

@@ -321,7 +321,8 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
     def shown(drift: float = 0.0) -> bool:
         at = TransformMessage(Vector3(0.0, 0.0, 0.1))
         there = TransformStamped(Header(frame_id="map"), message.header.frame_id, TransformMessage(Vector3(0.3)))
-        frames.put(TFMessage([TransformStamped(Header(frame_id=message.child_frame_id), "laser", at), there]))
+        above = TransformStamped(Header(frame_id="world"), "map", TransformMessage())  # named as the choice is
+        frames.put(TFMessage([TransformStamped(Header(frame_id=message.child_frame_id), "laser", at), there, above]))
         first, many = -turned - math.pi / 2 - 0.05, [0.8] * 11
         scans.put(LaserScan(Header(frame_id="laser"), first, angle_increment=0.01, range_max=5.0, ranges=many))
         images.put(Image(height=2, width=2, encoding="rgb8", step=6, data=[0, 0, 255] * 4))

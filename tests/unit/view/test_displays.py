@@ -80,6 +80,21 @@ def test_a_distance_is_shown_as_far_as_it_was_measured() -> None:
     assert fan(Range(field_of_view=0.1, max_range=4.0, range=math.inf))[:, 0].max() == pytest.approx(4.0, rel=0.01)
 
 
+def test_a_distance_that_is_too_near_is_not_shown_as_far_and_none_is_not_shown() -> None:
+    near = fan(Range(field_of_view=0.1, min_range=0.2, max_range=4.0, range=-math.inf))
+    assert near[:, 0].max() == pytest.approx(0.2, rel=0.01)
+    for limit, measured in ((4.0, math.nan), (math.inf, math.inf), (math.nan, 1.0)):
+        assert np.isfinite(found := fan(Range(field_of_view=0.1, max_range=limit, range=measured))).all()
+        assert limit != 4.0 or not len(found)
+
+
+def test_a_compressed_depth_is_bright_where_it_is_near() -> None:
+    file = io.BytesIO()
+    Picture.fromarray(np.array([[500, 1000]], np.uint16)).save(file, "PNG")
+    near, far = decompressed(CompressedImage(data=array("B", file.getvalue())))[0, :, 0].tolist()
+    assert near > far > 0
+
+
 def test_a_covariance_is_an_ellipse_of_one_standard_deviation() -> None:
     covariance = [0.0] * 36
     covariance[0], covariance[7] = 0.04, 0.25
