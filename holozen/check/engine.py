@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Literal
 
 from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
-from holozen.check.sources import SourceFile, elements, read_sources, trace
 from holozen.robot import reader
 from holozen.robot.elements import Tag, read_xml, repair_xml
 from holozen.robot.errors import RobotError
@@ -16,6 +15,7 @@ from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import check_simulated
+from holozen.robot.sources import SourceFile, elements, read_sources, trace
 from holozen.robot.xacro import Outcome, is_xacro, read_text
 
 Severity = Literal["error", "warning"]

@@ -32,12 +32,12 @@ from holozen.check.engine import (
     split,
 )
 from holozen.check.examples import EXAMPLES
-from holozen.check.sources import expand_marked
 from holozen.robot import reader
 from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, FORCE, OMNI, kind_of
 from holozen.robot.packages import readable
+from holozen.robot.sources import expand_marked
 from holozen.robot.xacro import process
 from holozen.suggest import shorten
 

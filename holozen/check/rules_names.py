@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Iterator
 
 from holozen.check.engine import Mistake, Subject, rule
-from holozen.check.sources import SourceFile
 from holozen.robot.elements import Tag
+from holozen.robot.sources import SourceFile
 from holozen.suggest import listed, suggest
 
 PALETTE = 2  # this many unused colours are a palette shared by several robots

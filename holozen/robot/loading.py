@@ -1,7 +1,7 @@
 """Robot files -> a checked RobotModel, or a self-contained text. What is hostile in them is read in a process apart."""
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -15,6 +15,7 @@ from holozen.robot.meshes import data_uri, file_uri
 from holozen.robot.model import RobotModel
 from holozen.robot.packages import is_data, readable, readable_by_strangers, resolve_uri
 from holozen.robot.sdf_models import parse_sdf
+from holozen.robot.sources import source_lines
 from holozen.robot.urdf import read_robot
 from holozen.robot.xacro import expanded, is_xacro, read_text
 from holozen.suggest import cut
@@ -33,8 +34,12 @@ def load(
     RobotError; with `strict` also for a missing or invalid mesh, otherwise replaced by a box with a warning.
     """
     text, place, warnings = _written(path, args, packages, allow_env)
-    model = _apart(RobotModel, path, packages, parse, text, path, packages, place, strict)
-    return replace(model, warnings=warnings + model.warnings)
+    in_source = partial(_in_source, place, path, args, packages, allow_env)
+    try:
+        model = _apart(RobotModel, path, packages, parse, text, path, packages, place, strict)
+    except RobotError as error:
+        raise RobotError(*in_source([str(error)])) from None
+    return replace(model, warnings=warnings + in_source(model.warnings))
 
 
 def received(text: str, packages: Mapping[str, Path] = {}) -> RobotModel:
@@ -66,7 +71,7 @@ def _written(
     if not is_xacro(path, text):
         return text, "", ()
     outcome = expanded(path, args, packages, allow_env)
-    # Line numbers are those of the expanded text, so messages have to mention it.
+    # Where the line in the source is not known, messages give that of the expanded text.
     return outcome.text, f"{path} (as `holozen xacro` prints it)", outcome.warnings
 
 
@@ -121,8 +126,28 @@ def both(
 ) -> tuple[RobotModel, str]:
     """What `load` and `portable` make of a file, in one go; the warnings of the latter are among the model's."""
     text, place, warnings = _written(path, args, packages, allow_env)
-    model, sent = _apart(tuple[RobotModel, str], path, packages, _both, text, path, packages, place, strict)
-    return replace(model, warnings=warnings + model.warnings), sent
+    in_source = partial(_in_source, place, path, args, packages, allow_env)
+    try:
+        model, sent = _apart(tuple[RobotModel, str], path, packages, _both, text, path, packages, place, strict)
+    except RobotError as error:
+        raise RobotError(*in_source([str(error)])) from None
+    return replace(model, warnings=warnings + in_source(model.warnings)), sent
+
+
+def _in_source(
+    place: str, path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str],
+    messages: Sequence[str],
+) -> tuple[str, ...]:  # fmt: skip
+    """Messages about lines of the expanded text, which they call `place`, with the lines of the source instead."""
+    start = f"{place}, line "
+    if not place or not any(start in message for message in messages):
+        return tuple(messages)
+    lines = source_lines(path, args, packages, allow_env)
+
+    def named(found: re.Match[str]) -> str:
+        return lines.get(int(found[1]), found[0])
+
+    return tuple(re.sub(rf"{re.escape(start)}(\d+)", named, message) for message in messages)
 
 
 def _both(text: str, path: Path, packages: Mapping[str, Path], place: str, strict: bool) -> tuple[RobotModel, str]:

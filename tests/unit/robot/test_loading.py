@@ -3,6 +3,7 @@
 import math
 import re
 import shutil
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from holozen.robot.errors import RobotError
-from holozen.robot.loading import load, parse, portable
+from holozen.robot.loading import both, load, parse, portable
 from holozen.robot.meshes import hull
 from holozen.robot.model import Drive, Inertial, Limits, Link, Omni, Pose, RobotModel, Shape, driven
 from tests.students import MIXED, ROS_1, ROS_2, hb_bot, workspace
@@ -364,16 +365,33 @@ def test_what_xml_allows_around_the_elements_does_not_matter(text: str) -> None:
     assert parse(text.format("<link name='a'/>"), ORIGIN).root == "a"
 
 
-def test_a_xacro_file_is_loaded_and_its_lines_are_those_of_the_expanded_text(tmp_path: Path) -> None:
+def test_a_xacro_file_is_loaded_with_its_arguments(tmp_path: Path) -> None:
     path = tmp_path / "robot.xacro"
     head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
     path.write_text(f'{head}<xacro:arg name="m" default="1"/><link name="{{}}"/></robot>'.format("$(arg m)"))
     assert load(path).root == "1"
     assert load(path, {"m": "b"}).root == "b"
     for name in ("robot.xacro", "robot.urdf"):
-        (tmp_path / name).write_text(f'{head}<xacro:property name="x" value="1"/></robot>')
-        with pytest.raises(RobotError, match=rf"{name} \(as `holozen xacro` prints it\), line \d+: <robot name"):
+        (tmp_path / name).write_text(f'\n{head}<xacro:property name="x" value="1"/></robot>')
+        with pytest.raises(RobotError, match=rf"{name}, line 2: <robot name"):
             load(tmp_path / name)
+
+
+def test_a_mistake_in_a_macro_is_at_its_line_also_in_another_file(tmp_path: Path) -> None:
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">\n'
+    (tmp_path / "part.xacro").write_text(
+        f'{head}<xacro:macro name="part" params="name">\n<link name="${{name}}">\n<visual>\n<origin xyz="0 0 abc"/>'
+        '<geometry><box size="1 1 1"/></geometry></visual></link></xacro:macro></robot>'
+    )
+    path = tmp_path / "robot.xacro"
+    path.write_text(f'{head}<xacro:include filename="part.xacro"/>\n\n<xacro:part name="a"/></robot>')
+    for function in (load, partial(both, args={}, packages={}, strict=False, allow_env=())):
+        with pytest.raises(RobotError, match=r"part\.xacro, line 5: <origin> of <link name='a'> xyz: 'abc'"):
+            function(path)
+    computed = '<xacro:arg name="f" default="part"/><xacro:include filename="$(arg f).xacro"/>'
+    path.write_text(f'{head}{computed}\n<xacro:part name="a"/></robot>')
+    with pytest.raises(RobotError, match=r"robot\.xacro \(as `holozen xacro` prints it\), line \d+: <origin>"):
+        load(path)
 
 
 def test_packages_are_given_to_xacro_and_to_meshes(tmp_path: Path) -> None:
@@ -619,7 +637,7 @@ def test_a_mistake_that_people_make_is_reported_in_one_line_and_the_robot_drives
     assert model.drive == DRIVE
     (warning,) = model.warnings
     place, _, problem = warning.partition(": ")
-    assert place.startswith(f"{path} (as `holozen xacro` prints it), line ")
+    assert place.startswith(f"{path}, line ")
     assert problem == message
 
 

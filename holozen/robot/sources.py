@@ -5,14 +5,15 @@ import re
 import tempfile
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from xml.parsers import expat
 
 from holozen.robot import reader
 from holozen.robot.elements import Tag, read_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.packages import find_by_name, find_package, known_folders, lies_in
-from holozen.robot.xacro import expand_in_child, read_text
+from holozen.robot.packages import find_by_name, find_package, known_folders, lies_in, readable
+from holozen.robot.xacro import expand_in_child, process, read_text
 
 MARK = "holozen-line"  # the attribute that carries file and line through xacro
 MOST_FILES = 200
@@ -62,6 +63,35 @@ def trace(sources: list[SourceFile], plain: Tag, packages: Mapping[str, Path]) -
     places = [tag.attributes.pop(MARK, "") for tag in marked]
     same = [(tag.name, tag.attributes) for tag in marked] == [(tag.name, tag.attributes) for tag in elements(plain)]
     return places if same else []
+
+
+def source_lines(
+    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
+) -> dict[int, str]:
+    """Line of the expanded text -> "FILE, line N" of the element that begins there, as far as that is known."""
+    try:
+        found = reader.run(
+            list[tuple[int, str]], path, _source_lines, path, packages, readable=partial(readable, path, packages),
+            handlers={
+                "expand": partial(process, path, args, packages, allow_env),
+                "marked": partial(expand_marked, path, args, packages, allow_env),
+            },
+        )  # fmt: skip
+    except (RobotError, OSError):
+        return {}
+    return dict(reversed(found))  # of several on a line, the first
+
+
+def _source_lines(path: Path, packages: Mapping[str, Path]) -> list[tuple[int, str]]:
+    root = read_xml(reader.ask("expand").text, "expanded")
+    sources = read_sources(path, packages)
+    found = []
+    for tag, mark in zip(elements(root), trace(sources, root, packages), strict=False):
+        number, colon, line = mark.partition(":")
+        if colon:
+            here = int(tag.place.rpartition(", line ")[2])
+            found.append((here, f"{sources[int(number)].path}, line {line}"))
+    return found
 
 
 def expand_marked(
