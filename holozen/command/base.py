@@ -76,7 +76,7 @@ class Base:
         self._pose, self._moved_at, self._status_at = (0.0, 0.0, 0.0), now, -math.inf
 
     def velocity(self) -> Planar:
-        """The body-frame velocity (m/s, rad/s) to drive at now; zeros while nobody drives, or everybody is silent."""
+        """The body-frame velocity (m/s, rad/s) to drive at now; zeros while no source drives."""
         now = time.monotonic()
         moment = Moment(now, self._reads.since(now), (time.time(),))
         self._inputs.read(moment)

@@ -106,7 +106,7 @@ class Probe:
         time.sleep(2 * COMMAND_SILENCE)
         try:
             self.call("resume")
-        except BusError:  # a base may have no such service: then nobody has to be resumed
+        except BusError:  # a base without that service holds no sources
             pass
 
     def _read(self) -> list[Odometry]:
@@ -116,7 +116,7 @@ class Probe:
 
 
 def it_obeys_and_stops_in_silence(probe: Probe) -> None:
-    """It moves as commanded, and rests once nobody has commanded for 0.5 s."""
+    """It moves as commanded, and rests after 0.5 s without a command."""
     probe.drive(lambda: probe.script.put(Twist.planar(probe.speed)), 1)
     probe.rest(f"after {COMMAND_SILENCE:g} s without a command: is there a watchdog?")
 

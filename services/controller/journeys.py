@@ -21,7 +21,7 @@ MOST_POSES = 10_000  # of one goal, all loops included
 
 
 class Journey:
-    """Poses to visit, in order, and the key that they came on: one pose of goal_pose, for whose end nobody waits."""
+    """Poses to visit, in order, and the key that they came on: one pose of goal_pose has no client that waits for its end."""
 
     is_canceled = False  # whether its client no longer wants it
 
@@ -44,7 +44,7 @@ class Journey:
 
 
 class GoalJourney(Journey):
-    """The journey of an action's goal. Its end is published once, whoever causes it."""
+    """The journey of an action's goal. Its end is published once, by whichever cause."""
 
     def __init__(
         self, origin: str, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any

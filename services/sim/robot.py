@@ -44,7 +44,7 @@ class Robot:
         keep_stop: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
-        self._agenda: Agenda[Robot] = Agenda()  # which nobody reads, until `attend`
+        self._agenda: Agenda[Robot] = Agenda()  # unread until `attend`
         self._embody(mover)
         drive = model.drive
         command = command_key(model, prefix)

@@ -196,7 +196,7 @@ class Page:
     async def _on_hold(self, button: str, _event: Any) -> None:
         shown = self._shown_robot()
         if self._pressed.setdefault(button, _entity(shown)) != _entity(shown):
-            return  # nobody chose this robot for it
+            return  # no person has chosen this robot for it
         if driver := self._driver_of(shown):
             self._driven.add(driver)
             page, speeds = self._client.client_id, (float(self._speed.value), float(self._turn.value))

@@ -1,4 +1,4 @@
-"""Plays a bag on a bus that reaches nobody else, from where a page says."""
+"""Plays a bag on a bus of its own, from the position that a page sets."""
 
 import threading
 import time

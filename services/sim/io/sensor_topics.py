@@ -210,7 +210,7 @@ class ImuTopic:
         self._publisher: Publisher[ImuMessage] = bus.publisher(key_for(sensor.topic, prefix), ImuMessage)
         self._before: tuple[float, XYZ] | None = None  # s, and the velocity then
 
-    wanted = True  # also when nobody subscribes: what is measured must not depend on readers
+    wanted = True  # also without subscribers: what is measured must not depend on them
 
     def publish(self, step: Step, links: LinkStates) -> None:
         """Measure, and publish it."""

@@ -258,7 +258,7 @@ class DriveTopics:
             self._tf.queue(TFMessage([transform(header, self._base, position, rotation)]))
 
     def _measured(self, stamp: Time, moved: Moved) -> Moved:
-        """The pose since the start and with noise, as the file says. The noise of a time is the same whoever reads, and
+        """The pose since the start and with noise, as the file says. The noise of a time is the same for all readers, and
         however often.
         """
         ((x, y, z), rotation, velocity), noise = moved, self._drive.odometry_noise
