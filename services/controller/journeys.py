@@ -21,7 +21,7 @@ MOST_POSES = 10_000  # of one goal, all loops included
 
 
 class Journey:
-    """Poses to visit, in order, and the key that they came on: one pose of goal_pose has no client that waits for its end."""
+    """Poses to visit, in order, and the key that they came on. No client waits for the end of one pose of goal_pose."""
 
     is_canceled = False  # whether its client no longer wants it
 

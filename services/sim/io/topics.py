@@ -258,8 +258,8 @@ class DriveTopics:
             self._tf.queue(TFMessage([transform(header, self._base, position, rotation)]))
 
     def _measured(self, stamp: Time, moved: Moved) -> Moved:
-        """The pose since the start and with noise, as the file says. The noise of a time is the same for all readers, and
-        however often.
+        """The pose since the start and with noise, as the file says. The noise of a time is the same for all readers
+        and looks.
         """
         ((x, y, z), rotation, velocity), noise = moved, self._drive.odometry_noise
         if self._drive.odometry_from_start:

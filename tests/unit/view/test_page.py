@@ -67,8 +67,8 @@ class Buttons:
         self.client = MagicMock(client_id=7)
         self.made: dict[str, list[Any]] = {}
         self.client.gui.add_button = self._add
-        dropdowns: list[Any] = []
-        self.client.gui.add_dropdown.side_effect = lambda *_, **__: (dropdowns.append(MagicMock()), dropdowns[-1])[1]
+        dropdowns = [MagicMock() for _ in range(20)]  # more than there are
+        self.client.gui.add_dropdown.side_effect = dropdowns
         bus = MagicMock()
         bus.subscribe.return_value.try_recv.return_value = bus.state.return_value.try_recv.return_value = None
         self.page = Page(self.client, bus, self.robots, self.robots, MagicMock(late_at=-9.0), False)  # type: ignore[arg-type]
