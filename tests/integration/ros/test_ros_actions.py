@@ -73,6 +73,7 @@ if __name__ == '__main__':
 
 CLIENT = """
 import sys
+import time
 
 import rclpy
 from action_msgs.msg import GoalStatus
@@ -94,6 +95,8 @@ class FibonacciActionClient(Node):
         self._action_client.wait_for_server()
         self._send_goal_future = self._action_client.send_goal_async(
             goal_msg, feedback_callback=self.feedback_callback)
+        if sys.argv[2:3] == ['late']:
+            time.sleep(0.5)
         self._send_goal_future.add_done_callback(self.goal_response_callback)
 
     def goal_response_callback(self, future):
@@ -167,6 +170,11 @@ def test_a_goal_is_accepted_reports_its_progress_and_succeeds(town: Wire, script
         "accepted", "feedback [0, 1, 1]", "feedback [0, 1, 1, 2]", "feedback [0, 1, 1, 2, 3]",
         "result 4 [0, 1, 1, 2, 3]",
     ]  # fmt: skip
+
+
+def test_progress_waits_for_the_callback_of_the_answer_however_late_it_is_added(town: Wire, scripts: Path) -> None:
+    first, second, *_ = printed(client(town, scripts, "4", "late"))
+    assert (first, second) == ("accepted", "feedback [0, 1, 1]")
 
 
 @pytest.mark.parametrize(

@@ -209,7 +209,10 @@ class ActionClient(HelpfulAttributes):
         elif callback := self._feedback_callbacks.get(identity):
             callback(message)
 
-    def _report_early(self, identity: bytes) -> None:
+    def _report_early(self, identity: bytes, again: bool = False) -> None:
+        if not again:  # a script adds its callback to the future after the goal was sent, which may be after its answer
+            self._sender.tasks.create_task(self._report_early, identity, True)
+            return
         for message in self._early.pop(identity, ()):
             self._hear_feedback(message)
 
