@@ -95,6 +95,12 @@ class Theirs:
 
         return dict(get_topic_names_and_types(router_port=self._wire.port, timeout=1.0))
 
+    def services(self) -> dict[str, list[str]]:
+        """What `ros2 service list -t` shows, with the parts of actions."""
+        from zenoh_ros2_sdk import get_service_names_and_types
+
+        return dict(get_service_names_and_types(router_port=self._wire.port, timeout=1.0))
+
     def close(self) -> None:
         """End all of them."""
         from zenoh_ros2_sdk import ZenohSession

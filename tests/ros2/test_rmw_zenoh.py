@@ -165,6 +165,8 @@ def test_a_ros_node_is_a_client_of_our_actions(wire: Wire, theirs: "Theirs") -> 
     server.start()
     joined(wire)
     wait_for(lambda: "/fibonacci/_action/feedback" in theirs.topics())
+    parts = {f"/fibonacci/_action/{part}" for part in ("send_goal", "get_result")}
+    wait_for(lambda: parts <= theirs.services().keys())
     theirs.subscriber("/fibonacci/_action/feedback", f"{FIBONACCI}_FeedbackMessage", feedback.append)
     send = theirs.client("/fibonacci/_action/send_goal", f"{FIBONACCI}_SendGoal")
     result = theirs.client("/fibonacci/_action/get_result", f"{FIBONACCI}_GetResult")
