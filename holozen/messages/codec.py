@@ -48,7 +48,7 @@ def written(message: Message, wire: str) -> tuple[bytes, str]:
     """The bytes of `message`, and their wire: CDR for one with ANY_NUMBER that holds a NaN or an infinity."""
     if wire == "json" and not message.SETTLE:
         try:
-            if b"null" not in (payload := _encode_json(message)):  # as in _write_json
+            if not _has_null(payload := _encode_json(message)):
                 return payload, wire
         except UnicodeEncodeError:
             pass  # the long way has the reason
@@ -166,7 +166,13 @@ def _short(text: str) -> str:
 
 def _write_json(message: Message) -> tuple[bytes, bool]:
     payload = _encode_json(message)
-    return payload, b"null" not in payload  # msgspec writes NaN and infinities as null, which no message has otherwise
+    return payload, not _has_null(payload)
+
+
+def _has_null(payload: bytes) -> bool:
+    """Whether JSON may hold a NaN or an infinity, which msgspec writes as null; no message has one otherwise."""
+    first = payload.find(b"u")  # most messages have few of these, and one byte is found ten times faster than four
+    return first > 0 and b"null" in payload[first - 1 :]
 
 
 _WRITERS: dict[str, Callable[[Message], tuple[bytes, bool]]] = {
