@@ -218,15 +218,14 @@ REFUSED: dict[str, tuple[dict[str, object], int, str]] = {
 }
 
 
-@pytest.mark.parametrize("fault", REFUSED)
-def test_a_request_that_is_wrong_is_refused_with_a_code_and_changes_nothing(town: Town, fault: str) -> None:
+def test_a_request_that_is_wrong_is_refused_with_a_code_and_changes_nothing(town: Town) -> None:
     town.spawn("Fred")
-    fields, code, reported = REFUSED[fault]
-    request = si.SpawnEntityRequest(**({"name": "Ann", "resource_string": HB_BOT} | fields))  # type: ignore[arg-type]
-    found, reason = town.refusal(lambda: town.services.spawn(request))
-    assert (found, reported in reason, reason.isprintable()) == (code, True, True), reason
-    assert [entity.name for entity in town.entities] == ["Fred"]
-    assert len(town.entities.robots) == 1
+    for fault, (fields, code, reported) in REFUSED.items():
+        request = si.SpawnEntityRequest(**({"name": "Ann", "resource_string": HB_BOT} | fields))  # type: ignore[arg-type]
+        found, reason = town.refusal(partial(town.services.spawn, request))
+        assert (found, reported in reason, reason.isprintable()) == (code, True, True), (fault, reason)
+        assert [entity.name for entity in town.entities] == ["Fred"], fault
+        assert len(town.entities.robots) == 1
 
 
 def test_nothing_is_put_deep_inside_something_else(town: Town) -> None:
