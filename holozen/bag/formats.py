@@ -19,8 +19,6 @@ from holozen.messages import Message, codec
 from holozen.messages.definitions import Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 
-# Encodings that may carry JSON; the first ones do not describe the content.
-_MAYBE_JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
 _MCAP = {"application/msgpack": "msgpack", "application/cdr": "cdr", "application/protobuf": "protobuf"}
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _KEPT = ("type", "items", "properties")
@@ -96,7 +94,7 @@ def _message(payload: bytes, encoding: str, types: tuple[type[Message], ...]) ->
 
 def _mcap_encoding(payload: bytes, encoding: str, message: Message | None) -> str:
     name = encoding.partition(";")[0]
-    if name in _MAYBE_JSON:
+    if name in codec.JSON:
         if message is not None and payload[:1] == b"\0":  # bridges to ROS 2 write CDR without an Encoding
             return "cdr"
         return "json" if message is not None or _is_json(payload) else name or "zenoh/bytes"

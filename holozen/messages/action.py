@@ -4,6 +4,7 @@ An action class of `holozen run` (`holozen.ros.generated`) has the same names.
 """
 
 from functools import cached_property
+from types import SimpleNamespace
 from typing import Any
 
 import msgspec
@@ -23,22 +24,6 @@ class ActionPart(Message):
         cls.ROS = f"{package}/action/{name}"
 
 
-class Service:
-    """The two messages of a service."""
-
-    def __init__(self, request: type[Message], response: type[Message]) -> None:
-        self.Request: Any = request
-        self.Response: Any = response
-
-
-class Implementation:
-    """What travels: the messages of an action with a goal's id."""
-
-    def __init__(self, send_goal: Service, get_result: Service, feedback: type[Message]) -> None:
-        self.SendGoalService, self.GetResultService = send_goal, get_result
-        self.FeedbackMessage: Any = feedback
-
-
 class Action:
     """An action of Structs: `Goal`, `Result`, `Feedback`, and in `Impl` the messages that carry them."""
 
@@ -47,21 +32,21 @@ class Action:
         self.ROS = goal.ROS.removesuffix("_Goal")
 
     @cached_property
-    def Impl(self) -> Implementation:
-        """What travels, made on first use."""
+    def Impl(self) -> SimpleNamespace:
+        """What travels: the messages with a goal's id, made on first use."""
         from holozen.messages.builtin_interfaces import Time
         from holozen.messages.unique_identifier_msgs import UUID
 
-        return Implementation(
-            Service(
-                self._made("_SendGoalRequest", goal_id=UUID, goal=self.Goal),
-                self._made("_SendGoalReply", accepted=bool, stamp=Time),
+        return SimpleNamespace(
+            SendGoalService=SimpleNamespace(
+                Request=self._made("_SendGoalRequest", goal_id=UUID, goal=self.Goal),
+                Response=self._made("_SendGoalReply", accepted=bool, stamp=Time),
             ),
-            Service(
-                self._made("_GetResultRequest", goal_id=UUID),
-                self._made("_GetResultReply", status=Int8, result=self.Result),
+            GetResultService=SimpleNamespace(
+                Request=self._made("_GetResultRequest", goal_id=UUID),
+                Response=self._made("_GetResultReply", status=Int8, result=self.Result),
             ),
-            self._made("FeedbackMessage", goal_id=UUID, feedback=self.Feedback),
+            FeedbackMessage=self._made("FeedbackMessage", goal_id=UUID, feedback=self.Feedback),
         )
 
     def _made(self, ending: str, **fields: Any) -> type[Message]:

@@ -68,17 +68,14 @@ class Shape:
         return f"{owner}[{field.name!r}]"
 
 
-def _message_names(interface: Interface) -> list[str]:
-    return [part.name for part in interface.parts if part.kind == "msg"]
-
-
 class Codec:
     """Reads and writes one type, as values of a `shape`. Its code is generated on first use."""
 
     def __init__(self, interface: Interface, shape: Shape, name: str = "") -> None:
         if interface.kind != "msg":
             what = "a service" if interface.kind == "srv" else "an action"
-            raise CodecError(f"{interface.name} is {what}; its messages are {' and '.join(_message_names(interface))}")
+            names = " and ".join(part.name for part in interface.parts if part.kind == "msg")
+            raise CodecError(f"{interface.name} is {what}; its messages are {names}")
         self.interface, self._shape, self._name = interface, shape, name or interface.name
         self._readers: dict[str, Any] = {}
         self._writer: Any = None
@@ -87,13 +84,14 @@ class Codec:
         """The value in `payload`. Raises CodecError."""
         order = ORDERS.get(payload[:2])
         if order is None or len(payload) < len(HEADER):
-            raise CodecError(
-                f"not a {self._name}: {_start(payload)}; CDR begins with 00 00 or 00 01 and two more bytes"
-            )
+            start = f"{len(payload)} bytes that begin with {payload[:2].hex(' ')}" if payload else "no bytes"
+            raise CodecError(f"not a {self._name}: {start}; CDR begins with 00 00 or 00 01 and two more bytes")
         if len(payload) == len(HEADER) and not self.interface.fields:
             payload += b"\0"  # other libraries write no byte for an empty message
         try:
-            value, end = self._reader(order)(payload, len(HEADER), len(payload))
+            if order not in self._readers:
+                self._readers[order] = reader(self.interface, self._shape, order)
+            value, end = self._readers[order](payload, len(HEADER), len(payload))
         except struct.error:
             raise CodecError(f"not a {self._name}: cut off after {len(payload)} bytes") from None
         except UnicodeDecodeError as error:
@@ -116,20 +114,11 @@ class Codec:
         self._writer(value, len(HEADER), parts, odd)
         return b"".join(parts), not odd
 
-    def _reader(self, order: str) -> Any:
-        if order not in self._readers:
-            self._readers[order] = reader(self.interface, self._shape, order)
-        return self._readers[order]
-
 
 @cache
 def plain(interface: Interface) -> Codec:
     """The codec of a type as dicts."""
     return Codec(interface, Shape())
-
-
-def _start(payload: bytes) -> str:
-    return f"{len(payload)} bytes that begin with {payload[:2].hex(' ')}" if payload else "no bytes"
 
 
 def reader(interface: Interface, shape: Shape, order: str) -> Read:

@@ -25,7 +25,7 @@ WIRES = {"json": "application/json", "msgpack": "application/msgpack", "cdr": "a
 """The names that `--wire` takes, and the Encoding of each."""
 
 # Encodings that do not describe the content, or mean JSON, which is what people write by hand.
-_JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
+JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
 
 LONGEST = 200  # characters of a reason
 
@@ -87,7 +87,7 @@ def decode(payload: bytes, encoding: str, types: tuple[type[M], ...], tolerant: 
 
     Unknown fields are refused, or ignored if `tolerant` (`wire.is_command` has the rule).
     """
-    wire = "json" if payload[:1] == b"{" and encoding in _JSON else form(payload, encoding)
+    wire = "json" if payload[:1] == b"{" and encoding in JSON else form(payload, encoding)
     makers: Makers[M] = _decoders(types, encoding, wire)
     try:
         return _first(makers, payload)
@@ -104,7 +104,7 @@ def decoder(types: tuple[type[M], ...], tolerant: bool = False) -> Callable[[byt
 
     def read(payload: bytes, encoding: str) -> M:
         nonlocal first
-        if payload[:1] == b"{" and encoding in _JSON:
+        if payload[:1] == b"{" and encoding in JSON:
             first = first or _decoders(types, encoding, "json")[0][1]
             try:
                 return first(payload)
@@ -213,7 +213,14 @@ def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
 
 def form(payload: bytes, encoding: str) -> str:
     """The wire of a payload: "json", "msgpack" or "cdr". Raises CodecError for any other Encoding."""
-    return _format(encoding, _is_cdr(payload))
+    name = encoding.partition(";")[0]  # a schema may follow
+    if name in JSON:
+        # Bridges to ROS 2 write CDR without an Encoding; no text begins with a NUL.
+        return "cdr" if payload[:1] == b"\0" else "json"
+    found = next((wire for wire, written in WIRES.items() if written == name), None)
+    if found is None:
+        raise CodecError(f"unknown encoding {name[:80]!r}; known: {', '.join(WIRES.values())}")
+    return found
 
 
 def transcoded(interface: "Interface", payload: bytes, encoding: str) -> bytes:
@@ -229,22 +236,6 @@ def transcoded(interface: "Interface", payload: bytes, encoding: str) -> bytes:
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
         raise CodecError(_short(str(error))) from None
     return cdr.write(interface, value)
-
-
-def _format(encoding: str, is_cdr: bool) -> str:
-    """The wire of an Encoding, which may carry a schema after a semicolon."""
-    name = encoding.partition(";")[0]
-    if name in _JSON:
-        # Bridges to ROS 2 write CDR without an Encoding; no text begins with a NUL.
-        return "cdr" if is_cdr else "json"
-    found = next((wire for wire, written in WIRES.items() if written == name), None)
-    if found is None:
-        raise CodecError(f"unknown encoding {name[:80]!r}; known: {', '.join(WIRES.values())}")
-    return found
-
-
-def _is_cdr(payload: bytes) -> bool:
-    return payload[:1] == b"\0"
 
 
 def _structs() -> ModuleType:

@@ -6,7 +6,7 @@ along, and an echo has to start at once. The spellings of ROS 1 are read too: He
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from holozen.console import Failure
@@ -197,12 +197,13 @@ def parse(text: str, where: str, resolve: Resolve, first: int = 1) -> list[Secti
                 raise  # it names the file of the nested type
             except InterfaceError as error:
                 raise PlacedError(f"{where}:{number}: {error}") from None
-    return [_section(members) for members in sections]
-
-
-def _section(members: list[Field | Constant]) -> Section:
-    fields = tuple(member for member in members if isinstance(member, Field))
-    return Section(fields, tuple(member for member in members if isinstance(member, Constant)))
+    return [
+        Section(
+            tuple(member for member in members if isinstance(member, Field)),
+            tuple(member for member in members if isinstance(member, Constant)),
+        )
+        for members in sections
+    ]
 
 
 def _bare(line: str) -> str:
@@ -262,10 +263,14 @@ def _parsed_default(field: Field, text: str) -> Any:
     if not (text.startswith("[") and text.endswith("]")):
         raise InterfaceError(f"{field.name!r}: {text[:80]!r} is not a list; write [1, 2]")
     values = [value_of(field, item) for item in _items(field, text[1:-1])]
-    wrong = len(values) != field.bound if field.array == "fixed" else 0 < field.bound < len(values)
-    if wrong:
+    if not fits_length(field, len(values)):
         raise InterfaceError(f"{field.name!r}: {len(values)} values for {field.spelled()}")
     return values
+
+
+def fits_length(field: Field, length: int) -> bool:
+    """Whether an array field may have so many elements."""
+    return length == field.bound if field.array == "fixed" else not field.bound or length <= field.bound
 
 
 def _items(field: Field, text: str) -> list[str]:
@@ -323,9 +328,7 @@ def completed(interface: Interface, value: Any, path: str = "") -> dict[str, Any
     for name in value:
         if name not in names:
             where = f"{path}.{name}" if path else f"{name}"
-            raise InterfaceError(
-                f"{interface.name} has no field {where[:80]!r}{suggest(str(name), names) or _listed(names)}"
-            )
+            raise InterfaceError(f"{interface.name} has no field {where[:80]!r}{field_hint(str(name), names)}")
     return {
         field.name: _checked(field, value[field.name], f"{path}.{field.name}".lstrip("."))
         if field.name in value
@@ -334,19 +337,21 @@ def completed(interface: Interface, value: Any, path: str = "") -> dict[str, Any
     }
 
 
-def _listed(names: list[str]) -> str:
-    return f"; it has {', '.join(names)}" if names else "; it has none"
+def field_hint(name: str, names: Sequence[str]) -> str:
+    """The end of an error line about a field that a message does not have: the most similar one, or all."""
+    return suggest(name, names) or f"; it has {', '.join(names) or 'none'}"
 
 
 def _default(field: Field) -> Any:
     if field.default is not None:
         return list(field.default) if isinstance(field.default, list) else field.default
     if field.array:
-        return [_zero(field) for _ in range(field.bound if field.array == "fixed" else 0)]
-    return _zero(field)
+        return [zero(field) for _ in range(field.bound if field.array == "fixed" else 0)]
+    return zero(field)
 
 
-def _zero(field: Field) -> Any:
+def zero(field: Field) -> Any:
+    """One element of a field without a default."""
     if field.nested:
         return prototype(field.nested)
     if field.type in TEXTS:
@@ -361,8 +366,7 @@ def _checked(field: Field, value: Any, path: str) -> Any:
         value = [dict(zip(names, item, strict=True)) for item in value.items()]
     if not isinstance(value, list | tuple):
         raise InterfaceError(f"{path}: {_shown(value)} is not a list")
-    wrong = len(value) != field.bound if field.array == "fixed" else 0 < field.bound < len(value)
-    if wrong:
+    if not fits_length(field, len(value)):
         raise InterfaceError(f"{path}: {len(value)} values for {field.spelled()}")
     return [_element(field, inner, f"{path}[{index}]") for index, inner in enumerate(value)]
 

@@ -21,8 +21,12 @@ _IDS = {
 _BOUNDED_TEXT = 4  # from a string to a bounded string
 _ARRAYS = {"": 0, "fixed": 48, "bounded": 96, "sequence": 144}
 
-_TIME = "builtin_interfaces/msg/Time"
-_EVENT_INFO = "service_msgs/msg/ServiceEventInfo"
+_NO_FIELDS = (Field("structure_needs_at_least_one_member", "uint8"),)
+_TIME = Interface("builtin_interfaces/msg/Time", "msg", (Field("sec", "int32"), Field("nanosec", "uint32")))
+_EVENT_INFO = Interface("service_msgs/msg/ServiceEventInfo", "msg", (
+    Field("event_type", "uint8"), Field("stamp", _TIME.name, nested=_TIME), Field("client_gid", "char", "fixed", 16),
+    Field("sequence_number", "int64"),
+))  # fmt: skip
 
 Description = dict[str, Any]
 
@@ -31,65 +35,37 @@ Description = dict[str, Any]
 def type_hash(interface: Interface) -> str:
     """The hash of a message or a service, such as `RIHS01_` and 64 hexadecimal digits."""
     nested: dict[str, Description] = {}
-    described = _service(interface, nested) if interface.kind == "srv" else _message(interface, nested)
+    described = _described(_with_event(interface) if interface.kind == "srv" else interface, nested)
     whole = {"type_description": described, "referenced_type_descriptions": [nested[name] for name in sorted(nested)]}
     return f"RIHS01_{hashlib.sha256(json.dumps(whole).encode()).hexdigest()}"
 
 
-def _message(interface: Interface, nested: dict[str, Description]) -> Description:
-    fields = [_field(field, nested) for field in interface.fields]
-    return _described(interface.name, *fields or [_plain("structure_needs_at_least_one_member", "uint8")])
+def _described(interface: Interface, nested: dict[str, Description]) -> Description:
+    fields = [_field(field, nested) for field in interface.fields or _NO_FIELDS]
+    return {"type_name": interface.name, "fields": fields}
 
 
 def _field(field: Field, nested: dict[str, Description]) -> Description:
     if field.nested and field.nested.name not in nested:
         nested[field.nested.name] = {}  # its place, before those that are nested in it
-        nested[field.nested.name] = _message(field.nested, nested)
+        nested[field.nested.name] = _described(field.nested, nested)
     number = _NESTED if field.nested else _IDS[field.type] + (_BOUNDED_TEXT if field.longest else 0)
-    return _typed(
-        field.name, number + _ARRAYS[field.array], field.bound, field.longest, field.type * bool(field.nested)
-    )
+    kind = {
+        "type_id": number + _ARRAYS[field.array],
+        "capacity": field.bound,
+        "string_capacity": field.longest,
+        "nested_type_name": field.type if field.nested else "",
+    }
+    return {"name": field.name, "type": kind}
 
 
-def _service(interface: Interface, nested: dict[str, Description]) -> Description:
-    """A service has three messages: the third reports calls to observers (service_msgs)."""
-    assert interface.request
-    assert interface.response
-    halves = [interface.request, interface.response]
-    for half in halves:
-        nested[half.name] = _message(half, nested)
-    event = f"{interface.name}_Event"
-    sequences = [
-        _typed(name, _NESTED + _ARRAYS["bounded"], 1, 0, half.name)
-        for name, half in zip(("request", "response"), halves, strict=True)
-    ]
-    nested[event] = _described(event, _part("info", _EVENT_INFO), *sequences)
-    nested[_EVENT_INFO] = _described(
-        _EVENT_INFO,
-        _plain("event_type", "uint8"),
-        _part("stamp", _TIME),
-        _typed("client_gid", _IDS["char"] + _ARRAYS["fixed"], 16),
-        _plain("sequence_number", "int64"),
-    )
-    nested[_TIME] = _described(_TIME, _plain("sec", "int32"), _plain("nanosec", "uint32"))
-    parts = zip(
-        ("request_message", "response_message", "event_message"), [*(h.name for h in halves), event], strict=True
-    )
-    return _described(interface.name, *(_part(name, kind) for name, kind in parts))
-
-
-def _described(name: str, *fields: Description) -> Description:
-    return {"type_name": name, "fields": list(fields)}
-
-
-def _plain(name: str, kind: str) -> Description:
-    return _typed(name, _IDS[kind])
-
-
-def _part(name: str, kind: str) -> Description:
-    return _typed(name, _NESTED, nested=kind)
-
-
-def _typed(name: str, number: int, capacity: int = 0, longest: int = 0, nested: str = "") -> Description:
-    kind = {"type_id": number, "capacity": capacity, "string_capacity": longest, "nested_type_name": nested}
-    return {"name": name, "type": kind}
+def _with_event(service: Interface) -> Interface:
+    """A service as a message of three messages: the third reports calls to observers (service_msgs)."""
+    request, response = service.parts
+    event = Interface(f"{service.name}_Event", "msg", (
+        Field("info", _EVENT_INFO.name, nested=_EVENT_INFO),
+        Field("request", request.name, "bounded", 1, nested=request),
+        Field("response", response.name, "bounded", 1, nested=response),
+    ))  # fmt: skip
+    parts = {"request_message": request, "response_message": response, "event_message": event}
+    return Interface(service.name, "msg", tuple(Field(name, part.name, nested=part) for name, part in parts.items()))

@@ -29,10 +29,13 @@ from holozen.messages.definitions import (
     Field,
     Interface,
     InterfaceError,
+    field_hint,
+    fits_length,
+    zero,
 )
 from holozen.messages.message import packed
 from holozen.messages.registry import Registry
-from holozen.suggest import shorten, suggest
+from holozen.suggest import shorten
 
 Check = Callable[[Any], Any]
 """Takes the value assigned to a field and returns what is stored, or raises AssertionError."""
@@ -52,7 +55,8 @@ class RosMeta(StructMeta):
 
     def __call__(cls, *positions: Any, **given: Any) -> Any:
         if positions:
-            raise TypeError(f"{cls.__module__}.{cls.__name__} takes its fields by name: {_example(cls)}")
+            example = ", ".join(f"{name}=..." for name in getattr(cls, "__struct_fields__")[:3])  # noqa: B009
+            raise TypeError(f"{cls.__module__}.{cls.__name__} takes its fields by name: {cls.__name__}({example})")
         message, checks = _construct(cls), getattr(cls, "__checks__")  # noqa: B009
         for name, value in given.items():
             if name not in checks:
@@ -79,11 +83,14 @@ class RosMessage(Message, metaclass=RosMeta):
         _store(self, name, self.__checks__[name](value))
 
     def __repr__(self) -> str:
-        values = ", ".join(f"{name}={_printable(getattr(self, name))!r}" for name in self.__struct_fields__)
-        return f"{type(self).__module__}.{type(self).__name__}({values})"
+        values = []
+        for name in self.__struct_fields__:
+            value = getattr(self, name)
+            values.append(f"{name}={value.tolist() if type(value) is array else value!r}")
+        return f"{type(self).__module__}.{type(self).__name__}({', '.join(values)})"
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> "RosMessage":
-        return _restored(type(self), [deepcopy(getattr(self, name), memo) for name in self.__struct_fields__])
+    def __deepcopy__(self, memo: dict[int, Any]) -> Any:
+        return _construct(type(self), *(deepcopy(getattr(self, name), memo) for name in self.__struct_fields__))
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _unpickled, (self.__interface__.name, [getattr(self, name) for name in self.__struct_fields__])
@@ -217,33 +224,19 @@ def _settle(owner: str, interface: Interface, nested: dict[str, type[RosMessage]
 
 
 def _default(field: Field, nested: type | None) -> Callable[[], Any]:
-    one: Callable[[], Any] = partial(_construct, nested) if nested else partial(_same, _zero(field))
+    value = zero(field) if field.default is None else field.default
+    one: Callable[[], Any] = partial(_construct, nested) if nested else partial(_same, value)
     if code := _typecode(field):
         return partial(array, code, field.default or ())
     if isinstance(field.default, list):
         return partial(list, tuple(field.default))
-    if not field.array or field.array != "fixed":
+    if field.array != "fixed":
         return list if field.array else one
-    return partial(_row, one, field.bound) if nested else partial(list, (one(),) * field.bound)
-
-
-def _zero(field: Field) -> Any:
-    if field.default is not None:
-        return field.default
-    return "" if field.type in TEXTS else 0.0 if field.type in FLOATS else False if field.type == "bool" else 0
-
-
-def _row(one: Callable[[], Any], length: int) -> list[Any]:
-    return [one() for _ in range(length)]
+    return lambda: [one() for _ in range(field.bound)]
 
 
 def _same(value: Any) -> Any:
     return value
-
-
-def _printable(value: Any) -> Any:
-    """What a repr shows: the numbers of an array, as in ROS."""
-    return value.tolist() if type(value) is array else value
 
 
 def _module(interface: Interface) -> str:
@@ -256,22 +249,11 @@ def _last(interface: Interface) -> str:
 
 
 def _no_field(kind: Any, name: str) -> str:
-    known = kind.__struct_fields__
-    hint = suggest(name, known) or (f"; it has {', '.join(known)}" if known else "; it has none")
-    return f"{kind.__module__}.{kind.__name__} has no field {name!r}{hint}"
+    return f"{kind.__module__}.{kind.__name__} has no field {name!r}{field_hint(name, kind.__struct_fields__)}"
 
 
-def _example(kind: Any) -> str:
-    return f"{kind.__name__}({', '.join(f'{name}=...' for name in kind.__struct_fields__[:3])})"
-
-
-def _restored(kind: type[RosMessage], values: list[Any]) -> RosMessage:
-    made: RosMessage = _construct(kind, *values)
-    return made
-
-
-def _unpickled(name: str, values: list[Any]) -> RosMessage:
-    return _restored(find(name), values)
+def _unpickled(name: str, values: list[Any]) -> Any:
+    return _construct(find(name), *values)
 
 
 # Fields: their types for the decoder, and ROS's checks at every assignment
@@ -343,14 +325,14 @@ def _settled(owner: str, field: Field, nested: type | None) -> Check:
     def check(values: Any) -> list[Any]:
         where = ""
         try:
-            if _fits_length(field, len(values)) and _all_exact(field, values, exact):
+            if fits_length(field, len(values)) and _all_exact(field, values, exact):
                 return list(values) if type(values) is not list else values
             made = []
             for index, value in enumerate(values):
-                where = f"[{index}]: {_short(value)} of type '{_class_name(value)}'"
+                where = f"[{index}]: {_short(value)} of type '{type(value).__name__}'"
                 made.append(one(value))
             where = f": {len(values)} values"
-            if _fits_length(field, len(values)):
+            if fits_length(field, len(values)):
                 return made
         except _REJECTED:
             pass
@@ -359,17 +341,9 @@ def _settled(owner: str, field: Field, nested: type | None) -> Check:
     return check
 
 
-def _to_float(value: Any) -> Any:
-    return value if isinstance(value, str) else float(value)
-
-
-def _to_bool(value: Any) -> Any:
-    return value.item() if hasattr(value, "item") else value
-
-
 _LENIENT: dict[str, Check] = {
-    "bool": _to_bool,
-    **dict.fromkeys(FLOATS, _to_float),
+    "bool": lambda value: value.item() if hasattr(value, "item") else value,
+    **dict.fromkeys(FLOATS, lambda value: value if isinstance(value, str) else float(value)),
     **{kind: operator.index for kind in INTEGERS if kind != "byte"},
 }
 
@@ -405,7 +379,7 @@ def _list_check(owner: str, field: Field, nested: type | None, one: Check) -> Ch
 
     def check(given: Any) -> list[Any]:
         values = _as_list(given)
-        if values is None or not _fits_length(field, len(values)):
+        if values is None or not fits_length(field, len(values)):
             raise AssertionError(_rejection(owner, field, nested, given))
         if _all_exact(field, values, exact):
             return values if is_kept or values is not given else list(values)
@@ -430,10 +404,6 @@ def _as_list(value: Any) -> list[Any] | None:
     return list(value) if isinstance(value, Sequence | Set) and not isinstance(value, str) else None
 
 
-def _fits_length(field: Field, length: int) -> bool:
-    return length == field.bound if field.array == "fixed" else not field.bound or length <= field.bound
-
-
 def _all_exact(field: Field, values: list[Any], exact: type) -> bool:
     """Whether all values are of the exact class and in range: a quick test for the usual case."""
     if not values:
@@ -441,18 +411,10 @@ def _all_exact(field: Field, values: list[Any], exact: type) -> bool:
     if field.longest or not set(map(type, values)) <= {exact}:
         return False
     if field.type == "float32":
-        return _fit_float32(values)
+        return _fits("f", values)
     if exact is int:
         low, high = INTEGERS[field.type]
         return bool(low <= min(values) and max(values) <= high)
-    return True
-
-
-def _fit_float32(values: list[float]) -> bool:
-    try:
-        struct.pack(f"={len(values)}f", *values)
-    except OverflowError:
-        return False
     return True
 
 
@@ -512,15 +474,16 @@ def _filled(name: str, code: str, values: list[Any]) -> "array[Any]":
     try:
         return packed(code, values)
     except (OverflowError, struct.error):
-        index = next(index for index, value in enumerate(values) if not _fits(code, value))
+        index = next(index for index, value in enumerate(values) if not _fits(code, [value]))
         raise ValueError(f"{name}[{index}] of {values[index]!r} is too large") from None
 
 
-def _fits(code: str, value: Any) -> bool:
+def _fits(code: str, values: Sequence[Any]) -> bool:
     try:
-        return bool(packed(code, [value]))
+        struct.pack(f"={len(values)}{code}", *values)
     except (OverflowError, struct.error):
         return False
+    return True
 
 
 def _copied(code: str, given: Any) -> "array[Any] | None":
@@ -549,15 +512,14 @@ def _rejection(owner: str, field: Field, nested: type | None, value: Any, place:
         one = f"a sequence of {many + ' values' if many else 'values'} {one.removeprefix('a ')}"
         if (values := _as_list(value)) is not None:
             return f"The '{field.name}' field of {owner} must be {one}, not of {len(values)} values"
-    given = f"'{_class_name(value)}' ({_short(value)})"
+    given = f"'{type(value).__name__}' ({_short(value)})"
     text = f"The '{field.name}{place}' field of {owner} must be {one}{_limits(field)}, not {given}"
     return text + _remedy(field, wanted, value, place)
 
 
 def _limits(field: Field) -> str:
     if field.type in INTEGERS:
-        low, high = INTEGERS[field.type]
-        return f" in [{low}, {high}]"
+        return " in [{}, {}]".format(*INTEGERS[field.type])
     if field.longest:
         return f" of at most {field.longest} characters"
     return " within a float32" if field.type == "float32" else ""
@@ -572,10 +534,6 @@ def _remedy(field: Field, wanted: str, value: Any, place: str) -> str:
     if wanted == "float" and type(value) is int:
         return f"; write {_short(value)}.0, or float(...)"
     return f"; write {wanted}(...)" if hasattr(value, "item") or (wanted == "int" and isinstance(value, float)) else ""
-
-
-def _class_name(value: Any) -> str:
-    return type(value).__name__
 
 
 def _short(value: Any) -> str:
