@@ -91,7 +91,6 @@ class PushROSNamespace(Action):
         self.namespace = namespace
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.scope.namespace = context.full_name("", text(context, self.namespace))
 
 
@@ -106,7 +105,6 @@ class SetParameter(Action):
         self.name, self.value = name, value
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.scope.parameters.append({text(context, self.name): parameter_value(context, self.value)})
 
 
@@ -118,7 +116,6 @@ class SetParametersFromFile(Action):
         self.filename = filename
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.scope.parameters.append(text(context, self.filename))
 
 
@@ -130,7 +127,6 @@ class SetRemap(Action):
         self.src, self.dst = src, dst
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.scope.remappings.append((text(context, self.src), text(context, self.dst)))
 
 
@@ -161,7 +157,8 @@ def parameter_value(context: LaunchContext, value: Any) -> Any:
     if isinstance(value, ParameterValue):
         if not value.value_type:
             return parameter_value(context, value.value)
-        return _converted(value.value_type, _word(context, value.value))
+        word = str(value.value) if isinstance(value.value, bool | int | float) else text(context, value.value)
+        return _converted(value.value_type, word)
     if isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, Substitution) or (_is_list(value) and any(isinstance(each, Substitution) for each in value)):
@@ -191,10 +188,6 @@ def _as_yaml(value: Any) -> str:
 
 def _is_list(value: Any) -> bool:
     return isinstance(value, list | tuple)
-
-
-def _word(context: LaunchContext, value: Any) -> str:
-    return str(value) if isinstance(value, bool | int | float) else text(context, value)
 
 
 def _parsed(word: str) -> Any:

@@ -86,7 +86,6 @@ class SetLaunchConfiguration(Action):
         self.name, self.value = name, value
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.launch_configurations[text(context, self.name)] = text(context, self.value)
 
 
@@ -98,7 +97,6 @@ class UnsetLaunchConfiguration(Action):
         self.name = name
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.launch_configurations.pop(text(context, self.name), None)
 
 
@@ -110,7 +108,6 @@ class SetEnvironmentVariable(Action):
         self.name, self.value = name, value
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.environment[text(context, self.name)] = text(context, self.value)
 
 
@@ -137,7 +134,6 @@ class UnsetEnvironmentVariable(Action):
         self.name = name
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.environment.pop(text(context, self.name), None)
 
 
@@ -153,7 +149,6 @@ class GroupAction(Action):
         self.launch_configurations = dict(launch_configurations or {})
 
     def execute(self, context: LaunchContext) -> Entities:
-        """The actions."""
         if truth(context, self.scoped, "scoped"):
             context.scope = context.scope.copy()
         for name, value in self.launch_configurations.items():
@@ -189,7 +184,6 @@ class LogInfo(Action):
         self.msg = msg
 
     def execute(self, context: LaunchContext) -> None:
-        """Print it."""
         report(text(context, self.msg))
 
 
@@ -219,7 +213,6 @@ class TimerAction(Action):
         self._timer: object = None
 
     def execute(self, context: LaunchContext) -> None:
-        """Start the timer."""
         self._timer = context.runner.after(number(context, self.period, "period"), self.actions)
         self._runner = context.runner
 
@@ -237,7 +230,6 @@ class RegisterEventHandler(Action):
         self.event_handler = event_handler
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
         context.runner.register(self.event_handler)
 
 
@@ -257,7 +249,6 @@ class Shutdown(Action):
         self.reason = reason
 
     def execute(self, context: LaunchContext) -> None:
-        """End it."""
         context.runner.stop(text(context, self.reason))
 
 
@@ -272,7 +263,6 @@ class EmitEvent(Action):
         self.event = event
 
     def execute(self, context: LaunchContext) -> None:
-        """End it."""
         context.runner.stop(self.event.reason)
 
 

@@ -67,7 +67,7 @@ class Action(LaunchDescriptionEntity):
 
     def execute(self, context: LaunchContext) -> Entities | None:
         """Execute it; returns the entities to execute next. Raises LaunchError."""
-        return None
+        ...
 
 
 def checked(entities: Any, place: str) -> list[LaunchDescriptionEntity]:

@@ -241,7 +241,6 @@ class Restart(Action):
         self.action, self.program = action, program
 
     def execute(self, context: LaunchContext) -> None:
-        """Start it."""
         context.runner.start(self.action, self.program)
 
 

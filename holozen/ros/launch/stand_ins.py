@@ -149,18 +149,14 @@ class Simulation(Action):
         if context.simulates:
             return None
         context.simulates = True
-        world = _world_file(text(context, self.world))
+        world = text(context, self.world)
+        ours = data.find("worlds", f"{Path(world).stem or 'empty'}.world")  # for the names of Gazebo's own
+        if not Path(world).is_file() and ours.is_file():
+            world = str(ours)
         words = holozen_command(context, "sim", "--empty", "--world", world, *package_flags())
         report("launch: `holozen sim` replaces Gazebo; `holozen map` in another terminal shows what is in it")
         context.runner.start(self.target, Program("sim", words, environment=context.environment, required=True))
         return None
-
-
-def _world_file(given: str) -> str:
-    """The world file with that name; ours for the names of Gazebo's own."""
-    stem = Path(given).stem or "empty"
-    ours = data.find("worlds", f"{stem}.world")
-    return str(ours) if not Path(given).is_file() and ours.is_file() else given
 
 
 def _gz_world(args: str) -> str:

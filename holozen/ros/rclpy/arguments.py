@@ -1,9 +1,8 @@
 """ROS arguments of a command line: `--ros-args -r from:=to -p name:=value --params-file FILE --log-level LEVEL --`."""
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from holozen.console import printable
 from holozen.ros import parameter_yaml
@@ -22,13 +21,13 @@ WITHOUT_VALUE = tuple(f"--{verb}-{name}" for verb in ("enable", "disable") for n
 QUIET = "--disable-stdout-logs"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class Arguments:
     """The ROS arguments of a command line, for all nodes of a process, or of `cli_args`, for one node."""
 
-    remaps: tuple[names.Remap, ...] = ()
-    sections: tuple[Section, ...] = ()
-    levels: tuple[tuple[str, LoggingSeverity], ...] = ()
+    remaps: list[names.Remap] = field(default_factory=list)
+    sections: list[Section] = field(default_factory=list)
+    levels: list[tuple[str, LoggingSeverity]] = field(default_factory=list)
     """Loggers and their levels; "" is the default of all others."""
     quiet: bool = False
     """Whether loggers print nothing."""
@@ -71,7 +70,7 @@ def parse(args: Sequence[str] | None = None) -> Arguments:
 
     Raises RCLInvalidROSArgsError for a value that cannot be parsed, UnknownROSArgsError for an unknown flag.
     """
-    found = _Parsed()
+    found = Arguments()
     words = iter(sys.argv if args is None else args)
     for text in words:
         if not isinstance(text, str):
@@ -82,10 +81,8 @@ def parse(args: Sequence[str] | None = None) -> Arguments:
         for flag in words:
             if flag == END:
                 break
-            found.take(flag, words)
-    return Arguments(
-        tuple(found.remaps), tuple(found.sections), tuple(found.levels), found.quiet, unparsed=found.unparsed
-    )
+            _take(found, flag, words)
+    return found
 
 
 def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
@@ -93,42 +90,31 @@ def remove_ros_args(args: Sequence[str] | None = None) -> list[str]:
     return parse(args).unparsed
 
 
-class _Parsed:
-    """What was parsed so far."""
-
-    def __init__(self) -> None:
-        self.remaps: list[names.Remap] = []
-        self.sections: list[Section] = []
-        self.levels: list[tuple[str, LoggingSeverity]] = []
-        self.quiet = False
-        self.unparsed: list[str] = []
-
-    def take(self, flag: str, words: Iterator[str]) -> None:
-        """Parse one flag, with its value from the words after it."""
-        if flag == START or flag in WITHOUT_VALUE:
-            self.quiet = self.quiet or flag == QUIET
-            return
-        full = SHORT.get(flag, flag)
-        if full not in WITH_VALUE:
-            known = (*WITH_VALUE, *SHORT, *WITHOUT_VALUE)
-            hint = suggest(flag, known) or "; end the ROS arguments with -- before your own"
-            raise UnknownROSArgsError(f"unknown ROS argument {flag!r}{hint}")
-        text = next(words, None)
-        if text is None or text == END:
-            raise RCLInvalidROSArgsError(f"{flag} needs a value")
-        try:
-            self._read(full, text)
-        except (ValueError, NameValidationException) as error:
-            raise RCLInvalidROSArgsError(printable(f"{flag} {text}: {error}")) from None
-
-    def _read(self, flag: str, text: str) -> None:
-        readers: dict[str, Callable[[str], Any]] = {
-            REMAP: lambda text: self.remaps.append(names.remap(text)),
-            PARAM: lambda text: self.sections.append(parameter_yaml.assigned(text)),
-            FILE: lambda text: self.sections.extend(parameter_yaml.read(text)),
-            LEVEL: lambda text: self.levels.append(_level(text)),
-        }
-        readers.get(flag, str)(text)  # the other flags are accepted and have no effect
+def _take(found: Arguments, flag: str, words: Iterator[str]) -> None:
+    """Parse one flag, with its value from the words after it."""
+    if flag == START or flag in WITHOUT_VALUE:
+        found.quiet = found.quiet or flag == QUIET
+        return
+    full = SHORT.get(flag, flag)
+    if full not in WITH_VALUE:
+        known = (*WITH_VALUE, *SHORT, *WITHOUT_VALUE)
+        hint = suggest(flag, known) or "; end the ROS arguments with -- before your own"
+        raise UnknownROSArgsError(f"unknown ROS argument {flag!r}{hint}")
+    text = next(words, None)
+    if text is None or text == END:
+        raise RCLInvalidROSArgsError(f"{flag} needs a value")
+    try:
+        if full == REMAP:
+            found.remaps.append(names.remap(text))
+        elif full == PARAM:
+            found.sections.append(parameter_yaml.assigned(text))
+        elif full == FILE:
+            found.sections.extend(parameter_yaml.read(text))
+        elif full == LEVEL:
+            found.levels.append(_level(text))
+        # The other flags are accepted and have no effect.
+    except (ValueError, NameValidationException) as error:
+        raise RCLInvalidROSArgsError(printable(f"{flag} {text}: {error}")) from None
 
 
 def _level(text: str) -> tuple[str, LoggingSeverity]:

@@ -1,5 +1,6 @@
 """Client: calls a service."""
 
+import contextlib
 import threading
 import time
 import weakref
@@ -7,6 +8,7 @@ from typing import Any
 
 from holozen.messages.codec import CodecError
 from holozen.ros.rclpy.callback_groups import CallbackGroup
+from holozen.ros.rclpy.context import Context
 from holozen.ros.rclpy.exceptions import InvalidHandle
 from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
@@ -17,6 +19,7 @@ from holozen.transport.errors import BusError, NoReply, ServiceError
 __all__ = ["Client"]
 
 POLL = 0.01  # s between two looks for the service
+LOOK = 0.1  # s between two looks whether rclpy was shut down
 LONGEST = 86_400.0  # s for a service to answer
 
 
@@ -72,19 +75,7 @@ class Client(Owned):
 
         Raises TimeoutError, ServiceError with the service's reason, or InvalidHandle if it is destroyed while it waits.
         """
-        future, done = self.call_async(request), threading.Event()
-        future.watch(done.set)
-        deadline = None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
-        while not done.is_set():
-            left = 0.1 if deadline is None else min(0.1, deadline - time.monotonic())
-            if left <= 0:
-                future.cancel()
-                raise TimeoutError(f"no reply from {self.srv_name} within {timeout_sec:g} s")
-            self._handle.context.check_can_publish(f"call {self.srv_name}")
-            done.wait(left)
-        if future.cancelled():
-            raise InvalidHandle(f"the client of {self.srv_name} was destroyed while it waited for the reply")
-        return future.result()
+        return wait_for_reply(self.call_async(request), self._handle.context, self.srv_name, timeout_sec)
 
     def call_async(self, request: Any) -> Future:
         """Call the service; the future of the reply, at once."""
@@ -123,19 +114,43 @@ class Client(Owned):
             raise InvalidHandle(f"the client of {self.srv_name} was destroyed")
 
     def _call(self, request: Any, future: Future) -> None:
-        while not (future.done() or self._closed.is_set()):
-            try:
-                if not self._is_served():
-                    self._closed.wait(POLL)
-                    continue
-                reply = self._handle.bus.call(key(self.srv_name), request, self.srv_type.Response, LONGEST)
+        try:
+            if (reply := self._reply(request, future)) is not None:
                 return future.set_result(reply)
-            except NoReply:
-                continue
-            except (ServiceError, CodecError) as error:
+        except (ServiceError, CodecError) as error:
+            return future.set_exception(error)
+        except Exception as error:
+            if not self._closed.is_set() and not isinstance(error, BusError):
                 return future.set_exception(error)
-            except Exception as error:
-                if not self._closed.is_set() and not isinstance(error, BusError):
-                    return future.set_exception(error)
-                break
         future.cancel()
+
+    def _reply(self, request: Any, future: Future) -> Any:
+        """The reply to a request; None once nobody waits for it any more."""
+        while not (future.done() or self._closed.is_set()):
+            if not self._is_served():
+                self._closed.wait(POLL)
+                continue
+            with contextlib.suppress(NoReply):
+                return self._handle.bus.call(key(self.srv_name), request, self.srv_type.Response, LONGEST)
+        return None
+
+
+def wait_for_reply(future: Future, context: Context, name: str, timeout_sec: float | None = None) -> Any:
+    """The result of a future of the service or action `name`, once it is there.
+
+    Raises its exception, TimeoutError, InvalidHandle if it is cancelled, and what `Publisher.publish` raises after a
+    shutdown.
+    """
+    done = threading.Event()
+    future.watch(done.set)
+    deadline = None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
+    while not done.is_set():
+        left = LOOK if deadline is None else min(LOOK, deadline - time.monotonic())
+        if left <= 0:
+            future.cancel()
+            raise TimeoutError(f"no reply from {name} within {timeout_sec:g} s")
+        context.check_can_publish(f"call {name}")
+        done.wait(left)
+    if future.cancelled():
+        raise InvalidHandle(f"the client of {name} was destroyed while it waited for the reply")
+    return future.result()

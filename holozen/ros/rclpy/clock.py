@@ -6,7 +6,6 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import IntEnum
-from types import TracebackType
 from typing import Any, Self
 from weakref import WeakSet
 
@@ -21,14 +20,7 @@ from holozen.transport.errors import BusError
 from holozen.transport.pubsub import Subscription
 
 __all__ = [
-    "USE_SIM_TIME",
-    "Clock",
-    "ClockChange",
-    "JumpHandle",
-    "JumpThreshold",
-    "ROSClock",
-    "TimeJump",
-    "TimeSource",
+    "USE_SIM_TIME", "Clock", "ClockChange", "JumpHandle", "JumpThreshold", "ROSClock", "TimeJump", "TimeSource",
 ]  # fmt: skip
 
 USE_SIM_TIME = "use_sim_time"
@@ -103,7 +95,7 @@ class JumpHandle:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_error: type[BaseException] | BaseException | TracebackType | None) -> None:
+    def __exit__(self, *_error: object) -> None:
         self.unregister()
 
 

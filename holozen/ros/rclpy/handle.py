@@ -1,6 +1,7 @@
 """NodeHandle: what the publishers, subscriptions, services and clients of a node share with it."""
 
 import threading
+from collections.abc import Iterable
 
 from holozen.bus import Bus
 from holozen.ros.catalog import HelpfulAttributes
@@ -9,7 +10,10 @@ from holozen.ros.rclpy.arguments import Arguments
 from holozen.ros.rclpy.context import Context
 from holozen.ros.rclpy.exceptions import InvalidHandle, NotInitializedException
 from holozen.ros.rclpy.logging import get_logger
+from holozen.transport.actions import Found
 from holozen.transport.graph import Endpoint, Graph, on_key
+
+NamesAndTypes = list[tuple[str, list[str]]]
 
 
 class NodeHandle:
@@ -74,3 +78,11 @@ class Owned(HelpfulAttributes):
     def logger_name(self) -> str:
         """The name of its node's logger."""
         return self._handle.logger.name
+
+
+def names_and_types(found: Iterable[Endpoint | Found]) -> NamesAndTypes:
+    """The absolute names of endpoints or actions, each with its types."""
+    types: dict[str, set[str]] = {}
+    for one in found:
+        types.setdefault(f"/{one.key}", set()).add(one.type)
+    return [(name, sorted(types[name])) for name in sorted(types)]

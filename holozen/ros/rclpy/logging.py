@@ -82,48 +82,39 @@ MOST_CALLS = 10_000  # that are remembered: generated code must not fill the mem
 Call = tuple[str, Place]  # the name of a logger, and where it is called
 
 
-class _Filters:
-    """Drops repeated lines of calls with `once`, `skip_first` or `throttle_duration_sec`."""
+_filter_lock = threading.Lock()
+_call_levels: dict[Call, LoggingSeverity] = {}
+_last_lines: dict[Call, int] = {}  # when a call was printed, in ns
 
-    def __init__(self) -> None:
-        self._lock = threading.Lock()
-        self._levels: dict[Call, LoggingSeverity] = {}
-        self._last: dict[Call, int] = {}
 
-    def passes(
-        self,
-        name: str,
-        place: Place,
-        severity: LoggingSeverity,
-        *,
-        once: bool,
-        skip_first: bool,
-        seconds: float | None,
-        clock: Any,
-    ) -> bool:
-        """Whether a line is printed. Raises ValueError if a call logs at two levels, TypeError for invalid seconds."""
-        if seconds is not None and (isinstance(seconds, bool) or not isinstance(seconds, int | float)):
-            raise TypeError(f"throttle_duration_sec is a {type(seconds).__name__}; use seconds, as a number")
-        call = (name, place)
-        with self._lock:
-            if len(self._levels) >= MOST_CALLS:
-                return True
-            is_first = call not in self._levels
-            if self._levels.setdefault(call, severity) != severity:
-                raise ValueError(
-                    f"{place.file}:{place.line} logs at {severity.name}, and before at {self._levels[call].name}; "
-                    "a call with once, skip_first or throttle_duration_sec must keep its level"
-                )
-            if (once and not is_first) or (skip_first and is_first):
-                return False
-            return seconds is None or self._is_due(call, seconds, clock)
+def _passes(
+    call: Call, level: LoggingSeverity, once: bool, skip_first: bool, seconds: float | None, clock: Any
+) -> bool:
+    """Whether a call with `once`, `skip_first` or `throttle_duration_sec` prints its line now.
 
-    def _is_due(self, call: Call, seconds: float, clock: Any) -> bool:
+    Raises ValueError if a call logs at two levels, TypeError for invalid seconds.
+    """
+    if seconds is not None and (isinstance(seconds, bool) or not isinstance(seconds, int | float)):
+        raise TypeError(f"throttle_duration_sec is a {type(seconds).__name__}; use seconds, as a number")
+    with _filter_lock:
+        if len(_call_levels) >= MOST_CALLS:
+            return True
+        is_first = call not in _call_levels
+        if (before := _call_levels.setdefault(call, level)) != level:
+            place = call[1]
+            raise ValueError(
+                f"{place.file}:{place.line} logs at {level.name}, and before at {before.name}; "
+                "a call with once, skip_first or throttle_duration_sec must keep its level"
+            )
+        if (once and not is_first) or (skip_first and is_first):
+            return False
+        if seconds is None:
+            return True
         now = clock.now().nanoseconds if hasattr(clock, "now") else time.monotonic_ns()
-        last = self._last.get(call)
+        last = _last_lines.get(call)
         if last is not None and last <= now < last + seconds * 1e9:  # a clock that was set back starts again
             return False
-        self._last[call] = now
+        _last_lines[call] = now
         return True
 
 
@@ -131,7 +122,6 @@ DEFAULT = LoggingSeverity.INFO
 
 _levels: dict[str, LoggingSeverity] = {}
 _quiet = False
-_filters = _Filters()
 
 
 class RcutilsLogger(HelpfulAttributes):
@@ -177,10 +167,10 @@ class RcutilsLogger(HelpfulAttributes):
         if not self.is_enabled_for(level):
             return False
         place = _caller()
-        if (once or skip_first or throttle_duration_sec is not None) and not _filters.passes(
-            self.name, place, level, once=once, skip_first=skip_first, seconds=throttle_duration_sec,
-            clock=throttle_time_source_type,
-        ):  # fmt: skip
+        is_filtered = once or skip_first or throttle_duration_sec is not None
+        if is_filtered and not _passes(
+            (self.name, place), level, once, skip_first, throttle_duration_sec, throttle_time_source_type
+        ):
             return False
         _write(level, self.name, str(message), place)
         return True

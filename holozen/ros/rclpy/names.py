@@ -116,7 +116,9 @@ def remap(text: str) -> Remap:
     if match in ("__node", "__name"):
         return Remap("__node", check_node_name(replacement), only)
     if match == "__ns":
-        return Remap("__ns", _absolute(replacement), only)
+        if not replacement.startswith("/"):
+            raise InvalidNamespaceException(replacement, "it does not start with /", 0)
+        return Remap("__ns", check_namespace(replacement), only)
     if match.startswith("__"):
         raise ValueError(f"{match} cannot be remapped; use __node, __ns, or a name")
     bare = match
@@ -125,12 +127,6 @@ def remap(text: str) -> Remap:
     for name in (bare, replacement):
         expand(name, "node", "/")
     return Remap(match, replacement, only)
-
-
-def _absolute(namespace: str) -> str:
-    if not namespace.startswith("/"):
-        raise InvalidNamespaceException(namespace, "it does not start with /", 0)
-    return check_namespace(namespace)
 
 
 def _text(name: object, what: str) -> str:

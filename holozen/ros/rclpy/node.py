@@ -4,7 +4,7 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import Any, NamedTuple, Self, TypeVar
@@ -24,7 +24,7 @@ from holozen.ros.rclpy.exceptions import (
     ParameterUninitializedException,
 )
 from holozen.ros.rclpy.executors import Executor
-from holozen.ros.rclpy.handle import NodeHandle
+from holozen.ros.rclpy.handle import NamesAndTypes, NodeHandle, names_and_types
 from holozen.ros.rclpy.logging import RcutilsLogger
 from holozen.ros.rclpy.parameter import (
     PARAMETER_SEPARATOR_STRING,
@@ -49,7 +49,6 @@ __all__ = ["HIDDEN_NODE_PREFIX", "Node", "TopicEndpointInfo", "TopicEndpointType
 HIDDEN_NODE_PREFIX = "_"
 
 T = TypeVar("T")
-NamesAndTypes = list[tuple[str, list[str]]]
 
 CLOSE_LIMIT = 0.15  # s for the threads of service calls to end
 POLL = 0.01  # s between two looks for another node
@@ -565,11 +564,11 @@ class Node(HelpfulAttributes):
 
     def get_topic_names_and_types(self, no_demangle: bool = False) -> NamesAndTypes:
         """Every topic with its types."""
-        return _names_and_types(end for end in self._holozen.endpoints() if end.kind in ("pub", "sub"))
+        return names_and_types(end for end in self._holozen.endpoints() if end.kind in ("pub", "sub"))
 
     def get_service_names_and_types(self) -> NamesAndTypes:
         """Every service with its types."""
-        return _names_and_types(end for end in self._holozen.endpoints() if end.kind == "srv")
+        return names_and_types(end for end in self._holozen.endpoints() if end.kind == "srv")
 
     def get_publishers_info_by_topic(self, topic_name: str, no_mangle: bool = False) -> list[TopicEndpointInfo]:
         """The publishers of a topic."""
@@ -583,17 +582,17 @@ class Node(HelpfulAttributes):
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> NamesAndTypes:
         """The topics that a node publishes."""
-        return _names_and_types(self._holozen.endpoints_of(node_name, node_namespace, "pub"))
+        return names_and_types(self._holozen.endpoints_of(node_name, node_namespace, "pub"))
 
     def get_subscriber_names_and_types_by_node(
         self, node_name: str, node_namespace: str, no_demangle: bool = False
     ) -> NamesAndTypes:
         """The topics that a node subscribes to."""
-        return _names_and_types(self._holozen.endpoints_of(node_name, node_namespace, "sub"))
+        return names_and_types(self._holozen.endpoints_of(node_name, node_namespace, "sub"))
 
     def get_service_names_and_types_by_node(self, node_name: str, node_namespace: str) -> NamesAndTypes:
         """The services that a node provides."""
-        return _names_and_types(self._holozen.endpoints_of(node_name, node_namespace, "srv"))
+        return names_and_types(self._holozen.endpoints_of(node_name, node_namespace, "srv"))
 
     def get_node_names(self) -> list[str]:
         """The name of every node, without its namespace."""
@@ -664,13 +663,6 @@ def _stack_level_of_the_script() -> int:
     while frame.f_back is not None and frame.f_code.co_filename.startswith(_OURS):
         frame, level = frame.f_back, level + 1
     return level
-
-
-def _names_and_types(ends: Iterable[Endpoint]) -> NamesAndTypes:
-    found: dict[str, set[str]] = {}
-    for end in ends:
-        found.setdefault(f"/{end.key}", set()).add(end.type)
-    return [(name, sorted(types)) for name, types in sorted(found.items())]
 
 
 def _endpoint_info(end: Endpoint) -> TopicEndpointInfo:

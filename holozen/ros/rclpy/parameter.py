@@ -203,15 +203,6 @@ def _short(value: object) -> str:
 TOLERANCE = 1e-9  # of the steps of a range: decimal fractions are not exact in binary
 
 
-def _rejection(parameter: Parameter, descriptor: Any) -> str:
-    """Why a descriptor does not allow a value; empty if it does."""
-    if descriptor.read_only:
-        return f"{parameter.name} is read-only"
-    if reason := _out_of_range(parameter, descriptor):
-        return f"{parameter.name}: {parameter.value}: {reason}"
-    return _wrong_type(parameter, descriptor)
-
-
 def _wrong_type(parameter: Parameter, descriptor: Any) -> str:
     """Why the type does not fit the descriptor; empty if it does."""
     if descriptor.dynamic_typing:
@@ -301,7 +292,9 @@ class ParameterStore:
         """Set all or none; the reason of a rejection, empty if all were set. Raises ParameterNotDeclaredException."""
         with self.lock:
             for callback in list(self.pre):
-                parameters = _listed(callback(parameters), callback)
+                parameters = callback(parameters)
+                if not isinstance(parameters, list) or not all(isinstance(each, Parameter) for each in parameters):
+                    raise TypeError(f"{_name(callback)} returned {parameters!r}; it must return a list of Parameter")
             self.check_known(each.name for each in parameters)
             reason = next(filter(None, map(self.rejection, parameters)), "") or self._refusal(parameters)
             if reason:
@@ -314,8 +307,14 @@ class ParameterStore:
 
     def rejection(self, parameter: Parameter) -> str:
         """Why the descriptor does not allow a value; empty if it does."""
-        known = self.descriptors.get(parameter.name)
-        return _rejection(parameter, known) if known is not None else ""
+        descriptor = self.descriptors.get(parameter.name)
+        if descriptor is None:
+            return ""
+        if descriptor.read_only:
+            return f"{parameter.name} is read-only"
+        if reason := _out_of_range(parameter, descriptor):
+            return f"{parameter.name}: {parameter.value}: {reason}"
+        return _wrong_type(parameter, descriptor)
 
     def describe(self, name: str, descriptor: Any, parameter: Parameter) -> None:
         """Replace the descriptor of a parameter, and its value. Raises as `Node.set_descriptor`."""
@@ -362,12 +361,6 @@ class ParameterStore:
 def empty_descriptor(name: str, dynamic_typing: bool = False) -> Any:
     """A rcl_interfaces.msg.ParameterDescriptor without limits."""
     return find("rcl_interfaces/msg/ParameterDescriptor")(name=name, dynamic_typing=dynamic_typing)
-
-
-def _listed(parameters: Any, callback: Callback) -> list[Parameter]:
-    if not isinstance(parameters, list) or not all(isinstance(each, Parameter) for each in parameters):
-        raise TypeError(f"{_name(callback)} returned {parameters!r}; it must return a list of Parameter")
-    return parameters
 
 
 def _name(callback: Callback) -> str:

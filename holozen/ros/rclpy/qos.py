@@ -154,14 +154,12 @@ class QoSProfile(HelpfulAttributes):
         return all(getattr(self, name) == getattr(other, name) for name in KINDS)
 
     def __repr__(self) -> str:
-        values = (f"{name}={_shown(getattr(self, name))}" for name in KINDS)
+        values = []
+        for name in KINDS:
+            value = getattr(self, name)
+            shown = f"{type(value).__name__}.{value.name}" if isinstance(value, IntEnum) else repr(value)
+            values.append(f"{name}={shown}")
         return f"QoSProfile({', '.join(values)})"
-
-    def __copy__(self) -> "QoSProfile":
-        return QoSProfile(**{name: getattr(self, name) for name in KINDS})
-
-    def __deepcopy__(self, _memo: object) -> "QoSProfile":
-        return self.__copy__()
 
 
 DEFAULTS = {
@@ -173,37 +171,24 @@ DEFAULTS = {
 """Defaults for unset policies."""
 
 
-def _shown(value: object) -> str:
-    return f"{type(value).__name__}.{value.name}" if isinstance(value, IntEnum) else repr(value)
-
-
-def _preset(
-    depth: int,
-    reliability: ReliabilityPolicy = ReliabilityPolicy.RELIABLE,
-    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
-    history: HistoryPolicy = HistoryPolicy.KEEP_LAST,
-    liveliness: LivelinessPolicy = LivelinessPolicy.SYSTEM_DEFAULT,
-) -> QoSProfile:
-    return QoSProfile(
-        depth=depth, reliability=reliability, durability=durability, history=history, liveliness=liveliness
-    )
-
-
-qos_profile_default = _preset(10)
-qos_profile_unknown = _preset(
-    0, ReliabilityPolicy.UNKNOWN, DurabilityPolicy.UNKNOWN, HistoryPolicy.UNKNOWN, LivelinessPolicy.UNKNOWN
-)
-qos_profile_system_default = _preset(
-    0, ReliabilityPolicy.SYSTEM_DEFAULT, DurabilityPolicy.SYSTEM_DEFAULT, HistoryPolicy.SYSTEM_DEFAULT
-)
-qos_profile_sensor_data = _preset(5, ReliabilityPolicy.BEST_EFFORT)
-qos_profile_services_default = _preset(10)
-qos_profile_parameters = _preset(1000)
-qos_profile_parameter_events = _preset(1000)
-qos_profile_action_status_default = _preset(1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-qos_profile_best_available = _preset(
-    10, ReliabilityPolicy.BEST_AVAILABLE, DurabilityPolicy.BEST_AVAILABLE, liveliness=LivelinessPolicy.BEST_AVAILABLE
-)
+qos_profile_default = QoSProfile(depth=10)
+qos_profile_unknown = QoSProfile(
+    history=HistoryPolicy.UNKNOWN, reliability=ReliabilityPolicy.UNKNOWN, durability=DurabilityPolicy.UNKNOWN,
+    liveliness=LivelinessPolicy.UNKNOWN,
+)  # fmt: skip
+qos_profile_system_default = QoSProfile(
+    history=HistoryPolicy.SYSTEM_DEFAULT, reliability=ReliabilityPolicy.SYSTEM_DEFAULT,
+    durability=DurabilityPolicy.SYSTEM_DEFAULT,
+)  # fmt: skip
+qos_profile_sensor_data = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+qos_profile_services_default = QoSProfile(depth=10)
+qos_profile_parameters = QoSProfile(depth=1000)
+qos_profile_parameter_events = QoSProfile(depth=1000)
+qos_profile_action_status_default = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+qos_profile_best_available = QoSProfile(
+    depth=10, reliability=ReliabilityPolicy.BEST_AVAILABLE, durability=DurabilityPolicy.BEST_AVAILABLE,
+    liveliness=LivelinessPolicy.BEST_AVAILABLE,
+)  # fmt: skip
 
 
 class QoSPresetProfiles(Enum):

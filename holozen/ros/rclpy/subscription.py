@@ -101,9 +101,14 @@ class Subscription(Owned):
         """The callback with the next message, or None."""
         while (sample := self._next()) is not None:
             try:
-                message = sample.payload if self.raw else self._decoded(sample)
+                message = sample.payload
+                if not self.raw:
+                    message = codec.decode(sample.payload, sample.encoding, self._kinds, self._tolerant)
             except codec.CodecError as error:
-                self._reject(sample, error)
+                self.bad += 1
+                source = sample.source or "an unknown sender"
+                text = f"{self.topic}: dropped a message from {source} ({self.bad} so far): {error}"
+                self._handle.logger.warning(text, throttle_duration_sec=1.0)
                 continue
             if self._with_info:
                 now = time.time_ns()
@@ -116,15 +121,6 @@ class Subscription(Owned):
         if self.latched is None:
             return sample
         return self.latched.saw(sample) if sample else self.latched.take()
-
-    def _decoded(self, sample: Sample) -> Any:
-        return codec.decode(sample.payload, sample.encoding, self._kinds, self._tolerant)
-
-    def _reject(self, sample: Sample, error: Exception) -> None:
-        self.bad += 1
-        source = sample.source or "an unknown sender"
-        text = f"{self.topic}: dropped a message from {source} ({self.bad} so far): {error}"
-        self._handle.logger.warning(text, throttle_duration_sec=1.0)
 
 
 class _LatchedMessages:
@@ -175,16 +171,13 @@ class _LatchedMessages:
             while not self._closed.is_set():
                 for pause in RETRIES:
                     self._closed.wait(pause)
-                    self._ask()
+                    for reply in self._bus.ask_all(self._key, REPLY_TIMEOUT):
+                        if isinstance(reply, Sample):
+                            self._late.append(reply)
+                            self._waker.wake()
                 self.writers.recv()
         except BusError:
             return
-
-    def _ask(self) -> None:
-        for reply in self._bus.ask_all(self._key, REPLY_TIMEOUT):
-            if isinstance(reply, Sample):
-                self._late.append(reply)
-                self._waker.wake()
 
 
 def wait_for_message(

@@ -96,9 +96,6 @@ class Future(HelpfulAttributes):
         with self._lock:
             self._watchers = [one for one in self._watchers if one != watcher]
 
-    def _set_executor(self, executor: Any) -> None:
-        self._executor = executor
-
     def _finish(self, result: Any = None, exception: Exception | None = None, cancelled: bool = False) -> None:
         with self._lock:
             if self._done:

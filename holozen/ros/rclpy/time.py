@@ -72,10 +72,10 @@ class Duration(HelpfulAttributes):
 
     def __eq__(self, other: object) -> bool:
         # A comparison with a number would always be False, which is hard to notice.
-        return self._nanoseconds == self._of(other, "compare")._nanoseconds
+        return self._nanoseconds == self._of(other)._nanoseconds
 
     def __lt__(self, other: object) -> bool:
-        return self._nanoseconds < self._of(other, "compare")._nanoseconds
+        return self._nanoseconds < self._of(other)._nanoseconds
 
     def __add__(self, other: object) -> "Duration":
         if not isinstance(other, Duration):
@@ -95,10 +95,10 @@ class Duration(HelpfulAttributes):
     __rmul__ = __mul__
 
     @staticmethod
-    def _of(other: object, verb: str) -> "Duration":
+    def _of(other: object) -> "Duration":
         if isinstance(other, Duration):
             return other
-        raise TypeError(f"cannot {verb} a Duration with a {type(other).__name__}; use Duration(seconds=...)")
+        raise TypeError(f"cannot compare a Duration with a {type(other).__name__}; use Duration(seconds=...)")
 
 
 Infinite = Duration(nanoseconds=LARGEST - 1)

@@ -138,7 +138,7 @@ class GuardCondition:
         if not self._triggered:
             return None
         self._triggered = False
-        return self.callback or _do_nothing
+        return self.callback or (lambda: None)
 
     def arm(self, waker: Waker) -> None:
         """Wake `waker` when it is triggered."""
@@ -149,7 +149,3 @@ class GuardCondition:
         self.callback, self._triggered = None, False
 
     detach = destroy
-
-
-def _do_nothing() -> None:
-    """What a guard condition without a callback runs."""

@@ -3,6 +3,7 @@
 import threading
 import time as clock
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from holozen.ros.catalog import HelpfulAttributes
@@ -102,22 +103,16 @@ class Buffer(HelpfulAttributes):
         self, target_frame: str, source_frame: str, time: Any, timeout: Any = None, return_debug_tuple: bool = False
     ) -> Any:
         """Whether lookup_transform would succeed; with `return_debug_tuple` also why not."""
-        try:
-            self.lookup_transform(target_frame, source_frame, time, timeout)
-        except TransformException as error:
-            return (False, str(error)) if return_debug_tuple else False
-        return (True, "") if return_debug_tuple else True
+        look = partial(self.lookup_transform, target_frame, source_frame, time, timeout)
+        return _succeeds(look, return_debug_tuple)
 
     def can_transform_full(
         self, target_frame: str, target_time: Any, source_frame: str, source_time: Any, fixed_frame: str,
         timeout: Any = None, return_debug_tuple: bool = False,
     ) -> Any:  # fmt: skip
         """Whether lookup_transform_full would succeed; with `return_debug_tuple` also why not."""
-        try:
-            self.lookup_transform_full(target_frame, target_time, source_frame, source_time, fixed_frame, timeout)
-        except TransformException as error:
-            return (False, str(error)) if return_debug_tuple else False
-        return (True, "") if return_debug_tuple else True
+        words = (target_frame, target_time, source_frame, source_time, fixed_frame, timeout)
+        return _succeeds(partial(self.lookup_transform_full, *words), return_debug_tuple)
 
     def transform(self, object_stamped: Any, target_frame: str, timeout: Any = None, new_type: Any = None) -> Any:
         """A stamped point, vector or pose in another frame. Raises as lookup_transform, and TypeException."""
@@ -197,6 +192,14 @@ class Buffer(HelpfulAttributes):
                 self._waiting.append((look, future))
                 return
         future.set_result(found)
+
+
+def _succeeds(look: Callable[[], object], with_reason: bool) -> Any:
+    try:
+        look()
+    except TransformException as error:
+        return (False, str(error)) if with_reason else False
+    return (True, "") if with_reason else True
 
 
 def nanoseconds(time: Any) -> int:

@@ -83,7 +83,7 @@ def test_of_a_file_and_a_word_the_later_counts(tmp_path: Path) -> None:
 
 def test_levels_are_for_all_loggers_or_for_one() -> None:
     found = parse("--ros-args", "--log-level", "warn", "--log-level", "tom:=DEBUG")
-    assert found.levels == (("", LoggingSeverity.WARN), ("tom", LoggingSeverity.DEBUG))
+    assert found.levels == [("", LoggingSeverity.WARN), ("tom", LoggingSeverity.DEBUG)]
 
 
 def test_what_ros_takes_and_means_nothing_here_is_taken() -> None:

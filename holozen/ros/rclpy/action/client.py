@@ -1,6 +1,5 @@
 """ActionClient: sends goals."""
 
-import threading
 import time
 from collections.abc import Callable
 from functools import partial
@@ -11,17 +10,13 @@ from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.generated import find
 from holozen.ros.rclpy.action.server import check_action
 from holozen.ros.rclpy.callback_groups import CallbackGroup
-from holozen.ros.rclpy.client import Client
-from holozen.ros.rclpy.exceptions import InvalidHandle
+from holozen.ros.rclpy.client import Client, wait_for_reply
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
 from holozen.ros.rclpy.task import Future
 from holozen.transport.actions import CANCEL, FEEDBACK, MOST, RESULT, SEND, STATUS, State, new_id, wait_for_result
-from holozen.transport.errors import BusError, ServiceError
 
 __all__ = ["ActionClient", "ClientGoalHandle"]
-
-POLL = 0.1  # s between two looks whether rclpy was shut down
 
 
 class ClientGoalHandle(HelpfulAttributes):
@@ -44,7 +39,7 @@ class ClientGoalHandle(HelpfulAttributes):
 
     def cancel_goal(self) -> Any:
         """Ask to cancel it, and wait for the CancelGoal.Response."""
-        return self._client._waited(self.cancel_goal_async())
+        return self._client._result(self.cancel_goal_async())
 
     def cancel_goal_async(self) -> Future:
         """Ask to cancel it; the future of the CancelGoal.Response."""
@@ -52,7 +47,7 @@ class ClientGoalHandle(HelpfulAttributes):
 
     def get_result(self) -> Any:
         """Wait for its end: a message with `status` and `result`. Raises as the future of `get_result_async`."""
-        return self._client._waited(self.get_result_async())
+        return self._client._result(self.get_result_async())
 
     def get_result_async(self) -> Future:
         """The future of a message with `status` and `result`. It raises ServiceError if the server leaves before."""
@@ -66,20 +61,12 @@ class _ResultClient(Client):
         super().__init__(handle, *words)
         self._action = key(action_name)
 
-    def _call(self, request: Any, future: Future) -> None:
+    def _reply(self, request: Any, future: Future) -> Any:
         bus, kind = self._handle.bus, self.srv_type.Response
         payload, wire = codec.written(request, bus.wire)
         encoding = codec.encoding(wire, type(request))
-        try:
-            reply = wait_for_result(bus, self._action, payload, encoding, self._closed.is_set)
-            if reply:
-                return future.set_result(codec.decode(reply.payload, reply.encoding, (kind,), tolerant=True))
-        except (ServiceError, codec.CodecError) as error:
-            return future.set_exception(error)
-        except Exception as error:
-            if not self._closed.is_set() and not isinstance(error, BusError):
-                return future.set_exception(error)
-        future.cancel()
+        reply = wait_for_result(bus, self._action, payload, encoding, self._closed.is_set)
+        return codec.decode(reply.payload, reply.encoding, (kind,), tolerant=True) if reply else None
 
 
 class ActionClient(HelpfulAttributes):
@@ -137,7 +124,7 @@ class ActionClient(HelpfulAttributes):
 
     def send_goal(self, goal: Any, feedback_callback: Callable[[Any], Any] | None = None, goal_uuid: Any = None) -> Any:
         """Send a goal and wait for its end: a message with `status` and `result`; None if it was rejected."""
-        handle = self._waited(self.send_goal_async(goal, feedback_callback, goal_uuid))
+        handle = self._result(self.send_goal_async(goal, feedback_callback, goal_uuid))
         return handle.get_result() if handle.accepted else None
 
     def send_goal_async(
@@ -192,15 +179,8 @@ class ActionClient(HelpfulAttributes):
         future: Future = self._results.call_async(self._type.Impl.GetResultService.Request(goal_id=handle.goal_id))
         return future
 
-    def _waited(self, future: Future) -> Any:
-        """The result of a future, once it is there. Raises its exception, or InvalidHandle if it is cancelled."""
-        done = threading.Event()
-        future.watch(done.set)
-        while not done.wait(POLL):
-            self._node.context.check_can_publish(f"wait for {self._name}")
-        if future.cancelled():
-            raise InvalidHandle(f"the client of {self._name} was destroyed while it waited")
-        return future.result()
+    def _result(self, future: Future) -> Any:
+        return wait_for_reply(future, self._node.context, self._name)
 
     def _hear_feedback(self, message: Any) -> None:
         identity = bytes(message.goal_id.uuid)
