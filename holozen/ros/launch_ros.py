@@ -5,7 +5,6 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from holozen.robot.errors import RobotError
 from holozen.ros import parameter_yaml
 from holozen.ros.launch.actions import ExecuteProcess
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Substitution, Text, pairs, text
@@ -61,13 +60,10 @@ class Node(ExecuteProcess):
         """Start it, or its replacement. Raises LaunchError."""
         package, executable = text(context, self.package), text(context, self.executable)
         words = [text(context, word) for word in self.arguments]
-        try:
-            texts = {name: value for name, value in parameter_pairs(context, self.parameters) if isinstance(value, str)}
-            texts.pop("", None)  # files
-            node = Executable(self, package, executable, words, texts, text(context, self.namespace))
-            return self._run_node(context, node, text(context, self.name), self._ros_words(context))
-        except RobotError as error:
-            raise LaunchError(str(error), self.place) from None
+        texts = {name: value for name, value in parameter_pairs(context, self.parameters) if isinstance(value, str)}
+        texts.pop("", None)  # files
+        node = Executable(self, package, executable, words, texts, text(context, self.namespace))
+        return self._run_node(context, node, text(context, self.name), self._ros_words(context))
 
     def _ros_words(self, context: LaunchContext) -> list[str]:
         """The ROS arguments: name, namespace, remappings and parameters, those of the group first."""

@@ -8,7 +8,6 @@ from typing import Any
 
 from holozen.cli import VERBS
 from holozen.console import report
-from holozen.robot.errors import RobotError
 from holozen.ros import executables
 from holozen.ros.launch.event_handlers import Shutdown as ShutdownEvent
 from holozen.ros.launch.launch_context import (
@@ -65,11 +64,10 @@ class DeclareLaunchArgument(Action):
         context.used.add(self.name)
         if self.name not in values:
             if self.default_value is None:
-                raise LaunchError(f"launch argument {self.name!r} has no value; give {self.name}:=VALUE", self.place)
+                raise LaunchError(f"launch argument {self.name!r} has no value; give {self.name}:=VALUE")
             values[self.name] = text(context, self.default_value)
         if self.choices and values[self.name] not in self.choices:
-            message = f"{self.name}:={values[self.name]}: it must be one of {', '.join(self.choices)}"
-            raise LaunchError(message, self.place)
+            raise LaunchError(f"{self.name}:={values[self.name]}: it must be one of {', '.join(self.choices)}")
 
     def summary(self) -> str:
         """The argument in one line."""
@@ -168,7 +166,7 @@ class IncludeLaunchDescription(Action):
     def execute(self, context: LaunchContext) -> Entities:
         """The description of the file. Raises LaunchError, and what the file raises."""
         if len(context.scope.files) > DEEPEST:
-            raise LaunchError(f"launch files include one another more than {DEEPEST} levels deep", self.place)
+            raise LaunchError(f"launch files include one another more than {DEEPEST} levels deep")
         for name, value in self.launch_arguments:
             context.launch_configurations[text(context, name)] = text(context, value)
         path, description = self.source.load(context)
@@ -200,7 +198,7 @@ class OpaqueFunction(Action):
         """Call it. Raises what it raises."""
         found = self.function(context, *self.args, **self.kwargs)
         if inspect.isawaitable(found):
-            raise LaunchError("OpaqueFunction calls plain functions here, not async ones", self.place)
+            raise LaunchError("OpaqueFunction calls plain functions here, not async ones")
         return checked(found, self.place) if found is not None else ()
 
 
@@ -294,7 +292,7 @@ class ExecuteProcess(Action):
         """Start it, or its replacement. Raises LaunchError."""
         words = [text(context, word) for word in self.cmd]
         if not words:
-            raise LaunchError(f"{type(self).__name__} has no cmd", self.place)
+            raise LaunchError(f"{type(self).__name__} has no cmd")
         if truth(context, self.shell, "shell"):
             line = " ".join(words)
             words = _without_shell(line)
@@ -338,21 +336,18 @@ class ExecuteProcess(Action):
     def _run_node(
         self, context: LaunchContext, node: Executable, name: str, ros_words: list[str] | None = None
     ) -> Entities | None:
-        """Start an executable of a package by `holozen run`, or its replacement. Raises LaunchError."""
-        try:
-            replacement = stand_in(context, node)
-            if replacement is not None:
-                return replacement
-            prefix = text(context, self.prefix or "").partition(" ")[0]
-            if prefix.rpartition("/")[2] in TERMINALS:
-                hint = f"run it in another terminal: holozen run {node.package} {node.name}"
-                skip(context, self, f"{node.package} {node.name}", hint)
-                return None
-            ours = SCRIPTS.get(f"{node.package}/{node.name}")
-            if node.package and not ours:
-                executables.find(node.package, node.name, nameless=True)  # here, where the launch file's line is known
-        except (RobotError, executables.NotFound) as error:
-            raise LaunchError(str(error), self.place) from None
+        """Start an executable of a package by `holozen run`, or its replacement. Raises Failure."""
+        replacement = stand_in(context, node)
+        if replacement is not None:
+            return replacement
+        prefix = text(context, self.prefix or "").partition(" ")[0]
+        if prefix.rpartition("/")[2] in TERMINALS:
+            hint = f"run it in another terminal: holozen run {node.package} {node.name}"
+            skip(context, self, f"{node.package} {node.name}", hint)
+            return None
+        ours = SCRIPTS.get(f"{node.package}/{node.name}")
+        if node.package and not ours:
+            executables.find(node.package, node.name, nameless=True)  # here, where the launch file's line is known
         target = [str(ours)] if ours else [node.package, node.name] if node.package else [node.name]
         flags = package_flags(*([] if ours else [node.package]))
         words = holozen_command(context, "run", *flags, *target, *node.words, *(ros_words or []))
@@ -366,7 +361,7 @@ class ExecuteProcess(Action):
         delay = number(context, self.respawn_delay or 0.0, "respawn_delay") if is_respawned else None
         folder = text(context, self.cwd) if self.cwd else None
         if folder is not None and not Path(folder).is_dir():
-            raise LaunchError(f"cwd={folder!r} is not a folder", self.place)
+            raise LaunchError(f"cwd={folder!r} is not a folder")
         context.runner.start(self, Program(name, words, folder, environment, shell, respawn=delay))
 
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from holozen.ros.launch.launch_context import LaunchContext, Text, here, text, truth
+from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Text, here, text, truth
 from holozen.ros.launch.launch_description import Condition
 
 __all__ = ["IfCondition", "LaunchConfigurationEquals", "LaunchConfigurationNotEquals", "UnlessCondition"]
@@ -16,7 +16,10 @@ class IfCondition(Condition):
 
     def evaluate(self, context: LaunchContext) -> bool:
         """Whether it does. Raises LaunchError if the text is neither true nor false."""
-        return truth(context, self.predicate, f"{self.place}: the condition")
+        try:
+            return truth(context, self.predicate, "the condition")
+        except LaunchError as error:
+            raise LaunchError.of(error, self.place) from None
 
 
 class UnlessCondition(IfCondition):

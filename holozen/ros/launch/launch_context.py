@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, Self
 
 from holozen.console import Failure
 
@@ -21,10 +21,10 @@ class LaunchError(Failure):
         super().__init__(message)
         self.place = place
 
-    def at(self, place: str) -> "LaunchError":
-        """This error, with a place if it had none."""
-        self.place = self.place or place
-        return self
+    @classmethod
+    def of(cls, error: Failure, place: str) -> "LaunchError":
+        """An error with a place, unless it has one."""
+        return error if isinstance(error, LaunchError) and error.place else cls(str(error), place)
 
     def __str__(self) -> str:
         return ": ".join(filter(None, (self.place, super().__str__())))
@@ -130,10 +130,24 @@ class LaunchContext:
 
 
 class Substitution:
-    """A text that is evaluated when the launch file is executed."""
+    """A text that is evaluated when the launch file is executed; `place` is the file and line where it is written."""
+
+    place: str
+
+    def __new__(cls, *_args: Any, **_options: Any) -> Self:
+        made = super().__new__(cls)
+        made.place = here()
+        return made
 
     def perform(self, context: LaunchContext) -> str:
         """The text. Raises LaunchError."""
+        try:
+            return self._text(context)
+        except Failure as error:
+            raise LaunchError.of(error, self.place) from None
+
+    def _text(self, context: LaunchContext) -> str:
+        """The text; may raise any Failure."""
         raise LaunchError(f"{type(self).__name__} has no text")
 
     def describe(self) -> str:

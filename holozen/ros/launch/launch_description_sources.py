@@ -28,7 +28,7 @@ class PythonLaunchDescriptionSource:
         try:
             return path, gazebo_launch_file(path) or read(path)
         except LaunchError as error:
-            raise error.at(self.place) from None
+            raise LaunchError.of(error, self.place) from None
 
 
 class AnyLaunchDescriptionSource(PythonLaunchDescriptionSource):

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import count
 from typing import IO, Any
 
-from holozen.console import report
+from holozen.console import Failure, report
 from holozen.process import dies_with_parent
 from holozen.ros.launch.actions import DeclareLaunchArgument, IncludeLaunchDescription, OpaqueFunction
 from holozen.ros.launch.event_handlers import Event, EventHandler, ProcessExited, ProcessStarted, Shutdown
@@ -104,7 +104,7 @@ class LaunchService:
             try:
                 self.start(action, program)
             except LaunchError as error:
-                raise error.at(action.place) from None
+                raise LaunchError.of(error, action.place) from None
         self._execute()
 
     def skip(self, action: Action, ends: bool) -> None:
@@ -162,8 +162,8 @@ class LaunchService:
             self.context.scope, entity = self._queue.popleft()
             try:
                 found = entity.visit(self.context)
-            except LaunchError as error:
-                raise error.at(entity.place) from None
+            except Failure as error:
+                raise LaunchError.of(error, entity.place) from None
             except (TypeError, ValueError, AttributeError) as error:
                 if user_frames(error.__traceback__):  # raised by a function of the launch file
                     raise

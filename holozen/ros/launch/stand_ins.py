@@ -235,7 +235,7 @@ class Spawn(Action):
         else:
             robot = name if source == "-string" else self.node.texts.get(name)
         if source and robot is None:
-            raise LaunchError(_no_description(context, source, name), self.place)
+            raise LaunchError(_no_description(context, source, name))
         words = [*flags, *(_description_file(context, robot) if robot is not None else [])]
         words += package_flags(*_MENTIONED_PACKAGE.findall(robot or ""))
         words += [word for name in context.allow_env for word in ("--allow-env", name)]
@@ -260,7 +260,7 @@ class Spawn(Action):
                 del words[: len(values)]
             elif flag in (*_SPAWN_FLAGS, *_DESCRIPTION_FLAGS):
                 if not words:
-                    raise LaunchError(f"{flag} needs a value", self.place)
+                    raise LaunchError(f"{flag} needs a value")
                 value = words.pop(0)
                 if flag in _DESCRIPTION_FLAGS:
                     description = flag, value
@@ -271,9 +271,9 @@ class Spawn(Action):
             else:
                 known = [*_SPAWN_FLAGS, *_DESCRIPTION_FLAGS]
                 hint = suggest(flag, known) or f"; known: {', '.join(known)}"
-                raise LaunchError(f"unknown flag {flag!r} to spawn a robot{hint}", self.place)
+                raise LaunchError(f"unknown flag {flag!r} to spawn a robot{hint}")
         if not description[0] and "-file" not in flags:
-            raise LaunchError("to spawn a robot, give -file FILE or -topic robot_description", self.place)
+            raise LaunchError("to spawn a robot, give -file FILE or -topic robot_description")
         return flags, description
 
 

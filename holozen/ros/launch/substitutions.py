@@ -7,7 +7,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from holozen.robot.errors import RobotError
 from holozen.robot.xacro import expand_xacro, read_text
 from holozen.ros import executables, packages
 from holozen.ros.launch.launch_context import (
@@ -16,7 +15,6 @@ from holozen.ros.launch.launch_context import (
     Substitution,
     Text,
     describe,
-    here,
     text,
     truth,
 )
@@ -41,8 +39,7 @@ class TextSubstitution(Substitution):
     def __init__(self, *, text: str) -> None:
         self.text = text
 
-    def perform(self, context: LaunchContext) -> str:
-        """The text."""
+    def _text(self, context: LaunchContext) -> str:
         return self.text
 
 
@@ -50,17 +47,16 @@ class LaunchConfiguration(Substitution):
     """The value of a launch argument, or `default` if it has none."""
 
     def __init__(self, variable_name: Text, *, default: Any = None) -> None:
-        self.variable_name, self.default, self.place = variable_name, default, here()
+        self.variable_name, self.default = variable_name, default
 
-    def perform(self, context: LaunchContext) -> str:
-        """The value. Raises LaunchError if there is none."""
+    def _text(self, context: LaunchContext) -> str:
         name, values = text(context, self.variable_name), context.launch_configurations
         context.used.add(name)
         if name in values:
             return values[name]
         if self.default is None:
             hint = suggest(name, values) or f"; declared arguments: {', '.join(values) or 'none'}"
-            raise LaunchError(f"launch argument {name!r} is not declared before it is used{hint}", self.place)
+            raise LaunchError(f"launch argument {name!r} is not declared before it is used{hint}")
         return str(self.default) if isinstance(self.default, bool | int | float) else text(context, self.default)
 
     def describe(self) -> str:
@@ -74,8 +70,7 @@ class PathJoinSubstitution(Substitution):
     def __init__(self, substitutions: Any) -> None:
         self.substitutions = list(substitutions)
 
-    def perform(self, context: LaunchContext) -> str:
-        """The path."""
+    def _text(self, context: LaunchContext) -> str:
         return os.path.join(*(text(context, part) for part in self.substitutions))
 
     def describe(self) -> str:
@@ -87,32 +82,25 @@ class Command(Substitution):
     """The output of `xacro FILE name:=value ...` or `cat FILE`. No other program is run."""
 
     def __init__(self, command: Text, *, on_stderr: str = "fail") -> None:
-        self.command, self.place = command, here()
+        self.command = command
 
-    def perform(self, context: LaunchContext) -> str:
-        """The output. Raises LaunchError."""
-        try:
-            return _output(context, text(context, self.command))
-        except RobotError as error:
-            raise LaunchError(str(error), self.place) from None
-        except LaunchError as error:
-            raise error.at(self.place) from None
+    def _text(self, context: LaunchContext) -> str:
+        return _output(context, text(context, self.command))
 
 
 class FindExecutable(Substitution):
     """The path of a program."""
 
     def __init__(self, *, name: Text) -> None:
-        self.name, self.place = name, here()
+        self.name = name
 
-    def perform(self, context: LaunchContext) -> str:
-        """The path; only the name of a program that is replaced here. Raises LaunchError."""
+    def _text(self, context: LaunchContext) -> str:
         name = text(context, self.name)
         if name in REPLACED:
             return name
         found = shutil.which(name)
         if found is None:
-            raise LaunchError(f"no program {name!r} on the PATH", self.place)
+            raise LaunchError(f"no program {name!r} on the PATH")
         return found
 
 
@@ -120,17 +108,14 @@ class EnvironmentVariable(Substitution):
     """The value of an environment variable."""
 
     def __init__(self, name: Text, *, default_value: Any = None) -> None:
-        self.name, self.default, self.place = name, default_value, here()
+        self.name, self.default = name, default_value
 
-    def perform(self, context: LaunchContext) -> str:
-        """The value, or the default. Raises LaunchError if there is neither."""
+    def _text(self, context: LaunchContext) -> str:
         name = text(context, self.name)
         if name in context.environment:
             return context.environment[name]
         if self.default is None:
-            raise LaunchError(
-                f"the environment variable {name!r} is not set; set it, or give default_value", self.place
-            )
+            raise LaunchError(f"the environment variable {name!r} is not set; set it, or give default_value")
         return text(context, self.default)
 
 
@@ -138,33 +123,29 @@ class PythonExpression(Substitution):
     """The value of a Python expression, with the names of math; `python_modules` adds other modules."""
 
     def __init__(self, expression: Text, python_modules: Any = ()) -> None:
-        self.expression, self.modules, self.place = expression, list(python_modules), here()
+        self.expression, self.modules = expression, list(python_modules)
 
-    def perform(self, context: LaunchContext) -> str:
-        """The value as text. Raises LaunchError."""
+    def _text(self, context: LaunchContext) -> str:
         source = text(context, self.expression)
         try:
             names = {"math": math, **vars(math)}
             names |= {name: __import__(name) for name in (text(context, module) for module in self.modules)}
             return str(eval(source, names))
         except Exception as error:
-            message = f"PythonExpression {source!r}: {type(error).__name__}: {error}"
-            raise LaunchError(message, self.place) from None
+            raise LaunchError(f"PythonExpression {source!r}: {type(error).__name__}: {error}") from None
 
 
 class ThisLaunchFile(Substitution):
     """The path of the launch file."""
 
-    def perform(self, context: LaunchContext) -> str:
-        """The path."""
+    def _text(self, context: LaunchContext) -> str:
         return str(context.file)
 
 
 class ThisLaunchFileDir(Substitution):
     """The folder of the launch file."""
 
-    def perform(self, context: LaunchContext) -> str:
-        """The folder."""
+    def _text(self, context: LaunchContext) -> str:
         return str(context.file.parent)
 
 
@@ -172,16 +153,15 @@ class FileContent(Substitution):
     """The content of a file."""
 
     def __init__(self, path: Text) -> None:
-        self.path, self.place = path, here()
+        self.path = path
 
-    def perform(self, context: LaunchContext) -> str:
-        """The text. Raises LaunchError."""
+    def _text(self, context: LaunchContext) -> str:
         path = text(context, self.path)
         try:
             return Path(path).read_text()
         except (OSError, UnicodeDecodeError) as error:
             reason = getattr(error, "strerror", "") or "not a text file"
-            raise LaunchError(f"cannot read {path}: {reason}", self.place) from None
+            raise LaunchError(f"cannot read {path}: {reason}") from None
 
 
 class AnonName(Substitution):
@@ -190,8 +170,7 @@ class AnonName(Substitution):
     def __init__(self, name: Text) -> None:
         self.name = name
 
-    def perform(self, context: LaunchContext) -> str:
-        """The name with the number of this process."""
+    def _text(self, context: LaunchContext) -> str:
         return f"{text(context, self.name)}_{os.getpid()}"
 
 
@@ -199,10 +178,9 @@ class FindPackageShare(Substitution):
     """The folder of a package, with its urdf, launch and worlds."""
 
     def __init__(self, package: Text) -> None:
-        self.package, self.place = package, here()
+        self.package = package
 
-    def perform(self, context: LaunchContext) -> str:
-        """The folder. Raises LaunchError."""
+    def _text(self, context: LaunchContext) -> str:
         return str(self._folder(context))
 
     def find(self, package_name: str) -> str:
@@ -214,17 +192,13 @@ class FindPackageShare(Substitution):
         return f"share of {describe(self.package)}"
 
     def _folder(self, context: LaunchContext) -> Path:
-        try:
-            return packages.find(text(context, self.package)).absolute()
-        except RobotError as error:
-            raise LaunchError(str(error), self.place) from None
+        return packages.find(text(context, self.package)).absolute()
 
 
 class FindPackagePrefix(FindPackageShare):
     """Where a package is installed; the folder of its sources if it is not."""
 
-    def perform(self, context: LaunchContext) -> str:
-        """The folder. Raises LaunchError."""
+    def _text(self, context: LaunchContext) -> str:
         return str(packages.prefix(self._folder(context)))
 
 
@@ -235,15 +209,11 @@ class ExecutableInPackage(Substitution):
     """The path of an executable of a package."""
 
     def __init__(self, executable: Text, package: Text) -> None:
-        self.executable, self.package, self.place = executable, package, here()
+        self.executable, self.package = executable, package
 
-    def perform(self, context: LaunchContext) -> str:
-        """The path. Raises LaunchError."""
-        try:
-            package, executable = text(context, self.package), text(context, self.executable)
-            return str(executables.find(package, executable, nameless=True).path)
-        except executables.NotFound as error:
-            raise LaunchError(str(error), self.place) from None
+    def _text(self, context: LaunchContext) -> str:
+        package, executable = text(context, self.package), text(context, self.executable)
+        return str(executables.find(package, executable, nameless=True).path)
 
 
 class EqualsSubstitution(Substitution):
@@ -252,16 +222,14 @@ class EqualsSubstitution(Substitution):
     def __init__(self, left: Any, right: Any) -> None:
         self.left, self.right = left, right
 
-    def perform(self, context: LaunchContext) -> str:
-        """true or false."""
+    def _text(self, context: LaunchContext) -> str:
         return _word(_side(context, self.left) == _side(context, self.right))
 
 
 class NotEqualsSubstitution(EqualsSubstitution):
     """false if two texts are equal, otherwise true."""
 
-    def perform(self, context: LaunchContext) -> str:
-        """true or false."""
+    def _text(self, context: LaunchContext) -> str:
         return _word(_side(context, self.left) != _side(context, self.right))
 
 
@@ -271,8 +239,7 @@ class NotSubstitution(Substitution):
     def __init__(self, value: Any) -> None:
         self.value = value
 
-    def perform(self, context: LaunchContext) -> str:
-        """true or false. Raises LaunchError if the value is neither."""
+    def _text(self, context: LaunchContext) -> str:
         return _word(not truth(context, self.value, "the value of NotSubstitution"))
 
 
@@ -282,8 +249,7 @@ class AndSubstitution(Substitution):
     def __init__(self, left: Any, right: Any) -> None:
         self.left, self.right = left, right
 
-    def perform(self, context: LaunchContext) -> str:
-        """true or false. Raises LaunchError if a value is neither."""
+    def _text(self, context: LaunchContext) -> str:
         return _word(all(self._values(context)))
 
     def _values(self, context: LaunchContext) -> list[bool]:
@@ -293,8 +259,7 @@ class AndSubstitution(Substitution):
 class OrSubstitution(AndSubstitution):
     """true if one of two values is."""
 
-    def perform(self, context: LaunchContext) -> str:
-        """true or false. Raises LaunchError if a value is neither."""
+    def _text(self, context: LaunchContext) -> str:
         return _word(any(self._values(context)))
 
 
@@ -304,8 +269,7 @@ class IfElseSubstitution(Substitution):
     def __init__(self, condition: Any, if_value: Text = "", else_value: Text = "") -> None:
         self.condition, self.if_value, self.else_value = condition, if_value, else_value
 
-    def perform(self, context: LaunchContext) -> str:
-        """The text. Raises LaunchError."""
+    def _text(self, context: LaunchContext) -> str:
         holds = truth(context, self.condition, "the condition of IfElseSubstitution")
         return text(context, self.if_value if holds else self.else_value)
 
@@ -319,7 +283,7 @@ def _word(value: bool) -> str:
 
 
 def _output(context: LaunchContext, command: str) -> str:
-    """The output of a command. Raises LaunchError, and RobotError for the file."""
+    """The output of a command. Raises LaunchError, or RobotError for the file."""
     try:
         words = shlex.split(command)
     except ValueError as error:

@@ -6,6 +6,7 @@ from typing import Any
 
 import pytest
 
+from holozen.console import Failure
 from holozen.ros.launch import stand_ins
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Program
 from holozen.ros.launch.launch_description import Entities, LaunchDescription
@@ -34,8 +35,8 @@ class Kept:
             self.context.scope = scope
             try:
                 found = entity.visit(self.context)
-            except LaunchError as error:
-                raise error.at(entity.place) from None
+            except Failure as error:
+                raise LaunchError.of(error, entity.place) from None
             self.follow(found)
 
     def start(self, _action: Any, program: Program) -> None:
