@@ -141,23 +141,18 @@ print(json.dumps(result | {"mcap": summary.statistics.message_count}))
 """
 
 
-@pytest.mark.parametrize(
-    ("words", "code", "part"),
-    [
+def test_an_error_is_reported_in_one_line(wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for words, code, part in [
         (("odom", "-o", "/nowhere/a"), 1, "cannot write /nowhere/a.mcap: No such file or directory"),
         (("odom", "--max-size", "0"), 2, "use a number from 0.1"),
         (("a//b", "-o", "a"), 1, "key 'a//b'"),
-    ],
-)
-def test_an_error_is_reported_in_one_line(
-    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: tuple[str, ...], code: int, part: str
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    done = wire.run("record", *words)
-    assert done.returncode == code, done.stderr
-    assert part in done.stderr.splitlines()[-1]
-    assert "Traceback" not in done.stderr
-    assert list(tmp_path.iterdir()) == []
+    ]:
+        monkeypatch.chdir(tmp_path)
+        done = wire.run("record", *words)
+        assert done.returncode == code, done.stderr
+        assert part in done.stderr.splitlines()[-1]
+        assert "Traceback" not in done.stderr
+        assert list(tmp_path.iterdir()) == []
 
 
 def test_a_file_that_exists_is_not_written_over(wire: Wire, tmp_path: Path) -> None:

@@ -97,20 +97,17 @@ def test_they_are_read_and_set(run: Run, robot: Robot) -> None:
     assert run("get", "lab/tom", "goals")[1] == "Double Array value is: [3.5, 4.0, 5.5]\n"
 
 
-@pytest.mark.parametrize(
-    ("name", "value", "reason"),
-    [
+def test_what_the_node_refuses_is_reported(run: Run, robot: Robot) -> None:
+    for name, value, reason in [
         ("speed", "3.0", "speed: 3.0: use a number from 0.0 to 2.0"),
         ("speed", "1", "speed takes DOUBLE, and 1 is INTEGER; write 1.0"),
         ("goals", "[1, 2]", "goals takes DOUBLE_ARRAY, and [1, 2] is INTEGER_ARRAY"),
         ("shape", "circle", "shapes are square and hexagon"),
         ("sped", "1.0", "lab/tom has no parameter 'sped' (did you mean 'speed'?)"),
         ("use_sim_time", "maybe", "use_sim_time takes BOOL, and 'maybe' is STRING"),
-    ],
-)
-def test_what_the_node_refuses_is_reported(run: Run, robot: Robot, name: str, value: str, reason: str) -> None:
-    assert run("set", "lab/tom", name, value) == (1, "", f"holozen param set: setting parameter failed: {reason}\n")
-    assert robot.values("speed", "goals", "shape", "use_sim_time") == [0.5, [1.0, 2.0], "square", False]
+    ]:
+        assert run("set", "lab/tom", name, value) == (1, "", f"holozen param set: setting parameter failed: {reason}\n")
+        assert robot.values("speed", "goals", "shape", "use_sim_time") == [0.5, [1.0, 2.0], "square", False]
 
 
 def test_several_are_set_all_or_none(wire: Wire, robot: Robot) -> None:

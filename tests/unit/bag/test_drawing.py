@@ -55,17 +55,15 @@ def test_a_bag_is_drawn_as_png_and_svg(tmp_path: Path) -> None:
     assert ET.parse(tmp_path / "a.svg").getroot().tag.endswith("svg")
 
 
-@pytest.mark.parametrize(
-    ("target", "keys", "why"),
-    [
+def test_what_cannot_be_drawn_is_reported(tmp_path: Path) -> None:
+    bag = a_bag(tmp_path / "a.mcap")
+    for target, keys, why in [
         ("a.txt", None, "pictures end in .png or .svg"),
         ("none/a.png", None, "cannot write .*No such file"),
         ("a.png", ["Fred/odom"], "has no odometry on Fred/odom; on: odom"),
-    ],
-)
-def test_what_cannot_be_drawn_is_reported(tmp_path: Path, target: str, keys: list[str] | None, why: str) -> None:
-    with pytest.raises(BagError, match=why):
-        draw(a_bag(tmp_path / "a.mcap"), tmp_path / target, keys)
+    ]:
+        with pytest.raises(BagError, match=why):
+            draw(bag, tmp_path / target, keys)
 
 
 def test_a_bag_without_odometry_is_reported(tmp_path: Path) -> None:

@@ -80,10 +80,10 @@ def test_json_is_what_people_write_by_hand() -> None:
     assert msgspec.json.decode(encode(m.Twist.planar(0.3)))["linear"] == {"x": 0.3, "y": 0.0, "z": 0.0}
 
 
-@pytest.mark.parametrize("wire", WIRES)
-def test_an_encoding_may_carry_a_schema(wire: str) -> None:
-    payload = encode(m.Twist.planar(1), wire)
-    assert decode(payload, f"{WIRES[wire]};geometry_msgs/msg/Twist", (m.Twist,)) == m.Twist.planar(1)
+def test_an_encoding_may_carry_a_schema() -> None:
+    for wire in WIRES:
+        payload = encode(m.Twist.planar(1), wire)
+        assert decode(payload, f"{WIRES[wire]};geometry_msgs/msg/Twist", (m.Twist,)) == m.Twist.planar(1)
 
 
 def test_encodings_without_meaning_are_taken_for_json() -> None:

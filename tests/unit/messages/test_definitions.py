@@ -131,12 +131,10 @@ def test_any_text_is_a_definition_or_an_error(text: str) -> None:
         assert str(error).startswith("X.msg:")
 
 
-@pytest.mark.parametrize(
-    "text", ['"' * 50_000, "string a " + "'\\" * 50_000, "int8[] a [" + "'," * 50_000, "#" * 90_000]
-)
-def test_a_long_line_is_read_in_a_moment(text: Any) -> None:
-    with contextlib.suppress(InterfaceError):
-        parse(text, "X.msg", resolve)
+def test_a_long_line_is_read_in_a_moment() -> None:
+    for text in ['"' * 50_000, "string a " + "'\\" * 50_000, "int8[] a [" + "'," * 50_000, "#" * 90_000]:
+        with contextlib.suppress(InterfaceError):
+            parse(text, "X.msg", resolve)
 
 
 POINT = Interface("t/msg/Point", "msg", (Field("x", "float32"), Field("y", "float32", default=2.0)))

@@ -54,12 +54,10 @@ def test_a_service_has_a_request_and_a_response_that_are_messages_too() -> None:
     assert (half.kind, [field.name for field in half.fields]) == ("msg", ["data"])
 
 
-@pytest.mark.parametrize(
-    "name", ["geometry_msgs/Twist", "geometry_msgs::msg::dds_::Twist_", "geometry_msgs::msg::Twist"]
-)
-def test_other_spellings_of_a_name_are_understood(name: str) -> None:
-    registry = Registry()
-    assert registry.find(name) is registry.find("geometry_msgs/msg/Twist")
+def test_other_spellings_of_a_name_are_understood() -> None:
+    for name in ["geometry_msgs/Twist", "geometry_msgs::msg::dds_::Twist_", "geometry_msgs::msg::Twist"]:
+        registry = Registry()
+        assert registry.find(name) is registry.find("geometry_msgs/msg/Twist")
 
 
 def test_a_short_name_may_be_a_service() -> None:

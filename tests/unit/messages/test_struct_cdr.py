@@ -72,10 +72,10 @@ def test_a_schema_that_names_no_type_is_ignored() -> None:
         assert decode(encode(m.Twist.planar(1), "cdr"), f"application/cdr{schema}", (m.Twist,)) == m.Twist.planar(1)
 
 
-@pytest.mark.parametrize("expected", ["", "zenoh/bytes"])
-def test_cdr_without_its_encoding_is_recognised(expected: str) -> None:
+def test_cdr_without_its_encoding_is_recognised() -> None:
     """Bridges to ROS 2 give their samples no Encoding."""
-    assert decode(encode(m.Twist.planar(1), "cdr"), expected, (m.Twist,)) == m.Twist.planar(1)
+    for expected in ["", "zenoh/bytes"]:
+        assert decode(encode(m.Twist.planar(1), "cdr"), expected, (m.Twist,)) == m.Twist.planar(1)
 
 
 def test_numbers_within_a_field_are_held_to_its_range() -> None:
@@ -89,10 +89,10 @@ def test_a_nan_in_cdr_reaches_the_reader_which_must_check_for_it() -> None:
     assert not_finite(decode(payload, "application/cdr", (m.Twist,))) == "linear.x"
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
-def test_a_number_in_a_list_that_is_not_finite_is_not_written(bad: float) -> None:
-    with pytest.raises(CodecError, match=r"^JointState\.effort\[1\] is not a finite number$"):
-        encode(m.JointState(effort=[0.0, bad]), "cdr")
+def test_a_number_in_a_list_that_is_not_finite_is_not_written() -> None:
+    for bad in [math.nan, math.inf, -math.inf]:
+        with pytest.raises(CodecError, match=r"^JointState\.effort\[1\] is not a finite number$"):
+            encode(m.JointState(effort=[0.0, bad]), "cdr")
 
 
 def test_large_numbers_are_finite_even_where_their_sum_is_not() -> None:

@@ -170,22 +170,31 @@ node.create_client(Trigger, "mine").call_async(Trigger.Request())
 rclpy.spin_until_future_complete(node, future)
 """
 CALL = "up()\nnode.create_client(Trigger, 'nobody').call(Trigger.Request())"
-WAIT = """
-client = node.create_client(Trigger, 'nobody')
-up()
-while not client.wait_for_service(timeout_sec=0.05):
-    pass
-"""
-WAITS = "up()\nwait_for_message(Twist, node, 'x')"
-COUNT = "up()\nwhile pub.get_subscription_count() == 0:\n    time.sleep(0.01)"
-LOOK = "up()\nwhile node.count_publishers('odom') == 0:\n    time.sleep(0.01)"
-NODE = "up()\nwhile not node.wait_for_node('nobody', 0.05):\n    pass"
-FRAME = """
+WAITS = """
+from functools import partial
 from tf2_ros import Buffer
-buffer, long = Buffer(), rclpy.duration.Duration(seconds=1000)
+client, long = node.create_client(Trigger, "nobody"), rclpy.duration.Duration(seconds=1000)
+def forever(look):
+    while not look():
+        time.sleep(0.01)
+def wait(name, call):
+    try:
+        call()
+    except ExternalShutdownException:
+        print(name, "ended", flush=True)
+calls = {
+    "service": client.wait_for_service, "message": partial(wait_for_message, Twist, node, "x"),
+    "reader": partial(forever, pub.get_subscription_count),
+    "writer": partial(forever, partial(node.count_publishers, "x")),
+    "node": partial(node.wait_for_node, "nobody", 1000.0),
+    "frame": partial(Buffer().can_transform, "map", "odom", rclpy.time.Time(), timeout=long),
+}
+threads = [threading.Thread(target=wait, args=item) for item in calls.items()]
+for thread in threads:
+    thread.start()
 up()
-while not buffer.can_transform("map", "odom", rclpy.time.Time(), timeout=long):
-    pass
+for thread in threads:
+    thread.join()
 """
 MANY = """
 executor = MultiThreadedExecutor(4)
@@ -210,12 +219,6 @@ CASES = {
     "a thread spins, SIGTERM that the main thread does not see": (DEAF, signal.SIGTERM, 0, ""),
     "calls wait, SIGINT": (PENDING, signal.SIGINT, 130, ""),
     "a call, SIGINT": (CALL, signal.SIGINT, 130, ""),
-    "wait for a service, SIGTERM": (WAIT, signal.SIGTERM, 1, EXTERNAL),
-    "wait for a message, SIGTERM": (WAITS, signal.SIGTERM, 1, EXTERNAL),
-    "wait for a reader, SIGTERM": (COUNT, signal.SIGTERM, 1, EXTERNAL),
-    "wait for a writer, SIGTERM": (LOOK, signal.SIGTERM, 1, EXTERNAL),
-    "wait for a frame, SIGTERM": (FRAME, signal.SIGTERM, 1, EXTERNAL),
-    "wait for a node, SIGTERM": (NODE, signal.SIGTERM, 1, EXTERNAL),
     "many threads, SIGINT": (MANY, signal.SIGINT, 130, ""),
     "many nodes, SIGINT": (NODES, signal.SIGINT, 130, ""),
 }
@@ -246,6 +249,16 @@ def test_a_signal_ends_it(script: Script, case: str) -> None:
         assert message in process.err if message else not process.err
         assert "Fatal Python error" not in process.err
         assert ("stopped" in process.out) == (text == POLITE)
+
+
+def test_a_signal_ends_every_wait(script: Script) -> None:
+    with script(WAITS) as process:
+        process.wait_for_line("up")
+        process.signal(signal.SIGTERM)
+        assert process.wait() == 0, process.err
+        assert not process.err
+        ended = {line.removesuffix(" ended") for line in process.out.splitlines() if line.endswith(" ended")}
+        assert ended == {"service", "message", "reader", "writer", "node", "frame"}
 
 
 @pytest.mark.parametrize(

@@ -10,12 +10,13 @@ from holozen.ros.executables import NotFound, find, from_file
 from .conftest import Write
 
 
-@pytest.mark.parametrize("folder", ["scripts", "my_bot", "nodes", "src"])
-@pytest.mark.parametrize("name", ["controller", "controller.py"])
-def test_a_script_is_found_with_and_without_its_ending(my_bot: Path, write: Write, folder: str, name: str) -> None:
-    path = write(f"src/my_bot/{folder}/controller.py")
-    script = find("my_bot", name)
-    assert (script.path, script.root, script.function) == (path, path.parent, "")
+def test_a_script_is_found_with_and_without_its_ending(my_bot: Path, write: Write) -> None:
+    for name in ["controller", "controller.py"]:
+        for folder in ["scripts", "my_bot", "nodes", "src"]:
+            path = write(f"src/my_bot/{folder}/controller.py")
+            script = find("my_bot", name)
+            assert (script.path, script.root, script.function) == (path, path.parent, "")
+            path.unlink()
 
 
 def test_a_script_without_ending_has_to_be_executable_and_python(my_bot: Path, write: Write) -> None:
@@ -48,21 +49,16 @@ setup(name=package_name, entry_points={'console_scripts': [
 """
 
 
-@pytest.mark.parametrize(
-    ("name", "module", "function"),
-    [
+def test_console_scripts_are_read_from_setup_py_without_running_it(my_bot: Path, write: Write) -> None:
+    write("src/my_bot/setup.py", SETUP_PY + "raise SystemExit('this was run')")
+    for name, module, function in [
         ("drive", "my_bot.controller", "main"),
         ("shape", "my_bot.shape", "run"),
         ("pose", "my_bot.pose", "Pose.start"),
-    ],
-)
-def test_console_scripts_are_read_from_setup_py_without_running_it(
-    my_bot: Path, write: Write, name: str, module: str, function: str
-) -> None:
-    write("src/my_bot/setup.py", SETUP_PY + "raise SystemExit('this was run')")
-    path = write(f"src/my_bot/{module.replace('.', '/')}.py")
-    script = find("my_bot", name)
-    assert (script.module, script.function, script.path, script.root) == (module, function, path, my_bot)
+    ]:
+        path = write(f"src/my_bot/{module.replace('.', '/')}.py")
+        script = find("my_bot", name)
+        assert (script.module, script.function, script.path, script.root) == (module, function, path, my_bot)
 
 
 def test_console_scripts_are_read_from_setup_cfg(my_bot: Path, write: Write) -> None:
@@ -77,20 +73,15 @@ def test_a_console_script_without_its_module_is_reported(my_bot: Path, write: Wr
         find("my_bot", "drive")
 
 
-@pytest.mark.parametrize(
-    ("file", "text", "message"),
-    [
+def test_a_setup_file_that_cannot_be_read_is_reported(my_bot: Path, write: Write) -> None:
+    for file, text, message in [
         ("setup.py", "setup(\n  entry_points={'console", r"setup.py:2: unterminated string"),
         ("setup.cfg", "[options.entry_points", r"setup.cfg: File contains no section headers"),
-    ],
-)
-def test_a_setup_file_that_cannot_be_read_is_reported(
-    my_bot: Path, write: Write, file: str, text: str, message: str
-) -> None:
-    write(f"src/my_bot/{file}", text)
-    with pytest.raises(NotFound, match=message) as error:
-        find("my_bot", "drive")
-    assert str(error.value).isprintable()
+    ]:
+        write(f"src/my_bot/{file}", text)
+        with pytest.raises(NotFound, match=message) as error:
+            find("my_bot", "drive")
+        assert str(error.value).isprintable()
 
 
 def test_where_it_is_installed_lib_is_looked_into(home: Path, write: Write, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -129,14 +120,14 @@ def test_a_folder_without_a_package_name_cannot_be_run(home: Path, write: Write)
     assert find("hb_contrl", "controller.py", nameless=True).path == path
 
 
-@pytest.mark.parametrize("where", [".", "src", "src/my_bot", "src/my_bot/scripts"])
 def test_a_package_is_found_from_anywhere_in_its_workspace(
-    my_bot: Path, write: Write, monkeypatch: pytest.MonkeyPatch, where: str
+    my_bot: Path, write: Write, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     write("src/my_bot/scripts/a.py")
-    monkeypatch.chdir(where)
-    packages.use({})
-    assert find("my_bot", "a").path == my_bot / "scripts" / "a.py"
+    for where in [my_bot.parents[1], my_bot.parent, my_bot, my_bot / "scripts"]:
+        monkeypatch.chdir(where)
+        packages.use({})
+        assert find("my_bot", "a").path == my_bot / "scripts" / "a.py"
 
 
 def test_a_package_in_a_repository_of_packages_is_found(my_bot: Path, write: Write) -> None:

@@ -82,9 +82,9 @@ def test_no_node_before_init_and_after_the_end(ros: Wire) -> None:
         Node("tom")
 
 
-@pytest.mark.parametrize(
-    ("make", "error"),
-    [
+def test_what_is_wrong_is_refused_and_leaves_nothing(ros: Wire) -> None:
+    node = rclpy.create_node("tom", start_parameter_services=False)
+    rows: list[tuple[Callable[[Any], object], type[Exception]]] = [
         (lambda node: Node("tom!"), exceptions.InvalidNodeNameException),
         (lambda node: Node("tom", namespace="a b"), exceptions.InvalidNamespaceException),
         (lambda node: node.create_publisher(Twist, "a//b", 1), exceptions.InvalidTopicNameException),
@@ -95,17 +95,13 @@ def test_no_node_before_init_and_after_the_end(ros: Wire) -> None:
         (lambda node: node.create_publisher(Twist(), "a", 1), AttributeError),
         (lambda node: node.create_service(Twist, "a", print), AttributeError),
         (lambda node: node.create_client(3, "a"), AttributeError),
-    ],
-)
-def test_what_is_wrong_is_refused_and_leaves_nothing(
-    ros: Wire, make: Callable[[Node], object], error: type[Exception]
-) -> None:
-    node = rclpy.create_node("tom", start_parameter_services=False)
-    with pytest.raises(error):
-        make(node)
-    assert node.get_topic_names_and_types() == []
-    assert node.get_service_names_and_types() == []
-    assert node.get_node_names() == ["tom"]
+    ]
+    for make, error in rows:
+        with pytest.raises(error):
+            make(node)
+        assert node.get_topic_names_and_types() == []
+        assert node.get_service_names_and_types() == []
+        assert node.get_node_names() == ["tom"]
 
 
 def test_a_destroyed_node_has_left_and_makes_nothing_more(ros: Wire) -> None:

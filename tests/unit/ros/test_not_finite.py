@@ -74,18 +74,18 @@ def test_requests_and_responses_carry_any_number(used: str, ros: Wire, spin_for:
     assert (asked, future.result().plan.poses[0].pose.position.x) == ([math.inf], -math.inf)
 
 
-@pytest.mark.parametrize("wire", WIRES)
-def test_only_what_was_made_for_scripts_takes_any_number(wire: str) -> None:
-    ours, theirs = m.Twist.planar(math.nan), find("geometry_msgs/msg/Twist")()
-    theirs.linear.x = math.nan
-    payload, name = written(theirs, wire)
-    assert name == "cdr"
-    assert math.isnan(decode(payload, encoding(name, type(theirs)), (m.Twist,)).linear.x)
-    for write in (written, encode):
-        with pytest.raises(CodecError, match=r"^Twist\.linear\.x is not a finite number$"):
-            write(ours, wire)
-    theirs.linear.x = 1.0
-    assert written(theirs, wire) == (encode(m.Twist.planar(1.0), wire), wire)
+def test_only_what_was_made_for_scripts_takes_any_number() -> None:
+    for wire in WIRES:
+        ours, theirs = m.Twist.planar(math.nan), find("geometry_msgs/msg/Twist")()
+        theirs.linear.x = math.nan
+        payload, name = written(theirs, wire)
+        assert name == "cdr"
+        assert math.isnan(decode(payload, encoding(name, type(theirs)), (m.Twist,)).linear.x)
+        for write in (written, encode):
+            with pytest.raises(CodecError, match=r"^Twist\.linear\.x is not a finite number$"):
+                write(ours, wire)
+        theirs.linear.x = 1.0
+        assert written(theirs, wire) == (encode(m.Twist.planar(1.0), wire), wire)
 
 
 def test_a_request_of_our_own_is_refused(wire: Wire) -> None:

@@ -98,13 +98,13 @@ def test_ours_is_left_out_of_what_an_error_came_from(run: Run, write: Write) -> 
     assert "holozen/" not in message
 
 
-@pytest.mark.parametrize("text", ["def f(:\n  pass", "x = '\0'"])
-def test_what_is_no_python_is_reported_as_python_does(run: Run, write: Write, text: str) -> None:
-    write("a.py", text)
-    done = run("a.py")
-    assert done.returncode == 1
-    assert "holozen" not in done.stderr
-    assert "Error: " in done.stderr.splitlines()[-1]
+def test_what_is_no_python_is_reported_as_python_does(run: Run, write: Write) -> None:
+    for text in ["def f(:\n  pass", "x = '\0'"]:
+        write("a.py", text)
+        done = run("a.py")
+        assert done.returncode == 1
+        assert "holozen" not in done.stderr
+        assert "Error: " in done.stderr.splitlines()[-1]
 
 
 def test_frames_of_ours_between_those_of_the_user_are_left_out(run: Run, write: Write) -> None:
@@ -278,9 +278,8 @@ thread.start()
     assert done.stderr.count("a.py") == 2
 
 
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [
+def test_an_error_of_ours_is_called_as_in_ros(run: Run, write: Write) -> None:
+    for line, message in [
         (
             "rclpy.get_default_context().interrupt(); rclpy.spin_once(node)",
             "rclpy.executors.ExternalShutdownException: ",
@@ -288,10 +287,8 @@ thread.start()
         ("rclpy.shutdown(); rclpy.create_node('b')", "rclpy.exceptions.NotInitializedException: "),
         ("import tf2_ros; raise tf2_ros.LookupException('no')", "tf2_ros.LookupException: no"),
         ("from holozen.messages.codec import CodecError; raise CodecError('no')", "CodecError: no"),
-    ],
-)
-def test_an_error_of_ours_is_called_as_in_ros(run: Run, write: Write, line: str, message: str) -> None:
-    write("a.py", f"import rclpy\nrclpy.init()\nnode = rclpy.create_node('a')\n{line}\n")
-    done = run("a.py")
-    assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith(message)
+    ]:
+        write("a.py", f"import rclpy\nrclpy.init()\nnode = rclpy.create_node('a')\n{line}\n")
+        done = run("a.py")
+        assert done.returncode == 1
+        assert done.stderr.splitlines()[-1].startswith(message)

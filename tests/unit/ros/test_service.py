@@ -51,25 +51,21 @@ def test_a_request_of_our_bus_is_answered_in_spin(ros: Wire, spin_for: Spin) -> 
     assert node.count_services("/tom/go") == 0
 
 
-@pytest.mark.parametrize(
-    ("wrong", "expected"),
-    [
+def test_a_callback_that_returns_no_response_is_reported_to_both(ros: Wire, spin_for: Spin) -> None:
+    node, bus, returned = rclpy.create_node("tom"), ros.bus("bus"), list[Any]()
+    node.create_service(Trigger, "go", lambda _request, _response: returned.pop())
+    for wrong, expected in [
         (None, "NoneType; write `return response` at its end"),
         (3, "int"),
         (SetBool.Response(), "SetBool_Response"),
-    ],
-)
-def test_a_callback_that_returns_no_response_is_reported_to_both(
-    ros: Wire, spin_for: Spin, wrong: Any, expected: str
-) -> None:
-    node = rclpy.create_node("tom")
-    node.create_service(Trigger, "go", lambda _request, _response: wrong)
-    reply = asked(ros.bus("bus"))
-    text = f"the callback of /go must return a Trigger.Response, and gave a {expected}"
-    with pytest.raises(TypeError) as error:
-        spin_for(reply, node)
-    assert str(error.value) == text
-    assert spin_for(reply, node) == text
+    ]:
+        returned.append(wrong)
+        reply = asked(bus)
+        text = f"the callback of /go must return a Trigger.Response, and gave a {expected}"
+        with pytest.raises(TypeError) as error:
+            spin_for(reply, node)
+        assert str(error.value) == text
+        assert spin_for(reply, node) == text
 
 
 def test_an_exception_ends_the_spin_and_reaches_the_caller(ros: Wire, spin_for: Spin) -> None:

@@ -24,16 +24,13 @@ def test_the_words_are_a_transform() -> None:
         assert [q.x, q.y, q.z, q.w] == pytest.approx(turn, abs=1e-7)
 
 
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
+def test_wrong_words_are_one_line(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, expected in [
         ("1 2 3", "are required: --frame-id, --child-frame-id"),
         ("a 2 3 0 0 0 map odom", "argument --x: invalid float value: 'a'"),
         ("--frame-id map --child-frame-id odom --yow 1", "no flag '--yow' (did you mean '--yaw'?)"),
-    ],
-)
-def test_wrong_words_are_one_line(words: str, expected: str, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(SystemExit) as end:
-        read(words.split())
-    message = capsys.readouterr().err
-    assert (end.value.code, message.count("\n"), expected in message) == (2, 1, True)
+    ]:
+        with pytest.raises(SystemExit) as end:
+            read(words.split())
+        message = capsys.readouterr().err
+        assert (end.value.code, message.count("\n"), expected in message) == (2, 1, True)

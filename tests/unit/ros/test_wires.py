@@ -144,24 +144,24 @@ def test_what_was_put_into_a_list_is_written_as_its_field_type() -> None:
             assert all(type(one) is type(plain) for one, plain in zip(message.some, held, strict=True))
 
 
-@pytest.mark.parametrize("wire", WIRES)
-def test_numbers_of_numpy_may_be_put_into_lists(wire: str) -> None:
-    import numpy as np
+def test_numbers_of_numpy_may_be_put_into_lists() -> None:
+    for wire in WIRES:
+        import numpy as np
 
-    made: Any = generated.make(
-        Interface(
-            "t/msg/N", "msg",
-            (Field("f", "float64", "fixed", 3), Field("i", "int32", "fixed", 2), Field("b", "bool", "sequence"),
-             Field("a", "float64", "sequence")),
-        )
-    )  # fmt: skip
-    message = made()
-    message.a.extend([np.float64(0.5), np.float32(1.5), np.int64(2)])
-    message.f[:] = message.a
-    message.i[:] = np.array([1, 2])
-    message.b.append(np.True_)
-    read = decode(encode(message, wire), encoding(wire, made), (made,))
-    assert (read.f, read.i, read.b, read.a.tolist()) == ([0.5, 1.5, 2.0], [1, 2], [True], [0.5, 1.5, 2.0])
+        made: Any = generated.make(
+            Interface(
+                "t/msg/N", "msg",
+                (Field("f", "float64", "fixed", 3), Field("i", "int32", "fixed", 2), Field("b", "bool", "sequence"),
+                 Field("a", "float64", "sequence")),
+            )
+        )  # fmt: skip
+        message = made()
+        message.a.extend([np.float64(0.5), np.float32(1.5), np.int64(2)])
+        message.f[:] = message.a
+        message.i[:] = np.array([1, 2])
+        message.b.append(np.True_)
+        read = decode(encode(message, wire), encoding(wire, made), (made,))
+        assert (read.f, read.i, read.b, read.a.tolist()) == ([0.5, 1.5, 2.0], [1, 2], [True], [0.5, 1.5, 2.0])
 
 
 JOINTS, VALUE, ODOMETRY = "sensor_msgs/msg/JointState", "rcl_interfaces/msg/ParameterValue", "nav_msgs/msg/Odometry"
@@ -205,30 +205,27 @@ def test_what_no_list_holds_is_refused_when_it_is_written() -> None:
             assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("wire", WIRES)
-def test_two_types_with_one_name_in_one_message(wire: str) -> None:
-    one = Interface("a/msg/Part", "msg", (Field("x", "int8"),))
-    two = Interface("b/msg/Part", "msg", (Field("name", "string"),))
-    fields = (Field("a", one.name, nested=one), Field("b", two.name, "sequence", nested=two))
-    kind: Any = generated.make(Interface("c/msg/Part", "msg", fields))
-    message = kind(a=generated.make(one)(x=3), b=[generated.make(two)(name="n")])
-    read = decode(encode(message, wire), encoding(wire, kind), (kind,))
-    assert read == message
-    assert [type(part).__module__ for part in (read, read.a, read.b[0])] == ["c.msg", "a.msg", "b.msg"]
+def test_two_types_with_one_name_in_one_message() -> None:
+    for wire in WIRES:
+        one = Interface("a/msg/Part", "msg", (Field("x", "int8"),))
+        two = Interface("b/msg/Part", "msg", (Field("name", "string"),))
+        fields = (Field("a", one.name, nested=one), Field("b", two.name, "sequence", nested=two))
+        kind: Any = generated.make(Interface("c/msg/Part", "msg", fields))
+        message = kind(a=generated.make(one)(x=3), b=[generated.make(two)(name="n")])
+        read = decode(encode(message, wire), encoding(wire, kind), (kind,))
+        assert read == message
+        assert [type(part).__module__ for part in (read, read.a, read.b[0])] == ["c.msg", "a.msg", "b.msg"]
 
 
-@pytest.mark.parametrize(
-    ("wire", "payload", "reason"),
-    [
+def test_bad_bytes_are_reported_as_for_ours() -> None:
+    for wire, payload, reason in [
         ("json", b'{"linaer": {}}', "not a Twist: Object contains unknown field `linaer`"),
         ("json", b'{"linear": {"x": "a"}}', "not a Twist: Expected `float`, got `str` - at `$.linear.x`"),
         ("cdr", b"\0\1\0\0\0", "not a Twist: cut off after 5 bytes"),
-    ],
-)
-def test_bad_bytes_are_reported_as_for_ours(wire: str, payload: bytes, reason: str) -> None:
-    with pytest.raises(CodecError) as error:
-        decode(payload, WIRES[wire], (generated.find("geometry_msgs/msg/Twist"),))
-    assert str(error.value) == reason
+    ]:
+        with pytest.raises(CodecError) as error:
+            decode(payload, WIRES[wire], (generated.find("geometry_msgs/msg/Twist"),))
+        assert str(error.value) == reason
 
 
 def test_a_range_holds_in_every_wire() -> None:

@@ -33,16 +33,13 @@ def test_an_argument_has_the_value_given_or_its_default(follow: Follow, capsys: 
     assert reported(capsys) == ["I am nobody", "I am Fred"]
 
 
-@pytest.mark.parametrize(
-    ("declared", "message"),
-    [
+def test_an_argument_without_a_good_value_is_reported(follow: Follow) -> None:
+    for declared, message in [
         (a.DeclareLaunchArgument("which"), "launch argument 'which' has no value; give which:=VALUE"),
         (a.DeclareLaunchArgument("robot", choices=["Ann", "Bob"]), "robot:=Fred: it must be one of Ann, Bob"),
-    ],
-)
-def test_an_argument_without_a_good_value_is_reported(follow: Follow, declared: Any, message: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
-        follow([declared], robot="Fred")
+    ]:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
+            follow([declared], robot="Fred")
 
 
 def test_values_and_the_environment_can_be_set(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
@@ -79,23 +76,18 @@ def generate_launch_description():
     assert kept.context.launch_configurations["robot"] == "Fred"  # as in ROS, where includes are not scoped
 
 
-@pytest.mark.parametrize(
-    ("name", "text", "message"),
-    [
+def test_a_file_that_cannot_be_included_is_reported(follow: Follow, write: Write) -> None:
+    for name, text, message in [
+        ("c.launch.py", "", r"no launch file '.*/b.launch.py' \(did you mean 'c.launch.py'"),
         ("b.launch.xml", "<launch/>", "launch files in XML and YAML are not supported; Python only"),
         ("b.launch.txt", "", "only launch files in Python are supported"),
         ("b.launch.py", "x = 1", "has no function generate_launch_description"),
         ("b.launch.py", "def generate_launch_description(): return 7", r"returned 7, not a LaunchDescription"),
-        ("c.launch.py", "", r"no launch file '.*/b.launch.py' \(did you mean 'c.launch.py'"),
-    ],
-)
-def test_a_file_that_cannot_be_included_is_reported(
-    follow: Follow, write: Write, name: str, text: str, message: str
-) -> None:
-    path = write(f"other/{name}", text)
-    wanted = path if name[0] == "b" else path.with_name("b.launch.py")
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
-        follow([a.IncludeLaunchDescription(wanted)])
+    ]:
+        path = write(f"other/{name}", text)
+        wanted = path if name[0] == "b" else path.with_name("b.launch.py")
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
+            follow([a.IncludeLaunchDescription(wanted)])
 
 
 def test_files_that_include_themselves_are_reported(follow: Follow, write: Write) -> None:
@@ -123,10 +115,10 @@ def test_a_function_is_called_and_what_it_returns_is_done(follow: Follow, capsys
     assert reported(capsys) == ["Fred ('x',) y"]
 
 
-@pytest.mark.parametrize("function", [lambda _context: [7], lambda _context: 7])
-def test_a_function_that_returns_no_actions_is_reported(follow: Follow, function: Any) -> None:
-    with pytest.raises(LaunchError, match=r"7 is not an action; write Node"):
-        follow([a.OpaqueFunction(function=function)])
+def test_a_function_that_returns_no_actions_is_reported(follow: Follow) -> None:
+    for function in [lambda _context: [7], lambda _context: 7]:
+        with pytest.raises(LaunchError, match=r"7 is not an action; write Node"):
+            follow([a.OpaqueFunction(function=function)])
 
 
 def test_timers_and_handlers_are_kept_for_later(follow: Follow) -> None:
@@ -138,9 +130,9 @@ def test_timers_and_handlers_are_kept_for_later(follow: Follow) -> None:
     assert follow([a.RegisterEventHandler(handler), a.UnregisterEventHandler(handler)]).handlers == []
 
 
-@pytest.mark.parametrize("action", [a.Shutdown(reason="done"), a.EmitEvent(event=ShutdownEvent(reason="done"))])
-def test_the_launch_can_be_ended(follow: Follow, action: Any) -> None:
-    assert follow([action]).reason == "done"
+def test_the_launch_can_be_ended(follow: Follow) -> None:
+    for action in [a.Shutdown(reason="done"), a.EmitEvent(event=ShutdownEvent(reason="done"))]:
+        assert follow([action]).reason == "done"
 
 
 def test_a_handler_answers_for_its_own_action(follow: Follow) -> None:
@@ -229,14 +221,11 @@ def test_what_is_written_wrong_is_reported_with_its_place() -> None:
             make()
 
 
-@pytest.mark.parametrize(
-    ("action", "message"),
-    [
-        (lambda: a.ExecuteProcess(), "ExecuteProcess has no cmd"),
-        (lambda: a.TimerAction(period=-1, actions=[]), "period is '-1'; it must be a number from 0 up"),
-        (lambda: a.GroupAction([], scoped="perhaps"), "scoped is 'perhaps'; it must be true or false"),
-    ],
-)
-def test_what_cannot_be_done_is_reported_with_its_place(follow: Follow, action: Any, message: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
-        follow([action()])
+def test_what_cannot_be_done_is_reported_with_its_place(follow: Follow) -> None:
+    for action, message in [
+        (a.ExecuteProcess(), "ExecuteProcess has no cmd"),
+        (a.TimerAction(period=-1, actions=[]), "period is '-1'; it must be a number from 0 up"),
+        (a.GroupAction([], scoped="perhaps"), "scoped is 'perhaps'; it must be true or false"),
+    ]:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
+            follow([action])

@@ -70,23 +70,19 @@ def test_server_and_window_are_one_sim(follow: Follow, capsys: pytest.CaptureFix
     assert len(both.programs) == 1
 
 
-@pytest.mark.parametrize(
-    ("command", "world"),
-    [
+def test_gazebo_as_a_program_is_the_sim(follow: Follow) -> None:
+    for command, world in [
         (["gazebo", "--verbose", "-s", "libgazebo_ros_factory.so", "arena.world"], ARENA),
         (["gzserver", "-s", "libgazebo_ros_init.so"], EMPTY),
         (["/usr/bin/gazebo", "my.world"], "my.world"),
         (["gz", "sim", "-r", "empty.sdf"], EMPTY),
         (["ign", "gazebo", "-r", "arena.sdf"], ARENA),
-    ],
-)
-def test_gazebo_as_a_program_is_the_sim(follow: Follow, command: list[str], world: str) -> None:
-    assert follow([ExecuteProcess(cmd=command, output="screen")]).words() == ["sim", "--empty", "--world", world]
+    ]:
+        assert follow([ExecuteProcess(cmd=command, output="screen")]).words() == ["sim", "--empty", "--world", world]
 
 
-@pytest.mark.parametrize(
-    ("package", "name", "message"),
-    [
+def test_an_unknown_launch_file_of_gazebo_is_reported(follow: Follow) -> None:
+    for package, name, message in [
         ("gazebo_ros", "gazeb.launch.py", r"has no 'launch/gazeb.launch.py' \(did you mean 'gazebo.launch.py'"),
         (
             "ros_gz_sim",
@@ -94,11 +90,9 @@ def test_gazebo_as_a_program_is_the_sim(follow: Follow, command: list[str], worl
             r"has no 'launch/ros_gz_spawn_model.launch.py' \(did you mean 'gz_sim",
         ),
         ("nav2_bringup", "x.launch.py", "no package 'nav2_bringup'"),
-    ],
-)
-def test_an_unknown_launch_file_of_gazebo_is_reported(follow: Follow, package: str, name: str, message: str) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
-        follow([included(package, name)])
+    ]:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: .*{message}"):
+            follow([included(package, name)])
 
 
 def test_a_file_is_spawned_at_the_root_of_the_keys(follow: Follow) -> None:
@@ -132,14 +126,14 @@ def test_what_the_launch_lets_a_file_read_the_spawner_may_read(follow: Follow, w
     assert kept.words()[:5] == ["spawn", "-file", "a.urdf", "--allow-env", "TOKEN"]
 
 
-@pytest.mark.parametrize("first", [True, False])
-def test_topic_robot_description_is_what_robot_state_publisher_has(follow: Follow, write: Write, first: bool) -> None:
+def test_topic_robot_description_is_what_robot_state_publisher_has(follow: Follow, write: Write) -> None:
     """Whichever of the two comes first in the launch file."""
     path = write("src/my_bot/urdf/r.urdf.xacro", ROBOT)
     robot = ParameterValue(Command(["xacro ", str(path), " robot:=", LaunchConfiguration("robot")]), value_type=str)
     actions = [publisher(robot), spawn("-topic", "robot_description", "-entity", "r")]
-    kept = follow(actions if first else actions[::-1], robot="me")
-    assert kept.words()[:5] == ["spawn", "--name", "r", str(path), "robot:=me"]
+    for ordered in (actions, actions[::-1]):
+        kept = follow(ordered, robot="me")
+        assert kept.words()[:5] == ["spawn", "--name", "r", str(path), "robot:=me"]
 
 
 def test_a_text_that_no_file_holds_is_written_into_one(follow: Follow) -> None:

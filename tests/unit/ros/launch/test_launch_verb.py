@@ -76,13 +76,13 @@ NODE = """Node(package='my_bot', executable='controller.py', name='controller', 
 ARGUMENTS = ("DeclareLaunchArgument('kp', default_value='1.5', description='how eager')",)
 
 
-@pytest.mark.parametrize("words", [["my_bot", "a.launch.py"], ["src/my_bot/launch/a.launch.py"]])
-def test_a_node_runs_with_its_words(launch: Launch, write: Write, words: list[str]) -> None:
+def test_a_node_runs_with_its_words(launch: Launch, write: Write) -> None:
     write("src/my_bot/scripts/controller.py", CONTROLLER)
     write("src/my_bot/launch/a.launch.py", described(*ARGUMENTS, NODE))
-    done = launch(*words, "kp:=2.5")
-    assert (done.stdout, done.stderr) == ("[controller.py-1] /fred controller 2.5 /drive --fast\n", "")
-    assert done.returncode == 0
+    for words in [["my_bot", "a.launch.py"], ["src/my_bot/launch/a.launch.py"]]:
+        done = launch(*words, "kp:=2.5")
+        assert (done.stdout, done.stderr) == ("[controller.py-1] /fred controller 2.5 /drive --fast\n", "")
+        assert done.returncode == 0
 
 
 def test_show_args_lists_the_arguments_and_starts_nothing(launch: Launch, write: Write) -> None:
@@ -124,13 +124,13 @@ def test_a_value_that_nothing_uses_is_reported_while_the_launch_goes_on(
     assert going.err.count("kpp") == 1
 
 
-@pytest.mark.parametrize(
-    "later",
-    [LATER.format("kpp"), "TimerAction(period=0.1, actions=[OpaqueFunction(function=lambda c: c.used.add('kpp'))])"],
-)
-def test_a_value_that_may_be_used_later_is_not_reported(launch: Launch, write: Write, later: str) -> None:
-    write("a.launch.py", described(*ARGUMENTS, later, "ExecuteProcess(cmd=['true'])"))
-    assert "kpp" not in launch("a.launch.py", "kpp:=3").stderr.replace("launch: x", "")
+def test_a_value_that_may_be_used_later_is_not_reported(launch: Launch, write: Write) -> None:
+    for later in [
+        LATER.format("kpp"),
+        "TimerAction(period=0.1, actions=[OpaqueFunction(function=lambda c: c.used.add('kpp'))])",
+    ]:
+        write("a.launch.py", described(*ARGUMENTS, later, "ExecuteProcess(cmd=['true'])"))
+        assert "kpp" not in launch("a.launch.py", "kpp:=3").stderr.replace("launch: x", "")
 
 
 def test_a_launch_file_of_a_package_in_xml_is_not_read(launch: Launch, write: Write) -> None:
@@ -184,20 +184,17 @@ def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> No
         assert message in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("words", "code", "message"),
-    [
+def test_a_file_that_is_not_there_is_one_line(launch: Launch) -> None:
+    for words, code, message in [
         (["b.launch.py"], 1, "no launch file 'b.launch.py'"),
         (["my_bot", "b.launch.py"], 1, "no launch file 'b.launch.py' in "),
         (["my_boot", "a.launch.py"], 1, "no package 'my_boot' around "),
         (["a", "b", "c"], 2, "give FILE, or PACKAGE FILE, not 'a b c'"),
         (["x:=1"], 2, "give FILE, or PACKAGE FILE, not 'nothing'"),
-    ],
-)
-def test_a_file_that_is_not_there_is_one_line(launch: Launch, words: list[str], code: int, message: str) -> None:
-    done = launch(*words)
-    assert (done.returncode, done.stderr.count("\n")) == (code, 1)
-    assert message in done.stderr
+    ]:
+        done = launch(*words)
+        assert (done.returncode, done.stderr.count("\n")) == (code, 1)
+        assert message in done.stderr
 
 
 def test_an_error_in_the_launch_file_has_its_own_traceback(launch: Launch, write: Write) -> None:

@@ -106,9 +106,8 @@ def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
             follow([node(**wrong)])
 
 
-@pytest.mark.parametrize(
-    ("package", "executable", "message"),
-    [
+def test_a_node_that_is_not_there_is_reported_before_anything_runs(follow: Follow) -> None:
+    for package, executable, message in [
         (
             "my_bot",
             "controler.py",
@@ -116,13 +115,9 @@ def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
         ),
         ("my_boot", "controller.py", "no package 'my_boot' around "),
         ("nav2_bringup", "bt_navigator", "no package 'nav2_bringup' around "),
-    ],
-)
-def test_a_node_that_is_not_there_is_reported_before_anything_runs(
-    follow: Follow, package: str, executable: str, message: str
-) -> None:
-    with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
-        follow([Node(package=package, executable=executable)])
+    ]:
+        with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
+            follow([Node(package=package, executable=executable)])
 
 
 def test_a_group_holds_what_is_set_in_it(follow: Follow) -> None:
