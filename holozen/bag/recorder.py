@@ -161,7 +161,8 @@ class _Listener:
                 in_a_row = in_a_row + 1 if waiting else 1
                 if in_a_row == DEPTH:
                     self.overran, in_a_row = self.overran + 1, 0
-                self._add(waiting or self._wait())
+                sample = waiting or self._wait()
+                self._intake.add(sample.key, sample.payload, sample.encoding, sample.number)
         except Exception:  # raised by a closed subscriber; anything else is an error
             if not self._closing:
                 raise
@@ -171,9 +172,6 @@ class _Listener:
         sample = self._subscriber.recv()
         self._idle = False
         return sample
-
-    def _add(self, sample: Sample) -> None:
-        self._intake.add(sample.key, sample.payload, sample.encoding, sample.number)
 
 
 class LeftOut(NamedTuple):

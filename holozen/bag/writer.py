@@ -57,7 +57,10 @@ class BagWriter:
         self.messages += 1
         if self._limit and self._file.size >= self._limit:
             self._finish()
-            self._open_next()
+            try:
+                self._open()
+            except OSError as error:
+                raise BagError(error.strerror or str(error)) from None
         return True
 
     def flush(self) -> None:
@@ -75,12 +78,6 @@ class BagWriter:
     def abandon(self) -> None:
         """Close without the summary at the end, which did not fit. Readers do not require it."""
         self._file.close()
-
-    def _open_next(self) -> None:
-        try:
-            self._open()
-        except OSError as error:
-            raise BagError(error.strerror or str(error)) from None
 
     def _open(self) -> None:
         number = f"_{len(self.files)}" if self._numbered else ""

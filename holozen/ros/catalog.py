@@ -10,7 +10,7 @@ from holozen.suggest import suggest
 PAGE = "docs/coming-from-ros.md"
 
 SAME = (
-    "rclpy", "rclpy.action", "rclpy.action.client", "rclpy.action.graph", "rclpy.action.server",
+    "rclpy", "rclpy.action", "rclpy.action.client", "rclpy.action.server",
     "rclpy.callback_groups", "rclpy.client", "rclpy.clock", "rclpy.context", "rclpy.exceptions",
     "rclpy.executors", "rclpy.logging", "rclpy.node", "rclpy.parameter", "rclpy.publisher", "rclpy.qos",
     "rclpy.service", "rclpy.subscription", "rclpy.task", "rclpy.time", "rclpy.timer", "tf2_ros",
@@ -21,6 +21,7 @@ SAME = (
 """ROS's modules whose counterpart has the same name below `holozen.ros`."""
 
 ALIASES = {
+    "rclpy.action.graph": "rclpy.action",
     "rclpy.clock_type": "rclpy.time",
     "rclpy.constants": "rclpy.time",
     "rclpy.duration": "rclpy.time",

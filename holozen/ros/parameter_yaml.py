@@ -49,13 +49,13 @@ def parse(text: str) -> Value | dict[str, Any]:
     stripped = text.strip()
     if PLAIN.fullmatch(stripped):
         return word(stripped)
-    found: Value | dict[str, Any] = _Parser(text).found
+    found: Value | dict[str, Any] = _parsed(text)
     return found
 
 
 def document(text: str) -> dict[str, Any]:
     """The map in a YAML file; empty for an empty file. Raises ValueError with one line."""
-    found = _Parser(text).found
+    found = _parsed(text)
     if found == "":
         return {}
     if not isinstance(found, dict):
@@ -78,32 +78,31 @@ def _composed(text: str) -> Any:
         raise ValueError(f"invalid YAML: {' '.join(str(error).split())}") from None
 
 
-class _Parser:
-    """Parses one text."""
+def _parsed(text: str) -> Any:
+    """The value of a YAML text."""
+    seen = 0
 
-    def __init__(self, text: str) -> None:
-        self._seen = 0
-        self.found = self._of(_composed(text), 0)
-
-    def _of(self, node: Any, depth: int) -> Any:
-        """The value of a node from the YAML library."""
+    def value(node: Any, depth: int) -> Any:
+        nonlocal seen
         if node is None:
             return ""
-        self._seen += 1  # aliases count every time: a few lines can expand to millions of values
-        if depth > DEEPEST or self._seen > MOST:
+        seen += 1  # aliases count every time: a few lines can expand to millions of values
+        if depth > DEEPEST or seen > MOST:
             raise ValueError(f"it is nested deeper than {DEEPEST}, or has more than {MOST} values")
         line = node.start_mark.line + 1
         if node.id == "scalar":
             quoted = node.style is not None or node.tag == "!!str"
             return node.value if quoted else word(node.value)
         if node.id == "sequence":
-            return _list([self._of(each, depth + 1) for each in node.value], line)
+            return _list([value(each, depth + 1) for each in node.value], line)
         found: dict[str, Any] = {}
         for name, inner in node.value:
             if name.id != "scalar":
                 raise ValueError(f"line {line}: a name must be a word")
-            found[name.value] = self._of(inner, depth + 1)
+            found[name.value] = value(inner, depth + 1)
         return found
+
+    return value(_composed(text), 0)
 
 
 def _list(values: list[Any], line: int) -> list[Any]:

@@ -75,40 +75,27 @@ class JumpThreshold:
         return forward or (self.min_backward is not None and jump.delta <= self.min_backward)
 
 
+@dataclass(eq=False)
 class JumpHandle:
     """The callbacks before and after a jump, until `unregister()`."""
 
-    def __init__(
-        self,
-        handles: set["JumpHandle"],
-        threshold: JumpThreshold,
-        before: Callable[[], object] | None,
-        after: Callable[[TimeJump], object] | None,
-    ) -> None:
-        self._handles, self.threshold, self.before, self.after = handles, threshold, before, after
-        handles.add(self)
+    handles: set["JumpHandle"]
+    threshold: JumpThreshold
+    before: Callable[[], object] | None
+    after: Callable[[TimeJump], object] | None
+
+    def __post_init__(self) -> None:
+        self.handles.add(self)
 
     def unregister(self) -> None:
         """Stop calling them. A second time does nothing."""
-        self._handles.discard(self)
+        self.handles.discard(self)
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_error: object) -> None:
         self.unregister()
-
-
-def _jump(handles: set[JumpHandle], jump: TimeJump, move: Callable[[], Any]) -> None:
-    """Move a clock, with the callbacks before and after."""
-    concerned = [handle for handle in list(handles) if handle.threshold.is_passed(jump)]
-    for handle in concerned:
-        if handle.before:
-            handle.before()
-    move()
-    for handle in concerned:
-        if handle.after:
-            handle.after(jump)
 
 
 class _Moves:
@@ -261,10 +248,15 @@ class ROSClock(Clock):
         self._jump(change, delta if active else -delta, lambda: setattr(self, "_active", active))
 
     def _jump(self, change: ClockChange, delta: int, move: Callable[[], None]) -> None:
-        if self._handles:
-            _jump(self._handles, TimeJump(change, Duration(nanoseconds=delta)), move)
-        else:
-            move()
+        jump = TimeJump(change, Duration(nanoseconds=delta))
+        concerned = [handle for handle in list(self._handles) if handle.threshold.is_passed(jump)]
+        for handle in concerned:
+            if handle.before:
+                handle.before()
+        move()
+        for handle in concerned:
+            if handle.after:
+                handle.after(jump)
         _moves.notify()
         for watcher in list(self.watchers):
             watcher()

@@ -5,7 +5,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import partial
 from typing import Any, Self
 
@@ -211,7 +211,8 @@ class Executor(HelpfulAttributes):
             if found := self._next():
                 return found
             # From here on a shutdown, or a future that is done, wakes this wait even before it begins.
-            self.waker.wait(_earliest([seconds, *(timer.wait_seconds() for timer in self._timers)]))
+            waits = [seconds, *(timer.wait_seconds() for timer in self._timers)]
+            self.waker.wait(min((wait for wait in waits if wait is not None), default=None))
         finally:
             self.waker.waiting = False
         return None
@@ -316,7 +317,3 @@ def _never() -> bool:
 def _deadline(timeout_sec: float | None) -> float | None:
     """None, and a negative timeout, mean no deadline."""
     return None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
-
-
-def _earliest(seconds: Iterable[float | None]) -> float | None:
-    return min((one for one in seconds if one is not None), default=None)

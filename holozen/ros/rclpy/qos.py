@@ -88,12 +88,15 @@ QoSDurabilityPolicy, QoSLivelinessPolicy = DurabilityPolicy, LivelinessPolicy
 UNBOUNDED = 10_000  # messages that wait under KEEP_ALL: a script that never spins must not fill the memory
 DEFAULT_DEPTH = 10  # messages that wait if a profile gives no depth
 
-KINDS = {
-    "history": HistoryPolicy, "depth": int, "reliability": ReliabilityPolicy, "durability": DurabilityPolicy,
-    "lifespan": Duration, "deadline": Duration, "liveliness": LivelinessPolicy, "liveliness_lease_duration": Duration,
-    "avoid_ros_namespace_conventions": bool,
+DEFAULTS = {
+    "history": HistoryPolicy.KEEP_LAST, "depth": 0, "reliability": ReliabilityPolicy.RELIABLE,
+    "durability": DurabilityPolicy.VOLATILE, "lifespan": Duration(), "deadline": Duration(),
+    "liveliness": LivelinessPolicy.SYSTEM_DEFAULT, "liveliness_lease_duration": Duration(),
+    "avoid_ros_namespace_conventions": False,
 }  # fmt: skip
-"""The fields of a profile."""
+"""The fields of a profile, and their defaults."""
+
+KINDS = {name: type(default) for name, default in DEFAULTS.items()}
 
 
 class InvalidQoSProfileException(Exception):
@@ -160,15 +163,6 @@ class QoSProfile(HelpfulAttributes):
             shown = f"{type(value).__name__}.{value.name}" if isinstance(value, IntEnum) else repr(value)
             values.append(f"{name}={shown}")
         return f"QoSProfile({', '.join(values)})"
-
-
-DEFAULTS = {
-    "history": HistoryPolicy.KEEP_LAST, "depth": 0, "reliability": ReliabilityPolicy.RELIABLE,
-    "durability": DurabilityPolicy.VOLATILE, "lifespan": Duration(), "deadline": Duration(),
-    "liveliness": LivelinessPolicy.SYSTEM_DEFAULT, "liveliness_lease_duration": Duration(),
-    "avoid_ros_namespace_conventions": False,
-}  # fmt: skip
-"""Defaults for unset policies."""
 
 
 qos_profile_default = QoSProfile(depth=10)

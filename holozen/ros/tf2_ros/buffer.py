@@ -188,6 +188,9 @@ class Buffer(HelpfulAttributes):
         with self._changed:
             try:
                 found = look()
+            except InvalidArgumentException as error:  # waiting does not help
+                future.set_exception(error)
+                return
             except TransformException:
                 self._waiting.append((look, future))
                 return

@@ -197,3 +197,5 @@ def test_what_is_known_can_be_shown_and_forgotten(buffer: tf2_ros.Buffer) -> Non
 def test_a_frame_that_cannot_be_is_not_waited_for() -> None:
     with pytest.raises(tf2_ros.InvalidArgumentException, match="the target frame '/map' starts with a slash"):
         tf2_ros.Buffer().lookup_transform("/map", "odom", NEWEST, timeout=Duration(seconds=10_000))
+    future = tf2_ros.Buffer().lookup_transform_async("/map", "odom", NEWEST)
+    assert isinstance(future.exception(), tf2_ros.InvalidArgumentException)

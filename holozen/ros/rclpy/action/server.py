@@ -143,11 +143,7 @@ class _GoalService(Service):
 
     def _reply(self, query: Any, response: Any) -> None:
         super()._reply(query, response)
-        self.then.pop(id(response), _nothing)()
-
-
-def _nothing() -> None:
-    """What follows the answer to a rejected goal."""
+        self.then.pop(id(response), lambda: None)()
 
 
 class ActionServer(HelpfulAttributes):
