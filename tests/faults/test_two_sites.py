@@ -1,10 +1,14 @@
 """Two sites, each with a router, over a link of 100 ms that loses packets; deploy/site.json5 says what crosses it."""
 
+import subprocess
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
-from holozen.testing import wait_for
+import pytest
+
+from holozen.testing import Process, wait_for
 from holozen.testing.wire import command, free_port
 
 from .history import CLOCK, EACH_STEP, History, newest, script
@@ -13,25 +17,43 @@ from .namespaces import NEEDS, Lab
 pytestmark = [NEEDS]
 
 HERE = Path(__file__).parent
-SITE = HERE.parents[1] / "deploy" / "site.json5"
+ROOT = HERE.parents[1]
+SITE = ROOT / "deploy" / "site.json5"
+ZENOHD = subprocess.run([ROOT / "scripts/zenohd", "--path"], capture_output=True, text=True, check=True).stdout.strip()
+"""Where Zenoh's own router is; asked before the tests get a cache folder of their own."""
 DELAY = 0.1  # s, one way
 CLIENT = ("--mode", "client", "--connect")
 
 
+@pytest.fixture(params=["holozen router", "zenohd"])
+def router(request: pytest.FixtureRequest) -> Callable[..., Process]:
+    """Starts a router on a host, which then listens."""
+    if request.param != "zenohd":
+        return lambda host, *words: listening(host.start(*command("router", *words)), "listens at")
+    if not Path(ZENOHD).exists():
+        pytest.skip("not built: scripts/zenohd builds zenohd, as scripts/test --long does")
+    return lambda host, *words: listening(host.start(ZENOHD, "--no-multicast-scouting", *words), "reached at")
+
+
+def listening(process: Process, line: str) -> Process:
+    process.wait_for_line(line)
+    return process
+
+
 def test_robots_stand_when_the_link_is_cut_and_only_fresh_commands_move_them_afterwards(
-    lab: Lab, tmp_path: Path
+    lab: Lab, tmp_path: Path, router: Callable[..., Process]
 ) -> None:
     robot, desk = lab.host("robot"), lab.host("desk", clock=CLOCK)
     cable, port = lab.cable(robot, desk), free_port()
     config, here = tmp_path / "site.json5", f"tcp/127.0.0.1:{port}"
     config.write_text(SITE.read_text().replace("wan0", cable.interface))
-    robot.start(*command("router", "--config", str(config), "--listen", f"tcp/0.0.0.0:{port}")).wait_for_line("listens")
+    router(robot, "--config", str(config), "--listen", f"tcp/0.0.0.0:{port}")
     robot.start(*command("sim", *CLIENT, here)).wait_for_line("listens on cmd_vel")
     robot.check(*command(*EACH_STEP, *CLIENT, here))
     observer = robot.start(*script("observer", here))
     link = desk.start(sys.executable, str(HERE / "proxy.py"), cable.address(robot), str(port), str(DELAY))
     there = f"tcp/127.0.0.1:{link.wait_for_line('port').split()[1]}"
-    desk.start(*command("router", "--listen", here, "--connect", there)).wait_for_line("listens")
+    router(desk, "--listen", here, "--connect", there)
     driver = desk.start(*script("driver", here))
 
     def history() -> History:
