@@ -1,4 +1,4 @@
-"""Follows a page of the tutorial: writes its files, runs its commands, and compares what they print.
+"""Follows a page of docs/: writes its files, runs its commands, and compares what they print.
 
 python -m tests.pages NAME FOLDER
 
@@ -8,13 +8,21 @@ python -m tests.pages NAME FOLDER
   each runs to its end, with exit code 0 unless an `error:` is shown. With a title, of a terminal, it goes on until a
   line `^C`, and the page goes on once it has printed what is shown.
 - `<!-- TERMINAL: hold KEY -->` holds a key there for a second; `<!-- TERMINAL: type KEYS -->` types.
+- A block without a language has a command a line. What goes on, such as a sim, ends with the block, as do variables;
+  `record` ends after a second.
+- A `python` block without a title is run to its end.
+- `<!-- given: COMMAND; COMMAND -->` is what the reader has running from there on, until the next such line, which may
+  say `nothing`.
+- `<!-- not run: REASON -->` stands before a block that cannot be run here, or that another test runs.
 """
 
 import os
 import re
+import shlex
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -23,14 +31,21 @@ from typing import NamedTuple, Self
 from holozen.testing import Terminal, wait_for
 
 REPO = Path(__file__).parents[1]
-TUTORIAL = REPO / "docs" / "tutorial"
+DOCS = REPO / "docs"
 STEP = re.compile(
-    r'^```(?P<language>\w+)(?: title="(?P<title>[^"]+)")?\n(?P<text>.*?)^```$'
+    r'^```(?P<language>\w*)(?: title="(?P<title>[^"]+)")?\n(?P<text>.*?)^```$'
+    r"|^<!-- given: (?P<given>[^\n]+) -->$|^<!-- not run: (?P<reason>[^\n]+) -->\n\n?(?=```)"
     r"|^<!-- (?P<terminal>[^:\n]+): (?P<verb>hold|type) (?P<keys>\S+) -->$",
     re.M | re.S,
 )
+GOES_ON = re.compile(
+    r"(?:\S*/)?holozen (?:controller(?!.* --resume)|pose-service|record|router|ros2|run|teleop|up|view"
+    r"|sim(?! (?:pause|play|reset|step)))\b|zenoh .* subscribe|.* &$"
+)
 EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<where>.+))?")
+READ = {"text", "toml", "xml"}  # blocks that are only read
 WITHIN = 60.0  # s for a command
+MOMENT = 5.0  # s for the first line of one that goes on; it may have nothing to say
 
 
 class Command(NamedTuple):
@@ -61,20 +76,33 @@ class Reader:
 
     def __init__(self, folder: Path) -> None:
         self.folder, self.terminals = folder, dict[str, Terminal]()
+        self.given, self.started = list[Terminal](), list[Terminal]()
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_error: object) -> None:
-        for terminal in self.terminals.values():
+        for terminal in (*self.terminals.values(), *self.started, *self.given):
             terminal.close()
 
     def follow(self, page: Path) -> int:
         """Do each step; their number. AssertionError with the step that does not do what the page says."""
-        steps = list(STEP.finditer(page.read_text()))
+        found = list(STEP.finditer(page.read_text()))
+        steps = iter(found)
         for step in steps:
-            if step["verb"]:
+            if step["reason"]:
+                next(steps)
+            elif step["given"]:
+                end(self.given)
+                self.begin(step["given"].removeprefix("nothing").split("; "), self.given)
+            elif step["verb"]:
                 self.press(step["terminal"], step["verb"], step["keys"])
+            elif not step["language"]:
+                variables = dict(os.environ)
+                self.begin(step["text"].splitlines(), self.started)
+                end(self.started)
+                os.environ.clear()
+                os.environ |= variables
             elif step["language"] == "console" and step["title"]:
                 self.attend(step["title"], step["text"])
             elif step["language"] == "console":
@@ -82,7 +110,33 @@ class Reader:
                     self.run(command)
             elif step["title"]:
                 self.write(step["title"], step["text"])
-        return len(steps)
+            elif step["language"] == "python":
+                self.run(Command(f"python -c {shlex.quote(step['text'])}", ""))
+            else:
+                assert step["language"] in READ, f"a block of {step['language']} is neither run nor only read"
+        end(self.given)
+        return len(found)
+
+    def begin(self, lines: list[str], started: list[Terminal]) -> None:
+        """Run a command a line; those that go on are `started`."""
+        for text in lines:
+            line = text.partition("  #")[0].strip()
+            if line.startswith("export "):
+                name, _, value = line.removeprefix("export ").partition("=")
+                os.environ[name] = value
+            elif GOES_ON.match(line):
+                terminal = self.open(line.removesuffix(" &"))
+                started.append(terminal)
+                wait_for(partial(speaks, terminal, time.monotonic() + MOMENT))
+                if " record " in line:
+                    time.sleep(1.0)
+                    end([started.pop()])
+            elif line:
+                self.run(Command(line, ""))
+
+    def open(self, line: str) -> Terminal:
+        """A command in a terminal of its own."""
+        return Terminal(["bash", "-c", f"cd '{self.folder}' && exec {line}"], env={"NO_COLOR": "1"})
 
     def write(self, title: str, text: str) -> None:
         edit = EDIT.fullmatch(title)
@@ -111,14 +165,10 @@ class Reader:
     def attend(self, name: str, text: str) -> None:
         for line, shown in commands(text.replace("^C", "$ ^C")):
             if line == "^C":
-                terminal = self.terminals.pop(name)
-                terminal.process.signal(signal.SIGINT)
-                assert terminal.process.wait() in (0, 130), terminal.raw
-                terminal.close()
+                end([self.terminals.pop(name)])
                 continue
             assert name not in self.terminals, f"{name} is busy: $ {line}"
-            here = f"cd '{self.folder}' && exec {line}"
-            terminal = self.terminals[name] = Terminal(["bash", "-c", here], env={"NO_COLOR": "1"})
+            terminal = self.terminals[name] = self.open(line)
             wait_for(partial(has, terminal, shown), WITHIN, f"{name} to show {shown!r}")
 
     def press(self, name: str, verb: str, keys: str) -> None:
@@ -127,6 +177,21 @@ class Reader:
             terminal.hold(keys, 1.0)
         else:
             terminal.type(keys)
+
+
+def end(terminals: list[Terminal]) -> None:
+    """Ctrl-C, in the one that was opened last first."""
+    while terminals:
+        terminal = terminals.pop()
+        terminal.process.signal(signal.SIGINT)
+        assert terminal.process.wait() in (0, 130), terminal.raw
+        terminal.close()
+
+
+def speaks(terminal: Terminal, until: float) -> bool:
+    """Whether a terminal shows anything, or has been waited for. AssertionError if its command ended."""
+    assert terminal.process.returncode is None, plain(terminal.raw)
+    return bool(plain(terminal.raw).strip()) or time.monotonic() > until
 
 
 def has(terminal: Terminal, shown: str) -> bool:
@@ -143,10 +208,10 @@ def plain(text: str) -> str:
 
 
 def main(name: str, folder: Path) -> None:
-    """Follow a page of the tutorial, in a shell in which .venv is active."""
-    os.environ["PATH"] = f"{Path(sys.executable).parent}:{os.environ['PATH']}"
+    """Follow a page, at home in the folder, in a shell in which .venv is active."""
+    os.environ |= {"PATH": f"{Path(sys.executable).parent}:{os.environ['PATH']}", "HOME": str(folder)}
     with Reader(folder) as reader:
-        print(f"{reader.follow(TUTORIAL / f'{name}.md')} steps")
+        print(f"{reader.follow(DOCS / f'{name}.md')} steps")
 
 
 if __name__ == "__main__":
