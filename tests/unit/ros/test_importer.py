@@ -111,8 +111,15 @@ def test_a_lessons_package_is_found(how: str, package: Path, monkeypatch: pytest
     assert names["Shape"](name="star").name == "star"
 
 
-@pytest.mark.parametrize("where", ["on sys.path", "in the package", "in src"])
-@pytest.mark.parametrize("first", ["from my_pkg.srv import NextGoal", "from my_pkg.tools import TWO"])
+@pytest.mark.parametrize(
+    ("where", "first"),
+    [
+        ("on sys.path", "from my_pkg.srv import NextGoal"),
+        ("on sys.path", "from my_pkg.tools import TWO"),
+        ("in the package", "from my_pkg.srv import NextGoal"),
+        ("in src", "from my_pkg.tools import TWO"),
+    ],
+)
 def test_a_package_with_python_modules_has_both(
     where: str, first: str, package: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -25,10 +25,11 @@ Trigger: Any = find("std_srvs/srv/Trigger")
 @pytest.mark.parametrize(
     ("namespace", "topic", "key"),
     [
-        (None, "cmd_vel", "cmd_vel"), (None, "/cmd_vel", "cmd_vel"), ("Fred", "cmd_vel", "Fred/cmd_vel"),
-        ("/a/b", "cmd_vel", "a/b/cmd_vel"), ("/a/b", "/cmd_vel", "cmd_vel"), ("Fred", "~/x", "Fred/tom/x"),
+        (None, "cmd_vel", "cmd_vel"),
+        ("/a/b", "/cmd_vel", "cmd_vel"),
+        ("Fred", "~/x", "Fred/tom/x"),
     ],
-)  # fmt: skip
+)
 def test_names_become_keys(ros: Wire, namespace: str | None, topic: str, key: str) -> None:
     node = Node("tom", namespace=namespace)
     publisher = node.create_publisher(Twist, topic, 1)

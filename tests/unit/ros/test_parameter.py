@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from holozen.ros import rclpy
 from holozen.ros.generated import find
 from holozen.ros.rclpy.parameter import (
     Parameter,
@@ -102,8 +101,3 @@ def test_a_file_becomes_messages(tmp_path: Path) -> None:
         parameter_dict_from_yaml_file(str(file), target_nodes=["/anna"])
     with pytest.raises(RuntimeError, match="cannot read"):
         parameter_dict_from_yaml_file(str(tmp_path / "none.yaml"))
-
-
-def test_scripts_find_it_in_rclpy_too() -> None:
-    assert rclpy.Parameter is Parameter
-    assert "Parameter" in rclpy.__all__

@@ -14,7 +14,7 @@ from holozen.ros.rclpy.callback_groups import MutuallyExclusiveCallbackGroup
 from holozen.ros.rclpy.clock import ROSClock
 from holozen.ros.rclpy.exceptions import InvalidHandle, ROSInterruptException
 from holozen.ros.rclpy.parameter import Parameter
-from holozen.ros.rclpy.time import ClockType, Time
+from holozen.ros.rclpy.time import ClockType, Duration, Time
 from holozen.ros.rclpy.timer import Timer
 from holozen.ros.rclpy.waitable import Waker
 from holozen.testing import Wire, wait_for
@@ -156,7 +156,7 @@ def test_a_rate_sleeps_without_spin_and_catches_up_with_a_late_loop(ros: Wire) -
     for _ in range(5):
         rate.sleep()
     assert clock.nanoseconds() - start >= 24_000_000
-    node.get_clock().sleep_for(rclpy_duration(0.1))
+    node.get_clock().sleep_for(Duration(seconds=0.1))
     rate.sleep()  # late: from now on
     after = clock.nanoseconds()
     rate.sleep()
@@ -182,12 +182,6 @@ def test_a_rate_does_not_wait_for_the_time_of_a_clock_that_was_set_back(ros: Wir
     thread.start()
     wait_for(has_ended)
     thread.join()
-
-
-def rclpy_duration(seconds: float) -> Any:
-    from holozen.ros.rclpy.time import Duration
-
-    return Duration(seconds=seconds)
 
 
 def test_a_rate_ends_with_rclpy(ros: Wire) -> None:
