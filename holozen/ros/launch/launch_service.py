@@ -39,6 +39,7 @@ class LaunchService:
     def __init__(self, flags: Sequence[str], stop: threading.Event) -> None:
         self.context = LaunchContext(self, flags)
         self._stop, self._stopping, self.failed = stop, False, False
+        self._reason = "idle"  # as ROS calls the end of a launch in which nothing is left to do
         self.on_started: Callable[[], None] = lambda: None  # called once everything is done that waits for nothing
         self._queue: deque[tuple[Scope, LaunchDescriptionEntity]] = deque()
         self._later: list[tuple[Scope, Action]] = []  # executed after everything else
@@ -74,7 +75,7 @@ class LaunchService:
                 break
             self._wait()
             self._execute()
-        self._emit(Shutdown())
+        self._emit(Shutdown(reason=self._reason))
         self._execute()
         return not self.failed
 
@@ -145,10 +146,11 @@ class LaunchService:
         self._handlers = [each for each in self._handlers if each[1] is not handler]
 
     def stop(self, reason: str) -> None:
-        """End the launch."""
-        if reason and not self._stopping:
-            report(f"launch: ends: {reason}")
-        self._stopping = True
+        """End the launch, by a signal if there is no `reason`."""
+        if not self._stopping:
+            self._stopping, self._reason = True, reason or "a signal"
+            if reason:
+                report(f"launch: ends: {reason}")
 
     def _queue_first(self, scope: Scope, entities: Iterable[LaunchDescriptionEntity]) -> None:
         self._queue.extendleft((scope, entity) for entity in reversed(list(entities)))

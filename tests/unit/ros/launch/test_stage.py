@@ -103,6 +103,21 @@ def test_what_is_handled_once_is_done_for_the_first_of_them(play: Play) -> None:
     assert play(a.RegisterEventHandler(once), sh("true"), sh("true"))[2] == ["one has ended"]
 
 
+def test_handlers_of_the_end_are_told_why(play: Play) -> None:
+    reasons: list[str] = []
+
+    def ends(*actions: Any, stop: threading.Event | None = None) -> str:
+        handler = OnShutdown(on_shutdown=lambda event, _context: reasons.append(event.reason))
+        play(a.RegisterEventHandler(handler), *actions, stop=stop)
+        return reasons.pop()
+
+    signal = threading.Event()
+    signal.set()
+    assert ends(sh("true")) == "idle"
+    assert ends(sh("sleep 60"), a.Shutdown(reason="it is late")) == "it is late"
+    assert ends(sh("sleep 60"), stop=signal) == "a signal"
+
+
 def test_on_exit_shutdown_ends_the_others(play: Play) -> None:
     good, _, err = play(sh("sleep 60"), sh("true", on_exit=a.Shutdown(reason="the window is closed")))
     assert (good, err) == (True, ["launch: ends: the window is closed"])
