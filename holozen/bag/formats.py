@@ -2,8 +2,8 @@
 
 Payloads stay as they arrived, and so does their Zenoh Encoding, in the channel's metadata. Viewers (Foxglove,
 Lichtblick) and ROS 2 choose what to draw by the schema's name, which is the ROS name: `nav_msgs/msg/Odometry`. Their
-readers of JSON schemas do not resolve `$ref`, so nothing is referenced. For CDR the schema is the text of the .msg
-files, one after another.
+readers of JSON schemas do not resolve `$ref`, so nested types are written out. For CDR the schema is the text of the
+.msg files, one after another.
 """
 
 import json
@@ -21,7 +21,8 @@ from holozen.messages.registry import Registry
 
 _MCAP = {"application/msgpack": "msgpack", "application/cdr": "cdr", "application/protobuf": "protobuf"}
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
-_KEPT = ("type", "items", "properties")
+_JSON_TYPES = {"bool": "boolean", "string": "string", "wstring": "string", "float32": "number", "float64": "number"}
+_ENTRY = "holozen/msg/RefusalCount"  # a sequence of these pairs is an object in JSON
 
 
 class Format(NamedTuple):
@@ -76,7 +77,7 @@ def types_of(key: str, names: Callable[[], set[str]]) -> tuple[type[Message], ..
 @lru_cache(maxsize=1024)
 def _format(mcap: str, encoding: str, kind: type[Message] | None) -> Format:
     if mcap == "json" and kind:
-        return Format(mcap, encoding, kind.ROS, "jsonschema", json_schema(kind))
+        return Format(mcap, encoding, kind.ROS, "jsonschema", json_schema(kind.ROS))
     name = kind.ROS if kind else encoding.partition(";")[2]
     if mcap == "cdr" and (schema := msg_schema(name)):
         return Format(mcap, encoding, name, "ros2msg", schema)
@@ -118,26 +119,6 @@ def known() -> dict[str, type[Message]]:
     return {kind.ROS: kind for row in wire.TOPICS for kind in row.types}
 
 
-@cache
-def json_schema(kind: type[Message]) -> bytes:
-    """The JSON schema of a message."""
-    schema = msgspec.json.schema(kind)
-    return json.dumps({"title": kind.ROS, **_in_place(schema, schema.get("$defs", {}))}).encode()
-
-
-def _in_place(schema: dict[str, Any], parts: dict[str, Any]) -> dict[str, Any]:
-    """`schema` with each reference replaced by what it names, without keywords that viewers ignore."""
-    if "$ref" in schema:
-        return _in_place(parts[schema["$ref"].rpartition("/")[2]], parts)
-    plain: dict[str, Any] = {name: value for name, value in schema.items() if name in _KEPT}
-    if isinstance(plain.get("items"), dict):
-        plain["items"] = _in_place(plain["items"], parts)
-    if plain["type"] == "object":  # viewers expect properties, also in a mapping
-        fields = plain.get("properties", {})
-        plain["properties"] = {name: _in_place(field, parts) for name, field in fields.items()}
-    return plain
-
-
 @lru_cache(maxsize=1024)
 def msg_schema(name: str) -> bytes:
     """The definitions of a ROS type and of the types nested in it; empty for an unknown type."""
@@ -154,8 +135,8 @@ def learn(name: str, define: Callable[[str], str]) -> None:
 
 
 @cache
-def interface_schema(name: str) -> bytes:
-    """The JSON schema of a ROS type without a Struct; empty for an unknown type."""
+def json_schema(name: str) -> bytes:
+    """The JSON schema of a ROS type; empty for an unknown type."""
     try:
         interface = _registry().find(name)
     except InterfaceError:
@@ -164,11 +145,12 @@ def interface_schema(name: str) -> bytes:
 
 
 def _object(interface: Interface) -> dict[str, Any]:
-    properties = {}
+    properties: dict[str, Any] = {}
     for field in interface.fields:
-        kinds = {"bool": "boolean", "string": "string", "wstring": "string", "float32": "number", "float64": "number"}
-        one = _object(field.nested) if field.nested else {"type": kinds.get(field.type, "integer")}
+        one = _object(field.nested) if field.nested else {"type": _JSON_TYPES.get(field.type, "integer")}
         properties[field.name] = {"type": "array", "items": one} if field.array else one
+        if field.type == _ENTRY:
+            properties[field.name] = {"type": "object", "properties": {}}  # viewers expect properties here too
     return {"type": "object", "properties": properties}
 
 

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple, Self
 
-from holozen.bag.formats import Format, as_cdr, format_of, interface_as_cdr, interface_schema, known, learn, types_of
+from holozen.bag.formats import Format, as_cdr, format_of, interface_as_cdr, json_schema, known, learn, types_of
 from holozen.bag.writer import CHANNELS, BagWriter
 from holozen.messages import Clock, Message
 from holozen.messages.codec import CodecError
@@ -228,7 +228,7 @@ class Recorder:
                 self._leave_out(sample.key, str(error))
                 return
         elif form.encoding == "json" and not form.schema and (name := self._learned.get(sample.key)):
-            schema = interface_schema(name)
+            schema = json_schema(name)
             form = form._replace(schema=name, schema_encoding="jsonschema" if schema else "", schema_data=schema)
         self.refused += not self._writer.write(topic, form, payload, at, sample.missed)
 
