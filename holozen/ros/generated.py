@@ -323,20 +323,20 @@ def _settled(owner: str, field: Field, nested: type | None) -> Check:
     exact, one = nested or _CLASSES[field.type], _element_check(field, nested, _LENIENT.get(field.type, _same))
 
     def check(values: Any) -> list[Any]:
-        where = ""
+        fault = " does not fit"
         try:
             if fits_length(field, len(values)) and _all_exact(field, values, exact):
                 return list(values) if type(values) is not list else values
             made = []
             for index, value in enumerate(values):
-                where = f"[{index}]: {_short(value)} of type '{type(value).__name__}'"
+                fault = f"[{index}]: {_short(value)} of type '{type(value).__name__}' does not fit"
                 made.append(one(value))
-            where = f": {len(values)} values"
+            fault = f": {len(values)} values do not fit"
             if fits_length(field, len(values)):
                 return made
         except _REJECTED:
             pass
-        raise CodecError(f"{owner}.{field.name}{where} does not fit a {field.spelled()}") from None
+        raise CodecError(f"{owner}.{field.name}{fault} a {field.spelled()}") from None
 
     return check
 
@@ -450,7 +450,7 @@ def _settled_array(owner: str, field: Field) -> Check:
 
     def check(values: Any) -> Any:
         if 0 < field.bound < len(values):
-            raise CodecError(f"{owner}.{field.name}: {len(values)} values does not fit a {field.spelled()}")
+            raise CodecError(f"{owner}.{field.name}: {len(values)} values do not fit a {field.spelled()}")
         return values
 
     return check

@@ -139,12 +139,14 @@ class _Front(_Finder):
             module, _, last = name.rpartition(".")
             # Without `name=`, or Python would replace the message in `from rclpy import action`.
             raise ModuleNotFoundError(_missing_name(module, last, getattr(sys.modules[module], "__all__", [])))
-        if top in self.tables:
-            return self._bundled(name, rest)
+        if top in self.tables and not rest:
+            return _spec(name, _fill_package)
+        if top in self.tables and rest in KINDS:
+            return self.interfaces(name)
         if rest in KINDS:
             return self._beside_python(name, top)
         module = name.rpartition(".")[0]
-        if module and _is_ours(module):
+        if top in self.tables or (module and _is_ours(module)):
             raise self._no_type(name)
         return None
 
@@ -161,14 +163,6 @@ class _Front(_Finder):
             if each.startswith(f"{kind}/") and f"_{_snake_case(each.partition('/')[2])}" == last:
                 return _spec(name, _fill_single_type([f"{top}/{each}{suffix}" for suffix in suffixes]))
         return None
-
-    def _bundled(self, name: str, rest: str) -> ModuleSpec:
-        """A package, or its module, of the interfaces that come with holozen."""
-        if not rest:
-            return _spec(name, _fill_package)
-        if rest in KINDS:
-            return self.interfaces(name)
-        raise self._no_type(name)
 
     def _beside_python(self, name: str, top: str) -> ModuleSpec | None:
         """The interfaces of a package whose Python modules may be found elsewhere. Those built by a real ROS are

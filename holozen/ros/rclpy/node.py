@@ -127,7 +127,7 @@ class _Inside(NodeHandle):
         So many nodes of one process close at the same time: each has to announce to all others that it goes.
         """
         self._detach()
-        threading.Thread(target=self._leave, daemon=True).start()
+        threading.Thread(target=self.close, daemon=True).start()
 
     def close(self) -> None:
         """Close the session, within half a second whatever the peers do; a second caller waits for the first."""
@@ -137,9 +137,6 @@ class _Inside(NodeHandle):
                 self.bus.close()
                 session.wait_for_threads(self._calls, CLOSE_LIMIT)
                 self._has_left = True
-
-    def _leave(self) -> None:
-        self.close()
         self.context.closed(self)
 
     def _detach(self) -> None:

@@ -186,7 +186,7 @@ def test_what_no_list_holds_is_refused_when_it_is_written() -> None:
             "ParameterValue.byte_array_value[0]: 1.5 of type 'float' does not fit a byte",
         ),
         ("nav_msgs/msg/Path", "poses", m.Pose(), "Path.poses[0]: Pose(position=Point(x=0.0, y=0.0, z=0.0), orie"),
-        (ODOMETRY, "pose.covariance", 0.0, "PoseWithCovariance.covariance: 37 values does not fit a "),
+        (ODOMETRY, "pose.covariance", 0.0, "PoseWithCovariance.covariance: 37 values do not fit a "),
         (
             "visualization_msgs/msg/MarkerArray",
             "markers",
