@@ -26,7 +26,7 @@ TABLES = {name: table(layout) for name, layout in (LAYOUTS | {"fixed": Layout("f
 
 
 def examples() -> list[str]:
-    return re.findall(r"```toml\n(.*?)```", DOCS.read_text(), re.DOTALL)
+    return re.findall(r"```toml\b[^\n]*\n(.*?)```", DOCS.read_text(), re.DOTALL)
 
 
 @pytest.mark.parametrize("name", TABLES)
@@ -67,4 +67,4 @@ def test_the_error_that_is_shown_is_the_one_that_comes(tmp_path: Path, monkeypat
     Path("my_keys.toml").write_text('[moves]\nw = "forwards"\n')
     with pytest.raises(ValueError, match="not a motion") as error:
         load("my_keys.toml")
-    assert f"```\n{error.value}\n```" in DOCS.read_text()
+    assert f"```text\n{error.value}\n```" in DOCS.read_text()
