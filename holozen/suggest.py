@@ -56,3 +56,8 @@ def listed(names: Iterable[str], most: int = 12) -> str:
     names = sorted(names)
     shown = ", ".join(shorten(name) for name in names[:most])
     return shown + f" and {len(names) - most} more" if len(names) > most else shown or "none"
+
+
+def article(name: str) -> str:
+    """The name of a class with its article: `an int`, `a uint8`, `an Odometry`."""
+    return f"an {name}" if name[:1] in tuple("aeioAEIO") else f"a {name}"

@@ -19,6 +19,7 @@ from typing import Any
 
 from holozen.messages import CodecError
 from holozen.messages.definitions import TYPECODES, Field, Interface, InterfaceError, completed, least
+from holozen.suggest import article
 
 HEADER = b"\x00\x01\x00\x00"  # classic CDR, little endian
 ORDERS = {b"\x00\x00": ">", b"\x00\x01": "<"}
@@ -85,7 +86,7 @@ class Codec:
         order = ORDERS.get(payload[:2])
         if order is None or len(payload) < len(HEADER):
             start = f"{len(payload)} bytes that begin with {payload[:2].hex(' ')}" if payload else "no bytes"
-            raise CodecError(f"not a {self._name}: {start}; CDR begins with 00 00 or 00 01 and two more bytes")
+            raise CodecError(f"not {article(self._name)}: {start}; CDR begins with 00 00 or 00 01 and two more bytes")
         if len(payload) == len(HEADER) and not self.interface.fields:
             payload += b"\0"  # other libraries write no byte for an empty message
         try:
@@ -93,13 +94,13 @@ class Codec:
                 self._readers[order] = reader(self.interface, self._shape, order)
             value, end = self._readers[order](payload, len(HEADER), len(payload))
         except struct.error:
-            raise CodecError(f"not a {self._name}: cut off after {len(payload)} bytes") from None
+            raise CodecError(f"not {article(self._name)}: cut off after {len(payload)} bytes") from None
         except UnicodeDecodeError as error:
-            raise CodecError(f"not a {self._name}: a text is not UTF-8: {error.reason}") from None
+            raise CodecError(f"not {article(self._name)}: a text is not UTF-8: {error.reason}") from None
         except ValueError as error:
-            raise CodecError(f"not a {self._name}: {error}") from None
+            raise CodecError(f"not {article(self._name)}: {error}") from None
         if len(payload) - end > PADDING:
-            raise CodecError(f"not a {self._name}: {len(payload) - end} bytes too many")
+            raise CodecError(f"not {article(self._name)}: {len(payload) - end} bytes too many")
         return value
 
     def write(self, value: Any) -> tuple[bytes, bool]:

@@ -11,7 +11,7 @@ import msgspec
 from holozen.console import printable
 from holozen.messages import CodecError
 from holozen.messages.message import Message, listed, not_finite
-from holozen.suggest import shorten
+from holozen.suggest import article, shorten
 
 if TYPE_CHECKING:
     from holozen.messages.definitions import Interface
@@ -154,7 +154,7 @@ def _first(makers: Makers[M], value: Any) -> M:
         except CodecError as error:
             reasons.append(_short(str(error)))
         except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-            reasons.append(_short(f"not a {kind.__name__}: {error}"))
+            reasons.append(_short(f"not {article(kind.__name__)}: {error}"))
     # A message with a header was meant as the stamped type.
     raise CodecError(next((reason for reason in reasons if "field `header`" not in reason), reasons[0]))
 
@@ -207,7 +207,7 @@ def _named(types: tuple[type[M], ...], schema: str) -> tuple[type[M], ...]:
         return types
     found = tuple(kind for kind in types if _structs().ros_name(kind) == name)
     if not found:
-        raise CodecError(_short(f"not a {types[0].__name__}: its encoding names {name}"))
+        raise CodecError(_short(f"not {article(types[0].__name__)}: its encoding names {name}"))
     return found
 
 

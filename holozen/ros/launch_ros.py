@@ -10,6 +10,7 @@ from holozen.ros.launch.actions import ExecuteProcess
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Substitution, Text, pairs, text
 from holozen.ros.launch.launch_description import Action, Entities
 from holozen.ros.launch.stand_ins import Executable
+from holozen.suggest import article
 
 __all__ = [
     "Node", "Parameter", "ParameterFile", "ParameterValue", "PushROSNamespace", "PushRosNamespace", "SetParameter",
@@ -202,5 +203,5 @@ def _converted(kind: Any, word: str) -> Any:
     if kind is float and type(value) is int:
         return float(value)
     if isinstance(kind, type) and not isinstance(value, kind):
-        raise LaunchError(f"the parameter is {word!r:.80}, not a {kind.__name__}")
+        raise LaunchError(f"the parameter is {word!r:.80}, not {article(kind.__name__)}")
     return value

@@ -1,6 +1,6 @@
 """Suggestions for misspelt names, and how short they stay."""
 
-from holozen.suggest import cut, last_part, listed, suggest
+from holozen.suggest import article, cut, last_part, listed, suggest
 
 
 def test_a_hint_names_what_is_there() -> None:
@@ -24,3 +24,8 @@ def test_messages_stay_short() -> None:
     assert len(cut(long)) < 90
     assert listed(str(n) for n in range(100)).endswith(" and 88 more")
     assert listed([]) == "none"
+
+
+def test_a_class_has_its_article() -> None:
+    names = ("int", "uint8", "Odometry", "Twist")
+    assert [article(name) for name in names] == ["an int", "a uint8", "an Odometry", "a Twist"]

@@ -10,7 +10,7 @@ from holozen.ros.parameter_yaml import Section, Value
 from holozen.ros.rclpy import names
 from holozen.ros.rclpy.exceptions import NameValidationException, RCLInvalidROSArgsError, UnknownROSArgsError
 from holozen.ros.rclpy.logging import LoggingSeverity
-from holozen.suggest import suggest
+from holozen.suggest import article, suggest
 
 START, END = "--ros-args", "--"
 REMAP, PARAM, FILE, LEVEL = "--remap", "--param", "--params-file", "--log-level"
@@ -74,7 +74,7 @@ def parse(args: Sequence[str] | None = None) -> Arguments:
     words = iter(sys.argv if args is None else args)
     for text in words:
         if not isinstance(text, str):
-            raise TypeError(f"arguments must be a list of str; {text!r} is a {type(text).__name__}")
+            raise TypeError(f"arguments must be a list of str; {text!r} is {article(type(text).__name__)}")
         if text != START:
             found.unparsed.append(text)
             continue

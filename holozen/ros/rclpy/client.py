@@ -10,7 +10,7 @@ from holozen.messages.codec import CodecError
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.context import Context
 from holozen.ros.rclpy.exceptions import InvalidHandle
-from holozen.ros.rclpy.handle import NodeHandle, Owned
+from holozen.ros.rclpy.handle import NodeHandle, Owned, wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
 from holozen.ros.rclpy.task import Future, TaskQueue
@@ -80,8 +80,7 @@ class Client(Owned):
     def call_async(self, request: Any) -> Future:
         """Call the service; the future of the reply, at once."""
         if not isinstance(request, self.srv_type.Request):
-            given = request.__name__ if isinstance(request, type) else type(request).__name__
-            raise TypeError(f"{self.srv_name}: expected a {self.srv_type.__name__}.Request, and got a {given}")
+            raise wrong_type(self.srv_name, f"{self.srv_type.__name__}.Request", request)
         self._handle.context.check_can_publish(f"call {self.srv_name}")
         self._check_open()
         future = Future(executor=self.tasks)

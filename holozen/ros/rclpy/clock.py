@@ -16,6 +16,7 @@ from holozen.ros.rclpy.context import get_default_context
 from holozen.ros.rclpy.exceptions import NotInitializedException
 from holozen.ros.rclpy.parameter import Parameter
 from holozen.ros.rclpy.time import ClockType, Duration, Time
+from holozen.suggest import article
 from holozen.transport.errors import BusError
 from holozen.transport.pubsub import Subscription
 
@@ -58,7 +59,7 @@ class JumpThreshold:
     ) -> None:
         for name, value in (("min_forward", min_forward), ("min_backward", min_backward)):
             if value is not None and not isinstance(value, Duration):
-                raise TypeError(f"{name} must be a Duration or None; {value!r} is a {type(value).__name__}")
+                raise TypeError(f"{name} must be a Duration or None; {value!r} is {article(type(value).__name__)}")
         if min_forward is not None and min_forward <= Duration():
             raise ValueError(f"min_forward must be positive, not {min_forward}")
         if min_backward is not None and min_backward >= Duration():
@@ -175,7 +176,7 @@ class Clock(HelpfulAttributes):
         Raises ValueError for a time of another clock type, NotInitializedException if rclpy is not running.
         """
         if not isinstance(until, Time):
-            raise TypeError(f"until must be a Time; {until!r} is a {type(until).__name__}")
+            raise TypeError(f"until must be a Time; {until!r} is {article(type(until).__name__)}")
         if until.clock_type != self._clock_type:
             raise ValueError(f"this is a clock of {self._clock_type.name}, and the time is of {until.clock_type.name}")
         return self.sleep_nanoseconds(until.nanoseconds, context)
@@ -183,7 +184,7 @@ class Clock(HelpfulAttributes):
     def sleep_for(self, rel_time: Duration, context: Any = None) -> bool:
         """Sleep for a duration, see `sleep_until`."""
         if not isinstance(rel_time, Duration):
-            raise TypeError(f"rel_time must be a Duration; {rel_time!r} is a {type(rel_time).__name__}")
+            raise TypeError(f"rel_time must be a Duration; {rel_time!r} is {article(type(rel_time).__name__)}")
         until = max(0, self.nanoseconds() + rel_time.nanoseconds)
         return self.sleep_until(Time(nanoseconds=until, clock_type=self._clock_type), context)
 

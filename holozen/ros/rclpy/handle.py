@@ -10,6 +10,7 @@ from holozen.ros.rclpy.arguments import Arguments
 from holozen.ros.rclpy.context import Context
 from holozen.ros.rclpy.exceptions import InvalidHandle, NotInitializedException
 from holozen.ros.rclpy.logging import get_logger
+from holozen.suggest import article
 from holozen.transport.actions import Found
 from holozen.transport.graph import Endpoint, Graph, on_key
 
@@ -86,3 +87,10 @@ def names_and_types(found: Iterable[Endpoint | Found]) -> NamesAndTypes:
     for one in found:
         types.setdefault(f"/{one.key}", set()).add(one.type)
     return [(name, sorted(types[name])) for name in sorted(types)]
+
+
+def wrong_type(place: str, wanted: str, value: object) -> TypeError:
+    """The error for a value that is no `wanted`, or for a class in the place of a value."""
+    given = value.__name__ if isinstance(value, type) else type(value).__name__
+    hint = f"; write {wanted}()" if isinstance(value, type) else ""
+    return TypeError(f"{place}: expected {article(wanted)}, and got {article(given)}{hint}")

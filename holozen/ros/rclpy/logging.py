@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, TextIO
 
 from holozen.console import log
 from holozen.ros.catalog import HelpfulAttributes
+from holozen.suggest import article
 
 __all__ = [
     "LoggingSeverity", "RcutilsLogger", "clear_config", "get_logger", "get_logger_effective_level", "get_logger_level",
@@ -95,7 +96,7 @@ def _passes(
     Raises ValueError if a call logs at two levels, TypeError for invalid seconds.
     """
     if seconds is not None and (isinstance(seconds, bool) or not isinstance(seconds, int | float)):
-        raise TypeError(f"throttle_duration_sec is a {type(seconds).__name__}; use seconds, as a number")
+        raise TypeError(f"throttle_duration_sec is {article(type(seconds).__name__)}; use seconds, as a number")
     with _filter_lock:
         if len(_call_levels) >= MOST_CALLS:
             return True

@@ -10,6 +10,7 @@ from holozen.ros.rclpy.exceptions import (
     InvalidServiceNameException,
     InvalidTopicNameException,
 )
+from holozen.suggest import article
 
 LONGEST = 247  # characters of a full topic name
 LONGEST_NODE = 255
@@ -30,7 +31,7 @@ def join(namespace: str, name: str) -> str:
 
 def check_node_name(name: str) -> str:
     """`name` if it is valid for a node. Raises InvalidNodeNameException."""
-    place, fault = _token_fault(_text(name, "the name of a node"))
+    place, fault = _token_fault(text_of(name, "the name of a node"))
     if not name:
         raise InvalidNodeNameException(name, "it is empty", 0)
     if fault:
@@ -42,7 +43,7 @@ def check_node_name(name: str) -> str:
 
 def check_namespace(name: str) -> str:
     """A namespace with its leading slash, which may be omitted. Raises InvalidNamespaceException."""
-    full = name if _text(name, "a namespace").startswith("/") else f"/{name}"
+    full = name if text_of(name, "a namespace").startswith("/") else f"/{name}"
     fault = _path_fault(full) if full != "/" else None
     if fault:
         raise InvalidNamespaceException(full, fault[1], fault[0])
@@ -58,7 +59,7 @@ def expand(name: str, node: str, namespace: str, *, kind: str = "topic") -> str:
     def refuse(place: int, fault: str) -> NoReturn:
         raise (InvalidServiceNameException if kind == "service" else InvalidTopicNameException)(name, fault, place)
 
-    if not _text(name, f"the name of a {kind}"):
+    if not text_of(name, f"the name of a {kind}"):
         refuse(0, "it is empty")
     known = {"node": node, "ns": namespace, "namespace": namespace}
     for found in SUBSTITUTION.finditer(name):
@@ -129,9 +130,10 @@ def remap(text: str) -> Remap:
     return Remap(match, replacement, only)
 
 
-def _text(name: object, what: str) -> str:
+def text_of(name: object, what: str) -> str:
+    """`name`. Raises TypeError for anything but a str."""
     if not isinstance(name, str):
-        raise TypeError(f"{what} must be a str; {name!r} is a {type(name).__name__}")
+        raise TypeError(f"{what} must be a str; {name!r} is {article(type(name).__name__)}")
     return name
 
 

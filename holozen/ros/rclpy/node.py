@@ -40,6 +40,7 @@ from holozen.ros.rclpy.service import Service
 from holozen.ros.rclpy.subscription import Subscription
 from holozen.ros.rclpy.timer import Rate, Timer
 from holozen.ros.rclpy.waitable import GuardCondition, Waitable
+from holozen.suggest import article
 from holozen.transport import session
 from holozen.transport.graph import Endpoint
 from holozen.transport.parameters import is_below
@@ -630,7 +631,7 @@ def _parameters(given: Sequence[Parameter]) -> list[Parameter]:
     found = list(given)
     for each in found:
         if not isinstance(each, Parameter):
-            raise TypeError(f"use a list of rclpy.parameter.Parameter; {each!r} is a {type(each).__name__}")
+            raise TypeError(f"use a list of rclpy.parameter.Parameter; {each!r} is {article(type(each).__name__)}")
     return found
 
 
@@ -639,8 +640,7 @@ def _declaration(entry: tuple[Any, ...], namespace: str) -> tuple[str, Any, Any]
     if not isinstance(entry, tuple | list) or not 1 <= len(entry) <= 3:
         raise TypeError(f"{entry!r} does not declare a parameter; write (name, value), or (name, value, descriptor)")
     name, *rest = entry
-    if not isinstance(name, str):
-        raise TypeError(f"the name of a parameter must be a str; {name!r} is a {type(name).__name__}")
+    names.text_of(name, "the name of a parameter")
     full = f"{namespace}{PARAMETER_SEPARATOR_STRING}{name}" if namespace and name else name
     value, descriptor = [*rest, None, None][:2]
     if not rest:

@@ -16,7 +16,8 @@ from holozen.ros.rclpy.exceptions import (
     ParameterAlreadyDeclaredException,
     ParameterNotDeclaredException,
 )
-from holozen.suggest import shorten
+from holozen.ros.rclpy.names import text_of
+from holozen.suggest import article, shorten
 
 __all__ = [
     "PARAMETER_SEPARATOR_STRING", "Parameter", "get_parameter_value", "parameter_dict_from_yaml_file",
@@ -75,13 +76,12 @@ class Parameter:
             return Parameter.Type.from_parameter_value(parameter_value) == self
 
     def __init__(self, name: str, type_: "Parameter.Type | None" = None, value: Any = None) -> None:
-        if not isinstance(name, str):
-            raise TypeError(f"the name of a parameter must be a str; {name!r} is a {type(name).__name__}")
+        text_of(name, "the name of a parameter")
         value = _plain(value)
         if type_ is None:
             type_ = Parameter.Type.from_parameter_value(value)
         if not isinstance(type_, Parameter.Type):
-            raise TypeError(f"parameter {name!r}: type_ must be a Parameter.Type, not a {type(type_).__name__}")
+            raise TypeError(f"parameter {name!r}: type_ must be a Parameter.Type, not {article(type(type_).__name__)}")
         if not type_.check(value):
             got = Parameter.Type.from_parameter_value(value)
             raise ValueError(f"parameter {name!r}: {_short(value)} is {got.name}, but its type is {type_.name}")
@@ -275,9 +275,7 @@ class ParameterStore:
     def check_new(self, names: list[str]) -> None:
         """Raises for names that are invalid, or declared already."""
         for name in names:
-            if not isinstance(name, str):
-                raise TypeError(f"the name of a parameter must be a str; {name!r} is a {type(name).__name__}")
-            if not name:
+            if not text_of(name, "the name of a parameter"):
                 raise InvalidParameterException(name)
         if there := [name for name in names if name in self.values]:
             raise ParameterAlreadyDeclaredException(there)

@@ -4,7 +4,7 @@ from typing import Any
 
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.exceptions import InvalidHandle
-from holozen.ros.rclpy.handle import NodeHandle, Owned
+from holozen.ros.rclpy.handle import NodeHandle, Owned, wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import HistoryPolicy, QoSProfile
 from holozen.transport.graph import subscribers
@@ -40,9 +40,7 @@ class Publisher(Owned):
         if writer is None:
             raise InvalidHandle(f"the publisher of {self.topic} was destroyed")
         if not isinstance(msg, self.msg_type | bytes):
-            given = msg.__name__ if isinstance(msg, type) else type(msg).__name__
-            hint = f"; write {given}()" if isinstance(msg, type) else ""
-            raise TypeError(f"{self.topic}: expected a {self.msg_type.__name__}, and got a {given}{hint}")
+            raise wrong_type(self.topic, self.msg_type.__name__, msg)
         try:
             (writer.put_bytes if isinstance(msg, bytes) else writer.put)(msg)
         except Exception:

@@ -10,6 +10,7 @@ from typing import Any, Self
 
 from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.time import Duration
+from holozen.suggest import article
 
 __all__ = [
     "DurabilityPolicy", "HistoryPolicy", "InvalidQoSProfileException", "LivelinessPolicy", "QoSCompatibility",
@@ -146,7 +147,7 @@ class QoSProfile(HelpfulAttributes):
         if issubclass(kind, IntEnum) and type(value) is int:
             value = kind(value)
         is_one = isinstance(value, kind) and (kind is bool or not isinstance(value, bool))
-        assert is_one, f"QoSProfile.{name}: {value!r} is a {type(value).__name__}; use a {kind.__name__}"
+        assert is_one, f"QoSProfile.{name}: {value!r} is {article(type(value).__name__)}; use {article(kind.__name__)}"
         if name == "depth" and value < 0:
             raise ValueError(f"QoSProfile.depth: {value}; use 0 or more messages")
         object.__setattr__(self, name, value)
@@ -243,7 +244,8 @@ def as_profile(qos: QoSProfile | int) -> QoSProfile:
     if isinstance(qos, QoSProfile):
         return qos
     if isinstance(qos, bool) or not isinstance(qos, int):
-        raise TypeError(f"{qos!r} is a {type(qos).__name__}; use a QoSProfile, or the depth of the queue as an int")
+        given = article(type(qos).__name__)
+        raise TypeError(f"{qos!r} is {given}; use a QoSProfile, or the depth of the queue as an int")
     if qos < 0:
         raise ValueError(f"the depth of a queue must be 0 or more, not {qos}")
     return qos_profile_default if qos == 0 else QoSProfile(depth=qos)

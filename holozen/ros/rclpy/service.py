@@ -11,6 +11,7 @@ from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
 from holozen.ros.rclpy.waitable import Inbox, Waker
+from holozen.suggest import article
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import refuse
 
@@ -108,10 +109,9 @@ class Service(Owned):
         with query:
             try:
                 if not isinstance(response, self.srv_type.Response):
-                    name = f"{self.srv_type.__name__}.Response"
+                    wanted, given = article(f"{self.srv_type.__name__}.Response"), article(type(response).__name__)
                     hint = "; write `return response` at its end" if response is None else ""
-                    given = type(response).__name__
-                    raise TypeError(f"the callback of {self.srv_name} must return a {name}, and gave a {given}{hint}")
+                    raise TypeError(f"the callback of {self.srv_name} must return {wanted}, and gave {given}{hint}")
                 self._server.reply(query, response)
             except (TypeError, CodecError) as error:
                 refuse(query, str(error))

@@ -16,6 +16,7 @@ from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile, as_profile, queue_length
 from holozen.ros.rclpy.waitable import Inbox, Waker
+from holozen.suggest import article
 from holozen.transport.errors import BusError
 from holozen.transport.samples import Sample
 
@@ -217,7 +218,8 @@ def _argument_count(callback: Callable[..., Any]) -> int:
     except (TypeError, ValueError):  # a built-in function, or not a function
         if callable(callback):
             return 1
-        raise TypeError(f"a callback must be a function, and {callback!r} is a {type(callback).__name__}") from None
+        given = article(type(callback).__name__)
+        raise TypeError(f"a callback must be a function, and {callback!r} is {given}") from None
     for count in (1, 2):
         try:
             signature.bind(*[None] * count)

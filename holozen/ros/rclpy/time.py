@@ -6,6 +6,7 @@ from typing import Any
 
 from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.generated import find
+from holozen.suggest import article
 
 __all__ = ["CONVERSION_CONSTANT", "S_TO_NS", "ClockType", "Duration", "Infinite", "Time"]
 
@@ -117,7 +118,7 @@ class Time(HelpfulAttributes):
         self, *, seconds: float = 0, nanoseconds: float = 0, clock_type: ClockType = ClockType.SYSTEM_TIME
     ) -> None:
         if not isinstance(clock_type, ClockType):
-            raise TypeError(f"clock_type is a {type(clock_type).__name__}; use a ClockType")
+            raise TypeError(f"clock_type is {article(type(clock_type).__name__)}; use a ClockType")
         if seconds < 0 or nanoseconds < 0:
             name, value = ("seconds", seconds) if seconds < 0 else ("nanoseconds", nanoseconds)
             raise ValueError(f"{name} value must not be negative, and is {value}")

@@ -221,7 +221,7 @@ def test_plain_values_become_messages() -> None:
     assert convert({"linear": {"x": 1}}, (m.Twist,)) == m.Twist.planar(1)
     assert convert({"request_goal": "2"}, (m.NextGoalRequest,)) == m.NextGoalRequest(2)  # from a selector's parameters
     for kind in (m.Twist, m.Odometry, m.CommandStatus):  # a typo on the command line, in telemetry as well
-        with pytest.raises(CodecError, match=rf"not a {kind.__name__}: .*`linaer`"):
+        with pytest.raises(CodecError, match=rf"not an? {kind.__name__}: .*`linaer`"):
             convert({"linaer": {}}, (kind,))
 
 

@@ -80,7 +80,7 @@ def test_a_name_that_is_no_text_is_a_type_error() -> None:
         lambda name: names.expand(name, "tom", "/"),
     ]
     for check in checks:
-        with pytest.raises(TypeError, match=r"must be a str; 5 is a int"):
+        with pytest.raises(TypeError, match=r"must be a str; 5 is an int"):
             check(5)
 
 

@@ -78,7 +78,7 @@ def test_type_and_value_must_agree() -> None:
         Parameter("x", Type.DOUBLE, 1)
     with pytest.raises(ValueError, match="True is BOOL"):
         Parameter("x", Type.INTEGER, True)
-    with pytest.raises(TypeError, match=r"type_ must be a Parameter\.Type, not a int"):
+    with pytest.raises(TypeError, match=r"type_ must be a Parameter\.Type, not an int"):
         Parameter("x", 3, 1.0)  # type: ignore[arg-type]
     with pytest.raises(TypeError, match="must be a str"):
         Parameter(5)  # type: ignore[arg-type]

@@ -33,10 +33,14 @@ def test_what_it_sends_has_priority_data_and_waits_only_to_keep_all(ros: Wire, k
 
 def test_another_type_is_reported(ros: Wire) -> None:
     publisher = rclpy.create_node("tom").create_publisher(Twist, "cmd_vel", 1)
-    for wrong, message in ((3, "int"), (Twist, "Twist; write Twist()"), (find("std_msgs/msg/String")(), "String")):
+    for wrong, message in (
+        (3, "an int"),
+        (Twist, "a Twist; write Twist()"),
+        (find("std_msgs/msg/String")(), "a String"),
+    ):
         with pytest.raises(TypeError) as error:
             publisher.publish(wrong)
-        assert str(error.value) == f"/cmd_vel: expected a Twist, and got a {message}"
+        assert str(error.value) == f"/cmd_vel: expected a Twist, and got {message}"
 
 
 def test_a_destroyed_one_sends_nothing(ros: Wire) -> None:

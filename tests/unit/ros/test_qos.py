@@ -35,10 +35,10 @@ def test_an_incomplete_profile_is_refused() -> None:
 def test_a_wrong_argument_is_reported() -> None:
     rows: list[tuple[dict[str, Any], str]] = [
         ({"deepth": 1}, "QoSProfile has no deepth; use history, depth"),
-        ({"depth": "10"}, r"depth: '10' is a str; use a int"),
+        ({"depth": "10"}, r"depth: '10' is a str; use an int"),
         ({"depth": True}, "depth: True is a bool"),
         ({"reliability": DurabilityPolicy.VOLATILE}, "reliability: .*DurabilityPolicy; use a ReliabilityPolicy"),
-        ({"deadline": 5}, "deadline: 5 is a int; use a Duration"),
+        ({"deadline": 5}, "deadline: 5 is an int; use a Duration"),
         ({"avoid_ros_namespace_conventions": 1}, "use a bool"),
     ]
     for reported, message in rows:

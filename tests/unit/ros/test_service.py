@@ -55,13 +55,13 @@ def test_a_callback_that_returns_no_response_is_reported_to_both(ros: Wire, spin
     node, bus, returned = rclpy.create_node("tom"), ros.bus("bus"), list[Any]()
     node.create_service(Trigger, "go", lambda _request, _response: returned.pop())
     for wrong, expected in [
-        (None, "NoneType; write `return response` at its end"),
-        (3, "int"),
-        (SetBool.Response(), "SetBool_Response"),
+        (None, "a NoneType; write `return response` at its end"),
+        (3, "an int"),
+        (SetBool.Response(), "a SetBool_Response"),
     ]:
         returned.append(wrong)
         reply = asked(bus)
-        text = f"the callback of /go must return a Trigger.Response, and gave a {expected}"
+        text = f"the callback of /go must return a Trigger.Response, and gave {expected}"
         with pytest.raises(TypeError) as error:
             spin_for(reply, node)
         assert str(error.value) == text

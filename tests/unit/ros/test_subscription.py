@@ -167,7 +167,7 @@ def test_a_callback_that_takes_no_message_is_refused(ros: Wire) -> None:
     node = rclpy.create_node("tom")
     with pytest.raises(RuntimeError, match=r"takes \(\); a subscription's callback takes one argument, the message$"):
         node.create_subscription(Twist, "a", lambda: None, 10)
-    with pytest.raises(TypeError, match=r"^a callback must be a function, and 3 is a int$"):
+    with pytest.raises(TypeError, match=r"^a callback must be a function, and 3 is an int$"):
         node.create_subscription(Twist, "a", 3, 10)  # type: ignore[arg-type]
 
 

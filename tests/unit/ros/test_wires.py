@@ -233,7 +233,7 @@ def test_a_range_holds_in_every_wire() -> None:
     for payload, reason in (
         (b'{"height": -1}', "`$.height`"), (b'{"data": [256]}', "`$.data[0]`"), (b'{"height": 1.5}', "`$.height`")
     ):  # fmt: skip
-        with pytest.raises(CodecError, match="not a Image") as error:
+        with pytest.raises(CodecError, match="not an Image") as error:
             decode(payload, WIRES["json"], (kind,))
         assert reason in str(error.value)
 

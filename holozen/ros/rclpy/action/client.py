@@ -11,6 +11,7 @@ from holozen.ros.generated import find
 from holozen.ros.rclpy.action.server import check_action
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.client import Client, wait_for_reply
+from holozen.ros.rclpy.handle import wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
 from holozen.ros.rclpy.task import Future
@@ -132,8 +133,7 @@ class ActionClient(HelpfulAttributes):
     ) -> Future:
         """Send a goal; the future of a ClientGoalHandle. `feedback_callback(message)` is called with each progress."""
         if not isinstance(goal, self._type.Goal):
-            given = goal.__name__ if isinstance(goal, type) else type(goal).__name__
-            raise TypeError(f"{self._name}: expected a {self._type.__name__}.Goal, and got a {given}")
+            raise wrong_type(self._name, f"{self._type.__name__}.Goal", goal)
         request = self._type.Impl.SendGoalService.Request()
         request.goal_id = goal_uuid or find("unique_identifier_msgs/msg/UUID")(uuid=list(new_id()))
         request.goal = goal

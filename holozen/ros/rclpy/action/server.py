@@ -9,10 +9,12 @@ from typing import Any
 
 from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
+from holozen.ros.rclpy.handle import wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
 from holozen.ros.rclpy.service import Service
 from holozen.ros.rclpy.task import Future
+from holozen.suggest import article
 from holozen.transport.actions import CANCEL, KEPT, RESULT, SEND, Goal, Goals, State
 
 __all__ = [
@@ -82,10 +84,9 @@ class ServerGoalHandle(HelpfulAttributes):
 
     def publish_feedback(self, feedback: Any) -> None:
         """Publish its progress. Raises TypeError for anything but a Feedback of the action."""
-        kind = self._server.action_type.Feedback
-        if not isinstance(feedback, kind):
-            given = feedback.__name__ if isinstance(feedback, type) else type(feedback).__name__
-            raise TypeError(f"expected a {self._server.action_type.__name__}.Feedback, and got a {given}")
+        kind = self._server.action_type
+        if not isinstance(feedback, kind.Feedback):
+            raise wrong_type(self._server.action_name, f"{kind.__name__}.Feedback", feedback)
         self._server.goals.feedback(self._goal, feedback)
 
     def succeed(self, response: Any = None) -> None:
@@ -263,8 +264,8 @@ class ActionServer(HelpfulAttributes):
                 return
             if not isinstance(result, self.action_type.Result):
                 hint = "; write `return result` at its end" if result is None else ""
-                kind = f"{self.action_type.__name__}.Result"
-                raise TypeError(f"the callback must return a {kind}, and gave a {type(result).__name__}{hint}")
+                wanted, given = article(f"{self.action_type.__name__}.Result"), article(type(result).__name__)
+                raise TypeError(f"the callback must return {wanted}, and gave {given}{hint}")
         except Exception as error:
             self._node.get_logger().error(f"{self.action_name}: a goal is aborted: {type(error).__name__}: {error}")
             traceback.print_exc()

@@ -94,7 +94,7 @@ def test_a_wrong_node_is_one_line_with_its_place(follow: Follow) -> None:
     rows: list[tuple[dict[str, Any], str]] = [
         ({"parameters": {"a": 1}}, r"parameters={'a': 1} is not a list; write \[{'name': value}, 'file.yaml'\]"),
         ({"parameters": [{"a": None}]}, "a parameter cannot be None; it must be a bool, a number, a text"),
-        ({"parameters": [{"a": ParameterValue("x", value_type=int)}]}, "the parameter is 'x', not a int"),
+        ({"parameters": [{"a": ParameterValue("x", value_type=int)}]}, "the parameter is 'x', not an int"),
         ({"arguments": "-x 1"}, "arguments='-x 1' is one text; write a list of words"),
         ({"condition": "true"}, "condition='true' is not a condition"),
         ({"paramters": []}, r"Node has no argument 'paramters' \(did you mean 'parameters'"),
