@@ -40,7 +40,7 @@ STEP = re.compile(
 )
 GOES_ON = re.compile(
     r"(?:\S*/)?holozen (?:controller(?!.* --resume)|pose-service|record|router|ros2|run|teleop|up|view"
-    r"|sim(?! (?:pause|play|reset|step)))\b|zenoh .* subscribe|.* &$"
+    r"|sim(?! (?:pause|play|reset|step))|topic (?:echo|hz|pub)(?!.* --(?:once|times)))\b|zenoh .* subscribe|.* &$"
 )
 EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<where>.+))?")
 READ = {"text", "toml", "xml"}  # blocks that are only read
