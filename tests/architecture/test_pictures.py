@@ -1,7 +1,10 @@
-"""The picture of the docs shows what there is."""
+"""The pictures of the docs show what there is."""
 
-from scripts.pictures import NOTE, made_of
+import pytest
+
+from scripts.pictures import PICTURES, made_of, notes
 
 
-def test_the_picture_is_not_older_than_what_it_shows() -> None:
-    assert NOTE.read_text().strip() == made_of(), "run scripts/pictures, and look at docs/view.png"
+@pytest.mark.parametrize("name", PICTURES)
+def test_a_picture_is_not_older_than_what_it_shows(name: str) -> None:
+    assert notes().get(name) == made_of(name), f"run scripts/pictures, and look at docs/{name}"
