@@ -46,9 +46,7 @@ def from_file(path: Path) -> Script:
     if path.is_dir():
         raise NotFound(f"{path} is a folder; give a Python file, or PACKAGE EXECUTABLE")
     if not path.exists():
-        files = sorted(each.name for each in path.parent.glob("*.py")) if path.parent.is_dir() else []
-        hint = suggest(path.name, files) or f"; Python files there: {listed(files, 20)}"
-        raise NotFound(f"no file {str(path)!r}{hint}")
+        raise NotFound(f"no file {str(path)!r}{files_there(path, '*.py', 'Python files')}")
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
@@ -58,6 +56,12 @@ def from_file(path: Path) -> Script:
         raise NotFound(f"{path} is no Python script: its name must end with .py, or it must begin #!/usr/bin/python3")
     path = path.absolute()
     return Script(path, path.resolve().parent)
+
+
+def files_there(path: Path, pattern: str, what: str) -> str:
+    """The end of an error line about a file that does not exist: the most similar one in its folder, or all."""
+    files = sorted(each.name for each in path.parent.glob(pattern) if each.is_file())
+    return suggest(path.name, files) or f"; {what} there: {listed(files, 20)}"
 
 
 def find(package: str, name: str, nameless: bool = False) -> Script:

@@ -3,10 +3,10 @@
 from pathlib import Path
 from types import ModuleType
 
+from holozen.ros.executables import files_there
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Text, describe, here, text
 from holozen.ros.launch.launch_description import LaunchDescription
 from holozen.ros.launch.stand_ins import gazebo_launch_file
-from holozen.suggest import listed, suggest
 
 __all__ = ["AnyLaunchDescriptionSource", "FrontendLaunchDescriptionSource", "PythonLaunchDescriptionSource"]
 
@@ -42,10 +42,7 @@ class FrontendLaunchDescriptionSource(PythonLaunchDescriptionSource):
 def read(path: Path) -> LaunchDescription:
     """The description that a launch file generates. Raises LaunchError, and what the file raises."""
     if not path.is_file():
-        folder = path.parent
-        files = sorted(each.name for each in folder.glob("*.launch.py") if each.is_file()) if folder.is_dir() else []
-        hint = suggest(path.name, files) or f"; launch files there: {listed(files, 20)}"
-        raise LaunchError(f"no launch file {str(path)!r}{hint}")
+        raise LaunchError(f"no launch file {str(path)!r}{files_there(path, '*.launch.py', 'launch files')}")
     if path.suffix in (".xml", ".yaml", ".yml"):
         raise LaunchError(f"{path}: launch files in XML and YAML are not supported; Python only")
     if path.suffix != ".py":

@@ -9,7 +9,7 @@ from holozen.ros import parameter_yaml
 from holozen.ros.parameter_yaml import Section, Value
 from holozen.ros.rclpy import names
 from holozen.ros.rclpy.exceptions import NameValidationException, RCLInvalidROSArgsError, UnknownROSArgsError
-from holozen.ros.rclpy.logging import LoggingSeverity
+from holozen.ros.rclpy.logging import LoggingSeverity, get_logging_severity_from_string
 from holozen.suggest import article, suggest
 
 START, END = "--ros-args", "--"
@@ -111,17 +111,8 @@ def _take(found: Arguments, flag: str, words: Iterator[str]) -> None:
         elif full == FILE:
             found.sections.extend(parameter_yaml.read(text))
         elif full == LEVEL:
-            found.levels.append(_level(text))
+            name, _, level = text.rpartition(":=")
+            found.levels.append((name, get_logging_severity_from_string(level)))
         # The other flags are accepted and have no effect.
-    except (ValueError, NameValidationException) as error:
+    except (ValueError, RuntimeError, NameValidationException) as error:
         raise RCLInvalidROSArgsError(printable(f"{flag} {text}: {error}")) from None
-
-
-def _level(text: str) -> tuple[str, LoggingSeverity]:
-    name, _, level = text.rpartition(":=")
-    try:
-        return name, LoggingSeverity[level.upper()]
-    except KeyError:
-        raise ValueError(
-            f"no level {level!r}; use one of {', '.join(s.name.lower() for s in LoggingSeverity)}"
-        ) from None

@@ -211,7 +211,8 @@ def get_logging_severity_from_string(log_severity: str) -> LoggingSeverity:
     try:
         return LoggingSeverity[log_severity.upper()]
     except KeyError:
-        raise RuntimeError(f"no level {log_severity!r}; use one of {_level_names()}") from None
+        names = ", ".join(each.name.lower() for each in LoggingSeverity)
+        raise RuntimeError(f"no level {log_severity!r}; use one of {names}") from None
 
 
 def get_logger_effective_level(name: str) -> LoggingSeverity:
@@ -262,11 +263,8 @@ def _severity(level: int) -> LoggingSeverity:
     try:
         return LoggingSeverity(level)
     except ValueError:
-        raise ValueError(f"no level {level!r}; use LoggingSeverity: {_level_names()}") from None
-
-
-def _level_names() -> str:
-    return ", ".join(each.name for each in LoggingSeverity)
+        names = ", ".join(each.name for each in LoggingSeverity)
+        raise ValueError(f"no level {level!r}; use LoggingSeverity: {names}") from None
 
 
 def _caller() -> Place:
