@@ -204,7 +204,11 @@ class Subject:
 
 def named(tags: list[Tag]) -> dict[str, Tag]:
     """Name -> element; the first of duplicates, none without a name. Names count to the letter, as in the loader."""
-    return {name: tag for tag in reversed(tags) if (name := tag.attributes.get("name", "")).strip()}
+    found: dict[str, Tag] = {}
+    for tag in tags:
+        if (name := tag.attributes.get("name", "")).strip():
+            found.setdefault(name, tag)
+    return found
 
 
 def read_place(text: str) -> Place:

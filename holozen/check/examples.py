@@ -94,6 +94,7 @@ EXAMPLES = {
     "no-drive": Example(
         '<plugin name="control" filename="libgazebo_ros2_control.so"/>', f"{_DRIVE}{_JOINTS}</plugin>"
     ),
+    "static": Example("<gazebo><static>true</static></gazebo>", "<gazebo><static>false</static></gazebo>"),
     "mesh": Example(_MESH.format("meshes/bdy.stl", _ONE), _MESH.format("meshes/body.stl", _ONE)),
     "mesh-path": Example(
         _MESH.format("file:///home/asha/ws/meshes/body.stl", _ONE), _MESH.format("meshes/body.stl", _ONE)

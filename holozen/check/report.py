@@ -125,22 +125,34 @@ def sarif(findings: Iterable[Finding], version: str) -> dict[str, object]:
         }
         for rule in EVERY
     ]
-    results = []
-    for finding in findings:
-        place = finding.place
-        location: dict[str, object] = {"artifactLocation": {"uri": quote(Path(place.file).as_posix())}}
-        if place.line and not place.expanded:
-            location["region"] = {"startLine": place.line}
-        results.append(
-            {
-                "ruleId": finding.rule,
-                "level": finding.severity,
-                "message": {"text": f"{finding.problem}; {finding.why}; {finding.fix}"},
-                "locations": [{"physicalLocation": location}],
-            }
-        )
+    numbers = {rule.name: number for number, rule in enumerate(EVERY)}
+    results = [
+        {
+            "ruleId": finding.rule,
+            "ruleIndex": numbers[finding.rule],
+            "level": finding.severity,
+            "message": {"text": f"{finding.problem}; {finding.why}; {finding.fix}{_expanded(finding.place)}"},
+            "locations": [{"physicalLocation": _location(finding.place)}],
+        }
+        for finding in findings
+    ]
     tool = {"driver": {"name": "holozen check", "version": version, "rules": rules}}
     return {"version": "2.1.0", "$schema": SARIF, "runs": [{"tool": tool, "results": results}]}
+
+
+def _location(place: Place) -> dict[str, object]:
+    """SARIF's physicalLocation; an absolute path is a file URI, since relative references begin with no slash."""
+    path = Path(place.file)
+    location: dict[str, object] = {
+        "artifactLocation": {"uri": path.as_uri() if path.is_absolute() else quote(path.as_posix())}
+    }
+    if place.line and not place.expanded:
+        location["region"] = {"startLine": place.line}
+    return location
+
+
+def _expanded(place: Place) -> str:
+    return f" ({place})" if place.expanded else ""
 
 
 SARIF = "https://json.schemastore.org/sarif-2.1.0.json"

@@ -15,6 +15,7 @@ FACTOR = 10.0  # between the given inertia and that of the solid shape
 MINOR = 0.1  # of the mass of what a link is fixed to; the inertia of a smaller part is irrelevant
 DENSEST = 25_000.0  # kg/m^3; osmium has 22 600
 STEEL = 8_000.0  # kg/m^3
+LIGHT = 2.0  # kg; lighter parts are often drawn smaller than they are
 ROUNDING = 0.01  # of the trace: numbers are written with few digits
 
 COMPUTE = "compute it from the shape"
@@ -99,18 +100,18 @@ def no_mass(subject: Subject) -> Iterator[Mistake]:
 @rule("heavy", "warning", "a mass impossible for its size", "motors and contacts fail")
 def absurd_mass(subject: Subject) -> Iterator[Mistake]:
     """Links denser than any metal, and robots denser than steel."""
-    total = 0.0
+    total, dense = 0.0, False
     for name, tag in subject.links.items():
         given = read_inertial(tag)
         mass = given.mass if given and given.mass else 0.0
         total += max(mass, 0.0)
         box = box_of([shape for shape in subject.placed if shape.link == name])
-        if given and box and mass > 10 and _volume(size_of(box)) * DENSEST < mass:
+        if given and box and mass > LIGHT and _volume(size_of(box)) * DENSEST < mass:
             problem = f"link {name!r} has {mass:g} kg in {dimensions(size_of(box))}, denser than any metal"
             yield Mistake(given.mass_tag, problem, "write kilograms, and sizes in metres")
-            return
+            dense = True
     box = box_of(subject.placed)
-    if box and total > 100 and _volume(size_of(box)) * STEEL < total:
+    if not dense and box and total > 100 and _volume(size_of(box)) * STEEL < total:
         problem = f"the robot has {total:g} kg in {dimensions(size_of(box))}, denser than a block of steel"
         yield Mistake(subject.root, problem, "write kilograms, and sizes in metres")
 

@@ -89,19 +89,22 @@ def _circles(subject: Subject, roots: list[str]) -> Iterator[Mistake]:
 
 @rule("colour", "warning", "a material without a colour, or with two", "the colour is undefined")
 def colours(subject: Subject) -> Iterator[Mistake]:
-    """Used materials without a colour, or with two; in URDF only."""
+    """Used materials without a colour, or with two; in URDF only. Nothing refers to one without a name."""
     if subject.sdf:
         return
     given: dict[str, Tag] = {}
     for tag in _materials(subject):
-        first = given.setdefault(tag.attributes.get("name", ""), tag)
+        name = tag.attributes.get("name", "").strip()
+        if not name:
+            continue
+        first = given.setdefault(name, tag)
         if tag.children and not first.children:
-            given[tag.attributes.get("name", "")] = tag
+            given[name] = tag
         elif _colour(tag) != _colour(first) and tag.children:
             yield Mistake(tag, f"{tag} has another colour at {subject.place(first)}", "give each colour a unique name")
     known = [name for name, tag in given.items() if tag.children]
     for name, tag in given.items():
-        if name and not tag.children and not name.startswith("Gazebo/"):
+        if not tag.children and not name.startswith("Gazebo/"):
             fix = f'write <material name="{name}"> with a <color rgba="..."/> in it, next to the links'
             yield Mistake(tag, f"material {name!r} has no colour anywhere{suggest(name, known)}", fix)
 
@@ -151,8 +154,12 @@ def _given(source: SourceFile, kind: str) -> Iterator[str]:
     return (tag.attributes.get("name", "").removeprefix("xacro:") for tag in source.root.below(f"xacro:{kind}"))
 
 
+_NO_USE = re.compile(r"<!--.*?-->|</?[A-Za-z_][\w.-]*(?=[\s/>])|[\w:.-]+\s*=\s*(?=[\"'])", re.DOTALL)
+"""Comments, and the names of elements without prefix and of attributes."""
+
+
 def _words(source: SourceFile) -> list[str]:
-    return re.findall(r"[A-Za-z_]\w*", re.sub(r"<!--.*?-->", "", source.text, flags=re.DOTALL))
+    return re.findall(r"[A-Za-z_]\w*", _NO_USE.sub(" ", source.text))
 
 
 def _end(tag: Tag) -> str:

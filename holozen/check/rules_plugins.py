@@ -1,4 +1,4 @@
-"""Plugins: whether they exist, whether what they name exists, and whether one of them drives."""
+"""Plugins: whether they exist, whether what they name exists, and whether one of them can drive the robot."""
 
 import re
 from collections.abc import Iterator
@@ -39,8 +39,9 @@ def unknown_plugins(subject: Subject) -> Iterator[Mistake]:
         if not file_of(plugin):
             yield Mistake(plugin, f"{plugin} has no filename", f"write one, such as {file_name(SUGGESTED[0])}")
         elif kind not in KNOWN and not FAMILIES.match(kind) and not nearest(kind, KNOWN, 6):
-            fix = f"to drive use one of {', '.join(map(file_name, SUGGESTED))}"
-            yield Mistake(plugin, f"plugin {plugin.attributes['filename']!r} is unknown and is ignored", fix)
+            names = ", ".join(map(file_name, SUGGESTED))
+            fix = "remove it, or correct its name" if _is_driven(subject) else f"to drive use one of {names}"
+            yield Mistake(plugin, f"plugin {plugin.attributes['filename']!r} is unknown", fix)
 
 
 @rule("plugin-link", "warning", "a plugin's frame that is not a link", "odometry and sensors refer to a missing frame")
@@ -60,10 +61,13 @@ def plugin_links(subject: Subject) -> Iterator[Mistake]:
 
 @rule("plugin-joint", "error", "a plugin's joint that does not exist", "the plugin has nothing to turn")
 def plugin_joints(subject: Subject) -> Iterator[Mistake]:
-    """Plugin joints that do not exist."""
-    for tag, name in subject.plugin_joints:
-        if name not in subject.joints and "::" not in name and subject.joints:
-            problem = f"<{tag.name}> is {name!r}, which names no joint{suggest(name, subject.joints)}"
+    """Joints of plugins, and of <ros2_control>, that do not exist."""
+    controls = [tag for control in subject.root.all("ros2_control") for tag in control.all("joint")]
+    named = [(tag, tag.attributes.get("name", "").strip()) for tag in controls]
+    for tag, name in [*subject.plugin_joints, *named]:
+        if name and name not in subject.joints and "::" not in name and subject.joints:
+            owner = "a joint of <ros2_control>" if (tag, name) in named else f"<{tag.name}>"
+            problem = f"{owner} is {name!r}, which names no joint{suggest(name, subject.joints)}"
             yield Mistake(tag, problem, f"joints: {listed(list(subject.joints))}")
 
 
@@ -88,6 +92,21 @@ def no_drive(subject: Subject) -> Iterator[Mistake]:
         problem += f"; not supported: {kind_of(controls[0]) or controls[0].name}"
     fix = f"add <gazebo><plugin> with filename={file_name(SUGGESTED[1])!r}, or spawn it with --drive planar_move"
     yield Mistake(controls[0] if controls else subject.root, problem, fix)
+
+
+@rule("static", "warning", "a robot on wheels, or with a drive, that is fixed to the world", "cmd_vel moves nothing")
+def fixed_to_world(subject: Subject) -> Iterator[Mistake]:
+    """Robots that are made to drive, but are static or have the root link `world`."""
+    model = subject.model
+    if model is None or not model.static or not (model.drive or any(wheel.sure for wheel in subject.wheels)):
+        return
+    settings = [subject.root, *subject.root.all("gazebo")]
+    tag = next((found for owner in settings for found in owner.children if found.name == "static"), None)
+    if tag:
+        yield Mistake(tag, f"{subject.root} is static", "remove <static>")
+    else:
+        fix = "give it another name, such as base_footprint"
+        yield Mistake(subject.links[model.root], f"the root link is {model.root!r}, which Gazebo fixes in place", fix)
 
 
 def _is_driven(subject: Subject) -> bool:

@@ -58,12 +58,11 @@ def test_a_line_that_cannot_be_traced_is_one_of_the_expanded_text(findings: Find
 
 
 def test_properties_and_macros_that_nothing_uses(findings: Findings) -> None:
-    text = (
-        HEAD + WHEELS.replace(' ivz="0"', "") + '<xacro:property name="spare" value="1"/>\n<link name="base"/></robot>'
-    )
+    spare = '<!-- ${size} --><xacro:property name="size" value="1"/>\n'  # a word of URDF, too
+    text = HEAD + WHEELS.replace(' ivz="0"', "") + spare + '<link name="base"><visual size="1"/></link></robot>'
     found = findings(text, "r.xacro")
     message = [finding.problem for finding in found if finding.rule == "unused"]
-    assert message == ["macro 'part' is not used", "property 'spare' is not used"]
+    assert message == ["macro 'part' is not used", "property 'size' is not used"]
 
 
 def test_what_xacro_warns_of_is_a_finding(findings: Findings) -> None:

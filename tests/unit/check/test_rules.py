@@ -24,6 +24,10 @@ BODY = '<collision><origin xyz="0 0 0.02"/><geometry><box size="0.3 0.2 0.1"/>'
 SWAPPED = "<leftJoint>right_joint</leftJoint><rightJoint>left_joint<"
 PLUGIN = '<plugin name="drive" filename="libgazebo_ros_diff_drive.so">'
 
+CONTROL = '<ros2_control name="x" type="system"><joint name="{}"/></ros2_control></robot>'
+NAMELESS = (
+    '<visual><geometry><sphere radius="0.01"/></geometry><material name=""><color rgba="{}"/></material></visual>'
+)
 FRAME_ONLY = '<inertial><mass value="0"/></inertial>'
 
 BROKEN = [
@@ -97,9 +101,11 @@ BROKEN = [
     ("wheel-height", LEFT, LEFT.replace("0.12 0", "0.12 0.02"), "20 mm above the other wheels"),
     ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.26 0.02 0.05"/>', "the robot stands on"),
     ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_dif_drive", "libgazebo_ros_diff_drive.so"),
-    ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "is ignored"),
+    ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "remove it, or correct its name"),
     ("plugin-link", FRAME, "<robotBaseFrame>chasis</robotBaseFrame>", "names no link"),
     ("plugin-joint", "<leftJoint>left_joint", "<leftJoint>left_jiont", "'left_joint'"),
+    ("plugin-joint", "</robot>", CONTROL.format("left_jiont"), "<ros2_control> is 'left_jiont', which names no joint"),
+    ("static", "</robot>", "<gazebo><static>true</static></gazebo></robot>", "remove <static>"),
     ("two-drives", PLUGIN, '<plugin name="a" filename="libgazebo_ros_planar_move.so"/>' + PLUGIN, "keep one"),
 ]  # fmt: skip
 
@@ -142,6 +148,8 @@ FINE = [
     ("<wheelDiameter>0.1<", "<wheelDiameter>0.09<"),
     ("<leftJoint>left_joint</leftJoint><rightJoint>right_joint<", SWAPPED.replace("<leftJ", LEGACY + "<leftJ", 1)),
     ("</robot>", ROS2_CONTROL + "</robot>"),
+    ("</robot>", CONTROL.format("left_joint")),
+    ('<link name="arm">', '<link name="arm">' + NAMELESS.format("1 0 0 1") + NAMELESS.format("0 1 0 1")),
 ]
 
 
@@ -206,6 +214,12 @@ def test_wheels_and_plugins_but_no_drive(good: str, findings: Findings) -> None:
     found = {finding.rule: finding.problem for finding in findings(good.replace("ros_diff_drive", "ros_camera"))}
     assert sorted(found) == ["load-note", "no-drive"]
     assert "no drive plugin" in found["no-drive"] and "(camera) is not simulated" in found["load-note"]
+
+
+def test_gazebo_fixes_a_root_called_world_in_place(good: str, findings: Findings) -> None:
+    (finding,) = findings(good.replace("footprint", "world"))
+    assert (finding.rule, finding.place.line) == ("static", 4)
+    assert finding.problem == "the root link is 'world', which Gazebo fixes in place"
 
 
 def test_a_mere_description_needs_no_drive(good: str, findings: Findings) -> None:

@@ -115,7 +115,9 @@ def test_editors_get_the_line_of_the_source(run: Run, robot: Path) -> None:
         result["ruleId"]: result["locations"][0]["physicalLocation"]["region"]["startLine"] for result in one["results"]
     }
     assert found["tag"] == ROBOT[: ROBOT.index("<colision>")].count("\n") + 1
-    assert {result["level"] for result in one["results"]} <= {"error", "warning"}
+    for result in one["results"]:
+        assert result["level"] in ("error", "warning") and rules[result["ruleIndex"]] == result["ruleId"]
+        assert result["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] == robot.as_uri()
 
 
 @pytest.mark.parametrize("flags", ["--fix --json", "--fix --sarif", "--json --sarif", "--write"])
