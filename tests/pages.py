@@ -39,7 +39,7 @@ STEP = re.compile(
     re.M | re.S,
 )
 GOES_ON = re.compile(
-    r"(?:\S*/)?holozen (?:controller(?!.* --resume)|pose-service|record|router|ros2|run|teleop|up|view"
+    r"(?:\S*/)?holozen (?:controller(?!.* --resume)|pose-service|record|router|ros2|run|teleop(?!.* --script)|up|view"
     r"|sim(?! (?:pause|play|reset|step))|topic (?:echo|hz|pub)(?!.* --(?:once|times)))\b|zenoh .* subscribe|.* &$"
 )
 EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<where>.+))?")
@@ -118,20 +118,24 @@ class Reader:
         return len(found)
 
     def begin(self, lines: list[str], started: list[Terminal]) -> None:
-        """Run a command a line; those that go on are `started`."""
-        for text in lines:
+        """Run a command a line; those that go on are `started`, and have begun before one that ends is run."""
+        begun = list[tuple[Terminal, float]]()
+        for text in [*lines, ""]:
             line = text.partition("  #")[0].strip()
             if line.startswith("export "):
                 name, _, value = line.removeprefix("export ").partition("=")
                 os.environ[name] = value
-            elif GOES_ON.match(line):
-                terminal = self.open(line.removesuffix(" &"))
-                started.append(terminal)
-                wait_for(partial(speaks, terminal, time.monotonic() + MOMENT))
-                if " record " in line:
-                    time.sleep(1.0)
-                    end([started.pop()])
-            elif line:
+                continue
+            goes_on = GOES_ON.match(line)
+            if goes_on:
+                started.append(self.open(line.removesuffix(" &")))
+                begun.append((started[-1], time.monotonic() + MOMENT))
+            while begun and (" record " in line or not goes_on):
+                wait_for(partial(speaks, *begun.pop(0)))
+            if " record " in line:
+                time.sleep(1.0)
+                end([started.pop()])
+            elif line and not goes_on:
                 self.run(Command(line, ""))
 
     def open(self, line: str) -> Terminal:

@@ -1,24 +1,26 @@
-"""Each holozen command in the documentation is one that the command line takes."""
+"""Each holozen command in the documentation is one that the command line takes, and is run or says why not."""
 
 import os
 import re
 import shlex
-from pathlib import Path
 
 import pytest
 
 from holozen import cli
 from holozen.cli.verb import Noun, Service
+from tests.pages import DOCS, READ, REPO, STEP
 
-REPO = Path(__file__).parents[3]
 BLOCK = re.compile(r"^(`{3,})(?:|bash|sh|console|text)(?: title=.*)?\n(.*?)^\1$|((?:^    (?! ).*\n)+)", re.M | re.S)
+NOT_RUN = {  # how many blocks of a page
+    "coming-from-ros": 1, "fleet": 4, "performance": 1, "real-robots": 5, "robots": 1, "ros2": 6, "security": 2,
+}  # fmt: skip
 USAGE = re.compile(r"\[|\b[A-Z]{2,}\b=?\.\.\.|\.\.\.$")  # a form, not a command
 
 
-def commands(page: Path) -> list[str]:
+def commands(page: str) -> list[str]:
     """The commands in its code blocks, without what a shell does with them."""
     found = []
-    for block in BLOCK.finditer(page.read_text()):
+    for block in BLOCK.finditer(page):
         text = (block[2] or block[3] or "").replace("\\\n", " ")
         for line in text.splitlines():
             line = re.sub(r"^(?:\$ )?(?:[A-Z_]+=\S+ |env |\w+=\S+ )*(?:\.venv/bin/)?", "", line.strip())
@@ -47,7 +49,7 @@ def test_commands_on_pages_are_taken(capsys: pytest.CaptureFixture[str], monkeyp
     monkeypatch.chdir(REPO)
     wrong, seen = [], 0
     for page in [REPO / "README.md", *REPO.glob("docs/**/*.md")]:
-        for line in commands(page):
+        for line in commands(page.read_text()):
             seen += 1
             try:
                 parse(line)
@@ -57,3 +59,18 @@ def test_commands_on_pages_are_taken(capsys: pytest.CaptureFixture[str], monkeyp
                     wrong.append(f"{os.path.relpath(page, REPO)}: {line}: {reason}")
     assert seen > 80
     assert wrong == []
+
+
+def test_each_block_is_run_or_says_why_not() -> None:
+    not_run = dict[str, int]()
+    for page in DOCS.glob("**/*.md"):
+        steps = list(STEP.finditer(page.read_text()))
+        reasons = [step["reason"] for step in steps if step["reason"]]
+        if reasons:
+            not_run[page.stem] = len(reasons)
+        left = STEP.sub(lambda step: step[0] if step["language"] in READ else "", page.read_text())
+        assert commands(left) == [], f"{page.name}: neither run, nor a reason given"
+        assert "```" not in STEP.sub("", left), f"{page.name}: a block that is no step"
+        for test in re.findall(r"\btests/[\w/.]+", " ".join(reasons)):
+            assert (REPO / test).exists(), f"{page.name}: {test}"
+    assert not_run == NOT_RUN
