@@ -46,6 +46,7 @@ EDIT = re.compile(r"(?P<file>[^,]+)(?:, (?P<how>before|after|instead of) (?P<whe
 READ = {"text", "toml", "xml"}  # blocks that are only read
 WITHIN = 60.0  # s for a command
 MOMENT = 5.0  # s for the first line of one that goes on; it may have nothing to say
+MORE = 0.5  # s that it has to go on after that, since the line may be an error
 
 
 class Command(NamedTuple):
@@ -100,6 +101,7 @@ class Reader:
             elif not step["language"]:
                 variables = dict(os.environ)
                 self.begin(step["text"].splitlines(), self.started)
+                time.sleep(MORE if self.started else 0.0)
                 end(self.started)
                 os.environ.clear()
                 os.environ |= variables
