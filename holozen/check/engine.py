@@ -191,15 +191,11 @@ class Subject:
             return at
         if at is None:
             return Place(str(self.path))
-        return self.origins.get(at) or read_place(at.place)
+        return self.origins.get(at) or Place(at.place.removesuffix(f", line {at.line}"), at.line)
 
     def is_source(self, tag: Tag) -> bool:
         """Whether the element is in the robot file itself, not in an included one."""
         return self.place(tag).file == str(self.path)
-
-    def tags(self) -> Iterator[Tag]:
-        """Every element of the robot."""
-        return elements(self.root)
 
 
 def named(tags: list[Tag]) -> dict[str, Tag]:
@@ -209,12 +205,6 @@ def named(tags: list[Tag]) -> dict[str, Tag]:
         if (name := tag.attributes.get("name", "")).strip():
             found.setdefault(name, tag)
     return found
-
-
-def read_place(text: str) -> Place:
-    """The place in "FILE, line N"."""
-    file, comma, line = text.rpartition(", line ")
-    return Place(file, int(line)) if comma and line.isdecimal() else Place(text)
 
 
 def split(message: str, path: Path) -> tuple[Place, str]:
@@ -300,7 +290,7 @@ def _robot(root: Tag) -> Tag:
 def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
     by_line: dict[int, list[Tag]] = {}
     for tag in elements(root):
-        by_line.setdefault(_line(tag), []).append(tag)
+        by_line.setdefault(tag.line, []).append(tag)
     severity: Severity = "warning"
     try:
         subject.model = parse(text, subject.path, subject.packages, place)
@@ -332,13 +322,9 @@ def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:
     except (RobotError, OSError):
         marks = []
     tags = list(elements(root))
-    places = {tag: Place(str(subject.path), _line(tag), True) for tag in tags}
+    places = {tag: Place(str(subject.path), tag.line, True) for tag in tags}
     for tag, mark in zip(tags, marks, strict=False):
         number, colon, line = mark.partition(":")
         if colon:
             places[tag] = Place(str(subject.sources[int(number)].path), int(line))
     return places
-
-
-def _line(tag: Tag) -> int:
-    return int(tag.place.rpartition(", line ")[2])

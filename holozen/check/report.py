@@ -37,8 +37,7 @@ from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, FORCE, OMNI, kind_of
 from holozen.robot.packages import readable
-from holozen.robot.sources import expand_marked
-from holozen.robot.xacro import process
+from holozen.robot.sources import handlers
 from holozen.suggest import shorten
 
 # A file that cannot be read.
@@ -176,16 +175,13 @@ def check(
     allow_env: Collection[str] = (),
 ) -> tuple[list[Finding], str]:
     """The findings in a xacro, URDF or SDF file, by place, and a one-line summary of it. `args`, `packages` and
-    `allow_env` as for `xacro.expand`. Any file is accepted; one that cannot be read has one finding and no summary.
+    `allow_env` as for `xacro.expand_xacro`. A file that cannot be read has one finding and no summary.
     """
     try:
         return reader.run(
             tuple[list[Finding], str], path, _check, path, args, packages, requirements, allow_env,
             readable=partial(_readable, path, packages, requirements),
-            handlers={
-                "expand": partial(process, path, args, packages, allow_env),
-                "marked": partial(expand_marked, path, args, packages, allow_env),
-            },
+            handlers=handlers(path, args, packages, allow_env),
         )  # fmt: skip
     except RobotError as error:
         return [_fatal(path, str(error))], ""

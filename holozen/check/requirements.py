@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 from holozen.check.engine import Mistake, Place, Subject, rule
 from holozen.check.geometry import box_of, size_of
@@ -67,15 +66,10 @@ def missing_names(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(there[need.name], f"joint {need.name!r} is {kind}, not {need.type}", f'type="{need.type}"')
 
 
-def _needs(subject: Subject) -> Iterator[tuple[int, Need | str]]:
-    """Line number, and the requirement or what is wrong with the line."""
-    return iter(read_needs(subject.requirements.require)) if subject.requirements.require else iter(())
-
-
-def read_needs(path: Path) -> list[tuple[int, Need | str]]:
-    """The lines of a --require file: line number, and the requirement or what is wrong with the line."""
+def _needs(subject: Subject) -> list[tuple[int, Need | str]]:
+    """The lines of the --require file: line number, and the requirement or what is wrong with the line."""
     try:
-        lines = read_text(path).splitlines()
+        lines = read_text(subject.requirements.require).splitlines() if subject.requirements.require else []
     except RobotError as error:
         return [(0, str(error))]
     words = [(number, line.partition("#")[0].split()) for number, line in enumerate(lines, 1)]

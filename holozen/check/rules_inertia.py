@@ -1,13 +1,13 @@
 """Mass and inertia: whether a body can have them, and whether this one could."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from holozen.check.engine import Edit, Mistake, Subject, rule
 from holozen.check.geometry import MOVING, box_of, fixed_bodies, half_sizes, size_of
 from holozen.robot.elements import Tag, Vector, number
 from holozen.robot.inertia import of_shapes, positive_definite
-from holozen.robot.model import Link, Shape
+from holozen.robot.model import HERE, Link
 from holozen.robot.rigid import FALLS, falls_through
 from holozen.suggest import listed
 
@@ -213,24 +213,14 @@ def solid_moment(link: Link, mass: float) -> float:
         return 0.0
     volumes = [_volume(half) for half, _ in halves]
     largest = max(volumes)
-    return _moment(halves[volumes.index(largest)][1], mass) if sum(volumes) < 1.25 * largest else 0.0
+    shape = replace(halves[volumes.index(largest)][1], pose=HERE)
+    per_mass = of_shapes(replace(link, collisions=(shape,)))
+    return mass * max(per_mass) if per_mass and sum(volumes) < 1.25 * largest else 0.0
 
 
 def dimensions(size: Vector) -> str:
     """0.4 x 0.2 x 0.1 m."""
     return " x ".join(f"{value:.3g}" for value in size) + " m"
-
-
-def _moment(shape: Shape, mass: float) -> float:
-    half = half_sizes(shape)
-    if half is None:
-        return 0.0
-    x, y, z = (value * value for value in half)
-    if shape.kind == "sphere":
-        return 0.4 * mass * x
-    if shape.kind == "cylinder":
-        return mass * max(x / 2, x / 4 + z / 3)
-    return mass * (x + y + z - min(x, y, z)) / 3
 
 
 def _computed(name: str, given: Given, subject: Subject) -> Edit | None:

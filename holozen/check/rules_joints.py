@@ -5,6 +5,7 @@ from collections.abc import Iterator
 
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.robot.elements import Tag, number
+from holozen.robot.sources import elements
 from holozen.suggest import suggest
 
 LARGE_ANGLE = 20.0  # rad; more than three turns, and written as a round number of degrees
@@ -69,7 +70,7 @@ def mimics(subject: Subject) -> Iterator[Mistake]:
 @rule("degrees", "warning", "an angle in degrees", "URDF and SDF use radians")
 def degrees(subject: Subject) -> Iterator[Mistake]:
     """Angles that can only be degrees."""
-    for tag in subject.tags():
+    for tag in elements(subject.root):
         words = [tag.attributes.get("rpy", "")] if tag.name == "origin" else []
         if tag.name == "limit" and tag.parent and tag.parent.attributes.get("type") == "revolute":
             words = [tag.attributes.get(name, "") for name in ("lower", "upper")]

@@ -58,6 +58,12 @@ class Tag:
         """An error with the location of this element and `problem`."""
         return RobotError(f"{self.place}: {self} {problem}")
 
+    @property
+    def line(self) -> int:
+        """Its line; 0 for one in no file."""
+        number = self.place.rpartition(", line ")[2]
+        return int(number) if number.isdecimal() else 0
+
     def value(self) -> str:
         """The value of a Gazebo element: its `value="..."`, else its text."""
         return (self.attributes.get("value") or self.text).strip()

@@ -99,7 +99,9 @@ def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool 
     if inertial is None or part is None or not part.mass or not (link.collisions or part.inertia == NO_INERTIA):
         return link
     least = of_shapes(link)
-    if part.inertia != NO_INERTIA and (least is None or not _is_absurd(link, least)):
+    if part.inertia != NO_INERTIA and (
+        least is None or not is_absurd(symmetric(part.inertia), part.mass, symmetric(least))
+    ):
         return link
     if not silent:
         _warn(link, inertial, least is not None, source)
@@ -132,11 +134,6 @@ def of_shapes(link: Link) -> tuple[float, float, float, float, float, float] | N
         return None
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = found.tolist()
     return xx, xy, xz, yy, yz, zz
-
-
-def _is_absurd(link: Link, least: tuple[float, float, float, float, float, float]) -> bool:
-    assert link.inertial is not None, "checked by the caller"
-    return is_absurd(symmetric(link.inertial.inertia), link.inertial.mass, symmetric(least))
 
 
 # Links without mass. Gazebo Classic drops them, and so do we, by the rule of sdformat's src/parser_urdf.cc

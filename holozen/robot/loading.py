@@ -1,15 +1,14 @@
 """Robot files -> a checked RobotModel, or a self-contained text. What is hostile in them is read in a process apart."""
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TypeVar
 from xml.parsers import expat
 
 from holozen.robot import reader
-from holozen.robot.elements import Source, read_xml, repair_xml
+from holozen.robot.elements import Source, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.meshes import data_uri, file_uri
 from holozen.robot.model import RobotModel
@@ -20,8 +19,6 @@ from holozen.robot.urdf import read_robot
 from holozen.robot.xacro import expanded, is_xacro, read_text
 from holozen.suggest import cut
 
-T = TypeVar("T")
-
 
 def load(
     path: Path,
@@ -30,16 +27,43 @@ def load(
     strict: bool = False,
     allow_env: Collection[str] = (),
 ) -> RobotModel:
-    """The robot in a xacro, URDF or SDF file. `args`, `packages` and `allow_env` as for `xacro.expand`. Raises
+    """The robot in a xacro, URDF or SDF file. `args`, `packages` and `allow_env` as for `xacro.expand_xacro`. Raises
     RobotError; with `strict` also for a missing or invalid mesh, otherwise replaced by a box with a warning.
     """
+    return _loaded(path, args, packages, strict, allow_env, portable=False)[0]
+
+
+def both(
+    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], strict: bool, allow_env: Collection[str]
+) -> tuple[RobotModel, str]:
+    """As `load`, and the text, expanded, that is the same robot on another machine: the URI of every collision mesh is
+    replaced by its hull, and of every visual one by the file itself, up to MOST_SHOWN. Other meshes have a warning.
+    """
+    return _loaded(path, args, packages, strict, allow_env, portable=True)
+
+
+def _loaded(
+    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], strict: bool, allow_env: Collection[str],
+    portable: bool,
+) -> tuple[RobotModel, str]:  # fmt: skip
     text, place, warnings = _written(path, args, packages, allow_env)
     in_source = partial(_in_source, place, path, args, packages, allow_env)
     try:
-        model = _apart(RobotModel, path, packages, parse, text, path, packages, place, strict)
+        model, sent = reader.run(
+            tuple[RobotModel, str], path, _parsed, text, path, packages, place, strict, portable,
+            readable=partial(readable, path, packages),
+        )  # fmt: skip
     except RobotError as error:
         raise RobotError(*in_source([str(error)])) from None
-    return replace(model, warnings=warnings + in_source(model.warnings))
+    return replace(model, warnings=warnings + in_source(model.warnings)), sent
+
+
+def _parsed(
+    text: str, path: Path, packages: Mapping[str, Path], place: str, strict: bool, portable: bool
+) -> tuple[RobotModel, str]:
+    model = parse(text, path, packages, place, strict)
+    sent, warnings = with_meshes(text, path, packages) if portable else ("", ())
+    return replace(model, warnings=model.warnings + warnings), sent
 
 
 def received(text: str, packages: Mapping[str, Path] = {}) -> RobotModel:
@@ -47,20 +71,9 @@ def received(text: str, packages: Mapping[str, Path] = {}) -> RobotModel:
     origin = Path("resource_string")
     known = partial(readable_by_strangers, packages)
     return reader.run(
-        RobotModel,
-        origin,
-        _parse_received,
-        text,
-        origin,
-        packages,
-        readable=known,
-        only_known=True,
-        seconds=MOST_SECONDS,
-    )
-
-
-def _parse_received(text: str, origin: Path, packages: Mapping[str, Path]) -> RobotModel:
-    return parse(text, origin, packages, confined=True)
+        RobotModel, origin, partial(parse, confined=True), text, origin, packages,
+        readable=known, only_known=True, seconds=MOST_SECONDS,
+    )  # fmt: skip
 
 
 def _written(
@@ -73,10 +86,6 @@ def _written(
     outcome = expanded(path, args, packages, allow_env)
     # Where the line in the source is not known, messages give that of the expanded text.
     return outcome.text, f"{path} (as `holozen xacro` prints it)", outcome.warnings
-
-
-def _apart(kind: type[T], path: Path, packages: Mapping[str, Path], function: Callable[..., T], *args: object) -> T:
-    return reader.run(kind, path, function, *args, readable=partial(readable, path, packages))
 
 
 def parse(
@@ -107,33 +116,6 @@ MOST_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accept
 _FILENAME = re.compile(rb"""\sfilename\s*=\s*("[^"]*"|'[^']*')""")
 
 
-def portable(
-    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
-) -> tuple[str, tuple[str, ...]]:
-    """The text of a xacro, URDF or SDF file, expanded, with the URI of every collision mesh replaced by its hull, and
-    of every visual one by the file itself, up to MOST_SHOWN; and warnings for meshes that are left unchanged. The rest
-    of the text is unchanged.
-
-    `args`, `packages` and `allow_env` are those of `xacro.expand`. Raises RobotError for a file that
-    cannot be read or is not XML.
-    """
-    text, _, _ = _written(path, args, packages, allow_env)
-    return _apart(tuple[str, tuple[str, ...]], path, packages, _with_meshes, text, path, packages)
-
-
-def both(
-    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], strict: bool, allow_env: Collection[str]
-) -> tuple[RobotModel, str]:
-    """What `load` and `portable` make of a file, in one go; the warnings of the latter are among the model's."""
-    text, place, warnings = _written(path, args, packages, allow_env)
-    in_source = partial(_in_source, place, path, args, packages, allow_env)
-    try:
-        model, sent = _apart(tuple[RobotModel, str], path, packages, _both, text, path, packages, place, strict)
-    except RobotError as error:
-        raise RobotError(*in_source([str(error)])) from None
-    return replace(model, warnings=warnings + in_source(model.warnings)), sent
-
-
 def _in_source(
     place: str, path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str],
     messages: Sequence[str],
@@ -150,24 +132,24 @@ def _in_source(
     return tuple(re.sub(rf"{re.escape(start)}(\d+)", named, message) for message in messages)
 
 
-def _both(text: str, path: Path, packages: Mapping[str, Path], place: str, strict: bool) -> tuple[RobotModel, str]:
-    return parse(text, path, packages, place, strict), _with_meshes(text, path, packages)[0]
-
-
-def _with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[str, tuple[str, ...]]:
+def with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[str, tuple[str, ...]]:
+    """The text with its meshes in it, and warnings about visual ones that are too large or cannot be read."""
     text, _ = repair_xml(text)
-    read_xml(text, str(path))  # reports broken XML with its line, and rejects entities
     data = text.encode()
     warnings: list[str] = []
     room = MOST_SHOWN
     for use, start, end, uri in reversed(_Meshes(data).found):  # backwards, so that earlier positions stay valid
         try:
             file = resolve_uri(uri, path, packages)
+        except RobotError:
+            continue
+        try:
             sent = data_uri(file) if use == "collision" else file_uri(file)
             if use == "visual" and (room := room - len(sent)) < 0:
                 raise RobotError(f"the visual meshes take more than {MOST_SHOWN / 1e6:g} MB compressed; simplify them")
         except RobotError as error:
-            warnings.append(f"{path}: the {use} mesh {cut(uri)} is not sent: {error}")
+            if use == "visual":
+                warnings.append(f"{path}: the visual mesh {cut(uri)} is not sent: {error}")
         else:
             data = data[:start] + sent.encode() + data[end:]
     return data.decode(), tuple(reversed(warnings))

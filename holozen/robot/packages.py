@@ -142,17 +142,10 @@ def packages_in(folders: list[Path]) -> dict[str, Path]:
 
 def _packages(folders: list[Path]) -> Iterator[tuple[str, Path]]:
     for folder in folders:
-        for candidate in (folder, *_children(folder)):
+        for candidate in (folder, *_folders_in(folder)):
             name = _name_in_package_xml(candidate)
             if name:
                 yield name, candidate
-
-
-def _children(folder: Path) -> list[Path]:
-    try:
-        return sorted(child for child in folder.iterdir() if not child.name.startswith("."))
-    except OSError:
-        return []
 
 
 def _name_in_package_xml(folder: Path) -> str | None:
@@ -180,8 +173,8 @@ def _unknown(name: str, start: Path, given: Mapping[str, Path]) -> str:
 
 def remember_folders() -> None:
     """Look at each folder once from now on, for a process that later may not."""
-    global _children, _name_in_package_xml
-    _children, _name_in_package_xml = cache(_children), cache(_name_in_package_xml)
+    global _folders_in, _name_in_package_xml
+    _folders_in, _name_in_package_xml = cache(_folders_in), cache(_name_in_package_xml)
 
 
 def readable(start: Path, given: Mapping[str, Path] = {}) -> list[str]:

@@ -28,7 +28,7 @@ import msgspec
 from holozen.console import report
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import VARIABLES, remember_folders
-from holozen.robot.sandbox import restrict
+from holozen.robot.sandbox import limit, restrict
 
 T = TypeVar("T")
 PROCESSOR_TIME = 20  # s of a call; the largest mesh that is read takes 10 on a slow machine
@@ -272,7 +272,7 @@ def _work(request: bytes, end: int) -> NoReturn:
     _inside = True
     for name in {*os.environ}.difference(VARIABLES):
         del os.environ[name]
-    _limit(seconds)
+    limit(_memory() + MOST_MEMORY, seconds, 0)
     granted = [path for asked, yes in _answers.items() if yes is True and (path := _opened(asked))]
     remember_folders()
     allowed = [*readable(), *granted, *_CODE]
@@ -302,18 +302,10 @@ def _opened(question: bytes) -> str:
     return rest[0] if name == "open" else ""
 
 
-def _limit(seconds: int) -> None:
+def _memory() -> int:
+    """Bytes of address space that this process has."""
     with open("/proc/self/statm") as file:
-        now = int(file.read().split()[0]) * resource.getpagesize()
-    for kind, most in (
-        (resource.RLIMIT_AS, now + MOST_MEMORY),
-        (resource.RLIMIT_CPU, seconds),
-        (resource.RLIMIT_FSIZE, 0),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        hard = resource.getrlimit(kind)[1]
-        with suppress(OSError, ValueError):
-            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+        return int(file.read().split()[0]) * resource.getpagesize()
 
 
 class _Watch:

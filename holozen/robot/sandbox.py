@@ -6,8 +6,10 @@ Documentation/userspace-api/landlock.rst and seccomp_filter.rst, and its tables 
 
 import ctypes
 import os
+import resource
 import struct
 from collections.abc import Iterable
+from contextlib import suppress
 
 _CREATE, _ADD, _RESTRICT = 444, 445, 446  # landlock_create_ruleset, _add_rule, _restrict_self; on every machine
 _READ_FILE, _READ_FOLDER = 1 << 2, 1 << 3
@@ -42,6 +44,19 @@ _DENIED = {
 """Machine -> its number in a filter, and the numbers of the system calls that end with EPERM: Landlock does not cover
 all of what they do.
 """
+
+
+def limit(memory: int, seconds: int, file_size: int) -> None:
+    """Limit this process: bytes of address space, seconds of the processor, bytes of a file it writes. No core dump."""
+    for kind, most in (
+        (resource.RLIMIT_AS, memory),
+        (resource.RLIMIT_CPU, seconds),
+        (resource.RLIMIT_FSIZE, file_size),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        hard = resource.getrlimit(kind)[1]
+        with suppress(OSError, ValueError):  # the system lacks this limit
+            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
 
 
 def restrict(readable: Iterable[str]) -> str:

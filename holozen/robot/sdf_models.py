@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from holozen.robot.elements import Source, Tag, Vector, read_xml
-from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import read_forces, read_plugins
 from holozen.robot.model import MOST_PARTS, Joint, Limits, Link, Pose, RobotModel, descend
 from holozen.robot.rigid import Frame
@@ -95,7 +94,8 @@ class Frames:
                 circle = [*chain][[*chain].index(name) :]
                 raise self._nodes[name].tag.wrong(f"has a circular pose reference: {listed(circle)}")
             chain[name] = None
-            name = self._base(self._nodes[name])
+            node = self._nodes[name]
+            name = self._known(node.tag, node.scope, node.within)
         frame = self._found[name]
         for inner in reversed(chain):
             frame = self._found[inner] = frame @ Frame.of(self._nodes[inner].pose)
@@ -128,19 +128,13 @@ class Frames:
             raise tag.wrong(f"names {cut(name.rpartition(INSIDE)[2])}, which has no link")
         return self._known(tag, name, self._roots[name])
 
-    def _base(self, node: _Node) -> str:
-        return self._known(node.tag, node.scope, node.within)
-
     def _known(self, tag: Tag, scope: str, name: str) -> str:
         found = WORLD if name in ("world", "__root__") and not scope else whole(scope, name)
         if found and found not in self._nodes:
-            raise self._unknown(tag, scope, name)
+            start = f"{scope}{INSIDE}" if scope else ""
+            inside = [key[len(start) :].strip() for key in self._nodes if key.startswith(start)]
+            raise tag.wrong(f"names the unknown frame {cut(name)}; frames: {listed(inside)}")
         return found
-
-    def _unknown(self, tag: Tag, scope: str, name: str) -> RobotError:
-        start = f"{scope}{INSIDE}" if scope else ""
-        inside = [key[len(start) :].strip() for key in self._nodes if key.startswith(start)]
-        return tag.wrong(f"names the unknown frame {cut(name)}; frames: {listed(inside)}")
 
     def _add(self, name: str, node: _Node) -> None:
         if name in self._nodes:
@@ -502,10 +496,6 @@ def models_in(outer: Piece, frames: Frames, includes: Includes) -> Iterator[Robo
         for model in build(family, frames):
             tag = family[0].piece.tag
             if model.name in names:
-                raise _taken(tag, model.name)
+                raise tag.wrong(f"makes a second body called {cut(model.name)}; give each a unique name")
             names[model.name] = tag
             yield model
-
-
-def _taken(tag: Tag, name: str) -> RobotError:
-    return tag.wrong(f"makes a second body called {cut(name)}; give each a unique name")

@@ -72,14 +72,19 @@ def source_lines(
     try:
         found = reader.run(
             list[tuple[int, str]], path, _source_lines, path, packages, readable=partial(readable, path, packages),
-            handlers={
-                "expand": partial(process, path, args, packages, allow_env),
-                "marked": partial(expand_marked, path, args, packages, allow_env),
-            },
+            handlers=handlers(path, args, packages, allow_env),
         )  # fmt: skip
     except (RobotError, OSError):
         return {}
     return dict(reversed(found))  # of several on a line, the first
+
+
+def handlers(
+    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
+) -> dict[str, reader.Handler]:
+    """What answers the questions "expand" and "marked" of the process that reads."""
+    return {name: partial(answer, path, args, packages, allow_env)
+            for name, answer in (("expand", process), ("marked", _expand_marked))}  # fmt: skip
 
 
 def _source_lines(path: Path, packages: Mapping[str, Path]) -> list[tuple[int, str]]:
@@ -89,12 +94,11 @@ def _source_lines(path: Path, packages: Mapping[str, Path]) -> list[tuple[int, s
     for tag, mark in zip(elements(root), trace(sources, root, packages), strict=False):
         number, colon, line = mark.partition(":")
         if colon:
-            here = int(tag.place.rpartition(", line ")[2])
-            found.append((here, f"{sources[int(number)].path}, line {line}"))
+            found.append((tag.line, f"{sources[int(number)].path}, line {line}"))
     return found
 
 
-def expand_marked(
+def _expand_marked(
     path: Path,
     args: Mapping[str, str],
     packages: Mapping[str, Path],

@@ -8,11 +8,10 @@ import io
 import json
 import os
 import re
-import resource
 import signal
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stderr, redirect_stdout, suppress
+from contextlib import redirect_stderr, redirect_stdout
 from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
@@ -35,7 +34,7 @@ from holozen.robot.packages import (
     remember_folders,
     without_home,
 )
-from holozen.robot.sandbox import restrict
+from holozen.robot.sandbox import limit, restrict
 from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, read_text, unchanged
 from holozen.suggest import cut, shorten, suggest
 
@@ -340,7 +339,11 @@ MOST_WORDS = 10_000  # characters of warnings
 def main(asked: dict[str, Any]) -> None:
     out = os.dup(1)
     os.dup2(2, 1)
-    _limit()
+    signal.pthread_sigmask(signal.SIG_SETMASK, ())
+    for number in (signal.SIGPROF, signal.SIGXCPU):
+        signal.signal(number, signal.SIG_DFL)
+    limit(MOST_MEMORY, PROCESSOR_TIME, MOST_REPLY)
+    sys.setrecursionlimit(DEEPEST_CALLS)
     words = io.StringIO()
     with redirect_stdout(words), redirect_stderr(words):
         packages = {name: Path(folder) for name, folder in asked["packages"].items()}
@@ -349,22 +352,6 @@ def main(asked: dict[str, Any]) -> None:
     with os.fdopen(out, "wb") as file:
         file.write(json.dumps(reply).encode())
     os._exit(0)  # freeing a large document takes as long as building it
-
-
-def _limit() -> None:
-    signal.pthread_sigmask(signal.SIG_SETMASK, ())
-    for number in (signal.SIGPROF, signal.SIGXCPU):
-        signal.signal(number, signal.SIG_DFL)
-    for kind, most in (
-        (resource.RLIMIT_AS, MOST_MEMORY),
-        (resource.RLIMIT_CPU, PROCESSOR_TIME),
-        (resource.RLIMIT_FSIZE, MOST_REPLY),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        hard = resource.getrlimit(kind)[1]
-        with suppress(OSError, ValueError):  # the system lacks this limit
-            resource.setrlimit(kind, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
-    sys.setrecursionlimit(DEEPEST_CALLS)
 
 
 class Outside(BaseException):

@@ -10,7 +10,7 @@ import pytest
 from holozen import data
 from holozen.robot.description import Mesh, read, written
 from holozen.robot.errors import RobotError
-from holozen.robot.loading import load, parse, portable
+from holozen.robot.loading import both, load, parse
 from holozen.robot.meshes import bounds, file_in
 from holozen.robot.packages import NOWHERE
 from holozen.robot.sdf_world import load_world
@@ -40,8 +40,7 @@ def test_it_has_the_links_shapes_and_joints_of_the_file(path: Path) -> None:
 
 def test_a_robot_that_was_sent_has_the_same_description() -> None:
     path = data.find("urdf", "hb_bot.urdf.xacro")
-    text, warnings = portable(path)
-    assert warnings == ()
+    _, text = both(path, {}, {}, False, ())
     assert read(written(parse(text, NOWHERE, confined=True))) == read(written(load(path)))
 
 

@@ -101,12 +101,12 @@ def test_a_relative_start_is_seen_from_the_working_folder(home: Path, monkeypatc
     assert find_package("holo", Path("hb_bot.urdf.xacro")) == home / "holo"
 
 
-@pytest.mark.parametrize("broken", ["<package><name>holo</nam", "", "<package/>", "\x00"])
-def test_a_broken_package_xml_names_nothing(home: Path, broken: str) -> None:
-    folder = home / "holo"
-    start = robot_file(folder)
-    (folder / "package.xml").write_text(broken)
-    assert find_named("holo", start) is None
+def test_a_broken_package_xml_names_nothing(home: Path) -> None:
+    for broken in ["<package><name>holo</nam", "", "<package/>", "\x00"]:
+        folder = home / "holo"
+        start = robot_file(folder)
+        (folder / "package.xml").write_text(broken)
+        assert find_named("holo", start) is None
 
 
 def test_a_package_xml_that_is_no_file_of_a_sensible_size_names_nothing(home: Path) -> None:
@@ -175,9 +175,8 @@ def start(home: Path) -> Path:
     return home / "holo" / "urdf" / "hb_bot.urdf"
 
 
-@pytest.mark.parametrize(
-    ("uri", "file"),
-    [
+def test_a_mesh_is_found_by_package_and_by_relative_path(start: Path, home: Path) -> None:
+    for uri, file in [
         ("package://holo/meshes/base.dae", "holo/meshes/base.dae"),
         ("package://holo//meshes/base.dae", "holo/meshes/base.dae"),
         ("model://holo/meshes/base.dae", "holo/meshes/base.dae"),
@@ -190,10 +189,8 @@ def start(home: Path) -> Path:
         ("../meshes/my%20base.dae", "holo/meshes/my base.dae"),
         ("meshes/base.dae", "holo/meshes/base.dae"),
         ("file://meshes/base.dae", "holo/meshes/base.dae"),
-    ],
-)
-def test_a_mesh_is_found_by_package_and_by_relative_path(start: Path, home: Path, uri: str, file: str) -> None:
-    assert resolve_uri(uri, start) == home / file
+    ]:
+        assert resolve_uri(uri, start) == home / file
 
 
 def test_an_absolute_path_is_taken_as_it_stands(start: Path, home: Path) -> None:
@@ -213,17 +210,14 @@ def test_a_given_package_is_used(start: Path, home: Path) -> None:
     assert resolve_uri("package://x/meshes/wheel.stl", start, {"x": home / "wheels"}).name == "wheel.stl"
 
 
-@pytest.mark.parametrize(
-    "uri",
-    [
+def test_a_path_of_another_machine_is_found_again_by_its_file_name(start: Path, home: Path) -> None:
+    for uri in [
         "/home/asha/catkin_ws/src/hb/meshes/wheel.stl",
         "file:///home/asha/catkin_ws/src/hb/meshes/wheel.stl",
         r"C:\Users\asha\hb\meshes\wheel.stl",
         "file:///C:/Users/asha/hb/meshes/wheel.stl",
-    ],
-)
-def test_a_path_of_another_machine_is_found_again_by_its_file_name(start: Path, home: Path, uri: str) -> None:
-    assert resolve_uri(uri, start) == home / "wheels" / "meshes" / "wheel.stl"
+    ]:
+        assert resolve_uri(uri, start) == home / "wheels" / "meshes" / "wheel.stl"
 
 
 def test_of_several_files_with_that_name_the_one_that_shares_most_of_the_path_is_taken(start: Path, home: Path) -> None:
@@ -261,10 +255,10 @@ def test_an_unknown_package_is_reported(home: Path) -> None:
         resolve_uri("package://hollo/meshes/base.dae", home / "alone.urdf")
 
 
-@pytest.mark.parametrize("uri", ["http://example.org/base.dae", "data://x", "https://x/meshes/base.dae"])
-def test_nothing_is_fetched_from_elsewhere(start: Path, uri: str) -> None:
-    with pytest.raises(RobotError, match="is not fetched; write package://"):
-        resolve_uri(uri, start)
+def test_nothing_is_fetched_from_elsewhere(start: Path) -> None:
+    for uri in ["http://example.org/base.dae", "data://x", "https://x/meshes/base.dae"]:
+        with pytest.raises(RobotError, match="is not fetched; write package://"):
+            resolve_uri(uri, start)
 
 
 def test_a_package_uri_has_to_name_its_package(start: Path) -> None:
@@ -343,9 +337,9 @@ def test_a_confined_text_finds_the_meshes_that_holozen_has(start: Path) -> None:
     assert resolve_uri(f"file://{mesh}", start, confined=True) == mesh
 
 
-@pytest.mark.parametrize(
-    "uri",
-    [
+def test_a_confined_text_finds_nothing_else(start: Path, home: Path) -> None:
+    (home / "holo" / "meshes" / "out.stl").symlink_to(home / "wheels" / "meshes" / "wheel.stl")
+    for uri in [
         "/etc/passwd",
         "file:///etc/passwd",
         "package://holo/../wheels/meshes/wheel.stl",
@@ -364,11 +358,8 @@ def test_a_confined_text_finds_the_meshes_that_holozen_has(start: Path) -> None:
         "/home/asha/base.dae",
         "/",
         "",
-    ],
-)
-def test_a_confined_text_finds_nothing_else(start: Path, home: Path, uri: str) -> None:
-    (home / "holo" / "meshes" / "out.stl").symlink_to(home / "wheels" / "meshes" / "wheel.stl")
-    assert confined(uri, start, home / "holo") is None
+    ]:
+        assert confined(uri, start, home / "holo") is None
 
 
 def test_a_relative_path_means_nothing_to_a_confined_text(start: Path, home: Path) -> None:

@@ -73,20 +73,18 @@ def librarys(path: Path, args: Mapping[str, str], monkeypatch: pytest.MonkeyPatc
     return str(library.process_file(str(path), mappings=dict(args)).toprettyxml(indent="  "))
 
 
-@pytest.mark.parametrize("path", LESSONS, ids=lambda path: path.name)
-def test_every_file_of_the_lessons_is_as_the_library_makes_it(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    assert expand_xacro(path) == librarys(path, {}, monkeypatch)
+def test_every_file_of_the_lessons_is_as_the_library_makes_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    for path in LESSONS:
+        assert expand_xacro(path) == librarys(path, {}, monkeypatch), path
 
 
-@pytest.mark.parametrize("use", BODIES)
-def test_what_a_file_may_use_is_as_the_library_makes_it(
-    folder: Path, use: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_file_may_use_is_as_the_library_makes_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = folder / "robot.xacro"
-    body = f'<xacro:property name="n2" value="2"/>\n{BODIES[use]}'.replace("\n", "\r\n" if use == "maths" else "\n")
-    path.write_bytes(f'<?xml version="1.0"?>\n{HEAD}{body}</robot>'.encode())
-    for args in ({}, {"n": "5"}):
-        assert expand_xacro(path, args, allow_env=["HOLOZEN_TEST"]) == librarys(path, args, monkeypatch)
+    for use, given in BODIES.items():
+        body = f'<xacro:property name="n2" value="2"/>\n{given}'.replace("\n", "\r\n" if use == "maths" else "\n")
+        path.write_bytes(f'<?xml version="1.0"?>\n{HEAD}{body}</robot>'.encode())
+        for args in ({}, {"n": "5"}):
+            assert expand_xacro(path, args, allow_env=["HOLOZEN_TEST"]) == librarys(path, args, monkeypatch), use
 
 
 def test_a_relative_path_is_as_the_library_makes_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -102,16 +100,19 @@ def test_what_the_librarys_command_line_prints_is_the_same_text(folder: Path) ->
     assert expand_xacro(path) == library.process(str(path))
 
 
-@pytest.mark.parametrize(
-    "body", ['<l n="$(dirname)"/>', '<l n="$(anon x)"/>', '<l n="$(find a b)"/>', "<l n=\"$(eval find('holo'))\"/>"]
-)
-def test_what_the_library_refuses_is_refused(folder: Path, body: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = folder / "robot.xacro"
-    path.write_text(f"{HEAD}{body}</robot>")
-    with pytest.raises(library.XacroException):
-        librarys(path, {}, monkeypatch)
-    with pytest.raises(RobotError, match=r"robot\.xacro, line 1: "):
-        expand_xacro(path)
+def test_what_the_library_refuses_is_refused(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for body in [
+        '<l n="$(dirname)"/>',
+        '<l n="$(anon x)"/>',
+        '<l n="$(find a b)"/>',
+        "<l n=\"$(eval find('holo'))\"/>",
+    ]:
+        path = folder / "robot.xacro"
+        path.write_text(f"{HEAD}{body}</robot>")
+        with pytest.raises(library.XacroException):
+            librarys(path, {}, monkeypatch)
+        with pytest.raises(RobotError, match=r"robot\.xacro, line 1: "):
+            expand_xacro(path)
 
 
 def test_files_that_nest_as_deep_as_the_library_can_go_are_expanded(
