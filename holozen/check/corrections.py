@@ -36,8 +36,8 @@ class _Element:
 
 
 def correct(text: str, file: str, findings: Iterable[Finding]) -> tuple[str, list[Finding]]:
-    """The source `text` of a file, corrected, and the findings that were. Left alone are those in other files and in
-    lines of the expanded text, and where it is not sure what is meant.
+    """The source `text` of a file, corrected, and the findings that were. Findings in other
+    files or in lines of the expanded text, and ambiguous ones, are left alone.
     """
     own = [one for one in findings if one.edit and one.place.file == file and one.place.line and not one.place.expanded]
     elements = _elements(text) if own else []

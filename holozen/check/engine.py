@@ -1,4 +1,4 @@
-"""A robot file under check, read as far as possible, and the words in which rules say what is wrong with it."""
+"""The robot file under check, read as far as possible, and the types in which rules report mistakes."""
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -271,6 +271,8 @@ def loader_mistakes(subject: Subject, severity: Severity) -> list[Mistake]:
 
 def _message(severity: Severity, at: Tag | Place, text: str) -> tuple[Severity, Mistake]:
     fix = "fix it as described" if severity == "error" else "check that this is intended"
+    if text.startswith("<robot> has no name="):
+        fix = "add one; a file that others include is checked with the one that includes it"
     return severity, Mistake(at, text, fix)
 
 

@@ -44,7 +44,7 @@ from holozen.suggest import shorten
 
 
 def how_to_fix(reason: str) -> tuple[str, str]:
-    """Why a file cannot be read, and how to fix it, which messages about broken XML end with."""
+    """Why a file cannot be read, and the fix, with which messages about broken XML end."""
     if "broken XML" in reason:
         problem, _, fix = reason.rpartition("; ")
         return problem, fix

@@ -1,4 +1,4 @@
-"""Misspelt and misplaced elements and attributes, which parsers silently ignore, and values that are no numbers."""
+"""Misspelt and misplaced elements and attributes, which parsers silently ignore, and values that are not numbers."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -230,7 +230,7 @@ def joint_kinds(subject: Subject) -> Iterator[Mistake]:
             yield Mistake(tag, f"{tag} has unknown type {kind!r}", fix)
 
 
-@rule("number", "error", "a value that is no number", "the robot cannot be loaded")
+@rule("number", "error", "a value that is not a number", "the robot cannot be loaded")
 def bad_numbers(subject: Subject) -> Iterator[Mistake]:
     """Values of links and joints that are not finite numbers, or not as many as needed, and axes without direction."""
     for tag in _outside_plugins(subject.root) if subject.sdf else _urdf_elements(subject):

@@ -1,4 +1,4 @@
-"""Words of the file formats that are misspelt, or that are not what the format calls them."""
+"""Misspelt words of the file formats, and common words for which the formats have others."""
 
 from collections.abc import Iterable
 

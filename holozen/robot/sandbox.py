@@ -1,4 +1,4 @@
-"""Takes from this process, for good, what a hostile file could use: files, the network, other processes.
+"""Permanently denies this process what a hostile file could use: files, the network, other processes.
 
 Landlock (Linux 5.13 and later) limits the files, seccomp the system calls. Sources: the kernel's
 Documentation/userspace-api/landlock.rst and seccomp_filter.rst, and its tables of system calls.

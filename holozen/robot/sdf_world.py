@@ -9,13 +9,7 @@ from holozen.robot.elements import Source, Tag, Vector
 from holozen.robot.model import GRAVITY, STEP, RobotModel, WorldSpec
 from holozen.robot.packages import readable
 from holozen.robot.rigid import Frame, link_frames
-from holozen.robot.sdf import (
-    Includes,
-    Piece,
-    check_world,
-    read_file,
-    version_of,
-)
+from holozen.robot.sdf import Includes, Piece, check_world, read_file, version_of
 from holozen.robot.sdf_models import WORLD, Frames, add_frames, models_in
 
 STRONGEST = 100.0  # m/s^2; ten times Earth's

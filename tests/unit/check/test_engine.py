@@ -3,8 +3,6 @@
 from collections.abc import Callable
 from pathlib import Path
 
-import pytest
-
 from holozen.check.report import check
 from holozen.check.rules_xml import PLUGIN, URDF
 from holozen.check.spelling import distance, nearest
@@ -92,6 +90,13 @@ def test_a_file_for_others_to_include_is_no_robot_and_no_mistake(rules: Callable
     assert rules(HEAD + WHEELS + "</robot>", "parts.xacro") == []
 
 
+def test_a_part_of_a_robot_without_a_name_is_to_be_checked_with_its_robot(findings: Findings) -> None:
+    found = findings(HEAD.replace(' name="r"', "") + f'<link name="base">{BALL}</link></robot>', "core.xacro")
+    assert [finding.fix for finding in found if finding.rule == "load"] == [
+        "add one; a file that others include is checked with the one that includes it"
+    ]
+
+
 def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
     for name in ["r.urdf", "r.xacro"]:
         for text, line, fix in [
@@ -117,13 +122,16 @@ def test_a_file_that_cannot_be_read_is_one_finding(findings: Findings) -> None:
             assert len(str(finding).splitlines()) == 2
 
 
-@pytest.mark.parametrize(
-    "text",
-    ["", "<world/>", '<robot name="r" xmlns:xacro="x"><link name="${1/0}"/></robot>', "<sdf><world/></sdf>", "<sdf/>"],
-)
-def test_a_file_that_is_no_robot_is_one_finding(text: str, findings: Findings) -> None:
-    (finding,) = findings(text, "r.xacro")
-    assert finding.rule == "file"
+def test_a_file_that_is_no_robot_is_one_finding(findings: Findings) -> None:
+    for text in [
+        "",
+        "<world/>",
+        '<robot name="r" xmlns:xacro="x"><link name="${1/0}"/></robot>',
+        "<sdf><world/></sdf>",
+        "<sdf/>",
+    ]:
+        (finding,) = findings(text, "r.xacro")
+        assert finding.rule == "file"
 
 
 def test_a_file_that_is_not_there_is_one_finding(tmp_path: Path) -> None:
@@ -139,14 +147,15 @@ def test_letters_are_counted() -> None:
         assert distance(one, other) == distance(other, one) == far
 
 
-@pytest.mark.parametrize(
-    ("word", "element", "meant"),
-    [("ivz", "inertia", True), ("raduis", "cylinder", "radius"), ("height", "cylinder", "length"),
-     ("foo", "origin", None)],
-)  # fmt: skip
-def test_a_known_word_is_found(word: str, element: str, meant: object) -> None:
-    found = nearest(word, sorted(URDF[element].attributes))
-    assert found == meant if meant is not True else found in ("ixz", "iyz", "izz")
+def test_a_known_word_is_found() -> None:
+    for word, element, meant in [
+        ("ivz", "inertia", True),
+        ("raduis", "cylinder", "radius"),
+        ("height", "cylinder", "length"),
+        ("foo", "origin", None),
+    ]:
+        found = nearest(word, sorted(URDF[element].attributes))
+        assert found == meant if meant is not True else found in ("ixz", "iyz", "izz")
 
 
 def test_of_two_spellings_the_one_in_the_same_style_is_meant() -> None:

@@ -102,25 +102,21 @@ def test_a_mecanum_drive_needs_a_wheelbase() -> None:
     assert "has no <wheelbase>, and its front and back wheels are at the same x; give <wheelbase>" in message
 
 
-@pytest.mark.parametrize(
-    ("filename", "tag", "least"),
-    [
+def test_a_measure_is_at_least_a_millimetre() -> None:
+    for filename, tag, least in [
         ("libgazebo_ros_diff_drive.so", "wheelSeparation", 0.001),
         ("libgazebo_ros_diff_drive.so", "wheelDiameter", 0.002),
         ("gz-sim-diff-drive-system", "wheel_radius", 0.001),
         ("gz-sim-mecanum-drive-system", "wheelbase", 0.001),
-    ],
-)
-def test_a_measure_is_at_least_a_millimetre(filename: str, tag: str, least: float) -> None:
-    for value in ("1e-310", str(least * 0.99)):
-        message = refusal(filename, f"{DRIVES[filename]}<{tag}>{value}</{tag}>")
-        assert f"<{tag}> of " in message and f"is '{value}'; it must be at least {least:g} m" in message
-    robot(filename, f"{DRIVES[filename]}<{tag}>{least}</{tag}>")
+    ]:
+        for value in ("1e-310", str(least * 0.99)):
+            message = refusal(filename, f"{DRIVES[filename]}<{tag}>{value}</{tag}>")
+            assert f"<{tag}> of " in message and f"is '{value}'; it must be at least {least:g} m" in message
+        robot(filename, f"{DRIVES[filename]}<{tag}>{least}</{tag}>")
 
 
-@pytest.mark.parametrize(
-    ("filename", "tags", "message"),
-    [
+def test_a_joint_is_one_wheel() -> None:
+    for filename, tags, message in [
         ("libgazebo_ros_diff_drive.so", PAIR.replace("fr", "fl"), "has the joint 'fl' on the left and on the right"),
         (
             "libgazebo_ros_skid_steer_drive.so",
@@ -129,15 +125,13 @@ def test_a_measure_is_at_least_a_millimetre(filename: str, tag: str, least: floa
         ),
         ("libdiffdrive_plugin_multi_wheel.so", "<leftJoints>fl</leftJoints><rightJoints>fr fr</rightJoints>", "twice"),
         ("gz-sim-mecanum-drive-system", CORNERS.replace("rr", "rl"), "has the joint 'rl' on the left and on the right"),
-    ],
-)
-def test_a_joint_is_one_wheel(filename: str, tags: str, message: str) -> None:
-    assert message in refusal(filename, tags)
+    ]:
+        assert message in refusal(filename, tags)
 
 
-@pytest.mark.parametrize("shape", ["", BOX.format("collision"), CYLINDER.replace("0.1", "0.0005")])
-def test_a_robot_balances_on_round_wheels(shape: str) -> None:
-    places = {"jointL": "0 0.2 0", "jointR": "0 -0.2 0"}
-    message = refusal("libwb_plugin.so", "", shape, places)
-    assert "balances on the wheel 'l_jointL', whose collision shapes are not round; give it a <cylinder>" in message
-    assert robot("libwb_plugin.so", "", places=places).drive is not None
+def test_a_robot_balances_on_round_wheels() -> None:
+    for shape in ["", BOX.format("collision"), CYLINDER.replace("0.1", "0.0005")]:
+        places = {"jointL": "0 0.2 0", "jointR": "0 -0.2 0"}
+        message = refusal("libwb_plugin.so", "", shape, places)
+        assert "balances on the wheel 'l_jointL', whose collision shapes are not round; give it a <cylinder>" in message
+        assert robot("libwb_plugin.so", "", places=places).drive is not None

@@ -81,43 +81,44 @@ UPWARDS = "<normal>0 0 2</normal>"
 PLANE = '<link name="l"><collision name="c">{}<geometry><plane>{}</plane></geometry></collision></link>'
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
+def test_a_level_plane_at_zero_is_ground(path: Path) -> None:
+    for body in [
         "<include><uri>model://ground_plane</uri></include>",
         "<include><uri> model://asphalt_plane </uri></include>",
         f'<model name="floor"><static>1</static>{PLANE.format("", "")}</model>',
         f'<model name="m"><static>1</static>{PLANE.format("<pose>5 0 0 0 0 1</pose>", UPWARDS)}</model>',
         f'<model name="up"><static>1</static>{UP}{PLANE.format(DOWN, "")}</model>',
-    ],
-)
-def test_a_level_plane_at_zero_is_ground(path: Path, body: str) -> None:
-    spec = loaded(path, body)
-    assert (spec.ground, spec.models, spec.warnings) == (True, (), ())
+    ]:
+        spec = loaded(path, body)
+        assert (spec.ground, spec.models, spec.warnings) == (True, (), ())
 
 
-@pytest.mark.parametrize(
-    ("body", "xyz", "up"),
-    [
+def test_any_other_plane_is_a_static_model_where_it_stands(path: Path) -> None:
+    for body, xyz, up in [
         ("<include><uri>model://ground_plane</uri><pose>0 0 -0.5 0 0 0</pose></include>", (0, 0, -0.5), (0, 0, 1)),
-        ("<include><uri>model://ground_plane</uri><pose>0 0 0 0.1 0 0</pose></include>", (0, 0, 0),
-         (0, -math.sin(0.1), math.cos(0.1))),
-        (f'<model name="wall"><static>1</static>{PLANE.format("", "<normal>1 0 0</normal>")}</model>', (0, 0, 0),
-         (1, 0, 0)),
-        (f'<model name="m"><static>1</static><pose>0 0 2 0 0 0</pose>{PLANE.format("", "")}</model>', (0, 0, 2),
-         (0, 0, 1)),
-    ],
-)  # fmt: skip
-def test_any_other_plane_is_a_static_model_where_it_stands(
-    path: Path, body: str, xyz: tuple[float, ...], up: tuple[float, ...]
-) -> None:
-    spec = loaded(path, body)
-    (model,) = spec.models
-    (placed,) = lump(model).collisions
-    frame = Frame.of(model.pose) @ Frame.of(placed.shape.pose)
-    assert not spec.ground and model.static and placed.shape.kind == "plane"
-    np.testing.assert_allclose(frame.position, xyz, atol=1e-12)
-    np.testing.assert_allclose(frame.rotation[:, 2], up, atol=1e-12)
+        (
+            "<include><uri>model://ground_plane</uri><pose>0 0 0 0.1 0 0</pose></include>",
+            (0, 0, 0),
+            (0, -math.sin(0.1), math.cos(0.1)),
+        ),
+        (
+            f'<model name="wall"><static>1</static>{PLANE.format("", "<normal>1 0 0</normal>")}</model>',
+            (0, 0, 0),
+            (1, 0, 0),
+        ),
+        (
+            f'<model name="m"><static>1</static><pose>0 0 2 0 0 0</pose>{PLANE.format("", "")}</model>',
+            (0, 0, 2),
+            (0, 0, 1),
+        ),
+    ]:
+        spec = loaded(path, body)
+        (model,) = spec.models
+        (placed,) = lump(model).collisions
+        frame = Frame.of(model.pose) @ Frame.of(placed.shape.pose)
+        assert not spec.ground and model.static and placed.shape.kind == "plane"
+        np.testing.assert_allclose(frame.position, xyz, atol=1e-12)
+        np.testing.assert_allclose(frame.rotation[:, 2], up, atol=1e-12)
 
 
 def test_a_ground_with_more_on_it_stays_a_model(path: Path) -> None:
