@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -98,15 +99,20 @@ def number(low: float, high: float, unit: str = "") -> Callable[[str], float]:
     return parse
 
 
-def count(low: int = 0) -> Callable[[str], int]:
-    """A parser for a whole number from `low` up."""
+def count(low: int = 0, high: float = math.inf) -> Callable[[str], int]:
+    """A parser for a whole number from `low` to `high`."""
 
     def parse(text: str) -> int:
-        if not text.isdecimal() or int(text) < low:
-            raise refused(f"{text!r}: use a whole number from {low} up")
+        if not text.isdecimal() or not low <= int(text) <= high:
+            raise refused(f"{text!r}: use a whole number from {low} {'up' if high == math.inf else f'to {high}'}")
         return int(text)
 
     return parse
+
+
+def port(text: str) -> int:
+    """Parses the number of a TCP port; 0 stands for any that is free."""
+    return count(0, 65535)(text)
 
 
 def key(text: str) -> str:

@@ -271,7 +271,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--size", metavar="M", help="the side of that shape (infinity: half its length) in m")
     add("--goals", type=flags.file, metavar="FILE", help="goals from a file instead: x y theta a line")
     add("--laps", type=flags.count(), metavar="N", default=0, help="times round the goals; 0: for ever (default: 0)")
-    add("--view", nargs="?", type=flags.count(), const=8080, metavar="PORT",
+    add("--view", nargs="?", type=flags.port, const=8080, metavar="PORT",
         help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a free one)")  # fmt: skip
     add("--shards", type=flags.count(1), default=1, metavar="N",
         help="as many sims, which share the robots by name (default: 1)")  # fmt: skip

@@ -46,7 +46,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add("--host", default="127.0.0.1", metavar="ADDRESS",
         help="where to listen (default: %(default)s)")  # fmt: skip
-    add("--port", type=flags.count(), metavar="N",
+    add("--port", type=flags.port, metavar="N",
         help=f"0: a free one (default: {PORT}; with --foxglove {FOXGLOVE_PORT}, Foxglove's own)")  # fmt: skip
     add("--foxglove", action="store_true", help="serve Foxglove and Lichtblick instead of a page")
     add("--token", type=_word, metavar="WORD",

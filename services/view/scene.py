@@ -38,6 +38,7 @@ FRAME = 0.05  # s between two looks at the sims
 JOINTS_EVERY = 2  # frames; the wheels of a fleet are most of what there is to send
 A_SECOND = 2000  # entities a second that are asked for: of many, there are fewer frames
 PATIENCE = 0.3  # s for the sims to answer
+DESCRIBING = 0.05  # s in a frame in which new entities are asked for what they look like
 NAME_AT = (0.0, 0.0, 0.6)  # m
 GREY = (120, 120, 120)
 EYE, LOOK_AT, FIELD = (-2.0, -1.6, 1.6), (0.0, 0.0, 0.0), math.radians(60)  # m; of a page that was just opened
@@ -194,13 +195,20 @@ class Scene:
         server.initial_camera.fov = FIELD
 
     def ask(self) -> News:
-        """Ask the sims what there is, and what it looks like. Raises BusError once the bus is closed."""
+        """Ask the sims what there is, and for some time what it looks like: of many new ones the first are shown while
+        the others are asked for. Raises BusError once the bus is closed.
+        """
         self._look()
         answered = self._ask()
         entities = [one.entity for one in self.shown.values() if one.entity.number] if answered is None else answered
         there = {entity.name: entity for entity in [*self._others(entities), *entities]}
-        new = [entity for name, entity in there.items() if not self._has(entity)]
-        appearances = {entity.name: found for entity in new if (found := self._description(entity)) is not None}
+        appearances: dict[str, RobotDescriptionReply] = {}
+        until = time.monotonic() + DESCRIBING
+        for entity in there.values():
+            if time.monotonic() > until:
+                break
+            if not self._has(entity) and (found := self._description(entity)) is not None:
+                appearances[entity.name] = found
         return News(there, answered or [], appearances)
 
     def draw(self, now: float, news: News, watched: Mapping[str, Driver]) -> None:

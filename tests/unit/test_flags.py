@@ -32,6 +32,8 @@ def test_a_count_is_a_whole_number() -> None:
     assert flags.count(2)("12") == 12
     for text in ("1", "-3", "2.0", "", "two", "²"):
         assert refusal(flags.count(2), text) == f"{text!r}: use a whole number from 2 up"
+    assert flags.port("65535") == 65535
+    assert refusal(flags.port, "65536") == "'65536': use a whole number from 0 to 65535"
 
 
 def test_a_key_loses_the_slash_that_ros_puts_first() -> None:
