@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import math
 import threading
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -82,6 +83,13 @@ class Window:
         return lost(list(self._numbers)) if self._numbers else None
 
 
+def _received(tap: RawSubscriber) -> Iterator[Sample]:
+    """The samples of a key as they arrive, until the bus is closed."""
+    with contextlib.suppress(BusError):
+        while True:
+            yield tap.recv()
+
+
 class Watch:
     """Listens to the keys of a verb. `measure` returns a sample's value, or None if it has none; `excuse` explains
     why, if there were any of those.
@@ -104,10 +112,8 @@ class Watch:
         for name in self._args.keys:
             threading.Thread(target=self._listen, args=(bus.subscribe_raw(name),), daemon=True).start()
         deadline = self._args.timeout and time.monotonic() + self._args.timeout
-        many, keys = (
-            len(self._args.keys) > 1 or any("*" in name for name in self._args.keys),
-            ", ".join(self._args.keys),
-        )
+        keys = ", ".join(self._args.keys)
+        many = len(self._args.keys) > 1 or "*" in keys
         near: str | None = None  # looked up when no messages came
         while not stop.wait(EVERY):
             reports = self._reports()
@@ -127,11 +133,7 @@ class Watch:
         return 0
 
     def _listen(self, tap: RawSubscriber) -> None:
-        while True:
-            try:
-                sample = tap.recv()
-            except BusError:
-                return
+        for sample in _received(tap):
             now = time.monotonic()
             value = self._measure(sample, now)
             if value is None:
@@ -294,12 +296,8 @@ class Delays:
             self._clock = threading.Thread(target=self._follow, args=(self._bus.subscribe_raw("clock"),), daemon=True)
             self._clock.start()
 
-    def _follow(self, tap: Any) -> None:
-        while True:
-            try:
-                sample = tap.recv()
-            except BusError:
-                return
+    def _follow(self, tap: RawSubscriber) -> None:
+        for sample in _received(tap):
             value = self._reader.read(sample, self._bus)
             clock = value.get("clock") if isinstance(value, dict) else None
             if (seconds := _seconds(clock)) is not None:

@@ -3,7 +3,7 @@
 import argparse
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -104,29 +104,25 @@ def follow(args: argparse.Namespace, where: connection.Connection) -> int:
 
 def serve_parameters(bus: Bus, robot: str, follower: Follower) -> None:
     """Serve its gains and limits as parameters; changes apply from the next command on."""
-
-    def write(gains: Gains) -> None:
-        follower.gains = gains
-
-    Parameters(bus, key_for("controller", robot), lambda: declared(lambda: follower.gains, write)).start()
+    Parameters(bus, key_for("controller", robot), lambda: declared(follower)).start()
 
 
-def declared(read: Callable[[], Gains], write: Callable[[Gains], None]) -> Iterator[Number]:
-    """The parameters of the Gains that `read` returns and `write` sets."""
+def declared(follower: Follower) -> Iterator[Number]:
+    """The parameters of the follower's Gains."""
     for param in PARAMS:
         yield Number(
             param.name, param.about, param.unit, param.low, param.high,
-            partial(_get, read, param.field), partial(_set, read, write, param.field),
+            partial(_get, follower, param.field), partial(_set, follower, param.field),
         )  # fmt: skip
 
 
-def _get(read: Callable[[], Gains], field: str) -> float:
-    value: float = getattr(read(), field)
+def _get(follower: Follower, field: str) -> float:
+    value: float = getattr(follower.gains, field)
     return value
 
 
-def _set(read: Callable[[], Gains], write: Callable[[Gains], None], field: str, value: float) -> None:
-    write(replace(read(), **{field: value}))
+def _set(follower: Follower, field: str, value: float) -> None:
+    follower.gains = replace(follower.gains, **{field: value})
 
 
 def resume(robot: str, where: connection.Connection) -> int:

@@ -36,10 +36,6 @@ class Route:
         self._shape, self._size, self._file = shape, size, file
         self.goals = read_goals(file) if file else SHAPES[shape](size)
 
-    def next_goal(self, request: NextGoalRequest) -> NextGoalReply:
-        """The goal with the requested number. Raises ServiceError if the list has no such goal."""
-        return next_goal(self.goals, request)
-
     def declared(self) -> Iterator[Parameter]:
         """Its parameters; goals from a file cannot be changed."""
         if self._file:
@@ -84,7 +80,7 @@ def main(argv: list[str] | None = None) -> int:
         with Bus("pose_service", connection.from_arguments(args), lasting=True, stop=stop) as bus:
             tracker = Tracker(bus.subscribe("**/odom", Odometry, depth=256, limit=MAX_ODOM_BYTES))
             bus.serve("get_pose", GetPoseRequest, GetPoseReply, tracker.get_pose).start()
-            bus.serve("next_goal", NextGoalRequest, NextGoalReply, route.next_goal).start()
+            bus.serve("next_goal", NextGoalRequest, NextGoalReply, lambda asked: next_goal(route.goals, asked)).start()
             Parameters(bus, "pose_service", route.declared).start()
             report(f"pose_service: {len(route.goals)} goals from {args.goals or args.shape}")
             wait_for_end(stop)

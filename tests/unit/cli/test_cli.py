@@ -151,11 +151,11 @@ def test_output_into_a_full_disk_is_one_line(words: str) -> None:
     assert done.stderr == "holozen: cannot write what was asked for: No space left on device\n"
 
 
-@pytest.mark.parametrize("verb", cli.SERVICES)
-def test_a_service_is_found_in_the_tree(verb: str) -> None:
-    command = cli.command(verb)
-    module = command.module if isinstance(command, Service) else command
-    assert module.__name__ == f"services.{cli.SERVICES[verb]}.__main__"
+def test_a_service_is_found_in_the_tree() -> None:
+    for verb, name in cli.SERVICES.items():
+        command = cli.command(verb)
+        module = command.module if isinstance(command, Service) else command
+        assert module.__name__ == f"services.{name}.__main__"
 
 
 @pytest.mark.parametrize("words", ["param load sim -", "topic pub cmd_vel -", "teleop --script -", "teleop"])

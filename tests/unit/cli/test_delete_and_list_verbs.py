@@ -74,11 +74,11 @@ def test_deleted_ones_are_an_object_a_line_as_json(sim: FakeSim, run: Run) -> No
     assert (code, err) == (1, f"holozen delete: {reason}\n")
 
 
-@pytest.mark.parametrize("name", ["*", "a/b", "", "9"])
-def test_an_illegal_name_is_wrong_usage_and_asks_nothing(sim: FakeSim, run: Run, name: str) -> None:
+def test_an_illegal_name_is_wrong_usage_and_asks_nothing(sim: FakeSim, run: Run) -> None:
     sim.put("Fred")
-    code, _, err = run("delete", "Fred", name)
-    assert code == 2 and f"robot name {name!r}: use a letter" in err
+    for name in ("*", "a/b", "", "9"):
+        code, _, err = run("delete", "Fred", name)
+        assert code == 2 and f"robot name {name!r}: use a letter" in err
     assert sim.log == []
 
 

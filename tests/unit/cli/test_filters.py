@@ -1,7 +1,5 @@
 """A filter is a small expression over fields, and nothing else."""
 
-from typing import Any
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -56,9 +54,9 @@ def test_a_message_that_lacks_the_field_or_holds_something_else_does_not_pass() 
         assert compiled(text)(MESSAGE) is False
 
 
-@pytest.mark.parametrize("message", ["text", [1, 2], None, 3.5])
-def test_a_message_without_fields_does_not_pass(message: Any) -> None:
-    assert compiled("linear.x > 0")(message) is False
+def test_a_message_without_fields_does_not_pass() -> None:
+    for message in ("text", [1, 2], None, 3.5):
+        assert compiled("linear.x > 0")(message) is False
 
 
 def test_anything_else_is_refused_in_one_line() -> None:
@@ -114,11 +112,9 @@ def test_no_text_does_more_than_pass_or_not(text: str) -> None:
     assert passes(MESSAGE) in (True, False)
 
 
-@pytest.mark.parametrize(
-    ("text", "value"), [("linear.x", 0.3), ("name", ["a", "b"]), ("name[1]", "b"), ("frame_id", "odom")]
-)
-def test_a_field_is_picked_by_its_path(text: str, value: object) -> None:
-    assert pick(MESSAGE, path(text)) == value
+def test_a_field_is_picked_by_its_path() -> None:
+    for text, value in {"linear.x": 0.3, "name": ["a", "b"], "name[1]": "b", "frame_id": "odom"}.items():
+        assert pick(MESSAGE, path(text)) == value
 
 
 def test_what_is_no_path_is_refused() -> None:

@@ -249,11 +249,11 @@ def test_publishing_what_is_no_message_never_reaches_the_wire(run: Run) -> None:
     assert "has no known type; known keys: cmd_vel, odom" in run("topic", "pub", "nonsense", "{}")[2]
 
 
-@pytest.mark.parametrize("key", ["*/cmd_vel", "**/cmd_vel", "a$*/cmd_vel", "cmd_vel?x"])
-def test_a_wildcard_is_not_published_to(run: Run, key: str) -> None:
-    code, out, err = run("topic", "pub", key, "{}")
-    assert (code, out) == (1, "")
-    assert err == f"holozen topic pub: {key!r}: write to one key; a wildcard would move every robot\n"
+def test_a_wildcard_is_not_published_to(run: Run) -> None:
+    for key in ("*/cmd_vel", "**/cmd_vel", "a$*/cmd_vel", "cmd_vel?x"):
+        code, out, err = run("topic", "pub", key, "{}")
+        assert (code, out) == (1, "")
+        assert err == f"holozen topic pub: {key!r}: write to one key; a wildcard would move every robot\n"
 
 
 def test_a_foreign_service_is_called_as_it_is_or_by_its_type(wire: Wire, run: Run) -> None:

@@ -79,9 +79,9 @@ def test_a_robot_that_was_never_heard_is_named_with_those_that_were(robots: Robo
     assert robots.refusal("Fred") == "no Fred/odom was received; robots with odom: '' (at the root), Ann"
 
 
-@pytest.mark.parametrize("name", ["*", "a/b", "**", "9", "x" * 65])
-def test_a_name_that_no_robot_may_have_is_refused(robots: Robots, name: str) -> None:
-    assert robots.refusal(name).startswith(f"robot name {name!r}: use a letter")
+def test_a_name_that_no_robot_may_have_is_refused(robots: Robots) -> None:
+    for name in ("*", "a/b", "**", "9", "x" * 65):
+        assert robots.refusal(name).startswith(f"robot name {name!r}: use a letter")
 
 
 def test_odom_that_is_too_old_is_refused_with_its_age(robots: Robots) -> None:
