@@ -66,12 +66,12 @@ def test_a_key_without_a_status_has_no_line_of_it(sim: Bus, teleop: Bus, run: Ru
     assert lines[-1] == f"  sim ({sim.id[:6]})"
 
 
-@pytest.mark.parametrize("wrong", [b"[]", b"{", b'{"sources": [{}]}', b'{"sources": 3}', b"\xff"])
-def test_a_status_that_is_none_is_passed_over(sim: Bus, run: Run, wrong: bytes) -> None:
+def test_a_status_that_is_none_is_passed_over(sim: Bus, run: Run) -> None:
     publisher = sim.publisher("Fred/cmd_vel_status", CommandStatus)
-    publisher.put_bytes(wrong)
-    code, out, _ = run("topic", "info", "Fred/cmd_vel")
-    assert (code, out.splitlines()[0]) == (0, "Type: geometry_msgs/msg/Twist")
+    for wrong in (b"[]", b"{", b'{"sources": [{}]}', b'{"sources": 3}', b"\xff"):
+        publisher.put_bytes(wrong)
+        code, out, _ = run("topic", "info", "Fred/cmd_vel")
+        assert (code, out.splitlines()[0]) == (0, "Type: geometry_msgs/msg/Twist")
 
 
 def test_verbose_shows_priority_encoding_and_delivery(wire: Wire, run: Run) -> None:

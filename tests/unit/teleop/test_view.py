@@ -226,18 +226,18 @@ def test_the_title_names_the_robot_those_that_tab_switches_to_and_us() -> None:
     assert "Tab:" not in rows(replace(GOOD, others=[]))[0]
 
 
-@pytest.mark.parametrize("size", [*SIZES, (40, 30)], ids=str)
-def test_the_last_warning_is_shown(size: tuple[int, int]) -> None:
+def test_the_last_warning_is_shown() -> None:
     warned = replace(GOOD, warning="not handed over")
-    assert " not handed over" in rows(warned, size)
-    assert styles(warned, "not handed over", size) == {"warning"}
+    for size in [*SIZES, (40, 30)]:
+        assert " not handed over" in rows(warned, size)
+        assert styles(warned, "not handed over", size) == {"warning"}
 
 
-@pytest.mark.parametrize("size", [(80, 24), (120, 40), (40, 30)], ids=str)
-def test_the_keys_are_shown_where_there_is_room(size: tuple[int, int]) -> None:
-    shown = rows(GOOD, size)
-    for key in GOOD.keys:
-        assert any(key in line for line in shown), key
+def test_the_keys_are_shown_where_there_is_room() -> None:
+    for size in [(80, 24), (120, 40), (40, 30)]:
+        shown = rows(GOOD, size)
+        for key in GOOD.keys:
+            assert any(key in line for line in shown), (key, size)
 
 
 def test_a_line_of_help_that_is_as_wide_as_the_screen_is_whole() -> None:
@@ -367,9 +367,9 @@ def test_no_alarm_is_ever_lost(state: State, size: tuple[int, int]) -> None:
     assert {len(line) for line in alarms} <= {size[0]}
 
 
-@pytest.mark.parametrize("size", [(0, 5), (5, 0), (-1, 3)])
-def test_a_terminal_without_a_size_shows_nothing(size: tuple[int, int]) -> None:
-    assert render(GOOD, *size) == []
+def test_a_terminal_without_a_size_shows_nothing() -> None:
+    for size in [(0, 5), (5, 0), (-1, 3)]:
+        assert render(GOOD, *size) == []
 
 
 def test_a_slow_link_is_reported_with_the_figure() -> None:
