@@ -40,6 +40,14 @@ def parent_of(pid: int) -> int:
         return 0
 
 
+def state_of(pid: int) -> str:
+    """The kernel's letter for what a process does: T is stopped, Z has ended, or is gone."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return "Z"
+
+
 def parts_at(wire: Wire) -> dict[str, int]:
     """The verbs that run on this wire, with their process ids; `up` itself too."""
     found = {}

@@ -7,6 +7,7 @@ import pytest
 from holozen.messages import Odometry
 from holozen.testing import Process, Terminal, Wire, wait_for
 
+from .processes import state_of
 from .robots import Robot, distance, moves, place, planar, rests, speeds, time_of
 
 SILENCE = 0.5  # s; the promise
@@ -61,7 +62,7 @@ def test_a_moment_of_silence_shorter_than_that_does_not_stop_it(robot: Robot) ->
 def test_a_teleop_that_dies_while_driving_leaves_a_robot_that_stands(town: Wire, robot: Robot, number: int) -> None:
     with drives_fast(town, robot) as terminal:
         terminal.process.signal(number)
-        wait_for(lambda: state(terminal.process) in "TZ")
+        wait_for(lambda: state_of(terminal.process.pid) in "TZ")
         last = robot.newest()  # no command has left the teleop since before this one
         stood = robot.stands()
         assert distance(last, stood) <= 2.0 * LONGEST
@@ -85,14 +86,6 @@ def drives_fast(town: Wire, robot: Robot) -> Terminal:
     return terminal
 
 
-def state(process: Process) -> str:
-    """The kernel's letter for what a process does: T is stopped, Z has ended."""
-    if process.returncode is not None:
-        return "Z"
-    with open(f"/proc/{process.pid}/stat") as file:
-        return file.read().rpartition(")")[2].split()[0]
-
-
 def test_after_a_silence_the_same_source_drives_again(robot: Robot) -> None:
     robot.drive(0.3)
     robot.stands()
@@ -113,7 +106,7 @@ def test_a_sim_that_hung_drops_the_commands_that_waited(sim: Process, robot: Rob
     def dropped() -> bool:
         """False where a busy machine made more of it than a link's lease of a second: then nothing waits any more."""
         sim.signal(signal.SIGSTOP)
-        wait_for(lambda: state(sim) == "T")
+        wait_for(lambda: state_of(sim.pid) == "T")
         stood = robot.odom.messages()[-1]
         put_for(robot, SILENCE + 0.2)
         sim.signal(signal.SIGCONT)
@@ -131,7 +124,7 @@ def test_a_sim_that_hung_drops_the_commands_that_waited(sim: Process, robot: Rob
 def test_a_sim_that_hung_longer_than_a_lease_comes_back(sim: Process, robot: Robot) -> None:
     """Zenoh gives its links up after a second; they are made anew."""
     sim.signal(signal.SIGSTOP)
-    wait_for(lambda: state(sim) == "T")
+    wait_for(lambda: state_of(sim.pid) == "T")
     stood = robot.odom.messages()[-1]
     put_for(robot, 2.5)
     sim.signal(signal.SIGCONT)

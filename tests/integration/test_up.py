@@ -13,7 +13,7 @@ from holozen import data
 from holozen.testing import Process, Terminal, Wire, wait_for
 
 from .conftest import start_sim
-from .processes import assert_one_line, parts_at
+from .processes import assert_one_line, parts_at, state_of
 from .robots import Robot, moves, rests
 
 PARTS = {"sim", "pose-service", "controller"}
@@ -71,7 +71,9 @@ def test_a_signal_right_at_the_start_leaves_nothing(wire: Wire) -> None:
 
 def test_a_part_that_hangs_is_killed_and_reported(wire: Wire) -> None:
     up = wire.start("up")
-    os.kill(all_run(wire, PARTS)["sim"], signal.SIGSTOP)
+    sim = all_run(wire, PARTS)["sim"]
+    os.kill(sim, signal.SIGSTOP)
+    wait_for(lambda: state_of(sim) == "T")  # of two signals that wait, the kernel delivers SIGTERM first
     up.signal(signal.SIGINT)
     assert up.wait(AT_MOST) == 0
     assert parts_at(wire) == {}
