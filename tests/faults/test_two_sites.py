@@ -1,6 +1,5 @@
 """Two sites, each with a router, over a link of 100 ms that loses packets; deploy/site.json5 says what crosses it."""
 
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -10,6 +9,7 @@ import pytest
 
 from holozen.testing import Process, wait_for
 from holozen.testing.wire import command, free_port
+from tests.built import built, needs
 
 from .history import CLOCK, EACH_STEP, History, newest, script
 from .namespaces import NEEDS, Lab
@@ -19,8 +19,7 @@ pytestmark = [NEEDS]
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
 SITE = ROOT / "deploy" / "site.json5"
-ZENOHD = subprocess.run([ROOT / "scripts/zenohd", "--path"], capture_output=True, text=True, check=True).stdout.strip()
-"""Where Zenoh's own router is; asked before the tests get a cache folder of their own."""
+ZENOHD = built("zenohd")
 DELAY = 0.1  # s, one way
 CLIENT = ("--mode", "client", "--connect")
 
@@ -30,9 +29,8 @@ def router(request: pytest.FixtureRequest) -> Callable[..., Process]:
     """Starts a router on a host, which then listens."""
     if request.param != "zenohd":
         return lambda host, *words: listening(host.start(*command("router", *words)), "listens at")
-    if not Path(ZENOHD).exists():
-        pytest.skip("not built: scripts/zenohd builds zenohd, as scripts/test --long does")
-    return lambda host, *words: listening(host.start(ZENOHD, "--no-multicast-scouting", *words), "reached at")
+    needs(ZENOHD, "zenohd")
+    return lambda host, *words: listening(host.start(str(ZENOHD), "--no-multicast-scouting", *words), "reached at")
 
 
 def listening(process: Process, line: str) -> Process:

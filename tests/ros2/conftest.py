@@ -1,7 +1,6 @@
 """Nodes of zenoh-ros2-sdk, an implementation of rmw_zenoh's protocol that shares no code with ours; and the bridge."""
 
 import contextlib
-import subprocess
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,9 @@ import pytest
 from holozen.messages.definitions import whole_text
 from holozen.messages.registry import Registry
 from holozen.testing import Wire
+from tests.built import built, needs
 
-ROOT = Path(__file__).resolve().parents[2]
-BRIDGE = Path(
-    subprocess.run([ROOT / "scripts/bridge", "--path"], capture_output=True, text=True, check=True).stdout.strip()
-)
-"""Where the bridge is; asked before the tests get a cache folder of their own."""
+BRIDGE = built("bridge")
 
 HASHES = {
     "std_msgs/msg/String": "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18",
@@ -132,6 +128,5 @@ def published() -> dict[str, str]:
 @pytest.fixture(scope="module")
 def bridge() -> Path:
     """The program zenoh-bridge-ros2dds."""
-    if not BRIDGE.exists():
-        pytest.skip("not built: scripts/bridge builds zenoh-bridge-ros2dds, as scripts/test --long does")
+    needs(BRIDGE, "bridge")
     return BRIDGE
