@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from holozen import messages as m
-from holozen.messages.codec import WIRES, CodecError, convert, decode, encode
+from holozen.messages.codec import WIRES, CodecError, convert, decode, encode, written
 from holozen.messages.message import not_finite
 from holozen.wire import SERVICES, TOPICS
 
@@ -229,3 +229,14 @@ def test_cdr_is_loaded_only_where_it_is_used() -> None:
     code = "import sys, holozen.messages.codec as c; c.encode(c.Message()); print(*sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert not {"holozen.messages.cdr", "holozen.messages.definitions"} & set(done.stdout.split())
+
+
+def test_a_single_number_that_is_not_finite_is_found_wherever_it_stands() -> None:
+    for at in range(36):  # between words with and without a u
+        odom = m.Odometry(child_frame_id="u" * (at % 3))
+        odom.pose.covariance[at] = math.nan
+        with pytest.raises(CodecError, match="not a finite number"):
+            encode(odom)
+    for twist in (m.Twist.planar(math.nan), m.Twist.planar(0.0, 0.0, math.inf)):
+        with pytest.raises(CodecError, match="not a finite number"):
+            written(twist, "json")
