@@ -1,5 +1,5 @@
 """Round trip of a command from a ROS 2 node on DDS: cmd_vel (Twist) there, odom (Odometry) back, over `holozen ros2`
-and zenoh-bridge-ros2dds, against the same from a process on our bus. And the processor time that both take for it.
+and zenoh-bridge-ros2dds, against the same from a process on our bus; and the processor time that those two take.
 """
 
 import json
@@ -13,21 +13,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.company import beside, meeting_point
+from benchmarks.company import ROOT, beside, meeting_point, processor_time
 from benchmarks.latency import COMMAND, ODOM, RATE, Trip, answer_ours, meet, ours, timed
 from benchmarks.report import Case, parser, publish
 from holozen.messages import Odometry, Twist
 from holozen.testing.process import Process
 from holozen.testing.wire import command, free_port
 
-ROOT = Path(__file__).parents[1]
-TICKS = 100  # of processor time a second, as Linux counts it in /proc
 REPLY = 10  # s to wait for an answer
 
 
 @contextmanager
 def bridged(endpoint: str, folder: str) -> Iterator[tuple[Trip, list[Process]]]:
-    """The pilot's side on DDS, and the processes between both: the gateway and the bridge."""
+    """The pilot's side on DDS, and the two processes in between: the gateway and the bridge."""
     from cyclonedds.util import duration
 
     from tests.ros2 import dds
@@ -58,18 +56,13 @@ def bridged(endpoint: str, folder: str) -> Iterator[tuple[Trip, list[Process]]]:
         yield trip, [gateway, bridge]
 
 
-def used(process: Process) -> float:
-    """The processor time in s that a process has used."""
-    fields = Path(f"/proc/{process.pid}/stat").read_text().rpartition(") ")[2].split()
-    return (int(fields[11]) + int(fields[12])) / TICKS
-
-
 def share(trip: Trip, between: list[Process], seconds: float) -> tuple[float, ...]:
-    """The processor time of each process in percent of a core, while a command goes and comes at RATE."""
-    before, begin = [used(one) for one in between], time.perf_counter()
+    """The load of each process in percent of a core, with round trips at RATE."""
+    before, begin = [processor_time(one.pid) for one in between], time.perf_counter()
     timed(trip, round(seconds * RATE), 1 / RATE)
     passed = time.perf_counter() - begin
-    return tuple(100 * (used(one) - start) / passed for one, start in zip(between, before, strict=True))
+    spent = [processor_time(one.pid) - start for one, start in zip(between, before, strict=True)]
+    return tuple(100 * one / passed for one in spent)
 
 
 def main() -> int:

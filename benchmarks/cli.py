@@ -3,7 +3,6 @@
 Beside raw zenoh (a subscriber of ten lines) and `zenoh`, the command of the package zenoh-cli, in the same interpreter.
 """
 
-import compileall
 import json
 import os
 import subprocess
@@ -13,10 +12,19 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
-from benchmarks.company import beside, guest, host, meeting_point
+from benchmarks.company import (
+    HOLOZEN,
+    ROOT,
+    beside,
+    compile_tree,
+    host,
+    meeting_point,
+    processor_time,
+    wait_for_odom,
+)
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
-from benchmarks.startup import HOLOZEN, ROOT, echo, meet_at, publish_odom
+from benchmarks.startup import echo, meet_at, publish_odom
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, Odometry, TriggerReply, TriggerRequest, Twist, codec
 from holozen.transport.connection import LOOPBACK
@@ -37,7 +45,7 @@ BATCH = 2000  # messages that are decoded for one sample
 
 
 def company(endpoint: str, rate: float) -> None:
-    """A robot with all that the verbs look for, which publishes odom at `rate` Hz."""
+    """A robot with everything that the verbs look for. It publishes odom at `rate` Hz."""
     with Bus("robot", host(endpoint), lasting=True) as bus:
         bus.publisher("cmd_vel_status", CommandStatus).put(CommandStatus())
         bus.subscribe("cmd_vel", Twist)
@@ -65,11 +73,11 @@ def wall(*words: str) -> list[float]:
 
 
 def verbs(turns: int, timed: Sequence[str] = VERBS) -> list[Case]:
-    """Verbs beside raw zenoh that only opens, links and closes, and Python that only prints."""
+    """Verbs, beside raw zenoh that only opens, links and closes, and Python that only prints."""
     looked_at, driven = meeting_point(), meeting_point()
     with beside(company, looked_at, 50.0), sim(driven):
-        _wait(looked_at)
-        _wait(driven)
+        wait_for_odom(looked_at)
+        wait_for_odom(driven)
 
         def ours(verb: str) -> Callable[[], list[float]]:
             # A publisher of commands waits for the sim's status.
@@ -88,23 +96,17 @@ def verbs(turns: int, timed: Sequence[str] = VERBS) -> list[Case]:
 
 
 def work(seconds: float, *words: str) -> list[float]:
-    """Microseconds of processor time for each message that comes to an echo, without its start."""
+    """Microseconds of processor time of an echo for each message, without its start."""
     with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as process:
         assert process.stdout
         reader = process.stdout.fileno()
         assert os.read(reader, 1), f"nothing from: {' '.join(words)}"
-        before, deadline = _spent(process.pid), time.monotonic() + seconds
+        before, deadline = processor_time(process.pid), time.monotonic() + seconds
         while time.monotonic() < deadline:
             assert os.read(reader, 1 << 16), f"it ended: {' '.join(words)}"
-        spent = _spent(process.pid) - before
+        spent = processor_time(process.pid) - before
         process.kill()
     return [spent / (seconds * RATE) * 1e6]
-
-
-def _spent(pid: int) -> float:
-    """The processor time of a process so far, in seconds (proc(5), fields 14 and 15 of stat)."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def echoing(turns: int, seconds: float) -> Case:
@@ -112,8 +114,8 @@ def echoing(turns: int, seconds: float) -> Case:
     endpoint = meeting_point()
     at = ("--connect", endpoint, "--listen", LOOPBACK)  # it cannot listen where another one does
     with beside(company, endpoint, RATE):
-        _wait(endpoint)
-        # zenoh-cli prints a line a message, so the fair side of ours is --json; the text of 60 lines stands beside.
+        wait_for_odom(endpoint)
+        # zenoh-cli prints a line for each message, so the comparison is with --json; text takes 60 lines.
         return Case("echo odom at 1 kHz, work", "us/msg", CPU_AIM).take_turns(
             turns,
             holozen_json=lambda: work(seconds, HOLOZEN, "topic", "echo", "odom", "--json", *meet_at(endpoint)),
@@ -145,16 +147,11 @@ def _each(call: Callable[[], object]) -> list[float]:
     return [(time.perf_counter() - start) / BATCH * 1e6]
 
 
-def _wait(endpoint: str) -> None:
-    with Bus("waits", guest(endpoint)) as bus:
-        assert bus.latest("odom", Odometry).wait(0, timeout=20), "the robot did not come up within 20 s"
-
-
 def loaded() -> list[str]:
     """The modules that an echo has loaded when its first line is out."""
     endpoint = meeting_point()
     with beside(company, endpoint, 50.0):
-        _wait(endpoint)
+        wait_for_odom(endpoint)
         code = "import sys; from holozen.cli import main; main(sys.argv[1:]); print(*sys.modules, file=sys.stderr)"
         words = [sys.executable, "-c", code, "topic", "echo", "odom", "--once", *meet_at(endpoint)]
         return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True).stderr.split()
@@ -162,8 +159,7 @@ def loaded() -> list[str]:
 
 def main() -> int:
     args = parser("cli", __doc__).parse_args()
-    for folder in ("holozen", "services"):
-        compileall.compile_dir(ROOT / folder, quiet=2)
+    compile_tree()
     quick = args.quick
     cases = [echo(500.0, turns=1 if quick else 40), *(verbs(1, VERBS[:2]) if quick else verbs(20))]
     cases += [echoing(1 if quick else 5, 0.3 if quick else 3.0), *decoding(2 if quick else 20)]

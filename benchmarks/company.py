@@ -1,17 +1,24 @@
-"""The other process of a benchmark, and where to meet it: loopback, on a port of its own."""
+"""The other processes of a benchmark, and where to meet them: on loopback, at a port of its own."""
 
+import compileall
 import multiprocessing
 import os
 import socket
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
+from holozen.bus import Bus
+from holozen.messages import Odometry
 from holozen.transport.connection import Connection
 
 PATIENCE = 60.0  # s for the other process to come up
+ROOT = Path(__file__).resolve().parents[1]
+HOLOZEN = str(Path(sys.executable).with_name("holozen"))
 
 
 def meeting_point() -> str:
@@ -33,7 +40,7 @@ def guest(endpoint: str) -> Connection:
 
 @contextmanager
 def beside(job: Callable[..., None], *args: Any) -> Iterator[None]:
-    """Within this block another process runs `job(*args)`, which never ends by itself."""
+    """Within this block another process runs `job(*args)`, which never returns."""
     process = multiprocessing.get_context("spawn").Process(target=_run, args=(job, *args), daemon=True)
     process.start()
     try:
@@ -44,11 +51,29 @@ def beside(job: Callable[..., None], *args: Any) -> Iterator[None]:
 
 
 def until(ready: Callable[[], object], every: float = 0.05) -> None:
-    """Ask again and again until `ready()` is true; AssertionError if the other process does not come up."""
+    """Wait until `ready()` is true, polled `every` seconds. AssertionError if the other process does not come up."""
     deadline = time.monotonic() + PATIENCE
     while not ready():
         assert time.monotonic() < deadline, f"the other process did not come up within {PATIENCE:g} s"
         time.sleep(every)
+
+
+def wait_for_odom(endpoint: str) -> None:
+    """Wait until a robot publishes odom at `endpoint`."""
+    with Bus("waits", guest(endpoint)) as bus:
+        assert bus.latest("odom", Odometry).wait(0, timeout=20), "the robot did not come up within 20 s"
+
+
+def processor_time(pid: int) -> float:
+    """The processor time (s) of a process so far, in all its threads: proc(5), fields 14 and 15 of stat."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+def compile_tree() -> None:
+    """Make the byte code, which an installed package always has; without it half of a start is the compiler's."""
+    for folder in ("holozen", "services"):
+        compileall.compile_dir(ROOT / folder, quiet=2)
 
 
 def _run(job: Callable[..., None], *args: Any) -> None:

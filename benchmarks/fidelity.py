@@ -1,4 +1,4 @@
-"""Commanded against driven path: on omni wheels, as spheres or with real rollers, on mecanum and other wheels, and as
+"""Driven against commanded path: on omni wheels, as spheres or with real rollers, on mecanum and other wheels, and as
 planar_move.
 
 Each drive starts from rest, settles, and is commanded for some seconds, on a level floor and on a ramp, with wheels of
@@ -6,16 +6,13 @@ different friction. The commanded path is the closed form of the body-frame velo
 straight line or the arc that wheels without slip would drive.
 """
 
-import json
 import math
-import os
-import platform
 from collections.abc import Iterator
 from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from benchmarks.report import parser
+from benchmarks.report import parser, show, write
 from holozen.flags import ENGINES
 from holozen.kinematics import travelled
 from holozen.limits import STOP, Planar
@@ -55,9 +52,9 @@ SETTLES, SPEEDS_UP, LASTS = 0.5, 0.5, 4.0  # s
 
 @dataclass(frozen=True)
 class Result:
-    """One drive. `error`: between commanded and driven place, of the way; `aside`: the largest distance from the
-    commanded path to the place at the same time, both once it has sped up; `heading`: the error in degrees at the end;
-    `start`: what it lost while it sped up.
+    """One drive. Once it has sped up, `error` is the distance between commanded and driven place at the end, in percent
+    of the way, and `aside` the largest distance between them at any time; `heading` is the heading error at the end;
+    `start` is the way that it lost while it sped up.
     """
 
     engine: str
@@ -167,17 +164,11 @@ def main() -> None:
     made.add_argument("--engine", choices=ENGINES, action="append", help="only this one; may be repeated")
     args = made.parse_args()
     results = [result for engine in args.engine or ENGINES for result in drives(engine, args.quick)]
-    rows = [HEAD, *(result.row() for result in results)]
-    widths = [max(len(row[column]) for row in rows) for column in range(len(HEAD))]
-    for row in rows:
-        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+    show([HEAD, *(result.row() for result in results)])
     for line in plot(results):
         print(line)
     print("aim: within 1 % of the way on its wheels, and within 0.1 % as planar_move, which is exact on the level")
-    machine = {"system": platform.platform(), "python": platform.python_version(), "cpus": os.cpu_count()}
-    figures = {"benchmark": "fidelity", "machine": machine, "cases": [vars(result) for result in results]}
-    args.json.write_text(json.dumps(figures, indent=1) + "\n")
-    print(f"figures: {args.json}")
+    write("fidelity", args.json, cases=[vars(result) for result in results])
 
 
 if __name__ == "__main__":

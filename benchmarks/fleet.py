@@ -2,7 +2,8 @@
 
 Another process commands each robot once a second of sim time, a third one subscribes to `*/odom`. Beside it, in turns,
 the bare engine steps the same bodies on the same ground. Time is processor time of all threads of the sim's process, so
-the real-time factor is that of one core. The last case is a fleet in one sim and in two shards, each a process.
+the real-time factor is that of one core. The last cases are a fleet in two processes against one: shards that are read,
+shards that are not, and bare engines, which show what the machine can give.
 """
 
 import math
@@ -13,12 +14,13 @@ import threading
 import time
 from contextlib import ExitStack, closing
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from benchmarks.company import beside, guest, host, meeting_point, until
 from benchmarks.report import Case, parser, publish
-from benchmarks.sim_loop import REST, ROBOT, WORLD, Stepper
+from benchmarks.sim_loop import REST, ROBOT, WORLD, Stepper, repeated
 from holozen.bus import Bus
 from holozen.messages import Clock, Twist
 from holozen.robot.loading import load
@@ -39,13 +41,13 @@ SETTLING = 120  # steps until all stand on the ground
 
 
 def places(robots: int) -> list[tuple[float, float, float]]:
-    """Where the robots start: a square grid."""
+    """Where the robots start: on a square grid."""
     side = math.ceil(math.sqrt(robots))
     return [(GRID * (i % side), GRID * (i // side), REST) for i in range(robots)]
 
 
 def drive(endpoint: str, robots: int, rate: float = COMMANDED) -> None:
-    """The pilot of them all, who commands each `rate` times a second of sim time."""
+    """A pilot of all robots, who commands each `rate` times a second of sim time."""
     with Bus("pilot", guest(endpoint)) as bus:
         commands = [bus.publisher(f"bot{i}/cmd_vel", Twist) for i in range(robots)]
         clock, sent = bus.subscribe("clock", Clock, depth=1), 0
@@ -76,20 +78,15 @@ def fleet(bus: Bus, world: World, model: RobotModel, robots: int, first: int = 0
 
 
 def bare(model: RobotModel, robots: int) -> Stepper:
-    """The same bodies and nothing but steps. Where the world is not quite level they keep their contacts."""
+    """The same bodies, and nothing but steps. In a world that is not quite level they keep their contacts."""
     world, body = World(replace(WORLD, gravity=(1e-9, 0.0, WORLD.gravity[2]))), lump(model)
     for at in places(robots):
         world.add(body, at)
-
-    def step(steps: int) -> None:
-        for _ in range(steps):
-            world.step()
-
-    return step
+    return repeated(world.step)
 
 
 def timed(stepper: Stepper, steps: int, robots: int) -> list[float]:
-    """Microseconds of processor time a robot and step."""
+    """Microseconds of processor time for each robot and step."""
     start = time.process_time()
     stepper(steps)
     return [(time.process_time() - start) / steps / robots * 1e6]
@@ -102,7 +99,7 @@ def resident() -> int:
 
 
 def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]]:
-    """One fleet: its case, and the figures that have no other side."""
+    """One fleet: its case, and the figures without a comparison."""
     model = load(ROBOT)
     assert model.drive is not None
     model = replace(model, drive=replace(model.drive, odometry_rate=20.0, command_timeout=-1.0))
@@ -133,39 +130,56 @@ def measure(robots: int, turns: int, steps: int) -> tuple[Case, dict[str, float]
     }
 
 
-def one_shard(endpoint: str, robots: int, first: int, seconds: float, results: Any) -> None:
-    """A sim in a process of its own with some robots, from bot`first` on. It puts their steps in a second of real
-    time into `results`.
-    """
-    model = load(ROBOT)
+Share = tuple[int, int, float]
+"""Robots of a process, the number of its first one, and for how many seconds it steps them."""
+
+
+def counted(step: Stepper, share: Share, together: Any, results: Any) -> None:
+    """Step a share once all are `together`; the steps of its robots in a second of real time go into `results`."""
+    robots, _, seconds = share
+    step(SETTLING)
+    together.wait()
+    start, steps = time.monotonic(), 0
+    while time.monotonic() < start + seconds:
+        step(12)
+        steps += 12
+    results.put(steps * robots / (time.monotonic() - start))
+    time.sleep(60)  # until it is ended
+
+
+def one_shard(endpoint: str, share: Share, together: Any, results: Any) -> None:
+    """A sim in a process of its own with some robots."""
+    robots, first, _ = share
     with Bus("sim", guest(endpoint)) as bus, closing(World(WORLD)) as world:
-        entities, step = fleet(bus, world, model, robots, first)
+        entities, step = fleet(bus, world, load(ROBOT), robots, first)
         for robot in entities.robots:
             robot.arbiter.offer("benchmark", 4, (0.2, 0.0, 0.5), time.monotonic() + 1e6)
-        step(SETTLING)
-        results.put(None)
-        start, before = time.monotonic(), world.steps
-        while time.monotonic() < start + seconds:
-            step(12)
-        results.put((world.steps - before) * robots / (time.monotonic() - start))
-        time.sleep(60)  # until it is ended
+        counted(step, share, together, results)
 
 
-def sharded(count: int, seconds: float) -> list[float]:
-    """Microseconds of real time a robot and step, of a fleet in `count` sims at once."""
-    results, endpoint = multiprocessing.get_context("spawn").Queue(), meeting_point()
+def one_engine(_endpoint: str, share: Share, together: Any, results: Any) -> None:
+    """The bare engine in a process of its own with some bodies."""
+    counted(bare(load(ROBOT), share[0]), share, together, results)
+
+
+def side_by_side(job: Any, count: int, seconds: float, is_read: bool = True) -> list[float]:
+    """Microseconds of real time a robot and step, of a fleet in `count` processes at once, whose odometry `is_read`."""
+    spawn, endpoint = multiprocessing.get_context("spawn"), meeting_point()
+    results, together = spawn.Queue(), spawn.Barrier(count)
     with ExitStack() as sims, Bus("watcher", host(endpoint)) as bus:
-        odoms = bus.subscribe_raw("*/odom", depth=1)
-        share = SHARDED // count
+        odoms = bus.subscribe_raw("*/odom", depth=1) if is_read else None
+        robots = SHARDED // count
         for number in range(count):
-            sims.enter_context(beside(one_shard, endpoint, share, number * share, seconds, results))
-        found = [results.get(timeout=300) for _ in range(2 * count)]
-        odoms.close()
-    return [1e6 / sum(filter(None, found))]
+            share = robots, number * robots, seconds
+            sims.enter_context(beside(job, endpoint, share, together, results))
+        found = [results.get(timeout=300) for _ in range(count)]
+        if odoms:
+            odoms.close()
+    return [1e6 / sum(found)]
 
 
 def plot(fleets: list[dict[str, float]], cases: list[Case], file: Path) -> None:
-    """Draw what a robot and step costs over the number of robots, beside the bare engine."""
+    """Plot the cost of a robot and step against the number of robots, beside that of the bare engine."""
     from matplotlib import pyplot
 
     figure, axes = pyplot.subplots(figsize=(6, 3.2))
@@ -196,13 +210,15 @@ def main() -> int:
     if args.plot:
         plot(fleets, cases, args.plot)
     seconds = 0.2 if args.quick else 3.0
-    case = Case(f"{SHARDED} robots, two shards against one sim", "us of real time a robot and step", "ratio <= 0.6")
-    cases.append(
-        case.take_turns(
-            1 if args.quick else 5,
-            two_shards=lambda: sharded(2, seconds), one_sim=lambda: sharded(1, seconds),
-        )
-    )  # fmt: skip
+    turns = 1 if args.quick else 5
+    for name, job, is_read in (
+        (f"{SHARDED} robots in sims", one_shard, True),
+        ("the same, unread", one_shard, False),
+        ("the same in bare engines", one_engine, False),
+    ):
+        case = Case(name, "us of real time a robot and step", "ratio of two processes to one <= 0.6")
+        two, one = (partial(side_by_side, job, count, seconds, is_read) for count in (2, 1))
+        cases.append(case.take_turns(turns, two=two, one=one))
     publish("fleet", cases, args.json, fleets=fleets)
     return 0
 

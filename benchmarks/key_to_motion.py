@@ -1,6 +1,6 @@
-"""From a key to the robot's motion: the byte in the teleop's terminal to the velocity of the base in the sim.
+"""From a key to the robot's motion: from the byte in the teleop's terminal to the velocity of the base in the sim.
 
-Against the least there can be: one step of the sim's physics and the time that one message takes on raw zenoh.
+The comparison is the least there can be: one step of the sim's physics, and one message on raw zenoh.
 """
 
 import random
@@ -23,7 +23,7 @@ RATE = 240  # Hz; of the physics, and of odom, so that every step is seen
 STEP = 1000 / RATE  # ms
 ASPIRED = 1.5
 AIM = f"ratio of p99 <= {ASPIRED} (ours / one step and one message on raw zenoh)"
-PAUSE = 0.02, 0.06  # s between two keys, by chance, so that they fall anywhere in a step
+PAUSE = 0.02, 0.06  # s between two keys, at random, so that they fall anywhere in a step
 SPEED = 0.5  # m/s
 
 BOX = f"""<robot name="box">
@@ -41,8 +41,8 @@ BOX = f"""<robot name="box">
 """
 
 
-class Seat:
-    """Where the operator sits: a terminal with the teleop, and a sight of the robot."""
+class Operator:
+    """A terminal with the teleop, and the robot's odometry."""
 
     def __init__(self, wire: Wire, terminal: Terminal) -> None:
         self._odom, self._terminal = wire.bus("witness").subscribe("odom", Odometry, depth=1000), terminal
@@ -53,13 +53,13 @@ class Seat:
         """Milliseconds from a key to motion, and from a key to rest, `count` times each."""
         times: list[list[float]] = [[], []]
         for _ in range(count):
-            self._forward = not self._forward  # to and fro: it stays where it is
+            self._forward = not self._forward  # back and forth, so that it stays where it is
             times[0].append(self._time("i" if self._forward else ",", SPEED if self._forward else -SPEED))
             times[1].append(self._time("k", 0.0))
         return times
 
     def _time(self, key: str, speed: float) -> float:
-        """From the key to the first odom that has this speed. The odom's own way here is counted too."""
+        """Milliseconds from the key to the arrival of the first odom with this speed."""
         time.sleep(random.uniform(*PAUSE))
         while self._odom.try_recv():
             pass
@@ -76,7 +76,7 @@ class Seat:
 
 
 @contextmanager
-def seat() -> Iterator[Seat]:
+def operator() -> Iterator[Operator]:
     """A sim with a box, and a teleop that drives it."""
     with tempfile.TemporaryDirectory() as folder, Wire() as wire:
         file = Path(folder) / "box.urdf"
@@ -84,11 +84,11 @@ def seat() -> Iterator[Seat]:
         teleop = command("teleop", "--mode", "latch", "--speed", str(SPEED), *wire.flags)
         with Process(command("sim", "--robot", str(file), *wire.flags)) as sim, Terminal(teleop) as terminal:
             sim.wait_for_line("listens on")
-            yield Seat(wire, terminal)
+            yield Operator(wire, terminal)
 
 
 def stamp_commands(endpoint: str) -> None:
-    """Answer each message with the time at which it came."""
+    """Answer each message with the time at which it arrived."""
     with open_raw(host(endpoint)) as session:
         commands, stamps = raw_ends(session, reads="cmd_vel", writes="odom")
         while True:
@@ -98,7 +98,7 @@ def stamp_commands(endpoint: str) -> None:
 
 @contextmanager
 def one_way(endpoint: str) -> Iterator[Any]:
-    """A function that measures some messages on their way: one step and that, in milliseconds each."""
+    """A function that sends some messages, and returns for each the time of one step and its own, in milliseconds."""
     with open_raw(guest(endpoint)) as session:
         answers, ask = raw_ends(session, reads="odom", writes="cmd_vel")
         message = b'{"linear": {"x": 0.5}}'
@@ -121,7 +121,7 @@ def main() -> int:
     turns, count = (2, 5) if args.quick else (40, 25)
     cases = [Case(name, "ms", AIM, {"holozen": [], "step and raw zenoh": []}) for name in ("to motion", "to rest")]
     endpoint = meeting_point()
-    with seat() as ours, beside(stamp_commands, endpoint), one_way(endpoint) as raw:
+    with operator() as ours, beside(stamp_commands, endpoint), one_way(endpoint) as raw:
         ours.start_and_stop(10)
         for _ in range(turns):
             least = raw(count)

@@ -115,7 +115,7 @@ def raw_ends(session: Any, reads: str, writes: str) -> tuple[Any, Any]:
 
 
 def meet(send: Callable[[], None], try_recv: Callable[[], object]) -> None:
-    """Send until an answer comes, and leave none behind."""
+    """Send until an answer comes, and discard all answers."""
 
     def answered() -> bool:
         send()

@@ -1,6 +1,6 @@
 """A script's callback on odom at 1 kHz: an rclpy node that spins, beside a plain subscriber of our bus.
 
-Each in a process of its own, in turns, with the same robot. Result are latency, processor time, and what was lost.
+They take turns, each in a process of its own, with the same robot. Results are latency, processor time and losses.
 """
 
 import multiprocessing
@@ -19,10 +19,10 @@ from holozen.messages import Header, Odometry, Time
 AIM = "ratio <= 1.5, nothing lost"
 RATE = 1000.0  # Hz
 DEPTH = 100  # messages that wait: a busy machine may not run a process for some hundredths of a second
-FIRST = 200  # messages that are not counted, while the two meet and caches fill
+FIRST = 200  # messages that do not count, while the two processes meet and caches fill
 
 Arrivals = list[tuple[float, int]]
-"""Of each message: how long it took in microseconds, and its number."""
+"""The latency of each message in microseconds, and its number."""
 Result = tuple[list[float], float, int]
 """The latencies in microseconds, the processor time in microseconds a message, and how many were lost."""
 
@@ -41,25 +41,25 @@ def robot(endpoint: str) -> None:
             number += 1
 
 
-class Ear:
-    """What both sides do with a message."""
+class Receiver:
+    """Takes the messages of either side."""
 
     def __init__(self, count: int) -> None:
-        self.heard: Arrivals = []
+        self.received: Arrivals = []
         self._count, self._before = count, 0.0
 
-    def hear(self, message: Any) -> bool:
-        """Take one in; whether more are wanted."""
+    def take(self, message: Any) -> bool:
+        """Take a message. Returns whether more are wanted."""
         stamp = message.header.stamp
         took = (time.monotonic_ns() - stamp.sec * 10**9 - stamp.nanosec) / 1000
-        self.heard.append((took, int(message.child_frame_id)))
-        if len(self.heard) == FIRST:
+        self.received.append((took, int(message.child_frame_id)))
+        if len(self.received) == FIRST:
             self._before = time.process_time()
-        return len(self.heard) < FIRST + self._count
+        return len(self.received) < FIRST + self._count
 
     def result(self) -> Result:
-        """The figures of what came after the first ones."""
-        spent, counted = time.process_time() - self._before, self.heard[FIRST:]
+        """The figures of all messages but the first ones."""
+        spent, counted = time.process_time() - self._before, self.received[FIRST:]
         numbers = [number for _, number in counted]
         lost = numbers[-1] - numbers[0] + 1 - len(numbers)
         return [took for took, _ in counted], spent / len(counted) * 1e6, lost
@@ -73,12 +73,12 @@ def listen_as_node(endpoint: str, count: int) -> Result:
 
     context.connection = guest(endpoint)
     rclpy.init(args=[])
-    node, ear = rclpy.create_node("listener"), Ear(count)
+    node, receiver = rclpy.create_node("listener"), Receiver(count)
     done = rclpy.Future()
 
     def callback(message: Any) -> None:
-        if not done.done() and not ear.hear(message):
-            done.set_result(ear.result())
+        if not done.done() and not receiver.take(message):
+            done.set_result(receiver.result())
 
     node.create_subscription(find("nav_msgs/msg/Odometry"), "odom", callback, DEPTH)
     rclpy.spin_until_future_complete(node, done)
@@ -90,10 +90,10 @@ def listen_as_node(endpoint: str, count: int) -> Result:
 def listen_on_bus(endpoint: str, count: int) -> Result:
     """A subscriber of our bus that waits in `recv`."""
     with Bus("listener", guest(endpoint)) as bus:
-        odom, ear = bus.subscribe("odom", Odometry, depth=DEPTH), Ear(count)
-        while ear.hear(odom.recv().message):
+        odom, receiver = bus.subscribe("odom", Odometry, depth=DEPTH), Receiver(count)
+        while receiver.take(odom.recv().message):
             pass
-        return ear.result()
+        return receiver.result()
 
 
 def in_a_process(job: Callable[[str, int], Result], endpoint: str, count: int) -> Result:
@@ -112,7 +112,7 @@ def _send_result(pipe: "Pipe[Any, Any]", job: Callable[[str, int], Result], endp
 
 
 def compare(turns: int, count: int) -> tuple[list[Case], dict[str, int]]:
-    """Latency and work of both sides, and how many messages each has lost in all."""
+    """Latency and work of both sides, and the number of messages that each has lost."""
     sides = {"rclpy_node": listen_as_node, "bus_subscriber": listen_on_bus}
     latency = Case(f"latency at {RATE:g} Hz", "us", AIM, {side: [] for side in sides})
     work = Case(f"work at {RATE:g} Hz", "us/msg", AIM, {side: [] for side in sides})

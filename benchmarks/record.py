@@ -1,7 +1,7 @@
-"""`holozen record` of 50 topics at 100 Hz: is everything in the file, and how late was it taken in?
+"""`holozen record` of 50 topics at 100 Hz: is everything in the file, and how late was it recorded?
 
-The publisher is our bus in another process: typed Odometry with a number in each message. Whatever is missing in the
-file is counted, by where it was lost. Nothing else records Zenoh keys into MCAP, so there is no other side.
+The publisher is our bus in another process: typed Odometry with a number in each message. Messages that are missing in
+the file are counted by where they were lost. Nothing else records Zenoh keys into MCAP, so there is no comparison.
 """
 
 import json
@@ -14,7 +14,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks.company import guest, host, meeting_point, until
+from benchmarks.company import HOLOZEN, guest, host, meeting_point, until
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
 from holozen.bag.reader import Bag
@@ -26,7 +26,6 @@ TOPICS, RATE = 50, 100.0  # Hz
 # A publisher drops a message that waits for a millisecond; with more patience it is the recorder that is measured.
 WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # us
 SECONDS, QUICK = 60.0, 3.0
-HOLOZEN = str(Path(sys.executable).with_name("holozen"))
 
 
 def send(bus: Bus, seconds: float) -> int:

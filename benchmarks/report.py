@@ -1,4 +1,4 @@
-"""What the benchmarks share: sides that take turns, one table, one JSON file."""
+"""What the benchmarks share: sides that take turns, a table, a JSON file."""
 
 import argparse
 import json
@@ -28,9 +28,9 @@ class Figures(TypedDict):
 
 @dataclass
 class Case:
-    """One comparison: side -> its rounds, each a list of times in `unit`. `aim` is the target in words.
+    """One comparison. `rounds` are those of each side, each a list of times in `unit`; `aim` is the target in words.
 
-    The first side is ours. Its ratio is to the second, time by time: below 1 is faster.
+    The first side is ours. The ratio is that of its times to those of the second: below 1 is faster.
     """
 
     name: str
@@ -39,7 +39,7 @@ class Case:
     rounds: dict[str, list[list[float]]] = field(default_factory=dict)
 
     def take_turns(self, times: int, **sides: Run) -> "Case":
-        """Run each side once, then again, `times` times over; every other time in the opposite order."""
+        """Run all sides in turn, `times` times, every second time in the opposite order."""
         self.rounds = {side: [] for side in sides}
         for turn in range(times):
             for side in sides if turn % 2 == 0 else reversed(sides):
@@ -84,14 +84,25 @@ def parser(name: str, description: str | None) -> argparse.ArgumentParser:
 
 
 def publish(name: str, cases: list[Case], file: Path, **more: object) -> None:
-    """Print the table and write the JSON."""
-    for line in _aligned([HEAD, *(row for case in cases for row in case.rows())]):
-        print(line)
+    """Print the table, and write the JSON."""
+    show([HEAD, *(row for case in cases for row in case.rows())])
     for aim in dict.fromkeys(case.aim for case in cases if case.aim):
         print(f"aim: {aim}")
+    write(name, file, cases=[case.as_json() for case in cases], **more)
+
+
+def show(rows: list[tuple[str, ...]]) -> None:
+    """Print a table."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
+
+
+def write(name: str, file: Path, **figures: object) -> None:
+    """Write figures as JSON, with the machine and its load."""
     machine = {"cpus": os.cpu_count(), "system": platform.platform(), "python": platform.python_version()}
-    figures = {"benchmark": name, "machine": machine, "load": os.getloadavg(), "cases": [c.as_json() for c in cases]}
-    file.write_text(json.dumps(figures | more, indent=1) + "\n")
+    head = {"benchmark": name, "machine": machine, "load": os.getloadavg()}
+    file.write_text(json.dumps(head | figures, indent=1) + "\n")
     print(f"figures: {file}")
 
 
@@ -112,9 +123,3 @@ def _spread(values: list[float]) -> tuple[float, float]:
 
 def _between(spread: tuple[float, float], form: str) -> str:
     return " .. ".join(format(value, form) for value in spread)
-
-
-def _aligned(rows: list[tuple[str, ...]]) -> Iterator[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        yield "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()

@@ -11,11 +11,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 from benchmarks.cli import company, wall
-from benchmarks.company import beside, guest, meeting_point, until
+from benchmarks.company import HOLOZEN, beside, meeting_point, until, wait_for_odom
 from benchmarks.report import Case, parser, publish
-from benchmarks.startup import HOLOZEN, meet_at
-from holozen.bus import Bus
-from holozen.messages import Odometry
+from benchmarks.startup import meet_at
 
 AIM = "ratio <= 0.1"
 NEEDED = ("rosmaster", "rostopic", "rosservice")
@@ -54,8 +52,7 @@ def cases(turns: int) -> list[Case]:
     """Both sides, in turns."""
     endpoint = meeting_point()
     with beside(company, endpoint, 50.0), ros(meeting_point().rpartition(":")[2]) as (environment, service):
-        with Bus("waits", guest(endpoint)) as bus:
-            assert bus.latest("odom", Odometry).wait(0, timeout=10), "the robot did not come up within 10 s"
+        wait_for_odom(endpoint)
         os.environ |= environment
 
         def ours(*words: str) -> list[float]:

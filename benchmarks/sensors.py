@@ -2,7 +2,6 @@
 robot that is driven at 20 Hz. They are read, or not, in turns, in the same sim: what nobody reads is not made.
 """
 
-import os
 import sys
 import tempfile
 import time
@@ -11,6 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from benchmarks.company import processor_time
 from benchmarks.report import Case, parser, publish
 from holozen.bus import Bus
 from holozen.data import find
@@ -23,7 +23,6 @@ READ: dict[str, dict[str, type[Message]]] = {
     "camera": {"camera/image_raw": Image},
     "both": {"scan": LaserScan, "camera/image_raw": Image},
 }
-TICKS = os.sysconf("SC_CLK_TCK")
 PERIOD = 0.05  # s between two commands
 LARGE = 4_000_000  # bytes
 
@@ -32,12 +31,6 @@ def robot() -> str:
     """explorer with a camera of 640 x 480, in a file beside the others."""
     text = find("urdf", "explorer.urdf.xacro").read_text()
     return text.replace("<width>320<", "<width>640<").replace("<height>240<", "<height>480<")
-
-
-def processor(pid: int) -> float:
-    """Seconds of processor time of a process so far."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 @contextmanager
@@ -54,7 +47,7 @@ def read(bus: Bus, keys: dict[str, type[Message]]) -> Iterator[dict[str, Any]]:
 
 
 class Driven:
-    """The sim's robot, driven, and what the sim reports meanwhile."""
+    """The sim's robot, which is driven, and the figures that the sim reports meanwhile."""
 
     def __init__(self, bus: Bus, pid: int) -> None:
         self._bus, self._pid = bus, pid
@@ -75,10 +68,10 @@ class Driven:
             for subscription in (self._statuses, self._times, *found.values()):
                 while subscription.try_recv():
                     pass
-            began, at = processor(self._pid), time.monotonic()
+            began, at = processor_time(self._pid), time.monotonic()
             self.drive(seconds)
             took = time.monotonic() - at
-            cost = (processor(self._pid) - began) / took * 1000
+            cost = (processor_time(self._pid) - began) / took * 1000
             self._report(name, took, {key: sum(1 for _ in iter(one.try_recv, None)) for key, one in found.items()})
         return [cost]
 

@@ -1,7 +1,7 @@
-"""The sim's loop as fast as it goes, commands and publishing included, against a bare stepSimulation loop.
+"""The sim's loop as fast as it goes, with commands and publishing, against a bare stepSimulation loop.
 
-The bare engine steps the same robot as it loads it: four links, three joints. Ours is one body whose wheels turn for
-the eye, so the engine alone with that body is measured too. --profile also prints where our time goes.
+The bare engine steps the same robot as it loads it: four links, three joints. Ours is one body whose wheels turn only
+visually, so the engine alone with that body is measured too. --profile also prints where our time goes.
 """
 
 import sys
@@ -10,6 +10,7 @@ import time
 from argparse import Namespace
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -24,7 +25,7 @@ from holozen.messages import Twist
 from holozen.robot.loading import load
 from holozen.robot.rigid import lump
 from holozen.robot.sdf_world import load_world
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.transport.pubsub import Publisher
 from services.sim.entities import Entities
 from services.sim.loop import Loop
@@ -43,7 +44,18 @@ REST = -0.04  # m; the height of the root frame when the robot stands on its whe
 engine: Any = bullet  # imported there, where pybullet is kept from writing to the terminal
 
 Stepper = Callable[[int], None]
-"""Makes so many steps."""
+"""Makes a number of steps."""
+
+
+def repeated(step: Callable[[], object]) -> Stepper:
+    """A Stepper that calls `step`."""
+
+    def run(steps: int) -> None:
+        for _ in range(steps):
+            step()
+
+    return run
+
 
 PARTS = {
     "read: commands and requests": (Loop, "_read_inputs"),
@@ -79,12 +91,7 @@ def our_body() -> Stepper:
     """Our world and body, and nothing but steps."""
     world = World(WORLD)
     world.add(lump(load(ROBOT)), (0.0, 0.0, REST))
-
-    def step(steps: int) -> None:
-        for _ in range(steps):
-            world.step()
-
-    return step
+    return repeated(world.step)
 
 
 def bare_loop() -> Stepper:
@@ -97,17 +104,12 @@ def bare_loop() -> Stepper:
     body = load_bare(world)
     for joint in range(engine.getNumJoints(body, physicsClientId=world)):
         engine.setJointMotorControl2(body, joint, engine.VELOCITY_CONTROL, force=0, physicsClientId=world)
-
-    def step(steps: int) -> None:
-        for _ in range(steps):
-            engine.stepSimulation(world)
-
-    return step
+    return repeated(partial(engine.stepSimulation, world))
 
 
 def load_bare(world: int) -> int:
     """hb_bot without what the engine cannot load: meshes for the eye, and a root without mass, which it makes 1 kg."""
-    robot = ElementTree.fromstring(expand(ROBOT))
+    robot = ElementTree.fromstring(expand_xacro(ROBOT))
     for part in robot.findall("link") + robot.findall("joint"):
         if part.get("name") in ("footprint_link", "footprint_joint"):
             robot.remove(part)
@@ -128,7 +130,7 @@ def timed(stepper: Stepper, steps: int) -> list[float]:
 
 
 def profile(ours: Stepper, steps: int) -> dict[str, float]:
-    """Microseconds a step in each of PARTS, with a commanding pilot. Looking at the time adds about 0.2 a call."""
+    """Microseconds of a step in each of PARTS, while a pilot commands. Measuring adds about 0.2 us to each call."""
     spent: Counter[str] = Counter()
     kept = {part: getattr(owner, name) for part, (owner, name) in PARTS.items()}
     for part, (owner, name) in PARTS.items():

@@ -1,16 +1,14 @@
-"""From process start to what a person sees: the first line of `holozen topic echo odom`, the first odom of `up`.
+"""From process start to the first line of `holozen topic echo odom`, and to the first odom of `holozen up`.
 
 The echo is compared with a raw zenoh subscriber of ten lines that prints its first sample, in the same interpreter.
 """
 
-import compileall
 import subprocess
 import sys
 import time
 from collections.abc import Sequence
-from pathlib import Path
 
-from benchmarks.company import beside, guest, host, meeting_point
+from benchmarks.company import HOLOZEN, ROOT, beside, compile_tree, host, meeting_point, wait_for_odom
 from benchmarks.latency import ODOM
 from benchmarks.report import Case, parser, publish
 from holozen.bus import Bus
@@ -18,8 +16,6 @@ from holozen.messages import Odometry
 
 ECHO_AIM, UP_AIM = "first line <= 50 ms", "up to first odom <= 1000 ms"
 RATES = (500.0, 50.0)  # Hz of odom; at 50 a newcomer waits 10 ms for a sample on average
-ROOT = Path(__file__).resolve().parent.parent
-HOLOZEN = str(Path(sys.executable).with_name("holozen"))
 
 
 def odom_publisher(endpoint: str, rate: float) -> None:
@@ -74,8 +70,7 @@ def echo(rate: float, turns: int) -> Case:
     """The first echoed line against the raw subscriber's, while a robot publishes odom at `rate`."""
     endpoint = meeting_point()
     with beside(odom_publisher, endpoint, rate):
-        with Bus("waits", guest(endpoint)) as bus:
-            assert bus.latest("odom", Odometry).wait(0, timeout=10), "the publisher did not come up within 10 s"
+        wait_for_odom(endpoint)
         return Case(f"first line, odom at {rate:g} Hz", "ms", ECHO_AIM).take_turns(
             turns,
             holozen=lambda: first_line(HOLOZEN, "topic", "echo", "odom", "--once", *meet_at(endpoint)),
@@ -86,9 +81,7 @@ def echo(rate: float, turns: int) -> Case:
 
 def main() -> int:
     args = parser("startup", __doc__).parse_args()
-    # Without bytecode half of the time would be the compiler's; an installed package always has it.
-    for folder in ("holozen", "services"):
-        compileall.compile_dir(ROOT / folder, quiet=2)
+    compile_tree()
     cases = [echo(rate, turns=1 if args.quick else 40) for rate in RATES]
     cases.append(Case("up to first odom", "ms", UP_AIM).take_turns(1 if args.quick else 15, holozen=first_odom))
     publish("startup", cases, args.json)

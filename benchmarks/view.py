@@ -1,4 +1,4 @@
-"""What looking costs: a hundred robots that drive, in the page of `holozen view`.
+"""What a view costs the sim: a hundred robots that drive, in a page of `holozen view`.
 
 The sim runs in real time, and another process commands each robot four times a second. In turns, a view with an open
 page is there or not. Times are processor time: of the sim's process for a second of its own time, and of the view's
@@ -8,7 +8,6 @@ robot. At the end Chromium, if it is there, opens the page of all robots and tha
 """
 
 import multiprocessing
-import os
 import shutil
 import signal
 import subprocess
@@ -25,7 +24,7 @@ import viser
 import websockets.sync.client as websockets
 import zstandard
 
-from benchmarks.company import beside, guest, meeting_point, until
+from benchmarks.company import beside, guest, meeting_point, processor_time, until
 from benchmarks.fleet import drive
 from benchmarks.report import Case, parser, publish
 from holozen import data
@@ -64,7 +63,6 @@ SEES_ROBOT = """() => new Promise((done, fail) => {
 WATCHED = b"/entities/bot0"  # its node in the page
 MOVED = b"\xa4name" + bytes([0xA0 | len(WATCHED)]) + WATCHED + b"\xa8position"  # in msgpack
 HEADER = 16  # bytes of viser's message before what is compressed
-TICKS = os.sysconf("SC_CLK_TCK")
 
 
 @contextmanager
@@ -78,12 +76,6 @@ def started(endpoint: str, verb: str, *words: str) -> Iterator[tuple[int, Path]]
         finally:
             process.send_signal(signal.SIGTERM)
             process.wait()
-
-
-def used(process: int) -> float:
-    """Seconds of processor time that a process has had, in all its threads."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / TICKS
 
 
 def page(address: str, frames: Any) -> None:
@@ -143,10 +135,16 @@ class Sim:
 
     def cost(self, seconds: float, other: int = 0) -> tuple[float, float, float]:
         """Over so many seconds: processor time a second of its own, real-time factor, and the load by `other`."""
-        began, own, work, others = time.monotonic(), self.seconds(), used(self._process), used(other or self._process)
+        other = other or self._process
+        began, own, work, others = (
+            time.monotonic(),
+            self.seconds(),
+            processor_time(self._process),
+            processor_time(other),
+        )
         time.sleep(seconds)
-        own, work = self.seconds() - own, used(self._process) - work
-        real, others = time.monotonic() - began, used(other or self._process) - others
+        own, work = self.seconds() - own, processor_time(self._process) - work
+        real, others = time.monotonic() - began, processor_time(other) - others
         return work / own, own / real, others / real
 
 

@@ -1,4 +1,4 @@
-"""A test in lock-step with the sim: it sleeps nowhere, and gives the same numbers on every computer."""
+"""A test in lock-step with the sim: it never sleeps, and gives the same numbers on every computer."""
 
 from collections.abc import Callable
 

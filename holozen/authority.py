@@ -32,14 +32,14 @@ from holozen.transport.members import AUTHORITY, CERTIFICATE, KEY, MEMBERS
 from holozen.transport.roles import ROLES, ROUTER
 
 AUTHORITY_KEY = "ca.key"
-LISTED = (ROUTER, "sim", "autopilot")  # who checks others: their folders have the list of members
+LISTED = (ROUTER, "sim", "autopilot")  # the roles that check others: their folders have the list of members
 AUTHORITY_DAYS = 3650
 HERE = ("localhost", "127.0.0.1", "::1")
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,31}")
 
 
 class AuthorityError(Failure):
-    """What cannot be done with the certificates."""
+    """A request about the certificates that cannot be met. The text is one line."""
 
 
 def initialize(root: Path, hosts: Sequence[str], days: int) -> None:
@@ -82,7 +82,7 @@ def add(root: Path, role: str, name: str, days: int, hosts: Sequence[str] = ()) 
 
 
 def revoke(root: Path, name: str) -> None:
-    """Remove a member: the router allows it nothing, and the sim obeys none of its commands."""
+    """Remove a member: the router allows it nothing, and the sim refuses its commands."""
     table = members(root)
     if name not in table["members"]:
         raise AuthorityError(f"there is no member {name!r}; there are: {', '.join(table['members'])}")
@@ -112,7 +112,7 @@ def _issue(root: Path, name: str, key: Ed25519PublicKey, days: int, hosts: Seque
             f"{error.filename}: {error.strerror}; members are added where {AUTHORITY_KEY} is"
         ) from None
     assert isinstance(signer, Ed25519PrivateKey)
-    # Only the router's may serve: no member can pose as the router.
+    # Only the router's certificate is valid for a server: no member can pose as the router.
     use = ExtendedKeyUsageOID.SERVER_AUTH if hosts else ExtendedKeyUsageOID.CLIENT_AUTH
     builder = _builder(_name(name), key, days).issuer_name(authority.subject)
     builder = builder.add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
@@ -150,7 +150,7 @@ def _write_key(path: Path, key: Ed25519PrivateKey) -> None:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Replace a file at once, readable by its owner alone."""
+    """Replace a file atomically, readable by its owner alone."""
     new = path.with_name(f"{path.name}.new")
     new.unlink(missing_ok=True)
     with os.fdopen(os.open(new, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:

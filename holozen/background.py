@@ -1,4 +1,4 @@
-"""Work in a thread of its own while the caller loads other modules."""
+"""Work in a separate thread while the caller loads other modules."""
 
 from __future__ import annotations
 
@@ -34,6 +34,6 @@ def background(work: Callable[[], T]) -> Callable[[], T]:
 
 
 def at_once(work: Callable[[], T]) -> Callable[[], T]:
-    """The same in the calling thread: `work` is done, or has raised its error, when this returns."""
+    """As `background`, but in the calling thread: `work` is done, or has raised its error, when this returns."""
     result = work()
     return lambda: result

@@ -1,7 +1,7 @@
 """Output for people: lines, and pictures redrawn in a terminal.
 
-Writing a line never blocks: an unread pipe, or a terminal that Ctrl-S holds, loses lines. Lost lines are counted, and
-reported when the reader continues.
+Writing a line never blocks: if a pipe is not read, or Ctrl-S holds the terminal, lines are dropped. Their number is
+reported once reading resumes.
 """
 
 import _thread
@@ -15,22 +15,22 @@ import time
 from collections import deque
 from typing import Self
 
-KEPT = 256  # lines that wait for a slow reader
+KEPT = 256  # lines queued for a slow reader
 SHORT_WAIT = 0.005  # s; usually enough to write the line, which keeps the order of a process's output
 LOG_WAIT = 0.1  # s, once, for a slow reader of a script's log
-LAST_WAIT = 0.2  # s at the end of the process, for a reader that does not read
-BUSY = 5.0  # s at most then, on a busy machine
+LAST_WAIT = 0.2  # s without progress, after which output that is not read is abandoned at exit
+BUSY = 5.0  # s at most at exit, on a busy machine
 EVERY = {True: 0.1, False: 1.0}  # s between two pictures, in a terminal and elsewhere
 SIZE = (80, 24)
-_BEGIN, _END = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"  # a screen of its own without a cursor, and back
+_BEGIN, _END = "\x1b[?1049h\x1b[?25l", "\x1b[?25h\x1b[?1049l"  # enter the alternate screen and hide the cursor; undo it
 
 
 class Failure(Exception):
-    """What was asked for cannot be done. One line, for a person: what was given, where, what is allowed, what to do."""
+    """A request that cannot be met. One line, for a person: what was given, where, what is allowed, what to do."""
 
 
 def printable(text: str) -> str:
-    """`text` with `?` for control characters: parts of it come over the wire."""
+    """`text` with `?` for each control character, since parts of it may come over the wire."""
     return text if text.isprintable() else "".join(c if c.isprintable() else "?" for c in text)
 
 
@@ -40,31 +40,31 @@ def report(text: str) -> None:
 
 
 def output(text: str) -> None:
-    """Write one line on standard output, for processes that must go on even if it is not read."""
+    """Write one line on standard output, without blocking if it is not read."""
     _OUTPUT.write(printable(text))
 
 
 def log(text: str, stdout: bool = False) -> None:
-    """Write a script's log as it is, with line breaks and colours, on standard error or output."""
+    """Write a script's log unchanged, with line breaks and colours, on standard error or output."""
     (_OUTPUT if stdout else _ERRORS).write(text, LOG_WAIT)
 
 
 def drain(seconds: float = LAST_WAIT) -> None:
-    """Wait until all lines are written, or none has been read for `seconds`."""
+    """Wait until all lines are written, or nothing has been read for `seconds`."""
     for lines in (_OUTPUT, _ERRORS):
         lines.drain(seconds)
 
 
 def give_up_readers() -> None:
-    """Discard further output that is not being read. For signal handlers: a `write` of the main thread that waits there
-    ends too, since the signal interrupts it, and it is tried again.
+    """Send each output that is not being read to /dev/null. For signal handlers: a main thread that is blocked in
+    `write` goes on too, since the signal interrupts the call and Python retries it.
     """
     for lines in (_OUTPUT, _ERRORS):
         lines.give_up()
 
 
 class _Lines:
-    """Lines on their way to a file descriptor. A thread writes them, since `write` waits for the reader."""
+    """A queue of lines for a file descriptor. A thread writes them, since `os.write` waits for the reader."""
 
     def __init__(self, number: int) -> None:
         self._number = number
@@ -76,10 +76,10 @@ class _Lines:
         self._idle.set()
 
     def write(self, line: str, patience: float = SHORT_WAIT) -> None:
-        """Write a line, now or later. If too many wait, it waits for the reader for `patience` seconds, once."""
+        """Queue a line. If the queue is full, wait `patience` seconds for room, but only for the first line dropped."""
         stream, usual = (sys.stdout, sys.__stdout__) if self._number == 1 else (sys.stderr, sys.__stderr__)
         if stream is not usual:  # replaced by a test or a script
-            with contextlib.suppress(OSError, ValueError):  # a terminal that is gone is not an error, nor a closed file
+            with contextlib.suppress(OSError, ValueError):  # neither a vanished terminal nor a closed file is an error
                 print(line, file=stream, flush=True)
             return
         if stream is None:  # closed by the parent process; the descriptor may be another file's now
@@ -95,14 +95,10 @@ class _Lines:
                 self._idle.clear()
                 _thread.start_new_thread(self._run, ())
         if was_idle:
-            self.wait(SHORT_WAIT)
-
-    def wait(self, seconds: float) -> None:
-        """Wait until all is written, at most `seconds`."""
-        self._idle.wait(max(seconds, 0.0))
+            self._idle.wait(SHORT_WAIT)
 
     def give_up(self) -> None:
-        """Discard further output if it is not being read. Takes no lock: a signal may come while it is held."""
+        """Send output to /dev/null if it is not being read. Takes no lock: a signal may come while it is held."""
         poll = select.poll()
         poll.register(self._number, select.POLLOUT)
         if (sys.__stdout__ if self._number == 1 else sys.__stderr__) is None or poll.poll(0):
@@ -127,11 +123,13 @@ class _Lines:
 
     def _run(self) -> None:
         while data := self._next():
-            try:
-                while data:
+            while data:
+                try:
                     data = data[os.write(self._number, data) :]
-            except OSError:  # the reader is gone
-                os.dup2(os.open(os.devnull, os.O_WRONLY), self._number)
+                except BlockingIOError:  # another process has made the shared terminal or pipe non-blocking
+                    select.select([], [self._number], [], LOG_WAIT)
+                except OSError:  # the reader is gone
+                    os.dup2(os.open(os.devnull, os.O_WRONLY), self._number)
 
     def _next(self) -> bytes:
         """The next data to write; empty when this thread may end."""
@@ -151,7 +149,7 @@ atexit.register(drain)
 
 
 class Line:
-    """A status line on standard error that is overwritten. Without a terminal it is not shown."""
+    """A status line on standard error, overwritten in place. Without a terminal it is not shown."""
 
     def __init__(self, hidden: bool = False) -> None:
         self.shown = sys.stderr.isatty() and not hidden

@@ -1,10 +1,11 @@
-"""Finds what people get wrong: on this machine, at the meeting point, and among the running nodes.
+"""Finds common mistakes: on this machine, at the meeting point, and among the running nodes.
 
-A check yields findings; `diagnose` runs all of them in their order.
+Each check yields findings; `diagnose` runs them all, in order.
 """
 
 import contextlib
 import json
+import math
 import os
 import re
 import sys
@@ -19,6 +20,7 @@ from holozen.transport.connection import ROS_DOMAIN, VARIABLES, Connection, addr
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, version
 from holozen.transport.listeners import Holder, exposure, holders, reached
+from holozen.transport.samples import PRIORITIES
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
@@ -28,24 +30,21 @@ if TYPE_CHECKING:
 OK, WARNING, ERROR = "ok", "warning", "error"
 OPEN, FIND, LISTEN = 0.8, 0.6, 1.0  # s to reach a router, to find other nodes, and to listen to robots
 ANSWER = 0.4  # s for nodes to answer
-ROUNDS = 3  # questions to each node; the fastest answer measures its clock best
+ROUNDS = 3  # queries to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
-MOST_KEYS, MOST_ROBOTS = 3, 50  # keys in a finding; robots that are listened to
+MOST_KEYS, MOST_ROBOTS = 3, 50  # keys named in a finding; robots listened to
 OPTIONAL = ("foxglove-sdk", "matplotlib", "mujoco-core")  # not in requirements.lock
-USERS = {
-    "foxglove": "view --foxglove",
-    "mujoco": "sim --engine mujoco",
-    "bag": "bag plot",
-}  # of extras that are no verbs
+USERS = {"foxglove": "view --foxglove", "mujoco": "sim --engine mujoco", "bag": "bag plot"}
+"""The commands that need an extra, where its name is not a verb."""
 SHARED = (
     "delete_entity", "get_entities", "get_entity_state", "set_entity_state", "get_simulation_state",
     "set_simulation_state", "step_simulation", "reset_simulation", "get_scene", "robot_description",
     *(f"simulate_steps/_action/{part}" for part in ("send_goal", "get_result", "cancel_goal")),
 )  # fmt: skip
-"""Served by joined sims too."""
-SHARD = re.compile(r"sim_\d+_of_\d+")  # the node of a sim that adds its share of the entities
-DRIVES = 2.0  # Hz; a slower source is not taken to drive a robot
+"""Services that several sims of one world have."""
+SHARD = re.compile(r"sim_\d+_of_\d+")  # the node of a sim that simulates its share of the entities
+DRIVES = 2.0  # Hz; a slower source does not count as driving
 
 
 class Finding(NamedTuple):
@@ -62,7 +61,7 @@ class Finding(NamedTuple):
 
 def diagnose(connection: Connection, given: Mapping[str, object]) -> Iterator[Finding]:
     """All findings about this machine and the nodes at `connection`. Changes nothing. `given`: the values of the flags,
-    None for one that is not given.
+    None where one was not given.
     """
     yield from packages()
     yield from terminal()
@@ -127,15 +126,15 @@ def terminal(environ: Mapping[str, str] = os.environ) -> Iterator[Finding]:
 
 
 def environment(given: Mapping[str, object], environ: Mapping[str, str] = os.environ) -> Iterator[Finding]:
-    """The variables that choose the network, and which of them a flag overrules."""
+    """The environment variables that choose the network, and which of them a flag overrides."""
     for name, variable in VARIABLES.items():
         if value := environ.get(variable, "").strip():
-            text = f"is in force for every verb without --{name}" if given[name] is None else f"yields to --{name} here"
-            yield Finding("environment", OK, f"{variable}={value} {text}")
+            text = "applies to every verb without" if given[name] is None else "is overridden here by"
+            yield Finding("environment", OK, f"{variable}={value} {text} --{name}")
     if value := environ.get(ROS_DOMAIN, "").strip():
         ours = f"{VARIABLES['domain']}={environ[VARIABLES['domain']]}" if environ.get(VARIABLES["domain"]) else ""
-        stronger = "--domain here" if given["domain"] is not None else ours
-        text = f"yields to {stronger}" if stronger else "is in force for every verb without --domain"
+        stronger = "--domain" if given["domain"] is not None else ours
+        text = f"is overridden here by {stronger}" if stronger else "applies to every verb without --domain"
         yield Finding("environment", OK, f"{ROS_DOMAIN}={value} {text}")
 
 
@@ -144,7 +143,7 @@ def nodes(connection: Connection) -> Iterator[Finding]:
     from holozen.bus import Bus
 
     if connection.mode == "peer" and not connection.config:
-        connection = connection.replace(listen=(connection.own_endpoint,))  # hold none that another process may want
+        connection = connection.replace(listen=(connection.own_endpoint,))  # leave the meeting points to others
     with Bus("doctor", connection, patience=OPEN) as bus:
         endpoints = bus.graph().settled(bus.connected, patience=FIND)
         began = time.monotonic()
@@ -152,6 +151,7 @@ def nodes(connection: Connection) -> Iterator[Finding]:
         yield from meeting_points(connection, bus.connected())
         peers = ask_peers(bus) if bus.connected() else {}
         yield from versions(endpoints, peers, version("holozen"))
+        yield from hidden(bus.hidden() if bus.connected() else ())
         yield from clocks(peers.values())
         yield from open_ports(peers.values())
         yield from duplicates(endpoints, peers)
@@ -161,8 +161,8 @@ def nodes(connection: Connection) -> Iterator[Finding]:
 
 
 def health(connection: Connection, node: str) -> Finding:
-    """Whether a node of this machine answers, and the loop behind its parameters, if it has any. Shards go by `sim`
-    too. For the health check of a container. Raises BusError.
+    """Whether a node of this machine answers, and so does the loop behind its parameters, if it has any. Shards answer
+    to the name `sim` too. For the health check of a container. Raises BusError.
     """
     from holozen.bus import Bus
     from holozen.messages.rcl_interfaces import ListParametersReply, ListParametersRequest
@@ -186,7 +186,7 @@ def health(connection: Connection, node: str) -> Finding:
 
 
 def meeting_points(connection: Connection, connected: bool) -> Iterator[Finding]:
-    """The holders of the endpoints to connect to. `connected`: whether any node was reached."""
+    """Which processes hold the endpoints to connect to. `connected`: whether any node was reached."""
     listed = json.loads(connection.settings().get("connect/endpoints", "[]"))
     endpoints = [one for one in listed if isinstance(one, str)] if isinstance(listed, list) else []
     asked_for = connection.connect is not None
@@ -194,7 +194,7 @@ def meeting_points(connection: Connection, connected: bool) -> Iterator[Finding]
         port = (address(endpoint) or ("", 0))[1]
         here = holders(endpoint)
         if endpoint in connection.meeting_points[1:] and not asked_for and not (here and not reason and not connected):
-            continue  # they matter where the first does not answer
+            continue  # the spare points matter only where the first does not answer
         yield _meeting_point(endpoint, port, reason, here, connected, asked_for)
 
 
@@ -212,7 +212,7 @@ def _meeting_point(
     if connected and not reason:
         return Finding("port", OK, f"{endpoint} is held by {held}, and speaks Zenoh")
     fix = here[0].fix if here else "find out what runs there, or choose another meeting point with --connect"
-    return Finding("port", ERROR, f"{endpoint} is held by {held}, which does not answer as Zenoh does", fix)
+    return Finding("port", ERROR, f"{endpoint} is held by {held}, which does not speak Zenoh", fix)
 
 
 # The nodes.
@@ -235,7 +235,7 @@ class Peer(NamedTuple):
 
 
 def ask_peers(bus: "Bus") -> dict[str, Peer]:
-    """Session -> its node, of all that answer. A clock is measured by half of the round trip, as NTP does."""
+    """Session -> its node, for all nodes that answer. Clock offsets are taken at half the round trip, as NTP does."""
     found: dict[str, Peer] = {}
     for _ in range(ROUNDS):
         before, began = time.time(), time.monotonic()
@@ -245,18 +245,20 @@ def ask_peers(bus: "Bus") -> dict[str, Peer]:
                 known = found.get(peer.session)
                 found[peer.session] = peer if known is None or peer.error < known.error else known
         if time.monotonic() - began > ANSWER / 2:
-            break  # a node does not answer, and would not the next time
+            break  # some node did not answer, and would not next time
     return found
 
 
 def read_peer(key: str, payload: bytes, before: float, now: float) -> Peer | None:
-    """The node in a reply that arrived at `now` to a question of `before` (s); None if it is malformed."""
-    with contextlib.suppress(ValueError, TypeError, KeyError, RecursionError):
+    """The node in a reply that arrived at `now` to a query sent at `before` (s since 1970); None if it is malformed."""
+    with contextlib.suppress(ValueError, TypeError, KeyError, RecursionError, OverflowError):
         row = json.loads(payload)
         node, number, host = (str(row[name])[:80] for name in ("node", "version", "host"))
         error = (now - before) / 2
         session = key.removeprefix("@holozen/").removesuffix("/about")
         offset = float(row["time"]) - before - error
+        if not math.isfinite(offset):
+            return None
         exposed = tuple(str(endpoint)[:80] for endpoint in row.get("exposed", ())[:MOST_KEYS])
         return Peer(session, node, number, host, int(row["pid"]), offset, error, exposed)
     return None
@@ -268,15 +270,25 @@ def versions(endpoints: Iterable[Endpoint], peers: Mapping[str, Peer], ours: str
     for end in (end for end in endpoints if end.kind == "node"):
         peer = peers.get(end.session)
         if peer is None:
-            text = f"{end.node} ({end.session[:6]}) does not answer: it hangs, is stopped, or is older than this"
+            text = f"{end.node} ({end.session[:6]}) does not answer: it hangs, is stopped, or is an older version"
             yield Finding("nodes", WARNING, text, "look at its terminal; fg or kill -CONT continues it after Ctrl-Z")
         elif peer.version != ours:
-            text = f"{peer} has holozen {peer.version or 'of no version'}, this is {ours or 'of no version'}"
+            text = f"{peer} has holozen {peer.version or 'of unknown version'}, this is {ours or 'of unknown version'}"
             yield Finding("nodes", WARNING, text, "install the same version on both")
         else:
             same.append(str(peer))
     if same:
         yield Finding("nodes", OK, f"{len(same)} of this version: {', '.join(sorted(same))}")
+
+
+def hidden(endpoints: Iterable[Endpoint]) -> Iterator[Finding]:
+    """Nodes with robots or sims that others know of, but that do not answer here."""
+    keys: dict[str, list[str]] = {}
+    for end in endpoints:
+        keys.setdefault(end.source, []).append(end.key)
+    for source, served in keys.items():
+        text = f"{source} with {listed(served)} does not answer: it hangs, is stopped, or cannot be reached from here"
+        yield Finding("nodes", ERROR, text, "look at its terminal; fg or kill -CONT continues it after Ctrl-Z")
 
 
 def clocks(peers: Iterable[Peer], here: str = os.uname().nodename) -> Iterator[Finding]:
@@ -353,7 +365,7 @@ class Robots:
             yield Finding("odom", ERROR, text, "continue or restart that node (fg, kill -CONT), or raise its --rtf")
         if not stale:
             yield Finding("odom", OK, f"fresh on {', '.join(list(self._odoms)[:MOST_KEYS])} ({self.count} robots)")
-        alike: dict[tuple[str, str], list[Finding]] = {}  # those of a fleet are much the same
+        alike: dict[tuple[str, str], list[Finding]] = {}  # the robots of a fleet have much the same findings
         for key, latest in self._statuses.items():
             if status := latest.read()[0]:
                 command = key.removesuffix("_status")
@@ -369,7 +381,7 @@ class Robots:
 
 
 def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> Iterator[Finding]:
-    """The findings about the sources that command the robot of `key`, and the nodes that could, its `writers`."""
+    """The findings about the sources that command the robot at `key`; `writers` are the nodes that could."""
     robot, name = status.name or "the robot", key.rpartition("/")[0]
     if status.stopped:
         text = f"{robot} is stopped by {status.stopped}, and ignores all commands"
@@ -377,7 +389,7 @@ def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> 
     driving = sorted((source for source in status.sources if source.rate >= DRIVES), key=_rank)
     resume = f"holozen controller {name and f'{name} '}--resume, or r in the teleop"
     if not driving and status.held:
-        text = f"{robot} stands, and the controller and scripts are held, since one above them took over"
+        text = f"{robot} stands still: the controller and scripts are held, since a source of higher priority took over"
         yield Finding(key, WARNING, text, resume)
     elif not driving and (silent := listed({*writers})) != "none":
         more = f"; if the controller is held: {resume}" if "controller" in writers else ""
@@ -385,7 +397,7 @@ def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> 
     elif not driving:
         yield Finding(key, OK, f"nothing commands {robot}; `holozen teleop` or `holozen controller` does")
     if len(driving) > 1:
-        level = ERROR if _rank(driving[0]) == _rank(driving[1]) else WARNING  # among equals chance decides
+        level = ERROR if _rank(driving[0]) == _rank(driving[1]) else WARNING  # which of two equals drives is chance
         names = [
             f"{one.source} ({one.priority}, {one.rate:.0f} Hz, {'' if one.obeyed else 'not '}obeyed)" for one in driving
         ]
@@ -394,6 +406,4 @@ def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> 
 
 
 def _rank(source: "CommandSource") -> int:
-    from holozen.transport.samples import PRIORITIES
-
     return PRIORITIES.index(source.priority) if source.priority in PRIORITIES else len(PRIORITIES)

@@ -5,12 +5,13 @@ from __future__ import annotations
 import argparse
 import math
 import os
+import re
 import sys
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from holozen.console import report
-from holozen.suggest import suggest
+from holozen.suggest import suggest, suggest_file
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -19,11 +20,12 @@ DRIVES = ("planar_move", "omni")
 DRIVE = "planar_move for a robot whose file has no drive; omni: on its own wheels, instead of planar_move"
 ENGINES = ("pybullet", "mujoco")
 ENGINE = f"the physics engine (default: {ENGINES[0]})"
+NEGATIVE = re.compile(r"-\.?\d")  # begins a negative number; argparse itself takes -1e-3 for a flag
 WIDTH = 100  # characters of a line of help where there is no terminal
 
 
 class Formatter(argparse.HelpFormatter):
-    """Help as wide as the terminal. argparse itself would load shutil for that, which takes 3 ms."""
+    """Help in paragraphs, as wide as the terminal. argparse itself would load shutil for that, which takes 3 ms."""
 
     def __init__(self, prog: str) -> None:
         try:
@@ -32,18 +34,27 @@ class Formatter(argparse.HelpFormatter):
             width = WIDTH
         super().__init__(prog, width=max(40, min(width, 120)), max_help_position=30)
 
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        return "\n\n".join(super(Formatter, self)._fill_text(part, width, indent) for part in text.split("\n\n"))
+
 
 class Parser(argparse.ArgumentParser):
-    """A parser that reports a mistake in one line and suggests the closest valid word."""
+    """A parser that reports a mistake in one line and suggests the closest valid word. Flags are written in full."""
 
     def __init__(self, **options: Any) -> None:
         self._words: list[str] = []  # the arguments
-        super().__init__(**{"formatter_class": Formatter, **options})
+        super().__init__(**{"formatter_class": Formatter, "allow_abbrev": False, **options})
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """As argparse; all its other parse methods call this one."""
         self._words = list(sys.argv[1:] if args is None else args)
         return super().parse_known_args(args, namespace)
+
+    def _parse_optional(self, arg_string: str) -> Any:
+        """As argparse, except that a negative number is a value unless that very number is a flag."""
+        if NEGATIVE.match(arg_string) and arg_string not in self._option_string_actions:
+            return None
+        return super()._parse_optional(arg_string)
 
     def error(self, message: str) -> NoReturn:
         """Report the mistake, and exit with code 2."""
@@ -62,14 +73,14 @@ class Parser(argparse.ArgumentParser):
         raise SystemExit(2)
 
     def _unknown_flag(self, message: str, left: list[str]) -> str:
-        """The unknown flag: the first one `left`, or one whose value `message` complains about, or one in place of a
-        required argument.
+        """The unknown flag: the first word in `left`, else the word before the value that `message` complains about, or
+        in place of a required argument.
         """
-        place = "are required: " in message
+        lacks_argument = "are required: " in message
         for word, value in [(word, word) for word in left] or zip(self._words, [*self._words[1:], ""], strict=False):
             flag = word.partition("=")[0]
-            unknown = flag[:1] == "-" and not any(name.startswith(flag) for name in self._option_string_actions)
-            if unknown and (left or place or repr(value) in message):
+            unknown = flag[:1] == "-" and flag not in self._option_string_actions and not NEGATIVE.match(flag)
+            if unknown and (left or lacks_argument or repr(value) in message):
                 return flag
         return ""
 
@@ -80,7 +91,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def refused(text: str) -> Exception:
-    """The error of a value's parser."""
+    """The error that a parser of values raises."""
     return argparse.ArgumentTypeError(text)
 
 
@@ -110,9 +121,8 @@ def count(low: int = 0, high: float = math.inf) -> Callable[[str], int]:
     return parse
 
 
-def port(text: str) -> int:
-    """Parses the number of a TCP port; 0 stands for any that is free."""
-    return count(0, 65535)(text)
+port = count(0, 65535)
+"""Parses the number of a TCP port; 0 stands for any that is free."""
 
 
 def key(text: str) -> str:
@@ -122,7 +132,7 @@ def key(text: str) -> str:
 
 def robot(text: str) -> str:
     """Parses a robot's name; an empty one is the robot at the root of the keys."""
-    from holozen.wire import robot_name  # loads the codec
+    from holozen.wire import robot_name  # most verbs do not need it
 
     try:
         return robot_name(text) if text else ""
@@ -132,15 +142,13 @@ def robot(text: str) -> str:
 
 def package(text: str) -> tuple[str, Path]:
     """Parses NAME=DIR, a package and its folder."""
-    from pathlib import Path
-
     name, equals, folder = text.partition("=")
     if not (name and equals and folder):
         raise refused(f"{text!r}: write NAME=DIR, such as holo=~/ws/src/holo")
-    path = Path(folder).expanduser()
-    if not path.is_dir():
-        raise refused(f"{text!r}: there is no folder {str(path)!r}")
-    return name, path
+    found = path(folder).expanduser()
+    if not found.is_dir():
+        raise refused(f"{text!r}: there is no folder {str(found)!r}")
+    return name, found
 
 
 def add_packages(
@@ -152,7 +160,7 @@ def add_packages(
 
 
 def add_robot_sources(parser: argparse.ArgumentParser) -> None:
-    """Add the flags `--package` and `--allow-env`, for what reads the files of robots."""
+    """Add the flags `--package` and `--allow-env`, for a verb that reads robot files."""
     add_packages(parser, "for $(find NAME) and package://NAME")
     parser.add_argument("--allow-env", type=variable, action="append", default=[], metavar="NAME",
         help="let a file read this environment variable, as $(env NAME)")  # fmt: skip
@@ -167,7 +175,7 @@ def pair(text: str) -> tuple[str, str]:
 
 
 def path(text: str) -> Path:
-    """Parses a path; a verb loads pathlib when it has one."""
+    """Parses a path. pathlib is loaded only when there is one."""
     from pathlib import Path
 
     return Path(text)
@@ -176,7 +184,7 @@ def path(text: str) -> Path:
 def file(text: str) -> Path:
     """Parses the path of a file that exists."""
     if not (found := path(text)).is_file():
-        raise refused(f"{text!r}: there is no such file")
+        raise refused(f"{text!r}: there is no such file{suggest_file(found)}")
     return found
 
 
@@ -189,9 +197,7 @@ def variable(text: str) -> str:
 
 def robot_file(text: str) -> tuple[Path, str]:
     """Parses FILE or FILE=NAME, a robot's file and its name."""
-    from pathlib import Path
-
-    path, equals, name = text.rpartition("=")
-    if not equals or Path(text).exists():
-        return Path(text), ""
-    return Path(path), robot(name)
+    before, equals, name = text.rpartition("=")
+    if not equals or path(text).exists():
+        return path(text), ""
+    return path(before), robot(name)

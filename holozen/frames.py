@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
@@ -12,8 +14,9 @@ from holozen.wire import key_for
 if TYPE_CHECKING:
     from holozen.messages import TFMessage
 
-WAITING = 256  # messages of transforms
+WAITING = 256  # queued messages of transforms
 LARGEST = 1_000_000  # bytes of a message of transforms
+SILENCE = 5.0  # s of a robot's time without an update of a frame, after which it is dropped
 
 
 class Frames:
@@ -23,14 +26,18 @@ class Frames:
         self._parents: dict[str, tuple[str, Transform, float]] = {}  # by child; with the stamp, 0 for a static one
 
     def take(self, message: TFMessage, static: bool) -> None:
-        """Take in a message of `tf` or `tf_static`."""
+        """Store the transforms of a message on `tf` or, if `static`, on `tf_static`."""
         for each in message.transforms:
             rigid = Transform.of(each.transform.translation, each.transform.rotation)
             self.put(each.header.frame_id, each.child_frame_id, rigid, 0.0 if static else each.header.stamp.seconds())
 
     def put(self, parent: str, child: str, at: Transform, stamp: float) -> None:
-        """Take in where the frame `child` is in `parent`."""
+        """Store the pose of the frame `child` in `parent`, and its stamp in s."""
         self._parents[child.removeprefix("/")] = parent.removeprefix("/"), at, stamp
+
+    def drop(self, child: str) -> None:
+        """Forget the pose of the frame `child`."""
+        self._parents.pop(child, None)
 
     def names(self) -> list[str]:
         """All frames, sorted."""
@@ -62,14 +69,32 @@ class Frames:
         return frame, pose, newest
 
 
+class Elapsed:
+    """Elapsed time in s. Each update adds what passed by the clock or by a robot's stamps, whichever is less: nothing
+    while a sim is paused, and little where the stamps jump, as in a bag or after a reset.
+    """
+
+    def __init__(self) -> None:
+        self.total = 0.0
+        self._now = self._stamp = math.inf
+
+    def update(self, now: float, stamp: float) -> None:
+        """It is `now` by the clock, and `stamp` by the robot's."""
+        self.total += max(0.0, min(now - self._now, stamp - self._stamp))
+        self._now, self._stamp = now, stamp
+
+
 class RobotFrames:
-    """The frames of a live robot, by `tf` and `tf_static` below `namespace`, and by its odometry."""
+    """The frames of a live robot, from `tf` and `tf_static` below `namespace`, and from the key `odometry`. A frame
+    without updates on `tf` is dropped after SILENCE, as long as odometry arrives.
+    """
 
     def __init__(self, bus: Bus, namespace: str, odometry: str) -> None:
         from holozen.messages import Odometry, TFMessage
 
-        self._tree = Frames()
-        self._tf = [
+        self._tree, self._elapsed = Frames(), Elapsed()
+        self._heard: dict[str, float] = {}  # child -> when it was last updated, by `_elapsed`
+        self._tf, self._static = [
             bus.subscribe(key_for(key, namespace), TFMessage, depth=WAITING, limit=LARGEST)
             for key in ("tf", "tf_static")
         ]
@@ -78,22 +103,31 @@ class RobotFrames:
         self.root = ""  # the one in which it does
 
     def update(self) -> None:
-        """Take in what has arrived."""
-        for reader in self._tf:
+        """Read the messages that have arrived."""
+        for reader, static in ((self._static, True), (self._tf, False)):
             while received := reader.try_recv():
                 if received.message:
-                    self._tree.take(received.message, static=False)
+                    self._tree.take(received.message, static)
+                    until = math.inf if static else self._elapsed.total
+                    children = (each.child_frame_id.removeprefix("/") for each in received.message.transforms)
+                    self._heard.update(dict.fromkeys(children, until))
         if (newest := self._odometry.try_recv()) and (odom := newest.message):
             at = Transform.of(odom.pose.pose.position, odom.pose.pose.orientation)
             self.root, self.body = (name.removeprefix("/") for name in (odom.header.frame_id, odom.child_frame_id))
-            self._tree.put(self.root, self.body, at, odom.header.stamp.seconds())
+            stamp = odom.header.stamp.seconds()
+            self._tree.put(self.root, self.body, at, stamp)
+            self._elapsed.update(time.monotonic(), stamp)
+            self._heard[self.body] = self._elapsed.total
+        for child in [child for child, heard in self._heard.items() if self._elapsed.total - heard > SILENCE]:
+            self._tree.drop(child)
+            del self._heard[child]
 
     def names(self) -> list[str]:
         """All frames, sorted."""
         return self._tree.names()
 
     def of(self, frame: str, source: str = "") -> Transform | None:
-        """Where a frame is in another, by default that of the robot's body; None if no transforms lead there."""
+        """The pose of a frame in `source`, by default the robot's body frame; None if they are not connected."""
         try:
             return self._tree.lookup(source or self.body, frame.removeprefix("/"))[0]
         except LookupError:
@@ -101,6 +135,5 @@ class RobotFrames:
 
     def close(self) -> None:
         """Stop listening."""
-        for reader in self._tf:
+        for reader in (self._tf, self._static, self._odometry):
             reader.close()
-        self._odometry.close()

@@ -36,7 +36,7 @@ def to_world(velocity: Planar, yaw: float, dt: float) -> tuple[float, float]:
 
 
 def travelled(velocity: Planar, yaw: float, seconds: float) -> tuple[float, float]:
-    """The way in metres in the world of a body that began at `yaw`, at a constant body-frame velocity: an arc."""
+    """The displacement (m, world frame) of a body that starts at `yaw` and keeps its body-frame velocity: an arc."""
     half = velocity[2] * seconds / 2
     chord = seconds * math.sin(half) / half if abs(half) > 1e-9 else seconds
     vx, vy = to_world(velocity, yaw, seconds)
@@ -62,19 +62,21 @@ def wheel_rate(velocity: Planar, wheel: Wheel) -> float:
 
 def planar_velocity(rates: Sequence[float], wheels: Sequence[Wheel]) -> Planar:
     """The body-frame velocity at which wheels turn at `rates` (rad/s): the inverse of `wheel_rate` for three omni
-    wheels, the least squares for more. Raises ValueError for wheels that leave a velocity open, as parallel ones do.
+    wheels, the least squares for more. Raises ValueError for wheels that do not determine it, such as parallel ones.
     """
     rows = [
         [wheel_rate(unit, wheel) for unit in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))] for wheel in wheels
     ]
     squares = [[sum(row[i] * row[j] for row in rows) for j in range(3)] for i in range(3)]
     sums = [sum(row[i] * rate for row, rate in zip(rows, rates, strict=True)) for i in range(3)]
-    whole = _determinant(squares)
-    if abs(whole) < 1e-9:
-        raise ValueError("these wheels leave a velocity open; three omni wheels with axles in three directions do not")
+    determinant = _determinant(squares)
+    if abs(determinant) < 1e-9:
+        raise ValueError(
+            "these wheels do not determine the velocity; three omni wheels with axles in three directions do"
+        )
     # Cramer's rule.
     x, y, turn = (
-        _determinant([[sums[i] if j == column else squares[i][j] for j in range(3)] for i in range(3)]) / whole
+        _determinant([[sums[i] if j == column else squares[i][j] for j in range(3)] for i in range(3)]) / determinant
         for column in range(3)
     )
     return x, y, turn

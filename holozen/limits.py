@@ -23,7 +23,7 @@ def clamp_speed(velocity: Planar, linear: float, angular: float) -> Planar:
 
 
 def ramp(now: Planar, wanted: Planar, linear: float, angular: float, dt: float) -> Planar:
-    """The velocity `dt` seconds after `now` on the way to `wanted`, at most `linear` m/s^2 and `angular` rad/s^2."""
+    """The velocity `dt` seconds after `now` on the way to `wanted`, at up to `linear` m/s^2 and `angular` rad/s^2."""
     dx, dy, dturn = (w - n for w, n in zip(wanted, now, strict=True))
     dx, dy, dturn = clamp_speed((dx, dy, dturn), linear * dt, angular * dt)
     return now[0] + dx, now[1] + dy, now[2] + dturn

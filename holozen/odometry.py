@@ -1,4 +1,4 @@
-"""A robot's odometry as feedback for what drives it: whether it is stale or lost, and whether the robot rests."""
+"""A robot's odometry as feedback for driving it: whether it is stale or lost, and whether the robot is at rest."""
 
 import time
 
@@ -7,7 +7,7 @@ from holozen.messages import Odometry
 from holozen.wire import topic
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
-LOST = 0.4  # s without odom once there was some, so as not to drive blind. Less than the sim's command timeout
+LOST = 0.4  # s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
 
 
 class OdometryFeedback(Latest[Odometry]):
@@ -21,7 +21,7 @@ class OdometryFeedback(Latest[Odometry]):
 
     @property
     def stale_after(self) -> float:
-        """The age in s from which it is too old to show or act on as current."""
+        """The age in s beyond which it is too old to show, or to act on, as current."""
         return self.patience(self._silence)
 
     @property

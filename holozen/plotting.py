@@ -1,7 +1,7 @@
 """Pictures as text: a canvas of braille dots, numbers over time (`panels`), and the plane from above (`draw`).
 
-Pure: points in, lines out. Metres, radians, seconds; on the plane east is x and north is y. Braille's dots are as far
-apart in both directions where characters are twice as high as wide.
+Pure: points in, lines out. Metres, radians, seconds; on the plane x points east (right) and y north (up). Braille dots
+are equally far apart in both directions if characters are twice as high as wide.
 """
 
 import math
@@ -173,8 +173,8 @@ def draw(plane: Plane, size: tuple[int, int], ascii: bool = False) -> list[str]:
 
 
 def drawn(plane: Plane, size: tuple[int, int], ascii: bool = False, grid: bool = False) -> tuple[list[list[Cell]], str]:
-    """As `draw`, as cells and the caption. `grid`: with a point at every step, whose length is the caption, and robots
-    as arrows of dots, which show a heading to a few degrees but no name.
+    """As `draw`, but as cells and the caption. With `grid` there is a dot at every step of a grid, whose length is the
+    caption, and robots are arrows of dots, which show the heading to a few degrees but no name.
     """
     columns, rows = size[0], size[1] - 1
     view = _View(columns, rows, list(_points(plane)))

@@ -59,7 +59,7 @@ def deferred_interrupt() -> Iterator[None]:
 
 
 class Ending:
-    """Ends a process that has opened Zenoh sessions: as Python does, without the final finalization.
+    """Ends a process that has opened Zenoh sessions: as Python does, but without finalizing the interpreter.
 
     Zenoh's own threads run on after its sessions are closed. One that enters Python while the interpreter is being
     finalized aborts the process, and one that uses statics that the C library has destroyed by then panics

@@ -1,7 +1,7 @@
 """Rotations and rigid transforms in plain floats: no numpy, no clock.
 
-Metres and radians. Quaternions are x, y, z, w, as in geometry_msgs; those taken and returned have length 1 unless a
-docstring differs. Matrices, and rotations of whole arrays, are in holozen/robot/rotation.py.
+Metres and radians. Quaternions are x, y, z, w, as in geometry_msgs, and have length 1 unless a docstring says
+otherwise. Matrices, and rotations of whole arrays, are in holozen/robot/rotation.py.
 """
 
 import math
@@ -20,7 +20,7 @@ def normalize(q: XYZW) -> XYZW:
     """A quaternion scaled to length 1. Raises ValueError if its length is zero or not finite."""
     length = math.sqrt(sum(component * component for component in q))
     if not (math.isfinite(length) and length > 0.0):
-        raise ValueError(f"the rotation {q} has no direction; the identity is 0, 0, 0, 1")
+        raise ValueError(f"the quaternion {q} is not a rotation; the identity is 0, 0, 0, 1")
     return q[0] / length, q[1] / length, q[2] / length, q[3] / length
 
 
@@ -54,7 +54,7 @@ def rotate(q: XYZW, v: XYZ) -> XYZ:
 def slerp(a: XYZW, b: XYZW, fraction: float, spin: float = 0.0, shortest: bool = True) -> XYZW:
     """The rotation at `fraction` (0 to 1) of the way from a to b, at constant angular speed.
 
-    `spin` (radians) is added on the way. Unless `shortest`, q and -q are different ends.
+    `spin` (radians) is added on the way. Unless `shortest`, q and -q count as different rotations.
     """
     dot = sum(i * j for i, j in zip(a, b, strict=True))
     if shortest and dot < 0.0:
@@ -124,7 +124,7 @@ class Transform:
 
     @classmethod
     def of(cls, translation: Vector, rotation: Quaternion) -> "Transform":
-        """That of two messages: a Pose's position and orientation, or a Transform's translation and rotation."""
+        """From two messages: a Pose's position and orientation, or a Transform's translation and rotation."""
         return cls((translation.x, translation.y, translation.z), (rotation.x, rotation.y, rotation.z, rotation.w))
 
     def __matmul__(self, inner: "Transform") -> "Transform":
@@ -132,7 +132,7 @@ class Transform:
         return Transform(self.apply(inner.translation), multiply(self.rotation, inner.rotation))
 
     def apply(self, point: XYZ) -> XYZ:
-        """Where a point of the child frame is in the parent frame."""
+        """A point given in the child frame, in the parent frame."""
         x, y, z = rotate(self.rotation, point)
         return x + self.translation[0], y + self.translation[1], z + self.translation[2]
 

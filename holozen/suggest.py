@@ -1,17 +1,32 @@
-"""What a misspelt name may stand for, and how names and values are shown in messages of one line."""
+"""Suggestions for misspelt names, and how names and values are shown in one-line messages."""
 
+from __future__ import annotations
+
+import os
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from itertools import islice
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 LONGEST = 80  # characters of a name or a value in a message
 MOST = 1000  # names that are compared with one
+ROBOT_FILES = {".xacro", ".urdf", ".sdf", ".world"}
 
 
 def suggest(word: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
-    """` (did you mean 'x'?)` with the `known` name most similar to `word`, for the end of a message; else empty.
+    """` (did you mean 'x'?)` with the name that is `closest` to `word`, for the end of a message; else empty."""
+    best = closest(word, known, part, alike)
+    return f" (did you mean {shorten(best)!r}?)" if best else ""
 
-    `alike` is the similarity required, from 0 to 1; the start of a name is nearly as similar as the whole, and a part
-    of it somewhat. Case is ignored; `part` is what of both is compared.
+
+def closest(word: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
+    """The `known` name most similar to `word`; empty if none is.
+
+    `alike` is the similarity required, from 0 to 1; a match of a name's start counts nearly as much as one of the
+    whole, a match inside it somewhat less. Case is ignored; `part` returns the part of each name that is compared.
     """
     from difflib import SequenceMatcher
 
@@ -29,15 +44,40 @@ def suggest(word: str, known: Iterable[str], part: Callable[[str], str] = str, a
         return found
 
     def rank(name: str) -> tuple[float, bool]:
-        """Of equals, the one with the same letters: two were swapped."""
+        """Among equals, the one with the same letters wins: two were swapped."""
         return likeness(name), sorted(part(name).casefold()) == sorted(plain)
 
     best = max(islice(known, MOST), key=rank, default="")
-    return f" (did you mean {shorten(best)!r}?)" if best and likeness(best) > alike else ""
+    return best if best and likeness(best) > alike else ""
+
+
+def suggest_file(path: Path) -> str:
+    """` (did you mean 'my_bot.urdf.xacro'?)` for a missing robot or world file: the most similar one in its folder and
+    among those that come with holozen; empty if there is none, or if the file exists.
+    """
+    from pathlib import Path
+
+    from holozen import data
+
+    if os.path.exists(path):  # reading it failed for another reason
+        return ""
+    found = dict[str, Path]()
+    for ours in ("", "urdf", "worlds"):
+        with suppress(OSError):
+            for file in sorted((data.find(ours) if ours else path.parent).iterdir()):
+                if file.suffix in ROBOT_FILES:
+                    found.setdefault(file.name, file)
+    best = closest(path.name, found, lambda name: name.partition(".")[0])
+    if not best:
+        return ""
+    near = found[best]
+    with suppress(OSError, ValueError):
+        near = near.relative_to(Path.cwd())
+    return f" (did you mean {str(near)!r}?)"
 
 
 def last_part(name: str) -> str:
-    """What follows the last slash: the package is no sign of similarity."""
+    """The text after the last slash: two types are not alike because their packages are."""
     return name.rpartition("/")[2]
 
 

@@ -5,30 +5,32 @@ The docs, tests, the command line and the services read it from here.
 
 import re
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from holozen import messages as m
-from holozen.messages import rcl_interfaces as r
-from holozen.messages import simulation_interfaces as s
+from holozen.messages import named
+
+if TYPE_CHECKING:
+    from holozen.messages import Message
 
 COMMAND_SILENCE = 0.5  # s; a robot without a fresh command for this long stops
+MAX_ENTITIES = 1000  # of one sim; each takes time at every step
 MAX_COMMAND_BYTES = 65_536  # a Twist takes about 100; a larger command is not decoded
 MAX_STAMP_AGE = 0.5  # s; an older (or as far future) stamp on a TwistStamped is refused
-MAX_SPEED, MAX_TURN = 100.0, 1000.0  # m/s, rad/s; a command beyond is a mistake: it is refused, not clamped
-MAX_FORCE = 1e4  # N, N m; also of a mistake
-MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N; also of a mistake
-
-LATCHED = ("tf_static", "robot_description", "map")  # in ROS 2, late subscribers receive their last message too
+MAX_SPEED, MAX_TURN = 100.0, 1000.0  # m/s, rad/s; a command beyond them is a mistake: it is refused, not clamped
+MAX_FORCE = 1e4  # N, N m; likewise
+MAX_OF_JOINT = {"position": 1e4, "velocity": 1e3, "effort": 1e6}  # rad or m; rad/s or m/s; N m or N; likewise
 
 PRIORITY_OF = {"teleop": "INTERACTIVE_HIGH", "view": "INTERACTIVE_HIGH", "controller": "DATA_LOW"}
 """Zenoh priority of each command source. Others have DATA, as a plain `zenoh put`."""
 
 
 class Topic(NamedTuple):
-    """A key with a stream of messages. `rate` in Hz, 0: on demand. After `silence` seconds readers call it stale."""
+    """A key with a stream of messages, each of one of its types. `rate` in Hz, 0: on demand. After `silence` seconds
+    readers call it stale.
+    """
 
     key: str
-    types: tuple[type[m.Message], ...]
+    type_names: tuple[str, ...]
     writers: tuple[str, ...]
     readers: tuple[str, ...]
     rate: float
@@ -36,9 +38,14 @@ class Topic(NamedTuple):
     rule: str
 
     @property
-    def type(self) -> type[m.Message]:
+    def type_name(self) -> str:
         """The default type; the others are accepted too."""
-        return self.types[0]
+        return self.type_names[0]
+
+    @property
+    def types(self) -> "tuple[type[Message], ...]":
+        """The Structs of all its types."""
+        return tuple(map(named, self.type_names))
 
     @property
     def is_command(self) -> bool:
@@ -50,128 +57,125 @@ class Service(NamedTuple):
     """A key that answers a request with one reply, or with an error and its reason."""
 
     key: str
-    request: type[m.Message]
-    reply: type[m.Message]
+    type_name: str
     server: str
     does: str
+
+    @property
+    def request(self) -> "type[Message]":
+        """The Struct of a request."""
+        return named(f"{self.type_name}_Request")
+
+    @property
+    def reply(self) -> "type[Message]":
+        """The Struct of a reply."""
+        return named(f"{self.type_name}_Response")
 
 
 class Action(NamedTuple):
     """A key below which goals are sent, see holozen.transport.actions."""
 
     key: str
-    type: str
+    type_name: str
     server: str
     does: str
 
 
 TOPICS = (
-    Topic("cmd_vel", (m.Twist, m.TwistStamped), ("teleop", "view", "controller"), ("sim",), 20.0, COMMAND_SILENCE,
-          "0.5 s without a fresh one: the robot stands"),
-    Topic("odom", (m.Odometry,), ("sim",), ("teleop", "view", "controller", "pose_service"), 50.0, 0.2,
+    Topic("cmd_vel", ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"), ("teleop", "view", "controller"),
+          ("sim",), 20.0, COMMAND_SILENCE, "0.5 s without a fresh one: the robot stops"),
+    Topic("odom", ("nav_msgs/msg/Odometry",), ("sim",), ("teleop", "view", "controller", "pose_service"), 50.0, 0.2,
           "0.2 s: shown as stale, the controller stops"),
-    Topic("cmd_vel_status", (m.CommandStatus,), ("sim",), ("teleop", "view", "controller"), 10.0, 1.0, ""),
-    Topic("joint_states", (m.JointState,), ("sim",), (), 50.0, 0.2, ""),
-    Topic("tf", (m.TFMessage,), ("sim",), (), 50.0, 0.2, ""),
-    Topic("clock", (m.Clock,), ("sim",), (), 50.0, 0.2, ""),
-    Topic("simulation_status", (m.SimulationStatus,), ("sim",), (), 10.0, 1.0, ""),
-    Topic("scan", (m.LaserScan,), ("sim",), (), 10.0, 1.0, ""),
-    Topic("imu", (m.Imu,), ("sim",), (), 100.0, 0.2, ""),
-    Topic("exposures", (m.Exposure,), ("sim",), ("camera",), 10.0, 1.0, ""),
-    Topic("image_raw", (m.Image,), ("camera",), (), 10.0, 1.0, ""),
-    Topic("camera_info", (m.CameraInfo,), ("camera",), (), 10.0, 1.0, ""),
-    Topic("joint_command", (m.JointState,), (), ("sim",), 20.0, COMMAND_SILENCE,
+    Topic("cmd_vel_status", ("holozen/msg/CommandStatus",), ("sim",), ("teleop", "view", "controller"), 10.0, 1.0, ""),
+    Topic("joint_states", ("sensor_msgs/msg/JointState",), ("sim",), (), 50.0, 0.2, ""),
+    Topic("tf", ("tf2_msgs/msg/TFMessage",), ("sim",), (), 50.0, 0.2, ""),
+    Topic("clock", ("rosgraph_msgs/msg/Clock",), ("sim",), (), 50.0, 0.2, ""),
+    Topic("simulation_status", ("holozen/msg/SimulationStatus",), ("sim",), (), 10.0, 1.0, ""),
+    Topic("scan", ("sensor_msgs/msg/LaserScan",), ("sim",), (), 10.0, 1.0, ""),
+    Topic("imu", ("sensor_msgs/msg/Imu",), ("sim",), (), 100.0, 0.2, ""),
+    Topic("exposures", ("holozen/msg/Exposure",), ("sim",), ("camera",), 10.0, 1.0, ""),
+    Topic("image_raw", ("sensor_msgs/msg/Image",), ("camera",), (), 10.0, 1.0, ""),
+    Topic("camera_info", ("sensor_msgs/msg/CameraInfo",), ("camera",), (), 10.0, 1.0, ""),
+    Topic("joint_command", ("sensor_msgs/msg/JointState",), (), ("sim",), 20.0, COMMAND_SILENCE,
           "0.5 s without a fresh one: joints hold still"),
-    Topic("gazebo_ros_force", (m.Wrench,), (), ("sim",), 20.0, COMMAND_SILENCE,
+    Topic("gazebo_ros_force", ("geometry_msgs/msg/Wrench",), (), ("sim",), 20.0, COMMAND_SILENCE,
           "0.5 s without a fresh one: the force ends"),
-    Topic("goal_pose", (m.PoseStamped,), ("view",), ("controller",), 0.0, 0.0,
+    Topic("goal_pose", ("geometry_msgs/msg/PoseStamped",), ("view",), ("controller",), 0.0, 0.0,
           "once for each goal; the controller stops without fresh odom"),
 )  # fmt: skip
 
 SERVICES = (
-    Service("next_goal", m.NextGoalRequest, m.NextGoalReply, "pose_service", "the goal with a number, in odom"),
-    Service("get_pose", m.GetPoseRequest, m.GetPoseReply, "pose_service", "a robot's last odom and its age"),
-    Service(
-        "stop", m.TriggerRequest, m.TriggerReply, "sim", "the robot stands, whatever is commanded, until `release`"
-    ),
-    Service("release", m.TriggerRequest, m.TriggerReply, "sim", "ends a `stop`; by itself it moves nothing"),
-    Service("resume", m.TriggerRequest, m.TriggerReply, "sim", "lets overruled sources drive again"),
-    Service("spawn_entity", s.SpawnEntityRequest, s.SpawnEntityReply, "sim", "adds a robot or object to the world"),
-    Service("delete_entity", s.DeleteEntityRequest, s.DeleteEntityReply, "sim", "removes an entity"),
-    Service("get_entities", s.GetEntitiesRequest, s.GetEntitiesReply, "sim", "the names of all entities"),
-    Service("get_entity_state", s.GetEntityStateRequest, s.GetEntityStateReply, "sim", "an entity's pose and velocity"),
-    Service("set_entity_state", s.SetEntityStateRequest, s.SetEntityStateReply, "sim", "moves an entity"),
+    Service("next_goal", "holozen/srv/NextGoal", "pose_service", "the goal with a number, in odom"),
+    Service("get_pose", "holozen/srv/GetPose", "pose_service", "a robot's last odom and its age"),
+    Service("stop", "std_srvs/srv/Trigger", "sim", "keeps the robot stopped, whatever is commanded, until `release`"),
+    Service("release", "std_srvs/srv/Trigger", "sim", "ends a `stop`; by itself it moves nothing"),
+    Service("resume", "std_srvs/srv/Trigger", "sim", "lets overruled sources drive again"),
+    Service("spawn_entity", "simulation_interfaces/srv/SpawnEntity", "sim", "adds a robot or object to the world"),
+    Service("delete_entity", "simulation_interfaces/srv/DeleteEntity", "sim", "removes an entity"),
+    Service("get_entities", "simulation_interfaces/srv/GetEntities", "sim", "the names of all entities"),
+    Service("get_entity_state", "simulation_interfaces/srv/GetEntityState", "sim", "an entity's pose and velocity"),
+    Service("set_entity_state", "simulation_interfaces/srv/SetEntityState", "sim", "moves an entity"),
     Service(
         "get_simulation_state",
-        s.GetSimulationStateRequest,
-        s.GetSimulationStateReply,
+        "simulation_interfaces/srv/GetSimulationState",
         "sim",
         "whether it plays, is paused or stopped",
     ),
     Service(
-        "set_simulation_state",
-        s.SetSimulationStateRequest,
-        s.SetSimulationStateReply,
-        "sim",
-        "plays, pauses, stops or ends it",
+        "set_simulation_state", "simulation_interfaces/srv/SetSimulationState", "sim", "plays, pauses, stops or ends it"
     ),
     Service(
         "step_simulation",
-        s.StepSimulationRequest,
-        s.StepSimulationReply,
+        "simulation_interfaces/srv/StepSimulation",
         "sim",
         "makes steps while it is paused; the reply follows all their messages",
     ),
     Service(
         "reset_simulation",
-        s.ResetSimulationRequest,
-        s.ResetSimulationReply,
+        "simulation_interfaces/srv/ResetSimulation",
         "sim",
         "sets time, poses or entities back to the start",
     ),
-    Service("get_scene", m.GetSceneRequest, m.GetSceneReply, "sim", "all entities, their keys and poses"),
+    Service("get_scene", "holozen/srv/GetScene", "sim", "all entities, their keys and poses"),
     Service(
-        "robot_description",
-        m.RobotDescriptionRequest,
-        m.RobotDescriptionReply,
-        "sim",
-        "an entity's URDF, with its visual meshes in it",
+        "robot_description", "holozen/srv/RobotDescription", "sim", "an entity's URDF, with its visual meshes in it"
     ),
 )
 
 ACTIONS = (
     Action("navigate_to_pose", "nav2_msgs/action/NavigateToPose", "controller", "drives to a pose in odom"),
-    Action(
-        "follow_waypoints", "nav2_msgs/action/FollowWaypoints", "controller", "drives to several, one after another"
-    ),
-    Action(
-        "simulate_steps", "simulation_interfaces/action/SimulateSteps", "sim", "as `step_simulation`, with progress"
-    ),
-)
+    Action("follow_waypoints", "nav2_msgs/action/FollowWaypoints", "controller",
+           "drives to several, one after another"),
+    Action("simulate_steps", "simulation_interfaces/action/SimulateSteps", "sim",
+           "as `step_simulation`, with progress"),
+)  # fmt: skip
 
 OF_NODES = (
-    Service("list_parameters", r.ListParametersRequest, r.ListParametersReply, "", "names of a node's parameters"),
-    Service("get_parameters", r.GetParametersRequest, r.GetParametersReply, "", "their values"),
-    Service("set_parameters", r.SetParametersRequest, r.SetParametersReply, "", "sets all of them, or none"),
-    Service(
-        "describe_parameters", r.DescribeParametersRequest, r.DescribeParametersReply, "", "their types and ranges"
-    ),
+    Service("list_parameters", "rcl_interfaces/srv/ListParameters", "", "names of a node's parameters"),
+    Service("get_parameters", "rcl_interfaces/srv/GetParameters", "", "their values"),
+    Service("set_parameters", "rcl_interfaces/srv/SetParameters", "", "sets all of them, or none"),
+    Service("describe_parameters", "rcl_interfaces/srv/DescribeParameters", "", "their types and ranges"),
 )
 """The services of every node with parameters, below its name: `sim/get_parameters`."""
+
+
+_TELEMETRY = {name for row in TOPICS if not row.is_command for name in row.type_names}
+COMMAND_TYPES = {name for row in TOPICS if "sim" in row.readers for name in row.type_names} - _TELEMETRY
+"""The types of messages that move a robot whatever their key. A JointState does so on `joint_command` alone."""
 
 
 def table() -> str:
     """The table as Markdown, for docs/wire.md (`scripts/tables` puts it there)."""
     topics = [_topic_row(row) for row in TOPICS]
-    services = [f"| `{row.key}` | {row.reply.ROS} | {row.server} | {row.does} |" for row in SERVICES]
-    actions = [f"| `{row.key}` | {row.type} | {row.server} | {row.does} |" for row in ACTIONS]
+    services = [f"| `{row.key}` | {row.type_name} | {row.server} | {row.does} |" for row in SERVICES]
+    actions = [f"| `{row.key}` | {row.type_name} | {row.server} | {row.does} |" for row in ACTIONS]
     heads = [f"| {kind} | type | server | what it does |\n|---|---|---|---|" for kind in ("service", "action")]
     first = ("| key | type | writers -> readers | rate | silence rule |", "|---|---|---|---|---|")
     return "\n".join([*first, *topics, "", heads[0], *services, "", heads[1], *actions])
 
 
 def _topic_row(row: Topic) -> str:
-    types = row.type.ROS + "".join(f" ({other.__name__} accepted)" for other in row.types[1:])
+    types = row.type_name + "".join(f" ({other.rpartition('/')[2]} accepted)" for other in row.type_names[1:])
     # Any plain Zenoh tool may write commands and read everything.
     writers = [*row.writers, "anyone"] if row.is_command else row.writers
     ends = f"{', '.join(writers)} -> {', '.join(row.readers) or 'anyone'}"
@@ -192,8 +196,8 @@ def robot_name(text: str) -> str:
 
 
 def key_for(key: str, robot: str = "") -> str:
-    """The key of a robot's topic or service: `cmd_vel` for the robot at the root, else `Fred/cmd_vel`. A file may hold
-    the robot's name already.
+    """The key of a robot's topic or service: `cmd_vel` for the robot at the root, else `Fred/cmd_vel`. A key that
+    begins with the robot's name, as one from its file may, is returned unchanged.
     """
     return f"{robot}/{key}" if robot and not key.startswith(f"{robot}/") else key
 
@@ -204,41 +208,40 @@ def topic(key: str) -> Topic | None:
     return next((row for row in TOPICS if row.key == last), None)
 
 
-def is_command(key: str, types: Iterable[type[m.Message]]) -> bool:
-    """Whether messages of `types` on `key` move a robot. On a key that is not in the table the type decides.
+def is_command(key: str, type_names: Iterable[str]) -> bool:
+    """Whether messages of these types on `key` move a robot. On a key that is not in the table the types decide.
 
     Commands are sent at once, and refused if they have an unknown field: a typo would leave the robot standing.
     Telemetry is batched, and unknown fields are ignored: a newer sim may send more than an older reader knows.
     """
     row = topic(key)
-    return row.is_command if row else any(kind.ROS in _COMMAND_TYPES for kind in types)
+    return row.is_command if row else not COMMAND_TYPES.isdisjoint(type_names)
 
 
-def implausible(command: m.Message) -> str:
-    """Which component of a command is a mistake, whatever the robot's limits, and the bound; empty if none is."""
-    if isinstance(command, m.Wrench):
+def implausible(command: Any, type_name: str) -> str:
+    """Which component of a command is a mistake, whatever the robot's limits, and the bound; empty if none is.
+
+    `command` is a message of that type, or any object with its fields.
+    """
+    name = type_name.rpartition("/")[2]
+    if name == "Wrench":
         for part, unit in (("force", "N"), ("torque", "N m")):
             for axis in "xyz":
                 if abs(value := getattr(getattr(command, part), axis)) > MAX_FORCE:
                     return f"{part}.{axis} is {value:g} {unit}; at most {MAX_FORCE:g}"
-    if isinstance(command, m.JointState):
+    if name == "JointState":
         for kind, most in MAX_OF_JOINT.items():
             for index, value in enumerate(getattr(command, kind)):
                 if abs(value) > most:
-                    name = f" of joint {command.name[index][:80]!r}" if index < len(command.name) else ""
-                    return f"{kind}[{index}]{name} is {value:g}; at most {most:g}"
-    twist = command.twist if isinstance(command, m.TwistStamped) else command
-    if isinstance(twist, m.Twist):
+                    joint = f" of joint {command.name[index][:80]!r}" if index < len(command.name) else ""
+                    return f"{kind}[{index}]{joint} is {value:g}; at most {most:g}"
+    if name in ("Twist", "TwistStamped"):
+        twist = command.twist if name == "TwistStamped" else command
         for part, most, unit in (("linear", MAX_SPEED, "m/s"), ("angular", MAX_TURN, "rad/s")):
             for axis in "xyz":
                 if abs(value := getattr(getattr(twist, part), axis)) > most:
                     return f"{part}.{axis} is {value:g} {unit}; at most {most:g}"
     return ""
-
-
-_COMMAND_TYPES = {kind.ROS for row in TOPICS if "sim" in row.readers for kind in row.types} - {
-    kind.ROS for row in TOPICS if not row.is_command for kind in row.types
-}
 
 
 def service(key: str) -> Service | None:

@@ -1,4 +1,4 @@
-"""What the site shows beside docs/: the README is its first page, and each file that a page links to is a page too."""
+"""What the site has besides docs/: the README is its first page, and each file that a page links to becomes a page."""
 
 import re
 from pathlib import Path, PurePosixPath
@@ -23,17 +23,17 @@ LANGUAGES = {".world": "xml", ".xacro": "xml", ".svg": "xml", ".json5": "json"}
 
 
 def on_config(config: MkDocsConfig) -> None:
-    """Anchors are those of GitHub, where the same pages are read."""
+    """Make the same anchors as GitHub, where the same pages are read."""
     config.mdx_configs["toc"]["slugify"] = slugify(case="lower")
 
 
 def source(page: File) -> Path:
-    """The file of the repository that a page is made of, relative to it."""
+    """The path, in the repository, of the file that a page is made from."""
     return next((Path(path) for path, uri in PAGES.items() if uri == page.src_uri), Path("docs", page.src_uri))
 
 
 def place(path: PurePosixPath) -> str:
-    """Where a file of the repository is in the site."""
+    """The path of a file of the repository in the site."""
     if str(path) in PAGES:
         return PAGES[str(path)]
     if path.parts[0] == "docs":
@@ -42,7 +42,7 @@ def place(path: PurePosixPath) -> str:
 
 
 def targets(text: str, folder: Path) -> list[tuple[re.Match[str], PurePosixPath]]:
-    """The links of a page, each with the file of the repository that it leads to."""
+    """The links of a page, each with the path in the repository that it leads to."""
     code = [block.span() for block in re.finditer(r"^```.*?^```$|`[^`\n]+`", text, re.M | re.S)]
     found = [link for link in LINK.finditer(text) if not any(start <= link.start() < end for start, end in code)]
     paths = [(REPO / folder / link["path"]).resolve().relative_to(REPO) for link in found]
@@ -68,7 +68,7 @@ def on_files(files: Files, config: MkDocsConfig) -> None:
 
 
 def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
-    """Links lead to where the site has what the repository has at the link's path."""
+    """Turn the links of a page, which are paths in the repository, into paths in the site."""
     if page.file.src_uri.startswith("files/"):
         return markdown
     here, done, end = PurePosixPath(page.file.src_uri).parent, [], 0

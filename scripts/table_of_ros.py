@@ -1,4 +1,4 @@
-"""The tables of docs/coming-from-ros.md: every name of ROS that scripts find here, read off the code."""
+"""The tables of docs/coming-from-ros.md, made from the code: every name of ROS that scripts find here."""
 
 from collections.abc import Iterable
 from enum import Enum
@@ -41,7 +41,7 @@ def classes() -> list[type]:
 
 
 def public(kind: type) -> list[str]:
-    """The public attributes that are ours, and not those of Python's own classes."""
+    """The public attributes that our classes define, without those of Python's own."""
     owners = [base for base in kind.__mro__ if base.__module__.startswith("holozen.")]
     return sorted({name for base in owners for name in vars(base) if not name.startswith("_") and name not in INTERNAL})
 

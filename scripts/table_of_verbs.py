@@ -1,4 +1,4 @@
-"""The table of docs/cli.md: the command line, read off the parsers."""
+"""The table of docs/cli.md, made from the parsers of the command line."""
 
 import argparse
 from collections.abc import Iterator
@@ -11,7 +11,7 @@ LEFT_OUT = ("zenoh", ROS2_TITLE)  # groups of flags that many verbs have
 
 
 def table() -> str:
-    """A row for each verb: how it is called, what it does, its flags, an example."""
+    """A row for each verb: its command line, what it does, an example, its flags."""
     rows = [_row(parser) for verb in cli.VERBS for parser in _parsers(cli.command(verb))]
     return "\n".join(["| command | does | flags |", "|---|---|---|", *rows])
 
@@ -41,7 +41,7 @@ def _row(parser: argparse.ArgumentParser) -> str:
 def _place(action: argparse.Action) -> str:
     name = action.dest.upper() if action.metavar is None else str(action.metavar)
     if name.startswith("["):
-        return name  # its text shows how often
+        return name  # it tells itself how often it may be given
     return {"?": f"[{name}]", "*": f"[{name} ...]", "+": f"{name} ..."}.get(str(action.nargs), name)
 
 

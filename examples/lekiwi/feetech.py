@@ -1,7 +1,7 @@
-"""Feetech's serial bus servos (STS3215), as wheels: speeds out, speeds in. Linux, no further library.
+"""Feetech's serial bus servos (STS3215) as wheels: commanded speeds out, measured speeds in. Linux, without a library.
 
-Source of packets and addresses: Feetech's protocol manual for the SMS and STS series. A speed is in steps per second,
-4096 steps a turn, with its sign in bit 15.
+Packets and addresses are those of Feetech's protocol manual for the SMS and STS series. A speed is in steps per second,
+with its sign in bit 15; a turn is 4096 steps.
 """
 
 import math
@@ -14,11 +14,11 @@ from collections.abc import Iterable, Mapping
 from typing import Self
 
 READ, WRITE, SYNC_WRITE = 2, 3, 0x83  # instructions
-ALL = 0xFE  # the id of all servos; nobody answers
+ALL = 0xFE  # the id of all servos, which none answers
 MODE, TORQUE, GOAL_SPEED, SPEED = 33, 40, 46, 58  # addresses
 SPEED_MODE = 1
 STEPS = 4096 / math.tau  # a radian
-ANSWER = 0.02  # s; a servo answers within 1 ms, a USB adapter holds it up for some more
+ANSWER = 0.05  # s; a servo answers within 1 ms, a USB adapter or a busy computer delays that
 
 
 class ServoError(Exception):
@@ -26,19 +26,19 @@ class ServoError(Exception):
 
 
 def packet(servo: int, instruction: int, parameters: bytes = b"") -> bytes:
-    """The bytes of an instruction, or of an answer with its error in that place."""
+    """The bytes of an instruction, or of an answer, which has its error code in place of the instruction."""
     body = bytes((servo, len(parameters) + 2, instruction)) + parameters
     return b"\xff\xff" + body + bytes((~sum(body) & 0xFF,))
 
 
 def speed_bytes(rate: float) -> bytes:
-    """A rate in rad/s as the servo has it."""
+    """A rate (rad/s) as the two bytes of a servo's speed."""
     steps = min(round(abs(rate) * STEPS), 0x7FFF)
     return (steps | (0x8000 if rate < 0 else 0)).to_bytes(2, "little")
 
 
 def rate_of(value: bytes) -> float:
-    """The rate in rad/s of a servo's speed."""
+    """The rate (rad/s) in the two bytes of a servo's speed."""
     number = int.from_bytes(value, "little")
     return (number & 0x7FFF) / STEPS * (-1 if number & 0x8000 else 1)
 
@@ -64,7 +64,7 @@ class Servos:
         os.close(self._file)
 
     def make_wheels(self, servos: Iterable[int]) -> None:
-        """Let servos turn for ever, at speed 0."""
+        """Put servos into the mode in which they turn without end, at speed 0."""
         for servo in servos:
             for address, value in (
                 (TORQUE, b"\0"),
@@ -75,7 +75,7 @@ class Servos:
                 self._ask(servo, WRITE, bytes((address,)) + value)
 
     def turn(self, rates: Mapping[int, float]) -> None:
-        """Let servos turn at `rates` (rad/s), from now on; no answer is waited for."""
+        """From now on, let servos turn at `rates` (rad/s). It does not wait for an answer."""
         values = b"".join(bytes((servo,)) + speed_bytes(rate) for servo, rate in rates.items())
         self._send(packet(ALL, SYNC_WRITE, bytes((GOAL_SPEED, 2)) + values))
 
@@ -99,7 +99,7 @@ class Servos:
                     raise ServoError(f"servo {servo} at {self._port} reports error {answer[4]:#04x}")
                 return answer[5:-1]
             if not select.select([self._file], [], [], max(0.0, deadline - time.monotonic()))[0]:
-                raise ServoError(f"servo {servo} at {self._port} does not answer: is it powered, is that its id?")
+                raise ServoError(f"servo {servo} at {self._port} does not answer: is it powered, and is that its id?")
             try:
                 received += os.read(self._file, 256)
             except OSError as error:

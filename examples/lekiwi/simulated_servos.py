@@ -1,6 +1,5 @@
-"""Three STS3215 servos without hardware: prints their port, then their speeds in steps/s whenever they change.
-
-python examples/lekiwi/simulated_servos.py
+"""Three simulated STS3215 servos: prints their port, then their speeds in steps/s whenever these change. Run it by
+`python examples/lekiwi/simulated_servos.py`.
 """
 
 import os
@@ -13,13 +12,13 @@ IDS = (7, 8, 9)
 
 
 class Simulated:
-    """Servos whose speed is at once what it should be."""
+    """Servos that reach a commanded speed at once."""
 
     def __init__(self) -> None:
         self.registers = {servo: bytearray(128) for servo in IDS}
 
     def answer(self, servo: int, instruction: int, parameters: bytes) -> bytes:
-        """Process an instruction; returns the answer, empty if there is none."""
+        """Process an instruction. Returns the answer, empty if there is none."""
         if instruction == SYNC_WRITE:
             address, length, *values = parameters
             for start in range(0, len(values), length + 1):
@@ -41,7 +40,7 @@ class Simulated:
                 self.registers[servo][SPEED : SPEED + 2] = value
 
     def speeds(self) -> str:
-        """The speeds of all, in steps/s."""
+        """The speeds of all servos, in steps/s."""
         steps = {
             servo: round(rate_of(bytes(each[SPEED : SPEED + 2])) * STEPS) for servo, each in self.registers.items()
         }
@@ -49,7 +48,7 @@ class Simulated:
 
 
 def packets(data: bytearray) -> "list[tuple[int, int, bytes]]":
-    """The whole packets at the start of the bytes received, which are removed."""
+    """Remove the whole packets from the start of the received bytes, and return them."""
     found = []
     while len(data) >= 6:
         if data[:2] != b"\xff\xff":

@@ -9,7 +9,7 @@ ENCODING = "zenoh_encoding"
 
 
 class BagError(Failure):
-    """A file that cannot be read, or cannot be written any further. The text is one line with the reason."""
+    """A file that cannot be read, or not be written any further. The text is one line with the reason."""
 
 
 class Channel(NamedTuple):

@@ -50,7 +50,7 @@ class Tracks:
 
     odometry: dict[str, Track] = field(default_factory=dict)
     commands: dict[str, Track] = field(default_factory=dict)
-    bad: int = 0  # messages on such keys that cannot be read or are out of range
+    bad: int = 0  # messages of these types that cannot be read or are out of range
 
     def add(self, rows: dict[str, Track], key: str, row: tuple[float, ...]) -> None:
         """Add a row of a key."""
@@ -65,14 +65,14 @@ def tracks(messages: Iterable[Message]) -> Tracks:
     made, start = Tracks(), None
     for message in messages:
         start = message.at if start is None else start
-        _see(made, message, (message.at - start) / 1e9)
+        _add(made, message, (message.at - start) / 1e9)
     return made
 
 
-def _see(made: Tracks, message: Message, time: float) -> None:
+def _add(made: Tracks, message: Message, time: float) -> None:
     key, kind = message.channel.key, message.channel.type
     row = wire.topic(key)
-    name = kind or (row.type.ROS if row else "")
+    name = kind or (row.type_name if row else "")
     try:
         if name == Odometry.ROS:
             odom = codec.decode(message.payload, message.channel.encoding, (Odometry,), tolerant=True)

@@ -16,13 +16,16 @@ import msgspec
 from holozen import wire
 from holozen.bag import cdr_encoding
 from holozen.messages import Message, codec
-from holozen.messages.definitions import Interface, InterfaceError, whole_text
+from holozen.messages.definitions import MAPPED, Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
+from holozen.transport.graph import is_latched
 
 _MCAP = {"application/msgpack": "msgpack", "application/cdr": "cdr", "application/protobuf": "protobuf"}
 _FOREVER = {"sec": 9223372036, "nsec": 854775807}
 _JSON_TYPES = {"bool": "boolean", "string": "string", "wstring": "string", "float32": "number", "float64": "number"}
-_ENTRY = "holozen/msg/RefusalCount"  # a sequence of these pairs is an object in JSON
+
+REGISTRY = Registry()
+"""The known types; `learn` adds one."""
 
 
 class Format(NamedTuple):
@@ -52,7 +55,7 @@ def offered_qos(topic: str) -> str:
 
     The numbers are those of rmw: keep last, reliable, transient local, automatic liveliness.
     """
-    if topic.rpartition("/")[2] not in wire.LATCHED:
+    if not is_latched(topic):
         return ""
     profile = {
         "history": 1, "depth": 1, "reliability": 1, "durability": 1, "deadline": _FOREVER, "lifespan": _FOREVER,
@@ -63,9 +66,8 @@ def offered_qos(topic: str) -> str:
 
 def interface_as_cdr(name: str, payload: bytes, encoding: str) -> tuple[Format, bytes]:
     """A message of a type without a Struct as ROS 2 writes it, and its format. Raises CodecError, InterfaceError."""
-    interface = _registry().find(name)
     form = Format("cdr", cdr_encoding(name), name, "ros2msg", msg_schema(name))
-    return form, codec.transcoded(interface, payload, encoding)
+    return form, codec.transcoded(REGISTRY.find(name), payload, encoding)
 
 
 def types_of(key: str, names: Callable[[], set[str]]) -> tuple[type[Message], ...]:
@@ -88,7 +90,7 @@ def _message(payload: bytes, encoding: str, types: tuple[type[Message], ...]) ->
     if not types:
         return None
     try:
-        return codec.decode(payload, encoding, types, tolerant=not wire.is_command("", types))
+        return codec.decode(payload, encoding, types, tolerant=not wire.is_command("", (kind.ROS for kind in types)))
     except codec.CodecError:
         return None
 
@@ -116,32 +118,25 @@ def _is_json(payload: bytes) -> bool:
 @cache
 def known() -> dict[str, type[Message]]:
     """The messages that travel on topics, by their ROS names."""
-    return {kind.ROS: kind for row in wire.TOPICS for kind in row.types}
+    return {name: kind for row in wire.TOPICS for name, kind in zip(row.type_names, row.types, strict=True)}
 
 
 @lru_cache(maxsize=1024)
 def msg_schema(name: str) -> bytes:
     """The definitions of a ROS type and of the types nested in it; empty for an unknown type."""
     try:
-        interface = _registry().find(name)
+        return whole_text(REGISTRY.find(name)).encode()
     except InterfaceError:
         return b""
-    return whole_text(interface).encode()
-
-
-def learn(name: str, define: Callable[[str], str]) -> None:
-    """Learn a type that is not known here from its definition, which `define` returns (empty: there is none)."""
-    _registry().learn(name, define)
 
 
 @cache
 def json_schema(name: str) -> bytes:
     """The JSON schema of a ROS type; empty for an unknown type."""
     try:
-        interface = _registry().find(name)
+        return json.dumps({"title": name, **_object(REGISTRY.find(name))}).encode()
     except InterfaceError:
         return b""
-    return json.dumps({"title": name, **_object(interface)}).encode()
 
 
 def _object(interface: Interface) -> dict[str, Any]:
@@ -149,11 +144,6 @@ def _object(interface: Interface) -> dict[str, Any]:
     for field in interface.fields:
         one = _object(field.nested) if field.nested else {"type": _JSON_TYPES.get(field.type, "integer")}
         properties[field.name] = {"type": "array", "items": one} if field.array else one
-        if field.type == _ENTRY:
+        if field.type == MAPPED:
             properties[field.name] = {"type": "object", "properties": {}}  # viewers expect properties here too
     return {"type": "object", "properties": properties}
-
-
-@cache
-def _registry() -> Registry:
-    return Registry()

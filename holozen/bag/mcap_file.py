@@ -27,8 +27,8 @@ _ZENOH = {"json": "application/json", "msgpack": "application/msgpack",
 class McapFile:
     """An MCAP file to read.
 
-    After its messages were read, `cut_off` is true if its end is missing, and `numbered` if the numbers of its
-    messages include lost ones.
+    Once its messages are read, `cut_off` is true if its end is missing, and `numbered` if the numbers of its messages
+    include lost ones.
     """
 
     def __init__(self, path: Path) -> None:

@@ -7,18 +7,21 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, NamedTuple, Protocol
+from functools import partial
+from typing import Any, NamedTuple
 
 from holozen import wire
 from holozen.bag import BagError, Channel, Message
 from holozen.bus import Bus
-from holozen.messages import Twist, TwistStamped, Wrench, codec
+from holozen.messages import Header, Time, Twist, TwistStamped, codec, named
+from holozen.terminal import single_keys
 from holozen.transport.graph import Endpoint, includes, on_key
 
-STOPPED = {kind.ROS: kind for kind in (Twist, TwistStamped, Wrench)}
 STOPS, STOP_EVERY = 5, 0.02  # s; several stops, since a congested link may drop some
 SETTLE = 0.3  # s for subscribers to match, so that they receive the first messages
 LOOK = 0.05  # s between two polls of the keyboard and of `stop`
+GAP = 0.5  # s between two looks; after more the process was suspended
+GOALS = "goal_pose"  # the last name of keys with goals
 PAUSE, STEP = "pause", "step"
 STEPS = (b"s", b"\x1b[C", b"\x1bOC")  # s, and the right arrow's two sequences
 
@@ -54,11 +57,12 @@ def plan(
             continue
         target = remap.get(channel.key, channel.key)
         is_command = _is_command(channel, target, endpoints)
-        if why := _why_not(target, is_command, commands, endpoints):
+        nodes = "" if is_command else _publishers(target, endpoints)
+        if why := _why_not(target, is_command and not commands, nodes):
             if asked:
                 raise BagError(f"{channel.key}{f' as {target}' if target != channel.key else ''}: {why}")
             made.left_out[channel.key] = why
-            if not is_command and (nodes := _publishers(target, endpoints)):
+            if nodes:
                 made.published[channel.key] = nodes
             continue
         made.targets[channel] = target
@@ -77,80 +81,113 @@ def _check_known(topics: list[str], remap: Mapping[str, str], channels: list[Cha
 def _is_command(channel: Channel, target: str, endpoints: list[Endpoint]) -> bool:
     """Whether it may move a robot, judged by its key in the bag or here, its type, or the key's subscribers."""
     types = {channel.type} | {endpoint.type for endpoint in on_key(endpoints, target, "sub")}
-    return any(row and row.is_command for row in map(wire.topic, (channel.key, target))) or bool(types & set(STOPPED))
+    has_row = any(row and row.is_command for row in map(wire.topic, (channel.key, target)))
+    return has_row or not types.isdisjoint(wire.COMMAND_TYPES)
 
 
-def _why_not(target: str, is_command: bool, commands: bool, endpoints: list[Endpoint]) -> str:
-    if not target or set(target) & set("*$?#") or target.startswith(("/", "@")) or "" in target.split("/"):
+def _why_not(target: str, moves: bool, nodes: str) -> str:
+    """Why a channel is not played on a key. `moves`: it moves a robot unasked; `nodes`: those that publish there."""
+    if set(target) & set("*$?#") or target.startswith("@") or "" in target.split("/"):
         return "this is not a key to publish on"
-    if is_command:
-        return "" if commands else "it moves robots; --commands plays it too"
-    nodes = _publishers(target, endpoints)
+    if moves:
+        return "it moves robots; --commands plays it too"
     return f"{nodes} publishes it now; --remap {target}:=NEW plays it elsewhere" if nodes else ""
 
 
 def _publishers(key: str, endpoints: list[Endpoint]) -> str:
-    if not key or set(key) & set("*$?#"):
-        return ""
     return ", ".join(sorted({endpoint.node for endpoint in on_key(endpoints, key, "pub")}))
+
+
+class Way(NamedTuple):
+    """The key that a channel is played on, with its publisher and what stamps each message."""
+
+    key: str
+    publisher: Any
+    stamp: Callable[[], bytes]
+
+    def put(self, payload: bytes, encoding: str | None = None) -> None:
+        """Send a payload, by default in the channel's encoding."""
+        self.publisher.put(payload, encoding=encoding, attachment=self.stamp())
 
 
 class Outlet:
     """Publishers for the channels of a plan, with the priority of plain data: a person at a teleop takes precedence.
 
-    Payloads and Encodings are those of the recording.
+    Payloads and Encodings are those of the recording, but for the stamps of commands: see `_restamped`. `goals` are the
+    keys on which goals were played.
     """
 
     def __init__(self, bus: Bus, plan: Plan) -> None:
-        self._stamp = bus.stamp
-        self._targets, self._commands = plan.targets, plan.commands
+        self._commands = plan.commands
+        if plan.commands:
+            _ = bus.listing
         self._tokens = [
             bus.announce("pub", channel.type or "any/msg/Any", key) for channel, key in plan.targets.items()
         ]
-        self._publishers: dict[Channel, Any] = {
-            # Telemetry is batched: sent one by one, more of it is lost on a busy machine.
-            channel: bus.session.declare_publisher(key, encoding=channel.encoding, express=key in plan.commands)
-            for channel, key in plan.targets.items()
-        }
+        self._ways = {channel: self._way(bus, channel, key) for channel, key in plan.targets.items()}
         self._driven: set[Channel] = set()  # command channels played since the last stop
+        self.goals: set[str] = set()
+
+    def _way(self, bus: Bus, channel: Channel, key: str) -> Way:
+        # Telemetry is batched: sent one by one, more of it is lost on a busy machine.
+        express = key in self._commands
+        return Way(key, bus.session.declare_publisher(key, encoding=channel.encoding, express=express), bus.stamps(key))
 
     def settle(self) -> None:
         """Wait briefly for subscribers."""
         deadline = time.monotonic() + SETTLE
         while time.monotonic() < deadline:
-            if any(publisher.matching_status.matching for publisher in self._publishers.values()):
+            if any(way.publisher.matching_status.matching for way in self._ways.values()):
                 return
             time.sleep(0.005)
 
     def publish(self, message: Message) -> None:
         """Send a message, if its channel is in the plan."""
-        if publisher := self._publishers.get(message.channel):
-            publisher.put(message.payload, attachment=self._stamp())
-            if self._targets[message.channel] in self._commands:
+        if way := self._ways.get(message.channel):
+            key = way.key
+            way.put(_restamped(message) if key in self._commands else message.payload)
+            if key in self._commands:
                 self._driven.add(message.channel)
+            if key.rpartition("/")[2] == GOALS:
+                self.goals.add(key)
 
     def stop(self) -> None:
         """Stop every robot that was moved."""
-        drives = [channel for channel in self._driven if not _ends_by_itself(channel.key, self._targets[channel])]
-        stops = [(self._publishers[channel], *_stop(channel)) for channel in drives]
+        driven = [(channel, self._ways[channel]) for channel in self._driven]
+        stops = [(way, *_stop(channel)) for channel, way in driven if not _ends_by_itself(channel.key, way.key)]
         for _ in range(STOPS if stops else 0):
-            for publisher, payload, encoding in stops:
-                publisher.put(payload, encoding=encoding, attachment=self._stamp())
+            for way, payload, encoding in stops:
+                way.put(payload, encoding)
             time.sleep(STOP_EVERY)
         self._driven.clear()
 
 
+def _restamped(message: Message) -> bytes:
+    """The payload of a command, with a stamp of this moment if it has one: robots refuse old stamps."""
+    channel, payload = message.channel, message.payload
+    if channel.type not in ("", TwistStamped.ROS):
+        return payload
+    try:
+        command = codec.decode(payload, channel.encoding, (TwistStamped,))
+        if not command.header.stamp.seconds():
+            return payload
+        header = Header(Time.of(time.time()), command.header.frame_id)
+        return codec.encode(TwistStamped(header, command.twist), codec.form(payload, channel.encoding))
+    except codec.CodecError:  # another type, or one that the robot refuses, with its reason
+        return payload
+
+
 def _ends_by_itself(*keys: str) -> bool:
-    """Joints stop after a short timeout, and no velocity would stop a controller."""
-    return any(key.rpartition("/")[2] in ("joint_command", "goal_pose") for key in keys)
+    """Whether a stop would do nothing: joints stop after a short timeout, and a controller obeys no velocity."""
+    return any(key.rpartition("/")[2] in ("joint_command", GOALS) for key in keys)
 
 
 def _stop(channel: Channel) -> tuple[bytes, str]:
     """A stop in the encoding and type of a channel, and its Encoding."""
     name = channel.encoding.partition(";")[0]
-    wire = next((wire for wire, encoding in codec.WIRES.items() if encoding == name), "json")
-    kind = STOPPED.get(channel.type, Twist)
-    return codec.encode(kind(), wire), codec.encoding(wire, kind)
+    form = next((form for form, encoding in codec.WIRES.items() if encoding == name), "json")
+    kind = named(channel.type) if channel.type in wire.COMMAND_TYPES else Twist
+    return codec.encode(kind(), form), codec.encoding(form, kind)
 
 
 class Pace:
@@ -175,37 +212,42 @@ class Pace:
         return self._at + round((now - self._now) * self._rate * 1e9)
 
 
-class TerminalKeys:
-    """Space and the right arrow (or s), read from a terminal."""
-
-    def __init__(self, number: int) -> None:
-        self._number = number
-
-    def read(self, timeout: float) -> str:
-        """PAUSE or STEP if pressed within `timeout` seconds, else ""."""
-        if not select.select([self._number], [], [], timeout)[0]:
-            return ""
-        try:
-            pressed = os.read(self._number, 1)
-            if pressed == b"\x1b" and select.select([self._number], [], [], 0)[0]:
-                pressed += os.read(self._number, 2)
-        except OSError:
-            pressed = b""
-        if not pressed:  # the terminal is gone; SIGHUP follows
-            time.sleep(timeout)
-        return meaning(pressed)
+ReadKey = Callable[[float], str]
+"""Waits at most that many seconds for a key: PAUSE or STEP if it was pressed, else ""."""
 
 
-class NoKeys:
-    """For a player without a terminal."""
+@contextlib.contextmanager
+def keys(stop: threading.Event) -> Iterator[ReadKey]:
+    """Reads space and the right arrow (or s) from standard input, and restores its settings. Without a terminal, or in
+    the background, no key is ever pressed, and `stop` ends the wait for one.
+    """
+    read: ReadKey = partial(_none, stop)
+    with contextlib.ExitStack() as stack:
+        with contextlib.suppress(OSError, ValueError, AttributeError):  # no terminal, or standard input is closed
+            number = sys.stdin.fileno()
+            stack.enter_context(single_keys(number))
+            read = partial(_pressed, number)
+        yield read
 
-    def __init__(self, stop: threading.Event) -> None:
-        self._stop = stop
 
-    def read(self, timeout: float) -> str:
-        """Wait for `timeout` seconds or `stop`."""
-        self._stop.wait(timeout)
+def _none(stop: threading.Event, timeout: float) -> str:
+    stop.wait(timeout)
+    return ""
+
+
+def _pressed(number: int, timeout: float) -> str:
+    """PAUSE or STEP if it was pressed in the terminal within `timeout` seconds, else ""."""
+    if not select.select([number], [], [], timeout)[0]:
         return ""
+    try:
+        pressed = os.read(number, 1)
+        if pressed == b"\x1b" and select.select([number], [], [], 0)[0]:
+            pressed += os.read(number, 2)
+    except OSError:
+        pressed = b""
+    if not pressed:  # the terminal is gone; SIGHUP follows
+        time.sleep(timeout)
+    return meaning(pressed)
 
 
 def meaning(pressed: bytes) -> str:
@@ -213,36 +255,10 @@ def meaning(pressed: bytes) -> str:
     return PAUSE if pressed == b" " else STEP if pressed in STEPS else ""
 
 
-@contextlib.contextmanager
-def keys(stop: threading.Event) -> Iterator[TerminalKeys | NoKeys]:
-    """The keys of standard input, if it is a terminal and we are in the foreground. Restores its settings."""
-    number = sys.stdin.fileno() if sys.stdin and sys.stdin.isatty() else -1
-    if number < 0 or os.tcgetpgrp(number) != os.getpgrp():
-        yield NoKeys(stop)
-        return
-    import termios
-    import tty
-
-    before = termios.tcgetattr(number)
-    tty.setcbreak(number)
-    try:
-        yield TerminalKeys(number)
-    finally:
-        with contextlib.suppress(termios.error):
-            termios.tcsetattr(number, termios.TCSADRAIN, before)
-
-
-class Keys(Protocol):
-    """A keyboard."""
-
-    def read(self, timeout: float) -> str:
-        """PAUSE or STEP, or "" if neither was pressed for `timeout` seconds."""
-        ...
-
-
 class Player:
-    """Calls `publish` with each message when it is due, and `hold` when it is paused.
+    """Calls `publish` with each message when it is due, and `hold` when a pause begins.
 
+    After a gap, as when the process was suspended, it goes on from where it was; `on_gap` gets the length in s.
     `paused` and `position` (ns, of the last message) are for the display.
     """
 
@@ -250,14 +266,17 @@ class Player:
         self,
         publish: Callable[[Message], None],
         hold: Callable[[], None],
-        keys: Keys,
+        read_key: ReadKey,
         stop: threading.Event,
         rate: float = 1.0,
+        on_gap: Callable[[float], None] = lambda _: None,
     ) -> None:
         self.paused, self.position, self.count = False, 0, 0
-        self._publish, self._hold, self._keys, self._stop = publish, hold, keys, stop
+        self._publish, self._hold, self._read_key, self._stop = publish, hold, read_key, stop
         self._pace = Pace(rate)
+        self._on_gap = on_gap
         self._looked = -LOOK
+        self._ran = 0.0  # when it last ran, s
         self._held = 0  # the position during a pause, ns
 
     def play(self, messages: Iterable[Message], on_look: Callable[[float], None] = lambda _: None) -> bool:
@@ -265,7 +284,8 @@ class Player:
         begun = False
         for message in messages:
             if not begun:
-                self._pace.jump(message.at, time.monotonic())
+                self._ran = time.monotonic()
+                self._pace.jump(message.at, self._ran)
                 begun = True
             if not self._wait_for(message.at, on_look):
                 return False
@@ -277,18 +297,26 @@ class Player:
         """Wait until a message is due; False if `stop` is set."""
         while not self._stop.is_set():
             now = time.monotonic()
+            self._skip_gap(now)
             left = LOOK if self.paused else self._pace.due(at) - now
             if left <= 0 and now - self._looked < LOOK:
                 return True
-            key = self._keys.read(max(0.0, min(left, LOOK)))  # also look when every message is late
+            key = self._read_key(max(0.0, min(left, LOOK)))  # also look when every message is late
             self._looked = time.monotonic()
             on_look(self._looked)
-            if self._obey(key, at):
+            if self._act_on(key, at):
                 return True
         return False
 
-    def _obey(self, key: str, at: int) -> bool:
-        """Act on a key; returns whether to play the next message at once."""
+    def _skip_gap(self, now: float) -> None:
+        """Go on from where it last was, if it has not run for a while: the rest must not catch up in a burst."""
+        ran, self._ran = self._ran, now
+        if now - ran > GAP and not self.paused:
+            self._pace.jump(self._pace.position(ran), now)
+            self._on_gap(now - ran)
+
+    def _act_on(self, key: str, at: int) -> bool:
+        """Act on a key press; returns whether to play the next message at once."""
         now = time.monotonic()
         if key == PAUSE and self.paused:
             self.paused = False

@@ -5,39 +5,27 @@ import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Self
 
 from holozen.bag import BagError, Channel, Message
 
+if TYPE_CHECKING:
+    from holozen.bag.mcap_file import McapFile
+    from holozen.bag.sqlite_file import SqliteFile
+
 FILES = (".mcap", ".db3")
-
-
-class File(Protocol):
-    """A file of a bag."""
-
-    size: int  # bytes
-    cut_off: bool
-    numbered: bool
-
-    def messages(self) -> Iterator[Message]:
-        """All messages, in the order of the file. Raises BagError at damage."""
-        ...
-
-    def close(self) -> None:
-        """Close it."""
-        ...
 
 
 class Bag:
     """A file to read, or a folder of ROS 2 with such files.
 
-    After its messages were read, `cut_off` is true if the end of a file is missing. While they are, `numbered` is true
-    if the numbers of the messages include lost ones.
+    Once its messages are read, `cut_off` is true if the end of a file is missing. While they are read, `numbered` is
+    true if the numbers of the messages include lost ones.
     """
 
     def __init__(self, path: Path) -> None:
         self.path, self.cut_off, self.numbered = path, False, False
-        self._files: list[File] = []
+        self._files: list[McapFile | SqliteFile] = []
         try:
             for one in files_of(path):
                 self._files.append(_opened(one))
@@ -85,7 +73,7 @@ def files_of(path: Path) -> list[Path]:
     return sorted(found, key=lambda one: int((re.findall(r"\d+", one.stem[-19:]) or ["0"])[-1]))
 
 
-def _opened(path: Path) -> File:
+def _opened(path: Path) -> "McapFile | SqliteFile":
     if path.suffix == ".db3":
         from holozen.bag.sqlite_file import SqliteFile
 

@@ -1,19 +1,19 @@
 """Recording: samples are received as fast as they arrive, and written when the disk is ready."""
 
 import contextlib
-import re
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
 from typing import NamedTuple, Self
 
-from holozen.bag.formats import Format, as_cdr, format_of, interface_as_cdr, json_schema, known, learn, types_of
+from holozen.bag.formats import REGISTRY, Format, as_cdr, format_of, interface_as_cdr, json_schema, known, types_of
 from holozen.bag.writer import CHANNELS, BagWriter
 from holozen.messages import Clock, Message
 from holozen.messages.codec import CodecError
 from holozen.messages.definitions import InterfaceError
-from holozen.transport.graph import Graph, on_key
+from holozen.transport.graph import Graph, is_latched, on_key
+from holozen.transport.rmw_zenoh import TOPIC
 from holozen.transport.samples import RawSubscriber, Sample
 
 DEPTH = 8192  # samples that a subscriber holds while its thread is not scheduled
@@ -23,13 +23,13 @@ LARGEST = 128 << 20  # bytes of a sample; a bag with larger ones could not be re
 BATCH = 1000  # samples
 OVERHEAD = 300  # bytes of memory of a queued sample besides its payload
 PATIENCE = 0.5  # s
-_TOPIC = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
+
 CLOCK = "clock"  # the key of the sim's time
 LONGEST_TICK = 100_000_000  # ns; between two ticks the sim's time advances by at most this, as the sim may be paused
 
 
 class SimTime:
-    """The sim's time at the arrival of a sample, also between two ticks. All times are arguments, in ns."""
+    """The sim's time when a sample arrives, also between two ticks. All times are arguments, in ns."""
 
     def __init__(self) -> None:
         self._tick = self._came = self._last = -1
@@ -67,7 +67,9 @@ class Intake:
     def __init__(self, room: int = QUEUE) -> None:
         self.received = self.dropped = 0
         self.lost = 0  # samples that never arrived, by their sequence numbers
-        self._numbers: dict[str, int] = {}  # the last one of each publisher
+        self.keys: set[str] = set()  # on which anything arrived, up to PUBLISHERS
+        self._latched: set[int] = set()  # hashes of the messages on latched keys, up to PUBLISHERS
+        self._numbers: dict[tuple[str, str], int] = {}  # the last one of each key and sender
         self._missed: dict[str, int] = {}  # samples of a key that were lost or dropped since the last one kept
         self._room, self._held = room, 0
         self._waiting: deque[Waiting] = deque()
@@ -109,11 +111,15 @@ class Intake:
             listener.close()
 
     def add(self, key: str, payload: bytes, encoding: str, number: tuple[str, int] | None = None) -> None:
-        """Add a sample. `number`: its publisher and sequence number."""
+        """Add a sample. `number`: see Sample.number."""
         size = len(payload) + OVERHEAD
         with self._lock:
             self.received += 1
-            missed = self._missed.pop(key, 0) + (self._lost_before(*number) if number else 0)
+            if len(self.keys) < PUBLISHERS:
+                self.keys.add(key)
+            if is_latched(key) and len(self._latched) < PUBLISHERS:
+                self._latched.add(hash((key, payload)))
+            missed = self._missed.pop(key, 0) + (self._lost_before((key, number[0]), number[1]) if number else 0)
             if self._held + size > self._room or size > LARGEST:
                 self.dropped += 1
                 if len(self._missed) < PUBLISHERS:
@@ -123,11 +129,16 @@ class Intake:
             at = self._epoch + time.monotonic_ns()
             self._waiting.append(Waiting(at, key, payload, encoding, missed))
 
-    def _lost_before(self, publisher: str, number: int) -> int:
+    def add_latched(self, sample: Sample) -> None:
+        """Add the last message of a latched key, unless it arrived."""
+        if hash((sample.key, sample.payload)) not in self._latched:
+            self.add(sample.key, sample.payload, sample.encoding)
+
+    def _lost_before(self, sender: tuple[str, str], number: int) -> int:
         if len(self._numbers) >= PUBLISHERS:
             self._numbers.clear()
-        lost = max(0, number - self._numbers.get(publisher, number - 1) - 1)
-        self._numbers[publisher] = number
+        lost = max(0, number - self._numbers.get(sender, number - 1) - 1)
+        self._numbers[sender] = number
         self.lost += lost
         return lost
 
@@ -184,11 +195,11 @@ class LeftOut(NamedTuple):
 class Recorder:
     """Writes the samples of an intake.
 
-    The types of keys are those of the wire table, or those that their publishers announce.
-    With `ros`, messages are written as by ROS 2: in CDR, on topics with a leading slash. Those of unknown types and
-    those on keys that are no topics of ROS 2 are left out (`left_out`). Without `ros`, messages stay as they arrived.
-    With `time`, times are those of the sim, and samples before its first tick are left out. `define` returns the
-    definition of a type that is not known here, from its publisher.
+    The types of keys are those of the wire table, or those that their publishers announce; `define` returns the
+    definition of an unknown type, from its publisher.
+    With `ros`, messages are written as by ROS 2: in CDR, on topics with a leading slash. Those of unknown types, and
+    those on keys that are not valid topics in ROS 2, are left out (`left_out`). Without `ros`, messages stay as they
+    arrived. With `time`, times are those of the sim, and samples before its first tick are left out.
     """
 
     def __init__(
@@ -241,7 +252,7 @@ class Recorder:
 
     def _as_ros(self, sample: Waiting, form: Format, message: Message | None) -> tuple[Format, bytes]:
         """A sample in CDR. Raises CodecError or InterfaceError with the reason why it cannot be."""
-        if not _TOPIC.fullmatch(sample.key):
+        if not TOPIC.fullmatch(sample.key):
             raise CodecError("a topic of ROS 2 has letters, digits and '_' alone, and no part that begins with a digit")
         if form.encoding == "cdr" and form.schema_encoding:
             return form, sample.payload
@@ -268,6 +279,6 @@ class Recorder:
         names = {endpoint.type for endpoint in on_key(self._graph.endpoints(), key, "pub")}
         for name in sorted(names - known().keys()):
             with contextlib.suppress(InterfaceError):
-                learn(name, self._define)
+                REGISTRY.learn(name, self._define)
                 self._learned[key] = name
         return names

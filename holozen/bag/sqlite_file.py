@@ -1,6 +1,5 @@
 """Reads the sqlite3 files of ROS 2's bags (rosbag2_storage_sqlite3), which may be damaged or malicious."""
 
-import contextlib
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
@@ -35,7 +34,7 @@ class SqliteFile:
 
     def messages(self) -> Iterator[Message]:
         """All messages, in the order of their times. Raises BagError at damage."""
-        with self._errors():
+        try:
             self._check_tables()
             rows = self._database.execute("SELECT id, name, type, serialization_format FROM topics")
             channels = {number: self._channel(*words) for number, *words in rows}
@@ -47,11 +46,6 @@ class SqliteFile:
                 if payload.startswith(ZSTD):
                     raise BagError(f"the messages of {self.path} are compressed one by one; `ros2 bag convert` unpacks")
                 yield Message(channels[number], at, payload)
-
-    @contextlib.contextmanager
-    def _errors(self) -> Iterator[None]:
-        try:
-            yield
         except (sqlite3.Error, UnicodeDecodeError) as error:
             raise BagError(f"{self.path} is not a bag of ROS 2, or damaged: {error}") from None
 

@@ -1,11 +1,14 @@
-"""Writes bags that stay readable even if the writer is killed or the disk fills up."""
+"""Writes bags, MCAP files or folders of ROS 2, that stay readable if the writer is killed or the disk fills up."""
 
 import contextlib
 import errno
+import json
 import os
 import tempfile
-from collections.abc import Iterator
+from collections import Counter
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from mcap.writer import CompressionType, Writer
 
@@ -15,6 +18,8 @@ from holozen.bag.formats import Format, offered_qos
 RESERVE = 8 << 20  # bytes of the disk kept free for the end of a file; a chunk and the summary take less
 CHUNK = 1 << 20  # bytes, before compression
 CHANNELS = 65_535  # MCAP numbers them with two bytes
+METADATA = "metadata.yaml"
+VERSION = 5  # of metadata.yaml, that of Humble, which every later distribution reads
 
 
 class BagWriter:
@@ -22,7 +27,8 @@ class BagWriter:
 
     With a limit, or `numbered`, the first file has a number too. `profile` is MCAP's, "ros2" for ROS 2.
 
-    Raises OSError if a file cannot be created, BagError if it cannot be continued; flushed data stays readable.
+    Raises OSError if a file cannot be created, BagError if it cannot be continued; flushed data stays readable, unless
+    the open file was deleted, which is then no longer among `files`.
     """
 
     def __init__(self, name: str, limit: int = 0, profile: str = "", numbered: bool = False) -> None:
@@ -66,6 +72,7 @@ class BagWriter:
     def flush(self) -> None:
         """Write the open chunk to the file, where it survives this process."""
         self._writer.flush()  # type: ignore[no-untyped-call]
+        self._check_kept()
 
     def close(self) -> None:
         """Finish the last file; a recording without messages leaves no file."""
@@ -88,23 +95,26 @@ class BagWriter:
         self._channels: dict[tuple[str, Format], int] = {}
         self._schemas: dict[str, int] = {}
         self._numbers: dict[int, int] = {}
-        with self._or_close():
-            self._writer.start(self._profile, "holozen")
-
-    def _finish(self) -> None:
-        with self._or_close():
-            self._writer.finish()  # type: ignore[no-untyped-call]
-        self._file.close()
-        self._before += self._file.size
-        self._file.size = 0
-
-    @contextlib.contextmanager
-    def _or_close(self) -> Iterator[None]:
         try:
-            yield
+            self._writer.start(self._profile, "holozen")
         except BagError:
             self._file.close()
             raise
+
+    def _check_kept(self) -> None:
+        """Raise BagError if the open file was deleted."""
+        if self._file.deleted and self._file.path in self.files:
+            self.files.remove(self._file.path)
+            raise BagError(f"{self._file.path} was deleted during the recording")
+
+    def _finish(self) -> None:
+        self._check_kept()
+        try:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+        finally:
+            self._file.close()
+        self._before += self._file.size
+        self._file.size = 0
 
     def _add_channel(self, topic: str, form: Format) -> int:
         if len(self._channels) == CHANNELS:
@@ -123,25 +133,124 @@ class BagWriter:
         return channel
 
 
+@dataclass
+class Span:
+    """How many messages, and the times of the first and the last, in ns."""
+
+    count: int = 0
+    first: int = 0
+    last: int = 0
+
+    def add(self, at: int) -> None:
+        """Add a message."""
+        self.first = min(self.first, at) if self.count else at
+        self.last = max(self.last, at)
+        self.count += 1
+
+    def figures(self) -> dict[str, Any]:
+        """As metadata.yaml has them."""
+        return {
+            "starting_time": {"nanoseconds_since_epoch": self.first},
+            "duration": {"nanoseconds": self.last - self.first},
+            "message_count": self.count,
+        }
+
+
+class RosBagWriter(BagWriter):
+    """Writes a new folder as ROS 2 does, with `NAME_0.mcap`, `NAME_1.mcap`, ... and with metadata.yaml about them.
+
+    Raises OSError if the folder or a file cannot be created, BagError if it cannot be continued. After a killed
+    process metadata.yaml is missing; `ros2 bag reindex` makes it.
+    """
+
+    def __init__(self, name: str, limit: int = 0) -> None:
+        self._folder = Path(name)
+        self._spans: dict[str, Span] = {}  # by file name
+        self._whole = Span()
+        self._counts: Counter[tuple[str, str]] = Counter()  # of the messages, by topic and type
+        self._folder.mkdir()
+        try:
+            super().__init__(str(self._folder / self._folder.name), limit, "ros2", numbered=True)
+        except OSError:
+            self._folder.rmdir()
+            raise
+
+    def write(self, topic: str, form: Format, payload: bytes, at: int, missed: int = 0) -> bool:
+        """Add a message, as BagWriter does."""
+        file = self.files[-1].name
+        written = super().write(topic, form, payload, at, missed)
+        if written:
+            for span in (self._spans.setdefault(file, Span()), self._whole):
+                span.add(at)
+            self._counts[topic, form.schema] += 1
+        return written
+
+    def close(self) -> None:
+        """Finish the last file and write metadata.yaml; a recording without messages leaves no folder."""
+        super().close()
+        if self.messages:
+            self._describe()
+        elif self._folder.exists():
+            self._folder.rmdir()
+
+    def abandon(self) -> None:
+        """Close without the summary at the end of the last file, which did not fit."""
+        super().abandon()
+        if self._file.path in self.files:  # else it was deleted: `ros2 bag reindex` describes the rest
+            with contextlib.suppress(OSError):
+                self._describe()
+
+    def _describe(self) -> None:
+        topics = [
+            {
+                "topic_metadata": {
+                    "name": topic,
+                    "type": kind,
+                    "serialization_format": "cdr",
+                    "offered_qos_profiles": offered_qos(topic),
+                },
+                "message_count": count,
+            }
+            for (topic, kind), count in self._counts.items()
+        ]
+        information = {
+            "version": VERSION,
+            "storage_identifier": "mcap",
+            **self._whole.figures(),
+            "topics_with_message_count": topics,
+            "compression_format": "",
+            "compression_mode": "",
+            "relative_file_paths": list(self._spans),
+            "files": [{"path": name, **span.figures()} for name, span in self._spans.items()],
+        }
+        text = json.dumps({"rosbag2_bagfile_information": information}, indent=1)  # which every reader of YAML reads
+        (self._folder / METADATA).write_text(f"{text}\n", encoding="utf-8")
+
+
 class SafeFile:
     """A new file. Writes are atomic, and disk space is reserved for its end.
 
     Raises OSError if it cannot be created.
     """
 
-    def __init__(self, path: Path, reserve: int = RESERVE) -> None:
+    def __init__(self, path: Path) -> None:
         self.path, self.size = path, 0  # bytes
         self.full = ""  # why the disk accepts no more data, or empty
         self._number = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_CLOEXEC, 0o644)
         # Unnamed, so that it disappears with the process.
         self._spare = tempfile.TemporaryFile(dir=path.parent)  # noqa: SIM115
         try:
-            os.posix_fallocate(self._spare.fileno(), 0, reserve)
+            os.posix_fallocate(self._spare.fileno(), 0, RESERVE)
         except OSError as error:
             if error.errno == errno.ENOSPC:
                 self.remove()
-                raise OSError(error.errno, f"fewer than {reserve >> 20} MB of the disk are free", str(path)) from None
+                raise OSError(error.errno, f"fewer than {RESERVE >> 20} MB of the disk are free", str(path)) from None
             # Otherwise file sizes are limited, and there is no reserve.
+
+    @property
+    def deleted(self) -> bool:
+        """Whether it has no name any more: what is written disappears."""
+        return self._number >= 0 and os.fstat(self._number).st_nlink == 0
 
     def write(self, data: bytes) -> None:
         """Append `data`, on a full disk into the reserved space. Raises BagError if that is full too."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from holozen.check.engine import Edit, Finding
 
 _TOKEN = re.compile(
-    r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>"  # what is in these is no element
+    r"<!--.*?-->|<!\[CDATA\[.*?\]\]>|<\?.*?\?>"  # there are no elements in these
     r"|<(?P<end>/?)(?P<name>[^\s<>/=\"'!?]+)(?P<rest>(?:[^<>\"']|\"[^\"]*\"|'[^']*')*?)(?P<empty>/?)>",
     re.DOTALL,
 )
@@ -16,12 +16,15 @@ _ATTRIBUTE = re.compile(r"([^\s=<>\"']+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _COMPUTED = re.compile(r"\$[{(]|<xacro:")
 _LINE_END = re.compile(r"\r\n?|\n")  # those of XML; str.splitlines knows more
 
-Span = tuple[int, int, str]  # from, to, and what is there instead
+Span = tuple[int, int, str]
+"""A part of the text, by its first and its end offset, and its replacement."""
 
 
 @dataclass(eq=False, slots=True)
 class _Element:
-    """An element of the text, by offsets: `names` are where its name is, in the start tag and in the end tag."""
+    """An element of the text, by offsets. `names` are the spans of its name in the start tag and the end tag, `inside`
+    to `close` is its content.
+    """
 
     name: str
     line: int
@@ -29,29 +32,29 @@ class _Element:
     attributes: dict[str, re.Match[str]]
     names: list[tuple[int, int]]
     start: int
-    inside: int  # where its content begins,
-    close: int  # and ends
+    inside: int
+    close: int
     end: int
     children: list["_Element"] = field(default_factory=list)
 
 
 def correct(text: str, file: str, findings: Iterable[Finding]) -> tuple[str, list[Finding]]:
-    """The source `text` of a file, corrected, and the findings that were. Findings in other
-    files or in lines of the expanded text, and ambiguous ones, are left alone.
+    """The source `text` of a file, corrected, and the findings that this corrects. Ambiguous findings, and those in
+    other files or in lines of the expanded text, are left alone.
     """
-    own = [one for one in findings if one.edit and one.place.file == file and one.place.line and not one.place.expanded]
-    elements = _elements(text) if own else []
+    edits = [(each, each.edit) for each in findings if each.edit and each.place.file == file and each.place.line
+             and not each.place.expanded]  # fmt: skip
+    elements = _elements(text) if edits else []
     spans: set[Span] = set()
     done = []
-    for finding in sorted(own, key=lambda one: bool(one.edit and one.edit.kind == "inertia")):  # names come first
-        assert finding.edit
-        wanted = set(_spans(text, [one for one in elements if one.line == finding.place.line], finding.edit))
-        if wanted and not any(a < d and c < b for a, b, _ in wanted for c, d, _ in spans - wanted):
-            spans |= wanted
+    for finding, edit in sorted(edits, key=lambda pair: pair[1].kind == "inertia"):  # names first
+        new = set(_spans(text, [element for element in elements if element.line == finding.place.line], edit))
+        if new and not any(a < d and c < b for a, b, _ in new for c, d, _ in spans - new):
+            spans |= new
             done.append(finding)
-    for first, last, instead in sorted(spans, reverse=True):
-        text = text[:first] + instead + text[last:]
-    return text, sorted(done, key=lambda one: one.place.line)
+    for first, last, replacement in sorted(spans, reverse=True):
+        text = text[:first] + replacement + text[last:]
+    return text, sorted(done, key=lambda finding: finding.place.line)
 
 
 def _elements(text: str) -> list[_Element]:
@@ -69,7 +72,7 @@ def _elements(text: str) -> list[_Element]:
                 element.close, element.end = start, end
                 element.names.append(token.span("name"))
             continue
-        attributes = {one[1]: one for one in _ATTRIBUTE.finditer(text, *token.span("rest"))}
+        attributes = {match[1]: match for match in _ATTRIBUTE.finditer(text, *token.span("rest"))}
         parent = around[-1] if around else None
         place = bisect(lines, start) + 1, parent, attributes, [token.span("name")]
         found.append(_Element(token["name"], *place, start, end, end, end))
@@ -81,19 +84,21 @@ def _elements(text: str) -> list[_Element]:
 
 
 def _spans(text: str, here: list[_Element], edit: Edit) -> list[Span]:
-    """What an edit changes, in the elements of its line; nothing where that is not sure."""
+    """The changes of an edit, given the elements `here` on its line; none if it is not certain where they belong."""
     if edit.kind == "element":
-        return [(*span, edit.new) for one in here if one.name == edit.old for span in one.names]
+        return [(*span, edit.new) for element in here if element.name == edit.old for span in element.names]
     if edit.kind == "attribute":
-        owners = [one.attributes for one in here if one.name == edit.owner and edit.new not in one.attributes]
+        owners = [each.attributes for each in here if each.name == edit.owner and edit.new not in each.attributes]
         return [(*given[edit.old].span(1), edit.new) for given in owners if edit.old in given]
-    inertials = [one.parent if edit.old else one for one in here if one.name == ("inertia" if edit.old else "inertial")]
-    return [span for one in inertials if one and _belongs(text, one, edit.owner) for span in _moments(text, one, edit)]
+    name = "inertia" if edit.old else "inertial"
+    inertials = [element.parent if edit.old else element for element in here if element.name == name]
+    certain = [inertial for inertial in inertials if inertial and _belongs(text, inertial, edit.owner)]
+    return [span for inertial in certain for span in _moments(text, inertial, edit)]
 
 
 def _belongs(text: str, inertial: _Element, link: str) -> bool:
-    """Whether it is written in the link of this name, and nothing there is computed: a macro's may be in several
-    links, which have different shapes.
+    """Whether an <inertial> is written in the link of this name, and nothing in that link is computed: a macro may make
+    several links of it, which have different shapes.
     """
     owner = inertial.parent
     if inertial.name != "inertial" or owner is None or owner.name != "link" or "name" not in owner.attributes:
@@ -103,11 +108,13 @@ def _belongs(text: str, inertial: _Element, link: str) -> bool:
 
 
 def _moments(text: str, inertial: _Element, edit: Edit) -> list[Span]:
-    """The new <inertia>, instead of the one that is there unless that has more than attributes, or as the last."""
-    there = [one for one in inertial.children if one.name == "inertia"]
-    if there:
-        empty = len(there) == 1 and not text[there[0].inside : there[0].close].strip()
-        return [(there[0].start, there[0].end, edit.new)] if edit.old and empty else []
+    """The new <inertia>, which replaces the old one or is added at the end; nothing if there are several, or if the old
+    one has content.
+    """
+    old = [child for child in inertial.children if child.name == "inertia"]
+    if old:
+        is_plain = len(old) == 1 and not text[old[0].inside : old[0].close].strip()
+        return [(old[0].start, old[0].end, edit.new)] if edit.old and is_plain else []
     content = text[inertial.inside : inertial.close]
     space = content[len(content.rstrip()) :]
     at = inertial.close - len(space)

@@ -1,4 +1,4 @@
-"""The robot file under check, read as far as possible, and the types in which rules report mistakes."""
+"""The robot file under check, read as far as possible, and the types with which rules report mistakes."""
 
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
@@ -9,21 +9,21 @@ from typing import Literal
 
 from holozen.check.geometry import Placed, Wheel, find_wheels, place_shapes
 from holozen.robot import reader
-from holozen.robot.elements import Tag, read_xml, repair_xml
+from holozen.robot.elements import Tag, read_text, read_xml, repair_xml
 from holozen.robot.errors import RobotError
-from holozen.robot.gazebo_plugins import KNOWN, kind_of
+from holozen.robot.gazebo_plugins import DRIVES, KNOWN, kind_of
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import check_simulated
-from holozen.robot.sources import SourceFile, elements, read_sources, trace
-from holozen.robot.xacro import Outcome, is_xacro, read_text
+from holozen.robot.sources import SourceFile, read_sources, trace
+from holozen.robot.xacro import Outcome, is_xacro, unasked
 
 Severity = Literal["error", "warning"]
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """A file and line; line 0 means the file as a whole. `expanded`: a line of the text that `holozen xacro` prints."""
+    """A file and line; line 0 means the whole file. `expanded`: it is a line of the output of `holozen xacro`."""
 
     file: str
     line: int = 0
@@ -37,8 +37,8 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class Edit:
-    """A correction that needs no judgement. `kind`: the name of an "element" or an "attribute" is `new` instead of
-    `old`; or `new` is the <inertia> of a link, instead of the `old` one or, if that is empty, beside the mass. `owner`
+    """A correction that needs no judgement. The kinds "element" and "attribute" change the name `old` to `new`; with
+    "inertia", `new` is the <inertia> of a link, which replaces the `old` one or, if `old` is empty, is added. `owner`
     is the name of the element that has the attribute, or that of the link.
     """
 
@@ -50,7 +50,7 @@ class Edit:
 
 @dataclass(frozen=True, slots=True)
 class Mistake:
-    """A finding of a rule: at an element, at a place, or (None) in the file as a whole."""
+    """A mistake that a rule found: at an element, at a place, or (None) in the whole file."""
 
     at: Tag | Place | None
     problem: str
@@ -60,8 +60,8 @@ class Mistake:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """`finds` and `why` are descriptions; `find` inspects a robot file. With an error the robot cannot be used as
-    intended; with a warning it can.
+    """A rule: `finds` and `why` describe it, `find` inspects a robot file. With an "error" the robot cannot be used as
+    intended; with a "warning" it can.
     """
 
     name: str
@@ -75,7 +75,7 @@ Find = Callable[["Subject"], Iterable[Mistake]]
 
 
 def rule(name: str, severity: Severity, finds: str, why: str) -> Callable[[Find], Rule]:
-    """Make a function that inspects a robot file a Rule."""
+    """Makes a Rule of a function that inspects a robot file."""
     return lambda find: Rule(name, severity, finds, why, find)
 
 
@@ -95,7 +95,7 @@ class Finding:
         return f"{self.place}: {self.severity}: {self.problem} [{self.rule}]\n    {self.why}; {self.fix}"
 
     def fields(self) -> dict[str, object]:
-        """For JSON: flat, with the line as a number or null."""
+        """The finding as one flat object of JSON; the line of a whole file is null."""
         return {
             "severity": self.severity,
             "rule": self.rule,
@@ -115,7 +115,9 @@ PLUGIN_OWNERS = ("model", "world", "sensor")  # in SDF
 
 @dataclass(frozen=True, slots=True)
 class Requirements:
-    """Requirements on the robot. `fits`: length, width and, if given, height in metres. `require`: a file of names."""
+    """Requirements on the robot. `fits`: the largest length, width and optionally height in metres; empty for none.
+    `require`: a file with the names of links and joints.
+    """
 
     fits: tuple[float, ...] = ()
     require: Path | None = None
@@ -123,17 +125,15 @@ class Requirements:
 
 @dataclass(eq=False)
 class Subject:
-    """`root` is the <robot>, or the <model> of an SDF file (`sdf`), xacro expanded. `model` is None if the file
-    cannot be loaded; `messages` are the loader's. `origins` maps elements to their source lines.
+    """The file under check. `root` is its <robot>, with xacro expanded, or its <model> for an SDF file (`sdf`). `model`
+    is None if the file cannot be loaded; `messages` are the loader's. `origins` maps elements to their source lines.
     `forgiven` are XML mistakes that Gazebo tolerates.
     """
 
     path: Path
     root: Tag
     sources: list[SourceFile]
-    args: Mapping[str, str] = field(default_factory=dict)
     packages: Mapping[str, Path] = field(default_factory=dict)
-    allow_env: Collection[str] = ()
     requirements: Requirements = Requirements()
     sdf: bool = False
     model: RobotModel | None = None
@@ -157,6 +157,12 @@ class Subject:
         return list(place_shapes(self.model)) if self.model else []
 
     @property
+    def loaded(self) -> RobotModel:
+        """The model, for code that runs only if the file could be loaded."""
+        assert self.model is not None
+        return self.model
+
+    @property
     def guessed(self) -> bool:
         """Whether a mesh is missing, so that the extent of some part is unknown."""
         return any("is replaced by a box" in message.problem for _, message in self.messages)
@@ -168,19 +174,29 @@ class Subject:
 
     @cached_property
     def plugins(self) -> list[Tag]:
-        """Every <plugin> that a simulator reads: in URDF inside a <gazebo>, in SDF of a model, world or sensor."""
+        """Every <plugin> that a simulator reads: in URDF inside a <gazebo>, in SDF in a model, world or sensor."""
         holders = [self.root] if self.sdf else self.root.all("gazebo")
         found = [plugin for holder in holders for plugin in holder.below("plugin")]
         return [tag for tag in found if not self.sdf or (tag.parent and tag.parent.name in PLUGIN_OWNERS)]
 
     @cached_property
+    def settings(self) -> list[Tag]:
+        """The elements in known plugins: those in other plugins may mean anything."""
+        return [tag for plugin in self.plugins if kind_of(plugin) in KNOWN for tag in plugin.children]
+
+    @cached_property
+    def drives(self) -> list[Tag]:
+        """The drive plugins; the first one drives the robot."""
+        return [plugin for plugin in self.plugins if kind_of(plugin) in DRIVES]
+
+    @cached_property
     def plugin_joints(self) -> list[tuple[Tag, str]]:
-        """(element, joint name) for each joint that a known plugin names as one of its wheels'."""
-        known = [plugin for plugin in self.plugins if kind_of(plugin) in KNOWN]
-        return [pair for plugin in known for tag in plugin.children for pair in _joint_names(tag)]
+        """(element, joint name) for each joint that a known plugin names, one of a wheel."""
+        tags = [tag for tag in self.settings if tag.name.lower().replace("_", "").endswith("joint")]
+        return [(tag, name) for tag in tags for name in tag.text.replace(",", " ").split()]
 
     def part(self, tag: Tag) -> Tag:
-        """The link, joint or other direct child of the robot that contains `tag`; the robot itself for its own tag."""
+        """The direct child of the robot, such as a link, that is or contains `tag`; the robot for its own element."""
         while tag.parent is not None and tag is not self.root and tag.parent is not self.root:
             tag = tag.parent
         return tag
@@ -199,7 +215,7 @@ class Subject:
 
 
 def named(tags: list[Tag]) -> dict[str, Tag]:
-    """Name -> element; the first of duplicates, none without a name. Names count to the letter, as in the loader."""
+    """Name -> element; the first of duplicates, none for elements without a name. Names are exact, as in the loader."""
     found: dict[str, Tag] = {}
     for tag in tags:
         if (name := tag.attributes.get("name", "")).strip():
@@ -208,16 +224,11 @@ def named(tags: list[Tag]) -> dict[str, Tag]:
 
 
 def split(message: str, path: Path) -> tuple[Place, str]:
-    """Place and text of a message "FILE, line N: text" or "FILE: text"; else the file and the whole message."""
+    """Place and text of a message "FILE, line N: text" or "FILE: text"; for any other one `path` and the message."""
     match = _WHERE.fullmatch(message)
     if match is None or not (match["line"] or match["file"].startswith(str(path))):
         return Place(str(path)), message
     return Place(match["file"], int(match["line"] or 0)), match["text"]
-
-
-def _joint_names(tag: Tag) -> Iterator[tuple[Tag, str]]:
-    if tag.name.lower().replace("_", "").endswith("joint"):
-        yield from ((tag, name) for name in tag.text.replace(",", " ").split())
 
 
 # Loading.
@@ -228,19 +239,13 @@ SEE_WORLD = "; see it with: holozen sim --world FILE"
 FORGIVEN = "correct it"
 
 
-def read(
-    path: Path,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    requirements: Requirements,
-    allow_env: Collection[str] = (),
-) -> Subject:
-    """The file, expanded and loaded as far as possible, in the process that reads. Raises RobotError if it is not the
-    XML of a robot.
+def read(path: Path, given: Collection[str], packages: Mapping[str, Path], requirements: Requirements) -> Subject:
+    """The file, expanded and loaded as far as possible. `given` are the names of its arguments. Runs in a worker of
+    `reader.run`. Raises RobotError unless it is the XML of a robot.
     """
     text = read_text(path)
     expanded = is_xacro(path, text)
-    outcome = reader.ask("expand") if expanded else Outcome(text)
+    outcome = reader.ask("expand") if expanded else Outcome(text, warnings=unasked(path, given))
     if outcome.error:
         raise RobotError(outcome.error)
     plain, place = outcome.text, f"{path}{EXPANDED}" if expanded else str(path)
@@ -248,7 +253,7 @@ def read(
     root = read_xml(plain, place)
     sources = read_sources(path, packages) if expanded else []
     robot = _robot(root)
-    subject = Subject(path, robot, sources, args, packages, allow_env, requirements, robot.name == "model")
+    subject = Subject(path, robot, sources, packages, requirements, robot.name == "model")
     subject.forgiven = [Mistake(Place(place, line), problem, FORGIVEN) for line, problem in mistakes]
     subject.origins = _origins(subject, root) if expanded else {}
     subject.messages += [_message("warning", *split(line, path)) for line in outcome.warnings]
@@ -258,7 +263,7 @@ def read(
 
 
 def is_library(subject: Subject) -> bool:
-    """Whether a xacro file only contains colours, properties and macros for others to include."""
+    """Whether a xacro file only has colours, properties and macros for other files to include."""
     own = subject.sources[0].root.children if subject.sources else []
     offers = any(tag.name in ("xacro:macro", "xacro:property", "xacro:include", "material", "gazebo") for tag in own)
     return offers and all(tag.name in ("material", "gazebo") for tag in subject.root.children)
@@ -272,7 +277,7 @@ def loader_mistakes(subject: Subject, severity: Severity) -> list[Mistake]:
 def _message(severity: Severity, at: Tag | Place, text: str) -> tuple[Severity, Mistake]:
     fix = "fix it as described" if severity == "error" else "check that this is intended"
     if text.startswith("<robot> has no name="):
-        fix = "add one; a file that others include is checked with the one that includes it"
+        fix = "add one; to check a file that others include, check the file that includes it"
     return severity, Mistake(at, text, fix)
 
 
@@ -291,7 +296,7 @@ def _robot(root: Tag) -> Tag:
 
 def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
     by_line: dict[int, list[Tag]] = {}
-    for tag in elements(root):
+    for tag in root.walk():
         by_line.setdefault(tag.line, []).append(tag)
     severity: Severity = "warning"
     try:
@@ -303,30 +308,24 @@ def _load(subject: Subject, root: Tag, text: str, place: str) -> None:
     for line in lines:
         where, message = split(line, subject.path)
         here = by_line.get(where.line, []) if where.file == place else []
-        # A line may contain several elements; the message starts with the one it is about.
+        # A line may contain several elements; the message starts with the one that it refers to.
         at = next((tag for tag in here if message.startswith(f"{tag} ")), here[0] if here else where)
         subject.messages.append(_message(severity, at, message))
 
 
 def _refusals(subject: Subject) -> Iterator[tuple[Severity, Mistake]]:
-    """What a sim refuses in a robot that could be loaded."""
-    assert subject.model is not None
+    """The reason why a sim refuses a robot that could be loaded, if it does."""
     try:
-        check_simulated(subject.model)
+        check_simulated(subject.loaded)
     except RobotError as error:
         yield _message("error", subject.root, str(error))
 
 
 def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:
-    """Element of the expanded text -> its place in a source file, or in the text if unknown."""
+    """Element of the expanded text -> its place in a source file or, if that is unknown, in the text."""
     try:
-        marks = trace(subject.sources, root, subject.packages)
+        known = trace(subject.sources, root, subject.packages)
     except (RobotError, OSError):
-        marks = []
-    tags = list(elements(root))
-    places = {tag: Place(str(subject.path), tag.line, True) for tag in tags}
-    for tag, mark in zip(tags, marks, strict=False):
-        number, colon, line = mark.partition(":")
-        if colon:
-            places[tag] = Place(str(subject.sources[int(number)].path), int(line))
-    return places
+        known = []
+    places = {tag: Place(str(subject.path), tag.line, True) for tag in root.walk()}
+    return places | {tag: Place(str(file), line) for tag, file, line in known}

@@ -1,10 +1,10 @@
-"""For each rule, how a file goes wrong and how it is right."""
+"""For each rule, a wrong example and the right one."""
 
 from typing import NamedTuple
 
 
 class Example(NamedTuple):
-    """Two ways to write a part of a robot file: with `wrong` the rule finds something, with `right` it does not."""
+    """Two versions of a part of a robot file: the rule finds something in `wrong`, and nothing in `right`."""
 
     wrong: str
     right: str

@@ -1,144 +1,104 @@
-"""The placement of a robot's shapes with all joints at zero, and which of its parts are wheels."""
+"""The poses of a robot's shapes with all joints at zero, and which of its parts are wheels."""
 
 import math
 import re
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from holozen.robot.elements import Tag, Vector
+import numpy as np
+import numpy.typing as npt
+
+from holozen.robot.elements import Tag
 from holozen.robot.errors import RobotError
 from holozen.robot.meshes import hull
 from holozen.robot.model import Joint, RobotModel, Shape
-from holozen.robot.rigid import Frame, joint_axes, link_frames
+from holozen.robot.rigid import Frame, farthest, joint_axes, link_frames
+from holozen.robot.rotation import Array, triple
+from holozen.robot.shapes import solid
 
-Box = tuple[Vector, Vector]  # lowest and highest x, y, z
+Box = tuple[Array, Array]  # lowest and highest x, y, z
 
-UP: Vector = (0.0, 0.0, 1.0)
+UP, DOWN = np.array((0.0, 0.0, 1.0)), np.array((0.0, 0.0, -1.0))
+WAYS = np.vstack([np.eye(3), -np.eye(3)])
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """A shape of `link` in the root frame, metres: its centre and its own x, y, z axes.
-
-    `half` are the half sizes of the box around it; a cylinder's axis is its z. `points` are those of a mesh's hull.
+    """A shape of `link`, a "collision" or "visual" by its `use`, with its `frame` in the root frame; in metres. `solid`
+    is the shape, or the hull of a mesh. Its bounding box along its own axes has its centre at `centre`, in the root
+    frame, and the half sizes `half`; a cylinder's axis is its z.
     """
 
     link: str
-    use: str  # "collision" or "visual"
+    use: str
     shape: Shape
-    centre: Vector
-    axes: tuple[Vector, Vector, Vector]
-    half: Vector
-    points: tuple[Vector, ...] = ()
+    solid: Shape
+    frame: Frame
+    centre: Array
+    half: Array
 
-    def farthest(self, way: Vector) -> Vector:
-        """The point of the shape that is farthest along the unit vector `way`."""
-        x, y, z = (dot(axis, way) for axis in self.axes)
-        if self.shape.kind == "sphere":
-            return along(self.centre, way, self.half[0])
-        if self.shape.kind == "cylinder":
-            across = math.hypot(x, y)
-            radius = self.half[0] / across if across > 1e-9 else 0.0
-            return self.at((x * radius, y * radius, math.copysign(self.half[2], z)))
-        if self.points:
-            return self.at(max(self.points, key=lambda point: dot(point, (x, y, z))))
-        sx, sy, sz = (math.copysign(half, part) for half, part in zip(self.half, (x, y, z), strict=True))
-        return self.at((sx, sy, sz))
+    def farthest(self, way: Array) -> Array:
+        """The point (3,) of the shape that is farthest along the unit vector `way`, both in the root frame."""
+        found = farthest(self.solid, way @ self.frame.rotation)
+        assert found is not None, "what has no extent is not placed"
+        return self.frame.position + self.frame.rotation @ found
 
-    def at(self, own: Vector) -> Vector:
-        """A point given in the shape's own frame."""
-        point = self.centre
-        for axis, value in zip(self.axes, own, strict=True):
-            point = along(point, axis, value)
-        return point
-
-    def holds(self, point: Vector) -> bool:
-        """Whether a point lies inside."""
-        away = minus(point, self.centre)
-        x, y, z = (dot(axis, away) for axis in self.axes)
-        if self.shape.kind == "sphere":
-            return math.hypot(x, y, z) < self.half[0]
-        if self.shape.kind == "cylinder":
-            return math.hypot(x, y) < self.half[0] and abs(z) < self.half[2]
-        return abs(x) < self.half[0] and abs(y) < self.half[1] and abs(z) < self.half[2]
+    def holds(self, points: Array) -> npt.NDArray[np.bool_]:
+        """Which of the points (n, 3), in the root frame, lie inside: (n,)."""
+        own = np.abs((points - self.centre) @ self.frame.rotation)
+        inside: npt.NDArray[np.bool_] = np.all(own < self.half, axis=1)
+        if self.solid.kind in ("cylinder", "sphere"):
+            inside &= np.linalg.norm(own[:, : 2 if self.solid.kind == "cylinder" else 3], axis=1) < self.half[0]
+        return inside
 
 
 def place_shapes(model: RobotModel) -> Iterator[Placed]:
-    """Every shape with a size: not planes, and not meshes that are missing or cannot be read."""
+    """Every shape with an extent: not planes, and not meshes that are missing or cannot be read."""
     frames = link_frames(model)
     for link in model.links.values():
         for use, shapes in (("collision", link.collisions), ("visual", link.visuals)):
             for shape in shapes:
-                frame = frames[link.name] @ Frame.of(shape.pose)
-                yield from _placed(link.name, use, shape, frame)
+                frame, found = frames[link.name] @ Frame.of(shape.pose), _solid(shape)
+                if box := extent(found):
+                    low, high = box
+                    centre = frame.position + frame.rotation @ (low + high) / 2
+                    yield Placed(link.name, use, shape, found, frame, centre, (high - low) / 2)
 
 
-def half_sizes(shape: Shape) -> Vector | None:
-    """Half the sizes of a box, cylinder or sphere; None for anything else."""
-    if shape.kind == "box":
-        return shape.size[0] / 2, shape.size[1] / 2, shape.size[2] / 2
-    if shape.kind == "cylinder":
-        return shape.size[0], shape.size[0], shape.size[1] / 2
-    return (shape.size[0],) * 3 if shape.kind == "sphere" else None
+def extent(shape: Shape) -> Box | None:
+    """The bounding box of a shape, in its own frame; None for a shape without extent."""
+    ends = [end for way in WAYS if (end := farthest(shape, way)) is not None]
+    return around(ends) if ends else None
 
 
-def around(points: Iterable[Vector]) -> Box:
-    """The box around points."""
-    x, y, z = zip(*points, strict=True)
-    return (min(x), min(y), min(z)), (max(x), max(y), max(z))
+def around(points: Iterable[Array]) -> Box:
+    """The bounding box of points (3,), of at least one."""
+    every = np.stack(list(points))
+    return every.min(axis=0), every.max(axis=0)
 
 
 def box_of(shapes: Iterable[Placed]) -> Box | None:
-    """The box around shapes, in the root frame."""
-    ways = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), UP]
-    points = [shape.farthest(turn) for shape in shapes for way in ways for turn in (way, minus((0, 0, 0), way))]
+    """The bounding box of shapes, in the root frame; None for no shapes."""
+    points = [shape.farthest(way) for shape in shapes for way in WAYS]
     return around(points) if points else None
 
 
-def size_of(box: Box) -> Vector:
-    """Length, width and height."""
-    return minus(box[1], box[0])
+def size_of(box: Box) -> Array:
+    """Length, width and height (3,) in metres."""
+    return box[1] - box[0]
 
 
-def dot(a: Vector, b: Vector) -> float:
-    """The scalar product."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def minus(a: Vector, b: Vector) -> Vector:
-    """From b to a."""
-    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
-
-
-def along(start: Vector, way: Vector, far: float) -> Vector:
-    """The point `far` from `start` along `way`."""
-    return start[0] + way[0] * far, start[1] + way[1] * far, start[2] + way[2] * far
-
-
-def _placed(link: str, use: str, shape: Shape, frame: Frame) -> Iterator[Placed]:
-    x, y, z = (tuple(column) for column in frame.rotation.T.tolist())
-    half, points = half_sizes(shape), _points(shape)
-    if half:
-        yield Placed(link, use, shape, frame.xyz, (x, y, z), half)
-    elif points:
-        low, high = around(points)
-        middle = along(low, minus(high, low), 0.5)
-        centre = Placed(link, use, shape, frame.xyz, (x, y, z), high).at(middle)
-        yield Placed(link, use, shape, centre, (x, y, z), minus(high, middle), tuple(minus(p, middle) for p in points))
-
-
-def _points(shape: Shape) -> tuple[Vector, ...]:
-    if shape.kind != "mesh" or shape.path is None:
-        return shape.points
-    x, y, z = shape.size
-    try:
-        return hull(shape.path, (x, y, z))
-    except RobotError:
-        return ()
+def _solid(shape: Shape) -> Shape:
+    if shape.kind == "mesh" and shape.path and not shape.points:
+        try:
+            return replace(shape, kind="hull", points=hull(shape.path, triple(shape.size)))
+        except RobotError:
+            return shape
+    return solid(shape)
 
 
 def fixed_bodies(model: RobotModel) -> list[list[str]]:
-    """Links that fixed joints connect to one rigid body; the one nearest to the root first."""
+    """The rigid bodies of a robot: for each, the links that fixed joints connect, the one nearest to the root first."""
     fixed = {joint.child: joint.parent for joint in model.joints.values() if joint.kind not in MOVING}
     bodies: dict[str, list[str]] = {}
     for name in model.links:
@@ -149,6 +109,11 @@ def fixed_bodies(model: RobotModel) -> list[list[str]]:
         if name != head:
             bodies[head].append(name)
     return list(bodies.values())
+
+
+def body_of(link: str, model: RobotModel) -> list[str]:
+    """The links of the rigid body that a link belongs to."""
+    return next(body for body in fixed_bodies(model) if link in body)
 
 
 # Wheels.
@@ -164,14 +129,14 @@ _NOT_ROLLING = re.compile(r"steer|caster|castor|swivel|roller|rotor|prop", re.IG
 _CASTER = re.compile(r"caster|castor|ball|swivel|roller", re.IGNORECASE)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Wheel:
     """A link that turns on a continuous joint and rolls, with the `links` fixed to it. `shape` is its collision shape,
     else its visual one.
     """
 
     joint: Joint
-    axis: Vector
+    axis: Array
     shape: Placed
     sure: bool
     links: tuple[str, ...]
@@ -179,36 +144,39 @@ class Wheel:
     @property
     def rolls(self) -> bool:
         """Whether the axle is level enough for the wheel to stand on the ground."""
-        return abs(dot(self.axis, UP)) < 0.5
+        return bool(abs(self.axis @ UP) < 0.5)
 
     @property
     def bottom(self) -> float:
-        """The height of its lowest point in the root frame, metres."""
-        return self.shape.farthest((0.0, 0.0, -1.0))[2]
+        """z of its lowest point in the root frame, in metres."""
+        return float(self.shape.farthest(DOWN)[2])
 
     @property
     def half_width(self) -> float:
-        """From the centre along the axle, metres."""
+        """Half of its extent along the axle, in metres."""
         return self._reach(self.axis)
 
     @property
     def radius(self) -> float:
-        """From the axle, metres."""
-        across = [axis for axis in self.shape.axes if abs(dot(axis, self.axis)) < 0.5]
-        return max(map(self._reach, across or self.shape.axes))
+        """Its largest distance from the axle, in metres."""
+        axes = self.shape.frame.rotation.T
+        across = [axis for axis in axes if abs(axis @ self.axis) < 0.5]
+        return max(map(self._reach, across or axes))
 
     @property
     def slack(self) -> float:
-        """Tolerance, metres."""
+        """The tolerance of its position, in metres."""
         return max(LEAST, SLACK * self.radius)
 
-    def _reach(self, way: Vector) -> float:
-        return dot(minus(self.shape.farthest(way), self.shape.centre), way)
+    def _reach(self, way: Array) -> float:
+        return float((self.shape.farthest(way) - self.shape.centre) @ way)
 
 
 def find_wheels(model: RobotModel, placed: Iterable[Placed], named: Iterable[tuple[Tag, str]]) -> list[Wheel]:
-    """Wheels are on continuous joints of the body, carry nothing movable, and are named by a plugin, called a
-    wheel, or (not `sure`) are cylinders no longer than wide.
+    """The wheels: links on continuous joints of the body that carry no moving part, and that either a plugin names or
+    whose own name is that of a wheel (`sure`), or that are cylinders no longer than wide (not `sure`).
+
+    `named` are the elements and names of the joints that plugins name.
     """
     bodies = {body[0]: body for body in fixed_bodies(model)}
     axes, shapes = joint_axes(model), _by_body(placed, bodies.values())
@@ -220,7 +188,7 @@ def find_wheels(model: RobotModel, placed: Iterable[Placed], named: Iterable[tup
             links = bodies[joint.child]
             sure = joint.name in driven or is_called_wheel(joint.name, *links)
             if sure or _is_disc(joint, shape):
-                wheels.append(Wheel(joint, axes[joint.name].direction, shape, sure, tuple(links)))
+                wheels.append(Wheel(joint, np.array(axes[joint.name].direction), shape, sure, tuple(links)))
     return wheels
 
 
@@ -253,7 +221,7 @@ def _by_body(placed: Iterable[Placed], bodies: Iterable[list[str]]) -> dict[str,
 
 
 def _is_free(joint: Joint, model: RobotModel, body: list[str]) -> bool:
-    """No other joint moves above it or below it: casters, rollers and suspensions are left alone."""
+    """Whether no other joint above or below it moves: the wheels of casters, rollers and suspensions do not count."""
     above = {other.child: other for other in model.joints.values()}
     below = [other for other in model.joints.values() if other.parent in body]
     if any(other.kind in MOVING for other in below):

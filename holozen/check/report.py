@@ -1,4 +1,4 @@
-"""A robot file -> everything that is wrong with it: the table of rules, and the findings in order."""
+"""A robot file -> all its mistakes: the table of rules, and their findings in order."""
 
 import re
 from collections.abc import Collection, Iterable, Mapping
@@ -38,53 +38,25 @@ from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, FORCE, OMNI, kind_of
 from holozen.robot.packages import readable
 from holozen.robot.sources import handlers
+from holozen.robot.xacro import XacroFile
 from holozen.suggest import shorten
 
-# A file that cannot be read.
+# The rules.
 
 
-def how_to_fix(reason: str) -> tuple[str, str]:
-    """Why a file cannot be read, and the fix, with which messages about broken XML end."""
-    if "broken XML" in reason:
-        problem, _, fix = reason.rpartition("; ")
-        return problem, fix
-    if "is a world" in reason:
-        return reason, "check takes a robot, or a single <model>"
-    return reason, "fix this, then the rest is checked"
-
-
-# The rules, in the order in which they are best fixed.
-
-
-FATAL = Rule(
-    "file",
-    "error",
-    "a file that is not a robot: broken XML, xacro that cannot be expanded",
-    "nothing in it is usable",
-    lambda _: (),  # `examine` reports it
-)
-LOAD = Rule(
-    "load",
-    "error",
-    "other mistakes that prevent loading",
-    "the robot cannot be spawned",
-    partial(loader_mistakes, severity="error"),
-)
-NOTE = Rule(
-    "load-note",
-    "warning",
-    "other values that are replaced on loading",
-    "the robot differs from the file",
-    partial(loader_mistakes, severity="warning"),
-)
+# `check` itself reports the first.
+FATAL = Rule("file", "error", "a file that is not a robot: broken XML, xacro that cannot be expanded",
+             "nothing in it is usable", lambda _: ())  # fmt: skip
+LOAD = Rule("load", "error", "other mistakes that prevent loading", "the robot cannot be spawned",
+            partial(loader_mistakes, severity="error"))  # fmt: skip
+NOTE = Rule("load-note", "warning", "other values that are replaced or ignored on loading",
+            "the robot differs from the file", partial(loader_mistakes, severity="warning"))  # fmt: skip
 
 MODULES = (
     rules_xml, rules_names, rules_joints, rules_inertia, rules_wheels, rules_plugins, rules_meshes, requirements,
 )  # fmt: skip
 RULES = [value for module in MODULES for value in vars(module).values() if isinstance(value, Rule)]
-"""All rules, in the order in which their findings are best fixed."""
-
-
+"""The rules that inspect a file, in the order in which their findings are best fixed."""
 EVERY = (FATAL, LOAD, NOTE, *RULES)
 
 
@@ -97,7 +69,7 @@ def table() -> str:
 
 
 def page() -> str:
-    """The rules as sections in Markdown, with an example each."""
+    """The rules as sections of Markdown, each with an example."""
     return "\n".join(
         f"## {rule.name}\n\n{rule.severity.capitalize()}: {rule.finds}, since {rule.why}. Wrong:\n\n"
         f"```xml\n{wrong.rstrip()}\n```\n\nRight:\n\n```xml\n{right.rstrip()}\n```\n"
@@ -113,7 +85,7 @@ def explain(rule: Rule) -> str:
 
 
 def sarif(findings: Iterable[Finding], version: str) -> dict[str, object]:
-    """The findings for editors and CI, as a log in SARIF 2.1.0 (OASIS)."""
+    """The findings as a log in SARIF 2.1.0 (OASIS), for editors and CI."""
     rules = [
         {
             "id": rule.name,
@@ -162,7 +134,7 @@ SARIF = "https://json.schemastore.org/sarif-2.1.0.json"
 
 MOST = 100  # findings of one rule
 LONGEST = 2000  # characters of a problem, and of its fix
-WHOLE = ("tree", "no-inertia", "place", "tag")  # the loader reports on the whole robot where these name a link
+WHOLE = ("tree", "no-inertia", "place", "tag")  # rules that name a link where the loader reports on the whole robot
 
 _LONG = re.compile(r"\S{301,}")  # paths may be long
 
@@ -174,14 +146,15 @@ def check(
     requirements: Requirements = Requirements(),  # noqa: B008
     allow_env: Collection[str] = (),
 ) -> tuple[list[Finding], str]:
-    """The findings in a xacro, URDF or SDF file, by place, and a one-line summary of it. `args`, `packages` and
-    `allow_env` as for `xacro.expand_xacro`. A file that cannot be read has one finding and no summary.
+    """The findings in a xacro, URDF or SDF file, in the order of their places, and a one-line summary of the robot.
+    `args`, `packages` and `allow_env` as for `xacro.expand_xacro`. For a file that cannot be read there is one finding
+    and an empty summary.
     """
     try:
         return reader.run(
-            tuple[list[Finding], str], path, _check, path, args, packages, requirements, allow_env,
+            tuple[list[Finding], str], path, _check, path, [*args], packages, requirements,
             readable=partial(_readable, path, packages, requirements),
-            handlers=handlers(path, args, packages, allow_env),
+            handlers=handlers(XacroFile(path, args, packages, allow_env)),
         )  # fmt: skip
     except RobotError as error:
         return [_fatal(path, str(error))], ""
@@ -193,13 +166,9 @@ def _readable(path: Path, packages: Mapping[str, Path], requirements: Requiremen
 
 
 def _check(
-    path: Path,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    requirements: Requirements,
-    allow_env: Collection[str],
+    path: Path, given: Collection[str], packages: Mapping[str, Path], requirements: Requirements
 ) -> tuple[list[Finding], str]:
-    subject = read(path, args, packages, requirements, allow_env)
+    subject = read(path, given, packages, requirements)
     mistakes = [(rule, mistake) for rule in RULES for mistake in _first(rule, subject)]
     mistakes += [(rule, mistake) for rule in (LOAD, NOTE) for mistake in _unreported(rule, subject, mistakes)]
     findings = [_finding(rule, mistake, subject) for rule, mistake in mistakes]
@@ -231,7 +200,7 @@ def _counted(count: int, thing: str) -> str:
 
 
 def _once(findings: Iterable[Finding], expanded: bool) -> Iterable[Finding]:
-    """Each finding once; if a macro repeats a line, only its first."""
+    """The findings without duplicates; of a line that a macro repeats, only the first."""
     first: dict[tuple[str, Place, str], Finding] = {}
     for finding in findings:
         traced = expanded and finding.place.line and not finding.place.expanded
@@ -244,9 +213,9 @@ def _order(place: Place, file: str) -> tuple[bool, str, bool, int]:
 
 
 def _first(rule: Rule, subject: Subject) -> list[Mistake]:
-    """The findings of a rule, at most MOST: a file full of mistakes has to finish soon too."""
+    """The first findings of a rule, at most MOST: a file full of mistakes has to finish soon too."""
     found = list(islice(rule.find(subject), MOST + 1))
-    more = [Mistake(None, f"there are more than {MOST} findings of this kind", "fix those first")]
+    more = [Mistake(None, f"there are more than {MOST} findings of this kind", "fix these first")]
     return found if len(found) <= MOST else found[:MOST] + more
 
 
@@ -254,13 +223,17 @@ def _fatal(path: Path, message: str) -> Finding:
     place, problem = split(message, path)
     if place.file == f"{path}{EXPANDED}":
         place = Place(str(path), place.line, True)
-    problem, fix = how_to_fix(problem)
+    fix = (
+        "check takes a robot, or a single <model>" if "is a world" in problem else "fix this, then the rest is checked"
+    )
+    if "broken XML" in problem:  # such a message ends with the fix
+        problem, _, fix = problem.rpartition("; ")
     return Finding(FATAL.name, FATAL.severity, place, problem, FATAL.why, fix)
 
 
 def _unreported(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mistake]]) -> list[Mistake]:
-    """The loader's warnings about elements in which no rule found anything, and its error unless a rule found one in
-    that part: an error has several consequences, and a warning hidden by another one is never seen.
+    """The loader's warnings about elements in which no rule found anything; its error unless a rule found an error in
+    the same part of the robot: one mistake may be the cause of both.
     """
     found = [(other, mistake.at) for other, mistake in mistakes if isinstance(mistake.at, Tag)]
     if rule is NOTE:
@@ -276,17 +249,15 @@ def _unreported(rule: Rule, subject: Subject, mistakes: Iterable[tuple[Rule, Mis
 
 
 def _inertial(tag: Tag) -> Tag:
-    """The `<inertial>` of a mass or an inertia: the loader speaks of the whole; of others the element itself."""
+    """The `<inertial>` around a mass or an inertia, to which the loader's messages refer; any other element itself."""
     return tag.parent if tag.parent and tag.parent.name == "inertial" else tag
 
 
 def _finding(rule: Rule, mistake: Mistake, subject: Subject) -> Finding:
-    place: Place = subject.place(mistake.at)
-    return Finding(
-        rule.name, rule.severity, place, _short(mistake.problem), rule.why, _short(mistake.fix), mistake.edit
-    )
+    problem, fix = _short(mistake.problem), _short(mistake.fix)
+    return Finding(rule.name, rule.severity, subject.place(mistake.at), problem, rule.why, fix, mistake.edit)
 
 
 def _short(text: str) -> str:
-    """The text with long words, and itself, truncated: file contents may be of any length."""
+    """The text, truncated, and the long words in it too: they are from the file, and may have any length."""
     return shorten(_LONG.sub(lambda word: shorten(word[0]), text), LONGEST)

@@ -1,4 +1,4 @@
-"""What a task requires of a robot: a size (--fits), and names of links and joints (--require)."""
+"""The requirements of a task: the size of the robot (--fits), and the names of links and joints (--require)."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from holozen.check.engine import Mistake, Place, Subject, rule
 from holozen.check.geometry import box_of, size_of
 from holozen.check.rules_inertia import dimensions
+from holozen.robot.elements import read_text
 from holozen.robot.errors import RobotError
 from holozen.robot.model import JOINT_KINDS
-from holozen.robot.xacro import read_text
 from holozen.suggest import listed, suggest
 
 GRAIN = 1e-6  # m; rounding error of sums of decimals
@@ -24,10 +24,10 @@ class Need:
 
 
 @rule("fits", "error", "a robot larger than --fits", "the task sets its size")
-def too_large(subject: Subject) -> Iterator[Mistake]:
-    """A robot larger than --fits: collision shapes, and visual ones except meshes, all joints at zero."""
+def _too_large(subject: Subject) -> Iterator[Mistake]:
+    """Measures collision shapes, and visual ones except meshes, with all joints at zero."""
     fits = subject.requirements.fits
-    shapes = [shape for shape in subject.placed if shape.use == "collision" or not shape.points]
+    shapes = [shape for shape in subject.placed if shape.use == "collision" or shape.solid.kind != "hull"]
     box = box_of(shapes)
     if not fits or subject.model is None:
         return
@@ -44,8 +44,7 @@ def too_large(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("require-file", "error", "an invalid line of --require", "it checks nothing")
-def bad_needs(subject: Subject) -> Iterator[Mistake]:
-    """Invalid lines of the --require file."""
+def _bad_needs(subject: Subject) -> Iterator[Mistake]:
     for line, need in _needs(subject):
         if isinstance(need, str):
             fix = "write `link NAME` or `joint NAME`, or `joint NAME TYPE`; # starts a comment"
@@ -53,15 +52,14 @@ def bad_needs(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("require", "error", "a missing link or joint of --require", "the task sets its names")
-def missing_names(subject: Subject) -> Iterator[Mistake]:
-    """Links and joints of the --require file that are missing, or joints of another type."""
+def _missing_names(subject: Subject) -> Iterator[Mistake]:
     for _, need in _needs(subject):
         if isinstance(need, str):
             continue
         there = subject.links if need.kind == "link" else subject.joints
         if need.name not in there:
             problem = f"there is no {need.kind} {need.name!r}{suggest(need.name, there)}"
-            yield Mistake(subject.root, problem, f"rename or add one; there are: {listed(list(there))}")
+            yield Mistake(subject.root, problem, f"rename or add one; there are: {listed(there)}")
         elif need.type and (kind := there[need.name].attributes.get("type")) != need.type:
             yield Mistake(there[need.name], f"joint {need.name!r} is {kind}, not {need.type}", f'type="{need.type}"')
 

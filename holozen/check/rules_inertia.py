@@ -1,18 +1,20 @@
-"""Mass and inertia: whether a body can have them, and whether this one could."""
+"""Mass and inertia: whether they are physically possible, and whether they suit the shape."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from holozen.check.engine import Edit, Mistake, Subject, rule
-from holozen.check.geometry import MOVING, box_of, fixed_bodies, half_sizes, size_of
-from holozen.robot.elements import Tag, Vector, number
+from holozen.check.geometry import MOVING, box_of, extent, fixed_bodies, size_of
+from holozen.robot.elements import Tag, number
 from holozen.robot.inertia import of_shapes, positive_definite
-from holozen.robot.model import HERE, Link
+from holozen.robot.model import HERE, Link, Moments
 from holozen.robot.rigid import FALLS, falls_through
+from holozen.robot.rotation import Array
+from holozen.robot.shapes import SHAPES
 from holozen.suggest import listed
 
 FACTOR = 10.0  # between the given inertia and that of the solid shape
-MINOR = 0.1  # of the mass of what a link is fixed to; the inertia of a smaller part is irrelevant
+MINOR = 0.1  # of the mass of the rigid body; the inertia of a lighter link in it is irrelevant
 DENSEST = 25_000.0  # kg/m^3; osmium has 22 600
 STEEL = 8_000.0  # kg/m^3
 LIGHT = 2.0  # kg; lighter parts are often drawn smaller than they are
@@ -20,7 +22,6 @@ ROUNDING = 0.01  # of the trace: numbers are written with few digits
 
 COMPUTE = "compute it from the shape"
 
-Tensor = tuple[float, float, float, float, float, float]
 WORDS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -32,7 +33,7 @@ class Given:
     mass_tag: Tag | None
     mass: float | None
     inertia_tag: Tag | None
-    inertia: Tensor | None
+    inertia: Moments | None
 
 
 def read_inertial(link: Tag) -> Given | None:
@@ -45,9 +46,14 @@ def read_inertial(link: Tag) -> Given | None:
     return Given(tag, mass, value, inertia, _tensor(inertia) if inertia else None)
 
 
+def _inertials(subject: Subject) -> Iterator[tuple[str, Given]]:
+    """The name of each link with an <inertial>, and that."""
+    return ((name, given) for name, tag in subject.links.items() if (given := read_inertial(tag)))
+
+
 @rule("no-inertia", "error", "a body without mass", "Gazebo drops it, or it cannot move")
-def no_inertia(subject: Subject) -> Iterator[Mistake]:
-    """Bodies without mass: a link, with all that is fixed to it, that a joint moves or that others move on."""
+def _no_inertia(subject: Subject) -> Iterator[Mistake]:
+    """A body is a link with all links fixed to it."""
     if subject.model is None or subject.model.static or subject.sdf:
         return  # SDF: a link without <inertial> has 1 kg
     weighed = {name for name, tag in subject.links.items() if tag.first("inertial")}
@@ -61,18 +67,17 @@ def no_inertia(subject: Subject) -> Iterator[Mistake]:
         solid = [name for name in group if subject.model.links[name].collisions and name not in weighed]
         carrying = [name for name in solid if _carries(name, subject)]
         if not weighed & set(group) and (len(fixed_bodies(subject.model)) > 1 or solid):
-            yield Mistake(lead, f"link {group[0]!r} has no <inertial>{_and_fixed(group)}", "add mass and inertia")
+            fixed = f", and none of {len(group) - 1} fixed to it has one" if len(group) > 1 else ""
+            yield Mistake(lead, f"link {group[0]!r} has no <inertial>{fixed}", "add mass and inertia")
         elif carrying:
             tag = subject.links[carrying[0]]
             yield Mistake(tag, f"link {carrying[0]!r} has a collision and moving parts but no <inertial>", "add one")
 
 
 @rule("mass", "error", "a negative or missing mass", "it is physically impossible")
-def bad_mass(subject: Subject) -> Iterator[Mistake]:
-    """Negative or missing masses."""
-    for name, tag in subject.links.items():
-        given = read_inertial(tag)
-        if given is None or (given.mass_tag is None and subject.sdf):
+def _bad_mass(subject: Subject) -> Iterator[Mistake]:
+    for name, given in _inertials(subject):
+        if given.mass_tag is None and subject.sdf:
             continue
         if given.mass_tag is None:
             yield Mistake(given.tag, f"the <inertial> of link {name!r} has no <mass>", 'add <mass value="..."/>, in kg')
@@ -85,28 +90,25 @@ def bad_mass(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("massless", "warning", "a mass or an inertia of zero", "Gazebo drops such a link")
-def no_mass(subject: Subject) -> Iterator[Mistake]:
-    """Links with a mass of zero or without moments of inertia, which are loaded nevertheless."""
-    for name, tag in subject.links.items():
-        given = read_inertial(tag)
-        if given and given.mass == 0 and given.mass_tag:
+def _no_mass(subject: Subject) -> Iterator[Mistake]:
+    for name, given in _inertials(subject):
+        if given.mass == 0 and given.mass_tag:
             fix = "give it its mass in kg, or remove the <inertial> if it is only a frame"
             yield Mistake(given.mass_tag, f"link {name!r} has a mass of 0 kg", fix)
-        elif given and given.mass and given.inertia and not any(given.inertia):
+        elif given.mass and given.inertia and not any(given.inertia):
             problem = f"the inertia of link {name!r} is zero"
             yield Mistake(given.inertia_tag, problem, COMPUTE, _computed(name, given, subject))
 
 
 @rule("heavy", "warning", "a mass impossible for its size", "motors and contacts fail")
-def absurd_mass(subject: Subject) -> Iterator[Mistake]:
+def _absurd_mass(subject: Subject) -> Iterator[Mistake]:
     """Links denser than any metal, and robots denser than steel."""
     total, dense = 0.0, False
-    for name, tag in subject.links.items():
-        given = read_inertial(tag)
-        mass = given.mass if given and given.mass else 0.0
+    for name, given in _inertials(subject):
+        mass = given.mass or 0.0
         total += max(mass, 0.0)
         box = box_of([shape for shape in subject.placed if shape.link == name])
-        if given and box and mass > LIGHT and _volume(size_of(box)) * DENSEST < mass:
+        if box and mass > LIGHT and _volume(size_of(box)) * DENSEST < mass:
             problem = f"link {name!r} has {mass:g} kg in {dimensions(size_of(box))}, denser than any metal"
             yield Mistake(given.mass_tag, problem, "write kilograms, and sizes in metres")
             dense = True
@@ -117,31 +119,26 @@ def absurd_mass(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("inertia", "error", "a physically impossible inertia", "the robot shakes or flies off")
-def impossible_inertia(subject: Subject) -> Iterator[Mistake]:
-    """Impossible inertias: missing, not positive definite, or one moment above the sum of the other two."""
-    for name, tag in subject.links.items():
-        given = read_inertial(tag)
-        if given is None or given.mass == 0 or (given.inertia_tag is None and (subject.sdf or not given.mass)):
+def _impossible_inertia(subject: Subject) -> Iterator[Mistake]:
+    """Missing, not positive definite, or with one moment above the sum of the other two."""
+    for name, given in _inertials(subject):
+        if given.mass == 0 or (given.inertia_tag is None and (subject.sdf or not given.mass)):
             continue
         if given.inertia_tag is None:
             problem = f"link {name!r} has a mass and no <inertia>"
             yield Mistake(given.tag, problem, "add one", _computed(name, given, subject))
-        elif not subject.sdf and any(given.inertia or ()) and (left_out := _left_out(given.inertia_tag)):
-            problem = f"the inertia of link {name!r} has no {' and no '.join(left_out)}, and what is left out is 0"
+        elif not subject.sdf and any(given.inertia or ()) and (lost := _missing_moments(given.inertia_tag)):
+            problem = f"the inertia of link {name!r} has no {' and no '.join(lost)}; omitted values are 0"
             yield Mistake(given.inertia_tag, problem, COMPUTE, _computed(name, given, subject))
         elif given.inertia and any(given.inertia) and (problem := impossible(given.inertia)):
             problem = f"the inertia of link {name!r} {problem}"
             yield Mistake(given.inertia_tag, problem, COMPUTE, _computed(name, given, subject))
 
 
-@rule(
-    "inertia-size",
-    "warning",
-    "an inertia 10 times larger or smaller than the shape's",
-    "it turns too hard or too easily",
-)
-def unlike_shape(subject: Subject) -> Iterator[Mistake]:
-    """Inertias that differ tenfold from those of the link's shape, solid and of the link's mass."""
+@rule("inertia-size", "warning", "an inertia 10 times larger or smaller than the shape's",
+      "it turns too hard or too easily")  # fmt: skip
+def _unlike_shape(subject: Subject) -> Iterator[Mistake]:
+    """Compares with a solid body of the link's shape and mass."""
     if subject.model is None:
         return
     for group in fixed_bodies(subject.model):
@@ -159,27 +156,23 @@ def unlike_shape(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("floating", "warning", "a body without gravity", "nothing keeps it on the ground")
-def floating(subject: Subject) -> Iterator[Mistake]:
-    """Bodies that gravity does not pull, or only by less than half of their mass."""
+def _floating(subject: Subject) -> Iterator[Mistake]:
+    """Gravity is off for more than half of the mass of a body."""
     if subject.model is None or subject.model.static:
         return
     for group in fixed_bodies(subject.model):
         masses = {name: inertial.mass for name in group if (inertial := subject.model.links[name].inertial)}
         light = [name for name in masses if not subject.model.links[name].gravity]
         if light and sum(masses[name] for name in light) > sum(masses.values()) / 2:
-            problem = f"gravity is off for link {light[0]!r}, so {_whole(light[0], group)} floats"
+            whole = "it" if group == light[:1] else f"what is fixed together with it ({listed(group)})"
+            problem = f"gravity is off for link {light[0]!r}, so {whole} floats"
             yield Mistake(_gravity(light[0], subject), problem, "remove that setting unless it is meant to float")
 
 
 @rule("no-collision", "warning", "a robot without a collision shape", "nothing carries it")
-def bodiless(subject: Subject) -> Iterator[Mistake]:
-    """Robots that fall, since nothing of them touches the ground."""
+def _bodiless(subject: Subject) -> Iterator[Mistake]:
     if subject.model is not None and falls_through(subject.model):
         yield Mistake(subject.root, f"{subject.root} {FALLS}", "give a link a <collision>")
-
-
-def _whole(name: str, group: list[str]) -> str:
-    return "it" if group == [name] else f"what is fixed together with it ({listed(group)})"
 
 
 def _gravity(link: str, subject: Subject) -> Tag:
@@ -189,8 +182,8 @@ def _gravity(link: str, subject: Subject) -> Tag:
     return next((tag for tag in settings if "gravity" in tag.name.lower()), subject.links[link])
 
 
-def impossible(inertia: Tensor) -> str:
-    """Why no body can have this tensor, else nothing."""
+def impossible(inertia: Moments) -> str:
+    """Why no body can have these moments; empty if one can."""
     xx, xy, xz, yy, yz, zz = inertia
     if not positive_definite(xx, xy, xz, yy, yz, zz):
         return "is negative or not positive definite"
@@ -204,28 +197,29 @@ def impossible(inertia: Tensor) -> str:
 
 
 def solid_moment(link: Link, mass: float) -> float:
-    """The largest moment of inertia, about its centre, of the link's solid shape; 0 if it has none.
+    """The largest moment of inertia in kg m^2, about its centre, of the link's solid shape; 0 if it has none.
 
-    Uses the collision shape, else the visual one; of several the one that contains nearly all of their volume.
+    The shape is the collision shape, else the visual one; of several, the one with nearly all of their volume, if any.
     """
-    halves = [(half, shape) for shape in link.collisions or link.visuals if (half := half_sizes(shape))]
-    if not halves or len(halves) < len(link.collisions or link.visuals):
+    shapes = link.collisions or link.visuals
+    boxes = [box for shape in shapes if shape.kind in SHAPES and (box := extent(shape))]
+    if not shapes or len(boxes) < len(shapes):
         return 0.0
-    volumes = [_volume(half) for half, _ in halves]
+    volumes = [_volume(size_of(box)) for box in boxes]
     largest = max(volumes)
-    shape = replace(halves[volumes.index(largest)][1], pose=HERE)
+    shape = replace(shapes[volumes.index(largest)], pose=HERE)
     per_mass = of_shapes(replace(link, collisions=(shape,)))
     return mass * max(per_mass) if per_mass and sum(volumes) < 1.25 * largest else 0.0
 
 
-def dimensions(size: Vector) -> str:
-    """0.4 x 0.2 x 0.1 m."""
+def dimensions(size: Array) -> str:
+    """A size (3,) in metres as text, such as 0.4 x 0.2 x 0.1 m."""
     return " x ".join(f"{value:.3g}" for value in size) + " m"
 
 
 def _computed(name: str, given: Given, subject: Subject) -> Edit | None:
-    """The <inertia> of a link's solid collision shapes; None where axes of its own, no shape, or a mesh
-    that is not there leave it open.
+    """The edit that gives a link the <inertia> of its solid collision shapes; None if its inertial frame is rotated, or
+    it has no such shape, or a mesh is missing.
     """
     link = subject.model.links.get(name) if subject.model and not subject.sdf else None
     origin = given.tag.first("origin")
@@ -237,12 +231,12 @@ def _computed(name: str, given: Given, subject: Subject) -> Edit | None:
     return Edit("inertia", "<inertia>" if given.inertia_tag else "", f"<inertia {moments}/>", name)
 
 
-def _left_out(inertia: Tag) -> list[str]:
+def _missing_moments(inertia: Tag) -> list[str]:
     return [word for word in WORDS if word[1] == word[2] and inertia.given(word) is None]
 
 
-def _tensor(tag: Tag) -> Tensor | None:
-    """Omitted values are 0, in SDF 1 on the diagonal."""
+def _tensor(tag: Tag) -> Moments | None:
+    """The tensor of an <inertia>; None if a value is not a number. Omitted values are 0, in SDF 1 on the diagonal."""
     texts = [tag.given(word) or ("1" if tag.sdf and word[1] == word[2] else "0") for word in WORDS]
     values = [value for text in texts if (value := number(text)) is not None]
     if len(values) < len(WORDS):
@@ -252,13 +246,8 @@ def _tensor(tag: Tag) -> Tensor | None:
 
 
 def _carries(name: str, subject: Subject) -> bool:
-    assert subject.model is not None
-    return any(joint.parent == name and joint.kind in MOVING for joint in subject.model.joints.values())
+    return any(joint.parent == name and joint.kind in MOVING for joint in subject.loaded.joints.values())
 
 
-def _and_fixed(group: list[str]) -> str:
-    return f", and none of {len(group) - 1} fixed to it has one" if len(group) > 1 else ""
-
-
-def _volume(size: Vector) -> float:
-    return size[0] * size[1] * size[2]
+def _volume(size: Array) -> float:
+    return float(size.prod())

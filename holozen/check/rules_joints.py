@@ -5,15 +5,15 @@ from collections.abc import Iterator
 
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.robot.elements import Tag, number
-from holozen.robot.sources import elements
+from holozen.robot.model import MOVING
 from holozen.suggest import suggest
 
 LARGE_ANGLE = 20.0  # rad; more than three turns, and written as a round number of degrees
 
 
 @rule("limit", "error", "a revolute or prismatic joint without limit", "URDF parsers reject it")
-def no_limit(subject: Subject) -> Iterator[Mistake]:
-    """Revolute and prismatic joints without a <limit>; in SDF they are unlimited."""
+def _no_limit(subject: Subject) -> Iterator[Mistake]:
+    """Not in SDF, where a joint without <limit> is unlimited."""
     for tag in subject.root.all("joint") if not subject.sdf else ():
         if _is_bounded(tag) and tag.first("limit") is None:
             kind = tag.attributes["type"]
@@ -23,8 +23,7 @@ def no_limit(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("limit-range", "error", "a joint limit without range", "the joint cannot move")
-def empty_limit(subject: Subject) -> Iterator[Mistake]:
-    """Limits without range: lower above upper, or both the same."""
+def _empty_limit(subject: Subject) -> Iterator[Mistake]:
     for tag in subject.root.all("joint"):
         limit = _limit(tag, subject.sdf)
         if limit is None or not _is_bounded(tag):
@@ -38,11 +37,10 @@ def empty_limit(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("limit-effort", "warning", "a limit without effort or velocity", "motors have no strength")
-def no_effort(subject: Subject) -> Iterator[Mistake]:
-    """Moving joints whose limit gives no effort or velocity, or 0."""
+def _no_effort(subject: Subject) -> Iterator[Mistake]:
     for tag in subject.root.all("joint"):
         limit = _limit(tag, subject.sdf)
-        if limit is None or not _moves(tag) or tag.first("mimic"):
+        if limit is None or tag.attributes.get("type") not in MOVING or tag.first("mimic"):
             continue
         for word, unit in (("effort", "N m (or N)"), ("velocity", "rad/s (or m/s)")):
             value = _value(limit, word, math.inf if subject.sdf or not _is_bounded(tag) else None)
@@ -52,9 +50,9 @@ def no_effort(subject: Subject) -> Iterator[Mistake]:
                 yield Mistake(limit, f"the limit of {tag} has {word} 0", f"give it a {word} above 0, in {unit}")
 
 
-@rule("mimic", "error", "a joint that mimics nothing", "the joint does not move")
-def mimics(subject: Subject) -> Iterator[Mistake]:
-    """Joints that mimic a missing joint, or themselves, directly or through others."""
+@rule("mimic", "error", "a joint that mimics a missing joint, or itself", "the joint does not move")
+def _mimics(subject: Subject) -> Iterator[Mistake]:
+    """A leader is missing, or is the joint itself, directly or through others."""
     leaders = {name: tag.first("mimic") for name, tag in subject.joints.items()}
     for name, mimic in leaders.items():
         leader = mimic.attributes.get("joint", "").strip() if mimic else ""
@@ -68,9 +66,8 @@ def mimics(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("degrees", "warning", "an angle in degrees", "URDF and SDF use radians")
-def degrees(subject: Subject) -> Iterator[Mistake]:
-    """Angles that can only be degrees."""
-    for tag in elements(subject.root):
+def _degrees(subject: Subject) -> Iterator[Mistake]:
+    for tag in subject.root.walk():
         words = [tag.attributes.get("rpy", "")] if tag.name == "origin" else []
         if tag.name == "limit" and tag.parent and tag.parent.attributes.get("type") == "revolute":
             words = [tag.attributes.get(name, "") for name in ("lower", "upper")]
@@ -82,10 +79,6 @@ def degrees(subject: Subject) -> Iterator[Mistake]:
 
 def _is_bounded(tag: Tag) -> bool:
     return tag.attributes.get("type") in ("revolute", "prismatic")
-
-
-def _moves(tag: Tag) -> bool:
-    return tag.attributes.get("type") in ("revolute", "prismatic", "continuous")
 
 
 def _limit(tag: Tag, sdf: bool) -> Tag | None:

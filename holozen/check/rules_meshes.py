@@ -1,4 +1,4 @@
-"""Mesh files: present, not empty, and in metres."""
+"""Mesh files: whether they exist, can be read, and are in metres."""
 
 import math
 from collections.abc import Iterator
@@ -14,17 +14,17 @@ from holozen.robot.rigid import link_frames
 
 PACKAGE = "put the file there, or write package://PACKAGE/PATH"
 MODEL = "put the file into MODEL beside this model, or add the folder that contains MODEL to GAZEBO_MODEL_PATH"
-FACTOR = 20.0  # larger than all the rest, or smaller than the rest of its link
-TINY = 500.0  # smaller than all the rest
-ALONE = 200.0  # larger than all other shapes
+FACTOR = 20.0  # times larger than the rest of the robot, or smaller than the rest of its link
+TINY = 500.0  # times smaller than the rest of the robot
+ALONE = 200.0  # times larger than all shapes other than meshes
 LARGEST, SMALLEST = 100.0, 0.001  # m; for a mesh without other shapes
 UNITS = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 1000.0: "", 100.0: "", 1 / 0.0254: ""}
-"""Factor to metres, and the unit that the file may be in; without one it may have been scaled twice."""
+"""Factor to metres -> the unit that the file may be in; empty if it may have been scaled twice."""
 
 
 @rule("mesh", "error", "a mesh that is not found", "the part is invisible or a box")
-def missing(subject: Subject) -> Iterator[Mistake]:
-    """Meshes that are not found. The places searched are reported once."""
+def _missing(subject: Subject) -> Iterator[Mistake]:
+    """The first finding lists the packages searched."""
     searched = ""
     for tag, uri, _ in _meshes(subject):
         try:
@@ -37,8 +37,8 @@ def missing(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("mesh-path", "warning", "a mesh at a path on another machine", "it is not found on other machines")
-def elsewhere(subject: Subject) -> Iterator[Mistake]:
-    """Meshes at an absolute path on another machine, found here by their file name."""
+def _elsewhere(subject: Subject) -> Iterator[Mistake]:
+    """It was found here by its file name."""
     for tag, uri, _ in _meshes(subject):
         lines: list[str] = []
         try:
@@ -50,8 +50,7 @@ def elsewhere(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("mesh-empty", "error", "a mesh that is empty or broken", "the part has no shape")
-def unreadable(subject: Subject) -> Iterator[Mistake]:
-    """Meshes that are empty or broken."""
+def _unreadable(subject: Subject) -> Iterator[Mistake]:
     for tag, uri, _ in _meshes(subject):
         path = _path(uri, subject)
         if path:
@@ -63,8 +62,8 @@ def unreadable(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("mesh-unit", "warning", "a mesh in the wrong unit", "it is far too large or too small")
-def units(subject: Subject) -> Iterator[Mistake]:
-    """Meshes whose size does not match the rest of the robot."""
+def _units(subject: Subject) -> Iterator[Mistake]:
+    """Compares the size of a mesh with the rest of the robot."""
     if subject.model is None:
         return
     for tag, uri, scale in _meshes(subject):
@@ -81,7 +80,7 @@ def units(subject: Subject) -> Iterator[Mistake]:
 
 
 def _other(subject: Subject, tag: Tag, path: Path, size: float) -> float:
-    """The size in metres that the mesh should have, 0 if its own is plausible."""
+    """The size in metres that would suit a mesh; 0 if its own is plausible."""
     rest = [shape for shape in subject.placed if shape.shape.path != path]
     link = subject.part(tag).attributes.get("name", "")
     own, every, bare = (
@@ -100,12 +99,12 @@ def _other(subject: Subject, tag: Tag, path: Path, size: float) -> float:
 
 
 def _largest(shapes: list[Placed], origins: Subject | None = None) -> float:
-    """The longest edge of the box around shapes, and around the links' origins if asked."""
+    """The longest edge in metres of the bounding box of shapes, and of all link frames of `origins`, if given."""
     box = box_of(shapes)
     points = list(box) if box else []
     if origins is not None and origins.model is not None:
-        points += [frame.xyz for frame in link_frames(origins.model).values()]
-    return max(size_of(around(points))) if points else 0.0
+        points += [frame.position for frame in link_frames(origins.model).values()]
+    return float(max(size_of(around(points)))) if points else 0.0
 
 
 def _meshes(subject: Subject) -> Iterator[tuple[Tag, str, Vector]]:
@@ -132,6 +131,7 @@ def _path(uri: str, subject: Subject) -> Path | None:
 
 def _size(path: Path, scale: Vector) -> float:
     try:
-        return max(size_of(bounds(path, scale)))
+        low, high = bounds(path, scale)
+        return max(b - a for a, b in zip(low, high, strict=True))
     except RobotError:
         return 0.0

@@ -2,19 +2,17 @@
 
 import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.robot.elements import Tag
-from holozen.robot.sources import SourceFile
 from holozen.suggest import listed, suggest
 
 PALETTE = 2  # this many unused colours are a palette shared by several robots
 
 
 @rule("twice", "error", "two links or two joints with one name", "references to it are ambiguous")
-def duplicates(subject: Subject) -> Iterator[Mistake]:
-    """Two links or two joints with one name."""
+def _duplicates(subject: Subject) -> Iterator[Mistake]:
     for kind in ("link", "joint"):
         seen: dict[str, Tag] = {}
         for tag in subject.root.all(kind):
@@ -26,9 +24,8 @@ def duplicates(subject: Subject) -> Iterator[Mistake]:
                 )
 
 
-@rule("no-link", "error", "a joint that names no link", "the joint connects nothing")
-def unknown_links(subject: Subject) -> Iterator[Mistake]:
-    """Joints that name a missing link."""
+@rule("no-link", "error", "a joint that names a missing link", "the joint connects nothing")
+def _unknown_links(subject: Subject) -> Iterator[Mistake]:
     for joint in subject.root.all("joint"):
         for end in ("parent", "child"):
             tag = joint.first(end)
@@ -37,9 +34,9 @@ def unknown_links(subject: Subject) -> Iterator[Mistake]:
                 yield _unknown(tag, f"{joint} names the {end} link {name!r}, which does not exist", name, subject.links)
 
 
-@rule("gazebo-link", "warning", "a gazebo tag that names no link", "its settings are lost, as in Gazebo")
-def unknown_references(subject: Subject) -> Iterator[Mistake]:
-    """<gazebo> tags that name a missing link; a file without links is meant to be included by others."""
+@rule("gazebo-link", "warning", "a gazebo tag that names a missing link", "its settings are lost, as in Gazebo")
+def _unknown_references(subject: Subject) -> Iterator[Mistake]:
+    """A file without links is one for others to include."""
     for gazebo in subject.root.all("gazebo") if subject.links else ():
         name = gazebo.attributes.get("reference", "").strip()
         if name and name not in subject.links and name not in subject.joints:
@@ -47,9 +44,9 @@ def unknown_references(subject: Subject) -> Iterator[Mistake]:
             yield _unknown(gazebo, f"reference={name!r} is neither a link nor a joint", name, known)
 
 
-@rule("tree", "error", "links that are not one tree", "the robot falls apart")
-def unconnected(subject: Subject) -> Iterator[Mistake]:
-    """Links other than the root without a parent joint, and links with two parents."""
+@rule("tree", "error", "links that do not form one tree", "the robot falls apart")
+def _unconnected(subject: Subject) -> Iterator[Mistake]:
+    """Links without a parent joint other than the root, links with two parents, and loops."""
     children = Counter[str]()
     for joint in subject.root.all("joint"):
         tag = joint.first("child")
@@ -88,8 +85,8 @@ def _circles(subject: Subject, roots: list[str]) -> Iterator[Mistake]:
 
 
 @rule("colour", "warning", "a material without a colour, or with two", "the colour is undefined")
-def colours(subject: Subject) -> Iterator[Mistake]:
-    """Used materials without a colour, or with two; in URDF only. Nothing refers to one without a name."""
+def _colours(subject: Subject) -> Iterator[Mistake]:
+    """Only in URDF, and only materials with a name: nothing refers to others."""
     if subject.sdf:
         return
     given: dict[str, Tag] = {}
@@ -110,19 +107,19 @@ def colours(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("unused-colour", "warning", "a material that nothing uses", "a name may be misspelt")
-def unused_colours(subject: Subject) -> Iterator[Mistake]:
-    """Materials of the file itself that no visual uses; a palette of several is left alone."""
+def _unused_colours(subject: Subject) -> Iterator[Mistake]:
+    """Only materials of the file itself; a palette of several is left alone."""
     used = {tag.attributes.get("name", "") for tag in _materials(subject) if tag.parent is not subject.root}
     own = [tag for tag in subject.root.all("material") if subject.is_source(tag)]
     unused = [tag for tag in own if tag.attributes.get("name", "") not in used]
-    if used and len(unused) < PALETTE and not any(colours.find(subject)):
+    if used and len(unused) < PALETTE and not any(_colours.find(subject)):
         for tag in unused:
             yield Mistake(tag, f"{tag} is used by no visual", "use it or remove it")
 
 
 @rule("macro-twice", "warning", "a macro that is defined twice", "the first one is lost")
-def macros_twice(subject: Subject) -> Iterator[Mistake]:
-    """A macro that is defined twice in one file, outside of conditions."""
+def _macros_twice(subject: Subject) -> Iterator[Mistake]:
+    """In one file, and outside conditions."""
     for source in subject.sources:
         seen: dict[str, Tag] = {}
         for tag in source.root.all("xacro:macro"):
@@ -133,33 +130,26 @@ def macros_twice(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("unused", "warning", "a property or macro that nothing uses", "a name may be misspelt")
-def unused_macros(subject: Subject) -> Iterator[Mistake]:
-    """Properties and macros of the robot file that nothing uses."""
+def _unused_macros(subject: Subject) -> Iterator[Mistake]:
     if (
         not subject.sources
         or not subject.links
         or any(found is None for source in subject.sources for found in source.includes.values())
     ):
         return  # a computed file name may use anything
-    words = Counter(word for source in subject.sources for word in _words(source))
+    texts = (_NO_USE.sub(" ", source.text) for source in subject.sources)
+    words = Counter(word for text in texts for word in re.findall(r"[A-Za-z_]\w*", text))
     for kind in ("property", "macro"):
+        tags = [tag for source in subject.sources for tag in source.root.below(f"xacro:{kind}")]
+        given = Counter(tag.attributes.get("name", "").removeprefix("xacro:") for tag in tags)
         for tag in subject.sources[0].root.below(f"xacro:{kind}"):
             name = tag.attributes.get("name", "").removeprefix("xacro:")
-            given = sum(1 for source in subject.sources for other in _given(source, kind) if other == name)
-            if name.isidentifier() and words[name] <= given:
+            if name.isidentifier() and words[name] <= given[name]:
                 yield Mistake(tag, f"{kind} {name!r} is not used", "use it or remove it")
 
 
-def _given(source: SourceFile, kind: str) -> Iterator[str]:
-    return (tag.attributes.get("name", "").removeprefix("xacro:") for tag in source.root.below(f"xacro:{kind}"))
-
-
 _NO_USE = re.compile(r"<!--.*?-->|</?[A-Za-z_][\w.-]*(?=[\s/>])|[\w:.-]+\s*=\s*(?=[\"'])", re.DOTALL)
-"""Comments, and the names of elements without prefix and of attributes."""
-
-
-def _words(source: SourceFile) -> list[str]:
-    return re.findall(r"[A-Za-z_]\w*", _NO_USE.sub(" ", source.text))
+"""Text that uses no macro or property: comments, names of elements without a prefix, and names of attributes."""
 
 
 def _end(tag: Tag) -> str:
@@ -168,16 +158,12 @@ def _end(tag: Tag) -> str:
 
 def _is_link(name: str, subject: Subject) -> bool:
     # SDF may name the world, frames, and links of nested models.
-    return name in subject.links or (subject.sdf and (name == "world" or "::" in name or _has_parts(subject)))
+    parts = (tag for tag in subject.root.children if tag.name in ("frame", "model", "include"))
+    return name in subject.links or (subject.sdf and (name == "world" or "::" in name or any(parts)))
 
 
-def _has_parts(subject: Subject) -> bool:
-    return any(tag.name in ("frame", "model", "include") for tag in subject.root.children)
-
-
-def _unknown(tag: Tag, problem: str, name: str, known: object) -> Mistake:
-    names = list(known)  # type: ignore[call-overload]
-    return Mistake(tag, problem + suggest(name, names), f"known names: {listed(names)}")
+def _unknown(tag: Tag, problem: str, name: str, known: Collection[str]) -> Mistake:
+    return Mistake(tag, problem + suggest(name, known), f"known names: {listed(known)}")
 
 
 def _materials(subject: Subject) -> Iterator[Tag]:

@@ -1,27 +1,25 @@
-"""Plugins: whether they exist, whether what they name exists, and whether one of them can drive the robot."""
+"""Plugins: whether they exist, whether the links and joints that they name exist, and whether one drives the robot."""
 
 import re
 from collections.abc import Iterator
 
 from holozen.check.engine import Mistake, Subject, rule
 from holozen.check.spelling import nearest
-from holozen.robot.elements import Tag
 from holozen.robot.gazebo_plugins import DRIVES, KNOWN, MOVING_ELSEWHERE, file_name, file_of, kind_of
 from holozen.suggest import listed, suggest
 
-SUGGESTED = ("gazebo_ros_planar_move", "gazebo_ros_diff_drive", "gazebo_ros_skid_steer_drive")  # to drive with
+SUGGESTED = ("gazebo_ros_planar_move", "gazebo_ros_diff_drive", "gazebo_ros_skid_steer_drive")
 FAMILIES = re.compile(
     r"gazebo_|gz|ign|hector_|roboticsgroup_|velodyne|ros_control|realsense|.*Plugin$|mimic|joint_state", re.IGNORECASE
 )
-"""Plugins that are known to exist, but are not supported."""
+"""The names of plugins that exist, though holozen does not support all of them."""
 
 LINK_TAGS = ("robotbaseframe", "robotbaselink", "bodyname")
 FRAME_TAGS = ("framename", "frameid", "childframeid")
 
 
 @rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it")
-def misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
-    """Plugins whose file name is similar to a known one."""
+def _misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
     for plugin in subject.plugins:
         kind = kind_of(plugin)
         suggestion = None if kind in KNOWN else nearest(kind, KNOWN, 6)
@@ -32,8 +30,8 @@ def misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("plugin", "warning", "an unknown plugin", "it is ignored")
-def unknown_plugins(subject: Subject) -> Iterator[Mistake]:
-    """Plugins that are neither known nor of a known family."""
+def _unknown_plugins(subject: Subject) -> Iterator[Mistake]:
+    """Neither supported nor of a known family."""
     for plugin in subject.plugins:
         kind = kind_of(plugin)
         if not file_of(plugin):
@@ -45,43 +43,40 @@ def unknown_plugins(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("plugin-link", "warning", "a plugin's frame that is not a link", "odometry and sensors refer to a missing frame")
-def plugin_links(subject: Subject) -> Iterator[Mistake]:
-    """Plugin frames that do not name a link."""
-    for tag in _settings(subject):
+def _plugin_links(subject: Subject) -> Iterator[Mistake]:
+    for tag in subject.settings:
         name = tag.text.strip().rpartition("/")[2]
-        sort = tag.name.lower().replace("_", "")
+        plain = tag.name.lower().replace("_", "")
         if not name or name in subject.links or "::" in name or not subject.links:
             continue
-        if sort in LINK_TAGS:
+        if plain in LINK_TAGS:
             problem = f"<{tag.name}> is {name!r}, which names no link{suggest(name, subject.links)}"
-            yield Mistake(tag, problem, f"links: {listed(list(subject.links))}")
-        elif sort in FRAME_TAGS and (suggestion := nearest(name, subject.links)):
+            yield Mistake(tag, problem, f"links: {listed(subject.links)}")
+        elif plain in FRAME_TAGS and (suggestion := nearest(name, subject.links)):
             yield Mistake(tag, f"<{tag.name}> is {name!r}, which names no link", f"write {suggestion}")
 
 
 @rule("plugin-joint", "error", "a plugin's joint that does not exist", "the plugin has nothing to turn")
-def plugin_joints(subject: Subject) -> Iterator[Mistake]:
-    """Joints of plugins, and of <ros2_control>, that do not exist."""
+def _plugin_joints(subject: Subject) -> Iterator[Mistake]:
+    """Also the joints of <ros2_control>."""
     controls = [tag for control in subject.root.all("ros2_control") for tag in control.all("joint")]
     named = [(tag, tag.attributes.get("name", "").strip()) for tag in controls]
     for tag, name in [*subject.plugin_joints, *named]:
         if name and name not in subject.joints and "::" not in name and subject.joints:
             owner = "a joint of <ros2_control>" if (tag, name) in named else f"<{tag.name}>"
             problem = f"{owner} is {name!r}, which names no joint{suggest(name, subject.joints)}"
-            yield Mistake(tag, problem, f"joints: {listed(list(subject.joints))}")
+            yield Mistake(tag, problem, f"joints: {listed(subject.joints)}")
 
 
 @rule("two-drives", "warning", "two drive plugins", "they work against each other")
-def two_drives(subject: Subject) -> Iterator[Mistake]:
-    """A second plugin that drives the robot."""
-    driving = [plugin for plugin in subject.plugins if kind_of(plugin) in DRIVES]
-    for plugin in driving[1:]:
-        yield Mistake(plugin, f"{plugin} drives the robot, and so does {driving[0]}", "keep one of them")
+def _two_drives(subject: Subject) -> Iterator[Mistake]:
+    for plugin in subject.drives[1:]:
+        yield Mistake(plugin, f"{plugin} drives the robot, and so does {subject.drives[0]}", "keep one of them")
 
 
 @rule("no-drive", "warning", "wheels and plugin tags, but no drive plugin", "cmd_vel moves nothing")
-def no_drive(subject: Subject) -> Iterator[Mistake]:
-    """A robot on wheels with plugin tags, but no drive plugin. A file without any is a plain description."""
+def _no_drive(subject: Subject) -> Iterator[Mistake]:
+    """A file without plugins and <gazebo> elements is a plain description, not meant to drive."""
     controls = [tag for tag in subject.plugins if kind_of(tag) in MOVING_ELSEWHERE] + subject.root.all("ros2_control")
     wheels = [wheel for wheel in subject.wheels if wheel.sure]
     simulated = controls or subject.plugins or subject.root.all("gazebo")
@@ -95,8 +90,7 @@ def no_drive(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("static", "warning", "a robot on wheels, or with a drive, that is fixed to the world", "cmd_vel moves nothing")
-def fixed_to_world(subject: Subject) -> Iterator[Mistake]:
-    """Robots that are made to drive, but are static or have the root link `world`."""
+def _fixed_to_world(subject: Subject) -> Iterator[Mistake]:
     model = subject.model
     if model is None or not model.static or not (model.drive or any(wheel.sure for wheel in subject.wheels)):
         return
@@ -110,11 +104,7 @@ def fixed_to_world(subject: Subject) -> Iterator[Mistake]:
 
 
 def _is_driven(subject: Subject) -> bool:
-    kinds = [kind_of(plugin) for plugin in subject.plugins]
-    near = any(kind in DRIVES or nearest(kind, DRIVES, 6) for kind in kinds)
-    return near or (subject.model is not None and subject.model.drive is not None)
-
-
-def _settings(subject: Subject) -> Iterator[Tag]:
-    """Tags of known plugins: those of others may mean anything."""
-    return (tag for plugin in subject.plugins if kind_of(plugin) in KNOWN for tag in plugin.children)
+    """Whether the robot has a drive, or a plugin that may be meant as one."""
+    if subject.drives or (subject.model is not None and subject.model.drive is not None):
+        return True
+    return any(nearest(kind_of(plugin), DRIVES, 6) for plugin in subject.plugins)

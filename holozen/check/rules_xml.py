@@ -1,15 +1,16 @@
 """Misspelt and misplaced elements and attributes, which parsers silently ignore, and values that are not numbers."""
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from holozen.check.engine import Edit, Mistake, Subject, rule, split
 from holozen.check.spelling import is_clear, nearest
 from holozen.robot.elements import LARGEST, Tag
 from holozen.robot.errors import RobotError
-from holozen.robot.gazebo_plugins import KNOWN, kind_of
 from holozen.robot.model import JOINT_KINDS
+from holozen.robot.sdf import IN_WORLD, NOT_SIMULATED
+from holozen.robot.sdf import KNOWN as KNOWN_IN_SDF
 from holozen.suggest import listed
 
 # The words of URDF, of its Gazebo elements, and of SDF.
@@ -64,28 +65,13 @@ URDF = {
 """Elements of URDF; the contents of <gazebo> and <transmission> are not listed."""
 
 MISPLACED = {
-    "origin": ("inertial", "visual", "collision", "joint"),
-    "mass": ("inertial",),
-    "inertia": ("inertial",),
-    "geometry": ("visual", "collision"),
-    "inertial": ("link",),
-    "visual": ("link",),
-    "collision": ("link",),
-    "axis": ("joint",),
-    "limit": ("joint",),
-    "parent": ("joint",),
-    "child": ("joint",),
-    "mimic": ("joint",),
-    "dynamics": ("joint",),
-    "link": ("robot",),
-    "joint": ("robot",),
-    "box": ("geometry",),
-    "cylinder": ("geometry",),
-    "sphere": ("geometry",),
-    "mesh": ("geometry",),
-    "color": ("material",),
+    name: [owner for owner, words in URDF.items() if name in words.children]
+    for name in _set(
+        """origin mass inertia geometry inertial visual collision axis limit parent child mimic dynamics link joint
+        box cylinder sphere mesh color"""
+    )
 }
-"""Elements that parsers silently ignore anywhere else."""
+"""Element -> the elements that it belongs in; parsers silently ignore it anywhere else."""
 
 IGNORED = {
     "surface": 'write <gazebo reference="LINK"> with <mu1> and <mu2> in it, next to the links',
@@ -122,27 +108,20 @@ PLUGIN = _set(
 )
 """Elements in a <plugin>, in the spelling of ROS 1, ROS 2 and gz-sim; a plugin may have others too."""
 
-SDF = _set(
-    """sdf world model include link joint pose static uri name inertial mass inertia ixx ixy ixz iyy iyz izz visual
-    collision geometry box size cylinder radius length sphere mesh scale plane normal capsule ellipsoid radii
-    polyline heightmap empty submesh center material script ambient diffuse specular emissive lighting shader pbr
-    metal metallic roughness albedo_map normal_map metalness_map roughness_map transparency cast_shadows parent child
-    axis axis2 xyz limit lower upper effort velocity stiffness dissipation dynamics damping friction spring_reference
-    spring_stiffness surface contact ode bullet torsional mu mu2 fdir1 slip1 slip2 kp kd soft_cfm soft_erp max_vel
-    min_depth bounce restitution_coefficient threshold max_contacts laser_retro collide_bitmask category_bitmask
-    collide_without_contact collide_without_contact_bitmask sensor plugin always_on update_rate visualize topic
-    camera ray lidar imu gps altimeter magnetometer contact noise type mean stddev bias_mean bias_stddev image width
-    height format horizontal_fov clip near far distortion scan horizontal vertical samples resolution min_angle
-    max_angle range min max self_collide kinematic gravity enable_wind allow_auto_disable velocity_decay linear
-    angular must_be_base_link light direction attenuation constant quadratic spot inner_angle outer_angle falloff
-    frame physics max_step_size real_time_factor real_time_update_rate solver iters sor cfm erp scene background
-    shadows sky grid state wind magnetic_field atmosphere gui audio road population spherical_coordinates
-    provide_feedback cfm_damping implicit_spring_damper limit suspension use_parent_model_frame gearbox_ratio
-    gearbox_reference_body screw_thread_pitch thread_pitch sensor_frame_id optical_frame_id gz_frame_id
-    ignition_frame_id density auto_inertia_params meta visibility_flags anti_aliasing cascade placement_frame
-    initial_position has_force_control density fluid_added_mass"""
+SDF = frozenset(KNOWN_IN_SDF).union(IN_WORLD, NOT_SIMULATED, *(map(_set, KNOWN_IN_SDF.values()))) | _set(
+    """sdf world uri name box size cylinder radius length sphere mesh scale plane normal capsule ellipsoid radii
+    polyline heightmap empty submesh center metal metallic roughness albedo_map normal_map metalness_map
+    roughness_map ode bullet torsional mu mu2 fdir1 slip1 slip2 kp kd soft_cfm soft_erp max_vel min_depth
+    restitution_coefficient threshold collide_bitmask category_bitmask collide_without_contact
+    collide_without_contact_bitmask always_on update_rate visualize topic camera ray lidar imu gps altimeter
+    magnetometer noise type mean stddev bias_mean bias_stddev image width height format horizontal_fov clip near far
+    distortion scan horizontal vertical samples resolution min_angle max_angle range min max linear angular
+    direction attenuation constant quadratic spot inner_angle outer_angle falloff max_step_size real_time_factor
+    real_time_update_rate solver iters sor cfm erp background shadows sky grid provide_feedback cfm_damping
+    implicit_spring_damper suspension sensor_frame_id optical_frame_id gz_frame_id ignition_frame_id anti_aliasing
+    cascade has_force_control"""
 )
-"""Elements of SDF."""
+"""Elements of SDF: those that the loader knows, and those inside them."""
 
 # Spelling.
 
@@ -153,14 +132,13 @@ SDF_JOINT_KINDS = (*JOINT_KINDS, "revolute2", "universal", "ball", "screw", "gea
 
 
 @rule("xml", "warning", "broken XML that Gazebo tolerates", "ROS and other parsers reject it")
-def forgiven(subject: Subject) -> Iterator[Mistake]:
-    """Broken XML that Gazebo tolerates."""
+def _forgiven(subject: Subject) -> Iterator[Mistake]:
     yield from subject.forgiven
 
 
 @rule("tag", "error", "a misspelt element", "it is silently ignored")
-def misspelt_tags(subject: Subject) -> Iterator[Mistake]:
-    """Unknown elements similar to one allowed there."""
+def _misspelt_tags(subject: Subject) -> Iterator[Mistake]:
+    """Unknown elements similar to one allowed in their place."""
     guessed: dict[tuple[str, frozenset[str]], str | None] = {}
     for tag, known, shortest in _read_elements(subject):
         if tag.name in known or ":" in tag.name or len(guessed) > MOST_GUESSES:
@@ -181,13 +159,13 @@ def misspelt_tags(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("attribute", "error", "a misspelt attribute", "it is silently ignored")
-def misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
+def _misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
     """Unknown attributes of URDF elements similar to a known one."""
     for tag in _urdf_elements(subject):
         given = set(tag.attributes)
         known = URDF[tag.name].attributes
         for word in sorted(given - known):
-            # Of equally similar words, prefer one that is missing.
+            # Prefer a word that the element does not have yet.
             suggestion = None if ":" in word else nearest(word, sorted(known - given)) or nearest(word, sorted(known))
             if suggestion:
                 sure = suggestion not in given and is_clear(word, suggestion, known - given)
@@ -196,8 +174,7 @@ def misspelt_attributes(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("place", "error", "an element in a place where it is not read", "it is silently ignored")
-def misplaced(subject: Subject) -> Iterator[Mistake]:
-    """Elements of URDF in an element where they are not read."""
+def _misplaced(subject: Subject) -> Iterator[Mistake]:
     for parent in _urdf_elements(subject):
         for tag in parent.children if parent.name not in FREE else ():
             if tag.name in MISPLACED and tag.name not in URDF[parent.name].children:
@@ -206,9 +183,9 @@ def misplaced(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("ignored", "warning", "an element that URDF does not have", "URDF parsers ignore it")
-def ignored(subject: Subject) -> Iterator[Mistake]:
-    """Elements that URDF does not have there, and that are no misspelling of one that it has."""
-    spelt = {mistake.at for mistake in misspelt_tags.find(subject)}
+def _ignored(subject: Subject) -> Iterator[Mistake]:
+    """Except misspellings of elements that URDF has there."""
+    spelt = {mistake.at for mistake in _misspelt_tags.find(subject)}
     for parent in _urdf_elements(subject):
         known = URDF[parent.name].children
         for tag in parent.children if parent.name not in FREE else ():
@@ -219,8 +196,7 @@ def ignored(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("joint-type", "error", "a joint type that does not exist", "the robot cannot be loaded")
-def joint_kinds(subject: Subject) -> Iterator[Mistake]:
-    """Joint types that do not exist."""
+def _joint_kinds(subject: Subject) -> Iterator[Mistake]:
     kinds = SDF_JOINT_KINDS if subject.sdf else JOINT_KINDS
     for tag in subject.root.all("joint"):
         kind = tag.attributes.get("type")
@@ -231,8 +207,8 @@ def joint_kinds(subject: Subject) -> Iterator[Mistake]:
 
 
 @rule("number", "error", "a value that is not a number", "the robot cannot be loaded")
-def bad_numbers(subject: Subject) -> Iterator[Mistake]:
-    """Values of links and joints that are not finite numbers, or not as many as needed, and axes without direction."""
+def _bad_numbers(subject: Subject) -> Iterator[Mistake]:
+    """Values of links and joints that are no finite numbers, or not as many as needed; axes without direction."""
     for tag in _outside_plugins(subject.root) if subject.sdf else _urdf_elements(subject):
         most = math.inf if tag.name == "limit" else LARGEST
         for name, count in NUMBERS.get(tag.name, {}).items():
@@ -260,23 +236,16 @@ def _read_elements(subject: Subject) -> Iterator[tuple[Tag, frozenset[str], int]
     """Each element with the words allowed in its place, and the minimum length of a word for suggestions."""
     if subject.sdf:
         yield from ((tag, SDF, 4) for tag in _outside_plugins(subject.root) if tag.name not in MISPLACED)
-        yield from _settings(subject.plugins)
-        return
     for parent in _urdf_elements(subject):
         if parent.name not in FREE:
             yield from ((tag, URDF[parent.name].children, 3) for tag in parent.children if tag.name not in URDF)
-    for gazebo in subject.root.all("gazebo"):
+    for gazebo in subject.root.all("gazebo") if not subject.sdf else ():
         yield from ((tag, GAZEBO, 4) for tag in gazebo.children)
-        yield from _settings(gazebo.below("plugin"))
-
-
-def _settings(plugins: Iterable[Tag]) -> Iterator[tuple[Tag, frozenset[str], int]]:
-    """The elements in known plugins: those of others may have any name."""
-    return ((tag, PLUGIN, 6) for plugin in plugins if kind_of(plugin) in KNOWN for tag in plugin.children)
+    yield from ((tag, PLUGIN, 6) for tag in subject.settings)
 
 
 def _urdf_elements(subject: Subject) -> Iterator[Tag]:
-    """The elements of URDF in their place; the contents of <gazebo> and <transmission> are not checked."""
+    """The elements of URDF in their place; none for SDF. The contents of <gazebo> and <transmission> are left out."""
     waiting = [] if subject.sdf else [subject.root]
     while waiting:
         tag = waiting.pop()

@@ -1,4 +1,4 @@
-"""Misspelt words of the file formats, and common words for which the formats have others."""
+"""The nearest known word for a misspelt one, or for a common word that the file formats have another one for."""
 
 from collections.abc import Iterable
 

@@ -25,13 +25,13 @@ VERBS = {
     "secure": "init, add, revoke, show",
     "run": "run a Python script that was written for ROS 2",
     "launch": "run a Python launch file that was written for ROS 2",
-    "spawn": "put a robot or object into the sim",
+    "spawn": "put a robot or object into the running sim",
     "delete": "remove robots or objects from the sim",
     "list": "list the robots and objects in the sim, and where they are",
     "xacro": "expand a xacro file",
     "new": "robot, controller, package",
     "check": "report what is wrong with a robot file",
-    "topic": "list, info, type, find, echo, hz, bw, delay, pub, plot",
+    "topic": "list, info, type, find, echo, pub, hz, bw, delay, plot",
     "service": "list, type, find, info, call",
     "action": "list, info, send_goal",
     "node": "list, info",
@@ -47,14 +47,9 @@ VERBS = {
     "plot": "draw fields of live messages in the terminal",
     "map": "draw the robots, their paths and their goals in the terminal",
 }
-MODULES = {
-    "graph": "node",
-    "list": "robot",
-    "delete": "robot",
-    "map": "plot",
-    "release": "stop",
-}  # of verbs in another noun's module
-NOUNS = ("secure", "new", "topic", "service", "action", "node", "param", "tf", "interface", "bag")  # followed by a verb
+MODULES = {"graph": "node", "list": "robot", "delete": "robot", "map": "plot", "release": "stop"}
+"""Verbs whose module has another name."""
+NOUNS = ("secure", "new", "topic", "service", "action", "node", "param", "tf", "interface", "bag")  # a verb follows
 _DRAWS = "`holozen view` shows robots in a browser, `holozen map` and `holozen plot` draw in the terminal"
 _TYPES = "`holozen interface` shows messages, services and actions"
 ELSEWHERE = {
@@ -72,31 +67,15 @@ ELSEWHERE = {
 }  # fmt: skip
 """Verbs of ROS's tools and other likely guesses, with what to use instead."""
 EXTRAS = (
-    "PIL",
-    "cryptography",
-    "foxglove",
-    "lz4",
-    "matplotlib",
-    "mcap",
-    "mujoco",
-    "numpy",
-    "pybullet",
-    "transforms3d",
-    "viser",
-    "websockets",
-    "xacro",
-    "zstandard",
-)  # libraries that only some verbs need
-OF_FLAGS = {"cryptography": "secure", "foxglove": "foxglove", "mujoco": "mujoco"}  # libraries and their extras
-OF_SERVICES = {"sim": dict.fromkeys(("pause", "play", "step", "reset"), "simulation")}  # verbs and their modules
-SERVICES = {
-    "sim": "sim",
-    "teleop": "teleop",
-    "controller": "controller",
-    "camera": "camera",
-    "view": "view",
-    "pose-service": "pose_service",
-}
+    "PIL", "cryptography", "foxglove", "lz4", "matplotlib", "mcap", "mujoco", "numpy", "pybullet", "transforms3d",
+    "viser", "websockets", "xacro", "zstandard",
+)  # fmt: skip
+"""Libraries that only some verbs need."""
+EXTRA_OF = {"cryptography": "secure", "foxglove": "foxglove", "mujoco": "mujoco"}
+"""Library that a flag of several verbs needs -> the extra that installs it; others are in the extra of their verb."""
+SERVICES = ("sim", "teleop", "controller", "camera", "view", "pose-service")
+SERVICE_VERBS = {"sim": dict.fromkeys(("pause", "play", "step", "reset"), "simulation")}
+"""Service -> verbs that may follow its name -> their modules."""
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -124,11 +103,15 @@ def _guarded(words: list[str]) -> int:
                 signal.signal(signal.SIGINT, signal.default_int_handler)
             return _main(words)
         finally:
-            _ = sys.stdout and sys.stdout.flush()  # a reader that is gone shows here, and not at the interpreter's end
+            _ = sys.stdout and sys.stdout.flush()  # so that a closed pipe raises here, not at the interpreter's end
     except KeyboardInterrupt:
         return 130
+    except RuntimeError as error:  # Python 3.11 wraps an interrupt while it creates a class, as in an import
+        if not isinstance(error.__cause__, KeyboardInterrupt):
+            raise
+        return 130
     except BrokenPipeError:
-        # The reader (such as head) has seen enough; nothing more may be written, not even at the interpreter's end.
+        # The reader, such as head, has closed the pipe: nothing more may be written, not even at the interpreter's end.
         _drop_output()
         return 0
     except OSError as error:
@@ -137,7 +120,7 @@ def _guarded(words: list[str]) -> int:
         from holozen.console import report
 
         _drop_output()
-        report(f"holozen: cannot write what was asked for: {error.strerror}")
+        report(f"holozen: cannot write the output: {error.strerror}")
         return 1
 
 
@@ -181,25 +164,26 @@ def _run(verb: str, words: list[str]) -> int:
         name = (error.name or "").partition(".")[0]
         if name not in EXTRAS:
             raise
-        extra = OF_FLAGS.get(name, verb)
+        extra = EXTRA_OF.get(name, verb)
         report(f"holozen {verb} needs {name}; in the checkout of holozen, run: pip install -e '.[{extra}]'")
         return 1
 
 
 def command(verb: str) -> Any:
-    """What implements a verb, with `main(argv)` and `parser()`: a Verb, a Noun, or the module of a service."""
-    if verb in OF_SERVICES:
+    """The implementation of a verb, with `main(argv)` and `parser()`: a Verb, a Noun, or the module of a service."""
+    if verb in SERVICE_VERBS:
         from holozen.cli.verb import Service
 
-        return Service(verb, _service(SERVICES[verb]), OF_SERVICES[verb])
+        return Service(verb, _service(verb), SERVICE_VERBS[verb])
     if verb in SERVICES:
-        return _service(SERVICES[verb])
+        return _service(verb)
     module = importlib.import_module(f"holozen.cli.{MODULES.get(verb, verb)}")
     return getattr(module, "VERBS", {}).get(verb, module)
 
 
-def _service(name: str) -> ModuleType:
+def _service(verb: str) -> ModuleType:
     """The module of a service: `holozen.sim` when installed, `services.sim` in the bare source tree."""
+    name = verb.replace("-", "_")
     try:
         return importlib.import_module(f"holozen.{name}.__main__")
     except ModuleNotFoundError as error:

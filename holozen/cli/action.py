@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import re
 import threading
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from holozen.background import background
 from holozen.bus import Bus
 from holozen.cli.hints import unknown
 from holozen.cli.keys import print_list, print_sides
-from holozen.cli.output import CDR, Reader, lines
-from holozen.cli.verb import Noun, Verb, by_name, key_argument, list_arguments, open_bus
-from holozen.console import printable, report
+from holozen.cli.output import Reader, lines
+from holozen.cli.verb import Noun, Verb, by_name, key_argument, list_arguments, open_bus, type_and_value
+from holozen.console import Failure, report
 from holozen.flags import add_packages, key, number
 from holozen.process import deferred_interrupt, stop_event
 from holozen.suggest import suggest
@@ -34,12 +33,8 @@ from holozen.transport.actions import (
 from holozen.transport.errors import BusError, NoReply
 from holozen.transport.services import call_bytes
 
-if TYPE_CHECKING:
-    from holozen.messages.definitions import Interface
-
-TYPE = re.compile(r"\w+/(action/)?\w+")
 JSON = "application/json"
-END = 10.0  # s for a goal to end that is to be cancelled
+END = 10.0  # s for a cancelled goal to end
 POLL = 0.02  # s between two looks for feedback
 
 
@@ -51,13 +46,12 @@ def list_actions(args: argparse.Namespace) -> int:
 
 
 def info(args: argparse.Namespace) -> int:
-    """Print an action's type, clients and servers; exit code 1 if it has none."""
+    """Print an action's type, clients and servers. Raises Failure if it has none."""
     with open_bus(args) as bus:
         found, where = found_in(bus.endpoints()), bus.where
     mine = [one for one in found if one.key == args.key]
     if not mine:
-        report(f"holozen action info: {unknown(args.key, sorted({one.key for one in found}), where)}")
-        return 1
+        raise Failure(unknown(args.key, sorted({one.key for one in found}), where))
     clients, servers = ([one for one in mine if one.is_server == is_server] for is_server in (False, True))
     sides = {"clients": ("Action clients", clients), "servers": ("Action servers", servers)}
     return print_sides(args, [one.type for one in mine], sides)
@@ -65,26 +59,21 @@ def info(args: argparse.Namespace) -> int:
 
 def send_goal(args: argparse.Namespace) -> int:
     """Send a goal and print its result; exit code 1 unless it succeeds. Ctrl-C cancels the goal."""
+    given, text = type_and_value(args, "action", "GOAL")
     stop = stop_event()
     with open_bus(args, stop) as bus:
-        words = list(args.words)
-        given = words.pop(0) if words and TYPE.fullmatch(words[0]) else ""
-        if len(words) > 1:
-            report(f"holozen action send_goal: {args.key}: {words[-1]!r} is too much; write KEY [TYPE] GOAL")
-            return 2
         try:
             server = _server(bus, args, stop)
-            goal = _goal(bus, args, server.type, given, words[0] if words else "{}") if server else {}
+            goal = _goal(bus, args, server.type, given, "{}" if text is None else text) if server else {}
         except ValueError as error:
-            report(f"holozen action send_goal: {args.key}: {error}")
-            return 1
+            raise Failure(f"{args.key}: {error}") from None
         if server is None or stop.is_set():
             return 130
-        return Errand(bus, args, server.type).run(goal, stop)
+        return GoalRequest(bus, args, server.type).run(goal, stop)
 
 
 def _server(bus: Bus, args: argparse.Namespace, stop: threading.Event) -> Found | None:
-    """The server of the action, waited for; None once `stop` is set. Raises ValueError if there is none in time."""
+    """Wait for the server of the action; None once `stop` is set. Raises Failure if there is none in time."""
     deadline, found = time.monotonic() + args.timeout, list[Found]()
     with bus.graph() as graph:
         ends = graph.settled(bus.connected)
@@ -94,10 +83,8 @@ def _server(bus: Bus, args: argparse.Namespace, stop: threading.Event) -> Found 
                 return server
             if time.monotonic() > deadline:
                 near = suggest(args.key, sorted({one.key for one in found}))
-                text = (
-                    f"it has no server at {bus.where} within {args.timeout:g} s{near}; `holozen action list` lists all"
-                )
-                raise ValueError(text)
+                text = f"no server for {args.key} answered within {args.timeout:g} s at {bus.where}{near}"
+                raise Failure(f"{text}; `holozen action list` lists all")
             stop.wait(POLL)
             ends = graph.endpoints()
     return None
@@ -107,23 +94,15 @@ def _goal(bus: Bus, args: argparse.Namespace, actual: str, given: str, text: str
     """The goal that `text` describes, as plain values. Raises ValueError."""
     with deferred_interrupt():
         from holozen.cli import values
-        from holozen.limits import not_finite
-        from holozen.messages.definitions import completed
         from holozen.messages.registry import Registry
 
-    full = given.replace("/", "/action/") if given.count("/") == 1 else given
-    if full and full != actual:
-        raise ValueError(f"its type is {actual}, not {full}")
-    kind: Interface = Registry(dict(args.package)).learn(f"{actual}_Goal", bus.definition)
-    value = values.plain(text)
-    goal = completed(kind, value)
-    if bad := not_finite(goal):
-        raise ValueError(f"refused: {bad} is not a finite number")
-    return {name: goal[name] for name in value}
+    if given and given != actual:
+        raise ValueError(f"its type is {actual}, not {given}")
+    return values.checked(text, Registry(dict(args.package)).learn(f"{actual}_Goal", bus.definition))
 
 
-class Errand:
-    """A goal on its way, from the command line."""
+class GoalRequest:
+    """Sends one goal, and follows it to its end."""
 
     def __init__(self, bus: Bus, args: argparse.Namespace, kind: str) -> None:
         self._bus, self._key, self._timeout, self._json = bus, args.key, args.timeout, args.json
@@ -132,20 +111,19 @@ class Errand:
         self._feedback = bus.subscribe_raw(key_of(args.key, FEEDBACK)) if args.feedback else None
 
     def run(self, goal: Any, stop: threading.Event) -> int:
-        """Send it and wait for its end; cancel it once `stop` is set. Returns the exit code."""
+        """Send the goal and wait for its end; cancel it once `stop` is set. Returns the exit code."""
         try:
             reply = self._call(SEND, {"goal_id": self._id, "goal": goal})
         except NoReply:
             self._cancel()  # it may have been accepted all the same
             raise
-        answer = self._value(reply, "SendGoal_Response")
+        answer = self._reader.read(reply, self._bus, f"{self._kind}_SendGoal_Response")
         if not isinstance(answer, dict):
             self._cancel()  # it may have been accepted
             raise BusError(f"{self._key}: the reply could not be decoded: {self._reader.why}")
         if not answer.get("accepted"):
             reason = reply.attachment.decode(errors="replace") or "its server gives no reason"
-            report(f"holozen action send_goal: {self._key}: the goal was rejected: {printable(reason)}")
-            return 1
+            raise Failure(f"{self._key}: the goal was rejected: {reason}")
         identity = bytes(self._id["uuid"]).hex()
         self._print({"goal_id": identity, "accepted": True}, f"Goal accepted with ID: {identity}")
         asked = {"goal_id": self._id}
@@ -172,7 +150,7 @@ class Errand:
                 return 130
         self._print_feedback()
         reply = result()
-        value = self._value(reply, "GetResult_Response")
+        value = self._reader.read(reply, self._bus, f"{self._kind}_GetResult_Response")
         status, outcome = (value.get("status"), value.get("result")) if isinstance(value, dict) else (0, value)
         name = State(status).name if status in list(State) else str(status)
         shown = ["Result:", *lines(outcome, "  "), f"Goal finished with status: {name}"]
@@ -181,22 +159,16 @@ class Errand:
 
     def _cancel(self) -> None:
         try:
-            reply = self._value(
-                self._call(CANCEL, {"goal_info": {"goal_id": self._id}}), "CancelGoal_Response", "action_msgs/srv/"
-            )
+            reply = self._call(CANCEL, {"goal_info": {"goal_id": self._id}})
         except BusError as error:
             report(f"holozen action send_goal: {error}")
             return
-        if isinstance(reply, dict) and not reply.get("goals_canceling"):
+        answer = self._reader.read(reply, self._bus, "action_msgs/srv/CancelGoal_Response")
+        if isinstance(answer, dict) and not answer.get("goals_canceling"):
             report(f"holozen action send_goal: {self._key}: its server does not cancel the goal")
 
     def _call(self, part: str, value: Any) -> Any:
         return call_bytes(self._bus, key_of(self._key, part), json.dumps(value).encode(), JSON, self._timeout)[0]
-
-    def _value(self, reply: Any, ending: str, start: str = "") -> Any:
-        if reply.encoding == CDR:  # whose encoding does not name the type
-            reply.encoding = f"{CDR};{start or f'{self._kind}_'}{ending}"
-        return self._reader.read(reply, self._bus)
 
     def _print_feedback(self) -> None:
         while self._feedback and (sample := self._feedback.try_recv()):
@@ -212,7 +184,7 @@ class Errand:
 def _set_after(work: Callable[[], object], done: threading.Event) -> None:
     try:
         work()
-    except BusError:  # which the next call raises again
+    except BusError:  # raised again where the result is read
         pass
     done.set()
 
@@ -228,9 +200,9 @@ def _send_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = by_name(
-    Noun("action", "Inspect actions, and send goals.", dict.fromkeys(("list", "info", "send_goal"), "action")),
-    Verb("action list", "the actions that nodes serve or use", "-t", list_arguments("action"), list_actions),
-    Verb("action info", "an action's type, clients and servers", "navigate_to_pose", key_argument, info),
+    Noun("action", "inspect actions, and send goals"),
+    Verb("action list", "list the actions that nodes serve or use", "-t", list_arguments("action"), list_actions),
+    Verb("action info", "show an action's type, clients and servers", "navigate_to_pose", key_argument, info),
     Verb("action send_goal", "send a goal and wait for its result; Ctrl-C cancels the goal",
         """navigate_to_pose '{"pose": {"pose": {"position": {"x": 1.0}}}}' --feedback""", _send_arguments, send_goal),
 )  # fmt: skip

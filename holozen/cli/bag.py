@@ -3,7 +3,7 @@
 import argparse
 import json
 
-from holozen.cli.verb import Noun, Verb, by_name
+from holozen.cli.verb import Noun, Verb, argument, by_name
 from holozen.console import printable
 from holozen.flags import path
 
@@ -35,10 +35,6 @@ def plot(args: argparse.Namespace) -> int:
     return 0
 
 
-def _info_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("files", nargs="+", type=path, metavar="FILE")
-
-
 def _plot_arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("file", type=path, metavar="FILE")
@@ -47,10 +43,11 @@ def _plot_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = by_name(
-    Noun("bag", "Record, play and inspect bags: MCAP files of messages.",
-        {"info": "bag", "plot": "bag", "record": "record", "play": "replay"}),
-    Verb("bag info", "what is in a bag: counts, missing messages, rates", "square.mcap", _info_arguments, info,
-        "one JSON object per file and line", bus=False),
+    Noun("bag", "record, play and inspect bags: MCAP files of messages",
+        {"record": "record", "play": "replay"}),
+    Verb("bag info", "show what is in a bag: counts, missing messages, rates", "square.mcap",
+        argument("files", nargs="+", type=path, metavar="FILE"), info,
+        "print the contents as JSON, one object per line", bus=False),
     Verb("bag plot", "draw the paths and velocities of a bag's robots", "square.mcap -o square.svg", _plot_arguments,
-        plot, "what was drawn, as one JSON object", bus=False),
+        plot, "print what was drawn as JSON, one object per line", bus=False),
 )  # fmt: skip

@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING
 from holozen import flags
 from holozen.cli.verb import Verb, by_name
 from holozen.console import Failure, printable, report
-from holozen.suggest import suggest
+from holozen.suggest import suggest, suggest_file
 
 if TYPE_CHECKING:
     from holozen.check.engine import Finding
 
 NOTES = """Without an error the last line summarizes the file. The exit code is 1 if there is an error, 0 if
 there are no findings or only warnings, 2 for wrong usage. The lines of the --require file are `link NAME` or
-`joint NAME [TYPE]`; # starts a comment. """
+`joint NAME [TYPE]`; # starts a comment."""
 
 
 def run(args: argparse.Namespace) -> int:
@@ -78,7 +78,9 @@ def _explain(name: str) -> int:
 
 
 def _fix(path: Path, findings: "list[Finding]", write: bool) -> bool:
-    """Show what can be corrected in a file, and `write` it, keeping the old one; returns whether it could."""
+    """Print a diff of the corrections to a file; with `write`, write the file and keep the original. Returns False if
+    there is no correction although a finding is an error.
+    """
     from difflib import unified_diff
 
     from holozen.check.corrections import correct
@@ -87,15 +89,15 @@ def _fix(path: Path, findings: "list[Finding]", write: bool) -> bool:
         old = path.read_bytes()
         text = old.decode()
     except (OSError, UnicodeDecodeError) as error:
-        raise Failure(f"{path}: {getattr(error, 'strerror', '') or 'is not UTF-8'}") from None
+        raise Failure(f"{path}: {getattr(error, 'strerror', '') or 'is not UTF-8'}{suggest_file(path)}") from None
     new, done = correct(text, str(path), findings)
     if not done:
-        report("holozen check: nothing that --fix can correct; without it, all findings are shown")
+        report("holozen check: there is nothing that --fix can correct; leave it out to see all findings")
         return not any(finding.severity == "error" for finding in findings)
     for line in unified_diff(text.splitlines(), new.splitlines(), str(path), f"{path} (corrected)", lineterm=""):
         print(printable(line))
     if not write:
-        report("holozen check: nothing is written yet; --fix --write does")
+        report("holozen check: nothing is written yet; add --write to write the file")
         return True
     path = path.resolve()
     try:
@@ -107,12 +109,12 @@ def _fix(path: Path, findings: "list[Finding]", write: bool) -> bool:
             os.replace(whole, path)
     except OSError as error:
         raise Failure(f"{path}: cannot be written: {error.strerror}") from None
-    report(f"holozen check: {path} is corrected; as it was it is {kept}")
+    report(f"holozen check: {path} is corrected; the original is kept as {kept}")
     return True
 
 
 def _keep(path: Path, content: bytes) -> Path:
-    """A new file beside `path` with the content it has."""
+    """Write `content` to a new file beside `path`, and return its path."""
     for number in count(1):
         kept = path.with_name(f"{path.name}.orig{number if number > 1 else ''}")
         with suppress(FileExistsError), kept.open("xb") as file:
@@ -137,15 +139,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("file", type=flags.path, nargs="?", help="a xacro, URDF or SDF file")
     add("args", type=flags.pair, nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg")
     flags.add_robot_sources(parser)
-    add("--fits", type=_size, default=(), metavar="LxW[xH]", help="most metres along x, y, z: 0.4x0.2")
+    add("--fits", type=_size, default=(), metavar="LxW[xH]", help="largest allowed size in metres, such as 0.4x0.2")
     add("--explain", nargs="?", const="", metavar="RULE", help="explain a rule with an example; without RULE, list all")
     add("--fix", action="store_true", help="show a diff that corrects misspelt names and missing inertia")
-    add("--write", action="store_true", help="with --fix: write it; the file as it was is FILE.orig")
+    add("--write", action="store_true", help="with --fix: write the file, and keep the original as FILE.orig")
     add("--sarif", action="store_true", help="print SARIF 2.1.0, for editors and CI")
     add("--require", type=flags.path, metavar="FILE", help="links and joints that the robot must have")
 
 
 VERBS = by_name(
-    Verb("check", "Report what is wrong with a xacro, URDF or SDF robot.", "my_bot.urdf.xacro", _arguments, run,
-        "print one JSON object a finding", NOTES, bus=False),
+    Verb("check", "report what is wrong with a xacro, URDF or SDF robot", "my_bot.urdf.xacro", _arguments, run,
+        "print the findings as JSON, one object per line", NOTES, bus=False),
 )  # fmt: skip

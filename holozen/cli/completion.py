@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from holozen.bus import Bus
 from holozen.cli.hints import is_any
-from holozen.cli.verb import Noun, Service, Verb, by_name
+from holozen.cli.verb import Noun, Service, Verb, argument, by_name
 from holozen.flags import Parser, package
 from holozen.transport import connection
 from holozen.transport.actions import found_in
@@ -51,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-PATIENCE = 0.25  # s to discover nodes
+PATIENCE = 0.25  # s to find nodes
 SAFE = re.compile(r"[A-Za-z0-9_./@%+-]+")  # words that need no quoting in a shell; keys come over the wire
 PARAMETERS = "rcl_interfaces/srv/ListParameters"
 LIVE = {
@@ -60,13 +60,13 @@ LIVE = {
     "service key": "services", "service type": "services' types",
     "node name": "nodes", "param node": "nodes with parameters",
 }  # fmt: skip
-"""By argument, or by verb and argument: the kind of candidates that are looked up on the wire."""
+"""Argument, or verb and argument -> the kind of candidates that are looked up on the wire."""
 
 
 def complete(words: list[str], verbs: Iterable[str], command: Callable[[str], Any]) -> int:
-    """Print the candidates for the last word, one a line; nothing if anything fails.
+    """Print the candidates for the last word, one per line; nothing if anything fails.
 
-    `verbs` are those of the command line, `command` gives what has a verb's parser.
+    `verbs` are those of the command line; `command` returns the implementation of one.
     """
     with contextlib.redirect_stderr(io.StringIO()), contextlib.suppress(Exception, SystemExit):
         for word in _candidates(words or [""], verbs, command):
@@ -101,19 +101,11 @@ def _parser(command: Any, words: list[str]) -> tuple[argparse.ArgumentParser, li
     """The parser of a command, or of the noun's verb that `words` begin with; and the remaining words."""
     if isinstance(command, Noun) and words and words[0] in command.modules:
         return command.verb(words[0]).parser(), words[1:]
-    return _innermost(command.parser(), words)
-
-
-def _innermost(parser: argparse.ArgumentParser, words: list[str]) -> tuple[argparse.ArgumentParser, list[str]]:
-    """The parser of the verb that `words` name, and the remaining words."""
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction) and words and words[0] in action.choices:
-            return _innermost(action.choices[words[0]], words[1:])
-    return parser, words
+    return command.parser(), words
 
 
 def _wanted(parser: argparse.ArgumentParser, words: list[str]) -> argparse.Action | None:
-    """The argument that the next word belongs to; None if any file or text may follow."""
+    """The argument that the next word belongs to; None if there is none."""
     if words and (flag := parser._option_string_actions.get(words[-1])) and flag.nargs != 0:
         return flag
     flags, taken, skip = parser._option_string_actions, 0, False
@@ -138,7 +130,7 @@ def _types(left: list[str], _current: str) -> list[str]:
 
 
 def _packages(left: list[str], current: str) -> list[str]:
-    """Names of packages; none for an empty word, for which the shell shows files."""
+    """The names of packages; none for an empty word, so that the shell lists files."""
     from holozen.ros import packages
 
     packages.use(_given(left))
@@ -160,7 +152,7 @@ def _given(left: list[str]) -> dict[str, Path]:
 LOOKED_UP: dict[str, Callable[[list[str], str], list[str]]] = {
     "interface type": _types, "run target": _packages, "run words": _executables,
 }  # fmt: skip
-"""By verb and argument: what lists candidates without the wire, from the previous words and the current one."""
+"""Verb and argument -> the function that lists candidates without the wire, from the words before and the current."""
 
 
 def _live(kind: str, words: list[str]) -> list[str]:
@@ -188,12 +180,9 @@ def _words(kind: str, ends: list[Endpoint]) -> list[str]:
     return [word for word in found if word and "*" not in word]
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("shell", choices=SCRIPTS, help="for which shell")
-
-
 VERBS = by_name(
-    Verb("completion", "Print a script that completes verbs, flags, and the keys, types, services, nodes and robots"
-        " found.", "bash > ~/.local/share/bash-completion/completions/holozen", _arguments, run,
-        "the script as one JSON object", bus=False),
+    Verb("completion", "print a script that completes verbs, flags, and the keys, types, services, nodes and robots"
+        " found", "bash > ~/.local/share/bash-completion/completions/holozen",
+        argument("shell", choices=SCRIPTS, help="for which shell"), run,
+        "print the script as JSON, one object per line", bus=False),
 )  # fmt: skip

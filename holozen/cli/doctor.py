@@ -3,7 +3,7 @@
 import argparse
 import json
 
-from holozen.cli.verb import Verb, by_name
+from holozen.cli.verb import Verb, argument, by_name
 from holozen.console import printable
 from holozen.transport import connection
 from holozen.transport.errors import BusError
@@ -25,12 +25,9 @@ def run(args: argparse.Namespace) -> int:
     return code
 
 
-def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--health", metavar="NODE",
-        help="check only that this node of this machine answers: for a container, such as --health sim")  # fmt: skip
-
-
+HEALTH = "only check that this node on this machine answers, such as sim: for containers"
 VERBS = by_name(
-    Verb("doctor", "Check this machine and the running nodes, and suggest fixes. Changes nothing.", "--json",
-        _arguments, run, notes="exit code: 0 without errors, 1 with one; warnings do not count. "),
+    Verb("doctor", "check this machine and the running nodes, and suggest fixes; change nothing", "--json",
+        argument("--health", metavar="NODE", help=HEALTH), run,
+        notes="exit code: 0 without errors, 1 with one; warnings do not count"),
 )  # fmt: skip

@@ -6,16 +6,19 @@ import argparse
 import json
 import sys
 import threading
+from collections import deque
 from functools import partial
 from typing import Any
 
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import Hex, Reader, csv_row, cut, lines, strict
-from holozen.console import printable, report
+from holozen.console import Failure, printable, report
 from holozen.transport.errors import BusError
+from holozen.transport.graph import is_latched, latched
 from holozen.transport.node import Node
 from holozen.transport.samples import RawSubscriber, Sample
 
+DEPTH = 1024  # messages that wait to be printed
 WAITING = 1.0  # s without a message until that is reported
 
 
@@ -24,28 +27,38 @@ def echo(args: argparse.Namespace, bus: Node) -> int:
     try:
         printer, reader = Printer(args), Reader(args.type_flag or args.type or "", args.package)
     except ValueError as error:
-        report(f"holozen topic echo: {error}")
-        return 2
-    tap = bus.subscribe_raw(args.key)
-    tap.ends.append(bus.announce("sub", "any/msg/Any", args.key))
-    return _echo(args, bus, tap, printer, reader)
+        args.error(str(error))
+    subscriber = bus.subscribe_raw(args.key, DEPTH)
+    subscriber.ends.append(bus.announce("sub", "any/msg/Any", args.key))
+    return _echo(args, bus, subscriber, printer, reader)
 
 
-def _echo(args: argparse.Namespace, bus: Node, tap: RawSubscriber, printer: Printer, reader: Reader) -> int:
-    what = "no message that passes the filter" if args.filter else "no messages"
-    late = threading.Timer(
-        args.timeout or WAITING, tap.close if args.timeout else partial(_wait, args, bus, what, printer)
-    )
+def _latched(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber) -> deque[Sample]:
+    """The last messages of latched keys, as the QoS says, and after them those that arrived meanwhile."""
+    every = args.qos_durability == "transient_local"
+    last = args.key.rpartition("/")[2]
+    if args.qos_durability == "volatile" or not (every or "*" in last or is_latched(last)):
+        return deque()
+    kept = [*bus.last_messages(latched(bus.endpoints(), args.key, every))]
+    came = [sample for _ in range(DEPTH) if (sample := subscriber.try_recv())]
+    known = {(sample.key, sample.payload) for sample in came}
+    return deque([sample for sample in kept if (sample.key, sample.payload) not in known] + came)
+
+
+def _echo(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber, printer: Printer, reader: Reader) -> int:
+    first = _latched(args, bus, subscriber)
+    nothing = "no message that passes the filter" if args.filter else "no messages"
+    then = subscriber.close if args.timeout else partial(_report_waiting, args, bus, nothing, printer)
+    late = threading.Timer(args.timeout or WAITING, then)
     late.daemon = True
     late.start()
     try:
         while True:
             try:
-                sample = tap.recv()
+                sample = first.popleft() if first else subscriber.recv()
             except BusError:
-                nothing = f"{what} on {args.key} within {args.timeout:g} s"
-                report(f"holozen topic echo: {nothing}{_hint(args, bus, printer)}")
-                return 1
+                why = f"{nothing} on {args.key} within {args.timeout:g} s"
+                raise Failure(f"{why}{_hint(args, bus, printer)}") from None
             if not args.filter:
                 late.cancel()
             if printer.show(sample, reader.read(sample, bus)):
@@ -53,15 +66,14 @@ def _echo(args: argparse.Namespace, bus: Node, tap: RawSubscriber, printer: Prin
                 if args.once:
                     return 0
     except LookupError as error:
-        report(f"holozen topic echo: {args.key}: {error.args[0]}")
-        return 1
+        raise Failure(f"{args.key}: {error.args[0]}") from None
     finally:
         printer.report_skipped(reader.why)
 
 
-def _wait(args: argparse.Namespace, bus: Node, what: str, printer: Printer) -> None:
+def _report_waiting(args: argparse.Namespace, bus: Node, nothing: str, printer: Printer) -> None:
     try:
-        report(f"waiting for {args.key}; {what} yet{_hint(args, bus, printer)}")
+        report(f"waiting for {args.key}; {nothing} yet{_hint(args, bus, printer)}")
     except Exception:  # the session was closed in the meantime, for which zenoh raises an error of its own
         return
 
@@ -75,7 +87,7 @@ def _hint(args: argparse.Namespace, bus: Node, printer: Printer) -> str:
 
 
 class Printer:
-    """Prints values according to the flags, and counts those it cannot show. Raises ValueError for an invalid flag."""
+    """Prints values as the flags say, and counts those it cannot show. Raises ValueError for an invalid flag."""
 
     def __init__(self, args: argparse.Namespace) -> None:
         self._args, self._many = args, "*" in args.key
@@ -149,7 +161,7 @@ class Printer:
             sys.stdout.buffer.flush()
 
     def report_skipped(self, why: str) -> None:
-        """Report how many samples could not be shown, if any, and `why` for the last of them."""
+        """Report how many samples could not be shown, if any, and `why` the last one could not."""
         if self._undecoded:
             last = "the last: " * (self._undecoded > 1)
             report(f"{self._undecoded} of {self._count} samples could not be decoded; {last}{why}")

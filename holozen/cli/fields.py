@@ -1,16 +1,16 @@
 """Fields of messages: picked by a dotted path, such as `pose.pose.position.x`, or tested by an expression (`--filter`).
 
-An expression, such as `m.linear.x > 0.2 and not m.angular.z`, is parsed by Python's own parser and evaluated here, node
-by node: comparisons, `and`, `or`, `not`, `in`, arithmetic without powers, `abs`, `len`, `[0]`. Anything else is
-rejected, so an expression has no side effects. `m` is the message; a bare name is its field.
+An expression, such as `m.linear.x > 0.2 and not m.angular.z`, is a Python expression with comparisons, `and`, `or`,
+`not`, `in`, arithmetic without powers, `abs`, `len` and `[0]`; anything else is refused. `m` is the message, a bare
+name one of its fields. Before Python evaluates it, names and attributes become items of the message, so it can read
+nothing else and has no side effects.
 """
 
 import ast
-import operator
 import re
+import warnings
 from collections.abc import Callable, Iterator
-from itertools import pairwise
-from typing import Any
+from typing import Any, NoReturn
 
 from holozen.suggest import suggest
 
@@ -28,12 +28,12 @@ def path(text: str) -> Path:
         parts.append(found[1] if found[1] is not None else int(found[2]))
         at = found.end()
     if not parts or at < len(text):
-        raise ValueError(f"{text[:80]!r} is no field; write names with dots, such as pose.pose.position.x")
+        raise ValueError(f"{text[:80]!r} is not a field; write names with dots, such as pose.pose.position.x")
     return tuple(parts)
 
 
 def pick(value: Any, path: Path) -> Any:
-    """The field of `value` at a path. Raises LookupError that names the fields there are."""
+    """The field of `value` at a path. Raises LookupError that lists the fields, if it has no such one."""
     for part in path:
         if isinstance(part, int) and isinstance(value, list):
             if part >= len(value):
@@ -53,43 +53,41 @@ def _missing(value: Any, part: str | int) -> str:
     return f"no field {part!r}{suggest(str(part), names)}; there are {', '.join(names) or 'none'}"
 
 
-LONGEST = 1000  # characters
-MOST_NODES = 200
+LONGEST = 1000  # characters of an expression
+MOST_NODES = 200  # parts of an expression
 
-Value = Callable[[Any], Any]
-"""Evaluates a node for a message."""
-
-COMPARE: dict[type[ast.cmpop], Callable[[Any, Any], Any]] = {
-    ast.Lt: operator.lt, ast.LtE: operator.le, ast.Gt: operator.gt, ast.GtE: operator.ge,
-    ast.Eq: operator.eq, ast.NotEq: operator.ne,
-    ast.In: lambda item, inside: item in inside, ast.NotIn: lambda item, inside: item not in inside,
-}  # fmt: skip
-REASON: dict[type[ast.operator], Callable[[Any, Any], Any]] = {
-    ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv,
-    ast.Mod: operator.mod, ast.FloorDiv: operator.floordiv,
-}  # fmt: skip
+ALLOWED = (
+    ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq, ast.In, ast.NotIn, ast.BoolOp, ast.And, ast.Or,
+    ast.UnaryOp, ast.Not, ast.USub, ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div, ast.Mod, ast.FloorDiv,
+    ast.Subscript, ast.Call, ast.Constant, ast.Name, ast.Attribute, ast.Load,
+)  # fmt: skip
+"""The parts that an expression may consist of."""
 CALLS: dict[str, Callable[[Any], Any]] = {"abs": abs, "len": len}
 
 
 def compiled(text: str) -> Callable[[Any], bool]:
     """The predicate of an expression. Raises ValueError with one line for an invalid one.
 
-    A message without such a field, or with a value of another type there, does not pass.
+    A message that lacks a field of the expression, or has a value of another type there, does not pass.
     """
     if len(text) > LONGEST:
         raise ValueError(f"the filter is longer than {LONGEST} characters")
-    try:
-        tree = ast.parse(text.strip(), mode="eval").body
-    except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
-        why = error.msg if isinstance(error, SyntaxError) else "nested too deeply"
-        raise ValueError(f"filter {text!r}: {why}; write such as m.linear.x > 0.2") from None
-    if sum(1 for _ in ast.walk(tree)) > MOST_NODES:
-        raise ValueError(f"the filter has more than {MOST_NODES} parts")
-    worth = _value(tree, text)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # Python warns of such as 1[0], which no message passes
+        try:
+            tree = ast.parse(text.strip(), mode="eval")
+        except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
+            why = error.msg if isinstance(error, SyntaxError) else "nested too deeply"
+            raise ValueError(f"filter {text!r}: {why}; write one such as m.linear.x > 0.2") from None
+        if sum(1 for _ in ast.walk(tree.body)) > MOST_NODES:
+            raise ValueError(f"the filter has more than {MOST_NODES} parts")
+        tree.body = _Lookups(text.strip()).visit(tree.body)
+        code = compile(ast.fix_missing_locations(tree), "<filter>", "eval")
+    names = {"__builtins__": {}, "number": _number, **CALLS}
 
     def passes(message: Any) -> bool:
         try:
-            return bool(worth(message))
+            return bool(eval(code, names, {"m": message}))
         except (LookupError, TypeError, ArithmeticError):
             return False
 
@@ -97,7 +95,9 @@ def compiled(text: str) -> Callable[[Any], bool]:
 
 
 def lacking(text: str, message: Any) -> str:
-    """A message about the first field in an expression that `message` lacks, with the nearest it has; else empty."""
+    """An error line about the first field of an expression that `message` lacks, with the nearest one that it has;
+    empty if it lacks none.
+    """
     for node in ast.walk(ast.parse(text.strip(), mode="eval").body):
         if isinstance(node, ast.Attribute) or (isinstance(node, ast.Name) and node.id not in CALLS):
             names = [*_chain(node)]
@@ -109,90 +109,60 @@ def lacking(text: str, message: Any) -> str:
 
 
 def _chain(node: ast.expr) -> Iterator[str]:
-    """The names of a field's path; none if it has anything but names."""
+    """The names of a field's path; none if the path has anything but names."""
     if isinstance(node, ast.Attribute) and (inner := [*_chain(node.value)]):
         yield from [*inner, node.attr]
     elif isinstance(node, ast.Name):
         yield node.id
 
 
-def _value(node: ast.expr, text: str) -> Value:
-    maker = _MAKERS.get(type(node))
-    made = maker(node, text) if maker else None
-    if made is None:
-        part = ast.get_source_segment(text.strip(), node) or text
-        raise ValueError(f"filter: {part!r} has no meaning here; it takes fields, numbers, texts, comparisons,"
+class _Lookups(ast.NodeTransformer):
+    """Turns `m.linear.x` and `linear.x` into `m["linear"]["x"]`. Raises ValueError for a part that is not ALLOWED."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def visit(self, node: ast.AST) -> Any:
+        """The replacement of a part."""
+        operators = (part for part in ast.iter_child_nodes(node) if not hasattr(part, "lineno"))
+        value = node.value if isinstance(node, ast.Constant) else None
+        is_plain = value is None or isinstance(value, bool | int | float | str)
+        if not is_plain or not all(isinstance(part, ALLOWED) for part in (node, *operators)):
+            self._refuse(node)
+        return super().visit(node)
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        """The message, or one of its fields."""
+        return node if node.id == "m" else _item(ast.Name("m", ast.Load()), node.id)
+
+    def visit_Attribute(self, node: ast.Attribute) -> ast.expr:
+        """A field of a field."""
+        return _item(self.visit(node.value), node.attr)
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        """Arithmetic on numbers only: a string times a billion would fill the memory."""
+        left, right = (
+            ast.Call(ast.Name("number", ast.Load()), [self.visit(one)], []) for one in (node.left, node.right)
+        )
+        return ast.BinOp(left, node.op, right)
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        """A call of one of CALLS."""
+        if not isinstance(node.func, ast.Name) or node.func.id not in CALLS or len(node.args) != 1 or node.keywords:
+            self._refuse(node)
+        return ast.Call(node.func, [self.visit(node.args[0])], [])
+
+    def _refuse(self, node: ast.AST) -> NoReturn:
+        part = ast.get_source_segment(self._text, node) or self._text
+        raise ValueError(f"filter: {part!r} is not allowed; use fields, numbers, texts, comparisons,"
                          " and, or, not, in, + - * / %, abs(), len()")  # fmt: skip
-    return made
 
 
-def _constant(node: ast.Constant, _text: str) -> Value | None:
-    value = node.value
-    return (lambda _: value) if value is None or isinstance(value, bool | int | float | str) else None
-
-
-def _name(node: ast.Name, _text: str) -> Value:
-    name = node.id
-    return (lambda message: message) if name == "m" else lambda message: message[name]
-
-
-def _attribute(node: ast.Attribute, text: str) -> Value:
-    inner, name = _value(node.value, text), node.attr
-    return lambda message: inner(message)[name]
-
-
-def _subscript(node: ast.Subscript, text: str) -> Value | None:
-    if isinstance(node.slice, ast.Slice):
-        return None
-    inner, index = _value(node.value, text), _value(node.slice, text)
-    return lambda message: inner(message)[index(message)]
-
-
-def _compare(node: ast.Compare, text: str) -> Value | None:
-    sides = [_value(side, text) for side in (node.left, *node.comparators)]
-    compare = [COMPARE.get(type(op)) for op in node.ops]
-    steps = [(how, *pair) for how, pair in zip(compare, pairwise(sides), strict=True) if how]
-    if len(steps) < len(compare):
-        return None
-    return lambda message: all(how(left(message), right(message)) for how, left, right in steps)
-
-
-def _bool(node: ast.BoolOp, text: str) -> Value:
-    parts, join = [_value(part, text) for part in node.values], all if isinstance(node.op, ast.And) else any
-    return lambda message: join(part(message) for part in parts)
-
-
-def _unary(node: ast.UnaryOp, text: str) -> Value | None:
-    inner = _value(node.operand, text)
-    if isinstance(node.op, ast.Not):
-        return lambda message: not inner(message)
-    return (lambda message: -_number(inner(message))) if isinstance(node.op, ast.USub) else None
-
-
-def _binary(node: ast.BinOp, text: str) -> Value | None:
-    left, right = _value(node.left, text), _value(node.right, text)
-    reason = REASON.get(type(node.op))
-    if reason is None:
-        return None
-    # Numbers only: a string times a billion would fill the memory.
-    return lambda message: reason(_number(left(message)), _number(right(message)))
-
-
-def _call(node: ast.Call, text: str) -> Value | None:
-    if not isinstance(node.func, ast.Name) or node.func.id not in CALLS or len(node.args) != 1 or node.keywords:
-        return None
-    call = CALLS[node.func.id]
-    inner = _value(node.args[0], text)
-    return lambda message: call(inner(message))
+def _item(owner: ast.expr, name: str) -> ast.expr:
+    return ast.Subscript(owner, ast.Constant(name), ast.Load())
 
 
 def _number(value: Any) -> float:
     if not isinstance(value, int | float):
         raise TypeError
     return value
-
-
-_MAKERS: dict[type[ast.expr], Callable[[Any, str], Value | None]] = {
-    ast.Constant: _constant, ast.Name: _name, ast.Attribute: _attribute, ast.Subscript: _subscript,
-    ast.Compare: _compare, ast.BoolOp: _bool, ast.UnaryOp: _unary, ast.BinOp: _binary, ast.Call: _call,
-}  # fmt: skip

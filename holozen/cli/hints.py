@@ -1,4 +1,4 @@
-"""Messages about keys and nodes that were not found, with the nearest that were."""
+"""Messages about keys and nodes that were not found, with the nearest ones that were."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def no_nodes(where: str) -> str:
 
 
 def none_found(what: str, ends: list[Endpoint], where: str) -> str:
-    """The message that the nodes at `where`, with the endpoints `ends`, have no `what`, or that there are none."""
+    """The message that the nodes at `where`, whose endpoints are `ends`, have no `what`; or that there are no nodes."""
     return f"no {what}: {f'the nodes at {where} have none' if ends else no_nodes(where)}"
 
 
@@ -27,8 +27,8 @@ def unknown(word: str, known: list[str], where: str) -> str:
 
 
 def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub", "sub")) -> str:
-    """` (did you mean 'odom'?)` with the live key nearest to the first of `keys` that no node has, or `; no nodes found
-    at ...`; empty where neither applies.
+    """` (did you mean 'odom'?)`, with the key nearest to the first of `keys` that no node has; or `; no nodes found at
+    ...`; or an empty string.
     """
     ends = [end for end in bus.endpoints() if end.session != bus.id]
     if not ends and not bus.connected():
@@ -39,5 +39,5 @@ def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub",
 
 
 def is_any(end: Endpoint) -> bool:
-    """Whether an endpoint accepts any type, as those of echo do."""
+    """Whether an endpoint accepts any type, such as one of `topic echo`."""
     return end.type.startswith("any/")

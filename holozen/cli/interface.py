@@ -35,14 +35,14 @@ def show(args: argparse.Namespace) -> int:
 
 
 def _found(args: argparse.Namespace) -> Interface:
-    """The type that is named, or that of a key; one that is not here comes from the node that publishes it."""
+    """The type that is named, or that of the named key; one that is unknown here is learned from its publisher."""
     registry = Registry(dict(args.package))
     try:
         return registry.find(args.type)
     except InterfaceError:
         package = args.type.partition("/")[0]
         if package.isidentifier() and registry.places.names(package):
-            raise  # it is here, without that type
+            raise  # the package is here, without that type
         from holozen.transport.graph import on_key
 
         with open_bus(args) as bus:
@@ -67,11 +67,9 @@ def definition(interface: Interface, indent: str = "") -> Iterator[str]:
     for number, part in enumerate(sections(interface)):
         yield from (*(["---"] if number else []), *definition(part))
     for constant in interface.constants:
-        value = constant.value if isinstance(constant.value, str) else json.dumps(constant.value)
-        yield f"{indent}{constant.type} {constant.name}={value}"
+        yield indent + constant.line()
     for field in interface.fields:
-        default = "" if field.default is None else f" {json.dumps(field.default)}"
-        yield f"{indent}{field.spelled(interface.package)} {field.name}{default}"
+        yield indent + field.line(interface.package)
         if field.nested:
             yield from definition(field.nested, indent + "\t")
 
@@ -126,10 +124,10 @@ def _proto_arguments(parser: argparse.ArgumentParser) -> None:
 
 SUCH = "such as geometry_msgs/msg/Twist, std_srvs/srv/Trigger, nav2_msgs/action/NavigateToPose"
 VERBS = by_name(
-    Noun("interface", "Show message, service and action types.", dict.fromkeys(("list", "show", "proto"), "interface")),
-    Verb("interface list", "all known types", "--only-srvs", _list_arguments, list_types, bus=False),
-    Verb("interface show", "the fields of a type, nested ones included", "geometry_msgs/msg/Twist", _show_arguments,
-        show),
-    Verb("interface proto", "a message with all fields, to edit and publish",
+    Noun("interface", "show message, service and action types"),
+    Verb("interface list", "list all known types", "--only-srvs", _list_arguments, list_types, bus=False),
+    Verb("interface show", "show the fields of a type, nested ones included", "geometry_msgs/msg/Twist",
+        _show_arguments, show),
+    Verb("interface proto", "print a message with all fields, to edit and publish",
         "geometry_msgs/msg/Twist | holozen topic pub cmd_vel -", _proto_arguments, proto, bus=False),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What `list`, `type`, `find` and `info` of topics, services and actions do: which keys there are, and whose."""
+"""The verbs `list`, `type`, `find` and `info` of topics and services, and what those of actions share with them."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from holozen.cli.hints import none_found, unknown
 from holozen.cli.output import decode
 from holozen.cli.topic import LISTEN
-from holozen.console import printable, report
+from holozen.console import Failure, printable, report
 from holozen.suggest import listed, suggest
 from holozen.transport.connection import FORBIDDEN
 from holozen.transport.errors import BusError
@@ -49,7 +49,7 @@ def topics(endpoints: list[Endpoint]) -> list[Topic]:
 def print_list(
     args: argparse.Namespace, noun: str, rows: Iterable[tuple[str, str]], ends: list[Endpoint], where: str
 ) -> int:
-    """Print each (key, type) once, or with -c only how many there are; `ends` are all endpoints at `where`."""
+    """Print each (key, type) once, or with -c only their number; `ends` are all endpoints at `where`."""
     found = sorted(set(rows))
     if args.count:
         print(json.dumps({"count": len(found)}) if args.json else len(found))
@@ -62,17 +62,16 @@ def print_list(
 
 
 def print_types(args: argparse.Namespace, types: Iterable[str], known: Iterable[str], where: str) -> int:
-    """Print the types of a key; exit code 1 if there are none. `known` are the keys at `where`."""
-    types = sorted(types)
+    """Print the types of a key. Raises Failure if there are none. `known` are the keys at `where`."""
+    if not (types := sorted(types)):
+        raise Failure(unknown(args.key, sorted(known), where))
     for name in types:
         print(json.dumps({"key": args.key, "type": name}) if args.json else printable(name))
-    if not types:
-        report(f"holozen {args.verb}: {unknown(args.key, sorted(known), where)}")
-    return 0 if types else 1
+    return 0
 
 
 def print_keys_of(args: argparse.Namespace, types: Mapping[str, Iterable[str]]) -> int:
-    """Print the keys of a type; exit code 1 if there are none. `types`: those of each key."""
+    """Print the keys of a type. Raises Failure if there are none. `types`: key -> its types."""
     keys = sorted(key for key, its in types.items() if any(f"/{name}".endswith(f"/{args.type}") for name in its))
     if getattr(args, "count", False):
         print(json.dumps({"count": len(keys)}) if args.json else len(keys))
@@ -82,12 +81,12 @@ def print_keys_of(args: argparse.Namespace, types: Mapping[str, Iterable[str]]) 
     if not keys:
         known = sorted({name for its in types.values() for name in its})
         what = f"{args.verb.partition(' ')[0]} of type {args.type!r}{suggest(args.type, known)}"
-        report(f"holozen {args.verb}: no {what}; types: {listed(known)}")
-    return 0 if keys else 1
+        raise Failure(f"no {what}; types: {listed(known)}")
+    return 0
 
 
 def print_sides(args: argparse.Namespace, types: Iterable[str], sides: Mapping[str, tuple[str, list[Any]]]) -> int:
-    """Print the types of a key and its nodes; `sides`: name in JSON -> title, and what has a node and a session."""
+    """Print the types of a key and its nodes. `sides`: name in JSON -> title, and ends with a node and a session."""
     types = sorted(set(types))
     if args.json:
         rows = {name: [{"node": one.node, "session": one.session} for one in ones] for name, (_, ones) in sides.items()}
@@ -102,7 +101,7 @@ def print_sides(args: argparse.Namespace, types: Iterable[str], sides: Mapping[s
 
 
 def is_hidden(key: str) -> bool:
-    """Whether ROS 2 lists a key only when asked to: a part of it begins with _."""
+    """Whether a key is listed on request only, as in ROS 2: a part of it begins with _."""
     return key.startswith("_") or "/_" in key
 
 
@@ -126,22 +125,21 @@ def list_services(args: argparse.Namespace, bus: Node) -> int:
 
 
 def service_type(args: argparse.Namespace, bus: Node) -> int:
-    """Print a service's type; exit code 1 if it has no server."""
+    """Print a service's type. Raises Failure if it has no server."""
     served = _served(bus.endpoints())
     return print_types(args, {end.type for end in served.get(args.key, ())}, served, bus.where)
 
 
 def find_services(args: argparse.Namespace, bus: Node) -> int:
-    """Print the keys of a type; exit code 1 if there are none."""
+    """Print the keys of a type. Raises Failure if there are none."""
     return print_keys_of(args, {key: [end.type for end in ends] for key, ends in _served(bus.endpoints()).items()})
 
 
 def service_info(args: argparse.Namespace, bus: Node) -> int:
-    """Print a service's type and servers; exit code 1 if it has none."""
+    """Print a service's type and servers. Raises Failure if it has none."""
     served = _served(bus.endpoints())
     if not (servers := served.get(args.key)):
-        report(f"holozen service info: {unknown(args.key, sorted(served), bus.where)}")
-        return 1
+        raise Failure(unknown(args.key, sorted(served), bus.where))
     return print_sides(args, [end.type for end in servers], {"servers": ("Services count", servers)})
 
 
@@ -152,9 +150,9 @@ def list_topics(args: argparse.Namespace, bus: Node) -> int:
     """Print each key that nodes read or write, once."""
     heard: set[str] = set()
     if args.heard:
-        tap, deadline = bus.subscribe_raw("**"), time.monotonic() + args.heard
+        subscriber, deadline = bus.subscribe_raw("**"), time.monotonic() + args.heard
         while time.monotonic() < deadline:
-            while (sample := tap.try_recv()) is not None:
+            while (sample := subscriber.try_recv()) is not None:
                 heard.add(sample.key)
             time.sleep(0.005)
     ends = bus.endpoints()
@@ -190,25 +188,24 @@ def _print_verbose(found: list[Topic]) -> None:
 
 
 def topic_type(args: argparse.Namespace, bus: Node) -> int:
-    """Print a key's type; exit code 1 if no node states it."""
+    """Print a key's type. Raises Failure if no node states it."""
     found = topics(bus.endpoints())
     types = next((topic.types for topic in found if topic.key == args.key), [])
     met = None if types else foreign_sample(bus, args.key)
     if met and (found_type := type_in(met[0].encoding)):
         types = [found_type]
     if met and not types:
-        report(f"holozen topic type: {args.key!r} has no known type; its samples are {met[0].encoding}")
-        return 1
+        raise Failure(f"{args.key!r} has no known type; its samples are {met[0].encoding}")
     return print_types(args, types, [topic.key for topic in found], bus.where)
 
 
 def find_topics(args: argparse.Namespace, bus: Node) -> int:
-    """Print the keys of a type; exit code 1 if there are none."""
+    """Print the keys of a type. Raises Failure if there are none."""
     return print_keys_of(args, {topic.key: topic.types for topic in topics(bus.endpoints())})
 
 
 Row = dict[str, Any]
-"""A publisher or a subscription, as `info --json` prints it."""
+"""A publisher or a subscription, in the form of `topic info --json`."""
 
 SOURCE = {"source": str, "priority": str, "rate": int | float, "obeyed": bool, "held": bool}  # of CommandSource
 ASK = 0.5  # s
@@ -227,8 +224,7 @@ def topic_info(args: argparse.Namespace, bus: Node) -> int:
         _add_foreign(publishers, bus, args.key)
     _add_status(publishers, status)
     if not publishers + subscriptions:
-        report(f"holozen topic info: {unknown(args.key, [topic.key for topic in topics(endpoints)], bus.where)}")
-        return 1
+        raise Failure(unknown(args.key, [topic.key for topic in topics(endpoints)], bus.where))
     types = sorted({row["type"] for row in publishers + subscriptions} - {"", "any/msg/Any"})
     if args.json:
         summary = {"key": args.key, "types": types, "publishers": publishers, "subscriptions": subscriptions}
@@ -259,7 +255,7 @@ def _status(bus: Node, name: str, endpoints: list[Endpoint]) -> Row:
 
 
 def _add_status(publishers: list[Row], status: Row) -> None:
-    """Add the sim's status to each publisher; sources without a token become rows of their own."""
+    """Add the sim's status of each source to its publisher; a source without a token becomes a row of its own."""
     by_source = {row["source"]: row for row in publishers}
     for source in _sources(status):
         row = by_source.get(source["source"])
@@ -269,7 +265,7 @@ def _add_status(publishers: list[Row], status: Row) -> None:
 
 
 def _sources(status: Row) -> list[Row]:
-    """The well-formed sources of a status, which came over the wire and was not validated."""
+    """The well-formed sources of a status, which is not validated yet."""
     found = status.get("sources")
     rows = [row for row in found if isinstance(row, dict)] if isinstance(found, list) else []
     return [row for row in rows if all(isinstance(row.get(name), kind) for name, kind in SOURCE.items())]
@@ -278,9 +274,9 @@ def _sources(status: Row) -> list[Row]:
 def _listen(bus: Node, name: str) -> dict[str, list[Sample]]:
     """The samples of a key by source, received within LISTEN seconds or until there are ENOUGH."""
     heard: dict[str, list[Sample]] = {}
-    tap, deadline, count = bus.subscribe_raw(name), time.monotonic() + LISTEN, 0
+    subscriber, deadline, count = bus.subscribe_raw(name), time.monotonic() + LISTEN, 0
     while time.monotonic() < deadline and count < ENOUGH:
-        if (sample := tap.try_recv()) is None:
+        if (sample := subscriber.try_recv()) is None:
             time.sleep(LOOK)
             continue
         heard.setdefault(sample.source, []).append(sample)
@@ -302,11 +298,11 @@ def _add_heard(publishers: list[Row], heard: dict[str, list[Sample]]) -> None:
 
 
 def _add_foreign(publishers: list[Row], bus: Node, name: str) -> None:
-    """Add a node without a token that publishes a key or answers queries for it."""
+    """Add the node without a token that publishes a key or answers queries for it, if there is one."""
     if found := foreign_sample(bus, name):
         sample, answered = found
         _add_heard(publishers, {sample.source: [sample]})
-        publishers[-1]["node"] += ", when asked" * answered
+        publishers[-1]["node"] += ", which answers queries" * answered
 
 
 def _line(row: Row) -> str:
@@ -323,20 +319,20 @@ def _line(row: Row) -> str:
 
 def _stop(status: Row) -> str:
     text = f"; stopped by {status['stopped']}" if status.get("stopped") else ""
-    return text + ("; sources below a person are held until `resume`" if status.get("held") else "")
+    return text + ("; sources of a lower priority are held until `resume`" if status.get("held") else "")
 
 
 def foreign_sample(bus: Node, key: str) -> tuple[Sample, bool] | None:
-    """The first sample of a key within LISTEN seconds, and whether it is a reply to our query.
+    """The first sample of a key within LISTEN seconds, and whether it is a reply to our query; None without one.
 
     Foreign nodes hold no tokens: only their samples and replies reveal them.
     """
     if not bus.connected():
         return None
     # `key/**` includes the key itself, and no service takes such a query for a request.
-    tap, replies, deadline = bus.subscribe_raw(key), bus.ask(f"{key}/**", LISTEN), time.monotonic() + LISTEN
+    subscriber, replies, deadline = bus.subscribe_raw(key), bus.ask(f"{key}/**", LISTEN), time.monotonic() + LISTEN
     while time.monotonic() < deadline:
-        if sample := tap.try_recv():
+        if sample := subscriber.try_recv():
             return sample, False
         if answer := _answer(replies, key):
             return answer, True

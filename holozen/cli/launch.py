@@ -21,7 +21,7 @@ def run(args: argparse.Namespace) -> int:
     from holozen.ros.launch.launch_description_sources import read
     from holozen.ros.launch.stand_ins import replace_gazebo_packages
 
-    given, where = dict(args.package), connection.from_arguments(args)
+    given = dict(args.package)
     packages.use(given)
     replace_gazebo_packages()
     values = dict(word.split(":=", 1) for word in args.words if ":=" in word)
@@ -30,34 +30,25 @@ def run(args: argparse.Namespace) -> int:
         packages.use(given, path.resolve().parent)
         importer.install(packages.given, [path.resolve().parent])
         description = read(path)
-        return (
-            _show(description)
-            if args.show_args
-            else _follow(path.absolute(), description, values, where, args.allow_env)
-        )
+        return _show(description) if args.show_args else _follow(args, path.absolute(), description, values)
     except Failure:
         raise
     except Exception as error:
-        if not (line := tracebacks.import_error_line(error) or tracebacks.argument_error_line(error)):
-            tracebacks.show(error)
-        else:
-            report(f"holozen launch: {line}")
+        if line := tracebacks.import_error_line(error) or tracebacks.argument_error_line(error):
+            raise Failure(line) from None
+        tracebacks.show(error)
     return 1
 
 
-def _follow(
-    path: Path,
-    description: "LaunchDescription",
-    values: dict[str, str],
-    where: connection.Connection,
-    allow_env: list[str],
-) -> int:
+def _follow(args: argparse.Namespace, path: Path, description: "LaunchDescription", values: dict[str, str]) -> int:
     from holozen.process import stop_event
     from holozen.ros.launch.launch_service import LaunchService
+    from holozen.suspension import suspend_children_too
 
-    with LaunchService(where.arguments(), stop_event()) as service:
+    suspend_children_too()
+    with LaunchService(connection.from_arguments(args).arguments(), stop_event()) as service:
         context = service.context
-        context.allow_env = allow_env
+        context.allow_env = args.allow_env
         context.scope.configurations.update(values)
         context.scope = context.scope.within(path)
         left = set(values)
@@ -68,7 +59,7 @@ def _follow(
 
 
 def _report_unused(path: Path, used: set[str], left: set[str], later: set[str]) -> None:
-    """Report the values among `left` that nothing has used and that nothing in `later` will use."""
+    """Report the arguments among `left` that are not in `used`, nor in `later`, which will be used; and remove them."""
     from holozen.ros.launch.launch_service import ANY
 
     unused = left - used - later if ANY not in later else set()
@@ -89,10 +80,10 @@ def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
         refuse(f"give FILE, or PACKAGE FILE, not {' '.join(words) or 'nothing'!r}")
     package, name = words
     folder = packages.find(package)
-    there = sorted(each for each in (folder / "launch").rglob("*") if each.is_file()) if folder.is_dir() else []
-    found = next((each for each in there if each.name == name), None)
+    files = sorted(file for file in (folder / "launch").rglob("*") if file.is_file()) if folder.is_dir() else []
+    found = next((file for file in files if file.name == name), None)
     if found is None:
-        names = [each.name for each in there if each.suffix == ".py"]
+        names = [file.name for file in files if file.suffix == ".py"]
         hint = suggest(name, names) or f"; there are {', '.join(names) or 'none'}"
         raise NotFound(f"no launch file {name!r} in {folder / 'launch'}{hint}")
     return found
@@ -125,7 +116,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = by_name(
-    Verb("launch", "Run a Python launch file that was written for ROS 2, without ROS.",
+    Verb("launch", "run a Python launch file that was written for ROS 2, without ROS",
         "launch/gazebo.launch.py world:=arena.world", _arguments, run, json=None,
         usage="%(prog)s [options] FILE|PACKAGE FILE [name:=value ...]"),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`holozen new`: a small robot, controller or interfaces package to start from."""
+"""`holozen new`: writes a small robot, controller or package of interfaces to start from."""
 
 import argparse
 import json
@@ -15,7 +15,7 @@ from holozen.flags import number, refused
 
 NAME = re.compile(r"[a-z][a-z0-9_]{0,63}")
 Make = Callable[[argparse.Namespace], tuple[dict[str, str], str]]
-"""Files by their paths, and what one does next."""
+"""Returns the contents of the files by their paths, and the commands to run next."""
 More = Callable[[argparse.ArgumentParser], None]
 
 
@@ -41,7 +41,7 @@ def _package(args: argparse.Namespace) -> tuple[dict[str, str], str]:
 
 
 def _filled(template: str, name: str, words: dict[str, str] = {}) -> str:
-    """A template with its words in capitals replaced."""
+    """A template with its placeholders, which are words in capitals, replaced."""
     from holozen.data import find
 
     text = find("templates", template).read_text()
@@ -51,12 +51,12 @@ def _filled(template: str, name: str, words: dict[str, str] = {}) -> str:
 
 
 def _run(make: Make, args: argparse.Namespace) -> int:
-    """Write the files that `make` gives, none of which may be there."""
+    """Write the files that `make` returns, none of which may exist."""
     from pathlib import Path
 
     files, following = make(args)
     if taken := next((place for name in files if (place := _taken(name))), None):
-        raise Failure(f"{taken} is there already, and is left as it is; choose another name, or another folder")
+        raise Failure(f"{taken} exists already and is left unchanged; choose another name, or another folder")
     for name, text in files.items():
         try:
             Path(name).parent.mkdir(parents=True, exist_ok=True)
@@ -71,7 +71,7 @@ def _run(make: Make, args: argparse.Namespace) -> int:
 
 
 def _taken(name: str) -> str:
-    """What is where a file, or a folder that it lies in, has to be; empty if nothing is in the way."""
+    """The path in the way of a new file: its own, or that of a parent which is not a folder; empty if none is."""
     from pathlib import Path
 
     path = Path(name)
@@ -80,12 +80,12 @@ def _taken(name: str) -> str:
 
 
 def _module(text: str) -> str:
-    """A name that Python can import, and that hides no module which is there."""
+    """A name that Python can import, and that hides no installed module."""
     from importlib.util import find_spec
 
     name = _name(text)
     if iskeyword(name):
-        raise refused(f"{text!r}: is a word of Python itself, which cannot import it; choose another name")
+        raise refused(f"{text!r}: is a keyword of Python and cannot be imported; choose another name")
     if (name in sys.stdlib_module_names or find_spec(name)) and not _taken(f"{name}.py") and not _taken(name):
         raise refused(f"{text!r}: would hide the Python module of that name; choose another one, such as my_{name}")
     return name
@@ -104,19 +104,20 @@ def _verb(thing: str, about: str, example: str, make: Make, more: More | None = 
         parser.add_argument("name", type=kind, metavar="NAME")
         _ = more and more(parser)
 
-    return Verb(f"new {thing}", about, example, arguments, partial(_run, make), "each file as a JSON object", bus=False)
+    text = "print the written files as JSON, one object per line"
+    return Verb(f"new {thing}", about, example, arguments, partial(_run, make), text, bus=False)
 
 
 def _sizes(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--radius", type=number(0.02, 5, "m"), default=0.2, metavar="M", help="to the wheels (default: 0.2)")
+    add("--radius", type=number(0.02, 5, "m"), default=0.2, metavar="M", help="distance to the wheels (default: 0.2)")
     add("--wheel-radius", type=number(0.005, 2, "m"), metavar="M", help="(default: a quarter of --radius)")
-    add("--mass", type=number(0.01, 500, "kg"), default=3.0, metavar="KG", help="of the base (default: 3)")
+    add("--mass", type=number(0.01, 500, "kg"), default=3.0, metavar="KG", help="mass of the base (default: 3)")
 
 
 VERBS = by_name(
-    Noun("new", "Write a small start to work on.", dict.fromkeys(("robot", "controller", "package"), "new")),
-    _verb("robot", "Write NAME.urdf.xacro: a base on three omni wheels.", "rosie --radius 0.3", _robot, _sizes),
-    _verb("controller", "Write NAME.py, which drives a robot to a place, and a test of it.", "go_there", _controller),
-    _verb("package", "Write NAME, a package with a message and a service.", "our_interfaces", _package),
+    Noun("new", "write a small start to work on"),
+    _verb("robot", "write NAME.urdf.xacro: a base on three omni wheels", "rosie --radius 0.3", _robot, _sizes),
+    _verb("controller", "write NAME.py, which drives a robot to a place, and a test of it", "go_there", _controller),
+    _verb("package", "write NAME, a package with a message and a service", "our_interfaces", _package),
 )

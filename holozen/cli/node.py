@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import json
+from functools import partial
 
 from holozen.cli.hints import is_any, no_nodes
-from holozen.cli.verb import Noun, Verb, by_name, open_bus
-from holozen.console import printable, report
+from holozen.cli.verb import Noun, Verb, add_count, argument, by_name, open_bus
+from holozen.console import Failure, printable, report
 from holozen.flags import key
 from holozen.suggest import listed, suggest
 from holozen.transport.graph import Endpoint, includes
@@ -16,11 +17,11 @@ TITLES = {"sub": "Subscribers", "pub": "Publishers", "srv": "Service Servers"}
 
 
 def list_nodes(args: argparse.Namespace) -> int:
-    """Print the name of each running node, once for each session."""
+    """Print the name of each running node; of several with one name, each."""
     with open_bus(args) as bus:
         endpoints = bus.endpoints()
     nodes = sorted((end.node, end.session) for end in endpoints if end.kind == "node")
-    if args.count_nodes:
+    if args.count:
         print(json.dumps({"count": len(nodes)}) if args.json else len(nodes))
         return 0
     for name, session in nodes:
@@ -31,7 +32,7 @@ def list_nodes(args: argparse.Namespace) -> int:
 
 
 def info(args: argparse.Namespace) -> int:
-    """Print what a node reads, writes and serves; exit code 1 if there is no node of that name."""
+    """Print what a node reads, writes and serves. Raises Failure if there is no node of that name."""
     with open_bus(args) as bus:
         endpoints = bus.endpoints()
     name, _, session = args.name.partition("@")
@@ -39,8 +40,7 @@ def info(args: argparse.Namespace) -> int:
     if not ends:
         names = sorted({end.node for end in endpoints})
         known = f"known: {listed(names)}" if names else no_nodes(bus.where)
-        report(f"holozen node info: unknown node {args.name!r}{suggest(name, names)}; {known}")
-        return 1
+        raise Failure(f"unknown node {args.name!r}{suggest(name, names)}; {known}")
     for session in sorted({end.session for end in ends}):
         _print_node(name, [end for end in ends if end.session == session], args.json)
     return 0
@@ -59,14 +59,6 @@ def _print_node(name: str, ends: list[Endpoint], as_json: bool) -> None:
         print(f"  {title}:")
         for end in kinds[kind]:
             print(printable(f"    {end['key']}: {end['type']}"))
-
-
-def _list_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("-c", "--count-nodes", action="store_true", help="only how many there are")
-
-
-def _info_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", type=key, help="such as sim, or sim@a1b2c3 where there are more")
 
 
 def graph(args: argparse.Namespace) -> int:
@@ -88,7 +80,7 @@ def _print_graph(args: argparse.Namespace, ends: list[Endpoint]) -> None:
 
 
 def arrows(ends: list[Endpoint]) -> list[str]:
-    """A line a key: `teleop -> cmd_vel -> sim`; services after the topics, as `get_pose: pose_service`."""
+    """One line per key: `teleop -> cmd_vel -> sim`; then one per service: `get_pose: pose_service`."""
     rows = []
     for topic in sorted({end.key for end in ends if end.kind in ("pub", "sub") and "*" not in end.key}):
         writers = sorted({end.node for end in ends if end.kind == "pub" and end.key == topic})
@@ -101,7 +93,7 @@ def arrows(ends: list[Endpoint]) -> list[str]:
 
 
 def dot(ends: list[Endpoint]) -> list[str]:
-    """A digraph: nodes as boxes, keys as ellipses, services as dashed ones."""
+    """The lines of a digraph in Graphviz's language: nodes as boxes, topics as ellipses, services as dashed ones."""
     nodes, services = sorted({end.node for end in ends}), {end.key for end in ends if end.kind == "srv"}
     keys = sorted({end.key for end in ends if "*" not in end.key})
     edges = set()
@@ -124,14 +116,12 @@ def _quoted(text: str) -> str:
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
 
 
-def _graph_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--dot", action="store_true", help="in the language of Graphviz")
-
-
 VERBS = by_name(
-    Noun("node", "Inspect the running nodes.", {"list": "node", "info": "node"}),
-    Verb("node list", "the names of the nodes", "", _list_arguments, list_nodes),
-    Verb("node info", "what a node reads, writes and serves", "sim", _info_arguments, info),
-    Verb("graph", "Show which nodes write, read and serve which keys.", "--dot | dot -Tsvg > g.svg", _graph_arguments,
-        graph, "one JSON object a line, of one end of a key"),
+    Noun("node", "inspect the running nodes"),
+    Verb("node list", "list the names of the nodes", "", partial(add_count, noun="node"), list_nodes),
+    Verb("node info", "show what a node reads, writes and serves", "sim",
+        argument("name", type=key, help="such as sim, or sim@a1b2c3 if there are several"), info),
+    Verb("graph", "show which nodes write, read and serve which keys", "--dot | dot -Tsvg > g.svg",
+        argument("--dot", action="store_true", help="in the language of Graphviz"), graph,
+        "print the ends of keys as JSON, one object per line"),
 )  # fmt: skip

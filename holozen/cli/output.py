@@ -1,4 +1,4 @@
-"""Samples of any node decoded to plain values, and formatted in the layout of `ros2 topic echo`."""
+"""Decodes samples of any node to plain values, and formats them in the layout of `ros2 topic echo`."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Reader:
     """
 
     def __init__(self, type_name: str = "", packages: Packages = ()) -> None:
-        self.why = ""  # the last sample that failed could not be decoded
+        self.why = ""  # the reason why the last sample that failed could not be decoded
         self._given, self._packages = type_name, packages
         self._interfaces: dict[str, Any] = {}
         self._registry: Any = None
@@ -43,15 +43,15 @@ class Reader:
         if type_name:
             self._interface(type_name)
 
-    def read(self, sample: Sample, bus: Node) -> Any:
-        """The value of a sample; a Hex if its bytes cannot be decoded."""
+    def read(self, sample: Sample, bus: Node, usual: str = "") -> Any:
+        """The value of a sample; a Hex if its bytes cannot be decoded. `usual`: its type if it does not name one."""
         name, _, schema = sample.encoding.partition(";")
         if name != CDR and (name not in UNSPECIFIC or sample.payload[:2] not in CDR_STARTS):
             value = decode(sample.payload, sample.encoding)
             self.why = "neither text, JSON, msgpack nor CDR" if isinstance(value, Hex) else self.why
             return value
         try:
-            if kind := self._given or schema or self._announced_type(sample.key, bus):
+            if kind := self._given or schema or usual or self._announced_type(sample.key, bus):
                 return self._cdr(kind, sample.payload, bus)
             self.why = "for CDR give the type: --type T"
         except ValueError as error:  # bytes of another type, or a type that is not known here
@@ -65,7 +65,7 @@ class Reader:
         return cdr.read(self._interface(kind, bus.definition), payload)
 
     def _interface(self, name: str, define: Callable[[str], str] = lambda _: "") -> Any:
-        """A type; one that is not here is learned from its publisher."""
+        """The definition of a type; an unknown one is learned from its publisher."""
         if name not in self._interfaces:
             from holozen.messages.registry import Registry
 
@@ -81,7 +81,7 @@ class Reader:
 
 
 def decode(payload: bytes, encoding: str) -> Any:
-    """The plain value in a payload: JSON or msgpack as values, other text as text, else a hex dump's text."""
+    """The plain value in a payload: of JSON and msgpack their value, other text as it is, else a Hex."""
     name = encoding.partition(";")[0]
     if name == "application/msgpack":
         import msgspec
@@ -94,7 +94,7 @@ def decode(payload: bytes, encoding: str) -> Any:
         text = payload.decode()
     except UnicodeDecodeError:
         return hex_dump(payload, encoding)
-    if "\0" in text:  # found in binary data, not in text
+    if "\0" in text:  # so it is binary data
         return hex_dump(payload, encoding)
     try:
         return json.loads(text)
@@ -109,7 +109,7 @@ def hex_dump(payload: bytes, encoding: str) -> Hex:
 
 
 def _plain(value: Any) -> Any:
-    """`value` with bytes, times and keys that JSON does not support as text."""
+    """`value`, with everything that JSON does not support, such as bytes and times, as text."""
     if isinstance(value, dict):
         return {key if isinstance(key, str) else str(_plain(key)): _plain(inner) for key, inner in value.items()}
     if isinstance(value, list | tuple):

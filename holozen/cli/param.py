@@ -23,7 +23,7 @@ from holozen.console import printable, report
 from holozen.flags import key, number
 from holozen.process import deferred_interrupt
 from holozen.ros import parameter_yaml
-from holozen.ros.parameter_yaml import Value
+from holozen.ros.parameter_yaml import Value, written
 from holozen.suggest import suggest
 from holozen.transport.errors import BusError
 
@@ -39,7 +39,7 @@ Word = bool | int | float | str
 
 
 class Nodes:
-    """The nodes with parameters, and the requests to them."""
+    """The nodes with parameters (by name, their sessions), and the requests to them."""
 
     def __init__(self, bus: Bus, timeout: float) -> None:
         self._bus, self._timeout = bus, timeout
@@ -53,12 +53,12 @@ class Nodes:
                 self.sessions.setdefault(endpoint.key.removesuffix(LIST), []).append(endpoint.session[:6])
 
     def only(self, name: str) -> str:
-        """`name` if exactly one node has it. Raises BusError that lists the nodes found."""
+        """`name`, if exactly one node has it. Raises BusError that lists the nodes found."""
         found = self.sessions.get(name, [])
         if len(found) > 1:
             raise BusError(f"{self.twins(name)}; a request would reach any of them: end all but one")
         if not found:
-            raise BusError(f"there is no node {name!r} with parameters{self._there(name)}")
+            raise BusError(f"there is no node {name!r} with parameters{self._known(name)}")
         return name
 
     def twins(self, name: str) -> str:
@@ -104,7 +104,7 @@ class Nodes:
         except CodecError as error:
             raise BusError(str(error)) from None
 
-    def _there(self, name: str) -> str:
+    def _known(self, name: str) -> str:
         if not self.sessions:
             return "; no node has any; `holozen up` starts a robot"
         return suggest(name, sorted(self.sessions)) or f"; there are {', '.join(sorted(self.sessions))}"
@@ -112,7 +112,7 @@ class Nodes:
 
 def _as_many(found: list[Any], asked: list[Any], node: str) -> list[Any]:
     if len(found) != len(asked):
-        raise BusError(f"{node} gave {len(found)} answers to {len(asked)} questions")
+        raise BusError(f"{node} replied with {len(found)} results for {len(asked)} parameters")
     return found
 
 
@@ -156,7 +156,7 @@ def set_values(args: argparse.Namespace) -> int:
         VERBS["param set"].parser().error(f"{args.pairs[-1]!r} has no value; write NAME VALUE, or more such pairs")
     names = args.pairs[::2]
     if len(set(names)) < len(names):
-        raise BusError(f"a name is there twice among {', '.join(names)}")
+        raise BusError(f"a parameter is named twice: {', '.join(names)}")
     return _set(args, dict(zip(names, map(typed, args.pairs[1::2]), strict=True)))
 
 
@@ -236,9 +236,9 @@ def _show(args: argparse.Namespace, row: dict[str, Any], *lines: str) -> None:
 
 
 def typed(text: str) -> Value:
-    """The value that a word denotes, or a list such as `[1.0, 2.5]`.
+    """The value that a word denotes: true, false, a finite number, or a list of one type such as `[1.0, 2.5]`.
 
-    Anything but a finite number or a list of one type stays text, which a node that expects another type refuses.
+    Anything else stays text, which a node that expects another type refuses.
     """
     if text.startswith("["):
         try:
@@ -262,8 +262,8 @@ def _scalar(text: str) -> Word:
 
 
 def file_lines(node: str, values: dict[str, Any]) -> list[str]:
-    """The file that holds `values`."""
-    rows = [f"    {_written_name(name)}: {_written(value)}" for name, value in values.items()]
+    """The lines of the file that holds a node's `values`."""
+    rows = [f"    {_written_name(name)}: {written(value)}" for name, value in values.items()]
     return [f"{_written_name('/' + node)}:", f"  {parameter_yaml.KEY}:" + ("" if rows else " {}"), *rows]
 
 
@@ -294,22 +294,11 @@ def _listed(value: Value) -> Sequence[Word]:
 
 
 def _written_name(name: str) -> str:
-    return name if _PLAIN.fullmatch(name) and name.lower() not in _NO_NAMES else _written(name)
-
-
-def _written(value: Value) -> str:
-    if isinstance(value, list):
-        return f"[{', '.join(map(_written, value))}]"
-    if isinstance(value, str):
-        quoted = json.dumps(value, ensure_ascii=False)
-        return "".join(c if c.isascii() and c.isprintable() else f"\\U{ord(c):08x}" for c in quoted)
-    text = json.dumps(value)
-    # YAML 1.1 requires a decimal point before the exponent.
-    return text.replace("e", ".0e") if isinstance(value, float) and "." not in text else text
+    return name if _PLAIN.fullmatch(name) and name.lower() not in _NO_NAMES else written(name)
 
 
 def _of_node(work: Callable[[argparse.Namespace, Nodes, str], int]) -> Callable[[argparse.Namespace], int]:
-    """Wraps a verb that works on one node, the one its arguments name."""
+    """The `run` of a verb that works on the one node that its arguments name."""
 
     def run(args: argparse.Namespace) -> int:
         with open_bus(args) as bus:
@@ -347,15 +336,15 @@ def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
 
 
 VERBS = by_name(
-    Noun("param", "Read and set the parameters of running nodes.",
-        dict.fromkeys(("list", "get", "set", "describe", "dump", "load"), "param")),
+    Noun("param", "read and set the parameters of running nodes"),
     *(Verb(f"param {name}", about, example, _arguments(name), run)
     for name, about, example, run in (
-        ("list", "the parameters of all nodes, or of one", "", list_names),
-        ("get", "the value of one", "sim max_linear", _of_node(get)),
+        ("list", "list the parameters of all nodes, or of one", "", list_names),
+        ("get", "show the value of one", "sim max_linear", _of_node(get)),
         ("set", "set one or more, all or none of them", "sim max_linear 0.5", set_values),
         ("describe", "describe parameters, and the values that they accept", "sim max_linear", _of_node(describe)),
-        ("dump", "all values of a node, as YAML that `load` reads", "controller > controller.yaml", _of_node(dump)),
+        ("dump", "print all values of a node, as YAML that `load` reads", "controller > controller.yaml",
+            _of_node(dump)),
         ("load", "set the values of a file that `dump` wrote, all or none of them", "controller controller.yaml", load),
     ))
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`holozen plot` and `map`: draw numbers of live messages, and robots on the plane, in the terminal."""
+"""`holozen plot` and `map`: draw fields of live messages, and robots seen from above, in the terminal."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from holozen.cli.fields import path, pick
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import Reader
 from holozen.cli.verb import Verb, by_name, open_bus
-from holozen.console import Screen, printable, report
+from holozen.console import Failure, Screen, printable, report
 from holozen.flags import add_packages, number
 from holozen.plotting import Plane, Point, Robot, draw, panels
 from holozen.process import stop_event
@@ -25,15 +25,15 @@ from holozen.transport.errors import ServiceError
 from holozen.transport.samples import RawSubscriber
 
 Field = tuple[str, str, tuple[str | int, ...]]
-"""A field as written on the command line, its key, and its path in the messages."""
+"""A field: as written on the command line, its key, and its path in the messages."""
 
-MOST = 5000  # points of a line
+MOST = 5000  # points of a line in the plot
 TICK = 0.02  # s between two polls
 TRAIL = 2000  # points
 STEP = 0.02  # m between two points of a trail
 ASK_EVERY = 2.0  # s between two requests to the sim and the pose service
 MOST_GOALS = 100
-MOST_PLACES = 12  # of robots in words
+MOST_PLACES = 12  # robots whose places are written out
 PATIENCE = 1.0  # s for a service to answer
 
 
@@ -50,15 +50,13 @@ def plot(args: argparse.Namespace) -> int:
         try:
             _print_rows(lines, args, stop) if args.json else _draw(lines, args, stop, waiting)
         except LookupError as error:
-            report(f"holozen {args.verb}: {error.args[0]}")
-            return 1
+            raise Failure(error.args[0]) from None
         if lines.bad:
             report(f"holozen {args.verb}: {lines.bad} messages could not be read")
         if any(lines.points.values()):
             return 0
         hint = suggest_key(bus, keys) or "; `holozen topic list` shows the topics"
-        report(f"holozen {args.verb}: no messages on {', '.join(dict.fromkeys(keys))}{hint}")
-        return 1
+        raise Failure(f"no messages on {', '.join(dict.fromkeys(keys))}{hint}")
 
 
 class Lines:
@@ -70,16 +68,16 @@ class Lines:
         self.points: dict[str, deque[tuple[float, float]]] = {name: deque(maxlen=MOST) for name, _, _ in fields}
         self.bad = 0  # messages that could not be decoded
         self._fields, self._bus, self._reader, self._clock = fields, bus, reader, clock
-        self._taps: dict[str, RawSubscriber] = {}
+        self._subscribers: dict[str, RawSubscriber] = {}
         for key in dict.fromkeys(key for _, key, _ in fields):
-            self._taps[key] = bus.subscribe_raw(key)
-            self._taps[key].ends.append(bus.announce("sub", "any/msg/Any", key))
+            self._subscribers[key] = bus.subscribe_raw(key)
+            self._subscribers[key].ends.append(bus.announce("sub", "any/msg/Any", key))
 
     def take(self) -> list[dict[str, float]]:
         """Take in the messages that wait, and return their rows. Raises LookupError for a missing field."""
         rows = []
-        for key, tap in self._taps.items():
-            while (sample := tap.try_recv()) is not None:
+        for key, subscriber in self._subscribers.items():
+            while (sample := subscriber.try_recv()) is not None:
                 value = self._reader.read(sample, self._bus)
                 if isinstance(value, dict | list):
                     rows.append(self._add(key, value))
@@ -100,15 +98,15 @@ class Lines:
 
     def close(self) -> None:
         """Stop listening."""
-        for tap in self._taps.values():
-            tap.close()
+        for subscriber in self._subscribers.values():
+            subscriber.close()
 
 
 def _number(value: Any) -> float:
     if isinstance(value, bool | int | float):
         return float(value)
-    inside = f", it has {', '.join(map(str, value))}" if isinstance(value, dict) else ""
-    raise LookupError(f"this is no number{inside}")
+    inside = f"; it has {', '.join(map(str, value))}" if isinstance(value, dict) else ""
+    raise LookupError(f"it is not a number{inside}")
 
 
 def _print_rows(lines: Lines, args: argparse.Namespace, stop: threading.Event) -> None:
@@ -119,7 +117,7 @@ def _print_rows(lines: Lines, args: argparse.Namespace, stop: threading.Event) -
 
 
 def _draw(lines: Lines, args: argparse.Namespace, stop: threading.Event, waiting: str) -> None:
-    """`waiting` is shown until there is a first point: the screen hides what was printed before."""
+    """Draw until interrupted. `waiting` is shown until there is a first point: the screen hides earlier lines."""
     begun = time.monotonic()
     picture: list[str] = []
     with Screen(args.once, args.ascii) as screen:
@@ -168,19 +166,18 @@ def _watch(watcher: Watcher, args: argparse.Namespace, stop: threading.Event) ->
             if single:
                 break
     if not (watcher.poses or watcher.objects):
-        report("holozen map: no robot is there; `holozen up` starts one")
-        return 1
+        raise Failure("no robots found; `holozen up` starts one")
     return 0
 
 
 def _plane_as_json(plane: Plane) -> dict[str, object]:
-    robots = [{"name": one.name, "x": one.x, "y": one.y, "yaw": one.yaw} for one in plane.robots]
+    robots = [{"name": robot.name, "x": robot.x, "y": robot.y, "yaw": robot.yaw} for robot in plane.robots]
     seen = [[round(x, 3), round(y, 3)] for x, y in plane.seen]
     return {"robots": robots, "goals": plane.goals, "objects": plane.objects, "seen": seen}
 
 
 class Scanner:
-    """What a lidar sees, in the frame of its robot's odometry."""
+    """The points that a lidar sees, in the frame of its robot's odometry."""
 
     def __init__(self, bus: Bus, key: str, namespace: str) -> None:
         from holozen.frames import RobotFrames  # while the session opens
@@ -210,7 +207,7 @@ class Scanner:
 
 
 class Watcher:
-    """Follows the odom of all robots, and calls the services periodically in a thread of its own."""
+    """Follows the odometry of all robots and the scans of their lidars, and asks for goals and objects in a thread."""
 
     def __init__(self, bus: Bus) -> None:
         from holozen.messages import CommandStatus, Odometry
@@ -238,7 +235,7 @@ class Watcher:
             scanner.take()
         while (received := self._odom.try_recv()) is not None:
             if received.message is not None:
-                name = received.sample.key.removesuffix("odom").removesuffix("/")
+                name = received.key.removesuffix("odom").removesuffix("/")
                 self._move(name, *received.message.pose.pose.planar())
 
     def plane(self) -> Plane:
@@ -263,10 +260,11 @@ class Watcher:
     def _follow_scanners(self) -> None:
         from holozen.messages import LaserScan
 
-        keys = {one.key for one in self._ends if one.kind == "pub" and one.type == LaserScan.ROS and "*" not in one.key}
+        published = [end for end in self._ends if end.kind == "pub"]
+        keys = {end.key for end in published if end.type == LaserScan.ROS and "*" not in end.key}
         for gone in self._scanners.keys() - keys:
             self._scanners.pop(gone).close()
-        robots = {one.key.removesuffix("odom") for one in self._ends if one.kind == "pub" and one.key.endswith("odom")}
+        robots = {end.key.removesuffix("odom") for end in published if end.key.endswith("odom")}
         for new in keys - self._scanners.keys():
             owners = [start for start in robots if new.startswith(start)]
             if owners:
@@ -291,7 +289,7 @@ class Watcher:
 
     def _ask_goals(self) -> list[Point]:
         """All goals of all next_goal services."""
-        served = {one.key for one in self._ends if one.kind == "srv"}
+        served = {end.key for end in self._ends if end.kind == "srv"}
         keys = [key for key in sorted(served) if key.rpartition("/")[2] == "next_goal"]
         return [goal for key in keys for goal in self._goals_of(key)]
 
@@ -308,7 +306,8 @@ class Watcher:
         from holozen.messages import GetSceneReply, GetSceneRequest
 
         scenes = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, PATIENCE)
-        return {one.name: (one.pose.position.x, one.pose.position.y) for scene in scenes for one in scene.entities}
+        entities = [entity for scene in scenes for entity in scene.entities]
+        return {entity.name: (entity.pose.position.x, entity.pose.position.y) for entity in entities}
 
 
 def _place(robot: Robot) -> str:
@@ -316,15 +315,13 @@ def _place(robot: Robot) -> str:
 
 
 def _plot_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("fields", nargs="+", type=_field, metavar="KEY.FIELD", help="such as joint_states.position[0]")
-    parser.add_argument(
-        "-w", "--window", type=number(0.1, 3600, "s"), default=10.0, metavar="S", help="seconds shown (default: 10)"
-    )
-    parser.add_argument(
-        "--once", action="store_true", help="watch for one window, print one picture (or its numbers) and end"
-    )
+    add = parser.add_argument
+    add("fields", nargs="+", type=_field, metavar="KEY.FIELD", help="such as joint_states.position[0]")
+    seconds = number(0.1, 3600, "s")
+    add("-w", "--window", type=seconds, default=10.0, metavar="S", help="seconds shown (default: 10)")
+    add("--once", action="store_true", help="watch for one window, print one picture (or its numbers) and end")
     add_packages(parser)
-    parser.add_argument("--ascii", action="store_true", help="without braille")
+    add("--ascii", action="store_true", help="without braille")
 
 
 def _field(text: str) -> Field:
@@ -350,14 +347,13 @@ def _map_arguments(parser: argparse.ArgumentParser) -> None:
 _PLOT = partial(
     Verb, about="draw fields of live messages in the terminal, until Ctrl-C",
     example="odom.twist.twist.linear.x cmd_vel.linear.x", arguments=_plot_arguments, run=plot,
-    json="the numbers as they arrive, one JSON object a line",
+    json="print the numbers as they arrive as JSON, one object per line",
 )  # fmt: skip
-ABOUT_MAP = (
-    "Draw the robots, their paths, their goals and what their lidars see in the terminal, until Ctrl-C. "
-    "East is x, north is y. Positions are those of odom: with encoders, relative to where a robot started."
-)
+ABOUT_MAP = "draw the robots, their paths, their goals and what their lidars see in the terminal, until Ctrl-C"
+NOTES_MAP = "East is x, north is y. Positions are those of odom: with encoders, relative to where a robot started."
 VERBS = by_name(
     _PLOT("plot"),
     _PLOT("topic plot"),
-    Verb("map", ABOUT_MAP, "--once", _map_arguments, draw_map, "what a picture would show, as one JSON object"),
-)
+    Verb("map", ABOUT_MAP, "--once", _map_arguments, draw_map,
+        "print what a picture would show as JSON, one object per line", NOTES_MAP),
+)  # fmt: skip

@@ -1,14 +1,15 @@
-"""`holozen record`: the messages of keys, into a bag."""
+"""`holozen record`: records the messages of keys into a bag."""
 
 import argparse
 import errno
 import json
 import threading
 import time
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from holozen.cli.verb import Verb, by_name
-from holozen.console import Line, printable, report
+from holozen.console import Failure, Line, printable, report
 from holozen.flags import key, number
 from holozen.process import stop_event
 from holozen.transport import connection
@@ -16,6 +17,8 @@ from holozen.transport import connection
 if TYPE_CHECKING:
     from holozen.bag.recorder import Intake, Recorder
     from holozen.bag.writer import BagWriter
+    from holozen.transport.graph import Endpoint
+    from holozen.transport.node import Node
 
 FLUSH = 1.0  # s; a killed recorder loses at most what arrived since
 IDLE = 0.01  # s between two looks at an empty queue
@@ -26,8 +29,7 @@ def run(args: argparse.Namespace) -> int:
     """Record until Ctrl-C, or until --max-duration has passed."""
     if bool(args.keys) == args.all:
         args.error("name the keys to record, or use -a for all")
-    from holozen.bag.rosbag2 import RosBagWriter
-    from holozen.bag.writer import BagWriter
+    from holozen.bag.writer import BagWriter, RosBagWriter
 
     name = args.output or time.strftime("holozen_%Y_%m_%d-%H_%M_%S")
     stop = stop_event()
@@ -35,9 +37,9 @@ def run(args: argparse.Namespace) -> int:
         limit = round((args.max_size or 0) * 1e6)
         writer = RosBagWriter(name, limit) if args.ros2 else BagWriter(name, limit, "ros2" if _for_ros(args) else "")
     except OSError as error:
-        report(f"holozen record: cannot write {error.filename or name}: {error.strerror}{_fix(error)}")
-        return 1
-    return _record(args, writer, stop)
+        raise Failure(f"cannot write {error.filename or name}: {error.strerror}{_fix(error)}") from None
+    _record(args, writer, stop)
+    return 0
 
 
 def _for_ros(args: argparse.Namespace) -> bool:
@@ -50,7 +52,7 @@ def _fix(error: OSError) -> str:
     return "; choose another name with -o" if isinstance(error, FileExistsError) else ""
 
 
-def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event) -> int:
+def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event) -> None:
     from holozen.bag import BagError
     from holozen.bag.recorder import DEPTH, Intake, Recorder, SimTime
     from holozen.bus import Bus
@@ -59,17 +61,19 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
     try:
         with Bus("record", connection.from_arguments(args), stop=stop) as bus, Intake() as intake:
             for expression in _expressions(args):
-                tap = bus.subscribe_raw(expression, DEPTH)
-                tap.ends.append(bus.announce("sub", "any/msg/Any", expression))
-                intake.listen(tap)
+                subscriber = bus.subscribe_raw(expression, DEPTH)
+                subscriber.ends.append(bus.announce("sub", "any/msg/Any", expression))
+                intake.listen(subscriber)
             report(
                 f"recording {'every key' if args.all else ' '.join(args.keys)} into {writer.files[0]}; Ctrl-C ends it"
             )
             sim_time = SimTime() if args.use_sim_time else None
-            recorder = Recorder(intake, writer, bus.graph(), _for_ros(args), sim_time, bus.definition)
-            progress = Progress(args.json, intake, recorder, writer)
+            graph, latched = bus.graph(), Latched(bus, intake, _expressions(args))
+            latched.take(bus.endpoints())
+            recorder = Recorder(intake, writer, graph, _for_ros(args), sim_time, bus.definition)
+            progress = Progress(args.json, args.keys, intake, recorder, writer)
             try:
-                _until(stop, args.max_duration, recorder, writer, progress)
+                _until(stop, args.max_duration, recorder, writer, lambda: latched.take(graph.endpoints()), progress)
                 intake.close()
                 while not writer.full and recorder.write_some():
                     pass
@@ -80,13 +84,31 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
     except BaseException:
         writer.close()
         raise
-    return progress.end(failed or writer.full)
+    progress.end(failed or writer.full)
+
+
+class Latched:
+    """Takes in the last message of each publisher of a latched key, once it appears."""
+
+    def __init__(self, bus: "Node", intake: "Intake", expressions: list[str]) -> None:
+        self._bus, self._intake, self._expressions = bus, intake, expressions
+        self._asked: set[Endpoint] = set()
+
+    def take(self, endpoints: "list[Endpoint]") -> None:
+        """Ask the publishers among these endpoints that were not asked."""
+        from holozen.transport.graph import latched
+
+        found = {one for expression in self._expressions for one in latched(endpoints, expression)}
+        for sample in self._bus.last_messages(sorted(found - self._asked)):
+            self._intake.add_latched(sample)
+        self._asked = found
 
 
 def _until(
-    stop: threading.Event, seconds: float | None, recorder: "Recorder", writer: "BagWriter", progress: "Progress"
-) -> None:
-    """Write until `stop` is set, `seconds` have passed or the disk is full."""
+    stop: threading.Event, seconds: float | None, recorder: "Recorder", writer: "BagWriter",
+    look: Callable[[], None], progress: "Progress",
+) -> None:  # fmt: skip
+    """Write until `stop` is set, `seconds` have passed or the disk is full; `look` is called with each flush."""
     begun = flushed = time.monotonic()
     while not (stop.is_set() or writer.full):
         now = time.monotonic()
@@ -96,6 +118,7 @@ def _until(
             stop.wait(IDLE)
         if now - flushed >= FLUSH:
             writer.flush()
+            look()
             flushed = now
         progress.report(now)
 
@@ -109,9 +132,12 @@ def _expressions(args: argparse.Namespace) -> list[str]:
 
 
 class Progress:
-    """Reports progress: on one line that is rewritten in a terminal, else on a line from time to time."""
+    """Reports progress: in a terminal on one line that is rewritten, elsewhere on a new line from time to time."""
 
-    def __init__(self, as_json: bool, intake: "Intake", recorder: "Recorder", writer: "BagWriter") -> None:
+    def __init__(
+        self, as_json: bool, wanted: list[str], intake: "Intake", recorder: "Recorder", writer: "BagWriter"
+    ) -> None:
+        self._wanted = wanted
         self._json, self._intake, self._recorder, self._writer = as_json, intake, recorder, writer
         self._over = Line(hidden=as_json)
         self._begun = self._reported = time.monotonic()
@@ -128,8 +154,8 @@ class Progress:
         else:
             report(self._line())
 
-    def end(self, failed: str) -> int:
-        """Report the result; returns the exit code."""
+    def end(self, failed: str) -> None:
+        """Report the result. Raises Failure if the recording `failed` for a reason, or is empty."""
         files = [str(path) for path in self._writer.files]
         self._over.show("")
         if self._json:
@@ -139,14 +165,21 @@ class Progress:
         for name, (count, why) in self._recorder.left_out.items():
             report(f"holozen record: left out {count} messages of {name}: {why}")
         if failed:
-            report(f"holozen record: stopped: {failed}; everything written before can be read")
-        elif not files and self._recorder.early:
-            report("holozen record: no file is left: nothing arrived on clock, so the sim's time is unknown")
-        elif not files and self._recorder.left_out:
-            report("holozen record: no file is left: a bag for ROS 2 can hold none of these messages")
-        elif not files:
-            report("holozen record: nothing arrived, so no file is left; `holozen topic list` shows what is published")
-        return 1 if failed or not files else 0
+            raise Failure(f"stopped: {failed}{'; everything written before can be read' if files else ''}")
+        if not files and self._recorder.early:
+            raise Failure("no file is kept: nothing arrived on clock, so the sim's time is unknown")
+        if not files and self._recorder.left_out:
+            raise Failure("no file is kept: a bag for ROS 2 can hold none of these messages")
+        if not files:
+            raise Failure("no messages arrived, so no file is kept; `holozen topic list` shows the topics")
+        if silent := self._silent():
+            report(f"holozen record: nothing arrived on {', '.join(silent)}; `holozen topic list` shows the topics")
+
+    def _silent(self) -> list[str]:
+        """The keys and key expressions that were asked for and brought nothing."""
+        from holozen.transport.graph import includes
+
+        return [one for one in self._wanted if not any(includes(one, key) for key in self._intake.keys)]
 
     def _figures(self) -> dict[str, object]:
         return {
@@ -179,11 +212,10 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--ros2", action="store_true", help="write the folder NAME as `ros2 bag record` does, for `ros2 bag play`")
 
 
-ABOUT = (
-    "Record the messages of keys into an MCAP file, until Ctrl-C. It needs 8 MB of free disk space, reserved to finish"
-    " the file on a full disk."
-)
+ABOUT = "record the messages of keys into an MCAP file, until Ctrl-C"
+NOTES = "It needs 8 MB of free disk space, reserved to finish the file on a full disk."
 VERBS = by_name(
-    *(Verb(name, ABOUT, "odom cmd_vel -o square", _arguments, run, "the figures as one JSON object a line")
+    *(Verb(name, ABOUT, "odom cmd_vel -o square", _arguments, run,
+        "print the figures as JSON, one object per line", NOTES)
     for name in ("record", "bag record"))
 )  # fmt: skip

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name
-from holozen.console import Line, printable, report
+from holozen.console import Failure, Line, printable, report
 from holozen.flags import key, number, path, refused
 from holozen.process import stop_event
 from holozen.transport import connection
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from holozen.bag.player import Outlet, Plan, Player
     from holozen.bag.reader import Summary
 
-WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # us
+WAIT = ("transport/link/tx/queue/congestion_control/drop/wait_before_drop", "20000")  # microseconds
 AGAIN = 0.02  # s between two rounds of a loop, so that a very short bag does not flood the bus
 SHOW_EVERY = 0.2  # s between two updates of the line in a terminal
 
@@ -44,17 +44,20 @@ def run(args: argparse.Namespace) -> int:
         for name, why in made.left_out.items():
             report(f"{name} is left out: {why}")
         if not made.targets:
-            report(f"holozen replay: nothing was played{_advice(made)}")
-            return 1
+            raise Failure(f"nothing was played{_advice(made)}")
         outlet = Outlet(bus, made)
         outlet.settle()
         with keys(stop) as pressed:
-            player = Player(outlet.publish, outlet.stop, pressed, stop, args.rate)
+            player = Player(outlet.publish, outlet.stop, pressed, stop, args.rate, _report_gap)
             return _play(args, summaries, player, outlet, set(made.targets))
 
 
+def _report_gap(seconds: float) -> None:
+    report(f"replay did not run for {seconds:.1f} s; it goes on from where it was")
+
+
 def _advice(made: "Plan") -> str:
-    """How to have something played if nothing was."""
+    """Advice for a plan that plays nothing."""
     if made.published:
         nodes = " and ".join(sorted(set(made.published.values())))
         key = "odom" if "odom" in made.published else min(made.published)
@@ -80,14 +83,15 @@ def _play(
     finally:
         outlet.stop()
         line.clear()
+        for key in sorted(outlet.goals):
+            report(f"{key}: the robot may drive on to the last goal, since its controller drives it")
     seconds = time.monotonic() - begun
     if args.json:
         print(json.dumps({"messages": player.count, "seconds": round(seconds, 3)}))
     else:
         print(printable(f"played {player.count} messages in {seconds:.1f} s"))
     if ended and not player.count:
-        report("holozen replay: no message is between --start-offset and --until")
-        return 1
+        raise Failure("no message is between --start-offset and --until")
     return 0
 
 
@@ -137,15 +141,18 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add("--until", type=number(0, 1e9, "s"), metavar="S", help="stop S seconds after the start of the bag")
     add("--topics", nargs="+", type=key, metavar="KEY", help="only these keys or key expressions")
     add("--remap", nargs="+", type=_remap, default=[], metavar="OLD:=NEW", help="play on another key")
-    add("--commands", action="store_true", help="also play keys that move robots; they are stopped at the end")
+    add("--commands", action="store_true",
+        help="also play keys that move robots; they are stopped at the end, but not on the way to a goal")  # fmt: skip
 
 
-ABOUT = (
-    "Publish the messages of MCAP files again, unchanged and in time. Keys that move robots are left out unless"
+ABOUT = "publish the messages of MCAP files again, at their times"
+NOTES = (
+    "Keys that move robots are left out unless"
     " --commands is given, and so are keys that have a publisher now (see --remap). In a terminal, space pauses and"
-    " resumes, and the right arrow (or s) plays the next message during a pause."
+    " resumes, and during a pause the right arrow (or s) plays the next message. Payloads are unchanged, but"
+    " for the stamps of commands (TwistStamped), which become the time of playing."
 )
 VERBS = by_name(
     *(Verb(name, ABOUT, "square.mcap --remap odom:=old/odom -r 2", _arguments, run,
-        "the figures as one JSON object at the end") for name in ("replay", "bag play"))
+        "print the figures as JSON at the end, one object per line", NOTES) for name in ("replay", "bag play"))
 )  # fmt: skip

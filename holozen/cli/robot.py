@@ -6,33 +6,40 @@ import argparse
 import json
 import math
 from collections.abc import Iterator
+from fnmatch import fnmatchcase
 from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
-from holozen.cli.verb import Verb, by_name, no_arguments, open_bus
+from holozen.cli.verb import Verb, argument, by_name, no_arguments, open_bus
 from holozen.console import printable, report
 from holozen.flags import refused
 from holozen.process import deferred_interrupt
+from holozen.suggest import listed
 from holozen.transport.errors import NoReply, ServiceError
+from holozen.transport.graph import SIMS
 
 if TYPE_CHECKING:
     from holozen.messages import Pose
 
-SIMS = "@holozen/*/*/srv/*/*/*/get_entities"  # the tokens of their services
 TILTED = 5.0  # degrees; a robot on a slope or a balancing one has less
 
 
 def list_entities(args: argparse.Namespace) -> int:
-    """Print the name and the pose of each entity; nothing if the world is empty."""
+    """Print the name and the pose of each entity in the sims; returns 1 if a sim does not answer."""
     with open_bus(args) as bus:
+        with deferred_interrupt():
+            from holozen import entities
         found = list(_entities(bus))
         sims = len(bus.endpoints(SIMS))
+        silent = entities.silent_sims(bus)
+    for sim in silent:
+        report(f"holozen list: {sim} does not answer; {entities.HANGS}")
     if args.json:
         from msgspec import to_builtins
 
         for name, pose in found:
             print(json.dumps({"name": name, "pose": to_builtins(pose)}))
-        return 0
+        return 1 if silent else 0
     width = max((len(name) for name, _ in found), default=0)
     for name, pose in found:
         print(printable(f"{name:<{width}}  {_where(pose)}"))
@@ -40,7 +47,7 @@ def list_entities(args: argparse.Namespace) -> int:
         report(f"they are in {sims} sims; robots of different sims do not collide")
     if not found:
         report("the world is empty; holozen spawn FILE --name NAME puts a robot there")
-    return 0
+    return 1 if silent else 0
 
 
 def _where(pose: Pose) -> str:
@@ -50,7 +57,7 @@ def _where(pose: Pose) -> str:
 
 
 def _lean(pose: Pose) -> str:
-    """Its tilt, if it is visible."""
+    """A note on the tilt of a pose; empty up to TILTED."""
     q = pose.orientation
     up = 1 - 2 * (q.x * q.x + q.y * q.y)  # the z part of its z axis
     lean = math.degrees(math.acos(max(-1.0, min(1.0, up))))
@@ -74,42 +81,54 @@ def _entities(bus: Bus) -> Iterator[tuple[str, Pose]]:
 
 
 def delete(args: argparse.Namespace) -> int:
-    """Delete each entity from the sim; 1 if one could not be."""
+    """Delete each entity from the sim; returns 1 if one could not be deleted."""
     with deferred_interrupt():
         from holozen import entities
 
+    def remove(name: str) -> str:
+        """Delete one entity; returns why it could not be deleted, else an empty string."""
+        if is_pattern(name):
+            return f"no name matches {name!r}; there are {listed(known)}"
+        try:
+            entities.delete(bus, name)
+        except ServiceError as error:
+            return str(error)
+        return ""
+
     failed = 0
     with open_bus(args) as bus:
-        entities.names(bus)  # fails once if there is no sim
-        for name in args.names:
-            reason = ""
-            try:
-                entities.delete(bus, name)
-            except ServiceError as error:
-                report(f"holozen delete: {error}")
-                failed, reason = 1, str(error)
-            if args.json:
-                print(json.dumps({"name": name, "deleted": not reason, "reason": reason}))
-            elif not reason:
-                print(f"{name} is deleted")
+        known = entities.names(bus)  # so that without a sim it fails once, not for each name
+        for word in args.names:
+            names = (is_pattern(word) and [name for name in known if fnmatchcase(name, word)]) or [word]
+            for name, reason in zip(names, entities.for_each(remove, names), strict=True):
+                if reason:
+                    report(f"holozen delete: {reason}")
+                    failed = 1
+                if args.json:
+                    print(json.dumps({"name": name, "deleted": not reason, "reason": reason}))
+                elif not reason:
+                    print(f"{name} is deleted")
     return failed
+
+
+def is_pattern(text: str) -> bool:
+    """Whether a name has wildcards of the shell."""
+    return bool(set(text) & set("*?["))
 
 
 def _name(text: str) -> str:
     from holozen.wire import robot_name
 
     try:
-        return robot_name(text)
+        return text if is_pattern(text) else robot_name(text)
     except ValueError as error:
         raise refused(str(error)) from None
 
 
-def _delete_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("names", nargs="+", type=_name, metavar="NAME", help="as `holozen list` shows them")
-
-
+NAMES = "names as `holozen list` shows them, or wildcards such as 'bot*'"
 VERBS = by_name(
-    Verb("list", "Show the robots and objects in the sim.", "--json", no_arguments, list_entities,
-        "name and pose as one JSON object a line"),
-    Verb("delete", "Remove robots or objects from the sim.", "Fred", _delete_arguments, delete),
+    Verb("list", "list the robots and objects in the sim, and where they are", "--json", no_arguments, list_entities,
+        "print name and pose as JSON, one object per line"),
+    Verb("delete", "remove robots or objects from the sim", "Fred",
+        argument("names", nargs="+", type=_name, metavar="NAME", help=NAMES), delete),
 )  # fmt: skip

@@ -1,20 +1,20 @@
-"""`holozen ros2`: joins the wire with ROS 2 nodes that use rmw_zenoh, or that a bridge to DDS connects."""
+"""`holozen ros2`: connects the keys here with ROS 2 nodes that use rmw_zenoh, or that are behind a bridge to DDS."""
 
 import argparse
 import os
 
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name
-from holozen.console import report
+from holozen.console import Failure, report
 from holozen.process import stop_event
 from holozen.transport import connection
 
-STAMPED = ("timestamping/enabled", "true")  # as the caches of latched topics need
+STAMPED = ("timestamping/enabled", "true")  # the caches of latched topics need timestamps
 EVERY = 0.05  # s between two looks at the nodes
 
 
 def run(args: argparse.Namespace) -> int:
-    """Join both until Ctrl-C."""
+    """Connect both sides until Ctrl-C."""
     if args.bridge and (args.humble or args.ros_domain_id is not None):
         flag = "--humble" if args.humble else "--ros-domain-id"
         args.error(f"{flag} is for rmw_zenoh; with --bridge give the bridge its domain and distribution")
@@ -37,12 +37,12 @@ def run(args: argparse.Namespace) -> int:
             pass
         gateway.close()
     if why:
-        report(f"holozen ros2: {why}")
-    return 1 if why else 0
+        raise Failure(why)
+    return 0
 
 
 def _domain(args: argparse.Namespace) -> int:
-    """The domain of the flag, or that of the environment."""
+    """The domain by the flag, else by the environment. Exits with code 2 for an invalid one there."""
     if args.ros_domain_id is not None:
         return int(args.ros_domain_id)
     try:
@@ -57,14 +57,15 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
         help="where a zenoh-bridge-ros2dds listens, such as tcp/192.168.1.5:7447; can be repeated")  # fmt: skip
     parser.add_argument(
         "--ros-domain-id", type=connection.domain, metavar="N",
-        help="as ROS_DOMAIN_ID of the nodes with rmw_zenoh (default: that variable here, else 0); a bridge has its own",
+        help="ROS_DOMAIN_ID of the nodes with rmw_zenoh (default: that variable here, else 0); a bridge has its own",
     )  # fmt: skip
     parser.add_argument("--humble", action="store_true",
         help="the nodes with rmw_zenoh are of ROS 2 Humble, where keys hold no type hashes")  # fmt: skip
 
 
 ABOUT = (
-    "Join the keys here with the topics and services of ROS 2 nodes: those with rmw_zenoh, or with --bridge all behind"
-    " a zenoh-bridge-ros2dds. What ROS 2 publishes on cmd_vel has the priority of plain data."
+    "join the keys here with the topics and services of ROS 2 nodes: those with rmw_zenoh, or with --bridge all behind"
+    " a zenoh-bridge-ros2dds"
 )
-VERBS = by_name(Verb("ros2", ABOUT, "--connect tcp/192.168.1.5:7447", _arguments, run, json=None))
+NOTES = "What ROS 2 publishes on cmd_vel has the priority of plain data."
+VERBS = by_name(Verb("ros2", ABOUT, "--connect tcp/192.168.1.5:7447", _arguments, run, json=None, notes=NOTES))

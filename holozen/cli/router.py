@@ -24,7 +24,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _members(where: connection.Connection) -> tuple[int, int]:
-    """Which list of members there is. Zenoh reads access rules only at its start, so with a new list it starts anew."""
+    """The version of the list of members. A new list restarts the router: Zenoh reads access rules only at start."""
     if not where.secure:
         return 0, 0
     from holozen.transport.members import version  # loads cryptography
@@ -36,5 +36,5 @@ def _members(where: connection.Connection) -> tuple[int, int]:
 
 
 VERBS = by_name(
-    Verb("router", "Run a Zenoh router.", "--listen tcp/0.0.0.0:7447", no_arguments, run, json=None),
+    Verb("router", "run a Zenoh router", "--listen tcp/0.0.0.0:7447", no_arguments, run, json=None),
 )  # fmt: skip

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from holozen import flags
 from holozen.cli.verb import Verb, by_name
-from holozen.console import report
+from holozen.console import Failure
 from holozen.transport import connection
 
 if TYPE_CHECKING:
@@ -19,8 +19,7 @@ def run(args: argparse.Namespace) -> int:
     from holozen.ros import packages, runner
 
     if not args.force and (reason := runner.real_ros()):
-        report(f"holozen run: {reason}: start the script with ROS's own `ros2 run`, or over Zenoh with --force")
-        return 1
+        raise Failure(f"{reason}: start the script with ROS's own `ros2 run`, or over Zenoh with --force")
     words, found = _split(args.words[1:] if args.words[:1] == ["--"] else args.words, ["--package"])
     args = VERBS["run"].parser().parse_args([*found, args.target], args)
     script, words = _script(args.target, words, dict(args.package))
@@ -36,8 +35,8 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _split(words: list[str], flags: list[str], sure: Collection[str] = ()) -> tuple[list[str], list[str]]:
-    """The words for the script, and those of the given holozen flags among them that have a valid value, or are `sure`
-    to be ours.
+    """The words for the script; and those that are holozen's: the given `flags` with a valid value, or with any value
+    if they are `sure` to be holozen's.
     """
     kept: list[str] = []
     found: list[str] = []
@@ -68,11 +67,11 @@ _BEHIND: dict[str, Callable[[str], object]] = {
     "--mode": connection.MODES.__contains__,
     "--wire": ("json", "msgpack", "cdr").__contains__,
 }
-"""holozen flags that may also follow the script -> a function that accepts their values."""
+"""A holozen flag that may also follow the script -> a function that is true for its values, or raises."""
 
 
 def _script(target: str, words: list[str], given: dict[str, Path]) -> "tuple[Script, list[str]]":
-    """The script to run, and its words. Raises NotFound."""
+    """The script to run, and its arguments. Raises NotFound."""
     from holozen.ros import executables, packages
 
     path = Path(target).expanduser()
@@ -99,7 +98,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = by_name(
-    Verb("run", "Run a Python script that was written for ROS 2, without ROS.",
+    Verb("run", "run a Python script that was written for ROS 2, without ROS",
         "scripts/controller.py --ros-args -r cmd_vel:=Fred/cmd_vel", _arguments, run, json=None,
         usage="%(prog)s [options] FILE.py|PACKAGE [EXECUTABLE] [arguments] [--ros-args ...]"),
 )  # fmt: skip

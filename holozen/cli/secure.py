@@ -1,4 +1,4 @@
-"""`holozen secure`: init, add, revoke, show the certificates of the secure set-up."""
+"""`holozen secure`: makes, revokes and shows the certificates of the secure set-up."""
 
 import argparse
 import json
@@ -8,13 +8,13 @@ from typing import Any
 
 from holozen.cli.verb import Noun, Verb, by_name
 from holozen.console import Failure, printable
-from holozen.flags import refused
+from holozen.flags import count
 from holozen.transport.connection import secure_folder
 from holozen.transport.roles import ROLES, ROUTER
 
 DAYS = 365
 Act = Callable[[Any, Path, argparse.Namespace], str]
-"""What a verb does with holozen.authority in a folder; returns what to say where there is no --json."""
+"""The work of a verb: called with the module holozen.authority and the folder; returns the text to print."""
 
 
 def _init(authority: Any, root: Path, args: argparse.Namespace) -> str:
@@ -38,7 +38,7 @@ def _show(authority: Any, root: Path, _args: argparse.Namespace) -> str:
 
 
 def _run(act: Act) -> Callable[[argparse.Namespace], int]:
-    """A verb's `run`: it acts, and prints the result, or with --json all members."""
+    """The `run` of a verb: does its work, and prints its text, or with --json all members."""
 
     def run(args: argparse.Namespace) -> int:
         from holozen import authority  # loads cryptography
@@ -59,12 +59,6 @@ def _run(act: Act) -> Callable[[argparse.Namespace], int]:
     return run
 
 
-def _days(text: str) -> int:
-    if not text.isdecimal() or not 0 < int(text) <= 3650:
-        raise refused(f"{text!r}: use a whole number of days from 1 to 3650")
-    return int(text)
-
-
 def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
     """A function that adds the flags of a verb to its parser."""
 
@@ -79,14 +73,13 @@ def _arguments(verb: str) -> Callable[[argparse.ArgumentParser], None]:
         if verb in ("add", "revoke"):
             add("name")
         if verb in ("init", "add"):
-            add("--days", type=_days, default=DAYS, help=f"until certificates expire (default: {DAYS})")
+            add("--days", type=count(1, 3650), default=DAYS, help=f"until certificates expire (default: {DAYS})")
 
     return fill
 
 
 VERBS = by_name(
-    Noun("secure", "Make and revoke the certificates of a network's members.",
-        dict.fromkeys(("init", "add", "revoke", "show"), "secure")),
+    Noun("secure", "make and revoke the certificates of a network's members"),
     *(Verb(f"secure {name}", about, example, _arguments(name), _run(act), bus=False)
     for name, about, example, act in (
         ("init", "make an authority, a router and a member of each role", "--host robot.local", _init),

@@ -1,4 +1,4 @@
-"""`holozen sim pause`, `play`, `step` and `reset`: the time of the sims that run."""
+"""`holozen sim pause`, `play`, `step` and `reset`: control the running sims."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import json
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from holozen.cli.verb import Verb, by_name, no_arguments, open_bus
-from holozen.console import report
+from holozen.cli.verb import Verb, argument, by_name, no_arguments, open_bus
+from holozen.console import Failure, report
 from holozen.flags import count, number
-from holozen.process import deferred_interrupt
+from holozen.process import INTERRUPTED, deferred_interrupt, stop_event
 
 if TYPE_CHECKING:
     from holozen.transport.bus import Bus
@@ -29,9 +29,19 @@ def play(args: argparse.Namespace) -> int:
 
 
 def step(args: argparse.Namespace) -> int:
-    """Let all sims make steps."""
-    done = f"made {args.steps} step{'s'[: args.steps != 1]}"
-    return _control(args, lambda sims, bus: sims.step(bus, args.steps, args.timeout), {"steps": args.steps}, done)
+    """Advance all sims by a number of steps, which end with Ctrl-C and with --timeout."""
+    stop = stop_event()
+    with open_bus(args, stop) as bus:
+        from holozen import entities
+
+        early = entities.step_until(bus, args.steps, args.timeout, stop)
+    if early and stop.is_set():
+        report(f"holozen {args.verb}: interrupted: {early}")
+        return INTERRUPTED
+    if early:
+        raise Failure(f"not done within {args.timeout:g} s, and ended: {early}; --timeout gives them longer")
+    print(json.dumps({"steps": args.steps}) if args.json else f"made {args.steps} step{'s'[: args.steps != 1]}")
+    return 0
 
 
 def reset(args: argparse.Namespace) -> int:
@@ -42,7 +52,7 @@ def reset(args: argparse.Namespace) -> int:
 
 
 def _control(args: argparse.Namespace, act: Callable[[Any, Bus], list[str]], row: dict[str, Any], done: str) -> int:
-    """Do something to all sims, and print their warnings and what was done."""
+    """Do something to all sims, then print their warnings and what was done."""
     with open_bus(args) as bus:
         with deferred_interrupt():
             from holozen import entities
@@ -56,18 +66,14 @@ def _control(args: argparse.Namespace, act: Callable[[Any, Bus], list[str]], row
 def _step_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("steps", nargs="?", type=count(1), default=1, metavar="N", help="how many (default: 1)")
     parser.add_argument("--timeout", type=number(0.1, 1e6, "s"), default=60.0, metavar="S",
-        help="seconds for the steps (default: 60)")  # fmt: skip
+        help="seconds after which the steps are ended (default: 60)")  # fmt: skip
 
 
-def _reset_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--scope", action="append", choices=SCOPES,
-        help="time to 0, entities to their places, or without those that were spawned (default: all)")  # fmt: skip
-
-
+SCOPE = "time to 0, entities to their places, or without those that were spawned (default: all)"
 VERBS = by_name(
-    Verb("sim pause", "Pause the sim: nothing moves, odom goes on.", "", no_arguments, pause),
-    Verb("sim play", "Let a paused sim go on; robots wait for a new command.", "", no_arguments, play),
-    Verb("sim step", "Let a paused sim make steps, as fast as it can.", "240", _step_arguments, step),
-    Verb("sim reset", "Put the sim back to its start; robots wait for a new command.", "--scope time", _reset_arguments,
-        reset),
+    Verb("sim pause", "pause the sim: nothing moves, odom goes on", "", no_arguments, pause),
+    Verb("sim play", "let a paused sim go on; robots wait for a new command", "", no_arguments, play),
+    Verb("sim step", "let a paused sim make steps, as fast as it can; Ctrl-C ends them", "240", _step_arguments, step),
+    Verb("sim reset", "put the sim back to its start; robots wait for a new command", "--scope time",
+        argument("--scope", action="append", choices=SCOPES, help=SCOPE), reset),
 )  # fmt: skip

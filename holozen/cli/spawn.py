@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields, replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,15 +24,17 @@ if TYPE_CHECKING:
 
 FAR = 1e6  # m
 PATIENCE = 3.0  # s to wait for a router and for a sim
-ROUND = 6.2832  # rad; a larger angle was probably given in degrees
+TURN = 6.2832  # rad; a larger angle was probably given in degrees
 PLUGINS = {"planar_move": "libgazebo_ros_planar_move.so", "omni": "libholozen_omni_drive.so"}
 ENDS = {"</robot>": "<gazebo>{}</gazebo></robot>", "</model>": "{}</model>"}
-"""The end tag of a robot in URDF and SDF, with the plugin of a drive before it."""
+"""The end tag of a robot in URDF and in SDF -> its replacement, with the plugin of a drive for {}."""
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The pose to spawn at: metres, and radians about the world's x, y, z. None: as in the file, and on the ground."""
+    """The pose to spawn at: metres, and radians about the world's x, y, z. None: that of the file; for z the height at
+    which it stands on the ground, unless the file gives one.
+    """
 
     x: float | None = None
     y: float | None = None
@@ -41,11 +44,14 @@ class Place:
     yaw: float | None = None
 
 
+ANYWHERE = Place()
+
+
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A robot that was read without error: its name, the text to send, and its model.
+    """A valid robot to spawn: its name, the text to send, and its model.
 
-    Its keys are below `namespace`: by default its name, the root for a slash.
+    Its keys are below `namespace`: empty for its name, a slash for the root.
     """
 
     name: str
@@ -56,7 +62,7 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Spawned:
-    """A spawned entity: the key it listens on (empty if none), its pose, and advice."""
+    """A spawned entity: its name, the key of its commands (empty if it takes none), its pose, and advice."""
 
     name: str
     key: str
@@ -77,7 +83,7 @@ class Spawned:
 
 PLACES = {
     "x": "position", "y": "position", "z": "height (default: it stands on the ground)",
-    "R": "roll, not in degrees", "P": "pitch, not in degrees", "Y": "yaw, not in degrees",
+    "R": "roll in radians", "P": "pitch in radians", "Y": "yaw in radians",
 }  # fmt: skip
 
 
@@ -98,17 +104,25 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Namespace) -> int:
-    """Spawn many copies on a square grid, called bot0, bot1 and so on, or by the name given. Several requests wait at
-    the sim at a time. Raises ServiceError; those that were spawned by then stay.
+    """Spawn many copies on a square grid, called bot0, bot1 and so on, or by the name given. Several requests are under
+    way at a time. Raises ServiceError; those spawned before that, or before Ctrl-C, stay.
     """
     from holozen import entities
     from holozen.messages import Point, Pose
+    from holozen.wire import MAX_ENTITIES
 
     side, base = math.ceil(math.sqrt(args.count)), args.name or "bot"
-    there = {f"{base}{number}" for number in range(args.count)}.intersection(entities.names(bus, args.timeout))
-    if there:
-        raise ServiceError(f"{len(there)} of these are there already, such as {min(there)}; --name gives another name")
-    first = _chosen(candidate.model, place)
+    sims = entities.names_by_sim(bus, args.timeout)
+    now = sum(map(len, sims))
+    if now + args.count > len(sims) * MAX_ENTITIES:
+        raise ServiceError(
+            f"--count {args.count} is too many: a sim holds {MAX_ENTITIES} entities, and there are {now} in "
+            f"{len(sims)} sim{'s'[: len(sims) != 1]}; `holozen up --shards N` runs N sims"
+        )
+    taken = {f"{base}{number}" for number in range(args.count)}.intersection(chain.from_iterable(sims))
+    if taken:
+        raise ServiceError(f"{len(taken)} of these exist already, such as {min(taken)}; --name gives another name")
+    first = _requested_pose(candidate.model, place)
 
     def spawn(number: int) -> Spawned:
         at = first.position
@@ -124,7 +138,16 @@ def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Name
             raise ServiceError(f"{error}; {advice}") from None
         return _spawned(name, candidate, pose)
 
-    fleet = list(entities.for_each(spawn, range(args.count)))
+    fleet = list[Spawned]()
+    try:
+        for spawned in entities.for_each(spawn, range(args.count)):
+            fleet.append(spawned)
+    except KeyboardInterrupt:
+        names = f" ({fleet[0].name} .. {fleet[-1].name})" if fleet else ""
+        report(
+            f"holozen spawn: spawned {len(fleet)} of {args.count}{names}; `holozen delete '{base}[0-9]*'` removes them"
+        )
+        raise
     if args.json:
         print(*(one.as_json() for one in fleet), sep="\n")
     else:
@@ -133,33 +156,18 @@ def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Name
     return 0
 
 
-def spawn_file(
-    bus: Bus,
-    path: Path,
-    name: str = "",
-    place: Place | None = None,
-    replace: bool = False,
-    args: Mapping[str, str] = {},
-    packages: Mapping[str, Path] = {},
-    drive: str = "",
-    strict: bool = False,
-    allow_env: Collection[str] = (),
-) -> Spawned:
-    """Read a file, report its warnings, and spawn it.
-
-    With `replace` an entity with that name is deleted once the new file was read without error; the new one takes its
-    pose unless a `place` is given. Raises RobotError for the file and ServiceError if the sim refuses.
-    """
-    return put(bus, read(path, name, args, packages, drive, strict, allow_env), place or Place(), replace)
+def spawn_file(bus: Bus, path: Path, name: str = "", place: Place = ANYWHERE, replace: bool = False) -> Spawned:
+    """`read` a file and `put` it into the sim."""
+    return put(bus, read(path, name), place, replace)
 
 
 def read(
     path: Path,
-    name: str,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    drive: str,
-    strict: bool,
+    name: str = "",
+    args: Mapping[str, str] = {},
+    packages: Mapping[str, Path] = {},
+    drive: str = "",
+    strict: bool = False,
     allow_env: Collection[str] = (),
 ) -> Candidate:
     """Read and check a file here, where its lines are known; warnings are reported. Raises RobotError."""
@@ -184,13 +192,22 @@ def read(
     return Candidate(name, text, model)
 
 
-def put(bus: Bus, candidate: Candidate, place: Place, replace: bool, notice: float = 0.0) -> Spawned:
-    """Spawn a candidate; waits `notice` seconds for a sim. Raises ServiceError."""
+def put(
+    bus: Bus, candidate: Candidate, place: Place = ANYWHERE, replace: bool = False, timeout: float = 0.0
+) -> Spawned:
+    """Spawn a candidate; waits up to `timeout` seconds for a sim. Raises ServiceError if the sim refuses.
+
+    With `replace` an entity with that name is deleted once the sim accepts the new one, which takes its pose unless a
+    `place` is given.
+    """
     from holozen import entities
 
-    there = candidate.name in entities.names(bus, notice)
-    old = entities.pose(bus, candidate.name) if replace and there else None
-    pose = _kept(candidate.model, old) if old and place == Place() else _chosen(candidate.model, place)
+    exists = candidate.name in entities.names(bus, timeout)
+    old = entities.pose(bus, candidate.name) if replace and exists else None
+    if old and place == ANYWHERE:
+        pose = _inherited_pose(candidate.model, old)
+    else:
+        pose = _requested_pose(candidate.model, place)
     try:
         name, warnings = entities.spawn(bus, candidate.name, candidate.text, pose, candidate.namespace)
     except ServiceError as error:
@@ -211,23 +228,16 @@ def put(bus: Bus, candidate: Candidate, place: Place, replace: bool, notice: flo
 
 
 def _complaint(warning: str) -> str:
-    """A warning without its line and without the reason for a box: the sim searches other folders for meshes."""
+    """A warning without its line, and without why a mesh is replaced: the sim looks for meshes in other folders."""
     return re.sub(r"^.*?, line \d+: |( is replaced by a box).*", r"\1", warning)
 
 
-def _joined(words: list[str]) -> list[str]:
-    """`-x -1e-3` as `-x=-1e-3`, since argparse takes such a number for a flag."""
-    joined: list[str] = []
-    for word in words:
-        if joined and joined[-1][1:] in PLACES and word[:1] == "-" and word[1:2] in "0123456789.":
-            joined[-1] += f"={word}"
-        else:
-            joined.append(word)
-    return joined
-
-
 def _words(args: argparse.Namespace) -> tuple[Path, dict[str, str]]:
-    values = dict(word.split(":=", 1) for word in args.words if not word.startswith(":=") and ":=" in word)
+    """The file, and the values of its xacro arguments. Exits with code 2 for anything else."""
+    try:
+        values = dict(flags.pair(word) for word in args.words if ":=" in word)
+    except argparse.ArgumentTypeError as error:
+        args.error(str(error))
     files = [word for word in (*args.words, *([args.file] if args.file else ())) if ":=" not in word]
     if len(files) != 1:
         args.error(f"give one FILE, not {len(files)}" + (f": {' '.join(files)}" if files else ""))
@@ -235,7 +245,7 @@ def _words(args: argparse.Namespace) -> tuple[Path, dict[str, str]]:
 
 
 def _driven(candidate: Candidate, drive: str) -> Candidate:
-    """The candidate with the plugin of a drive."""
+    """The candidate, with the plugin of a drive added."""
     from holozen.robot.model import driven
 
     end = next(end for end in ENDS if end in candidate.text)
@@ -244,21 +254,21 @@ def _driven(candidate: Candidate, drive: str) -> Candidate:
     return Candidate(candidate.name, f"{head}{ENDS[end].format(plugin)}{tail}", driven(candidate.model, drive))
 
 
-def _chosen(model: "RobotModel", place: Place) -> "Pose":
+def _requested_pose(model: "RobotModel", place: Place) -> "Pose":
     """The requested pose, else that of the file; on the ground unless either gives a height."""
     from holozen.messages import Pose
     from holozen.robot.rigid import lowest
     from holozen.rotation import from_rpy
 
     own = Place(*model.pose.xyz, *model.pose.rpy)
-    x, y, z, *angles = (_first(getattr(place, part.name), getattr(own, part.name)) for part in fields(Place))
-    roll, pitch, yaw = angles
+    given = {part.name: getattr(place, part.name) for part in fields(Place)}
+    x, y, z, roll, pitch, yaw = (getattr(own, name) if value is None else value for name, value in given.items())
     if place.z is None and own.z == 0:
         z = -lowest(model, (roll, pitch, yaw))
     return Pose.of((x, y, z), from_rpy(roll, pitch, yaw))
 
 
-def _kept(model: "RobotModel", old: "Pose") -> "Pose":
+def _inherited_pose(model: "RobotModel", old: "Pose") -> "Pose":
     """The pose of the replaced entity, raised if the new one would intersect the ground."""
     from holozen.robot.rigid import lowest
     from holozen.rotation import Transform, to_rpy
@@ -268,24 +278,16 @@ def _kept(model: "RobotModel", old: "Pose") -> "Pose":
     return old.of((x, y, max(z, -lowest(model, to_rpy(at.rotation)))), at.rotation)
 
 
-def _first(value: float | None, other: float | None) -> float:
-    return value if value is not None else other or 0.0
-
-
 def _spawned(name: str, candidate: Candidate, pose: "Pose") -> Spawned:
+    from holozen.robot.model import MOVING
     from holozen.wire import key_for
 
     model, prefix = candidate.model, candidate.namespace.strip("/") if candidate.namespace else name
     if model.drive is not None:
         return Spawned(name, key_for(model.drive.command_topic, prefix), pose)
-    moves = any(joint.kind in ("continuous", "revolute", "prismatic") for joint in model.joints.values())
+    moves = any(joint.kind in MOVING for joint in model.joints.values())
     hint = "nothing drives it: spawn it with --drive planar_move to move it as a whole" if moves else ""
     return Spawned(name, "", pose, hint)
-
-
-class _Spawn(Verb):
-    def main(self, argv: list[str]) -> int:
-        return super().main(_joined(argv))
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
@@ -296,7 +298,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     for flag in "xyz":
         add(f"-{flag}", type=flags.number(-FAR, FAR, "m"), metavar="m", help=PLACES[flag])
     for flag in "RPY":
-        add(f"-{flag}", type=flags.number(-ROUND, ROUND, "rad"), metavar="rad", help=PLACES[flag])
+        add(f"-{flag}", type=flags.number(-TURN, TURN, "rad"), metavar="rad", help=PLACES[flag])
     add("--namespace", "-robot_namespace", default="", metavar="NAME",
         help="its keys are below this; / is the root (default: its name)")  # fmt: skip
     add("--timeout", "-timeout", type=flags.number(0.1, 3600, "s"), default=0.0, metavar="S",
@@ -313,7 +315,7 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = by_name(
-    _Spawn("spawn", "Put a robot or object (xacro, URDF or SDF) into the running sim.",
-        "urdf/hb_bot.urdf.xacro --name Fred -x 1 -Y 1.57", _arguments, run, "its name, key and pose as one JSON object",
-        usage="%(prog)s [options] FILE [name:=value ...]"),
+    Verb("spawn", "put a robot or object (xacro, URDF or SDF) into the running sim",
+        "urdf/hb_bot.urdf.xacro --name Fred -x 1 -Y 1.57", _arguments, run,
+        "print name, key and pose as JSON, one object per line", usage="%(prog)s [options] FILE [name:=value ...]"),
 )  # fmt: skip

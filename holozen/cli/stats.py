@@ -18,7 +18,7 @@ from holozen.bus import Bus
 from holozen.cli.hints import suggest_key
 from holozen.cli.output import Reader
 from holozen.cli.verb import Verb, by_name, open_bus
-from holozen.console import printable, report
+from holozen.console import Failure, printable, report
 from holozen.flags import count, key, number
 from holozen.process import stop_event
 from holozen.transport.errors import BusError
@@ -83,16 +83,16 @@ class Window:
         return lost(list(self._numbers)) if self._numbers else None
 
 
-def _received(tap: RawSubscriber) -> Iterator[Sample]:
+def _received(subscriber: RawSubscriber) -> Iterator[Sample]:
     """The samples of a key as they arrive, until the bus is closed."""
     with contextlib.suppress(BusError):
         while True:
-            yield tap.recv()
+            yield subscriber.recv()
 
 
 class Watch:
-    """Listens to the keys of a verb. `measure` returns a sample's value, or None if it has none; `excuse` explains
-    why, if there were any of those.
+    """Listens to the keys of a verb. `measure` returns the value of a sample, None if it has none; `excuse` returns why
+    samples had none, empty if all had one.
     """
 
     def __init__(
@@ -106,34 +106,33 @@ class Watch:
         self._windows: dict[str, Window] = {}
         self._lock = threading.Lock()
 
-    def run(self, bus: Bus, text: Callable[[Report], str]) -> int:
-        """Print reports until interrupted."""
+    def run(self, bus: Bus, text: Callable[[Report], str]) -> None:
+        """Print reports until interrupted. Raises Failure if there is no first one within --timeout."""
         stop = stop_event()
         for name in self._args.keys:
             threading.Thread(target=self._listen, args=(bus.subscribe_raw(name),), daemon=True).start()
         deadline = self._args.timeout and time.monotonic() + self._args.timeout
         keys = ", ".join(self._args.keys)
         many = len(self._args.keys) > 1 or "*" in keys
-        near: str | None = None  # looked up when no messages came
+        near: str | None = None  # looked up once no messages arrive
         while not stop.wait(EVERY):
             reports = self._reports()
             for name, values in reports.items():
                 head = printable(f"{name}: ") if many else ""
                 print(json.dumps({"key": name, **values}) if self._args.json else head + text(values), flush=True)
-            if reports and self._args.once:
-                return 0
-            if not reports and near is None:
+            if reports:
+                if self._args.once:
+                    return
+                deadline = None
+                continue
+            if near is None:
                 near = suggest_key(bus, self._args.keys)
-            if not reports and deadline and time.monotonic() > deadline:
-                nothing = f"no messages on {keys} within {self._args.timeout:g} s{near}"
-                report(f"holozen {self._args.verb}: {self._excuse() or nothing}")
-                return 1
-            if not reports:
-                report(self._excuse() or f"no new messages on {keys}{near or ''}")
-        return 0
+            if deadline and time.monotonic() > deadline:
+                raise Failure(self._excuse() or f"no messages on {keys} within {self._args.timeout:g} s{near}")
+            report(self._excuse() or f"no new messages on {keys}{near}")
 
-    def _listen(self, tap: RawSubscriber) -> None:
-        for sample in _received(tap):
+    def _listen(self, subscriber: RawSubscriber) -> None:
+        for sample in _received(subscriber):
             now = time.monotonic()
             value = self._measure(sample, now)
             if value is None:
@@ -159,12 +158,13 @@ def watch(
     report: Callable[[Window], Report],
     text: Callable[[Report], str],
 ) -> int:
-    """Run a verb that needs only the samples."""
+    """Run a verb that measures each sample by itself."""
     with open_bus(args) as bus:
-        return Watch(args, measure, report).run(bus, text)
+        Watch(args, measure, report).run(bus, text)
+    return 0
 
 
-def lost_words(report: Report) -> str:
+def lost_text(report: Report) -> str:
     """The end of a report: the number of lost samples, if known."""
     return "" if report["lost"] is None else f" lost: {report['lost']}"
 
@@ -175,7 +175,7 @@ def _spread_text(report: Report) -> str:
         f"\tmin: {report['min']:.4f}s max: {report['max']:.4f}s std dev: {report['std_dev']:.5f}s"
         f" window: {report['window']}\n"
         f"\tp50: {report['p50']:.4f}s p95: {report['p95']:.4f}s p99: {report['p99']:.4f}s"
-        f" jitter: {report['jitter']:.5f}s{lost_words(report)}"
+        f" jitter: {report['jitter']:.5f}s{lost_text(report)}"
     )
 
 
@@ -190,8 +190,7 @@ def rate(times: list[float]) -> Report:
     if not gaps:
         return {}
     gap = spread(gaps)
-    average = 1 / gap["mean"] if gap["mean"] else 0.0
-    return {"rate": average, **gap, "jitter": jitter(gaps), "window": len(times)}
+    return {"rate": 1 / gap["mean"] if gap["mean"] else 0.0, **gap, "jitter": jitter(gaps), "window": len(times)}
 
 
 def rate_text(report: Report) -> str:
@@ -210,13 +209,8 @@ def bandwidth(window: Window) -> Report:
     span = times[-1] - times[0]
     if len(sizes) < 2:
         return {}
-    # The first message only starts the interval.
-    return {
-        "bytes_per_second": sum(sizes[1:]) / span if span else 0.0,
-        **spread(sizes),
-        "jitter": jitter(sizes),
-        "window": len(sizes),
-    }
+    average = sum(sizes[1:]) / span if span else 0.0  # the first message only starts the interval
+    return {"bytes_per_second": average, **spread(sizes), "jitter": jitter(sizes), "window": len(sizes)}
 
 
 def bandwidth_text(report: Report) -> str:
@@ -225,7 +219,7 @@ def bandwidth_text(report: Report) -> str:
         f"{size(report['bytes_per_second'])}/s from {report['window']} messages\n"
         f"\tMessage size mean: {size(report['mean'])} min: {size(report['min'])} max: {size(report['max'])}\n"
         f"\tp50: {size(report['p50'])} p95: {size(report['p95'])} p99: {size(report['p99'])}"
-        f" jitter: {size(report['jitter'])}{lost_words(report)}"
+        f" jitter: {size(report['jitter'])}{lost_text(report)}"
     )
 
 
@@ -264,7 +258,7 @@ class Delays:
         self._bus, self._reader, self._sim = bus, Reader(), SimClock()
         self._clock: threading.Thread | None = None
         self.by: set[str] = set()  # the clocks in use
-        self.unstamped = self.clockless = 0  # messages without a stamp, and with the stamp of an unknown clock
+        self.unstamped = self.clockless = 0  # messages without a stamp, and with one of an unknown clock
 
     def measure(self, sample: Sample, now: float) -> float | None:
         """The age of a sample in seconds; None if it has no stamp, or its clock is not known yet."""
@@ -296,8 +290,8 @@ class Delays:
             self._clock = threading.Thread(target=self._follow, args=(self._bus.subscribe_raw("clock"),), daemon=True)
             self._clock.start()
 
-    def _follow(self, tap: RawSubscriber) -> None:
-        for sample in _received(tap):
+    def _follow(self, subscriber: RawSubscriber) -> None:
+        for sample in _received(subscriber):
             value = self._reader.read(sample, self._bus)
             clock = value.get("clock") if isinstance(value, dict) else None
             if (seconds := _seconds(clock)) is not None:
@@ -328,10 +322,10 @@ def delay(args: argparse.Namespace) -> int:
             ages = list(window.values)
             return {**spread(ages), "jitter": jitter(ages), "window": len(ages), "clock": ", ".join(sorted(delays.by))}
 
-        code = Watch(args, delays.measure, row, delays.excuse).run(bus, delay_text)
-    if delays.unstamped and not code:
+        Watch(args, delays.measure, row, delays.excuse).run(bus, delay_text)
+    if delays.unstamped:
         report(delays.excuse())
-    return code
+    return 0
 
 
 def delay_text(report: Report) -> str:
@@ -343,14 +337,15 @@ def _arguments(parser: argparse.ArgumentParser, size: int = WINDOW) -> None:
     """The flags that these verbs share. `size`: the default number of samples."""
     add = parser.add_argument
     add("keys", type=key, nargs="+", metavar="KEY", help="keys or key expressions, such as odom or */odom")
-    text = f"of the last N messages (default: {size})"
+    text = f"measure the last N messages (default: {size})"
     add("-w", "--window", type=count(2), default=size, metavar="N", help=text)
     add("-1", "--once", action="store_true", help="end after the first report")
     add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without any")
 
 
 VERBS = by_name(
-    Verb("topic hz", "the rate of messages, their jitter, and how many are lost", "odom", _arguments, hz),
-    Verb("topic bw", "the bandwidth, and the sizes of messages", "odom", partial(_arguments, size=BYTES_WINDOW), bw),
-    Verb("topic delay", "the age of messages on arrival", "odom", _arguments, delay),
-)
+    Verb("topic hz", "measure the rate of messages, their jitter, and how many are lost", "odom", _arguments, hz),
+    Verb("topic bw", "measure the bandwidth, and the sizes of messages", "odom",
+        partial(_arguments, size=BYTES_WINDOW), bw),
+    Verb("topic delay", "measure the age of messages on arrival", "odom", _arguments, delay),
+)  # fmt: skip

@@ -1,4 +1,4 @@
-"""`holozen stop` and `release`: robots ignore every command and stand still until they are released."""
+"""`holozen stop` and `release`: a stopped robot stands still and ignores all commands until it is released."""
 
 import argparse
 import json
@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name
-from holozen.console import printable, report
+from holozen.console import Failure, printable, report
 from holozen.flags import number
 from holozen.transport import connection
 from holozen.transport.errors import TIMEOUT, BusError
 from holozen.transport.samples import Sample
+from holozen.transport.services import Attempts, refusal
 
 if TYPE_CHECKING:
     from holozen.messages import CommandStatus
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 TOKENS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/{verb}"
 DONE = {"stop": "is stopped", "release": "is released"}
+NOT_STOPPED = "the robot was not stopped"  # as robots reply to a release
 EVERY = 0.002  # s between two polls
 AGAIN = 0.5  # s without an answer until the request is repeated
 PAUSE = 0.02  # s until a refused request is repeated
@@ -30,29 +32,30 @@ NOTICE = 2.0  # s to discover the first robot, and those named on the command li
 
 def run(args: argparse.Namespace) -> int:
     """Stop or release robots; 0 only if all of them confirmed."""
-    verb = args.verb
+    verb, began = args.verb, time.monotonic()
     where = connection.from_arguments(args)
     try:
         with Bus(verb, where, patience=args.timeout) as bus:
-            orders = Orders(bus, verb, args)
+            orders = Orders(bus, verb, args, began)
             orders.give()
             connected = bus.connected()
             code = orders.report()
     except BusError as error:
-        report(f"holozen {verb}: no robot was reached: {error}")
-        return 1
-    if not orders.there:
+        raise Failure(f"no robot was reached: {error}") from None
+    if not orders.found:
         reason = f"no robot was found{connection.FORBIDDEN}" if connected else f"no nodes found at {where.where}"
-        report(f"holozen {verb}: {reason}; `holozen list` shows what a sim has, --connect where to look")
+        raise Failure(f"{reason}; `holozen list` shows what a sim has, --connect where to look")
     return code
 
 
 class Order:
-    """The request to one robot, repeated until every server of its key has confirmed: two sims may share it."""
+    """The request to one robot, repeated until every server of its key has confirmed it: two sims may share a key."""
 
-    def __init__(self, robot: str, verb: str) -> None:
+    def __init__(self, robot: str, verb: str, began: float) -> None:
         self.robot, self.key, self.confirmed = robot, f"{robot}/{verb}".removeprefix("/"), False
-        self.discovered = False  # by the token of its service; those that are named are asked without
+        self.outdated = False  # whether the robot was stopped after `began` (s), so that it stays stopped
+        self._attempts = Attempts(began) if verb == "release" else None
+        self.discovered = False  # by the token of its service; robots named on the command line are asked before
         self.servers: set[str] = set()
         self.printed = False  # its confirmation
         self.message = ""
@@ -63,10 +66,11 @@ class Order:
         """Send the request or read its replies; returns whether it was confirmed just now."""
         if self.confirmed and self._good < len(self.servers):  # another sim was discovered since
             self.confirmed, self._replies = False, None
-        if self.confirmed or (self._replies is None and now < self._due):
+        if self.confirmed or self.outdated or (self._replies is None and now < self._due):
             return False
         if self._replies is None:
-            self._replies, self._good = bus.ask_all(self.key, max(AGAIN, bus.took)), 0
+            number = self._attempts.number if self._attempts else ""
+            self._replies, self._good = bus.ask_all(self.key, max(AGAIN, bus.took), number=number), 0
         try:
             while reply := self._replies.try_recv():
                 self._read(reply)
@@ -80,9 +84,11 @@ class Order:
             success, self.message = _read(reply.payload, reply.encoding)
             self._good += success
         elif reply != TIMEOUT:
-            from holozen.transport.services import refusal
-
-            self.message = str(refusal(reply))
+            refused = refusal(reply)
+            self.message = str(refused)
+            self.outdated |= bool(refused.fields.get("outdated"))
+            if self._attempts:
+                self._attempts.were_asked(refused)
 
 
 def _read(payload: bytes, encoding: str) -> tuple[bool, str]:
@@ -103,16 +109,16 @@ def _read(payload: bytes, encoding: str) -> tuple[bool, str]:
 
 
 class Orders:
-    """The orders to all robots, or to those that `args` name."""
+    """The requests to all robots, or to those that `args` name."""
 
-    def __init__(self, bus: Bus, verb: str, args: argparse.Namespace) -> None:
-        self._bus, self._verb, self._args = bus, verb, args
+    def __init__(self, bus: Bus, verb: str, args: argparse.Namespace, began: float) -> None:
+        self._bus, self._verb, self._args, self._began = bus, verb, args, began
         self._graph = bus.graph(TOKENS.format(verb=verb))
         self._wanted = {name.removeprefix("/") for name in args.robots}
         # Those that are named, or else the robot at the root, are asked before they are discovered.
         names = {name for name in self._wanted or {""} if not set(name) & set("*$?#")}
-        self._orders = {name: Order(name, verb) for name in names}
-        self.there: set[str] = set()  # robots
+        self._orders = {name: Order(name, verb, began) for name in names}
+        self.found: set[str] = set()  # names of robots
         self._status: Latest[CommandStatus] | None = None  # of the robot at the root
         self._root = ""  # the name of the robot at the root, once it is known
 
@@ -125,7 +131,7 @@ class Orders:
             changed = changed if self._known() == known else now
             for order in self._orders.values():
                 if order.look(self._bus, now):
-                    self.there.add(order.robot)
+                    self.found.add(order.robot)
                 named = order.robot or self._root or now - begin > max(NAMING, self._bus.took)
                 if order.confirmed and named and not order.printed:
                     order.printed = True
@@ -139,24 +145,42 @@ class Orders:
         late = [order for order in self._orders.values() if order.discovered and not order.confirmed]
         for order in late + [order for order in self._orders.values() if order.confirmed and not order.printed]:
             self._print(order)
-        missing = sorted(self._wanted - self.there)
-        if missing and self.there:
-            there = ", ".join(map(self._named, sorted(self.there)))
-            report(f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there are: {there}")
-        # The robot at the root answered, but without a token: there may be others that were not asked.
+        missing = sorted(self._wanted - self.found)
+        if missing and self.found:
+            found = ", ".join(map(self._named, sorted(self.found)))
+            report(f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there are: {found}")
+        silent = self._report_silent()
+        # The robot at the root answered, but its token is unknown: so may be other robots, which were not asked.
         hidden = not self._wanted and any(order.confirmed and not order.discovered for order in self._orders.values())
         if hidden:
             report(f"holozen {self._verb}: other robots may not have been discovered{connection.FORBIDDEN}")
-        return 1 if late or missing or hidden or not self.there else 0
+        return 1 if late or missing or silent or hidden or not self.found else 0
+
+    def _report_silent(self) -> bool:
+        """Report the robots of nodes that others know of, but that do not answer. Returns whether there are any that
+        were to be reached.
+        """
+        if not self.found:
+            return False
+        for end in (silent := [end for end in self._bus.hidden() if self._is_wanted(end.key)]):
+            order = Order(end.key.removesuffix("stop").removesuffix("/"), self._verb, self._began)
+            order.message = f"{end.source} does not answer: it hangs or is stopped, or cannot be reached from here"
+            self._print(order)
+        return bool(silent)
+
+    def _is_wanted(self, stop: str) -> bool:
+        """Whether a service, if it is one that stops a robot, is that of a robot to reach."""
+        robot, _, verb = stop.rpartition("/")
+        return verb == "stop" and (not self._wanted or robot in self._wanted)
 
     def _find(self) -> None:
         for order in self._orders.values():
             order.servers.clear()
         for endpoint in self._graph.endpoints():
             robot = endpoint.key.removesuffix(self._verb).removesuffix("/")
-            self.there.add(robot)
+            self.found.add(robot)
             if not self._wanted or robot in self._wanted:
-                order = self._orders.setdefault(robot, Order(robot, self._verb))
+                order = self._orders.setdefault(robot, Order(robot, self._verb, self._began))
                 order.discovered = True
                 order.servers.add(endpoint.session)
 
@@ -168,20 +192,20 @@ class Orders:
             self._status = self._bus.latest("cmd_vel_status", CommandStatus)
         if not self._root and (status := self._status.read()[0]):
             self._root = status.name
-            if self._root in self._wanted - self.there:
+            if self._root in self._wanted - self.found:
                 self._wanted = self._wanted - {self._root} | {""}
-                self._orders[""] = Order("", self._verb)
+                self._orders[""] = Order("", self._verb, self._began)
 
     def _known(self) -> tuple[int, int]:
         """The number of robots discovered, and of servers that the orders go to."""
-        return len(self.there), sum(len(order.servers) for order in self._orders.values())
+        return len(self.found), sum(len(order.servers) for order in self._orders.values())
 
     def _is_over(self, since: float, quiet: float) -> bool:
-        if not all(order.confirmed for order in self._orders.values() if order.discovered):
+        if not all(order.confirmed or order.outdated for order in self._orders.values() if order.discovered):
             return False
-        if not self.there:  # among thousands of tokens, those of robots come late
+        if not self.found:  # among thousands of tokens, those of robots may come late
             return False
-        if self._wanted - self.there:
+        if self._wanted - self.found:
             return since > max(NOTICE, self._bus.took) and quiet > QUIET
         return quiet > max(QUIET, self._bus.took)
 
@@ -191,11 +215,16 @@ class Orders:
             row = {"robot": order.robot or self._root, "verb": self._verb, "confirmed": confirmed, "message": message}
             return print(json.dumps(row), flush=True)
         if confirmed:
+            if message == NOT_STOPPED:
+                return print(printable(f"{name} was not stopped"), flush=True)
             more = f": {message}" if self._verb == "release" and message else ""
             return print(printable(f"{name} {DONE[self._verb]}{more}"), flush=True)
+        if order.outdated:
+            return report(f"{name} is not released: {message}")
         because = f" ({message})" if message else ""
         risk = "; it may move" if self._verb == "stop" else ""
-        return report(f"{name} did not confirm within {self._args.timeout:g} s{because}{risk}")
+        within = f" within {self._args.timeout:g} s" if order.discovered else ""
+        return report(f"{name} did not confirm{within}{because}{risk}")
 
     def _named(self, robot: str) -> str:
         return robot or self._root or "the robot at the root"
@@ -208,6 +237,6 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = by_name(
-    Verb("stop", "Stop robots until `holozen release`.", "Fred", _arguments, run),
-    Verb("release", "Let robots drive again after `holozen stop`.", "Fred", _arguments, run),
+    Verb("stop", "stop robots until `holozen release`", "Fred", _arguments, run),
+    Verb("release", "let robots drive again after `holozen stop`", "Fred", _arguments, run),
 )

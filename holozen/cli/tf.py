@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from holozen.bus import Bus
 from holozen.cli.hints import no_nodes
 from holozen.cli.verb import Noun, Verb, by_name, open_bus
-from holozen.console import printable, report
+from holozen.console import Failure, printable, report
 from holozen.flags import number, robot
 from holozen.frames import Frames
 from holozen.process import stop_event
@@ -52,8 +52,7 @@ def echo(args: argparse.Namespace) -> int:
             except LookupError as error:
                 passed = now - begun
                 if args.timeout and passed > args.timeout and not shown:
-                    report(f"holozen tf echo: {_why(bus, keys[0], frames, error)}")
-                    return 1
+                    raise Failure(_why(bus, keys[0], frames, error)) from None
                 if passed > WAITING and not (warned or args.timeout):
                     report(f"waiting for {args.source} -> {args.target}; {_why(bus, keys[0], frames, error)}")
                     warned = True
@@ -113,13 +112,19 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("source", type=_frame, metavar="SOURCE", help="the frame in which the pose is given, such as odom")
     add("target", type=_frame, metavar="TARGET", help="the frame whose pose it is, such as base_link")
-    add("--robot", type=robot, default="", metavar="NAME", help="on the keys of this robot (default: at the root)")
-    add("-r", "--rate", type=number(0.01, 100, "Hz"), default=1.0, metavar="HZ", help="poses a second (default: 1)")
+    add(
+        "--robot",
+        type=robot,
+        default="",
+        metavar="NAME",
+        help="the robot whose keys to use (default: those at the root)",
+    )
+    add("-r", "--rate", type=number(0.01, 100, "Hz"), default=1.0, metavar="HZ", help="poses per second (default: 1)")
     add("-1", "--once", action="store_true", help="end after the first one")
     add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without one")
 
 
 VERBS = by_name(
-    Noun("tf", "Inspect the transforms between frames.", {"echo": "tf"}),
-    Verb("tf echo", "the pose of a frame in another one", "odom base_link", _arguments, echo),
+    Noun("tf", "inspect the transforms between frames"),
+    Verb("tf echo", "print the pose of a frame in another one", "odom base_link", _arguments, echo),
 )

@@ -6,8 +6,6 @@ import argparse
 
 from holozen.background import background
 from holozen.cli.verb import (
-    PUB_EXAMPLE,
-    PUB_PATIENCE,
     Noun,
     Verb,
     add_count,
@@ -16,15 +14,25 @@ from holozen.cli.verb import (
     list_arguments,
     on_node,
     open_bus,
+    type_and_value,
 )
 from holozen.flags import add_packages, count, key, number
 from holozen.process import deferred_interrupt
 
 LISTEN = 1.0  # s to listen for samples of foreign nodes, also by `info -v`
+PUB_PATIENCE = 3.0  # s for a subscriber of `pub` to appear
+PUB_EXAMPLE = """cmd_vel '{"linear": {"x": 0.3}}'"""
 
 
 def pub(args: argparse.Namespace) -> int:
     """Publish a value once, N times, or until interrupted; a robot that it moved is stopped at the end."""
+    args.type, args.value = type_and_value(args, "msg", "VALUE")
+    if args.stdin and args.value is not None:
+        args.error(f"{args.key}: {args.value!r} is too much; with --stdin the values come from there")
+    if args.value is None and not (args.type or args.stdin):
+        args.error(f"{args.key}: a value is missing; write holozen topic pub {PUB_EXAMPLE}")
+    if not (args.wait or args.max_wait):
+        args.max_wait = PUB_PATIENCE
     with open_bus(args) as bus:
         looking = bus.endpoints if args.no_wait else background(bus.endpoints)
         with deferred_interrupt():  # while the session opens and queries the graph
@@ -63,13 +71,16 @@ def _echo_arguments(parser: argparse.ArgumentParser) -> None:
     add("--timeout", type=number(0.01, 1e6, "s"), metavar="S", help="exit code 1 after S seconds without any")
     add("--field", metavar="A.B", help="only this field, such as pose.pose.position or transforms[0].child_frame_id")
     add("--filter", metavar="EXPR", help="only messages of which this is true, such as 'm.linear.x > 0.2'")
-    add("--csv", action="store_true", help="values with commas, a message a line")
+    add("--csv", action="store_true", help="values separated by commas, one message per line")
     add("--raw", action="store_true", help="the bytes as they came; on a terminal, escaped")
     add("--no-arr", action="store_true", help="only the length of lists")
     add("--no-str", action="store_true", help="only the length of texts")
     text = "show at most N values of a list and characters of a text (default: 128 values of a list)"
     add("-l", "--truncate-length", type=count(1), default=0, metavar="N", help=text)
     add("-f", "--full-length", action="store_true", help="lists in full")
+    add("--qos-durability", choices=("system_default", "transient_local", "volatile", "unknown", "best_available"),
+        default="system_default", metavar="NAME", help="transient_local: begin with the last message of each publisher,"
+        " on any key; volatile: on none (default: on tf_static, robot_description and map)")  # fmt: skip
 
 
 def _pub_arguments(parser: argparse.ArgumentParser) -> None:
@@ -86,23 +97,19 @@ def _pub_arguments(parser: argparse.ArgumentParser) -> None:
     add("--no-wait", action="store_true", help="do not wait for a subscriber")
     add("--force", action="store_true", help="also send numbers that are not finite")
     add_packages(parser)
-    add("--stdin", action="store_true", help="one value a line on standard input")
+    add("--stdin", action="store_true", help="one value per line on standard input")
 
 
 VERBS = by_name(
-    Noun(
-        "topic",
-        "Inspect topics, and publish to them.",
-        {
-            "list": "topic", "info": "topic", "type": "topic", "find": "topic", "echo": "topic",
-            "hz": "stats", "bw": "stats", "delay": "stats", "pub": "topic", "plot": "plot",
-        },
-    ),
-    Verb("topic list", "the keys that nodes read and write", "-t", _list_arguments, on_node("keys", "list_topics")),
-    Verb("topic info", "a key's type, publishers and subscribers", "cmd_vel", _info_arguments,
+    Noun("topic", "inspect topics, and publish to them",
+        {"hz": "stats", "bw": "stats", "delay": "stats", "plot": "plot"}),
+    Verb("topic list", "list the keys that nodes read and write", "-t", _list_arguments,
+        on_node("keys", "list_topics")),
+    Verb("topic info", "show a key's type, publishers and subscribers", "cmd_vel", _info_arguments,
         on_node("keys", "topic_info")),
-    Verb("topic type", "a key's type", "odom", key_argument, on_node("keys", "topic_type")),
-    Verb("topic find", "the keys of a type", "nav_msgs/msg/Odometry", _find_arguments, on_node("keys", "find_topics")),
+    Verb("topic type", "show a key's type", "odom", key_argument, on_node("keys", "topic_type")),
+    Verb("topic find", "find the keys of a type", "nav_msgs/msg/Odometry", _find_arguments,
+        on_node("keys", "find_topics")),
     Verb("topic echo", "print the messages of a key", "odom --once", _echo_arguments, on_node("echo", "echo")),
     Verb("topic pub", "write messages to a key", PUB_EXAMPLE, _pub_arguments, pub),
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""`holozen up`: start sim, pose service, controller and teleop, each as a process of its own."""
+"""`holozen up`: starts sim, pose service, controller and teleop, each as a process of its own."""
 
 import argparse
 import contextlib
@@ -17,6 +17,7 @@ from holozen.cli import command
 from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.process import dies_with_parent, stop_event
+from holozen.suspension import suspend_children_too
 from holozen.transport import connection
 from holozen.transport.rendezvous import is_taken
 from holozen.transport.roles import ROUTER
@@ -30,21 +31,22 @@ LOOK = 0.05  # s
 SETTLED = 10.0  # s; a part that fails sooner at its first start has a wrong flag or file
 PAUSES = 0.5, 30.0  # s before a part is started again: the first, doubled until it settles, and the longest
 LAST_LINES = 20
-# Plain keys, no update under way, lines wrap, no reports of focus and pastes, a cursor, the main screen.
+# Plain keys, no synchronized update, line wrapping, no reports of focus and pastes, a visible cursor, the main screen.
 SCREEN_LEFT = "\x1b[<u\x1b[?2026l\x1b[?7h\x1b[?1004l\x1b[?2004l\x1b[?25h\x1b[?1049l"
 
 
 def run(args: argparse.Namespace) -> int:
     """Start the parts and watch them until Ctrl-C, or until one fails for good."""
-    if args.shards > 1 and args.robot and not args.robot[1]:
+    if args.shards > 1 and not all(name for _, name in args.robot):
         args.error("--shards gives each robot to the shard of its name: use --robot FILE=NAME")
     has_terminal = sys.stdin.isatty() and sys.stdout.isatty()
     parts = _parts(args, has_terminal)
     where, router = _meeting(connection.from_arguments(args))
     stop = stop_event()
+    suspend_children_too()
     if "teleop" in parts and args.view is not None and (where.private or where.secure):
-        # The teleop's screen would hide it, and other users see the arguments of a process.
-        args.error("--view has no place here to show the token of its page: run `holozen view` in another terminal")
+        # The teleop's screen would hide it, and other users can see the arguments of a process.
+        args.error("--view cannot show the token of its page beside the teleop: run `holozen view` in another terminal")
     if not has_terminal:
         report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
@@ -64,8 +66,8 @@ def run(args: argparse.Namespace) -> int:
 
 def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]:
     """The parts to start and their arguments. Exits with code 2 if a part would refuse one."""
-    robot = ["--robot", "=".join(filter(None, map(str, args.robot)))] if args.robot else []
-    name = [args.robot[1]] if args.robot and args.robot[1] else []
+    robots = [word for robot in args.robot for word in ("--robot", "=".join(filter(None, map(str, robot))))]
+    name = [args.robot[0][1]] if args.robot and args.robot[0][1] else []
     sources = [word for package, folder in args.package for word in ("--package", f"{package}={folder}")]
     sources += [word for variable in args.allow_env for word in ("--allow-env", variable)]
     pace, goals = _flags(args, "rtf"), _flags(args, "shape", "size", "goals")
@@ -74,7 +76,7 @@ def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]
             parser = command(verb).parser()
             parser.prog = f"holozen {args.verb}"
             parser.parse_args(words)
-    sim = [*robot, *sources, *pace, *_flags(args, "world", "drive", "engine"), *_state(args.state)]
+    sim = [*robots, *sources, *pace, *_flags(args, "world", "drive", "engine"), *_state(args.state)]
     shards = [f"{shard}/{args.shards}" for shard in range(1, args.shards + 1)]
     parts = {f"sim {shard}": [*sim, "--shard", shard] for shard in shards} if args.shards > 1 else {"sim": sim}
     driven = args.shards == 1 or args.robot  # else there is no robot yet
@@ -88,31 +90,31 @@ def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]
 
 
 def _meeting(where: connection.Connection) -> tuple[connection.Connection, list[str]]:
-    """How the parts connect, and the flags of a router of their own; none where they need none, or there is one."""
+    """The connection of the parts, and the flags of a router for them; empty if they need none, or one runs."""
     if not where.secure or where.connect is not None or not os.path.isdir(os.path.join(where.secure, ROUTER)):
         return where, []
     listen = where.listen or where.meeting_points
     clients = where.replace(listen=None, connect=(connection.from_here(listen[0]),))
     if is_taken(listen[0]):
-        report(f"up: something listens at {listen[0]} already; it is taken for the router")
+        report(f"up: something listens at {listen[0]} already; assuming that it is the router")
         return clients, []
     return clients, where.replace(mode="router", listen=listen).arguments()
 
 
 class Team:
-    """The processes of one `up`. Their output goes to `log`, or to ours if that is None.
+    """The processes of one `up`. Their output goes to `log`, or to that of this process if it is None.
 
-    If it `restarts`, a part that dies is started again, and moves no robot by that: a new sim has its robots stopped
-    until `holozen release`, a new controller drives only after a resume. A new pose service would let a controller
-    that waits for it go on, so that one is replaced too.
+    If it `restarts`, a part that dies is started again in a way that moves no robot: the robots of a new sim are
+    stopped until `holozen release`, and a new controller drives only after a resume. A new pose service would let a
+    waiting controller drive on, so the controller is replaced too.
     """
 
     def __init__(self, where: list[str], log: IO[str] | None, restarts: bool) -> None:
         self._where, self._log, self._restarts = where, log, restarts
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._words: dict[str, list[str]] = {}
-        self._started: dict[str, float] = {}  # s; of those that are to be started again: when
-        self._pause: dict[str, float] = {}  # s; of those that were started again
+        self._started: dict[str, float] = {}  # s; in the future for a part that is to be started again
+        self._pause: dict[str, float] = {}  # s before the last restart of each part that was restarted
 
     def start(self, verb: str, words: list[str]) -> None:
         """Start a part, called by its verb, or `sim K/N`. The teleop keeps the terminal, and the others get no signals
@@ -139,13 +141,13 @@ class Team:
                 process = self._running.get(verb)
                 if process is None:
                     if time.monotonic() >= self._started[verb]:
-                        self.start(verb, [*self._words[verb], *STANDING.get(_verb(verb), ())])
+                        self.start(verb, [*self._words[verb], *RESTART_FLAGS.get(_verb(verb), ())])
                 elif (code := process.poll()) is not None and not self._ended(verb, code):
                     return code > 0
         return False
 
     def _ended(self, verb: str, code: int) -> bool:
-        """Report the end of a part, and have it started again if it died. Returns whether the others go on."""
+        """Report the end of a part, and schedule its restart if it died. Returns whether the others go on."""
         del self._running[verb]
         lived = time.monotonic() - self._started.pop(verb)
         if verb == "teleop":
@@ -171,7 +173,7 @@ class Team:
         return True
 
     def _report(self, text: str) -> None:
-        """Report a line; after the end if the teleop owns the terminal."""
+        """Report a line: at the end of `up` if the teleop owns the terminal."""
         if self._log:
             self._log.write(f"{text}\n")
         else:
@@ -185,11 +187,11 @@ class Team:
             _end(parts, grace)
 
 
-STANDING = {"sim": ["--stopped"], "controller": ["--held"]}
-AFTER = {
+RESTART_FLAGS = {"sim": ["--stopped"], "controller": ["--held"]}
+AFTER_RESTART = {
     "sim": ", its robots stopped until `holozen release`",
     "view": "",
-    "router": "; robots stand until then",
+    "router": "; robots stand still until then",
     "controller": "; it drives after `holozen controller --resume` or the teleop's r",
     "pose-service": "; the controller drives after `holozen controller --resume` or the teleop's r",
 }
@@ -205,7 +207,7 @@ def _again(part: str) -> str:
 
 def _after(part: str) -> str:
     if part == _verb(part):
-        return AFTER[part]
+        return AFTER_RESTART[part]
     return "; the robots that were spawned in this shard are gone, those of the others go on"
 
 
@@ -231,16 +233,15 @@ def _flags(args: argparse.Namespace, *names: str) -> list[str]:
 
 
 def _state(given: str | None) -> list[str]:
-    """The flags for the folder of software stops; none for that of the environment, or without a home folder."""
-    if given or os.environ.get("HOLOZEN_STATE"):
-        return ["--state", given] if given else []
-    base = os.environ.get("XDG_STATE_HOME", "")
-    base = base if os.path.isabs(base) else os.path.expanduser("~/.local/state")
-    return ["--state", os.path.join(base, "holozen")] if os.path.isabs(base) else []
+    """The sim's flags for the folder of its software stops; none without a home."""
+    from holozen.command.stop_files import default_folder  # once it is about to start parts
+
+    folder = given or default_folder()
+    return ["--state", str(folder)] if folder else []
 
 
 def _restore(terminal: list[Any]) -> None:
-    """Restore the terminal, also after the teleop was killed."""
+    """Restore the terminal: a teleop that was killed has not done so."""
     with contextlib.suppress(OSError, termios.error):
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, terminal)
         print(SCREEN_LEFT, end="", flush=True)
@@ -259,29 +260,31 @@ def _robot(text: str) -> "tuple[Path, str]":
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
-    add("--robot", type=_robot, metavar="FILE[=NAME]",
-        help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root)")  # fmt: skip
+    add("--robot", type=_robot, action="append", default=[], metavar="FILE[=NAME]",
+        help="a xacro or URDF file, and the robot's name (default: hb_bot, with its keys at the root);"
+        " of several the controller drives the first")  # fmt: skip
     add("--world", type=flags.file, metavar="FILE", help="an SDF file (default: gazebo.world)")
     add("--rtf", metavar="FACTOR", help="real-time factor; 0: as fast as possible (default: the world's)")
     add("--drive", choices=flags.DRIVES, help=flags.DRIVE)
     add("--engine", choices=flags.ENGINES, help=flags.ENGINE)
     flags.add_robot_sources(parser)
     add("--shape", metavar="SHAPE",
-        help="of the goals: square, triangle, rectangle, infinity or hexagon (default: square)")  # fmt: skip
-    add("--size", metavar="M", help="the side of that shape (infinity: half its length) in m")
-    add("--goals", type=flags.file, metavar="FILE", help="goals from a file instead: x y theta a line")
-    add("--laps", type=flags.count(), metavar="N", default=0, help="times round the goals; 0: for ever (default: 0)")
+        help="shape of the goals: square, triangle, rectangle, infinity or hexagon (default: square)")  # fmt: skip
+    add("--size", metavar="M", help="side length of the shape in metres (for infinity: half its length)")
+    add("--goals", type=flags.file, metavar="FILE", help="goals from a file instead: x y theta per line")
+    add("--laps", type=flags.count(), metavar="N", default=0,
+        help="number of laps around the goals; 0: for ever (default: 0)")  # fmt: skip
     add("--view", nargs="?", type=flags.port, const=8080, metavar="PORT",
         help="show the robots in a browser too, at http://127.0.0.1:8080/ or another port (0: a free one)")  # fmt: skip
     add("--shards", type=flags.count(1), default=1, metavar="N",
-        help="as many sims, which share the robots by name (default: 1)")  # fmt: skip
+        help="run N sims and divide the robots among them by name (default: 1)")  # fmt: skip
     add("--state", metavar="DIR",
-        help="where software stops outlast it (default: HOLOZEN_STATE, else ~/.local/state/holozen)")  # fmt: skip
-    add("--no-restart", action="store_true", help="do not start a part again that died (its robots would stand)")
+        help="folder where software stops are kept (default: HOLOZEN_STATE, else ~/.local/state/holozen)")  # fmt: skip
+    add("--no-restart", action="store_true", help="do not restart parts that die")
 
 
 ABOUT = (
-    "Start the sim, the controller, the pose service, and the teleop if there is a terminal; with --secure a router"
-    " too, unless --connect names one."
+    "start the sim, the controller, the pose service, and the teleop if there is a terminal; with --secure a router"
+    " too, unless --connect names one"
 )
 VERBS = by_name(Verb("up", ABOUT, "--robot my_bot.urdf.xacro", _arguments, run, json=None))

@@ -1,9 +1,10 @@
-"""What verbs of the command line share: their declaration, common flags and bus. Loads no more than the flags need."""
+"""The declaration of the command line's verbs, their common flags, and their bus. Imports only what the flags need."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
+import re
 import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from holozen.transport.bus import Bus
     from holozen.transport.node import Node
 
-JSON = "one JSON object a line"
+JSON = "print the output as JSON, one object per line"
 ROS2_TITLE = "accepted for compatibility with ros2"
 
 # Flags of ros2 without effect here, accepted so that its command lines work unchanged.
@@ -31,23 +32,23 @@ _QOS = (
 _NODES, _TOPICS, _SERVICES = "--include-hidden-nodes", "--include-hidden-topics", "--include-hidden-services"
 _ROS2 = {
     "topic find": (_TOPICS,), "topic type": (_TOPICS,), "topic info": (_TOPICS,),
-    "topic echo": (*_QOS, _TOPICS, "--lost-messages", "--no-lost-messages"), "topic pub": (*_QOS, "--keep-alive S"),
+    "topic echo": (*(flag for flag in _QOS if "durability" not in flag), _TOPICS, "--lost-messages",
+                   "--no-lost-messages"),
+    "topic pub": (*_QOS, "--keep-alive S"),
     "service find": (_SERVICES,),
     "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
 }  # fmt: skip
 
-
-PUB_PATIENCE = 3.0  # s for a subscriber of `topic pub` to appear
-PUB_EXAMPLE = """cmd_vel '{"linear": {"x": 0.3}}'"""
+_TYPE = re.compile(r"\w+/((msg|srv|action)/)?\w+")
 
 
 class Verb:
     """A verb, such as `topic list` or `plot`.
 
     `about` is its line of help, `arguments` adds its flags to a parser, `run` does the work and returns the exit code.
-    `json` is the help of its flag `--json`, None if it has none; `notes` are what its help says before the example.
-    `bus`: whether it has the flags of a connection. The flags have its name as `verb`, and `error` as of the parser.
+    `json` is the help of its flag `--json`, None if it has none; `notes` precede the example in its help. `bus`: if it
+    has the flags of a connection. The parsed flags also hold its name as `verb`, and the parser's method `error`.
     """
 
     def __init__(
@@ -67,22 +68,23 @@ class Verb:
         self._notes, self._usage, self._bus = notes, usage, bus
 
     def main(self, argv: list[str]) -> int:
-        """Run it with the words of a command line; returns the exit code."""
+        """Run it with its part of the command line; returns the exit code."""
         parser = self.parser()
         if any(action.nargs == argparse.REMAINDER for action in parser._actions):
             return self._run(parser.parse_args(argv))
         return self._run(parser.parse_intermixed_args(argv))  # flags may stand anywhere, also before a last value
 
     def parser(self) -> Parser:
-        """Its parser alone."""
+        """A parser for this verb alone."""
         parser = Parser(**self.options())
         self.fill(parser)
         return parser
 
     def options(self) -> dict[str, Any]:
-        """The arguments of its parser."""
+        """The keyword arguments with which to create its parser."""
         prog = f"holozen {self.name}"
-        epilog = f"{self._notes}example: {prog} {self._example}".rstrip()
+        example = f"example: {prog} {self._example}".rstrip()
+        epilog = f"{self._notes}\n\n{example}" if self._notes else example
         return {"prog": prog, "usage": self._usage, "description": self.about, "epilog": epilog}
 
     def fill(self, parser: argparse.ArgumentParser) -> None:
@@ -98,9 +100,11 @@ class Verb:
 
 
 class Noun:
-    """A noun, such as `topic`. `modules`: by verb, the module of holozen.cli that defines it in VERBS."""
+    """A noun, such as `topic`. `modules`: verb -> the module of holozen.cli that defines it in VERBS; `by_name` adds
+    the verbs of the noun's own module, before the others.
+    """
 
-    def __init__(self, name: str, about: str, modules: dict[str, str]) -> None:
+    def __init__(self, name: str, about: str, modules: dict[str, str] = {}) -> None:
         self.name, self.about, self.modules = name, about, modules
 
     def main(self, argv: list[str]) -> int:
@@ -147,12 +151,28 @@ class Service(Noun):
 
 
 def no_arguments(_parser: argparse.ArgumentParser) -> None:
-    """Fill in nothing: for a Verb that has no arguments of its own."""
+    """Add nothing: for a Verb without arguments of its own."""
 
 
-def key_argument(parser: argparse.ArgumentParser) -> None:
-    """Add the argument of a verb about one key."""
-    parser.add_argument("key", type=key)
+def argument(*names: str, **options: Any) -> Callable[[argparse.ArgumentParser], object]:
+    """For a Verb with a single argument: a function that adds it to a parser. The arguments are argparse's."""
+    return lambda parser: parser.add_argument(*names, **options)
+
+
+key_argument = argument("key", type=key)
+
+
+def type_and_value(args: argparse.Namespace, kind: str, what: str) -> tuple[str, str | None]:
+    """The words after a key, `[TYPE] VALUE`: the full name of the type, empty if none is given; and the value, None if
+    none is given. `kind` is msg, srv or action, `what` the name of the value in the help. Exits with code 2 if there
+    are more words.
+    """
+    words = list(args.words)
+    given = words.pop(0) if words and _TYPE.fullmatch(words[0]) else ""
+    if len(words) > 1:
+        args.error(f"{args.key}: {words[-1]!r} is too much; write KEY [TYPE] {what}")
+    full = given.replace("/", f"/{kind}/") if given.count("/") == 1 else given
+    return full, words[0] if words else None
 
 
 def list_arguments(noun: str) -> Callable[[argparse.ArgumentParser], None]:
@@ -162,24 +182,28 @@ def list_arguments(noun: str) -> Callable[[argparse.ArgumentParser], None]:
         parser.add_argument("-t", "--show-types", action="store_true", help="with their types")
         add_count(parser, noun)
         if noun != "action":
-            text = "also those with a name that begins with _, as those of actions"
+            text = "also those whose name has a part that begins with _, such as those of actions"
             parser.add_argument(f"--include-hidden-{noun}s", dest="hidden", action="store_true", help=text)
 
     return fill
 
 
 def add_count(parser: argparse.ArgumentParser, noun: str) -> None:
-    """Add the flag that has only counted what there is."""
-    parser.add_argument("-c", f"--count-{noun}s", dest="count", action="store_true", help="only how many there are")
+    """Add the flag that prints a number instead of a list."""
+    parser.add_argument("-c", f"--count-{noun}s", dest="count", action="store_true", help="print only their number")
 
 
 def by_name(*verbs: Noun | Verb) -> dict[str, Any]:
-    """The table VERBS of a module."""
-    return {verb.name: verb for verb in verbs}
+    """The table VERBS of a module: the nouns and verbs by name."""
+    table: dict[str, Any] = {verb.name: verb for verb in verbs}
+    for noun in (one for one in verbs if isinstance(one, Noun)):
+        own = [name.removeprefix(f"{noun.name} ") for name in table if name.startswith(f"{noun.name} ")]
+        noun.modules = dict.fromkeys(own, noun.name) | noun.modules
+    return table
 
 
 def _add_ros2_flags(parser: argparse.ArgumentParser, name: str) -> None:
-    group = parser.add_argument_group(ROS2_TITLE, "They change nothing here.")
+    group = parser.add_argument_group(ROS2_TITLE, "They have no effect here.")
     for flag in (*_EVERY, *_ROS2.get(name, ())):
         option, _, value = flag.partition(" ")
         if value:
@@ -189,8 +213,8 @@ def _add_ros2_flags(parser: argparse.ArgumentParser, name: str) -> None:
 
 
 def on_node(module: str, function: str) -> Callable[[argparse.Namespace], int]:
-    """A verb's `run`: a function of a module of holozen.cli that takes the flags and a node, for samples as bytes. The
-    module is loaded while the session opens.
+    """A verb's `run` that calls a function of a module of holozen.cli with the flags and a Node, for verbs that handle
+    samples as bytes. The module is imported while the session opens.
     """
 
     def run(args: argparse.Namespace) -> int:
@@ -204,8 +228,8 @@ def on_node(module: str, function: str) -> Callable[[argparse.Namespace], int]:
 
 
 def open_bus(args: argparse.Namespace, stop: threading.Event | None = None) -> Bus:
-    """The bus of a verb, connected according to its flags. Its session opens while this and the caller load their
-    modules. `stop` as in Opening.
+    """The bus of a verb, connected according to its flags. The session opens while this and the caller import modules.
+    `stop` as in Opening.
     """
     bus: Bus = _open(args, stop, "bus", "Bus")
     return bus

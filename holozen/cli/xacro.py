@@ -1,4 +1,4 @@
-"""`holozen xacro`: expand a xacro file, without ROS; with --watch again on every save."""
+"""`holozen xacro`: expands a xacro file, without ROS; with --watch again on every save."""
 
 import argparse
 import contextlib
@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import threading
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +15,7 @@ from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.process import stop_event
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import SAVED, Inputs, Outcome, expand_xacro, now, process, unchanged
+from holozen.robot.xacro import SAVED, Inputs, Outcome, XacroFile, current, expand_xacro, process, unchanged
 from holozen.transport import connection
 from holozen.transport.errors import BusError
 
@@ -29,14 +29,14 @@ SETTLED = 0.05  # s without a change: an editor may truncate a file before writi
 def run(args: argparse.Namespace) -> int:
     """Expand a file, once or on every save."""
     _check(args)
-    given = dict(args.args), dict(args.package), frozenset(args.allow_env)
+    args.args, args.package = dict(args.args), dict(args.package)
     if args.watch:
-        return watch(args, *given)
-    _give(args, expand_xacro(args.file, *given))
+        return watch(args)
+    _output(args, expand_xacro(args.file, args.args, args.package, args.allow_env))
     return 0
 
 
-def _give(args: argparse.Namespace, text: str) -> None:
+def _output(args: argparse.Namespace, text: str) -> None:
     row = {"file": str(args.file)}
     if args.output:
         write(args.output, text)
@@ -64,9 +64,9 @@ def _print(text: str) -> None:
         sys.stdout.buffer.write(_encoded(text))
         sys.stdout.buffer.flush()
     except BrokenPipeError:
-        raise  # the reader has seen enough
+        raise  # a reader such as head is done
     except OSError as error:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or the rest would be written again at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python would write the rest again at exit
         raise RobotError(f"cannot write to standard output: {error.strerror}") from None
 
 
@@ -82,10 +82,8 @@ def _check(args: argparse.Namespace) -> None:
         raise RobotError(f"-o {args.output} is the file that is expanded; write to another one")
 
 
-def watch(
-    args: argparse.Namespace, values: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
-) -> int:
-    """Expand on every save and report the result, until stopped; an error waits for the next save."""
+def watch(args: argparse.Namespace) -> int:
+    """Expand on every save, also after one with an error, and report each result, until stopped."""
     stop = stop_event()
     with contextlib.ExitStack() as ends:
         bus = None
@@ -97,45 +95,37 @@ def watch(
             bus = ends.enter_context(Bus("xacro", connection.from_arguments(args), lasting=True, stop=stop))
         inputs: Inputs = {"file": {str(args.file): None}}
         while not stop.is_set():
-            before = now(inputs, args.file, packages)  # later saves are noticed
-            outcome = _expanded(args.file, values, packages, allow_env)
-            _report(args, *((outcome.error, False) if outcome.error else _used(args, outcome, values, packages, bus)))
+            before = current(inputs, args.file, args.package)  # taken first, so that a save during the expansion counts
+            outcome = _expanded(args)
+            _report(args, *((outcome.error, False) if outcome.error else _apply(args, outcome, bus)))
             inputs = outcome.inputs or before
             inputs["file"].setdefault(str(args.file), before["file"].get(str(args.file)))
-            _wait_for_save(inputs, args.file, packages, stop)
+            _wait_for_save(inputs, args.file, args.package, stop)
     return 0
 
 
-def _expanded(
-    path: Path, values: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
-) -> Outcome:
+def _expanded(args: argparse.Namespace) -> Outcome:
     try:
-        return process(path, values, packages, allow_env)
+        return process(XacroFile(args.file, args.args, args.package, args.allow_env))
     except RobotError as error:
         return Outcome(error=str(error))
 
 
-def _used(
-    args: argparse.Namespace,
-    outcome: Outcome,
-    values: Mapping[str, str],
-    packages: Mapping[str, Path],
-    bus: "Bus | None",
-) -> tuple[str, bool]:
-    """The result of a save in words, and whether all of it succeeded."""
+def _apply(args: argparse.Namespace, outcome: Outcome, bus: "Bus | None") -> tuple[str, bool]:
+    """Write and spawn an expanded text; returns what was done as text, and whether all of it succeeded."""
     text = f"{args.file} expanded"
+    for warning in outcome.warnings if not bus else ():  # with a bus the robot is read again, and its warnings shown
+        report(f"warning: {warning}")
     try:
         if args.output:
             write(args.output, outcome.text)
             text += f", {args.output} written"
         if bus:
-            from holozen.cli.spawn import Place, spawn_file
+            from holozen.cli.spawn import Place, put, read
 
-            name, place, drive = args.name or "", Place(args.x, args.y), args.drive
-            text += (
-                f", {spawn_file(bus, args.file, name, place, True, values, packages, drive, allow_env=args.allow_env)}"
-            )
-            args.x = args.y = None  # from now on it is replaced where it stands
+            robot = read(args.file, args.name or "", args.args, args.package, args.drive, allow_env=args.allow_env)
+            text += f", {put(bus, robot, Place(args.x, args.y), replace=True)}"
+            args.x = args.y = None  # later ones replace it where it stands
     except (RobotError, BusError) as error:
         return f"{text}, but {error}", False
     return text, True
@@ -152,16 +142,15 @@ def _wait_for_save(inputs: Inputs, path: Path, packages: Mapping[str, Path], sto
     saved = {kind: answers for kind, answers in inputs.items() if kind in SAVED}
     while unchanged(saved, path, packages) and not stop.wait(LOOK):
         pass
-    while (latest := now(saved, path, packages)) != saved and not stop.wait(SETTLED):
+    while (latest := current(saved, path, packages)) != saved and not stop.wait(SETTLED):
         saved = latest
 
 
 def _arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", type=Path, help="the xacro file")
-    parser.add_argument(
-        "args", type=flags.pair, nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg"
-    )
-    parser.add_argument("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
+    add = parser.add_argument
+    add("file", type=Path, help="the xacro file")
+    add("args", type=flags.pair, nargs="*", default=[], metavar="name:=value", help="values of its xacro:arg")
+    add("-o", "--output", type=Path, metavar="OUT", help="write there instead of to standard output")
     flags.add_robot_sources(parser)
     watch = parser.add_argument_group("watch", "Expand again on every save, and respawn the robot in a running sim.")
     watch.add_argument("--watch", action="store_true", help="until Ctrl-C; with -o, only OUT is written unless --name")
@@ -173,6 +162,6 @@ def _arguments(parser: argparse.ArgumentParser) -> None:
 
 
 VERBS = by_name(
-    Verb("xacro", "Expand a xacro file to URDF.", "my_bot.urdf.xacro -o my_bot.urdf", _arguments, run,
-        "one JSON object a line: the URDF, or with --watch the result of each save"),
+    Verb("xacro", "expand a xacro file to URDF", "my_bot.urdf.xacro -o my_bot.urdf", _arguments, run,
+        "print the URDF, or with --watch the result of each save, as JSON, one object per line"),
 )  # fmt: skip

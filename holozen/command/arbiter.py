@@ -5,19 +5,20 @@ No clock, no socket.
 
 import math
 from collections.abc import Callable
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
-from holozen.command.time import ROUNDING, CommandTime
 from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import COMMAND_SILENCE
 
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # no source ranks above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here down, a source waits for `resume` once a higher one has driven
-MAX_HELD = 100  # names of each rank, since they come over the wire; beyond, the whole rank is held but its driver
-MAX_PER_RANK = 100  # names of each rank, since they come over the wire; those beyond share one entry
+MAX_HELD = 100  # held names of each rank, which come over the wire; beyond, all of the rank but its driver is held
+MAX_PER_RANK = 100  # recorded names of each rank, which come over the wire; those beyond share one record
 NEVER = 1e9  # s
+ROUNDING = 1e-6  # s of tolerance: which step ends a silence must not depend on rounding errors of the clock
 STOPPED = "stopped: by {by}; `holozen release` lets it drive again"
 LET_GO = "let go first: it commanded while the robot was stopped; send a stop{or_wait}"
 LATE = "late: it waited up to {age:.1f} s for the sim"
@@ -25,11 +26,45 @@ OVERRULED = "overruled: {driver} drives"
 HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
 
 
+class CommandTime:
+    """The clock that measures the silence of sources, in seconds. It follows real time while the sim plays, and only
+    the sim's steps while that is paused: so the effect of a command over a number of steps does not depend on the speed
+    of the computer. It never goes back.
+    """
+
+    def __init__(self) -> None:
+        self._ahead = 0.0  # of real time
+        self._paused_at = 0.0
+        self._stepped = 0.0  # s of steps since then
+        self.is_paused = False
+        self.slack = 0.0  # s of tolerance when a silence is compared with its limit
+
+    def at(self, now: float) -> float:
+        """The time on this clock at the real time `now`."""
+        return self._paused_at + self._stepped if self.is_paused else now + self._ahead
+
+    def real(self, time: float) -> float:
+        """The real time at which this clock will show `time`; long past while it is paused, when that is unknown."""
+        return -1.0 if self.is_paused else time - self._ahead
+
+    def pause(self, now: float) -> None:
+        """Advance by steps only."""
+        self._paused_at, self._stepped, self.is_paused, self.slack = self.at(now), 0.0, True, ROUNDING
+
+    def step(self, dt: float) -> None:
+        """Advance by a step of `dt` seconds, if it is paused."""
+        self._stepped += dt
+
+    def play(self, now: float) -> None:
+        """Follow real time."""
+        self._ahead, self.is_paused, self.slack = self.at(now) - now, False, 0.0
+
+
 class SoftwareStop:
     """Refuses every command while it is set.
 
-    Releasing it moves nothing (as ISO 13850 asks of an emergency stop): a source that commanded during
-    the stop drives again only after it has let go: it sent a stop, or was silent for the robot's watchdog timeout, at
+    Releasing it moves nothing, as ISO 13850 requires of an emergency stop: a source that commanded during the stop
+    drives again only after it has let go, by sending a stop or by being silent for the robot's watchdog timeout, at
     least 0.5 s. Where the watchdog is off (a `timeout` below zero), only a stop counts. A source without a record is
     assumed to have commanded at the moment of the stop.
     """
@@ -39,14 +74,14 @@ class SoftwareStop:
         self.set_timeout(timeout)
         self._last_moves: dict[int, dict[str, float]] = {}  # rank -> source -> time of its last motion
         self._stopped = -math.inf  # when it was set: any source may have commanded until then
-        self._others: dict[int, float] = {}  # rank -> the same for all sources beyond MAX_PER_RANK
+        self._others: dict[int, float] = {}  # rank -> time of the last motion of any source beyond MAX_PER_RANK
 
     def set_timeout(self, timeout: float) -> None:
-        """Set the timeout of the watchdog."""
+        """Set the watchdog's timeout in s."""
         self._silence = max(timeout, COMMAND_SILENCE) if timeout >= 0 else NEVER
 
     def set(self, by: str, driver: tuple[str, int] | None, now: float) -> None:
-        """Stop at `now`, while `driver`, a source and its rank, moves the robot. The first setter remains."""
+        """Set the stop at `now`. `driver` is the source that moves the robot, with its rank. The first setter stays."""
         if not self.setter:
             self._last_moves = {
                 rank: {source: time for source, time in sources.items() if self.must_let_go(source, rank, now)}
@@ -62,7 +97,7 @@ class SoftwareStop:
         self.setter = ""
 
     def refusal(self, source: str, rank: int, stops: bool, now: float) -> str:
-        """Why a command is refused at `now`, or ""; `stops`: whether it is a stop."""
+        """Why a command is refused at `now`, or ""; `stops` tells whether it is a stop."""
         waits = self.must_let_go(source, rank, now)
         if self.setter or waits:
             self._note(source, rank, -math.inf if stops else now)
@@ -81,7 +116,7 @@ class SoftwareStop:
     def inherit(self, other: "SoftwareStop") -> None:
         """Copy the state of another one."""
         self.setter, self._stopped, self._others = other.setter, other._stopped, dict(other._others)
-        self._last_moves = {rank: dict(sources) for rank, sources in other._last_moves.items()}
+        self._last_moves = deepcopy(other._last_moves)
 
     def _note(self, source: str, rank: int, when: float) -> None:
         sources = self._last_moves.setdefault(rank, {})
@@ -93,7 +128,7 @@ class SoftwareStop:
 
 @dataclass(slots=True)
 class Driver:
-    """The source that drives, its motion, and the earliest time of its last command in s. Rank 0 is highest."""
+    """The source that drives, its motion, and the earliest time (s) at which that was sent. Rank 0 is the highest."""
 
     source: str
     rank: int
@@ -102,8 +137,8 @@ class Driver:
 
 
 class Held:
-    """The sources of one rank that are held. A full table holds every source of its rank, except the one that drives at
-    that time: a flood of names frees no source, and holds none of another rank.
+    """The held sources of one rank. Once it is full it holds every source of the rank, except the one that drives at
+    that time: so a flood of names frees no source, and holds none of another rank.
     """
 
     def __init__(self) -> None:
@@ -122,48 +157,44 @@ class Held:
     def __contains__(self, source: str) -> bool:
         return source in self._names or (self._all and source != self._free)
 
-    def copy(self) -> "Held":
-        """An independent copy."""
-        other = Held()
-        other._names, other._all, other._free = set(self._names), self._all, self._free
-        return other
-
 
 class Arbiter:
-    """Chooses among the sources of one robot.
+    """Chooses which source drives one robot.
 
     Among equals the current driver keeps driving, but each of them may stop the robot. A source that a higher one
-    overruled, or that another one stopped, is held: it moves the robot again only after `resume`. So is every
-    autopilot once a source above it drove. A source is a name with a rank, since senders choose their names freely.
-    After `timeout` seconds of silence a source no longer drives; below zero it drives until another one commands. The
-    `software_stop` overrides all of them. Silence is measured by `time`; all methods take the real time.
+    overruled, or that another one stopped, is held: it moves the robot again only after `resume`. So is every autopilot
+    once a source above it has driven. A source is a name with a rank, since senders choose their names freely. A source
+    stops driving after `timeout` seconds of silence; below zero, it drives until another one commands. The
+    `software_stop` overrides them all. Silence is measured on the clock `time`; all methods take real times in s.
     """
 
     def __init__(self, timeout: float, time: CommandTime | None = None) -> None:
         self.time = time or CommandTime()
         self.timeout, self.software_stop = timeout, SoftwareStop(timeout)
         self.resumed = 0  # how often `resume` succeeded
-        self.due = -math.inf  # s; `motion` stays as it was last asked for until then, or until an event sets this back
-        self.changed: Callable[[], None] = lambda: None  # called by each such event
+        self.stopped_at = -math.inf  # s; the last time that the software stop was set, or set again
+        self.taken_at = -math.inf  # s; the last time that a source did what makes others wait for `resume`
+        self.due = -math.inf  # s; until when `motion` stays the same, unless an event invalidates it
+        self.changed: Callable[[], None] = lambda: None  # called on each such event
         self._driver: Driver | None = None
         self._held: dict[int, Held] = {}  # by rank
-        self._highest = AUTOPILOT + 1  # the best rank that drove since the last resume
+        self._highest = AUTOPILOT + 1  # the highest rank that has driven since the last resume
 
     def offer(self, source: str, rank: int, motion: Motion, now: float, sent: float | None = None) -> str:
-        """Consider a command at time `now`, sent at `sent` at the earliest. Returns why it is refused, or ""."""
-        age, now = 0.0 if sent is None else now - sent, self.time.at(now)
+        """Take a command at `now`, which was sent at `sent` at the earliest. Returns why it is refused, or ""."""
+        real, age, now = now, 0.0 if sent is None else now - sent, self.time.at(now)
         if reason := self.software_stop.refusal(source, max(rank, PERSON), is_stop(motion), now):
             return reason
         if age > COMMAND_SILENCE and not is_stop(motion):
             return LATE.format(age=age)
-        sent = now if self.time.is_held else now - age  # while nothing moves, it does not grow old
-        return self._choose(Driver(source, max(rank, PERSON), motion, sent), now)
+        sent = now if self.time.is_paused else now - age  # a command does not age while the sim is paused
+        return self._choose(Driver(source, max(rank, PERSON), motion, sent), now, real)
 
     def note_refused(self, source: str, rank: int, now: float) -> None:
-        """Note a command that was refused before it got here: its source has not let go of a stopped robot."""
+        """Record a command that was refused earlier: its source has not let go of a stopped robot."""
         self.software_stop.refusal(source, max(rank, PERSON), False, self.time.at(now))
 
-    def _choose(self, new: Driver, now: float) -> str:
+    def _choose(self, new: Driver, now: float, real: float) -> str:
         source, rank, motion = new.source, new.rank, new.motion
         driver = self._driver_at(now)
         other = driver if driver and (driver.source, driver.rank) != (source, rank) else None
@@ -176,18 +207,20 @@ class Arbiter:
             return HELD
         if other and (stops or rank < other.rank):
             self._hold(other.source, other.rank, new)
+        if (rank < AUTOPILOT and not is_stop(motion)) or (other and stops and not is_stop(other.motion)):
+            self.taken_at = real
         self._drive(new)
         self._highest = min(self._highest, rank)
         return ""
 
     def set_timeout(self, timeout: float, now: float) -> None:
-        """Set `timeout` from `now` on. A longer one does not revive a source that has fallen silent."""
+        """Set the `timeout` in s from `now` on. A longer one does not revive a source that has fallen silent."""
         self._drive(self.driver(now))
         self.timeout = timeout
         self.software_stop.set_timeout(timeout)
 
     def driver(self, now: float) -> Driver | None:
-        """The source that drives at `now`; None when all are silent."""
+        """The source that drives at `now`; None if all are silent."""
         return self._driver_at(self.time.at(now))
 
     def _driver_at(self, time: float) -> Driver | None:
@@ -210,14 +243,14 @@ class Arbiter:
         return driver.motion
 
     def pushes(self, now: float) -> list[AppliedForce] | None:
-        """The forces at `now`, each until it has been silent for too long; None when no source drives."""
+        """The forces that act at `now`, except those of silent topics. None if no source drives."""
         motion = self.motion(now)
         if not isinstance(motion, AppliedForces):
             return None
         return list(motion.since(self.time.at(now) - self.time.slack - COMMAND_SILENCE))
 
     def pushes_of(self, source: str, rank: int, now: float) -> AppliedForces:
-        """What a source pushes with at `now`."""
+        """The forces of a source at `now`; none unless it drives."""
         driver = self.driver(now)
         is_driver = driver is not None and (driver.source, driver.rank) == (source, max(rank, PERSON))
         return driver.motion if driver and is_driver and isinstance(driver.motion, AppliedForces) else AppliedForces(())
@@ -226,20 +259,20 @@ class Arbiter:
         """The silence in s after which a driver no longer drives; below zero: never."""
         return self.timeout if isinstance(driver.motion, tuple) else COMMAND_SILENCE
 
-    def start_anew(self, lasting: bool = True) -> None:
-        """Forget the driver, so that only a new command moves the robot; of drivers whose silence never ends, only if
-        `lasting`. Held sources and the software stop remain.
+    def drop_driver(self, without_watchdog: bool = True) -> None:
+        """Forget the driver, so that only a new command moves the robot; a driver that no watchdog ends only if
+        `without_watchdog`. Held sources and the software stop remain.
         """
-        self.ask_again()
-        if self._driver and (lasting or self._patience(self._driver) >= 0):
+        self.invalidate()
+        if self._driver and (without_watchdog or self._patience(self._driver) >= 0):
             self._drive(None)
 
     def _drive(self, driver: Driver | None) -> None:
         self._driver = driver
-        self.ask_again()
+        self.invalidate()
 
-    def ask_again(self) -> None:
-        """An event may have changed the motion."""
+    def invalidate(self) -> None:
+        """An event may have changed the motion: let it be asked for again."""
         self.due = -math.inf
         self.changed()
 
@@ -248,6 +281,7 @@ class Arbiter:
         driver = self.driver(now)
         moving = (driver.source, driver.rank) if driver and not is_stop(driver.motion) else None
         self.software_stop.set(by, moving, self.time.at(now))
+        self.stopped_at = self.taken_at = now
         self._drive(None)
         self._highest = PERSON
 
@@ -255,7 +289,7 @@ class Arbiter:
         """Stop the robot if this source drove: its process is gone.
 
         It counts as a stop sent with its last command, so that no other source takes over any sooner. `of_members`: the
-        sources of commands have the name of a member before that of their node, as in the secure set-up.
+        name of a source begins with that of a member, as in the secure set-up, and that is ignored.
         """
         if self._driver and source == (self._driver.source.partition("/")[2] if of_members else self._driver.source):
             self._drive(replace(self._driver, motion=STOP))
@@ -267,11 +301,11 @@ class Arbiter:
 
     @property
     def held(self) -> bool:
-        """Whether every autopilot waits for `resume`: a source above them drove."""
+        """Whether every autopilot waits for `resume`, since a source above them has driven."""
         return self._highest < AUTOPILOT
 
     def resume_refusal(self, now: float) -> str:
-        """Why `resume` is refused at `now`, or "": a source above the autopilots moves the robot, or it is stopped."""
+        """Why `resume` is refused at `now`, or "". It is while the robot is stopped, or moved by a person or script."""
         if self.software_stop.setter:
             return STOPPED.format(by=self.software_stop.setter)
         driver = self.driver(now)
@@ -292,8 +326,8 @@ class Arbiter:
 
     def inherit(self, other: "Arbiter") -> None:
         """Take over the held sources and the software stop of a robot that was replaced."""
-        self._held = {rank: held.copy() for rank, held in other._held.items()}
-        self._highest = other._highest
+        self._held = deepcopy(other._held)
+        self._highest, self.stopped_at, self.taken_at = other._highest, other.stopped_at, other.taken_at
         self.software_stop.inherit(other.software_stop)
 
     def _is_held(self, source: str, rank: int) -> bool:

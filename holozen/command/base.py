@@ -2,14 +2,15 @@
 
 import math
 import time
-from typing import Any
+from pathlib import Path
 
-from holozen.bus import Bus
+from holozen.bus import Bus, BusError
 from holozen.command.arbiter import Arbiter
 from holozen.command.inputs import MAX_ANGULAR, MAX_LINEAR, TwistInput
+from holozen.command.stop_files import StopFiles, default_folder
 from holozen.command.stop_services import RobotServices
-from holozen.command.time import Reads
-from holozen.command.wait_set import Moment, Reader, WaitSet
+from holozen.command.wait_set import Moment, ReadTimes, WaitSet
+from holozen.console import report
 from holozen.kinematics import travelled
 from holozen.limits import Planar
 from holozen.messages import (
@@ -28,20 +29,28 @@ from holozen.messages import (
     TwistWithCovariance,
     Vector3,
 )
+from holozen.transport.graph import Endpoint, on_key
 from holozen.transport.pubsub import Subscription
 from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for
 
 STATUS_EVERY = 0.1  # s
+PATIENCE = 0.5  # s for the nodes that are there to be discovered
+TAKEN = "{robot} is served by {by} already: end that one, or give this one another name"
 
 
 class Base:
-    """Hears `cmd_vel` by the rules of the sim's robots: watchdog, age, priorities, limits, stop, release and resume.
+    """Obeys `cmd_vel` by the same rules as the sim's robots: watchdog, age, priorities, limits, stop, release, resume.
 
-    Call `velocity` 20 times a second or more, drive the wheels so, and call `publish` with what they have measured. A
-    loop that is held up drives on blindly: let the hardware stop by itself when it hears nothing.
+    Call `velocity` at least 20 times a second, drive the wheels at that velocity, and call `publish` with what they
+    measured. While the loop is held up the wheels keep turning: make the hardware stop by itself without commands. Once
+    it ends, also by an error, stop them yourself.
 
-    `timeout` is the silence in s after which the robot stops; the limits are in m/s and rad/s, faster commands are
-    clamped. `bus` has to be a lasting one, whose node others see.
+    A software stop is kept in a file in the folder `state`, by default HOLOZEN_STATE, else ~/.local/state/holozen: the
+    next base of the same name on the same network is still stopped. Raises BusError if another process, a base or a
+    sim, serves the robot already.
+
+    `timeout` is the silence in s after which the robot stops, up to 2, else ValueError. Commands beyond the limits, in
+    m/s and rad/s, are clamped. `bus` has to be a lasting one, so that other nodes discover its node.
     """
 
     def __init__(
@@ -54,29 +63,46 @@ class Base:
         max_angular: float = MAX_ANGULAR,
         frame: str = "odom",
         base_frame: str = "base_link",
+        state: Path | None = None,
     ) -> None:
         if not 0 < timeout <= 2:
             raise ValueError(f"timeout is {timeout:g} s; a robot stops after 2 s of silence at the latest")
-        key, now = key_for("cmd_vel", robot), time.monotonic()
+        self._bus, self._robot = bus, robot
         self._graph, self._is_member = bus.graph(), bus.member is not None
+        self._graph.settled(bus.connected, max(PATIENCE, bus.took))
+        odom, others = key_for("odom", robot), self._other_servers()
+        if others := others or on_key(self._graph.endpoints(), odom, "pub"):
+            raise self._taken(others[0])
+        key, now = key_for("cmd_vel", robot), time.monotonic()
         self._clocks = bus.peer_clocks(self._graph.has)
         self._arbiter = Arbiter(timeout)
         self._input = TwistInput(key, self._arbiter, self._clocks, max_linear, max_angular)
-        self._commands: Subscription[Twist | TwistStamped] = bus.subscribe(
-            key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES
+        self._input.on_news = self._publish_status
+        commands: Subscription[Twist | TwistStamped] = bus.subscribe(
+            key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES, dealt=True
         )
-        self._odom = bus.publisher(key_for("odom", robot), Odometry)
+        self._odom = bus.publisher(odom, Odometry)
         self._tf = bus.publisher(key_for("tf", robot), TFMessage)
         self._status = bus.publisher(f"{key}_status", CommandStatus)
-        services = RobotServices(bus, key, (self._arbiter,), self._publish_status, bus.node)
+        services = RobotServices(bus, key, (self._arbiter,), self._on_stop, bus.node)
+        self._scanned = -1  # the graph's count of changes when it was last scanned for rivals
         self._inputs = WaitSet()
-        self._inputs.add([Reader(self._commands.raw.channel, self._read), *services.stop, *services.others])
-        self._reads, self._key, self._name = Reads(now), key, robot or bus.node
+        self._inputs.add([self._input.reader(commands), *services.stop, *services.others])
+        self._reads, self._key, self._name = ReadTimes(now), key, robot or bus.node
         self._frames = key_for(frame, robot), key_for(base_frame, robot)
         self._pose, self._moved_at, self._status_at = (0.0, 0.0, 0.0), now, -math.inf
+        folder = state or default_folder()
+        self._stops = StopFiles(folder, bus.networks, bus.node) if folder else None
+        if self._stops and (by := self._stops.read(robot)):
+            self._arbiter.stop(by, now)
+            self._stops.write(robot, by)
+            still = f"{robot or 'the robot'} is still stopped by {by}"
+            report(f"{bus.node}: {still}; `holozen release` lets it drive again")
 
     def velocity(self) -> Planar:
-        """The body-frame velocity (m/s, rad/s) to drive at now; zeros while no source drives."""
+        """The body-frame velocity (m/s, rad/s) to drive at; zeros while no source drives. Raises BusError if a base of
+        the same name that was not discovered before has the lower session id: of the two, that one goes on.
+        """
         now = time.monotonic()
         moment = Moment(now, self._reads.since(now), (time.time(),))
         self._inputs.read(moment)
@@ -84,17 +110,21 @@ class Base:
             self._inputs.read(moment)  # its last commands
             if self._input.freshness.is_session(node.source, node.session):
                 self._arbiter.forget(node.source, self._is_member)
+        if self._graph.changes != self._scanned:
+            self._scanned = self._graph.changes
+            if rival := next((one for one in self._other_servers() if one.session < self._bus.id), None):
+                raise self._taken(rival)
         self._clocks.track(set(self._graph.publishers(self._key)), now)
         self._clocks.poll(now)
-        if now >= self._status_at or self._input.has_news:
+        if now >= self._status_at:
             self._publish_status(now)
         motion = self._arbiter.motion(now)
         assert isinstance(motion, tuple), "only a velocity is offered"
         return motion
 
     def publish(self, measured: Planar) -> None:
-        """Publish odometry and its transform: since the last call the robot has moved at the velocity `measured`, in
-        the body frame. Raises ValueError for a number that is not finite.
+        """Publish odometry and its transform. `measured` is the body-frame velocity (m/s, rad/s) since the last call.
+        Raises ValueError for a number that is not finite.
         """
         if not all(map(math.isfinite, measured)):
             raise ValueError(f"the measured velocity {measured} is not finite")
@@ -110,9 +140,18 @@ class Base:
         )
         self._tf.put(TFMessage([TransformStamped(header, self._frames[1], Transform(Vector3(x, y, 0.0), turned))]))
 
-    def _read(self, first: Any, moment: Moment) -> bool:
-        self._input.take(self._commands.waiting(first), moment.now, moment.clocks, moment.since)
-        return self._input.freshness.is_waiting
+    def _other_servers(self) -> list[Endpoint]:
+        """The robot's service `stop` in other processes: each request would reach one of them only."""
+        servers = on_key(self._graph.endpoints(), key_for("stop", self._robot), "srv")
+        return [end for end in servers if end.session != self._bus.id]
+
+    def _taken(self, other: Endpoint) -> BusError:
+        return BusError(TAKEN.format(robot=self._robot or "the robot", by=other.source))
+
+    def _on_stop(self, now: float) -> None:
+        if self._stops:
+            self._stops.write(self._robot, self._arbiter.software_stop.setter)
+        self._publish_status(now)
 
     def _publish_status(self, now: float) -> None:
         status = self._input.status(now)

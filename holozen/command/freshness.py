@@ -20,7 +20,7 @@ M = TypeVar("M", bound=Message)
 T = TypeVar("T")
 
 MAX_WAITING = 32  # commands from senders whose clock is not known yet
-MAX_KNOWN = 256  # senders; of more, the one that commanded the longest ago is forgotten
+MAX_KNOWN = 256  # senders; beyond, the one that has not commanded for the longest time is forgotten
 AGES = (0.05, COMMAND_SILENCE)  # s; the range of `max_age`
 
 OLD = "old: it was sent up to {age:.2f} s ago; at most {limit:g} s"
@@ -32,33 +32,33 @@ UNSTAMPED = "unstamped: this sender stamps its commands"
 
 
 class Senders(Protocol):
-    """What is known about the senders' sessions. Times in seconds of the receiver's monotonic clock."""
+    """What the receiver knows about the senders' sessions. Times in s of its own monotonic clock."""
 
     def has(self, session: str) -> bool:
         """Whether the session holds a liveliness token."""
         ...
 
     def ages(self, session: str, sent: float, now: float, member: str) -> tuple[float, float] | None:
-        """Bounds of the age of a sample that it sent at `sent`, by its own clock; None while they are unknown, or in
-        the secure set-up if the session is not of that member.
+        """The least and the greatest age (s) of a sample that the session sent at `sent`, by the sender's clock. None
+        while they are unknown, and in the secure set-up if the session is not that of `member`.
         """
         ...
 
     def track_first(self, session: str, now: float) -> None:
-        """Measure its clock ahead of others."""
+        """Measure the clock of this session before those of others."""
         ...
 
     def answered(self, session: str) -> float:
-        """When the last request that it answered was sent; below zero before the first."""
+        """When the last clock request that the session answered was sent; below zero before the first answer."""
         ...
 
     def ask_now(self, session: str, now: float) -> None:
-        """Ask for its clock again at once."""
+        """Measure the clock of this session again at once."""
         ...
 
 
 class Sender(NamedTuple):
-    """What orders commands: a session, or the name of a sender without a stamp."""
+    """One sequence of commands: those of a `session`, or of a named sender without stamps, on one key and priority."""
 
     session: str
     priority: str
@@ -66,8 +66,8 @@ class Sender(NamedTuple):
 
 
 class Judged(NamedTuple, Generic[M]):
-    """A command with the earliest time it may have been sent, its greatest possible age (0: unknown), and why
-    it is refused, or "".
+    """A command, the earliest time (s) at which it may have been sent, its greatest possible age (s; 0: unknown), and
+    why it is refused, or "".
     """
 
     received: Received[M]
@@ -77,17 +77,18 @@ class Judged(NamedTuple, Generic[M]):
 
 
 class Freshness(Generic[M]):
-    """Filters the commands of one robot before anything else reads them.
+    """Judges the age of the commands of one robot before anything else reads them.
 
-    A stamped command (see holozen.transport.pubsub.Stamp) is measured by its sender's clock; it waits until that is
-    known, for at most 0.5 s. The greatest possible age counts. A command is refused if it is older than `max_age`, out
-    of order, or its sender has left. A slow command that would set the robot moving suggests that a link was held up:
-    its sender has to answer a request first, which no dead process does, and only commands that arrive after the answer
-    move the robot.
+    The age of a stamped command (see holozen.transport.samples.Stamp) is measured by its sender's clock; the command
+    waits until that is known, for at most 0.5 s. The greatest possible age counts. A command is refused if it is older
+    than `max_age` or out of order, or if its sender has left. A slow command that would set the robot moving suggests
+    that a link was held up. So its sender first has to answer a request, which no dead process does, and only commands
+    that arrive after the answer move the robot.
 
     The age of a command without a stamp is unknown. Of those that arrive together only the newest counts.
 
-    A stop passes at any age; whether its sender may stop the robot is decided elsewhere.
+    A stop passes at any age; whether its sender may stop the robot is decided elsewhere. `stops` tells whether a
+    message is a stop, `drives` whether a source moves the robot at a time.
     """
 
     def __init__(
@@ -99,9 +100,9 @@ class Freshness(Generic[M]):
     ) -> None:
         self._keys, self._senders, self._stops, self._drives = keys, senders, stops, drives
         self.max_age = COMMAND_SILENCE
-        self._newest: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # when it was sent, and its number
+        self._newest: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # the newest command: sent when, number
         self._doubted: OrderedDict[Sender, float] = OrderedDict()  # since when an answer is awaited
-        self._waiting: dict[Sender, tuple[Received[M], float]] = {}  # and when the first of its sender came
+        self._waiting: dict[Sender, tuple[Received[M], float]] = {}  # with the arrival of its sender's first one
 
     @property
     def is_waiting(self) -> bool:
@@ -109,16 +110,16 @@ class Freshness(Generic[M]):
         return bool(self._waiting)
 
     def sift(self, arrived: Iterable[Received[M]], now: float, since: float) -> Iterator[Judged[M]]:
-        """The judged commands in order: those that waited, then those that `arrived` by `now`, not before `since`."""
+        """Judge the commands in order: those that waited, then those that `arrived` between `since` and `now` (s)."""
         arrived = list(arrived)
         if self._waiting:
             yield from self._waited(now)
         senders = [*map(_sender, arrived)]
         newest = {sender: index for index, sender in enumerate(senders)}
         for index, (received, sender) in enumerate(zip(arrived, senders, strict=True)):
-            stamp = received.sample.stamp
+            stamp = received.stamp
             if received.message is None or sender.key not in self._keys:
-                yield Judged(received, since, 0.0, "")  # the next look refuses it
+                yield Judged(received, since, 0.0, "")  # refused later, by CommandStats.validated
             elif self._stops(received.message):
                 self._waiting.pop(sender, None)  # earlier commands are void
                 if stamp and self._ages(stamp, now):
@@ -127,18 +128,18 @@ class Freshness(Generic[M]):
             elif stamp:
                 if judged := self._judge(received, stamp, sender, now, now):
                     yield judged
-            elif any(map(self._senders.has, self._sessions(received.sample.source))):
+            elif any(map(self._senders.has, self._sessions(received.source))):
                 yield Judged(received, since, 0.0, UNSTAMPED)
             elif newest[sender] == index:
                 yield Judged(received, since, 0.0, "")
 
     def is_session(self, source: str, session: str) -> bool:
-        """Whether a source can be this session: it is, or no session of that name has stamped a command."""
+        """Whether a source may be this session: it is, or no session of that name has stamped a command."""
         known = self._sessions(source)
         return not known or session in known
 
     def _sessions(self, source: str) -> set[str]:
-        """The sessions that have stamped commands under the name of a source."""
+        """The sessions that have stamped commands under a source's name."""
         start = source.rpartition("@")[2]
         return {sender.session for sender in self._newest if sender.session[:6] == start}
 
@@ -149,7 +150,7 @@ class Freshness(Generic[M]):
     def _waited(self, now: float) -> Iterator[Judged[M]]:
         waiting, self._waiting = self._waiting, {}
         for sender, (received, came) in waiting.items():
-            stamp = received.sample.stamp
+            stamp = received.stamp
             if stamp and (judged := self._judge(received, stamp, sender, came, now)):
                 yield judged
 
@@ -162,7 +163,8 @@ class Freshness(Generic[M]):
         self._note(stamp, sender)
         youngest, oldest = ages
         sent = now - oldest
-        # The time counts first: a forged number lasts for the session's life, a forged time only until it has come.
+        # The time is compared first: a forged number would count for as long as the session lives, a forged time only
+        # until that time has come.
         if (stamp.sent, stamp.number) <= before:
             return Judged(received, sent, oldest, OUT_OF_ORDER.format(number=stamp.number, last=before[1]))
         if sender not in self._doubted and youngest > PROMPT and not self._drives(source_of(received), now):
@@ -193,7 +195,7 @@ class Freshness(Generic[M]):
 
 
 def _put(table: OrderedDict[Sender, T], sender: Sender, value: T) -> None:
-    """Write to a table of MAX_KNOWN senders, of which the one that was written the longest ago is forgotten."""
+    """Write to a table of at most MAX_KNOWN senders, which forgets the one that was written longest ago."""
     table[sender] = value
     table.move_to_end(sender)
     if len(table) > MAX_KNOWN:
@@ -201,10 +203,10 @@ def _put(table: OrderedDict[Sender, T], sender: Sender, value: T) -> None:
 
 
 def _sender(received: Received[M]) -> Sender:
-    stamp, sample = received.sample.stamp, received.sample
-    return Sender(stamp.session if stamp else sample.source, sample.priority, sample.key)
+    stamp = received.stamp
+    return Sender(stamp.session if stamp else received.source, received.priority, received.key)
 
 
 def source_of(received: Received[M]) -> str:
     """The name of a sample's sender."""
-    return received.sample.source or f"anonymous ({received.sample.priority})"
+    return received.source or f"anonymous ({received.priority})"

@@ -5,91 +5,159 @@ from __future__ import annotations
 import math
 from collections import Counter, deque
 from collections.abc import Callable, Iterable
-from typing import TypeVar
+from functools import partial
+from typing import Any, Generic, NamedTuple, TypeVar
 
 from holozen.command.arbiter import Arbiter
 from holozen.command.freshness import Freshness, Judged, Senders, source_of
-from holozen.command.motion import AppliedForce, AppliedForces, JointMotion, is_stop, motion_of
+from holozen.command.motion import AppliedForce, AppliedForces, JointMotion, Motion, is_stop, motion_of
+from holozen.command.wait_set import Moment, Reader
 from holozen.console import report
 from holozen.limits import STOP, Planar, clamp_speed
 from holozen.messages import CommandSource, CommandStatus, JointState, Message, Twist, TwistStamped, Wrench
 from holozen.messages.message import not_finite
 from holozen.suggest import listed
-from holozen.transport.pubsub import Received
+from holozen.transport.pubsub import Received, Subscription
 from holozen.transport.samples import PRIORITIES
 from holozen.wire import MAX_STAMP_AGE, implausible
 
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
-LINEAR, ANGULAR = (0.01, 50.0), (0.01, 100.0)  # their ranges
-MAX_RATES = 16  # names come over the wire; beyond, the least recent of the lowest rank is forgotten
-RECENT = 3.0  # s
-SPAN = 1.0  # s over which commands are counted
+LINEAR, ANGULAR = (0.01, 50.0), (0.01, 100.0)  # the ranges in which these two may be set
+MAX_RATES = 16  # sources, whose names come over the wire; beyond, the oldest of the lowest rank is forgotten
+RECENT = 3.0  # s for which a source is listed
+SPAN = 1.0  # s over which the rate is measured
 MARK = 0.1  # s between two samples of a count
 REPORT_EVERY = 1.0  # s
+MOST_LINES = 10  # a second by all robots: if a fleet's driver fails, each of them has something to report
 M = TypeVar("M", bound=Message)
 
-UNPROVEN = "unproven"  # the kind of a refused command whose sender's name is not proved
+UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its sender's name
 
 
-class TwistInput:
-    """Checks commands and passes the valid ones to the arbiter.
+class Command(NamedTuple, Generic[M]):
+    """A valid message on `key` from `source`, with its `rank`, read at a `moment`, and sent at `sent` (s) or later.
+    `age` in s is that by a stamp in the message itself; 0 without one.
+    """
 
-    Reports name the robot by `key`, its cmd_vel; `others` are additional command keys. `refusal` says why none but a
-    stop can move the robot, if that is so.
+    message: M
+    key: str
+    source: str
+    rank: int
+    moment: Moment
+    sent: float
+    age: float
+
+
+class Input(Generic[M]):
+    """Checks the commands on some keys, and passes those that are valid and fresh to the arbiters."""
+
+    def __init__(
+        self, keys: tuple[str, ...], freshness: Freshness[M], stats: CommandStats, arbiters: Iterable[Arbiter]
+    ) -> None:
+        self.keys, self.freshness, self.stats, self._arbiters = keys, freshness, stats, tuple(arbiters)
+
+    def reader(self, commands: Subscription[M]) -> Reader:
+        """A reader of the commands that wait at a subscription. It is unfinished while any waits for a clock."""
+        return Reader(commands.raw.channel, partial(self._read, commands))
+
+    def _read(self, commands: Subscription[M], first: Any, moment: Moment) -> bool:
+        self.take(commands.waiting(first), moment)
+        return self.freshness.is_waiting
+
+    def take(self, arrived: Iterable[Received[M]], moment: Moment) -> None:
+        """Process the samples that `arrived` by that moment, and those that waited for their sender's clock."""
+        for judged in self.freshness.sift(arrived, moment.now, moment.since):
+            self._take(judged, moment)
+
+    def _take(self, judged: Judged[M], moment: Moment) -> None:
+        received = judged.received
+        source, rank = source_of(received), PRIORITIES.index(received.priority)
+        self._note(judged, source, rank, moment.now)
+        message = self.stats.validated(received, self.keys, moment.now)
+        if message is None:
+            return
+        age = self._stamp_age(message, moment)
+        sent = min(judged.sent, moment.now - age)
+        command = Command(message, received.key, source, rank, moment, sent, age)
+        if refusal := judged.refusal or self._refusal(command):
+            for arbiter in self._arbiters:
+                arbiter.note_refused(source, rank, moment.now)
+            self._refuse(command, refusal)
+        else:
+            self._obey(command)
+
+    def _note(self, judged: Judged[M], source: str, rank: int, now: float) -> None:
+        """Called for each sample, whether it is valid or not. Does nothing; override it."""
+
+    def _stamp_age(self, message: M, moment: Moment) -> float:
+        """The age in s of a message by a stamp in it; 0 if it has none that counts."""
+        return 0.0
+
+    def _refusal(self, command: Command[M]) -> str:
+        """Why a command is refused, beginning with the kind of reason and a colon; empty if it is not."""
+        return ""
+
+    def _obey(self, command: Command[M]) -> None:
+        """Pass a command to the arbiters."""
+        raise NotImplementedError
+
+    def _offer(self, arbiter: Arbiter, command: Command[M], motion: Motion) -> bool:
+        """Pass a command's motion to an arbiter, and count it. Returns whether it is accepted."""
+        reason = arbiter.offer(command.source, command.rank, motion, command.moment.now, command.sent)
+        if reason:
+            self._refuse(command, reason)
+        else:
+            self.stats.accepted += 1
+        return not reason
+
+    def _refuse(self, command: Command[M], reason: str, kind: str = "") -> None:
+        """Count a refusal, by default under the `kind` that the reason begins with."""
+        kind = kind or reason.partition(":")[0]
+        self.stats.refuse(self._reported(command), kind, reason, command.source, command.moment.now)
+
+    def _reported(self, command: Command[M]) -> str:
+        """The key that reports of a refusal name."""
+        return command.key
+
+
+class TwistInput(Input[Twist | TwistStamped]):
+    """The velocity commands of one robot, clamped to `linear` (m/s) and `angular` (rad/s).
+
+    Reports name the robot by `key`, its cmd_vel; `others` are additional command keys. With a `refusal`, all commands
+    but stops are refused for that reason. `lines` limits the reports of all robots that share it.
     """
 
     def __init__(
         self, key: str, arbiter: Arbiter, senders: Senders, linear: float, angular: float,
         report: Callable[[str], None] = report, others: tuple[str, ...] = (), refusal: str = "",
+        lines: Lines | None = None,
     ) -> None:  # fmt: skip
-        self.arbiter, self.stats, self._rates = arbiter, CommandStats(report), SourceRates()
-        self.freshness: Freshness[Twist | TwistStamped] = Freshness((key, *others), senders, _stops, arbiter.moves)
-        self.keys, self.linear, self.angular, self._refusal = (key, *others), linear, angular, refusal
-        # Whether a source came that no status has named yet, or any command in a sim that is held: its stepper waits
-        # for its command to be read.
+        freshness: Freshness[Twist | TwistStamped] = Freshness((key, *others), senders, _stops, arbiter.moves)
+        super().__init__((key, *others), freshness, CommandStats(report, lines), (arbiter,))
+        self.arbiter, self.linear, self.angular, self._always_refused = arbiter, linear, angular, refusal
+        self._rates = SourceRates()
+        # Whether there is a source that no status has named yet, or, while the sim is paused, any command: a process
+        # that steps the sim waits until its command has been read.
         self.has_news = False
+        self.on_news: Callable[[float], None] = lambda now: None  # called at `now` (s) when there is news
 
-    def take(
-        self, arrived: Iterable[Received[Twist | TwistStamped]], now: float, clocks: tuple[float, ...], since: float
-    ) -> None:
-        """Process the samples that arrived by `now` (s, monotonic), not before `since`, and those that waited.
+    def take(self, arrived: Iterable[Received[Twist | TwistStamped]], moment: Moment) -> None:
+        """Process samples as every input does, then call `on_news` if there is news."""
+        super().take(arrived, moment)
+        if self.has_news:
+            self.on_news(moment.now)
 
-        `clocks`: the times in seconds that a header's stamp may be measured by.
-        """
-        for judged in self.freshness.sift(arrived, now, since):
-            self._take(judged, now, clocks)
-
-    def _take(self, judged: Judged[Twist | TwistStamped], now: float, clocks: tuple[float, ...]) -> None:
-        received, sent, delay, refusal = judged
-        rank, source = PRIORITIES.index(received.sample.priority), source_of(received)
-        if not received.error.startswith(UNPROVEN):  # its source is a claim
-            self.has_news |= self._rates.record(source, rank, now, delay) or self.arbiter.time.is_held
-        message = self.stats.validated(received, self.keys, now)
-        if message is None:
-            return None
-        velocity = _velocity(message)
-        if not is_stop(velocity):
-            refusal = refusal or self._refusal
-        if refusal:
-            self.arbiter.note_refused(source, rank, now)
-            return self._refuse(refusal.partition(":")[0], refusal, source, now)
-        if isinstance(message, TwistStamped) and not is_stop(velocity):  # a stop is obeyed whatever its sender's clock
-            age = _age(message, clocks)
-            if abs(age) > MAX_STAMP_AGE:
-                self.arbiter.note_refused(source, rank, now)
-                return self._refuse("stale", f"stamp is {age:.1f} s old; at most {MAX_STAMP_AGE} s", source, now)
-            sent = min(sent, now - age)
-        return self._obey(velocity, source, rank, now, sent)
+    def _note(self, judged: Judged[Twist | TwistStamped], source: str, rank: int, now: float) -> None:
+        if not judged.received.error.startswith(UNPROVEN):  # its source is a claim
+            self.has_news |= self._rates.record(source, rank, now, judged.age) or self.arbiter.time.is_paused
 
     def status(self, now: float) -> CommandStatus:
         """The source that drives, the sources of recent commands, and the counts so far."""
         self.has_news = False
         driver, held = self.arbiter.driver(now), self.arbiter.holds
         obeyed = driver.source if driver else ""
-        motion = (
-            driver.motion if driver and isinstance(driver.motion, tuple) else STOP
-        )  # that of joints has no velocity
+        motion = driver.motion if driver and isinstance(driver.motion, tuple) else STOP  # that of joints is no velocity
         return CommandStatus(
             commanded=Twist.planar(*motion),
             obeyed=obeyed,
@@ -106,18 +174,28 @@ class TwistInput:
             ],
         )
 
-    def _obey(self, velocity: Planar, source: str, rank: int, now: float, sent: float) -> None:
-        limited = clamp_speed(velocity, self.linear, self.angular)
-        if reason := self.arbiter.offer(source, rank, limited, now, sent):
-            return self._refuse(reason.partition(":")[0], reason, source, now)
-        self.stats.accepted += 1
-        if limited != velocity:
-            text = f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: {velocity}"
-            self._refuse("clamped", text, source, now)
-        return None
+    def _stamp_age(self, message: Twist | TwistStamped, moment: Moment) -> float:
+        """By the nearest clock. A stop may have any stamp."""
+        if not isinstance(message, TwistStamped) or not (stamp := message.header.stamp.seconds()) or _stops(message):
+            return 0.0
+        return min((now - stamp for now in moment.clocks), key=abs)
 
-    def _refuse(self, kind: str, reason: str, source: str, now: float) -> None:
-        self.stats.refuse(self.keys[0], kind, reason, source, now)
+    def _refusal(self, command: Command[Twist | TwistStamped]) -> str:
+        if self._always_refused and not _stops(command.message):
+            return self._always_refused
+        if abs(command.age) > MAX_STAMP_AGE:
+            return f"stale: its stamp is {command.age:.1f} s old; at most {MAX_STAMP_AGE} s"
+        return ""
+
+    def _obey(self, command: Command[Twist | TwistStamped]) -> None:
+        velocity = _velocity(command.message)
+        limited = clamp_speed(velocity, self.linear, self.angular)
+        if self._offer(self.arbiter, command, limited) and limited != velocity:
+            text = f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: {velocity}"
+            self._refuse(command, text, "clamped")
+
+    def _reported(self, command: Command[Twist | TwistStamped]) -> str:
+        return self.keys[0]
 
 
 def _velocity(message: Twist | TwistStamped) -> Planar:
@@ -129,14 +207,10 @@ def _stops(message: Twist | TwistStamped) -> bool:
     return is_stop(_velocity(message))
 
 
-def _age(message: TwistStamped, clocks: tuple[float, ...]) -> float:
-    """The age of a stamp in seconds, by the nearest clock; 0 without a stamp."""
-    stamp = message.header.stamp.seconds()
-    return min((now - stamp for now in clocks), key=abs) if stamp else 0.0
-
-
-class JointInput:
-    """Checks joint commands. The wheels share the arbiter of cmd_vel, so that a person at the teleop has priority."""
+class JointInput(Input[JointState]):
+    """The joint commands of one robot. Each of the `groups` of joints has an arbiter; `known` are all joints. The
+    wheels share the arbiter of cmd_vel, so that a person at the teleop has priority.
+    """
 
     def __init__(
         self,
@@ -146,35 +220,21 @@ class JointInput:
         groups: list[tuple[frozenset[str], Arbiter]],
         known: list[str],
     ) -> None:
-        self.key = key
-        self.freshness: Freshness[JointState] = Freshness((key,), senders, _joints_stop, self._moves)
-        self._stats, self._groups, self._known = stats, groups, known
+        freshness: Freshness[JointState] = Freshness((key,), senders, _joints_stop, self._moves)
+        super().__init__((key,), freshness, stats, (arbiter for _, arbiter in groups))
+        self._groups, self._known = groups, known
 
-    def take(self, arrived: Iterable[Received[JointState]], now: float, since: float) -> None:
-        """Process the samples that arrived by `now` (s, monotonic), not before `since`, and those that waited."""
-        for judged in self.freshness.sift(arrived, now, since):
-            self._take(judged, now)
-
-    def _take(self, judged: Judged[JointState], now: float) -> None:
-        received, sent, _, refusal = judged
-        message, source = self._stats.validated(received, (self.key,), now), source_of(received)
-        if message is None:
-            return
-        rank = PRIORITIES.index(received.sample.priority)
-        if refusal:
-            for _, arbiter in self._groups:
-                arbiter.note_refused(source, rank, now)
-            return self._stats.refuse(self.key, refusal.partition(":")[0], refusal, source, now)
+    def _obey(self, command: Command[JointState]) -> None:
         try:
-            motion = self._checked(motion_of(message))
+            motion = self._checked(motion_of(command.message))
         except ValueError as error:
-            return self._stats.refuse(self.key, "malformed", str(error), source, now)
+            return self._refuse(command, str(error), "malformed")
         for names, arbiter in self._groups:
             if part := motion.only(names):
-                self._offer(arbiter, source, rank, part, now, sent)
+                self._offer(arbiter, command, part)
 
     def _moves(self, source: str, now: float) -> bool:
-        return any(arbiter.moves(source, now) for _, arbiter in self._groups)
+        return any(arbiter.moves(source, now) for arbiter in self._arbiters)
 
     def _checked(self, motion: JointMotion) -> JointMotion:
         moved = frozenset[str]().union(*(names for names, _ in self._groups))
@@ -185,12 +245,6 @@ class JointInput:
                 raise ValueError(f"joint {name!r} follows the drive; only {listed(list(moved))} take commands")
         return motion
 
-    def _offer(self, arbiter: Arbiter, source: str, rank: int, motion: JointMotion, now: float, sent: float) -> None:
-        if reason := arbiter.offer(source, rank, motion, now, sent):
-            self._stats.refuse(self.key, reason.partition(":")[0], reason, source, now)
-        else:
-            self._stats.accepted += 1
-
 
 def _joints_stop(message: JointState) -> bool:
     try:
@@ -199,36 +253,18 @@ def _joints_stop(message: JointState) -> bool:
         return True  # it moves nothing, and is refused later
 
 
-class ForceInput:
-    """Checks the wrenches on a robot's `keys` and passes them to the arbiter, where one source gives all of them."""
+class ForceInput(Input[Wrench]):
+    """The wrenches on a robot's `keys`. One source drives at a time: all that act are its own."""
 
     def __init__(self, keys: tuple[str, ...], arbiter: Arbiter, senders: Senders, stats: CommandStats) -> None:
-        self.keys, self._arbiter, self._stats = keys, arbiter, stats
-        self.freshness: Freshness[Wrench] = Freshness(keys, senders, _pushes_nothing, arbiter.moves)
+        super().__init__(keys, Freshness(keys, senders, _pushes_nothing, arbiter.moves), stats, (arbiter,))
 
-    def take(self, arrived: Iterable[Received[Wrench]], now: float, since: float) -> None:
-        """Process the samples that arrived by `now` (s, monotonic), not before `since`, and those that waited."""
-        for judged in self.freshness.sift(arrived, now, since):
-            self._take(judged, now)
-
-    def _take(self, judged: Judged[Wrench], now: float) -> None:
-        received, sent, _, refusal = judged
-        message, source = self._stats.validated(received, self.keys, now), source_of(received)
-        if message is None:
-            return
-        key, rank, arbiter = received.sample.key, PRIORITIES.index(received.sample.priority), self._arbiter
-        if refusal:
-            arbiter.note_refused(source, rank, now)
-        else:
-            others = arbiter.pushes_of(source, rank, now).but(key)
-            push = AppliedForce(
-                key, _wrench(message), arbiter.time.at(now) - (0.0 if arbiter.time.is_held else now - sent)
-            )
-            refusal = arbiter.offer(source, rank, AppliedForces(tuple(sorted((*others, push)))), now, sent)
-        if refusal:
-            self._stats.refuse(key, refusal.partition(":")[0], refusal, source, now)
-        else:
-            self._stats.accepted += 1
+    def _obey(self, command: Command[Wrench]) -> None:
+        (arbiter,), now = self._arbiters, command.moment.now
+        age = 0.0 if arbiter.time.is_paused else now - command.sent
+        push = AppliedForce(command.key, _wrench(command.message), arbiter.time.at(now) - age)
+        others = arbiter.pushes_of(command.source, command.rank, now).without(command.key)
+        self._offer(arbiter, command, AppliedForces(tuple(sorted((*others, push)))))
 
 
 def _wrench(message: Wrench) -> tuple[float, float, float, float, float, float]:
@@ -241,7 +277,7 @@ def _pushes_nothing(message: Wrench) -> bool:
 
 
 class SourceRate:
-    """One source: its rank, the time of its last command, and their number."""
+    """One source: its rank, the time and the `delay` of its last command (s), and the number of its commands."""
 
     __slots__ = ("_marks", "count", "delay", "last", "rank")
 
@@ -261,7 +297,7 @@ class SourceRate:
 
 
 class SourceRates:
-    """The sources of the last seconds. A command costs one look-up and an addition."""
+    """The rates of recent sources. Recording a command takes one look-up and an addition."""
 
     def __init__(self) -> None:
         self._all: dict[tuple[str, int], SourceRate] = {}
@@ -286,10 +322,25 @@ class SourceRates:
         return sorted(rows, key=lambda row: (row[1], row[0]))
 
 
-class CommandStats:
-    """Counts accepted commands, and refused ones by reason."""
+class Lines:
+    """Limits the lines about refused commands: MOST_LINES a second, by all robots that share this."""
 
-    def __init__(self, report: Callable[[str], None] = report) -> None:
+    def __init__(self) -> None:
+        self._since, self._written = -math.inf, 0
+
+    def take(self, now: float) -> bool:
+        """Whether another line may be written at `now` (s)."""
+        if not 0 <= now - self._since < REPORT_EVERY:
+            self._since, self._written = now, 0
+        self._written += 1
+        return self._written <= MOST_LINES
+
+
+class CommandStats:
+    """Counts accepted commands, and refused ones by kind. `last` is the last refusal."""
+
+    def __init__(self, report: Callable[[str], None] = report, lines: Lines | None = None) -> None:
+        self._lines = lines or Lines()
         self.accepted = 0
         self.refused: Counter[str] = Counter()
         self.last = ""
@@ -298,7 +349,7 @@ class CommandStats:
         self._unreported = 0
 
     def validated(self, received: Received[M], keys: tuple[str, ...], now: float) -> M | None:
-        """The message of a sample on one of `keys`; None if it is not valid, which is counted."""
+        """The message of a sample on one of `keys`; None if it is not valid, which is counted and reported."""
         kind, reason = _fault(received, keys)
         if kind:
             self.refuse(keys[0], kind, reason, source_of(received), now)
@@ -309,7 +360,7 @@ class CommandStats:
         self.refused[kind] += 1
         self.last = f"{source}: {reason}"[:300]
         self._unreported += 1
-        if now - self._reported < REPORT_EVERY:
+        if now - self._reported < REPORT_EVERY or not self._lines.take(now):
             return
         more = f" (and {self._unreported - 1} more)" if self._unreported > 1 else ""
         self._report(f"{key}: from {self.last}{more}")
@@ -318,14 +369,13 @@ class CommandStats:
 
 def _fault(received: Received[M], keys: tuple[str, ...]) -> tuple[str, str]:
     """The kind of fault of a sample, and its description; both empty for a valid one."""
-    sample, message = received.sample, received.message
-    if sample.key not in keys:
-        return "wildcard", f"a command for {sample.key!r}; name one robot"
-    if message is None:
+    if received.key not in keys:
+        return "wildcard", f"a command for {received.key!r}; name one robot"
+    if (message := received.message) is None:
         kind = received.error.partition(":")[0]
         return kind if kind in ("oversized", UNPROVEN) else "malformed", received.error
     if bad := not_finite(message):
         return "not finite", f"{bad} is not a finite number"
-    if bad := implausible(message):
+    if bad := implausible(message, message.ROS):
         return "implausible", bad
     return "", ""

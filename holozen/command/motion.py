@@ -17,19 +17,17 @@ class JointMotion:
 
     @property
     def stops(self) -> bool:
-        """Whether it moves nothing."""
+        """Whether it moves no joint."""
         return self.kind != "position" and not any(value for _, value in self.values)
 
     def only(self, names: frozenset[str]) -> "JointMotion | None":
-        """The part for some joints, if there is one."""
+        """The part of it for some joints; None if it has none of them."""
         values = tuple((name, value) for name, value in self.values if name in names)
         return JointMotion(self.kind, values) if values else None
 
 
 class AppliedForce(NamedTuple):
-    """The wrench of one topic, sent at `sent` (s) at the earliest: x, y, z of the force in N, then of the torque in
-    N m.
-    """
+    """The wrench of one topic, sent at `sent` (s) at the earliest: force x, y, z in N, then torque x, y, z in N m."""
 
     key: str
     wrench: tuple[float, float, float, float, float, float]
@@ -48,11 +46,11 @@ class AppliedForces:
         return not any(any(push.wrench) for push in self.pushes)
 
     def since(self, time: float) -> Iterator[AppliedForce]:
-        """Those sent since `time` (s)."""
+        """The wrenches sent since `time` (s)."""
         return (push for push in self.pushes if push.sent >= time)
 
-    def but(self, key: str) -> tuple[AppliedForce, ...]:
-        """Those of all topics but one."""
+    def without(self, key: str) -> tuple[AppliedForce, ...]:
+        """The wrenches of all topics but `key`."""
         return tuple(push for push in self.pushes if push.key != key)
 
 
@@ -60,12 +58,12 @@ Motion = Planar | JointMotion | AppliedForces
 
 
 def is_stop(motion: Motion) -> bool:
-    """Whether it commands the robot to stand."""
+    """Whether a motion commands the robot to stand."""
     return motion == STOP if isinstance(motion, tuple) else motion.stops
 
 
 def motion_of(command: JointState) -> JointMotion:
-    """The motion of a command. Raises ValueError with the reason."""
+    """The motion that a joint command asks for. Raises ValueError with the reason."""
     given = {"position": command.position, "velocity": command.velocity, "effort": command.effort}
     kinds = [kind for kind, values in given.items() if values]
     if len(kinds) != 1:

@@ -1,4 +1,4 @@
-"""The services of one robot: stop, release, resume."""
+"""The services stop, release and resume of one robot."""
 
 from collections.abc import Callable
 from functools import partial
@@ -14,6 +14,7 @@ from holozen.transport.services import RING, Server
 from holozen.wire import key_for
 
 MAX_REQUESTS = 16  # of one service answered per poll; a flood of them must not stall the steps
+OUTDATED = "this {verb} may have been sent before {event}; send it again if that is still to end"
 RELEASED = (
     "sources that commanded during the stop have to let go first;"
     " an autopilot also waits for `holozen controller --resume`"
@@ -21,8 +22,8 @@ RELEASED = (
 
 
 class RobotServices:
-    """Serves them in the namespace of the key `command`, for all `arbiters` alike. `changed` is called with the
-    time, in s, before a stop or a release is confirmed. `reporter` begins the lines that tell of it.
+    """Serves stop, release and resume in the namespace of the key `command`, for all `arbiters` together. `changed` is
+    called with the time (s) before a stop or a release is confirmed. Reports begin with `reporter`.
     """
 
     VERBS = ("release", "resume", "stop")
@@ -35,7 +36,7 @@ class RobotServices:
         answers = (self._on_release, self._on_resume, self._on_stop)
         self._namespace = namespace = command.rpartition("/")[0]
         self._release, self._resume, self._stop = self._servers = tuple(
-            bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer, dealt=True)
+            bus.serve(key_for(verb, namespace), TriggerRequest, TriggerReply, answer, dealt=True, stops=verb == "stop")
             for verb, answer in zip(self.VERBS, answers, strict=True)
         )
         in_order = (self._stop, self._release, self._resume)
@@ -44,7 +45,7 @@ class RobotServices:
         self._now = 0.0
 
     def _read(self, server: Server, request: Any, moment: Moment) -> bool:
-        """Answer `request`, the first of `server`, and those that wait at any of them; returns whether more do."""
+        """Answer `request`, the first of `server`, and those that wait at any server. Returns whether more wait."""
         self._now = moment.now
         if request is not None:
             server.keep(request)
@@ -54,7 +55,7 @@ class RobotServices:
     def _answer(self) -> None:
         if self._stop.take_in():  # a stop wins over requests that wait with it
             for server in (self._release, self._resume):
-                server.take_in(RING)  # now: a release that is sent once the stop is confirmed counts
+                server.take_in(RING)  # before the stop is confirmed: a release sent after that counts
             self._stop.answer_pending(MAX_REQUESTS)
             for server in (self._release, self._resume):
                 server.refuse_waiting(f"a stop came at the same time; {self._namespace or 'the robot'} is stopped")
@@ -76,11 +77,14 @@ class RobotServices:
             arbiter.stop(self._stop.caller, self._now)
         if not before:
             self._report_change(f"is stopped by {self._setter}")
-        return TriggerReply(True, f"stopped by {self._setter}")
+        problem = f"; the request cannot be read: {self._stop.problem}" if self._stop.problem else ""
+        return TriggerReply(True, f"stopped by {self._setter}{problem}")
 
     def _on_release(self, _request: TriggerRequest) -> TriggerReply:
         if not self._setter:
             return TriggerReply(True, "the robot was not stopped")
+        stopped = max(arbiter.stopped_at for arbiter in self._arbiters)
+        self._require_sent_after(self._release, stopped, f"the last stop of {self._namespace or 'the robot'}")
         for arbiter in self._arbiters:
             arbiter.software_stop.release()
         self._report_change(f"was released by {self._release.caller or 'an unknown caller'}")
@@ -88,11 +92,17 @@ class RobotServices:
 
     def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
         refusals = [arbiter.resume_refusal(self._now) for arbiter in self._arbiters]
-        if reason := next(filter(None, refusals), ""):  # of any: no source is let go while another is refused
+        if reason := next(filter(None, refusals), ""):  # if one arbiter refuses, none of them resumes
             raise ServiceError(reason)
+        taken = max(arbiter.taken_at for arbiter in self._arbiters)
+        self._require_sent_after(self._resume, taken, f"a source took over or stopped {self._namespace or 'the robot'}")
         for arbiter in self._arbiters:
             arbiter.resume(self._now)
         return TriggerReply(True, "every source may drive")
+
+    def _require_sent_after(self, server: Server, event: float, what: str) -> None:
+        verb = "release" if server is self._release else "resume"
+        server.require_sent_after(event, self._now, OUTDATED.format(verb=verb, event=what))
 
     def _report_change(self, what: str) -> None:
         report(f"{self._reporter}: {self._namespace or 'the robot'} {what}")

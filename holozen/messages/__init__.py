@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from holozen.messages.geometry_msgs import *
     from holozen.messages.holozen import *
     from holozen.messages.message import *
+    from holozen.messages.message import Message as Message
     from holozen.messages.nav_msgs import *
     from holozen.messages.rosgraph_msgs import *
     from holozen.messages.sensor_msgs import *
@@ -33,6 +34,25 @@ else:
                 if found := vars(importlib.import_module(f"{__name__}.{module}")).get(name):
                     return globals().setdefault(name, found)
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+WIRES = {"json": "application/json", "msgpack": "application/msgpack", "cdr": "application/cdr"}
+"""The names that `--wire` takes, and the Encoding of each."""
+
+
+def encoding_of(wire: str, type_name: str) -> str:
+    """The Encoding of a message. CDR does not describe itself, so its type is appended, as Zenoh's schema."""
+    return f"{WIRES[wire]};{type_name}" if wire == "cdr" else WIRES[wire]
+
+
+def named(name: str) -> "type[Message]":
+    """The Struct with that name in ROS; for a service that of a half, such as `std_srvs/srv/Trigger_Request`."""
+    from importlib import import_module
+
+    package, _, last = name.split("/")
+    struct = last.replace("_Request", "Request").replace("_Response", "Reply")
+    found: type[Message] = getattr(import_module(f"{__name__}.{package}"), struct)
+    return found
 
 
 class CodecError(ValueError):

@@ -13,7 +13,7 @@ from holozen.messages.message import Int8, Message
 
 
 class ActionPart(Message):
-    """A message of an action. Its class is called after the action and the part: NavigateToPoseGoal."""
+    """A message of an action. Its class is named after the action and the part: NavigateToPoseGoal."""
 
     def __init_subclass__(cls) -> None:
         super().__init_subclass__()
@@ -33,7 +33,7 @@ class Action:
 
     @cached_property
     def Impl(self) -> SimpleNamespace:
-        """What travels: the messages with a goal's id, made on first use."""
+        """The messages that are sent, which add a goal's id, made on first use."""
         from holozen.messages.builtin_interfaces import Time
         from holozen.messages.unique_identifier_msgs import UUID
 
@@ -49,10 +49,9 @@ class Action:
             FeedbackMessage=self._made("FeedbackMessage", goal_id=UUID, feedback=self.Feedback),
         )
 
-    def _made(self, ending: str, **fields: Any) -> type[Message]:
+    def _made(self, ending: str, **fields: Any) -> Any:
         described = [
             (name, kind, msgspec.field(default_factory=int if kind is Int8 else kind)) for name, kind in fields.items()
         ]
         name = self.ROS.rpartition("/")[2] + ending
-        made: Any = msgspec.defstruct(name, described, bases=(ActionPart,), module=self.Goal.__module__)
-        return made  # type: ignore[no-any-return]
+        return msgspec.defstruct(name, described, bases=(ActionPart,), module=self.Goal.__module__)

@@ -6,12 +6,15 @@ from msgspec import Meta
 
 from holozen.messages.message import Int32, Message
 
+Nanoseconds = Annotated[int, Meta(ge=0, lt=1_000_000_000, extra={"ros": "uint32"})]
+"""Those beyond the whole seconds."""
+
 
 class Time(Message):
     """Seconds and nanoseconds since the clock's start. Zero means "no stamp"."""
 
     sec: Int32 = 0
-    nanosec: Annotated[int, Meta(ge=0, lt=1_000_000_000, extra={"ros": "uint32"})] = 0
+    nanosec: Nanoseconds = 0
 
     @classmethod
     def of(cls, seconds: float) -> "Time":
@@ -24,10 +27,10 @@ class Time(Message):
 
 
 class Duration(Message):
-    """A span of time. Of a negative one `sec` is negative, and `nanosec` counts up from it."""
+    """A span of time. In a negative one only `sec` is negative: -0.25 s is -1 and 750,000,000."""
 
     sec: Int32 = 0
-    nanosec: Annotated[int, Meta(ge=0, lt=1_000_000_000, extra={"ros": "uint32"})] = 0
+    nanosec: Nanoseconds = 0
 
     @classmethod
     def of(cls, seconds: float) -> "Duration":

@@ -18,7 +18,7 @@ from math import isfinite
 from typing import Any
 
 from holozen.messages import CodecError
-from holozen.messages.definitions import TYPECODES, Field, Interface, InterfaceError, completed, least
+from holozen.messages.definitions import TYPECODES, Field, Interface, InterfaceError, completed, element_size
 from holozen.suggest import article
 
 HEADER = b"\x00\x01\x00\x00"  # classic CDR, little endian
@@ -106,7 +106,7 @@ class Codec:
     def write(self, value: Any) -> tuple[bytes, bool]:
         """The bytes of `value`, and whether its numbers are certainly finite.
 
-        A wrong value raises what Python does for it; `completed` names the field.
+        A wrong value raises whatever Python raises for it; `completed` then names the field.
         """
         if self._writer is None:
             self._writer = writer(self.interface, self._shape)
@@ -211,7 +211,7 @@ class _Reading(_Body):
         one = reader(field.nested, self.shape, self.order) if field.nested else text
         if field.array == "fixed":
             return partial(read_row, one, field.bound)
-        return partial(read_many, self.order, one, least(field), field.bound) if field.array else one
+        return partial(read_many, self.order, one, element_size(field), field.bound) if field.array else one
 
     def end_run(self) -> None:
         if self.run:
@@ -391,14 +391,14 @@ def write_many(write: Write, bound: int, values: Sequence[Any], p: int, out: lis
 
 
 def write_row(write: Write, n: int, values: Sequence[Any], p: int, out: list[bytes], odd: list[Any]) -> int:
-    """So many texts or messages, and where they ended."""
+    """`n` texts or messages, and where they ended."""
     for value in sized(values, n):
         p = write(value, p, out, odd)
     return p
 
 
 def sized(values: Sequence[Any], n: int) -> Sequence[Any]:
-    """`values` if they are so many, else ValueError."""
+    """`values` if there are `n` of them, else ValueError."""
     if len(values) != n:
         raise ValueError
     return values

@@ -4,12 +4,12 @@ import threading
 from collections.abc import Callable
 from functools import lru_cache, partial
 from types import ModuleType
-from typing import TYPE_CHECKING, Any, TypeVar, get_args, get_origin, get_type_hints
+from typing import TYPE_CHECKING, Any, Protocol, TypeVar, get_args, get_origin, get_type_hints
 
 import msgspec
 
 from holozen.console import printable
-from holozen.messages import CodecError
+from holozen.messages import WIRES, CodecError, encoding_of
 from holozen.messages.message import Message, listed, not_finite
 from holozen.suggest import article, shorten
 
@@ -20,9 +20,6 @@ __all__ = ["WIRES", "CodecError", "convert", "decode", "decoder", "encode", "enc
 
 M = TypeVar("M", bound=Message)
 Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
-
-WIRES = {"json": "application/json", "msgpack": "application/msgpack", "cdr": "application/cdr"}
-"""The names that `--wire` takes, and the Encoding of each."""
 
 # Encodings that do not describe the content, or mean JSON, which is what people write by hand.
 JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "application/json"}
@@ -48,10 +45,12 @@ def written(message: Message, wire: str) -> tuple[bytes, str]:
     """The bytes of `message`, and their wire: CDR for one with ANY_NUMBER that holds a NaN or an infinity."""
     if wire == "json" and not message.SETTLE:
         try:
-            if not _has_null(payload := _encode_json(message)):
-                return payload, wire
+            payload = _encode_json(message)
         except UnicodeEncodeError:
             pass  # the long way has the reason
+        else:
+            if not _has_null(payload):
+                return payload, wire
     if not message.ANY_NUMBER or wire == "cdr":
         return encode(message, wire), wire
     payload, finite = _write(message, wire)
@@ -78,8 +77,8 @@ def _write(message: Message, wire: str) -> tuple[bytes, bool]:
 
 
 def encoding(wire: str, kind: type[Message]) -> str:
-    """The Encoding of a message. CDR does not describe itself, so its type is appended, as Zenoh's schema."""
-    return f"{WIRES[wire]};{_structs().ros_name(kind)}" if wire == "cdr" else WIRES[wire]
+    """The Encoding of a message, see `encoding_of`."""
+    return encoding_of(wire, _structs().ros_name(kind) if wire == "cdr" else "")
 
 
 def decode(payload: bytes, encoding: str, types: tuple[type[M], ...], tolerant: bool = False) -> M:
@@ -98,19 +97,30 @@ def decode(payload: bytes, encoding: str, types: tuple[type[M], ...], tolerant: 
     return _first(tuple((kind, partial(_without_unknown, kind, parse)) for kind in types), payload)
 
 
-def decoder(types: tuple[type[M], ...], tolerant: bool = False) -> Callable[[bytes, str], M]:
-    """`decode` for these types, faster for the first one in JSON."""
-    first: Callable[[bytes], M] | None = None
+class Encoded(Protocol):
+    """A payload and its Encoding."""
 
-    def read(payload: bytes, encoding: str) -> M:
-        nonlocal first
-        if payload[:1] == b"{" and encoding in JSON:
-            first = first or _decoders(types, encoding, "json")[0][1]
+    payload: bytes
+
+    @property
+    def encoding(self) -> str: ...
+
+
+def decoder(types: tuple[type[M], ...], tolerant: bool = False) -> Callable[[Encoded], M]:
+    """`decode` for these types, faster for the first one in JSON.
+
+    If `tolerant`, an object in JSON is read whatever its Encoding says: to ask takes as long as to decode a Twist.
+    """
+    first: Callable[[bytes], M] = _decoders(types, "", "json")[0][1]
+
+    def read(sample: Encoded) -> M:
+        payload = sample.payload
+        if payload[:1] == b"{" if tolerant else sample.encoding in JSON:
             try:
                 return first(payload)
             except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CodecError):
                 pass  # the long way has the reason
-        return decode(payload, encoding, types, tolerant)
+        return decode(payload, sample.encoding, types, tolerant)
 
     return read
 
@@ -171,8 +181,11 @@ def _write_json(message: Message) -> tuple[bytes, bool]:
 
 def _has_null(payload: bytes) -> bool:
     """Whether JSON may hold a NaN or an infinity, which msgspec writes as null; no message has one otherwise."""
-    first = payload.find(b"u")  # most messages have few of these, and one byte is found ten times faster than four
-    return first > 0 and payload.find(b"null", first - 1) >= 0
+    # One byte is found ten times faster than four, and most messages have at most one of these, in "angular".
+    if (first := payload.find(b"u")) < 0:
+        return False
+    second = payload.find(b"u", first + 1)
+    return payload[first - 1 : first + 3] == b"null" or (second > 0 and payload.find(b"null", second - 1) >= 0)
 
 
 _WRITERS: dict[str, Callable[[Message], tuple[bytes, bool]]] = {

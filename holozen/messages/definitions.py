@@ -1,11 +1,13 @@
 """Types as .msg, .srv and .action files define them, parsed from their text; values as plain dicts, lists and numbers.
 
-Written by hand, for the grammar is one line per field: libraries that read it (rosbags, rosidl) bring numpy or ROS
-along, and an echo has to start at once. The spellings of ROS 1 are read too: Header, time and duration.
+The parser is written by hand, since the grammar is one line per field, libraries for it (rosbags, rosidl) need numpy or
+ROS, and `topic echo` has to start at once. The spellings of ROS 1 are read too: Header, time and duration.
 """
 
+import json
 import math
 import re
+import struct
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -43,7 +45,10 @@ _LINE = re.compile(
 )
 _ITEM = re.compile(r"""\s*("(?:\\.|[^"\\])*"|'(?:\\.|[^'\\])*'|[^,"']+?)\s*(?:,|$)""")
 _BOOLS = {"true": True, "1": True, "false": False, "0": False}
-_SIZES = {"bool": 1, "byte": 1, "char": 1, "string": 4, "wstring": 4}
+_SIZES = {"bool": 1, "byte": 1, "string": 4, "wstring": 4} | {
+    name: struct.calcsize(f"<{code}") for name, code in TYPECODES.items()
+}
+"""The bytes of each primitive; of a text, those of its length."""
 
 
 class InterfaceError(Failure, ValueError):
@@ -72,6 +77,10 @@ class Field(NamedTuple):
         ends = {"": "", "fixed": f"[{self.bound}]", "bounded": f"[<={self.bound}]", "sequence": "[]"}
         return name + (f"<={self.longest}" if self.longest else "") + ends[self.array]
 
+    def line(self, package: str = "") -> str:
+        """Its line in a .msg file of `package`."""
+        return f"{self.spelled(package)} {self.name}{'' if self.default is None else f' {json.dumps(self.default)}'}"
+
 
 class Constant(NamedTuple):
     """A named value."""
@@ -79,6 +88,10 @@ class Constant(NamedTuple):
     name: str
     type: str
     value: Any
+
+    def line(self) -> str:
+        """Its line in a .msg file."""
+        return f"{self.type} {self.name}={self.value if isinstance(self.value, str) else json.dumps(self.value)}"
 
 
 class Interface:
@@ -102,7 +115,7 @@ class Interface:
         self.name, self.kind, self.fields, self.constants, self.parts = name, kind, fields, constants, parts
         self.request = parts[0] if kind == "srv" else None
         self.response = parts[1] if kind == "srv" else None
-        self.least: int = max(1, sum(map(_least, fields)))  # bytes; an empty message has one
+        self.least: int = max(1, sum(map(_field_size, fields)))  # bytes; an empty message has one
         self.width: int = 1 + sum(field.nested.width if field.nested else 1 for field in fields)
         if self.least > LARGEST or self.width > MOST_FIELDS:
             raise InterfaceError(f"{name} is too large: at least {self.least} bytes and {self.width} fields")
@@ -116,18 +129,13 @@ class Interface:
         return f"<Interface {self.name}>"
 
 
-def least(field: Field) -> int:
+def element_size(field: Field) -> int:
     """The least number of bytes of one element of a field, without padding."""
-    return field.nested.least if field.nested else size(field.type)
+    return field.nested.least if field.nested else _SIZES[field.type]
 
 
-def size(primitive: str) -> int:
-    """The bytes of a primitive; for a text, those of its length."""
-    return _SIZES.get(primitive) or int(primitive.lstrip("uintfloa")) // 8
-
-
-def _least(field: Field) -> int:
-    return 4 if field.array in ("sequence", "bounded") else least(field) * (field.bound if field.array else 1)
+def _field_size(field: Field) -> int:
+    return 4 if field.array in ("sequence", "bounded") else element_size(field) * (field.bound if field.array else 1)
 
 
 class PlacedError(InterfaceError):
@@ -135,7 +143,7 @@ class PlacedError(InterfaceError):
 
 
 ACTION_PARTS = ("Goal", "Result", "Feedback", "FeedbackMessage", "SendGoal", "GetResult")
-"""The endings of what an action consists of: its sections, the message of its topic, and its services."""
+"""The endings of the names of an action's parts: its sections, the message of its topic, and its services."""
 
 
 def action_parts(name: str, sections: "list[Section]", resolve: "Resolve") -> list[Interface]:
@@ -269,7 +277,7 @@ def _parsed_default(field: Field, text: str) -> Any:
 
 
 def fits_length(field: Field, length: int) -> bool:
-    """Whether an array field may have so many elements."""
+    """Whether an array field may have `length` elements."""
     return length == field.bound if field.array == "fixed" else not field.bound or length <= field.bound
 
 
@@ -315,26 +323,36 @@ def prototype(interface: Interface) -> dict[str, Any]:
     return {field.name: _default(field) for field in interface.fields}
 
 
-def completed(interface: Interface, value: Any, path: str = "") -> dict[str, Any]:
+def completed(interface: Interface, value: Any, path: str = "", tolerant: bool = False) -> dict[str, Any]:
     """`value` with missing fields at their defaults.
 
     Raises InterfaceError with the path of the first field that does not exist (and the most similar one that does) or
-    whose value has the wrong type, range or length. NaN and infinities are numbers. A mapping stands for a list of
-    pairs.
+    whose value has the wrong type, range or length. If `tolerant`, fields that do not exist are left out. NaN and
+    infinities are numbers. A mapping stands for a list of pairs.
     """
     if not isinstance(value, dict):
         raise InterfaceError(f"{path or interface.name}: {_shown(value)} is not a mapping of fields")
     names = [field.name for field in interface.fields]
     for name in value:
-        if name not in names:
+        if name not in names and not tolerant:
             where = f"{path}.{name}" if path else f"{name}"
             raise InterfaceError(f"{interface.name} has no field {where[:80]!r}{field_hint(str(name), names)}")
     return {
-        field.name: _checked(field, value[field.name], f"{path}.{field.name}".lstrip("."))
+        field.name: _checked(field, value[field.name], f"{path}.{field.name}".lstrip("."), tolerant)
         if field.name in value
         else _default(field)
         for field in interface.fields
     }
+
+
+MAPPED = "holozen/msg/RefusalCount"
+"""A sequence of these pairs is an object in JSON and msgpack."""
+
+
+def with_mappings(interface: Interface, value: dict[str, Any]) -> dict[str, Any]:
+    """A message with all its fields as JSON and msgpack have it, see MAPPED."""
+    mapped = [field for field in interface.fields if field.nested and field.nested.name == MAPPED]
+    return value | {field.name: dict(pair.values() for pair in value[field.name]) for field in mapped}
 
 
 def field_hint(name: str, names: Sequence[str]) -> str:
@@ -359,16 +377,16 @@ def zero(field: Field) -> Any:
     return False if field.type == "bool" else 0.0 if field.type in FLOATS else 0
 
 
-def _checked(field: Field, value: Any, path: str) -> Any:
+def _checked(field: Field, value: Any, path: str, tolerant: bool) -> Any:
     if not field.array:
-        return _element(field, value, path)
+        return _element(field, value, path, tolerant)
     if isinstance(value, dict) and (names := _pair(field)):
         value = [dict(zip(names, item, strict=True)) for item in value.items()]
     if not isinstance(value, list | tuple):
         raise InterfaceError(f"{path}: {_shown(value)} is not a list")
     if not fits_length(field, len(value)):
         raise InterfaceError(f"{path}: {len(value)} values for {field.spelled()}")
-    return [_element(field, inner, f"{path}[{index}]") for index, inner in enumerate(value)]
+    return [_element(field, inner, f"{path}[{index}]", tolerant) for index, inner in enumerate(value)]
 
 
 def _pair(field: Field) -> list[str]:
@@ -376,9 +394,9 @@ def _pair(field: Field) -> list[str]:
     return names if len(names) == 2 else []
 
 
-def _element(field: Field, value: Any, path: str) -> Any:
+def _element(field: Field, value: Any, path: str, tolerant: bool) -> Any:
     if field.nested:
-        return completed(field.nested, value, path)
+        return completed(field.nested, value, path, tolerant)
     if _fits(field, value):
         return float(value) if field.type in FLOATS else value
     raise InterfaceError(f"{path}: {_shown(value)} is not a valid {field._replace(array='').spelled()}")
@@ -443,11 +461,4 @@ def _collect(interface: Interface, found: dict[str, Interface]) -> None:
 
 
 def _definition(interface: Interface) -> str:
-    import json
-
-    constants = [f"{one.type} {one.name}={one.value}" for one in interface.constants]
-    fields = []
-    for field in interface.fields:
-        default = "" if field.default is None else f" {json.dumps(field.default)}"
-        fields.append(f"{field.spelled()} {field.name}{default}")
-    return "\n".join(constants + fields)
+    return "\n".join([*(one.line() for one in interface.constants), *(one.line() for one in interface.fields)])

@@ -59,12 +59,12 @@ class CommandStatus(Message):
 
 
 class SimulationStatus(Message):
-    """How the sim's time passes. `state` is one of simulation_interfaces/msg/SimulationState, `time` in s that of
-    `clock`, after `steps` steps of `step` seconds. Each reset begins a new `epoch`, in which the time may begin anew.
+    """How the sim's time passes. `state` is one of simulation_interfaces/msg/SimulationState; `time` is that of `clock`
+    in s, after `steps` steps of `step` seconds. Each reset begins a new `epoch`, in which the time may start again.
 
-    `real_time_factor` is measured over the last second, `target` is the one to keep (0: as fast as possible). A sim
-    that falls behind by more than 0.1 s does not catch up: that is one of the `overruns`, by which `lost` seconds of
-    real time were lost since the start.
+    `real_time_factor` is measured over the last second; `target` is the one to keep (0: as fast as possible). A sim
+    that falls behind by more than 0.1 s does not catch up: this counts as one of `overruns`, and adds to `lost`, the
+    seconds of real time lost since the start.
     """
 
     state: UInt8 = 0
@@ -105,7 +105,7 @@ class GetPoseReply(Message):
 
 
 class SceneEntity(Message):
-    """An entity of the sim and its pose in the world. `number` is another one after every spawn, in any sim.
+    """An entity of the sim and its pose in the world. `number` is different after every spawn, in any sim.
 
     `command` and `odometry` are the keys of its commands and its odometry; empty if it has none. `joints` are the
     positions of its joints, in rad or m, in the order of RobotDescriptionReply.
@@ -120,7 +120,9 @@ class SceneEntity(Message):
 
 
 class GetSceneRequest(Message):
-    pass
+    """Asks for all entities. With `without_joints` their `joints` are empty, which takes a sim half the time."""
+
+    without_joints: bool = False
 
 
 class GetSceneReply(Message):
@@ -153,12 +155,12 @@ class SeenEntity(Message):
 
 
 class Exposure(Message):
-    """A picture to be rendered: what there is to see at the time of `header`, and the camera, whose x axis at `pose` in
-    the world looks ahead.
+    """An image to render: the scene at the time of `header`, and the camera, which is at `pose` in the world and looks
+    along its x axis. A `width` of 0 is the end of the camera that has these keys.
 
-    `image`, `info` and `depth` are the keys to publish on (empty: not), with the stamp and frame of `header`. `width`
+    `image`, `info` and `depth` are the keys to publish on (empty: none), with the stamp and frame of `header`. `width`
     and `height` in pixels; `field_of_view` across the width in rad; `near` and `far` in m; `encoding` is "rgb8" or
-    "mono8"; the noise is that of a pixel from 0 to 1. `ground`: a level plane at z = 0.
+    "mono8"; the noise is added to pixel values from 0 to 1. `ground`: whether there is a level plane at z = 0.
     """
 
     header: Header = field(default_factory=Header)

@@ -23,7 +23,7 @@ Int32 = Annotated[int, Meta(ge=-(2**31), lt=2**31, extra={"ros": "int32"})]
 UInt64 = Annotated[int, Meta(ge=0, extra={"ros": "uint64"})]
 
 
-class Message(Struct, forbid_unknown_fields=True):
+class Message(Struct, forbid_unknown_fields=True, gc=False):  # they make no cycles for the collector to look for
     """A message of ROS, field for field. A field left out is zero.
 
     The name in ROS follows from the module and the class, with the ending Request or Reply for the two halves of a
@@ -50,7 +50,7 @@ def packed(code: str, values: Sequence[Any]) -> "array[Any]":
 
 
 def listed(value: Any) -> list[Any]:
-    """An array as a list, which is what stands on the wire. Raises TypeError for anything else."""
+    """An array as a list, which the wire carries instead. Raises TypeError for anything else."""
     if isinstance(value, array):
         return value.tolist()
     raise TypeError(f"a message cannot hold a {type(value).__name__}")
@@ -62,7 +62,7 @@ def not_finite(message: Message) -> str:
 
 
 def _suspects(value: Any) -> list[Any]:
-    """An array as a list if some of its numbers may not be finite, else an empty list. Raises TypeError."""
+    """An array as a list if one of its numbers may not be finite, else an empty list. Raises TypeError."""
     if isinstance(value, array) and (value.typecode not in "fd" or math.isfinite(sum(value))):
         return []
     return listed(value)

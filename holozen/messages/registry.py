@@ -23,7 +23,7 @@ KINDS = ("msg", "srv", "action")
 _SECTIONS = {"msg": 1, "srv": 2, "action": 3}  # of a file
 _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z][A-Za-z0-9_]*)")
 DEEPEST = 50  # levels of nesting
-MOST_LOST = 100  # unknown names that are remembered
+MOST_LOST = 100  # unknown names that are remembered, so that they are not looked up again
 MOST = 20  # names in an error
 _HALVES = ("_Request", "_Response")
 _PARTS = tuple(f"_{part}{half}" for part in ACTION_PARTS for half in ("", *_HALVES))  # ends of names within an action
@@ -103,7 +103,7 @@ class Places:
         return found
 
     def packages(self) -> list[str]:
-        """Our own, the given ones, and those in the environment that hold definitions."""
+        """Our own, the given ones, and those of the environment's folders that hold definitions."""
         shared = [os.path.join(prefix, "share") for prefix in _environment("AMENT_PREFIX_PATH")]
         for place in (*shared, *_environment("ROS_PACKAGE_PATH")):
             for name in _listing(place):
@@ -204,7 +204,7 @@ class Registry:
         return found
 
     def learn(self, name: str, define: Callable[[str], str]) -> Interface:
-        """As `find`; for a type that is not here `define` is asked once, which returns its `whole_text` or an empty
+        """As `find`; for a type that is not known, `define` is called once, which returns its `whole_text` or an empty
         text. Raises InterfaceError.
         """
         try:
@@ -285,8 +285,9 @@ class Registry:
 
     def _bare(self, name: str) -> str:
         same = [full for full in self.names() if full.rpartition("/")[2].lower() == name.lower()]
-        hint = f" (did you mean {' or '.join(map(repr, same))}?)" if same else "; `holozen interface list` lists all"
-        return f"{name[:80]!r} is not a type: the package is missing{hint}"
+        if same:
+            return f"{name[:80]!r} has no package; write {' or '.join(same)}"
+        return f"{name[:80]!r} is not a type; `holozen interface list` lists all"
 
     def _unknown(self, name: str, package: str) -> str:
         known = [f"{package}/{each}" for each in self.places.names(package)]

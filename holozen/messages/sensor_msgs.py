@@ -9,7 +9,7 @@ from holozen.messages.geometry_msgs import Quaternion, Vector3
 from holozen.messages.message import Float32, Message, UInt8, UInt32
 from holozen.messages.std_msgs import Header
 
-# Writers may give an array, which is sent without a look at each number.
+# Publishers may assign an array, which is sent without checking each number.
 Floats = Annotated[Sequence[float], Meta(extra={"ros": "float32[]"})]
 Bytes = Annotated[Sequence[int], Meta(extra={"ros": "uint8[]"})]
 Nine = Annotated[list[float], Meta(min_length=9, max_length=9)]

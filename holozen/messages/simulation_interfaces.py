@@ -187,8 +187,9 @@ class StepSimulationReply(Message):
 
 
 class ResetSimulationRequest(Message):
-    """`scope` is a sum of scopes: the time to zero, every entity to where it was added, no entities that were spawned.
-    With all of them, entities of the start that were deleted come back. The default is all.
+    """`scope` is a sum: SCOPE_TIME sets the time to zero, SCOPE_STATE moves every entity to where it was added,
+    SCOPE_SPAWNED removes those that were spawned. All of them, the default, also restore entities of the start that
+    were deleted.
     """
 
     SCOPE_DEFAULT: ClassVar[UInt8] = 0

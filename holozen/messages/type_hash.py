@@ -1,4 +1,4 @@
-"""RIHS01, the hash of a type by which ROS 2 (from Iron on) checks whether two nodes mean the same type.
+"""RIHS01, the hash by which ROS 2 (from Iron on) checks whether two nodes have the same definition of a type.
 
 It is the SHA-256 of the type's description in JSON, in the exact form of ROS's REP 2011 and its package rosidl: names
 and types of all fields, in order, and those of the types nested in it, sorted by name. Constants and defaults do not

@@ -1,1 +1,1 @@
-"""xacro and URDF files -> a checked RobotModel."""
+"""Robot and world files (xacro, URDF, SDF) -> a checked RobotModel or WorldSpec."""

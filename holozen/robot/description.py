@@ -1,4 +1,4 @@
-"""What a robot or object looks like, as URDF text that needs no other file: written by the sim, read by viewers."""
+"""The appearance of a robot or object as a self-contained URDF text: the sim writes it, viewers read it."""
 
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable, Iterator
@@ -13,17 +13,17 @@ from holozen.robot.errors import RobotError
 from holozen.robot.meshes import Surface, file_uri, surfaces_in
 from holozen.robot.model import Color, Joint, Link, Pose, RobotModel, Shape
 from holozen.robot.packages import NOWHERE
-from holozen.robot.rigid import Frame
+from holozen.robot.rigid import compose
 from holozen.robot.urdf import read_joint, read_link
 
-MOST_SHOWN = 3_000_000  # characters of meshes in a text; a reader accepts MOST_TEXT in all
-THIN = 0.002  # m; how thick a plane is shown
+MOST_SHOWN = 3_000_000  # characters of embedded meshes in a text; a reader accepts MOST_TEXT characters in all
+THIN = 0.002  # m; the thickness at which a plane is drawn
 
 
 @dataclass(frozen=True, slots=True)
 class Mesh:
-    """Triangles as bytes, as they come from the process that read them; `arrays` checks them. `color` is that of the
-    mesh file, if it has one.
+    """Triangles as raw bytes from the reader's process, which only `arrays` validates. `color` is the mesh file's, if
+    it gives one.
     """
 
     points: bytes
@@ -31,18 +31,21 @@ class Mesh:
     color: Color | None = None
 
     def arrays(self) -> tuple[npt.NDArray[np.float32], npt.NDArray[np.uint32]]:
-        """Points (n, 3) in metres, without the scale of the shape, and triangles (m, 3) of their indexes."""
+        """Points (n, 3) in metres, before the scale of the shape, and triangles (m, 3) as indices into them.
+
+        Raises ValueError for an index out of range, and for points that are not finite.
+        """
         points = np.frombuffer(self.points, np.float32).reshape(-1, 3)
         triangles = np.frombuffer(self.triangles, np.uint32).reshape(-1, 3)
         if not np.isfinite(points).all() or (len(triangles) and triangles.max() >= len(points)):
-            raise ValueError("triangles without corners, or corners nowhere")
+            raise ValueError("a mesh with an index out of range, or with points that are not finite")
         return points, triangles
 
 
 @dataclass(frozen=True, slots=True)
 class Appearance:
-    """Links with their visual shapes, and joints, of which every child has one. `meshes`, by link and shape, are what
-    the shapes that are meshes consist of; one that cannot be read has none.
+    """Links with their visual shapes, and the joints between them. `meshes`, by link and by visual shape, are the
+    triangles of a mesh; empty for an unreadable mesh and for any other shape.
     """
 
     links: tuple[Link, ...]
@@ -50,25 +53,25 @@ class Appearance:
     meshes: tuple[tuple[tuple[Mesh, ...], ...], ...] = ()
 
     def shapes(self) -> Iterator[tuple[Link, list[tuple[Shape, tuple[Mesh, ...]]]]]:
-        """Each link, and its visual shapes with their meshes."""
+        """Each link with its visual shapes, and each shape with its meshes."""
         for link, meshes in zip(self.links, self.meshes, strict=True):
             yield link, [*zip(link.visuals, meshes, strict=True)]
 
 
 def written(model: RobotModel) -> str:
-    """The URDF of a model's links, visual shapes and joints, with the meshes in it, up to MOST_SHOWN.
+    """The URDF of a model's links, visual shapes and joints, with up to MOST_SHOWN characters of embedded meshes.
 
-    A model without visual shapes has its collision shapes instead, and so has a link whose meshes cannot be sent. A
-    plane becomes a thin box, a hull its bounding box.
+    A model without any visual shape is written with its collision shapes, and so is a link whose meshes cannot be
+    embedded. A plane becomes a thin box, a hull its bounding box.
     """
     robot = ElementTree.Element("robot", name=model.name)
-    bare = not any(link.visuals for link in model.links.values())
+    has_visuals = any(link.visuals for link in model.links.values())
     room = MOST_SHOWN
     for link in model.links.values():
-        shapes = list(map(_sent, link.collisions if bare else link.visuals))
+        shapes = list(map(_portable, link.visuals if has_visuals else link.collisions))
         room -= sum(len(shape.data) for shape in shapes)
         if any(shape.kind == "mesh" and not shape.data for shape in shapes) or room < 0:
-            shapes = [shape for shape in map(_sent, link.collisions) if shape.kind != "mesh"]
+            shapes = [shape for shape in map(_portable, link.collisions) if shape.kind != "mesh"]
         tag = ElementTree.SubElement(robot, "link", name=link.name)
         for shape in shapes:
             _visual(tag, shape)
@@ -78,7 +81,9 @@ def written(model: RobotModel) -> str:
 
 
 def read(text: str) -> Appearance:
-    """What `written`, or any URDF, describes; no file is opened. It is read in a process apart. Raises RobotError."""
+    """The appearance that a URDF text describes, such as one of `written`. Parsed in a process of its own, which opens
+    no file. Raises RobotError.
+    """
     return reader.run(Appearance, "robot_description", _read, text, only_known=True)
 
 
@@ -90,8 +95,8 @@ def _read(text: str) -> Appearance:
     links = [read_link(tag, source) for tag in robot.all("link")]
     joints = tuple(read_joint(tag, source) for tag in robot.all("joint"))
     meshes = tuple(tuple(tuple(_meshes(shape)) for shape in link.visuals) for link in links)
-    bare = (replace(link, visuals=tuple(replace(shape, data="") for shape in link.visuals)) for link in links)
-    return Appearance(tuple(bare), joints, meshes)
+    stripped = (replace(link, visuals=tuple(replace(shape, data="") for shape in link.visuals)) for link in links)
+    return Appearance(tuple(stripped), joints, meshes)
 
 
 def _meshes(shape: Shape) -> list[Mesh]:
@@ -109,7 +114,8 @@ def _mesh(surface: Surface) -> Mesh:
     return Mesh(surface.points.astype(np.float32).tobytes(), triangles.astype(np.uint32).tobytes(), surface.color)
 
 
-def _sent(shape: Shape) -> Shape:
+def _portable(shape: Shape) -> Shape:
+    """The shape as URDF can hold it without another file; a mesh that cannot be embedded is unchanged."""
     if shape.kind == "mesh" and shape.path:
         try:
             return replace(shape, data=file_uri(shape.path))
@@ -117,12 +123,12 @@ def _sent(shape: Shape) -> Shape:
             return shape
     if shape.kind == "plane":
         down = Pose((0.0, 0.0, -THIN / 2))
-        return replace(shape, kind="box", size=(*shape.size, THIN), pose=(Frame.of(shape.pose) @ Frame.of(down)).pose)
+        return replace(shape, kind="box", size=(*shape.size, THIN), pose=compose(shape.pose, down))
     if shape.kind == "hull":
         low, high = (tuple(map(end, zip(*shape.points, strict=True))) for end in (min, max))
         middle = Pose(tuple((a + b) / 2 for a, b in zip(low, high, strict=True)))
         size = tuple(max(b - a, THIN) for a, b in zip(low, high, strict=True))
-        return replace(shape, kind="box", size=size, pose=(Frame.of(shape.pose) @ Frame.of(middle)).pose)
+        return replace(shape, kind="box", size=size, pose=compose(shape.pose, middle))
     return shape
 
 

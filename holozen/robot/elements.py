@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from holozen.robot.errors import RobotError
-from holozen.suggest import cut, suggest
+from holozen.suggest import cut, suggest, suggest_file
 
 Vector = tuple[float, float, float]
 
@@ -22,8 +22,9 @@ DEEPEST = 200
 
 @dataclass(eq=False, slots=True)
 class Tag:
-    """`place` is the file and line for messages; `text` is the element's own text. Below an `<sdf>`, where `sdf` is
-    true, a value such as a size is the text of a child; in URDF it is an attribute.
+    """An XML element. `place` is its file and line, for messages; `at` the offset of its start tag in the UTF-8 bytes
+    of the file; `text` its own character data. `sdf` is true inside an `<sdf>`, where a value such as a size is the
+    text of a child element; in URDF it is an attribute.
     """
 
     name: str
@@ -33,6 +34,7 @@ class Tag:
     text: str = ""
     children: "list[Tag]" = field(default_factory=list)
     sdf: bool = False
+    at: int = 0
 
     def all(self, name: str) -> "list[Tag]":
         """The children called `name`."""
@@ -45,14 +47,32 @@ class Tag:
                 return child
         return None
 
-    def below(self, name: str) -> "Iterator[Tag]":
-        """The elements called `name` at any depth, in file order."""
-        waiting = self.children[::-1]
+    def needed(self, name: str) -> "Tag":
+        """The first child called `name`. Raises RobotError if there is none."""
+        found = self.first(name)
+        if found is None:
+            raise self.wrong(f"has no <{name}>")
+        return found
+
+    def child(self, name: str) -> "Tag":
+        """The first child called `name`, else an empty one."""
+        return self.first(name) or self.empty(name)
+
+    def empty(self, name: str) -> "Tag":
+        """An empty child called `name`, in place of one that the file omits."""
+        return Tag(name, {}, self.place, self, sdf=self.sdf)
+
+    def walk(self) -> "Iterator[Tag]":
+        """This element and all below it, in file order."""
+        waiting = [self]
         while waiting:
             tag = waiting.pop()
-            if tag.name == name:
-                yield tag
+            yield tag
             waiting += tag.children[::-1]
+
+    def below(self, name: str) -> "Iterator[Tag]":
+        """The elements called `name` below this one at any depth, in file order."""
+        return (tag for tag in self.walk() if tag.name == name and tag is not self)
 
     def wrong(self, problem: str) -> RobotError:
         """An error with the location of this element and `problem`."""
@@ -60,7 +80,7 @@ class Tag:
 
     @property
     def line(self) -> int:
-        """Its line; 0 for one in no file."""
+        """The line of its start tag; 0 if its place has none."""
         number = self.place.rpartition(", line ")[2]
         return int(number) if number.isdecimal() else 0
 
@@ -75,12 +95,8 @@ class Tag:
             raise self.wrong(f'has no {attribute}="..."')
         return value
 
-    def empty(self, name: str) -> "Tag":
-        """An empty child called `name`, which the file leaves out."""
-        return Tag(name, {}, self.place, self, sdf=self.sdf)
-
     def given(self, name: str) -> str | None:
-        """The text of a value; None if the file leaves it out."""
+        """The text of a value; None if the file omits it."""
         if not self.sdf:
             return self.attributes.get(name)
         child = self.first(name)
@@ -89,7 +105,10 @@ class Tag:
     def numbers(
         self, name: str, count: int, default: tuple[float, ...] | None = None, most: float = LARGEST
     ) -> tuple[float, ...]:
-        """A value of `count` numbers separated by white space, from -`most` to `most`; else `default`."""
+        """A value of `count` numbers separated by white space, from -`most` to `most`; `default` if the file omits it.
+
+        Raises RobotError, as do the methods below, also for a value that is omitted and has no default.
+        """
         if default is not None and self.given(name) is None:
             return default
         if not self.sdf:
@@ -125,7 +144,7 @@ class Tag:
         for word in text.split():
             value = number(word)
             if value is None:
-                problem = "is not a finite number; write 0.25, and spaces between several"
+                problem = "is not a finite number; write numbers such as 0.25, separated by spaces"
             elif abs(value) > most:
                 problem = f"is beyond {most:g}; use metres, kilograms and radians"
             else:
@@ -137,7 +156,7 @@ class Tag:
         return tuple(values)
 
     def _naming(self) -> str:
-        """The attribute that distinguishes the element from others of its kind."""
+        """The attribute that identifies the element among others of its kind; empty if it has none."""
         if "name" in self.attributes:
             return "name"
         return "reference" if self.name == "gazebo" and self.attributes.get("reference", "").strip() else ""
@@ -180,8 +199,8 @@ def read_xml(text: str, place: str, most: int = MOST_TEXT) -> Tag:
 
 
 def repair_xml(text: str) -> tuple[str, list[tuple[int, str]]]:
-    """The text without what Gazebo's parser (TinyXML) accepts and XML forbids, blanked out so that lines stay in place;
-    and for each such mistake its line number and a description.
+    """The text, with blanks in place of what XML forbids but Gazebo's parser (TinyXML) accepts, and the line number and
+    a description of each such mistake. Line numbers stay the same.
     """
     if _is_well_formed(text):
         return text, []
@@ -213,7 +232,9 @@ _ATTRIBUTE = re.compile(r"""\s([\w:.-]+)\s*=\s*(?:"[^"]*"|'[^']*')""")
 
 
 def _markup(text: str, start: int, is_first: bool) -> tuple[int, str, list[tuple[int, int]]]:
-    """The end of the markup that starts with a `<`, or -1; what is wrong with it; and its parts to be blanked."""
+    """The end of the markup that starts at `start`, or -1 if it is not closed; what is wrong with it, else an empty
+    string; and the spans in it to blank.
+    """
     for opening, closing in (("<!--", "-->"), ("<![CDATA[", "]]>"), ("<?", "?>")):
         if not text.startswith(opening, start):
             continue
@@ -258,6 +279,29 @@ def check_size(size: int, place: str, most: int = MOST_TEXT) -> None:
         raise RobotError(f"{place}: the file contains {content}: move its meshes to separate files")
 
 
+def check_file(path: Path) -> None:
+    """Raise RobotError for a special file, such as a pipe, and for a file of more than MOST_TEXT bytes."""
+    if path.is_file():
+        check_size(path.stat().st_size, str(path))
+    elif path.exists() and not path.is_dir():
+        raise RobotError(f"{path}: is not a regular file; give one, since it is read several times")
+
+
+def read_text(path: Path) -> str:
+    """The text of a file, line endings kept. Raises RobotError if it cannot be read, is too large or is not UTF-8."""
+    try:
+        check_file(path)
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise RobotError(f"{path}: byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
+    except OSError as error:
+        raise RobotError(f"{path}: {error.strerror or error}{suggest_file(path)}") from None
+    except RobotError:
+        raise
+    except ValueError as error:
+        raise RobotError(f"{path}: {error}") from None
+
+
 class _Reader:
     def __init__(self, place: str) -> None:
         self.place = place
@@ -273,7 +317,7 @@ class _Reader:
 
     def start(self, name: str, attributes: dict[str, str]) -> None:
         tag = Tag(name, attributes, f"{self.place}, line {self.parser.CurrentLineNumber}", self.open)
-        tag.sdf = self.open.sdf or name == "sdf"
+        tag.sdf, tag.at = self.open.sdf or name == "sdf", self.parser.CurrentByteIndex
         self.count += 1
         if self.count > MOST_ELEMENTS:
             raise tag.wrong(f"is element number {self.count}; a file may have at most {MOST_ELEMENTS}")
@@ -314,9 +358,11 @@ _CASES = (
 
 
 def broken_xml(error: expat.ExpatError, text: str, context: str = "") -> str:
-    """The reason why a text is no XML, and after the last semicolon how to correct it: by the reason, or by the
-    reported line and the one before.
+    """Why a text is not well-formed XML and, after the last semicolon, how to correct it: judged by the error, or by
+    the reported line and the one before it. `context` is inserted between the two.
     """
+    if not text.strip():
+        return "broken XML: the file is empty; `holozen new robot NAME` writes one to start from"
     reason, lines = expat.ErrorString(error.code), text.splitlines()[max(0, error.lineno - 2) : error.lineno]
     return f"broken XML: {reason}{context}; {_advice(reason, lines)}"
 
@@ -338,7 +384,7 @@ def _advice(reason: str, lines: list[str]) -> str:
 
 
 MOST_WARNINGS = 200
-MOST_GUESSES = 20  # each scans every name; a file full of mistakes has to finish soon too
+MOST_GUESSES = 20  # each compares every name; a file full of mistakes has to finish soon too
 
 
 @dataclass(slots=True)
@@ -365,7 +411,7 @@ class Source:
             self.warnings.append(f"{tag.place}: there are more than {MOST_WARNINGS} warnings; the rest are not listed")
 
     def read(self, text: str, place: str = "") -> Tag:
-        """The root element of a text, parsed as by Gazebo, with a warning for what only its parser accepts.
+        """The root element of a text. What only Gazebo's parser accepts is tolerated, with a warning.
 
         `place` (default: the file) names the text in messages. Raises RobotError as `read_xml` does.
         """
@@ -376,6 +422,6 @@ class Source:
         return read_xml(text, place)
 
     def suggest(self, name: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
-        """As holozen.suggest's; nothing after MOST_GUESSES."""
+        """As `holozen.suggest.suggest`; empty after MOST_GUESSES calls."""
         self.guesses += 1
         return "" if self.guesses > MOST_GUESSES else suggest(name, known, part, alike)

@@ -1,4 +1,4 @@
-"""Gazebo plugins: the drive of a robot, and what is parsed but not simulated.
+"""Gazebo plugins: the drive and the forces of a robot, and warnings about plugins that have no effect here.
 
 A plugin is identified by its file name, or for gz-sim by its class.
 """
@@ -7,7 +7,6 @@ import math
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 from msgspec import structs
@@ -27,12 +26,10 @@ from holozen.robot.model import (
     Planar,
     Pushed,
     RobotModel,
-    Shape,
     sides_of,
 )
-from holozen.robot.rigid import link_frames
-from holozen.robot.rotation import Array, matrix_of
-from holozen.robot.shapes import solid
+from holozen.robot.rigid import Frame, link_frames, reach_along
+from holozen.robot.shapes import SHAPES, solid
 from holozen.suggest import cut, listed, shorten
 from holozen.wire import COMMAND_SILENCE
 
@@ -53,7 +50,7 @@ def kind_of(plugin: Tag) -> str:
 
 
 def file_name(kind: str) -> str:
-    """The `filename` to write for a plugin, by its kind."""
+    """The `filename` to write for a plugin of a kind."""
     return f"gz-sim-{kind[3:]}-system" if kind.startswith("gz:") else f"lib{kind}.so"
 
 
@@ -79,8 +76,7 @@ class Settings:
 
     def tag(self, *names: str) -> Tag:
         """The first of `names` that is present and not empty, else an empty tag."""
-        found = self._found(names)
-        return Tag(names[0], {}, self.owner.place, self.owner) if found is None else found
+        return self._found(names) or self.owner.empty(names[0])
 
     def each(self, *names: str) -> list[Tag]:
         """Every non-empty child called one of `names`, in file order."""
@@ -89,7 +85,7 @@ class Settings:
     def word(self, *names: str) -> str:
         """The text of the first of `names` that is present, else an empty string."""
         found = self._found(names)
-        return "" if found is None else found.value()
+        return found.value() if found else ""
 
     def number(self, default: float, *names: str, zero: bool = True, most: float = LARGEST) -> float:
         """A positive number, or zero where allowed, up to `most`. Raises RobotError."""
@@ -102,11 +98,11 @@ class Settings:
             raise self.tag(*names).wrong(f"is {cut(word)}; it must be at most {most:g}")
         return value
 
-    def maybe(self, *names: str, most: float = LARGEST) -> float | None:
+    def optional(self, *names: str, most: float = LARGEST) -> float | None:
         """A non-negative number, or None if none of `names` is present. Raises RobotError."""
         return self.number(0.0, *names, most=most) if self.word(*names) else None
 
-    def maybe_measure(self, *names: str, least: float = SMALLEST) -> float:
+    def length(self, *names: str, least: float = SMALLEST) -> float:
         """Metres, at least `least`, or 0 if none of `names` is present. Raises RobotError."""
         value = self.number(0.0, *names, zero=False) if self.word(*names) else 0.0
         if 0 < value < least:
@@ -115,7 +111,7 @@ class Settings:
 
     def timeout(self, *names: str) -> float:
         """Seconds, or -1 for a disabled watchdog. Raises RobotError."""
-        value = number(self.word(*names) or "")
+        value = number(self.word(*names))
         return -1.0 if value is not None and value < 0 else self.number(COMMAND_SILENCE, *names, zero=False)
 
     def flag(self, *names: str, default: bool = True) -> bool:
@@ -187,7 +183,7 @@ def wheel_joint(settings: Settings, joints: Joints, source: Source, default: str
     """The joint named by the first of the tags `names`, else `default`. Raises RobotError as `turning` does."""
     tag = settings.tag(*names)
     if not tag.value() and default not in joints:
-        raise settings.owner.wrong(f"has no <{names[0]}>; joints: {listed(list(joints))}")
+        raise settings.owner.wrong(f"has no <{names[0]}>; joints: {listed(joints)}")
     return turning(tag, tag.value() or default, joints, source)
 
 
@@ -196,7 +192,9 @@ def wheel_joints(settings: Settings, joints: Joints, source: Source, default: st
 
     Raises RobotError as `turning` does.
     """
-    named = [(tag, name) for tag in settings.each(*names) for name in _split(tag.value(), joints)]
+    # A joint's name may have spaces in it.
+    named = [(tag, name) for tag in settings.each(*names)
+             for name in ([tag.value()] if tag.value() in joints else tag.value().split())]  # fmt: skip
     if not named:
         return (wheel_joint(settings, joints, source, default, *names),)
     return tuple(turning(tag, name, joints, source) for tag, name in named)
@@ -207,17 +205,10 @@ def turning(tag: Tag, name: str, joints: Joints, source: Source) -> str:
     if name not in joints:
         near = source.suggest(name, joints)
         problem = f"names the joint {cut(name)}, which does not exist{near}"
-        raise tag.wrong(f"{problem}; joints: {listed(list(joints))}")
+        raise tag.wrong(f"{problem}; joints: {listed(joints)}")
     if joints[name].kind not in TURNING:
         raise tag.wrong(f"names the joint {cut(name)}, which is {joints[name].kind}; a wheel's joint is continuous")
     return name
-
-
-def _split(words: str, joints: Joints) -> list[str]:
-    return [words] if words in joints else words.split()
-
-
-SIMPLE = ("box", "cylinder", "sphere")  # visual meshes are not read
 
 
 def radius_across(link: Link, axle: Vector) -> float:
@@ -225,46 +216,24 @@ def radius_across(link: Link, axle: Vector) -> float:
 
     Measured on the collision shapes, else on visual shapes other than meshes.
     """
-    shapes = link.collisions or [shape for shape in link.visuals if shape.kind in SIMPLE]
-    corners = [part for shape in shapes if len(part := _corners(solid(shape)))]
-    if not corners:
-        return 0.0
+    shapes = link.collisions or [shape for shape in link.visuals if shape.kind in SHAPES]
+    placed = [(Frame.of(shape.pose), solid(shape)) for shape in shapes]
     along = np.array(axle)
     aside = np.cross(along, np.eye(3)[np.abs(along).argmin()])
     aside /= np.linalg.norm(aside)
-    across = np.stack([aside, np.cross(along, aside)], axis=1)
-    return float(np.ptp(np.vstack(corners) @ across, axis=0).max() / 2)
-
-
-def _corners(shape: Shape) -> Array:
-    """Points (n, 3) in the link's frame with the shape's bounding box, if its axes are parallel to the link's."""
-    match shape.kind:
-        case "hull":
-            points = np.array(shape.points)
-        case "box":
-            points = _box(shape.size)
-        case "cylinder":
-            points = _box((2 * shape.size[0], 2 * shape.size[0], shape.size[1]))
-        case "sphere":
-            points = _box((2 * shape.size[0],) * 3)
-        case _:
-            return np.zeros((0, 3))
-    return np.array(shape.pose.xyz) + points @ matrix_of(shape.pose.rpy).T
-
-
-def _box(size: tuple[float, ...]) -> Array:
-    return np.array(list(product((-0.5, 0.5), repeat=3))) * size
+    ways = (aside, -aside), (np.cross(along, aside), np.cross(aside, along))
+    reaches = [[max((reach_along(*part, way) for part in placed), default=0.0) for way in both] for both in ways]
+    return max(0.0, *map(sum, reaches)) / 2
 
 
 ROUND = ("cylinder", "sphere")
 
 
 def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
-    """The drive, with the radius of wheels without a round collision shape measured on their other shapes. That of
-    round ones stays 0: it is read from the links.
+    """The drive, with the wheel dimensions that the file omits measured on the robot's links.
 
-    Raises RobotError at `plugin` for a joint used for two wheels, and for wheels whose radius or separation is
-    neither given nor measurable.
+    Raises RobotError at `plugin` for a joint used for two wheels, and for a dimension that is neither given nor
+    measurable.
     """
     wheels = drive.mechanism
     if isinstance(wheels, Planar | Omni | Pushed):
@@ -276,75 +245,73 @@ def measured(drive: Drive, plugin: Tag, robot: RobotModel) -> Drive:
     if isinstance(wheels, Balancing):
         _check_round((*left, *right), plugin, robot)
         return drive
-    _check_apart(wheels, plugin, robot)
-    if wheels.radius:
-        return drive
-    link, radius = _first_radius(left[0], plugin, robot)
-    return drive if _round(link) else replace(drive, mechanism=structs.replace(wheels, radius=radius))
+    found = {"separation": wheels.separation or _apart(left, right, "wheel_separation", plugin, robot)}
+    if isinstance(wheels, Mecanum):
+        front, back = (wheels.front_left, wheels.front_right), (wheels.back_left, wheels.back_right)
+        found["wheelbase"] = wheels.wheelbase or _apart(front, back, "wheelbase", plugin, robot)
+    found["radius"] = wheels.radius or _radius(left[0], plugin, robot)
+    return replace(drive, mechanism=structs.replace(wheels, **found))
+
+
+ONE_EACH = "; each wheel needs a joint of its own"
 
 
 def _check_once(left: tuple[str, ...], right: tuple[str, ...], plugin: Tag) -> None:
     for name in left:
         if name in right:
-            problem = f"has the joint {cut(name)} on the left and on the right"
-            raise plugin.wrong(f"{problem}; each wheel turns on a joint of its own")
+            raise plugin.wrong(f"has the joint {cut(name)} on the left and on the right{ONE_EACH}")
     for side, names in (("left", left), ("right", right)):
         for name in names:
             if names.count(name) > 1:
-                raise plugin.wrong(f"has the joint {cut(name)} twice on the {side}; each wheel turns on its own")
+                raise plugin.wrong(f"has the joint {cut(name)} twice on the {side}{ONE_EACH}")
 
 
 def _check_round(names: tuple[str, ...], plugin: Tag, robot: RobotModel) -> None:
     for name in names:
         link = robot.links[robot.joints[name].child]
-        if _round(link) < SMALLEST:
+        if round_radius(link) < SMALLEST:
             problem = f"balances on the wheel {cut(link.name)}, whose collision shapes are not round"
             raise plugin.wrong(f"{problem}; give it a <cylinder> with a radius of {SMALLEST:g} m or more")
 
 
-def _check_apart(wheels: Differential | Mecanum, plugin: Tag, robot: RobotModel) -> None:
-    left, right = sides_of(wheels)
-    if not wheels.separation and _apart(left, right, 1, robot) < SMALLEST:
-        raise _missing_tag(plugin, "wheel_separation", "its left and right wheels are at the same y")
-    if isinstance(wheels, Mecanum) and not wheels.wheelbase:
-        front, back = (wheels.front_left, wheels.front_right), (wheels.back_left, wheels.back_right)
-        if _apart(front, back, 0, robot) < SMALLEST:
-            raise _missing_tag(plugin, "wheelbase", "its front and back wheels are at the same x")
+APART = {"wheel_separation": (1, "left and right", "y"), "wheelbase": (0, "front and back", "x")}
+"""Tag of a distance between wheels -> the index of its axis in the root frame, which wheels, and the axis's name."""
 
 
-def _apart(some: tuple[str, ...], others: tuple[str, ...], axis: int, robot: RobotModel) -> float:
-    """Metres between the mean positions of two groups of wheels, along an axis of the root frame."""
-    frames = link_frames(robot)
+def _apart(some: tuple[str, ...], others: tuple[str, ...], tag: str, plugin: Tag, robot: RobotModel) -> float:
+    """Metres between the mean positions of two groups of wheels, which `tag` would give."""
+    frames, (axis, which, along) = link_frames(robot), APART[tag]
     places = [[frames[robot.joints[name].child].xyz[axis] for name in names] for names in (some, others)]
     one, other = (sum(values) / len(values) for values in places)
+    if abs(one - other) < SMALLEST:
+        raise _missing_tag(plugin, tag, f"its {which} wheels are at the same {along}")
     return abs(one - other)
 
 
-def _first_radius(name: str, plugin: Tag, robot: RobotModel) -> tuple[Link, float]:
-    """The wheel on joint `name`, and its radius in metres."""
-
+def _radius(name: str, plugin: Tag, robot: RobotModel) -> float:
+    """The radius in metres of the wheel on joint `name`."""
     joint = robot.joints[name]
     link = robot.links[joint.child]
-    radius = _round(link) or radius_across(link, joint.axis)
+    radius = round_radius(link) or radius_across(link, joint.axis)
     if radius < SMALLEST:
         problem = f"its wheel {cut(link.name)} has no shape with a radius of {SMALLEST:g} m or more"
         raise _missing_tag(plugin, "wheel_radius" if kind_of(plugin).startswith("gz:") else "wheel_diameter", problem)
-    return link, radius
+    return radius
 
 
-def _round(link: Link) -> float:
+def round_radius(link: Link) -> float:
     """The radius of the first round collision shape in metres; 0 without one."""
     return next((shape.size[0] for shape in link.collisions if shape.kind in ROUND), 0.0)
 
 
 def _missing_tag(plugin: Tag, tag: str, reason: str) -> RobotError:
-    """`tag` as gz-sim and ROS 2 spell it."""
+    """The error for a missing `tag`, which is spelt as in gz-sim and ROS 2."""
     head, *rest = tag.split("_")
     either = "" if kind_of(plugin).startswith("gz:") else f", or <{head}{''.join(map(str.title, rest))}> in ROS 1"
     return plugin.wrong(f"has no <{tag}>, and {reason}; give <{tag}>{either}, in metres")
 
 
-# The drive plugins of ROS and of its tutorials. Tags and defaults are those of gazebo_ros_planar_move.cpp,
+# The drive plugins of ROS and of its lessons. Tags and defaults are those of gazebo_ros_planar_move.cpp,
 # gazebo_ros_diff_drive.cpp and gazebo_ros_skid_steer_drive.cpp in ros-simulation/gazebo_ros_pkgs, in ROS 1 (noetic)
 # and ROS 2 (galactic), and of hector_gazebo's diffdrive_plugin_multi_wheel.cpp. Three things differ here: odometry
 # and its tf are published unless the file disables them; a stale command stops the robot; and wheel dimensions that
@@ -352,24 +319,23 @@ def _missing_tag(plugin: Tag, tag: str, reason: str) -> RobotError:
 
 
 TORQUE = 5.0  # N m
-FAST = 100.0  # Hz; odometry rate of all but planar_move
+WHEELED_RATE = 100.0  # Hz; default odometry rate of drives on wheels
+COVARIANCE = Drive().covariance
 SKID_COVARIANCE = (1e-4, 1e-4, 1e-2)
-SOURCES = {"encoder": True, "0": True, "world": False, "1": False}
+ENCODER = {"encoder": True, "0": True, "world": False, "1": False}
+"""Value of odometry_source -> whether odometry integrates the rotation of the wheels."""
 
 
 def planar_move(settings: Settings, joints: Joints, source: Source) -> Drive:
     """gazebo_ros_planar_move.cpp. Raises RobotError, like all of these."""
-    plain = Drive()
-    rate = settings.number(plain.odometry_rate, "odometry_rate", "publish_rate", zero=False)
-    return _ros_drive(settings, Planar(), rate, plain.covariance)
+    return _ros_drive(settings, Planar())
 
 
 def omni_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
-    """Ours: the robot's own wheels, with free rollers on their rims. Its tags are those of planar_move, and
+    """holozen's own: the robot's own wheels, with free rollers on their rims. Its tags are those of planar_move, and
     odometry_source.
     """
-    rate = settings.number(Drive().odometry_rate, "odometry_rate", "publish_rate", zero=False)
-    return _ros_drive(settings, Omni(_encoder(settings)), rate, Drive().covariance)
+    return _ros_drive(settings, Omni(_encoder(settings)))
 
 
 def diff_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
@@ -383,8 +349,7 @@ def diff_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
         left, right = right, left
     _check_pairs(settings, len(left), source)
     # Both versions publish the true pose unless set to use the encoders.
-    wheels = _differential(settings, left, right, encoder=_encoder(settings))
-    return _ros_drive(settings, wheels, _ros_rate(settings), Drive().covariance)
+    return _ros_drive(settings, _differential(settings, left, right, encoder=_encoder(settings)))
 
 
 def skid_steer(settings: Settings, joints: Joints, source: Source) -> Drive:
@@ -394,41 +359,40 @@ def skid_steer(settings: Settings, joints: Joints, source: Source) -> Drive:
         wheel_joint(settings, joints, source, name, name) for name in names
     )
     wheels = _differential(settings, (front_left, rear_left), (front_right, rear_right), encoder=False)
-    return _ros_drive(settings, wheels, _ros_rate(settings), SKID_COVARIANCE)
+    return _ros_drive(settings, wheels, SKID_COVARIANCE)
 
 
 def multi_wheel(settings: Settings, joints: Joints, source: Source) -> Drive:
     """diffdrive_plugin_multi_wheel.cpp: any number of wheels per side, in one tag per side."""
     left, right = (wheel_joints(settings, joints, source, f"{side}_joint", f"{side}_joints", f"{side}_joint")
                    for side in ("left", "right"))  # fmt: skip
-    return _ros_drive(
-        settings, _differential(settings, left, right, encoder=False), _ros_rate(settings), Drive().covariance
-    )
+    return _ros_drive(settings, _differential(settings, left, right, encoder=False))
 
 
 def balancing(settings: Settings, joints: Joints, source: Source) -> Drive:
     """The wheely_boi lesson's libwb_plugin.so, which has fixed joint names and no tags."""
     left, right = (turning(settings.owner, name, joints, source) for name in ("jointL", "jointR"))
-    return _ros_drive(settings, Balancing(left, right), _ros_rate(settings), Drive().covariance)
+    return _ros_drive(settings, Balancing(left, right))
 
 
 def _ros_drive(
     settings: Settings,
     mechanism: Planar | Differential | Omni | Balancing,
-    rate: float,
-    variances: tuple[float, float, float],
+    variances: tuple[float, float, float] = COVARIANCE,
 ) -> Drive:
     named = zip(("covariance_x", "covariance_y", "covariance_yaw"), variances, strict=True)
     x, y, yaw = (settings.number(variance, name) for name, variance in named)
-    publish = settings.flag("publish_odom", "publish_odometry", "publish_tf")
+    rate, tags = Drive().odometry_rate, ["odometry_rate", "publish_rate"]
+    if not isinstance(mechanism, Planar | Omni):
+        rate, tags = WHEELED_RATE, ["update_rate", *tags]
     return Drive(
         command_topic=settings.topic("cmd_vel", "command_topic"),
         odometry_topic=settings.topic("odom", "odometry_topic"),
         odometry_frame=settings.frame("odometry_frame") or "odom",
-        odometry_rate=rate,
+        odometry_rate=settings.number(rate, *tags, zero=False),
         robot_base_frame=settings.frame("robot_base_frame"),
         command_timeout=settings.timeout("cmd_timeout", "command_timeout"),
-        publish_odom=publish,
+        publish_odom=settings.flag("publish_odom", "publish_odometry", "publish_tf"),
         publish_odom_tf=settings.flag("publish_odom_tf", "publish_odometry_tf", "broadcast_transform", "broadcast_tf"),
         covariance=(x, y, yaw),
         odometry_from_start=_from_start(settings),
@@ -449,28 +413,23 @@ def _from_start(settings: Settings) -> bool:
 
 
 def _differential(settings: Settings, left: tuple[str, ...], right: tuple[str, ...], encoder: bool) -> Differential:
-    acceleration = settings.number(0.0, "wheel_acceleration", "max_wheel_acceleration")
     return Differential(
         left,
         right,
-        separation=settings.maybe_measure("wheel_separation"),
-        radius=settings.maybe_measure("wheel_diameter", least=2 * SMALLEST) / 2,
+        separation=settings.length("wheel_separation"),
+        radius=settings.length("wheel_diameter", least=2 * SMALLEST) / 2,
         torque=settings.number(TORQUE, "wheel_torque", "max_wheel_torque", "torque"),
         encoder=encoder,
-        acceleration=acceleration or math.inf,
+        acceleration=settings.number(0.0, "wheel_acceleration", "max_wheel_acceleration") or math.inf,
     )
-
-
-def _ros_rate(settings: Settings) -> float:
-    return settings.number(FAST, "update_rate", "odometry_rate", "publish_rate", zero=False)
 
 
 def _encoder(settings: Settings) -> bool:
     word = settings.word("odometry_source").lower() or "world"
-    if word not in SOURCES:
+    if word not in ENCODER:
         problem = f"is {cut(word)}; it must be encoder (0) or world (1)"
         raise settings.tag("odometry_source").wrong(problem)
-    return SOURCES[word]
+    return ENCODER[word]
 
 
 def _check_pairs(settings: Settings, pairs: int, source: Source) -> None:
@@ -480,7 +439,7 @@ def _check_pairs(settings: Settings, pairs: int, source: Source) -> None:
     for name in ("wheel_separation", "wheel_diameter"):
         values = settings.each(name)
         if len({tag.value() for tag in values}) > 1:
-            source.warn(values[1], "differs from the first; one measure is kept for all pairs, the first")
+            source.warn(values[1], "differs from the first; the first is used for all pairs of wheels")
 
 
 # The drive systems of gz-sim and Ignition Gazebo. Parameters and defaults are those of
@@ -489,7 +448,7 @@ def _check_pairs(settings: Settings, pairs: int, source: Source) -> None:
 
 
 RATE = 50.0  # Hz
-UNKEPT = ("min_jerk", "max_jerk", "min_linear_jerk", "max_linear_jerk", "min_angular_jerk", "max_angular_jerk")
+JERK_LIMITS = ("min_jerk", "max_jerk", "min_linear_jerk", "max_linear_jerk", "min_angular_jerk", "max_angular_jerk")
 
 
 def velocity_control(settings: Settings, joints: Joints, source: Source) -> Drive:
@@ -505,13 +464,13 @@ def gz_diff_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
     """DiffDrive: any number of wheels per side; odometry integrates their rotation."""
     left = wheel_joints(settings, joints, source, "", "left_joint")
     right = wheel_joints(settings, joints, source, "", "right_joint")
-    separation, radius = settings.maybe_measure("wheel_separation"), settings.maybe_measure("wheel_radius")
+    separation, radius = settings.length("wheel_separation"), settings.length("wheel_radius")
     return _gz_drive(settings, Differential(left, right, separation, radius), source)
 
 
 def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
-    """MecanumDrive: one wheel per corner. Motors turn wheels with rollers, which are links that turn on them; others
-    only turn as the robot moves.
+    """MecanumDrive: one wheel per corner. Wheels that carry rollers, as links of their own, are driven by motors;
+    others only turn as the robot moves.
     """
     corners = []
     for corner in ("front_left", "front_right", "back_left", "back_right"):
@@ -529,9 +488,9 @@ def mecanum_drive(settings: Settings, joints: Joints, source: Source) -> Drive:
         front_right,
         back_left,
         back_right,
-        separation=settings.maybe_measure("wheel_separation"),
-        wheelbase=settings.maybe_measure("wheelbase"),
-        radius=settings.maybe_measure("wheel_radius"),
+        separation=settings.length("wheel_separation"),
+        wheelbase=settings.length("wheelbase"),
+        radius=settings.length("wheel_radius"),
     )
     return _gz_drive(settings, wheels, source)
 
@@ -553,7 +512,7 @@ def with_publisher(drive: Drive, settings: Settings, source: Source) -> Drive:
 
 
 def _gz_drive(settings: Settings, mechanism: Mechanism, source: Source) -> Drive:
-    for name in UNKEPT:
+    for name in JERK_LIMITS:
         if settings.word(name):
             source.warn(settings.tag(name), "is ignored; velocity and acceleration are limited, jerk is not")
     return Drive(
@@ -588,9 +547,9 @@ def _frame(settings: Settings, name: str) -> str:
     return settings.frame(name).removeprefix(f"{_model(settings)}/")
 
 
-def _limit(settings: Settings, what: str, source: Source) -> float:
-    """The limit of `what` in both directions; the smaller where forwards and backwards differ."""
-    tags = [settings.tag(f"{end}_{what}", f"{end}_{what.partition('_')[2]}") for end in ("max", "min")]
+def _limit(settings: Settings, quantity: str, source: Source) -> float:
+    """The limit of a quantity, such as "linear_velocity"; the smaller one if forward and backward differ."""
+    tags = [settings.tag(f"{end}_{quantity}", f"{end}_{quantity.partition('_')[2]}") for end in ("max", "min")]
     values = [number(tag.value()) for tag in tags if tag.value()]
     for tag, sign in zip(tags, (1, -1), strict=True):
         value = number(tag.value()) if tag.value() else sign * math.inf
@@ -605,35 +564,29 @@ def _limit(settings: Settings, what: str, source: Source) -> float:
 # Plugins that sense; `sensors` reads them.
 
 
-SENSING = {
-    "gazebo_ros_imu": "imu",
-    "gazebo_ros_imu_sensor": "imu",
-    "hector_gazebo_ros_imu": "imu",
-    "hector_gazebo_ros_gps": "gps",
-    "gazebo_ros_gps_sensor": "gps",
-    "hector_gazebo_ros_magnetic": "magnetometer",
-    "hector_gazebo_ros_sonar": "sonar",
-    "gazebo_ros_f3d": "force_torque",
-    "gazebo_ros_ft_sensor": "force_torque",
-    "gazebo_ros_bumper": "contact",
-    "gazebo_ros_laser": "ray",
-    "gazebo_ros_gpu_laser": "gpu_ray",
-    "gazebo_ros_block_laser": "ray",
-    "gazebo_ros_ray_sensor": "ray",
-    "gazebo_ros_range": "ray",
-    "gazebo_ros_camera": "camera",
-    "gazebo_ros_multicamera": "multicamera",
-    "gazebo_ros_triggered_camera": "camera",
-    "gazebo_ros_prosilica": "camera",
-    "gazebo_ros_depth_camera": "depth",
-    "gazebo_ros_openni_kinect": "depth",
-    "gazebo_ros_velodyne_laser": "ray",
-}
-"""Plugin -> the kind of sensor that it is outside a `<sensor>`."""
+def _by_plugin(groups: Mapping[str, str]) -> dict[str, str]:
+    """Plugin -> its group, from groups with the plugins in each."""
+    return {plugin: group for group, plugins in groups.items() for plugin in plugins.split()}
+
+
+SENSING = _by_plugin({
+    "imu": "gazebo_ros_imu gazebo_ros_imu_sensor hector_gazebo_ros_imu",
+    "gps": "hector_gazebo_ros_gps gazebo_ros_gps_sensor",
+    "magnetometer": "hector_gazebo_ros_magnetic",
+    "sonar": "hector_gazebo_ros_sonar",
+    "force_torque": "gazebo_ros_f3d gazebo_ros_ft_sensor",
+    "contact": "gazebo_ros_bumper",
+    "ray": "gazebo_ros_laser gazebo_ros_block_laser gazebo_ros_ray_sensor gazebo_ros_range gazebo_ros_velodyne_laser",
+    "gpu_ray": "gazebo_ros_gpu_laser",
+    "camera": "gazebo_ros_camera gazebo_ros_triggered_camera gazebo_ros_prosilica",
+    "multicamera": "gazebo_ros_multicamera",
+    "depth": "gazebo_ros_depth_camera gazebo_ros_openni_kinect",
+})  # fmt: skip
+"""Plugin -> the kind of sensor that it makes where no `<sensor>` contains it."""
 
 
 # Forces. Tags and defaults are those of gazebo_ros_force.cpp in ros-simulation/gazebo_ros_pkgs, in ROS 1 (noetic) and
-# ROS 2 (galactic). One thing differs here: a force ends with the silence of its source.
+# ROS 2 (galactic). One thing differs here: a force ends when its source falls silent.
 
 
 FORCE = "gazebo_ros_force"
@@ -643,10 +596,10 @@ FRAMES = {"world": False, "link": True}
 def read_forces(
     robot: Tag, links: Mapping[str, Link], root: str, drive: Drive | None, source: Source
 ) -> tuple[Drive | None, tuple[Force, ...]]:
-    """The drive of a `<robot>` or `<model>`, and its force plugins: without another drive they are its drive.
+    """The drive and the force plugins of a `<robot>` or `<model>`; without another `drive` the forces are its drive.
 
-    One that names no link, or pushes what a planar drive moves, causes a warning. Raises RobotError for a frame that is
-    neither world nor link.
+    A force that names no link, or pushes a robot whose drive sets its velocity, causes a warning. Raises RobotError for
+    a frame that is neither world nor link.
     """
     plugins = [plugin for plugin in plugins_outside_sensors(robot) if kind_of(plugin) == FORCE]
     forces = [force for plugin in plugins if (force := _force(plugin, links, source))]
@@ -666,8 +619,8 @@ def _force(plugin: Tag, links: Mapping[str, Link], source: Source) -> Force | No
     tag = settings.tag("link_name", "body_name")
     if tag.value() not in links:
         near = source.suggest(tag.value(), links)
-        named = f"names the link {cut(tag.value())}, which does not exist{near}" if tag.value() else "is missing"
-        source.warn(tag, f"{named}; this force pushes nothing; links: {listed(list(links))}")
+        problem = f"names the link {cut(tag.value())}, which does not exist{near}" if tag.value() else "is missing"
+        source.warn(tag, f"{problem}; this force pushes nothing; links: {listed(links)}")
         return None
     frame = settings.word("force_frame") or "world"
     if frame not in FRAMES:
@@ -696,43 +649,22 @@ PUBLISHER = "gz:odometry-publisher"
 OMNI = "holozen_omni_drive"  # alone, or beside a planar_move, which drives a robot in Gazebo
 
 JOINTS = "joint_states is published anyway, and joints follow joint_command"
-STATES = "joint_states is published anyway"
-POSES = "odom and tf are published anyway"
-SERVER = "the sim does this itself"
 WHOLE = "--drive planar_move moves the robot as a whole"
-SLIP = "friction is that of <mu1> and <mu2>"
-INSTEAD = {
-    "gazebo_ros_control": JOINTS,
-    "gazebo_ros2_control": JOINTS,
-    "gz_ros2_control": JOINTS,
-    "ign_ros2_control": JOINTS,
-    "gz:joint-position-controller": JOINTS,
-    "gz:joint-trajectory-controller": JOINTS,
-    "gz:joint-controller": JOINTS,
-    "gazebo_ros_joint_pose_trajectory": JOINTS,
-    "gazebo_ros_joint_state_publisher": STATES,
-    "gz:joint-state-publisher": STATES,
-    "gazebo_ros_p3d": POSES,
-    "gz:pose-publisher": POSES,
-    "gz:physics": SERVER,
-    "gz:user-commands": SERVER,
-    "gz:scene-broadcaster": SERVER,
-    "roboticsgroup_gazebo_mimic_joint_plugin": "a URDF <mimic> does the same",
-    "gazebo_ros_state": SERVER,
-    "gazebo_ros_init": SERVER,
-    "gazebo_ros_factory": SERVER,
-    "gazebo_ros_tricycle_drive": WHOLE,
-    "gazebo_ros_ackermann_drive": WHOLE,
-    "gz:ackermann-steering": WHOLE,
-    "gz:tracked-vehicle": WHOLE,
-    "gazebo_ros_harness": "nothing holds the robot up",
-    "gazebo_ros_vacuum_gripper": "nothing is held",
-    "gazebo_ros_wheel_slip": SLIP,
-    "gz:wheel-slip": SLIP,
-    "gazebo_ros_projector": "images are not rendered",
-    "gazebo_ros_video": "images are not rendered",
-}
-"""Plugin that drives nothing -> what replaces it."""
+INSTEAD = _by_plugin({
+    JOINTS: "gazebo_ros_control gazebo_ros2_control gz_ros2_control ign_ros2_control gz:joint-position-controller"
+    " gz:joint-trajectory-controller gz:joint-controller gazebo_ros_joint_pose_trajectory",
+    "joint_states is published anyway": "gazebo_ros_joint_state_publisher gz:joint-state-publisher",
+    "odom and tf are published anyway": "gazebo_ros_p3d gz:pose-publisher",
+    "the sim does this itself": "gz:physics gz:user-commands gz:scene-broadcaster gazebo_ros_state gazebo_ros_init"
+    " gazebo_ros_factory",
+    "a URDF <mimic> does the same": "roboticsgroup_gazebo_mimic_joint_plugin",
+    WHOLE: "gazebo_ros_tricycle_drive gazebo_ros_ackermann_drive gz:ackermann-steering gz:tracked-vehicle",
+    "nothing holds the robot up": "gazebo_ros_harness",
+    "nothing is held": "gazebo_ros_vacuum_gripper",
+    "friction is that of <mu1> and <mu2>": "gazebo_ros_wheel_slip gz:wheel-slip",
+    "images are not rendered": "gazebo_ros_projector gazebo_ros_video",
+})  # fmt: skip
+"""Plugin that is not simulated -> what replaces it, or what is missing."""
 OF_SENSORS = ("gz:sensors", "gz:imu", "gz:contact")  # without these gz-sim runs no sensor; here they all run
 KNOWN = (*DRIVES, *INSTEAD, *SENSING, *OF_SENSORS, PUBLISHER, FORCE, OMNI)
 MOVING_ELSEWHERE = frozenset(name for name, reason in INSTEAD.items() if reason in (JOINTS, WHOLE))
@@ -755,7 +687,7 @@ def read_plugins(
         elif kind == OMNI:
             wheels = wheels or plugin
         elif kind == FORCE:
-            continue  # of `read_forces`
+            continue  # left to `read_forces`
         elif kind not in DRIVES:
             _warn_not_run(plugin, kind, source)
         elif drive is not None:
@@ -765,12 +697,12 @@ def read_plugins(
             drive, driver = measured(found, plugin, RobotModel("", root, links, joints, None)), plugin
     if wheels:
         if drive and not isinstance(drive.mechanism, Planar):
-            raise wheels.wrong(f"is a second drive, beside {cut(kind_of(driver))}; it goes with planar_move, or alone")
+            raise wheels.wrong(f"is a second drive beside {cut(kind_of(driver))}; use it with planar_move, or alone")
         found = omni_drive(Settings(wheels), joints, source)
         drive, driver = (replace(drive, mechanism=found.mechanism), driver) if drive else (found, wheels)
     if drive is None:
         for plugin in publishers:
-            source.warn(plugin, "publishes the odometry of a drive, but there is no drive")
+            source.warn(plugin, "publishes odometry, but the robot has no drive")
         return None
     for plugin in publishers:
         drive, driver = with_publisher(drive, Settings(plugin), source), plugin
@@ -778,7 +710,7 @@ def read_plugins(
 
 
 def plugins_outside_sensors(robot: Tag) -> Iterator[Tag]:
-    """Plugins outside sensors, at any depth below a `<gazebo>`, or directly below a `<model>`."""
+    """The plugins outside sensors, at any depth in a `<gazebo>`, or directly in a `<model>`."""
     waiting = [tag for tag in reversed(robot.children) if tag.name in ("gazebo", "plugin")]
     while waiting:
         tag = waiting.pop()
@@ -790,18 +722,10 @@ def plugins_outside_sensors(robot: Tag) -> Iterator[Tag]:
 
 def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
     if kind in INSTEAD:
-        source.warn(plugin, f"({_file(plugin)}) is not supported; {INSTEAD[kind]}")
+        source.warn(plugin, f"({shorten(file_of(plugin))}) is not supported; {INSTEAD[kind]}")
     elif kind not in (*SENSING, *OF_SENSORS):
-        near = source.suggest(kind, KNOWN, _own_name, alike=0.8) if kind else ""
-        source.warn(plugin, f"({_file(plugin) or 'no filename'}) is unknown and is ignored{near}")
-
-
-def _own_name(kind: str) -> str:
-    return kind.removeprefix("gazebo_ros_")
-
-
-def _file(plugin: Tag) -> str:
-    return shorten(file_of(plugin))
+        near = source.suggest(kind, KNOWN, lambda name: name.removeprefix("gazebo_ros_"), alike=0.8) if kind else ""
+        source.warn(plugin, f"({shorten(file_of(plugin)) or 'no filename'}) is unknown and is ignored{near}")
 
 
 def _with_known_frame(drive: Drive, plugin: Tag, links: Mapping[str, Link], root: str, source: Source) -> Drive:

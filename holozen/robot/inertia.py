@@ -1,4 +1,4 @@
-"""Mass and inertia: moments that a file omits or gets wrong, and links without mass."""
+"""Mass and inertia: moments of inertia that a file omits or gets wrong, and links without mass."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
@@ -7,7 +7,7 @@ from itertools import chain
 import numpy as np
 
 from holozen.robot.elements import Source, Tag
-from holozen.robot.model import Drive, Joint, Link, Planar, Pose, Shape, descend, sides_of
+from holozen.robot.model import Drive, Joint, Link, Moments, Planar, Pose, Shape, descend, sides_of
 from holozen.robot.rotation import Array, matrix_of, symmetric
 from holozen.robot.shapes import solid
 from holozen.suggest import cut, listed
@@ -15,7 +15,7 @@ from holozen.suggest import cut, listed
 # Moments of inertia of solid shapes, per mass: kg m^2 per kg.
 
 
-LEAST = 64.0  # times smaller than a solid body's: an eighth of its radius of gyration, for a cube 1/20 of its edge
+ABSURD = 64.0  # times smaller than those of the solid shape: an eighth of its radius of gyration
 
 Placed = tuple[Shape, Array, Array]
 """A shape; its frame's position (3,) in metres, and rotation (3, 3) whose columns are the frame's axes."""
@@ -41,11 +41,11 @@ def moments(placed: Iterable[Placed]) -> Array | None:
 def is_absurd(tensor: Array, mass: float, least: Array) -> bool:
     """Whether a tensor in kg m^2 is far below that of a solid body, `least` in m^2, about any of its axes."""
     given, own = np.linalg.eigvalsh(tensor), np.linalg.eigvalsh(least)
-    return bool((given * LEAST < mass * own).any())
+    return bool((given * ABSURD < mass * own).any())
 
 
 def _part(shape: Shape, position: Array, rotation: Array) -> tuple[float, Array, Array] | None:
-    """Volume, centre and tensor of one shape."""
+    """Volume in m^3, centre (3,) in metres and tensor (3, 3) per mass of one shape; None if it has no volume."""
     middle, (x, y, z), volume = np.zeros(3), (0.0, 0.0, 0.0), 0.0
     if shape.kind == "box":
         x, y, z = (edge * edge / 12 for edge in shape.size)
@@ -79,11 +79,11 @@ def positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz:
 NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def read_inertia(inertial: Tag, moment: float) -> tuple[float, float, float, float, float, float]:
+def read_inertia(inertial: Tag, moment: float) -> Moments:
     """The tensor of an `<inertial>`, whose moments are `moment` where it gives none; NO_INERTIA for one that is not
     positive definite: rejecting those would stop many students' robots. Raises RobotError.
     """
-    given = inertial.first("inertia") or inertial.empty("inertia")
+    given = inertial.child("inertia")
     xx, yy, zz = (given.number(name, moment) for name in ("ixx", "iyy", "izz"))
     xy, xz, yz = (given.number(name, 0.0) for name in ("ixy", "ixz", "iyz"))
     if min(xx, yy, zz) < 0:
@@ -92,8 +92,8 @@ def read_inertia(inertial: Tag, moment: float) -> tuple[float, float, float, flo
 
 
 def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool = False) -> Link:
-    """The link, with the moments of inertia of its solid collision shapes if its own are NO_INERTIA or far smaller, and
-    a warning unless `silent`. A link without shapes is unchanged: a point mass, if it has no inertia.
+    """The link; with the moments of inertia of its solid collision shapes if its own are NO_INERTIA or absurdly small,
+    and a warning unless `silent`. A link without such shapes is unchanged: without inertia it is a point mass.
     """
     part = link.inertial
     if inertial is None or part is None or not part.mass or not (link.collisions or part.inertia == NO_INERTIA):
@@ -122,7 +122,7 @@ def _warn(link: Link, inertial: Tag, shaped: bool, source: Source) -> None:
     source.warn(given or inertial, f"{wrong}; {taken}")
 
 
-def of_shapes(link: Link) -> tuple[float, float, float, float, float, float] | None:
+def of_shapes(link: Link) -> Moments | None:
     """The moments per mass of a link's solid collision shapes, (ixx, ixy, ixz, iyy, iyz, izz) in m^2 about their
     centre, in the link's axes; None without any.
     """
@@ -145,7 +145,7 @@ LIGHTEST = 1e-6  # kg; treated as zero by ignition::math::equal
 
 
 def massless(links: Mapping[str, Link], joints: Mapping[str, Joint], root: str) -> dict[str, str]:
-    """Link to drop -> the link that starts its dropped branch: itself, or one above it.
+    """Each link to drop -> the topmost link of its dropped branch.
 
     A robot without any mass keeps all its links: it can be displayed but not driven.
     """
@@ -223,7 +223,7 @@ def check_drive(
 def without(
     links: Mapping[str, Link], joints: Mapping[str, Joint], lost: Mapping[str, str]
 ) -> tuple[dict[str, Link], dict[str, Joint]]:
-    """The remaining links and joints; mimics of removed joints are cleared."""
+    """The links and joints without the `lost` ones; mimics of removed joints are cleared."""
     kept = {name: joint for name, joint in joints.items() if joint.child not in lost}
     free = {
         name: replace(joint, mimic=None) if joint.mimic and joint.mimic.joint not in kept else joint

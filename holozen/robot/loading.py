@@ -1,14 +1,13 @@
-"""Robot files -> a checked RobotModel, or a self-contained text. What is hostile in them is read in a process apart."""
+"""Robot files -> a checked RobotModel, or a self-contained text. Files are parsed in a process of their own."""
 
 import re
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from xml.parsers import expat
 
 from holozen.robot import reader
-from holozen.robot.elements import Source, repair_xml
+from holozen.robot.elements import Source, Tag, read_text, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.meshes import data_uri, file_uri
 from holozen.robot.model import RobotModel
@@ -16,58 +15,51 @@ from holozen.robot.packages import is_data, readable, readable_by_strangers, res
 from holozen.robot.sdf_models import parse_sdf
 from holozen.robot.sources import source_lines
 from holozen.robot.urdf import read_robot
-from holozen.robot.xacro import expanded, is_xacro, read_text
+from holozen.robot.xacro import XacroFile, expanded, is_xacro, unasked
 from holozen.suggest import cut
 
 
 def load(
-    path: Path,
-    args: Mapping[str, str] = {},
-    packages: Mapping[str, Path] = {},
-    strict: bool = False,
-    allow_env: Collection[str] = (),
+    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
 ) -> RobotModel:
-    """The robot in a xacro, URDF or SDF file. `args`, `packages` and `allow_env` as for `xacro.expand_xacro`. Raises
-    RobotError; with `strict` also for a missing or invalid mesh, otherwise replaced by a box with a warning.
+    """The robot in a xacro, URDF or SDF file. The arguments are those of XacroFile. A missing or invalid mesh is
+    replaced by a box, with a warning. Raises RobotError.
     """
-    return _loaded(path, args, packages, strict, allow_env, portable=False)[0]
+    return _loaded(XacroFile(path, args, packages, allow_env), strict=False, portable=False)[0]
 
 
 def both(
     path: Path, args: Mapping[str, str], packages: Mapping[str, Path], strict: bool, allow_env: Collection[str]
 ) -> tuple[RobotModel, str]:
-    """As `load`, and the text, expanded, that is the same robot on another machine: the URI of every collision mesh is
-    replaced by its hull, and of every visual one by the file itself, up to MOST_SHOWN. Other meshes have a warning.
+    """As `load`, and the robot's expanded text, from which another machine reads the same robot: its meshes are
+    embedded, see `with_meshes`. With `strict` a missing or invalid mesh is an error.
     """
-    return _loaded(path, args, packages, strict, allow_env, portable=True)
+    return _loaded(XacroFile(path, args, packages, allow_env), strict, portable=True)
 
 
-def _loaded(
-    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], strict: bool, allow_env: Collection[str],
-    portable: bool,
-) -> tuple[RobotModel, str]:  # fmt: skip
-    text, place, warnings = _written(path, args, packages, allow_env)
-    in_source = partial(_in_source, place, path, args, packages, allow_env)
+def _loaded(file: XacroFile, strict: bool, portable: bool) -> tuple[RobotModel, str]:
+    path, packages = file.path, file.packages
+    text, place, warnings = _written(file)
     try:
-        model, sent = reader.run(
+        model, portable_text = reader.run(
             tuple[RobotModel, str], path, _parsed, text, path, packages, place, strict, portable,
             readable=partial(readable, path, packages),
         )  # fmt: skip
     except RobotError as error:
-        raise RobotError(*in_source([str(error)])) from None
-    return replace(model, warnings=warnings + in_source(model.warnings)), sent
+        raise RobotError(*_in_source(place, file, [str(error)])) from None
+    return replace(model, warnings=warnings + _in_source(place, file, model.warnings)), portable_text
 
 
 def _parsed(
     text: str, path: Path, packages: Mapping[str, Path], place: str, strict: bool, portable: bool
 ) -> tuple[RobotModel, str]:
     model = parse(text, path, packages, place, strict)
-    sent, warnings = with_meshes(text, path, packages) if portable else ("", ())
-    return replace(model, warnings=model.warnings + warnings), sent
+    portable_text, warnings = with_meshes(text, path, packages) if portable else ("", ())
+    return replace(model, warnings=model.warnings + warnings), portable_text
 
 
 def received(text: str, packages: Mapping[str, Path] = {}) -> RobotModel:
-    """The robot in a text that came over the network. Raises RobotError."""
+    """The robot in a text received over the network. `packages` are those it may read files of. Raises RobotError."""
     origin = Path("resource_string")
     known = partial(readable_by_strangers, packages)
     return reader.run(
@@ -76,16 +68,14 @@ def received(text: str, packages: Mapping[str, Path] = {}) -> RobotModel:
     )  # fmt: skip
 
 
-def _written(
-    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
-) -> tuple[str, str, tuple[str, ...]]:
-    """The text of a file, expanded; how messages name it, and the warnings of its expansion."""
-    text = read_text(path)
-    if not is_xacro(path, text):
-        return text, "", ()
-    outcome = expanded(path, args, packages, allow_env)
-    # Where the line in the source is not known, messages give that of the expanded text.
-    return outcome.text, f"{path} (as `holozen xacro` prints it)", outcome.warnings
+def _written(file: XacroFile) -> tuple[str, str, tuple[str, ...]]:
+    """The text of a file, expanded; the name of the expanded text in messages; and the warnings of the expansion."""
+    text = read_text(file.path)
+    if not is_xacro(file.path, text):
+        return text, "", unasked(file.path, file.args)
+    outcome = expanded(file)
+    # Messages give the line of the expanded text where that of the source is unknown.
+    return outcome.text, f"{file.path} (as `holozen xacro` prints it)", outcome.warnings
 
 
 def parse(
@@ -97,7 +87,7 @@ def parse(
     confined: bool = False,
 ) -> RobotModel:
     """The robot in a URDF or SDF text. `origin` is the file of the text: relative paths and packages are resolved
-    from there, and messages name it, or `place` if given. `strict` as for `load`; `confined` is for text received
+    from there, and messages name it, or `place` if given. `strict` as for `both`; `confined` is for text received
     over the network, which may only open files of known packages. Raises RobotError.
     """
     source = Source(origin, packages, strict=strict, confined=confined)
@@ -109,22 +99,19 @@ def parse(
     return read_robot(tag, source)
 
 
-MOST_SECONDS = 3  # of the processor, for a text that was sent: the sim waits for it
-MESHES = {"collision": ["collision", "geometry", "mesh"], "visual": ["visual", "geometry", "mesh"]}
-MOST_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accepts MOST_TEXT in all
+MOST_SECONDS = 3  # s of processor time for a text received over the network: the sim waits for it
+USES = ("collision", "visual")
+MOST_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accepts MOST_TEXT characters in all
 
 _FILENAME = re.compile(rb"""\sfilename\s*=\s*("[^"]*"|'[^']*')""")
 
 
-def _in_source(
-    place: str, path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str],
-    messages: Sequence[str],
-) -> tuple[str, ...]:  # fmt: skip
-    """Messages about lines of the expanded text, which they call `place`, with the lines of the source instead."""
+def _in_source(place: str, file: XacroFile, messages: Sequence[str]) -> tuple[str, ...]:
+    """The messages, with each line of the expanded text (`place`) replaced by the source line that it comes from."""
     start = f"{place}, line "
     if not place or not any(start in message for message in messages):
         return tuple(messages)
-    lines = source_lines(path, args, packages, allow_env)
+    lines = source_lines(file)
 
     def named(found: re.Match[str]) -> str:
         return lines.get(int(found[1]), found[0])
@@ -133,14 +120,18 @@ def _in_source(
 
 
 def with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[str, tuple[str, ...]]:
-    """The text with its meshes in it, and warnings about visual ones that are too large or cannot be read."""
+    """The text with its meshes embedded as `data:` URIs, and warnings about those that are not: of a collision mesh the
+    convex hull, of a visual mesh the file itself, up to MOST_SHOWN characters in all.
+    """
     text, _ = repair_xml(text)
     data = text.encode()
     warnings: list[str] = []
     room = MOST_SHOWN
-    for use, start, end, uri in reversed(_Meshes(data).found):  # backwards, so that earlier positions stay valid
+    for use, start, end, uri in reversed([*_meshes(read_xml(text, str(path)), data)]):  # so earlier offsets stay valid
+        if not uri.strip() or is_data(uri):
+            continue
         try:
-            file = resolve_uri(uri, path, packages)
+            file = resolve_uri(uri := uri.strip(), path, packages)
         except RobotError:
             continue
         try:
@@ -155,41 +146,14 @@ def with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[st
     return data.decode(), tuple(reversed(warnings))
 
 
-class _Meshes:
-    """The URIs of meshes in a text: their use (collision or visual), first byte, end byte, and the URI."""
-
-    def __init__(self, data: bytes) -> None:
-        self.data = data
-        self.found: list[tuple[str, int, int, str]] = []
-        self._open: list[str] = []
-        self._text, self._inside = "", 0
-        self._parser = expat.ParserCreate("utf-8")
-        self._parser.StartElementHandler = self._start
-        self._parser.EndElementHandler = self._end
-        self._parser.CharacterDataHandler = self._characters
-        self._parser.Parse(data, True)
-
-    def _start(self, name: str, attributes: dict[str, str]) -> None:
-        self._open.append(name)
-        self._text = ""
-        at = self._parser.CurrentByteIndex
-        self._inside = self.data.index(b">", at) + 1
-        if (use := self._use(self._open)) and "filename" in attributes:
-            match = _FILENAME.search(self.data, at)
-            assert match is not None, "expat found the attribute"
-            self._note(use, match.start(1) + 1, match.end(1) - 1, attributes["filename"])
-
-    def _characters(self, text: str) -> None:
-        self._text += text
-
-    def _end(self, name: str) -> None:
-        if self._open[-1] == "uri" and (use := self._use(self._open[:-1])):
-            self._note(use, self._inside, self._parser.CurrentByteIndex, self._text)
-        self._open.pop()
-
-    def _use(self, names: list[str]) -> str:
-        return next((use for use, ends in MESHES.items() if names[-3:] == ends), "")
-
-    def _note(self, use: str, start: int, end: int, uri: str) -> None:
-        if uri.strip() and not is_data(uri):
-            self.found.append((use, start, end, uri.strip()))
+def _meshes(root: Tag, data: bytes) -> Iterator[tuple[str, int, int, str]]:
+    """The URI of each mesh in a text: its use (collision or visual), its first byte and its end, and the URI itself."""
+    for mesh in root.below("mesh"):
+        use = mesh.parent.parent.name if mesh.parent and mesh.parent.parent and mesh.parent.name == "geometry" else ""
+        if use not in USES:
+            continue
+        if "filename" in mesh.attributes and (match := _FILENAME.search(data, mesh.at)):
+            yield use, match.start(1) + 1, match.end(1) - 1, mesh.attributes["filename"]
+        for tag in mesh.all("uri"):
+            start = data.index(b">", tag.at) + 1
+            yield use, start, data.index(b"</", start), tag.text

@@ -22,6 +22,7 @@ import numpy.typing as npt
 
 from holozen.robot.elements import Tag, Vector, read_xml
 from holozen.robot.errors import RobotError
+from holozen.robot.model import Color
 from holozen.robot.rotation import Array, triple
 from holozen.suggest import cut
 
@@ -33,10 +34,9 @@ from holozen.suggest import cut
 
 
 COUNT = 250  # directions besides the six along the axes
-POINTS_AT_ONCE = (
-    340  # points; with more the linear algebra library starts threads, which slow each other down on a busy machine
-)
-FARTHEST = 1e9  # of a coordinate; larger values are mistakes
+# points; with more the linear algebra library starts threads, which slow each other down on a busy machine
+POINTS_AT_ONCE = 340
+FARTHEST = 1e9  # largest coordinate; larger ones are mistakes
 THIN = 1e-4  # m; a hull thinner than this is not a solid ...
 THICK = 1e-3  # m; ... and is made this thick
 
@@ -54,7 +54,9 @@ ALL = np.arange(COUNT)
 
 
 def extremes(parts: Iterable[Array], place: str) -> Array:
-    """The farthest points (k, 3) of all parts (n, 3), k <= 256; empty for empty input. Raises RobotError for NaN."""
+    """The farthest points (k, 3) of all parts (n, 3), k <= 256; empty for empty input. Raises RobotError for a
+    coordinate that is not finite, or beyond FARTHEST.
+    """
     farthest: _Farthest | None = None
     with np.errstate(all="ignore"):  # numpy would warn about the NaN that is checked for here
         for part in parts:
@@ -89,7 +91,9 @@ class _Farthest:
 
 
 def solid(points: Array, place: str) -> Array:
-    """The points (n, 3) in metres, doubled to both sides if they lie in a plane. Raises RobotError for a line."""
+    """The points (n, 3) in metres; if they lie in a plane, a copy of them on each side of it. Raises RobotError if they
+    lie on a line.
+    """
     away = points - points.mean(axis=0)
     axes = np.linalg.svd(away, full_matrices=False)[2]
     spans = np.ptp(away @ axes.T, axis=0)
@@ -111,13 +115,13 @@ def _check(part: Array, place: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Surface:
-    """Points (n, 3) in metres that its triangles use: (m, 3) of their indexes; None: three by three, as they come.
-    `color` is that of the file, if it has one: red, green, blue, alpha.
+    """Points (n, 3) in metres, and triangles (m, 3) as indices into them; None: every three points are a triangle.
+    `color` is the one that the file gives, if any.
     """
 
     points: Array
     triangles: npt.NDArray[np.int64] | None = None
-    color: tuple[float, float, float, float] | None = None
+    color: Color | None = None
 
 
 # STL, binary and ASCII -> triangles.
@@ -141,7 +145,7 @@ def read_stl(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
         yield from map(Surface, _ascii(file, head, place))
     elif len(head) < HEAD or size < whole:
         expected = f"{count} triangles take {whole}" if len(head) == HEAD else f"the head alone takes {HEAD}"
-        raise RobotError(f"{place}: is cut off: it has {size} bytes, and {expected}; export it again as STL")
+        raise RobotError(f"{place}: is truncated: it has {size} bytes, but {expected}; export it again as STL")
     else:
         yield from map(Surface, _binary(file, count))
 
@@ -171,7 +175,7 @@ def _ascii(file: BinaryIO, head: bytes, place: str) -> Iterator[Array]:
         if len(part):
             yield part
     if count % 3 or b"endsolid" not in rest:
-        raise RobotError(f"{place}: is cut off: it does not end with 'endsolid'; export it again as STL")
+        raise RobotError(f"{place}: is truncated: it does not end with 'endsolid'; export it again as STL")
 
 
 def _ascii_corners(text: bytes, place: str) -> Array:
@@ -199,7 +203,7 @@ def read_obj(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
             elif line.startswith(FACE):
                 corners = _face_corners(line.split()[1:], len(vertices) // 3)
                 if len(corners) < 3:
-                    corners += corners[-1:] * (3 - len(corners))  # of no area, but they count for the hull
+                    corners += corners[-1:] * (3 - len(corners))  # no area, but part of the hull
                 for second, third in pairwise(corners[1:]):
                     used.extend((corners[0], second, third))
         except OverflowError:
@@ -264,7 +268,7 @@ def read_dae(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
 
 
 def _unit(root: Tag) -> float:
-    unit = next(root.below("unit"), Tag("unit", {}, root.place, root))
+    unit = next(root.below("unit"), root.empty("unit"))
     meter = unit.number("meter", 1.0)
     if meter <= 0:
         raise unit.wrong(f"meter is {meter:g}; a length must be positive")
@@ -272,17 +276,17 @@ def _unit(root: Tag) -> float:
 
 
 def _up(root: Tag) -> str:
-    tag = next(root.below("up_axis"), Tag("up_axis", {}, root.place, root))
+    tag = next(root.below("up_axis"), root.empty("up_axis"))
     up = tag.text.strip() or "Y_UP"
     if up not in UP:
-        raise tag.wrong(f"is {cut(up)}; there are {', '.join(UP)}")
+        raise tag.wrong(f"is {cut(up)}; it must be one of {', '.join(UP)}")
     return up
 
 
 @dataclass(slots=True)
 class _Scene:
-    """The elements of a file by kind and id, and the surfaces of geometries that were read, each with the symbol of
-    its material.
+    """The elements of a file by kind and id, and the surfaces of each geometry read so far, with the symbol of their
+    material.
     """
 
     elements: dict[tuple[str, str], Tag]
@@ -290,13 +294,8 @@ class _Scene:
 
     @classmethod
     def of(cls, root: Tag) -> "_Scene":
-        elements: dict[tuple[str, str], Tag] = {}
-        waiting = [root]
-        while waiting:
-            tag = waiting.pop()
-            elements[tag.name, tag.attributes.get("id", "")] = tag
-            waiting += tag.children
-        return cls(elements)
+        tags = [tag for tag in root.walk() if "id" in tag.attributes]
+        return cls({(tag.name, tag.attributes["id"]): tag for tag in reversed(tags)})  # of duplicates, the first
 
     def named(self, kind: str, tag: Tag, attribute: str = "url") -> Tag:
         """The element that an attribute such as url="#deck" refers to."""
@@ -308,8 +307,8 @@ class _Scene:
 
     def placed(self, root: Tag) -> Iterator[tuple[Tag, Array, Tag]]:
         """Each `<geometry>` of the scene, its 4 x 4 frame, and the element that places it there."""
-        scene = root.first("scene") or Tag("scene", {}, root.place, root)
-        waiting = [(self.named("visual_scene", tag), np.eye(4)) for tag in scene.all("instance_visual_scene")]
+        scenes = root.child("scene").all("instance_visual_scene")
+        waiting = [(self.named("visual_scene", tag), np.eye(4)) for tag in scenes]
         for _ in range(MOST_NODES):
             if not waiting:
                 return
@@ -329,8 +328,8 @@ class _Scene:
         bind = skin.first("bind_shape_matrix")
         return self.named("geometry", skin, "source"), frame if bind is None else frame @ _matrix(bind), tag
 
-    def color(self, instance: Tag, symbol: str) -> tuple[float, float, float, float] | None:
-        """The diffuse colour that a geometry's material has where it is placed; None for a texture, or none."""
+    def color(self, instance: Tag, symbol: str) -> Color | None:
+        """The diffuse colour of a geometry's material where it is placed; None if it has none or is a texture."""
         bound = (tag for tag in instance.below("instance_material") if tag.attributes.get("symbol") == symbol)
         try:
             material = self.named("material", next(bound), "target")
@@ -369,10 +368,8 @@ class _Scene:
         if not inputs:
             raise vertices.wrong("has no <input semantic='POSITION'>")
         source = self.named("source", inputs[0], "source")
-        values = source.first("float_array")
-        if values is None:
-            raise source.wrong("has no <float_array>")
-        accessor = next(source.below("accessor"), Tag("accessor", {}, source.place, source))
+        values = source.needed("float_array")
+        accessor = next(source.below("accessor"), source.empty("accessor"))
         start, stride = int(accessor.number("offset", 0.0)), int(accessor.number("stride", 3.0))
         if start < 0 or stride < 3:
             raise accessor.wrong(f"has offset {start} and stride {stride}; a position takes 3 numbers")
@@ -381,7 +378,7 @@ class _Scene:
 
 
 def _triples(_faces: Tag, corners: Array) -> Array:
-    missing = -len(corners) % 3  # of a triangle that is cut off: its corners count for the hull
+    missing = -len(corners) % 3  # the corners of a truncated triangle count for the hull
     return np.concatenate([corners, corners[-1:].repeat(missing)]).reshape(-1, 3)
 
 
@@ -405,7 +402,7 @@ def _polygons(faces: Tag, corners: Array) -> Array:
     tag = faces.first("vcount")
     counts = np.zeros(0) if tag is None else _numbers(tag, tag.text)
     if (len(counts) and counts.min() < 0) or counts.sum() != len(corners):
-        raise faces.wrong(f"has {len(corners)} corners, and <vcount> other numbers of them")
+        raise faces.wrong(f"has {len(corners)} corners, but <vcount> adds up to another number")
     whole = counts.astype(np.int64)
     fans = np.maximum(whole - 2, 0)
     first = np.repeat(np.cumsum(whole) - whole, fans)
@@ -417,7 +414,7 @@ def _polygons(faces: Tag, corners: Array) -> Array:
 _TRIANGLES: dict[str, Callable[[Tag, Array], Array]] = {
     "triangles": _triples, "polylist": _polygons, "polygons": _fan, "tristrips": _strip, "trifans": _fan,
 }  # fmt: skip
-"""Element -> what makes triangles (m, 3) of the corners in one of its <p>."""
+"""Element -> the function that turns the corners in one of its <p> into triangles (m, 3)."""
 
 
 def _transform(node: Tag) -> Array:
@@ -483,7 +480,7 @@ def _numbers(tag: Tag, text: str) -> npt.NDArray[np.float64]:
 T = TypeVar("T")
 UNSCALED = (1.0, 1.0, 1.0)
 MOST_DATA = 1_000_000  # characters of a data: URI; the hull of any mesh takes 6000
-POINTER = b"version https://git-lfs.github.com/spec/v1"  # the content of a placeholder for a file that was not fetched
+POINTER = b"version https://git-lfs.github.com/spec/v1"  # the start of a placeholder for a file that was not fetched
 
 Reader = Callable[[BinaryIO, int, str], Iterator[Surface]]
 READERS: dict[str, tuple[Reader, int]] = {
@@ -493,7 +490,7 @@ READERS: dict[str, tuple[Reader, int]] = {
 }
 """File name extension -> its reader, and the maximum size in bytes: what a slow machine reads in 10 s."""
 
-MOST_SHOWN = 20_000_000  # bytes of a visual mesh that is sent
+MOST_SHOWN = 20_000_000  # bytes of a visual mesh that is embedded
 KINDS = {".dae": "vnd.collada+xml", ".obj": "obj", ".stl": "stl"}  # file name extension -> media type below model/
 
 _FILE = re.compile(r"data:model/(vnd\.collada\+xml|obj|stl)\+gzip;base64,")
@@ -515,7 +512,7 @@ def bounds(path: Path, scale: Vector = UNSCALED) -> tuple[Vector, Vector]:
 
 
 def data_uri(path: Path) -> str:
-    """The unscaled hull of a mesh as text, in place of the file's name. Raises RobotError."""
+    """The unscaled hull of a mesh as a `data:` URI, to replace the file's name. Raises RobotError."""
     found = _checked(_extremes(*_identity(path)))
     return "data:model/stl;base64," + base64.b64encode(write_stl(found)).decode()
 
@@ -535,12 +532,12 @@ def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
 
 
 def file_uri(path: Path) -> str:
-    """The whole file of a mesh as text, compressed, in place of its name: what a viewer shows. Raises RobotError."""
+    """A whole mesh file, compressed, as a `data:` URI to replace its name, for viewers. Raises RobotError."""
     return _packed(*_identity(path))
 
 
 def file_in(uri: str) -> tuple[str, bytes]:
-    """The file name extension and the content of what `file_uri` made. Raises RobotError."""
+    """The file name extension and the content of the mesh file in a URI of `file_uri`. Raises RobotError."""
     head = _FILE.match(uri.lstrip())
     if head is None:
         raise RobotError(f"{cut(uri)} holds no mesh; write data:model/stl+gzip;base64,...")
@@ -555,7 +552,7 @@ def file_in(uri: str) -> tuple[str, bytes]:
 
 
 def surfaces_in(uri: str) -> Iterator[Surface]:
-    """The triangles of what `file_uri` made. Raises RobotError."""
+    """The triangles of the mesh file in a URI of `file_uri`. Raises RobotError."""
     suffix, content = file_in(uri)
     for part in READERS[suffix][0](io.BytesIO(content), len(content), f"the {suffix[1:]} mesh"):
         _check(part.points, f"the {suffix[1:]} mesh")
@@ -591,7 +588,7 @@ def _checked(found: T | str) -> T:
     return found
 
 
-# An error is cached as text, so that an invalid file is read only once as well.
+# Errors are cached too, as text, so that an invalid file is read only once.
 
 
 @lru_cache(maxsize=1024)

@@ -19,17 +19,20 @@ class Pose:
     rpy: Vector = (0.0, 0.0, 0.0)
 
 
+Moments = tuple[float, float, float, float, float, float]
+"""A tensor of inertia: ixx, ixy, ixz, iyy, iyz, izz."""
+
+
 @dataclass(frozen=True, slots=True)
 class Inertial:
-    """Mass in kg and `(ixx, ixy, ixz, iyy, iyz, izz)` in kg m^2 about the centre of mass, in the axes of
-    `pose`.
+    """Mass in kg, and moments of inertia in kg m^2 about the centre of mass, in the axes of `pose`.
 
     `pose` is the inertial frame in the link's. The tensor is positive definite, or all zero for a point mass.
     """
 
     pose: Pose
     mass: float
-    inertia: tuple[float, float, float, float, float, float]
+    inertia: Moments
 
 
 Color = tuple[float, float, float, float]
@@ -118,7 +121,8 @@ class Joint:
     mimic: Mimic | None = None
 
 
-JOINT_KINDS = ("continuous", "revolute", "prismatic", "fixed", "floating", "planar")
+MOVING = ("continuous", "revolute", "prismatic")  # the kinds that are simulated; the others are treated as fixed
+JOINT_KINDS = (*MOVING, "fixed", "floating", "planar")
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +138,7 @@ class Force:
 
 
 class Pushed(Struct, frozen=True, tag=True):
-    """Only the forces of the model move it; cmd_vel does not."""
+    """The model is moved by its forces alone; cmd_vel has no effect."""
 
 
 class Planar(Struct, frozen=True, tag=True):
@@ -144,8 +148,8 @@ class Planar(Struct, frozen=True, tag=True):
 class Differential(Struct, frozen=True, tag=True):
     """Wheels on two sides: linear.x and angular.z are used, linear.y is ignored. Four or more make a skid-steer.
 
-    `left` and `right` name joints. `separation` between the sides and `radius` of the wheels are in metres; 0: measured
-    on the robot's links. `torque` in N m is the maximum of a wheel's motor, `acceleration` in m/s^2 the maximum
+    `left` and `right` name joints. `separation` between the sides and `radius` of the wheels are in metres; 0: not
+    measured yet. `torque` in N m is the maximum of a wheel's motor, `acceleration` in m/s^2 the maximum
     acceleration and deceleration of a wheel's rim. `encoder` is true if odometry integrates the wheels' rotation,
     false if it is the true pose.
     """
@@ -160,7 +164,7 @@ class Differential(Struct, frozen=True, tag=True):
 
 
 class Mecanum(Struct, frozen=True, tag=True):
-    """Four wheels with rollers at 45 degrees. Joints by position; metres; 0: measured on the robot's links.
+    """Four wheels with rollers at 45 degrees: the joint of each, and lengths in metres; 0: not measured yet.
     `encoder` as for Differential.
     """
 
@@ -185,8 +189,8 @@ class Mecanum(Struct, frozen=True, tag=True):
 
 
 class Omni(Struct, frozen=True, tag=True):
-    """Omni or mecanum wheels, three or more: it moves any way. They are the continuous joints with a level axle that
-    carry rollers; without such, those with a round collision shape. `encoder` as for Differential.
+    """Three or more omni or mecanum wheels: it moves in any direction. The wheels are the continuous joints with a
+    level axle that carry rollers; if there are none, those with a round collision shape. `encoder` as for Differential.
     """
 
     encoder: bool = False
@@ -220,10 +224,10 @@ class Drive:
     All defaults except the timeout are those of Gazebo's planar_move.
     Topics include their namespace and have no leading slash. `odometry_rate` in Hz of sim time.
     `robot_base_frame` names a link, the child frame of odometry. `command_timeout` in seconds; -1 disables
-    it. `covariance` is the variance of x and y in m^2 and of yaw in rad^2. Odometry is the pose in the world, or
-    `odometry_from_start` that since the start; `odometry_noise` is the standard deviation of what is added to its x, y
-    and yaw and to their rates, in m, rad, m/s and rad/s. The limits are those of the file, in m/s,
-    rad/s, m/s^2 and rad/s^2.
+    it. `covariance` is the variance of x and y in m^2 and of yaw in rad^2. Odometry is the pose in the world, or with
+    `odometry_from_start` relative to where the robot started; `odometry_noise` is the standard deviation of the noise
+    on x, y, yaw and their rates, in m, rad, m/s and rad/s. The limits are those of the file, in m/s, rad/s, m/s^2 and
+    rad/s^2.
     """
 
     command_topic: str = "cmd_vel"
@@ -257,7 +261,7 @@ NO_NOISE = Noise()
 
 @dataclass(frozen=True, slots=True)
 class Fan:
-    """`count` angles in rad, evenly from `first` to `last`."""
+    """`count` angles in rad, evenly spaced from `first` to `last`."""
 
     first: float = 0.0
     last: float = 0.0
@@ -265,13 +269,13 @@ class Fan:
 
     @property
     def step(self) -> float:
-        """From one to the next."""
+        """The angle in rad from one to the next; 0 for a single one."""
         return (self.last - self.first) / (self.count - 1) if self.count > 1 else 0.0
 
 
 class Lidar(Struct, frozen=True, tag=True):
     """Rays from `near` to `far` metres, at angles to the left of x and upwards. `noise` is added to the ranges.
-    `message` is "scan", "points", or "range" for the nearest of all, which is `infrared` or ultrasound.
+    `message` is "scan", "points", or "range": the nearest of all rays, of an `infrared` or an ultrasonic sensor.
     """
 
     horizontal: Fan
@@ -284,8 +288,8 @@ class Lidar(Struct, frozen=True, tag=True):
 
 
 class Imu(Struct, frozen=True, tag=True):
-    """Noise of x, y, z of the rotation rate (rad/s) and of the acceleration (m/s^2). `oriented`: whether it measures
-    its orientation too.
+    """Noise on x, y, z of the angular velocity (rad/s) and of the linear acceleration (m/s^2). `oriented`: whether the
+    orientation is measured too.
     """
 
     rate: tuple[Noise, Noise, Noise] = (NO_NOISE,) * 3
@@ -300,8 +304,8 @@ class Bumper(Struct, frozen=True, tag=True):
 class Camera(Struct, frozen=True, tag=True):
     """A pinhole camera that looks along x, y to the left of its picture; `width` and `height` in pixels,
     `field_of_view` across the width in rad, `near` and `far` in m. `encoding` is "rgb8" or "mono8"; `noise` is that of
-    a pixel from 0 to 1. Pictures, their CameraInfo and depth are published on the keys `image`, `info` and `depth`;
-    empty: not.
+    a pixel value from 0 to 1. Pictures, their CameraInfo and depth are published on the keys `image`, `info` and
+    `depth`, unless empty.
     """
 
     width: int
@@ -317,14 +321,14 @@ class Camera(Struct, frozen=True, tag=True):
 
     @property
     def compressed(self) -> str:
-        """The key of its pictures as JPEG."""
+        """The key of its pictures as JPEG; empty if it publishes no pictures."""
         return self.image and f"{self.image}/compressed"
 
 
 @dataclass(frozen=True, slots=True)
 class Sensor:
-    """A sensor at `pose` on `link`. What it measures is published on `topic`, with a namespace and without a leading
-    slash, at `rate` in Hz of sim time, in `frame`: a link, or a frame of its own at `mount` on its link.
+    """A sensor at `pose` on `link`. Its measurements are published on `topic`, which includes its namespace and has no
+    leading slash, at `rate` in Hz of sim time, in `frame`: a link, or a frame of its own at `mount` on its link.
     """
 
     name: str
@@ -350,11 +354,11 @@ MOST_PARTS = 1000  # links, and joints; far beyond what an engine simulates in r
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RobotModel:
-    """A tree of links from `root`, in file order. Two are equal only if they are one object, by which what is computed
-    for a model is kept for its copies in a fleet.
+    """A tree of links from `root`, in file order. Compared by identity, so that results cached for a model serve all
+    its copies in a fleet.
 
-    `drive` is None for a robot without a plugin that drives it. Each of `warnings` is a line that names file, line,
-    element and what was done instead. A `static` one never moves. `pose` is the one given by the file itself (SDF).
+    `drive` is None for a robot without a drive plugin. Each of `warnings` is a line that names file, line, element and
+    what was done instead. A `static` model never moves. `pose` is the one that the file itself gives (SDF).
     """
 
     name: str
@@ -370,12 +374,12 @@ class RobotModel:
 
 
 def takes(model: RobotModel, drive: str) -> bool:
-    """Whether a `--drive` is for this model: it has none, or omni wheels shall do what its planar_move does."""
+    """Whether `--drive` applies to a model: it has no drive, or its planar_move is to be done by omni wheels."""
     return model.drive is None or (drive == "omni" and isinstance(model.drive.mechanism, Planar))
 
 
 def driven(model: RobotModel, drive: str) -> RobotModel:
-    """The model with the `--drive` planar_move or omni on its root; one that has another drive keeps it."""
+    """The model with the drive that `--drive` names (planar_move or omni) on its root, if it `takes` one."""
     if not takes(model, drive):
         return model
     mechanism = Omni() if drive == "omni" else Planar()
@@ -390,8 +394,8 @@ GRAVITY = (0.0, 0.0, -9.8)  # m/s^2; Gazebo's default
 class WorldSpec:
     """A world: physics step in s, gravity in m/s^2, real-time factor, and warnings.
 
-    `ground` is a level plane at z = 0. `models` are everything else: each has its own `pose` in the world, and a
-    plane that is tilted or at another height is a static model.
+    `ground`: whether there is a level plane at z = 0. `models` are all others, each with its `pose` in the world; a
+    plane that is tilted or at another height is a static one.
     """
 
     name: str = "default"

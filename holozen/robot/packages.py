@@ -36,7 +36,7 @@ def find_package(name: str, start: Path, given: Mapping[str, Path] = {}) -> Path
 
 
 def find_named(name: str, start: Path, given: Mapping[str, Path] = {}) -> Path | None:
-    """As `find_package`, but only if the folder is identified as this package; else None."""
+    """As `find_package`, without its last resort; None if no folder is known to be this package."""
     if not PACKAGE_NAME.fullmatch(name):
         raise RobotError(f"{start}: {cut(name)} is not a package name; a name has letters, digits, '_' and '-' only")
     if name in given:
@@ -165,21 +165,23 @@ def _unknown(name: str, start: Path, given: Mapping[str, Path]) -> str:
     searched = [*folders_listed("AMENT_PREFIX_PATH"), *folders_listed("ROS_PACKAGE_PATH"), *folders_above(start)]
     known = packages_in(folders_listed("ROS_PACKAGE_PATH")) | local_packages(start) | dict(given)
     return (
-        f"{start}: there is no package {cut(name)}; packages found: {listed(list(known))};"
+        f"{start}: there is no package {cut(name)}; packages found: {listed(known)};"
         f" looked in {', '.join(map(str, searched)) or 'no folder'}; give its folder: --package {name[:80]}=DIR"
         f"{suggest(name, list(known))}"
     )
 
 
 def remember_folders() -> None:
-    """Look at each folder once from now on, for a process that later may not."""
+    """From now on read each folder and package.xml once only, and remember it: for a process that is about to lose
+    access to them.
+    """
     global _folders_in, _name_in_package_xml
     _folders_in, _name_in_package_xml = cache(_folders_in), cache(_name_in_package_xml)
 
 
 def readable(start: Path, given: Mapping[str, Path] = {}) -> list[str]:
-    """The files and folders that a robot or world file `start` may read, its own among them: what its reader may open
-    (see `reader.run`).
+    """The files and folders that a robot or world file `start` may use, itself included: those that the process reading
+    it may open (see `reader.run`).
     """
     around = [start.absolute().parent, *(folder / "models" for folder in folders_above(start))]
     folders = [*known_folders(start, given), *without_home(around), *_known_folders(given)]
@@ -198,7 +200,8 @@ def readable_by_strangers(given: Mapping[str, Path] = {}) -> list[str]:
 
 MOST_FOLDERS = 5000  # searched for a missing mesh in one package; bounds the search if a home folder looks like one
 MODEL_PATHS = ("GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH")
-VARIABLES = ("HOME", "AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", *MODEL_PATHS)  # of the environment, that find packages
+VARIABLES = ("HOME", "AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", *MODEL_PATHS)  # environment variables used for the search
+MARKS = ("model.config", "package.xml", "meshes")  # one of these is in the folder of a model or a package
 NOWHERE = Path("/")  # the origin of text received over the network: no package is above it
 
 _URI = re.compile(r"(?:([A-Za-z][A-Za-z0-9+.-]+)://)?(.*)", re.DOTALL)
@@ -287,37 +290,35 @@ def _places(scheme: str, rest: str, start: Path, given: Mapping[str, Path]) -> I
     for text in dict.fromkeys((rest, unquote(rest))):
         if scheme:
             name, _, inside = text.partition("/")
-            yield from (folder / inside.lstrip("/") for folder in _folders(name, start, given))
+            # The last resort of `find_package` if no folder has that name.
+            folders = _named_folders(name, start, given) or [find_package(name, start, given)]
+            yield from (folder / inside.lstrip("/") for folder in folders)
         else:  # joined to a folder, an absolute path is unchanged
             yield from (folder / text for folder in _own_folders(start))
-
-
-def _folders(name: str, start: Path, given: Mapping[str, Path]) -> list[Path]:
-    """Folders of the package or model; the last resort of `find_package` if none has that name."""
-    return _named_folders(name, start, given) or [find_package(name, start, given)]
 
 
 def _named_folders(name: str, start: Path, given: Mapping[str, Path]) -> list[Path]:
     named = find_named(name, start, given)
     models = [folder / name for folder in folders_listed(*MODEL_PATHS, absolute=True) if os.path.isdir(folder / name)]
-    models += [folder / name for folder in folders_above(start) if _is_model(folder / name)]
+    beside = (folder / name for folder in folders_above(start))
+    models += [folder for folder in beside if any(os.path.exists(folder / mark) for mark in MARKS)]
     return [*([named] if named else []), *models]
-
-
-def _is_model(folder: Path) -> bool:
-    """Whether a folder contains a file that marks a model or a package."""
-    return any(os.path.exists(folder / name) for name in ("model.config", "package.xml", "meshes"))
 
 
 def _own_folders(start: Path) -> list[Path]:
     """The folder of the robot file, and that of the robot's package if different."""
-    folder = Path(os.path.abspath(start if os.path.isdir(start) else start.parent))
+    folder = folder_of(start)
     return list(dict.fromkeys((folder, nearest_robot_folder(start) or folder)))
+
+
+def folder_of(start: Path) -> Path:
+    """The absolute folder of a file; of a folder, that one."""
+    return Path(os.path.abspath(start if os.path.isdir(start) else start.parent))
 
 
 def find_by_name(lost: str, start: Path, given: Mapping[str, Path] = {}) -> list[Path]:
     """The files with the name of `lost`, a path on another machine, in the packages given, in those around the robot
-    file `start`, or in its folder: first the one that shares most trailing parts of the path.
+    file `start`, and in its folder; sorted by how many trailing parts of the path they share, most first.
     """
     parts = re.split(r"[/\\]+", lost)
     roots = dict.fromkeys((*given.values(), *_own_folders(start), *local_packages(start).values()))
@@ -326,8 +327,8 @@ def find_by_name(lost: str, start: Path, given: Mapping[str, Path] = {}) -> list
 
 
 def instead_of(lost: str, matches: list[Path], how: str, write: str) -> str:
-    """A warning that the first of these files is used (`how`) instead of `lost`, what to write, and which others have
-    that name.
+    """A warning that the first of the files in `matches` is used instead of `lost` (`how`: "used" or "included"), what
+    to `write` for it, and which others have the same name.
     """
     found, *others = matches
     more = [f"{len(others) - 3} more"] if len(others) > 3 else []
@@ -338,7 +339,7 @@ def instead_of(lost: str, matches: list[Path], how: str, write: str) -> str:
 def portable_name(file: Path, start: Path, given: Mapping[str, Path] = {}, package: str = "$(find {})") -> str:
     """A portable replacement for a file's absolute path: `$(find NAME)/...`, or a path relative to `start`.
 
-    `package` is how a package's folder is written.
+    `package` is the form of a reference to a package, with {} for its name.
     """
     packages = {name: os.path.abspath(folder) for name, folder in (local_packages(start) | dict(given)).items()}
     own = nearest_robot_folder(start)

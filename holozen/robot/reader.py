@@ -1,7 +1,7 @@
-"""Runs a function on a hostile file in a process of its own, with limits of time and memory and no way out.
+"""Runs a function on an untrusted file in a process of its own, with limits on time, memory and access.
 
-A lasting process, forked from this one before it has threads, connections or keys, forks one more for each call. So a
-call needs no new interpreter, and the process that reads finds no secret in its memory.
+A server process, forked from this one before it has threads, connections or keys, forks a worker for each call. So a
+call starts no new interpreter, and a worker finds no secret in its memory.
 """
 
 import ctypes
@@ -32,12 +32,12 @@ from holozen.robot.sandbox import limit, restrict
 
 T = TypeVar("T")
 PROCESSOR_TIME = 20  # s of a call; the largest mesh that is read takes 10 on a slow machine
-PATIENCE = 60.0  # s, of one that waits or that a busy machine holds up
-MOST_MEMORY = 1_500_000_000  # bytes that a call may take beyond what is there: a mesh of 100 MB takes 700 MB
+PATIENCE = 60.0  # s of wall time of a call, which may sleep, or run on a busy machine
+MOST_MEMORY = 1_500_000_000  # bytes that a call may use beyond those of the server: a mesh of 100 MB takes 700 MB
 MOST_REPLY = 200_000_000  # bytes
 MOST_ASKED = 200  # questions of one call
 SUFFIXES = (".stl", ".obj", ".dae", ".sdf", ".world", ".urdf", ".xacro", ".config")
-"""The ends of the names of files outside of the known folders that may be read: a robot's, and no private data."""
+"""Suffixes of the files that may be read outside the known folders: a robot's, not private data."""
 
 _PDEATHSIG = 1  # of prctl
 _HEAD = struct.Struct("=iQ")  # exit code, or 0; bytes that follow
@@ -51,7 +51,7 @@ Handler = Callable[..., Any]
 
 
 class _Reply(NamedTuple):
-    """A value, else an `error`, else a question `asked`; and what the kernel `lacks`."""
+    """A value, an `error`, or a question `asked`; and the protection that the kernel `lacks`, if any."""
 
     error: str = ""
     asked: list[Any] | None = None
@@ -60,18 +60,18 @@ class _Reply(NamedTuple):
 
 
 class _Asked(BaseException):
-    """A question to the process outside. Not an Exception, so that no parser takes it for one of its own."""
+    """A question to the parent process. Not an Exception, so that no parser takes it for one of its own."""
 
     def __init__(self, *question: Any) -> None:
         self.question = question
 
 
-# In the process that asks.
+# In the parent process.
 
 
 def start(*_modules: object) -> None:
-    """Fork the lasting process, which has the modules that are imported by then. Call it before this process has
-    threads, connections or keys.
+    """Fork the server process, which has all modules imported by then: `_modules` are those to import first. Call it
+    before this process has threads, connections or keys.
     """
     server.start()
 
@@ -80,12 +80,13 @@ def run(
     kind: Any, what: object, function: Callable[..., T], *args: Any, readable: Callable[[], list[str]] = list,
     only_known: bool = False, seconds: int = PROCESSOR_TIME, handlers: Mapping[str, Handler] = {},
 ) -> T:  # fmt: skip
-    """`function(*args)`, a function of a module, in a process that reads nothing but `readable()`, files and folders
-    with all below; unless `only_known` also robot and mesh files elsewhere, by their real names. `kind` is the type of
-    its value, as msgspec checks it. `what` names the input in errors; `seconds` limits the processor's time.
+    """The value of `function(*args)`, a function of a module, called in a worker process. `kind` is the type of the
+    value, which msgspec checks. `what` names the input in errors; `seconds` limits the processor time.
 
-    What the function asks with `ask(name, ...)` is answered by `handlers[name]`, in this process. Raises RobotError,
-    also for the function's own errors, one that takes too long or too much memory, or crashes.
+    The worker can read only the files `readable()` and all below the folders in it; unless `only_known` also robot and
+    mesh files elsewhere, by their real names. `handlers[name]` answers its `ask(name, ...)`, in this process.
+
+    Raises RobotError for errors of the function, and if it takes too long or too much memory, or crashes.
     """
     if _inside:
         return function(*args)
@@ -104,17 +105,19 @@ def run(
                 value: T = msgspec.msgpack.decode(reply.value, type=kind, dec_hook=lambda kind, value: kind(value))
                 return value
             except (msgspec.MsgspecError, TypeError, ValueError):
-                raise RobotError(f"{what}: its reader was taken over, or has a bug: no {kind} was replied") from None
+                raise RobotError(f"{what}: its reader was compromised, or has a bug: the reply is no {kind}") from None
         name, *rest = reply.asked
         if len(answers) >= MOST_ASKED:
             raise RobotError(f"{what}: refers to more than {MOST_ASKED} files outside of its folder and known packages")
         if name not in handlers:
-            raise RobotError(f"{what}: its reader was taken over: it asked for {name!r}")
+            raise RobotError(f"{what}: its reader was compromised: it asked for {name!r}")
         answers[msgspec.msgpack.encode(reply.asked)] = handlers[name](*rest)
 
 
 def ask(name: str, *rest: Any) -> Any:
-    """For a function that runs in the process apart: what `handlers[name](*rest)` says outside, False without it."""
+    """The answer of `handlers[name](*rest)` in the parent process; False without such a handler. For functions that run
+    in a worker.
+    """
     if name not in _names:
         return False
     question = msgspec.msgpack.encode([name, *rest])
@@ -129,11 +132,11 @@ def _may_read(path: str) -> bool:
 
 @lru_cache
 def _warn(lacks: str) -> None:
-    report(f"warning: this kernel lacks {lacks}: a robot file that takes its reader over is not kept from other files")
+    report(f"warning: this kernel lacks {lacks}: a robot file that compromises its reader could read other files")
 
 
 class Server:
-    """The lasting process, from outside."""
+    """The server process, as the parent sees it."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -141,7 +144,7 @@ class Server:
         self._owner = 0
 
     def start(self) -> None:
-        """Fork it, unless it is there."""
+        """Fork it, unless this process has one."""
         if self._socket is not None and self._owner == os.getpid():
             return
         here, there = socket.socketpair()
@@ -151,13 +154,13 @@ class Server:
         self._socket, self._owner = here, os.getpid()
 
     def close(self) -> None:
-        """End the lasting process."""
+        """End the server process."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
     def call(self, what: str, seconds: int, request: bytes) -> _Reply:
-        """The reply to a request. Raises RobotError where none comes."""
+        """The reply to a request. Raises RobotError if there is none."""
         with self._lock:
             for _ in range(2):  # it may have been killed since the last call
                 self.start()
@@ -202,7 +205,7 @@ def _ended(code: int, seconds: int) -> str:
     return f"its reader crashed ({name})"
 
 
-# In the lasting process.
+# In the server process.
 
 
 def _serve(connection: socket.socket) -> NoReturn:
@@ -213,10 +216,10 @@ def _serve(connection: socket.socket) -> NoReturn:
             signal.signal(number, signal.SIG_DFL)
         ctypes.CDLL(None).prctl(_PDEATHSIG, signal.SIGKILL)
         _keep_only(connection.fileno())
-        gc.disable()  # what the parent had, such as connections, is not to be closed here
+        gc.disable()  # objects of the parent, such as connections, must not be closed here
         gc.freeze()
         with suppress(ImportError):
-            importlib.import_module("numpy.ma")  # numpy's unique would, in every process anew
+            importlib.import_module("numpy.ma")  # or numpy.unique would import it in each worker
         with suppress(OSError, EOFError):
             while True:
                 _, size = _HEAD.unpack(_received(connection, _HEAD.size))
@@ -235,7 +238,7 @@ def _keep_only(number: int) -> None:
 
 
 def _forked(request: bytes, connection: socket.socket) -> tuple[int, bytes]:
-    """Exit code (negative: a signal) and reply of a process that works on the request."""
+    """Exit code (negative: a signal) and reply of a worker for the request."""
     end, begin = os.pipe()
     if (child := os.fork()) == 0:
         try:
@@ -258,7 +261,7 @@ def _forked(request: bytes, connection: socket.socket) -> tuple[int, bytes]:
     return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]), bytes(found)
 
 
-# In the process that reads.
+# In a worker.
 
 
 _inside = False
@@ -279,22 +282,18 @@ def _work(request: bytes, end: int) -> NoReturn:
     lacks = restrict(allowed)
     sys.addaudithook(_Watch(allowed))
     try:
-        reply = _Reply(lacks=lacks, value=_packed(function(*args)))
+        reply = _Reply(lacks=lacks, value=msgspec.msgpack.encode(function(*args), enc_hook=str))  # str of a Path
     except _Asked as asked:
         reply = _Reply(lacks=lacks, asked=[*asked.question])
     except RobotError as error:
         reply = _Reply(lacks=lacks, error=str(error))
     except MemoryError:
         reply = _Reply(lacks=lacks, error=f"{what}: it takes more than {MOST_MEMORY >> 20} MB of memory to read")
-    except Exception as error:  # hostile input may cause any, and one of our own bugs must not end the sim
+    except Exception as error:  # a bug that untrusted input triggers must not end the sim
         reply = _Reply(lacks=lacks, error=f"{what}: it cannot be read: {type(error).__name__}: {error}")
     with os.fdopen(end, "wb") as file:
         file.write(msgspec.msgpack.encode(reply))
     os._exit(0)
-
-
-def _packed(value: Any) -> bytes:
-    return msgspec.msgpack.encode(value, enc_hook=str)  # a Path
 
 
 def _opened(question: bytes) -> str:
@@ -309,7 +308,7 @@ def _memory() -> int:
 
 
 class _Watch:
-    """An audit hook: asks outside before a file is opened that may not be read."""
+    """An audit hook: asks the parent before a file outside the `allowed` ones is opened."""
 
     def __init__(self, allowed: list[str]) -> None:
         self._roots = tuple(os.path.realpath(path) for path in allowed)

@@ -1,7 +1,7 @@
 """A robot as rigid bodies: frames, lumped masses and shapes, moving parts, and its height above the ground."""
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -12,9 +12,9 @@ from holozen.robot.errors import RobotError
 from holozen.robot.inertia import is_absurd, moments
 from holozen.robot.model import (
     HERE,
+    MOVING,
     Inertial,
     Joint,
-    Link,
     Mecanum,
     Planar,
     Pose,
@@ -30,10 +30,10 @@ from holozen.suggest import cut
 
 SMALLEST_MASS = 1e-6  # kg; an engine divides by the mass
 SMALLEST_GYRATION = 1e-3  # m; and by the moments of inertia, of which a point mass would have none
-MAX_JOINTS = 120  # of a robot with what is in its root; pybullet silently stops at 127
+MAX_JOINTS = 120  # parts of a robot, each with a joint or the root; pybullet silently stops at 127 joints
 MAX_SHAPES = 500  # of one entity: each that touches the ground costs the engine 50 us at every step
 FALLS = "has no collision shape and falls through the ground"
-FLEETS = 8  # models of which all copies share what was computed once
+FLEETS = 8  # models whose results are cached, for all their copies
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -72,6 +72,13 @@ class Frame:
     def quaternion(self) -> XYZW:
         """The rotation as x, y, z, w."""
         return quaternion_of(self.rotation)
+
+
+def compose(outer: Pose, inner: Pose) -> Pose:
+    """The pose `inner`, which is relative to `outer`, in the frame that `outer` is relative to."""
+    if outer == HERE:
+        return inner
+    return outer if inner == HERE else (Frame.of(outer) @ Frame.of(inner)).pose
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,7 +135,7 @@ def link_frames(model: RobotModel) -> dict[str, Frame]:
 def joint_axes(model: RobotModel) -> Mapping[str, Axis]:
     """Joint name -> its axis in the root frame, for the joints that turn or slide."""
     frames = link_frames(model)
-    moving = [joint for joint in model.joints.values() if joint.kind in ("continuous", "revolute", "prismatic")]
+    moving = [joint for joint in model.joints.values() if joint.kind in MOVING]
     return {
         joint.name: Axis(frames[joint.child].xyz, triple(frames[joint.child].rotation @ np.array(joint.axis)))
         for joint in moving
@@ -150,22 +157,25 @@ def lump(model: RobotModel) -> Body:
 
 def lump_links(model: RobotModel, frames: Mapping[str, Frame]) -> Body:
     """The links in `frames` as one body, in the frame that `frames` are relative to. Moments of inertia far below those
-    of its shapes are replaced by them: in an engine so light a body would spin.
+    of its solid shapes are replaced by theirs: in an engine such a body would spin.
     """
     links = [model.links[name] for name in frames]
     parts = [(frames[link.name] @ Frame.of(link.inertial.pose), link.inertial) for link in links if link.inertial]
     mass, centre, inertia = _sum(parts)
-    principals, axes = principal(_not_absurd(inertia, mass, links, frames))
+    placed = [(link, shape, frames[link.name] @ Frame.of(shape.pose)) for link in links for shape in link.collisions]
+    least = moments((shape, frame.position, frame.rotation) for _, shape, frame in placed)
+    if least is not None and is_absurd(inertia, mass, least):
+        inertia = mass * least
+    principals, axes = principal(inertia)
     principals = np.maximum(principals, mass * SMALLEST_GYRATION**2)
-    collisions = tuple(_collisions(links, frames))
+    collisions = tuple(placed_shape(link.name, shape, frame) for link, shape, frame in placed)
     weightless = sum(link.inertial.mass for link in links if link.inertial and not link.gravity)
     return Body(mass, triple(centre), triple(principals), quaternion_of(axes), collisions, weightless)
 
 
-def _not_absurd(inertia: Array, mass: float, links: list[Link], frames: Mapping[str, Frame]) -> Array:
-    placed = [(shape, frames[link.name] @ Frame.of(shape.pose)) for link in links for shape in link.collisions]
-    least = moments((shape, frame.position, frame.rotation) for shape, frame in placed)
-    return inertia if least is None or not is_absurd(inertia, mass, least) else mass * least
+def placed_shape(link: str, shape: Shape, frame: Frame) -> PlacedShape:
+    """A collision shape of a link as it is simulated, with its frame in the root frame."""
+    return PlacedShape(link, solid(shape), frame.xyz, frame.quaternion)
 
 
 def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
@@ -181,17 +191,7 @@ def _sum(parts: list[tuple[Frame, Inertial]]) -> tuple[float, Array, Array]:
     return mass, centre, inertia
 
 
-def _collisions(links: list[Link], frames: Mapping[str, Frame]) -> Iterable[PlacedShape]:
-    for link in links:
-        for shape in link.collisions:
-            frame = frames[link.name] @ Frame.of(shape.pose)
-            yield PlacedShape(link.name, solid(shape), frame.xyz, frame.quaternion)
-
-
 # Moving parts: links connected by fixed joints are one part.
-
-
-MOVING = ("continuous", "revolute", "prismatic")
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +199,7 @@ class Part:
     """Links that move together, in the frame of the topmost, `link`.
 
     `joint` moves it, None for the root's part; `parent` is the index of the part that carries it. `xyz` in metres and
-    the quaternion x, y, z, w `rotation` are where it is in that part's frame, its joint at zero.
+    the quaternion x, y, z, w `rotation` are its pose in that part's frame, with its joint at zero.
     """
 
     link: str
@@ -240,8 +240,8 @@ def _grouped(model: RobotModel, above: dict[str, Joint]) -> tuple[dict[str, str]
 
 
 def moved_by(joint: Joint, at: XYZ, rotation: XYZW, position: float) -> tuple[XYZ, XYZW]:
-    """Where a joint's child is in its parent (m, and a rotation), from where it is at zero, at a `position`: rad, or m
-    of a prismatic joint.
+    """The pose of a joint's child in its parent (m, quaternion) at a joint `position` in rad, or in m for a prismatic
+    joint; `at` and `rotation` are the pose at zero.
     """
     if joint.kind == "prismatic":
         (x, y, z), (dx, dy, dz) = at, rotate(rotation, joint.axis)
@@ -254,7 +254,7 @@ def simulated_parts(model: RobotModel) -> list[Part]:
     parts = assemble(model)
     if parts[0].body.mass < SMALLEST_MASS and not model.static:
         solid = next((link.name for link in model.links.values() if link.collisions), parts[0].link)
-        problem = f"{cut(model.name)} has no mass: neither {parts[0].link!r} nor what is fixed to it has any"
+        problem = f"{cut(model.name)} has no mass: neither {parts[0].link!r} nor any link fixed to it has one"
         raise RobotError(f"{problem}; give {solid!r} an <inertial>")
     if len(parts) > MAX_JOINTS:
         problem = f"{cut(model.name)} has {len(parts) - 1} moving joints"
@@ -324,18 +324,42 @@ def _surface(model: RobotModel, links: dict[str, Frame]) -> Surface:
 
 
 LEVEL = (0.0, 0.0, 0.0)
+DOWN = np.array((0.0, 0.0, -1.0))
+
+
+def farthest(shape: Shape, way: Array) -> Array | None:
+    """The point (3,) of a shape that is farthest along a unit vector, both in its own frame; None for a shape without
+    extent: a plane, or a missing mesh.
+    """
+    x, y, z = way.tolist()
+    match shape.kind:
+        case "box":
+            return np.copysign(shape.size, way) / 2
+        case "cylinder":
+            (radius, length), across = shape.size, math.hypot(x, y)
+            share = radius / across if across > 1e-9 else 0.0
+            return np.array((x * share, y * share, math.copysign(length / 2, z)))
+        case "sphere":
+            return shape.size[0] * way
+        case "hull" if shape.points:
+            return np.array(max(shape.points, key=lambda point: point[0] * x + point[1] * y + point[2] * z))
+    return None
+
+
+def reach_along(frame: Frame, shape: Shape, way: Array) -> float:
+    """How far in metres a shape in a frame reaches along a unit vector; minus infinity for one without extent."""
+    found = farthest(shape, way @ frame.rotation)
+    return -math.inf if found is None else float((frame.position + frame.rotation @ found) @ way)
 
 
 def lowest(model: RobotModel, rpy: Vector = LEVEL) -> float:
     """z in metres of the lowest collision point under the root frame, with all joints at zero and the root turned by
     `rpy` in radians; 0 without collision shapes.
     """
-    turned = Frame.of(Pose(rpy=rpy))
-    frames = {name: turned @ frame for name, frame in link_frames(model).items()}
+    down, frames = Frame.of(Pose(rpy=rpy)).rotation.T @ DOWN, link_frames(model)
     shapes = [(frames[link.name], shape) for link in model.links.values() for shape in link.collisions]
-    # Adding 0 turns -0 into 0 for printing.
-    low = min((_bottom(frame @ Frame.of(shape.pose), solid(shape)) for frame, shape in shapes), default=math.inf)
-    return low + 0.0 if math.isfinite(low) else 0.0
+    depth = max((reach_along(frame @ Frame.of(shape.pose), solid(shape), down) for frame, shape in shapes), default=0.0)
+    return 0.0 - depth if math.isfinite(depth) else 0.0  # 0 and not -0, for printing
 
 
 def reach(part: PlacedShape) -> float:
@@ -347,42 +371,3 @@ def reach(part: PlacedShape) -> float:
         x, y, z = rotate(conjugate(part.quaternion), part.xyz)
         return math.hypot(math.hypot(x, y) + radius, abs(z) + length / 2)
     return math.hypot(*part.xyz) + math.hypot(*part.shape.size) / (2 if part.shape.kind == "box" else 1)
-
-
-def _bottom(frame: Frame, shape: Shape) -> float:
-    """z of the lowest point of a shape. Infinity for planes and missing meshes, which support nothing."""
-    reach = _REACHES.get(shape.kind)
-    return math.inf if reach is None else float(frame.position[2]) - reach(shape, _up(frame))
-
-
-def _up(frame: Frame) -> Vector:
-    """The world's z axis in the shape's own frame."""
-    x, y, z = (float(value) for value in frame.rotation[2])
-    return x, y, z
-
-
-def _box(shape: Shape, up: Vector) -> float:
-    return sum(abs(part) * edge / 2 for part, edge in zip(up, shape.size, strict=True))
-
-
-def _cylinder(shape: Shape, up: Vector) -> float:
-    radius, length = shape.size
-    return abs(up[2]) * length / 2 + math.hypot(up[0], up[1]) * radius
-
-
-def _sphere(shape: Shape, up: Vector) -> float:
-    return shape.size[0]
-
-
-def _hull(shape: Shape, up: Vector) -> float:
-    x, y, z = up
-    return -min(a * x + b * y + c * z for a, b, c in shape.points)
-
-
-_REACHES: dict[str, Callable[[Shape, Vector], float]] = {
-    "box": _box,
-    "cylinder": _cylinder,
-    "sphere": _sphere,
-    "hull": _hull,
-}
-"""How far in metres a kind of shape reaches below its origin."""

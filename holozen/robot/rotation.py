@@ -61,8 +61,8 @@ def quaternion_of(matrix: Array) -> XYZW:
 def principal(inertia: Array) -> tuple[Array, Array]:
     """Principal moments (3,) of a symmetric 3x3 tensor, and the rotation whose columns are their axes.
 
-    Of the 24 right-handed ways to name the axes it takes the one next to x, y, z: a tensor that is diagonal
-    already keeps its order and gets the identity.
+    Of the 24 right-handed ways to name the axes, the one nearest to x, y, z: for a tensor that is diagonal already,
+    the rotation is the identity.
     """
     noise = 1e-12 * np.trace(inertia)
     moments, axes = np.linalg.eigh(np.where(np.abs(inertia) > noise, inertia, 0.0))
@@ -80,6 +80,6 @@ def symmetric(values: Sequence[float]) -> Array:
 
 
 def triple(values: Any) -> tuple[float, float, float]:
-    """Three plain floats, as engines want them."""
+    """Three values as plain floats, as engines require them."""
     x, y, z = (float(value) for value in values)
     return x, y, z

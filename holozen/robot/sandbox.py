@@ -1,4 +1,4 @@
-"""Permanently denies this process what a hostile file could use: files, the network, other processes.
+"""Permanently denies this process what an attacker could abuse: files, the network, other processes.
 
 Landlock (Linux 5.13 and later) limits the files, seccomp the system calls. Sources: the kernel's
 Documentation/userspace-api/landlock.rst and seccomp_filter.rst, and its tables of system calls.
@@ -41,8 +41,8 @@ _DENIED = {
         ),
     ),
 }  # fmt: skip
-"""Machine -> its number in a filter, and the numbers of the system calls that end with EPERM: Landlock does not cover
-all of what they do.
+"""Machine -> its number in a filter, and the numbers of the system calls that fail with EPERM, since Landlock does not
+cover all that they do.
 """
 
 
@@ -60,8 +60,9 @@ def limit(memory: int, seconds: int, file_size: int) -> None:
 
 
 def restrict(readable: Iterable[str]) -> str:
-    """From now on this process reads nothing but `readable`, files and folders with all below; it changes and executes
-    no file, opens no socket, and reaches no other process. Returns what the kernel lacks for that; empty if nothing.
+    """From now on this process can read nothing but the files `readable` and all below the folders in it; it can change
+    and execute no file, open no socket, and reach no other process. Returns what the kernel lacks for that; empty if
+    nothing.
     """
     library = ctypes.CDLL(None, use_errno=True)
     if library.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0):
@@ -89,7 +90,7 @@ def _landlock(library: ctypes.CDLL, readable: Iterable[str]) -> bool:
 
 
 def _allow(library: ctypes.CDLL, rules: int, path: str) -> None:
-    """Allow to read a path. One that does not exist, or cannot be opened, stays forbidden."""
+    """Allow reading a path. One that does not exist, or cannot be opened, stays forbidden."""
     try:
         place = os.open(path, os.O_PATH | os.O_CLOEXEC)
     except (OSError, ValueError):

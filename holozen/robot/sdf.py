@@ -1,24 +1,23 @@
-"""SDF elements -> values, shapes, links and joints, and `<include>` -> the model that its URI names."""
+"""SDF elements -> values, shapes, links and joints; and `<include>` -> the model that its URI names."""
 
 import math
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from itertools import product
 from pathlib import Path
 
-from holozen.robot.elements import SHORTEST, Source, Tag, Vector, check_size, read_xml
+from holozen.robot.elements import SHORTEST, Source, Tag, Vector, read_text, read_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.inertia import NO_INERTIA, read_inertia, with_moments
 from holozen.robot.model import Color, Inertial, Joint, Limits, Link, Pose, Shape, Surface
-from holozen.robot.packages import MODEL_PATHS, find_named, folders_above, folders_listed, local_packages
-from holozen.robot.rigid import Frame
+from holozen.robot.packages import MODEL_PATHS, find_named, folder_of, folders_above, folders_listed, local_packages
+from holozen.robot.rigid import Frame, compose
 from holozen.robot.rotation import triple
-from holozen.robot.shapes import SHAPES, SIZES, material_color, mesh_shape, needed, read_size
+from holozen.robot.shapes import SHAPES, SIZES, geometry_of, material_color, mesh_shape, read_size, tags
 from holozen.robot.urdf import read_dynamics, read_mimic
-from holozen.robot.xacro import read_text
 from holozen.rotation import to_rpy
 from holozen.suggest import cut
 
@@ -56,13 +55,6 @@ def read_pose(tag: Tag) -> Placed:
     # SDF 1.5 and 1.6 called it frame.
     within = pose.attributes.get("relative_to", pose.attributes.get("frame", "")).strip()
     return Placed(_pose(pose), within)
-
-
-def compose(outer: Pose, inner: Pose) -> Pose:
-    """The composition: `inner`, a pose relative to `outer`, relative to the frame that `outer` is relative to."""
-    if outer == Pose():
-        return inner
-    return outer if inner == Pose() else (Frame.of(outer) @ Frame.of(inner)).pose
 
 
 def _pose(tag: Tag) -> Pose:
@@ -111,16 +103,16 @@ KNOWN = {
 """Element -> its allowed children; elements not listed here may contain anything."""
 
 IN_WORLD = (
-    "model include light physics gravity frame gui scene state plugin audio wind magnetic_field atmosphere"
-    " spherical_coordinates"
-)
-NOT_SIMULATED = "actor population road joint"
+    "model", "include", "light", "physics", "gravity", "frame", "gui", "scene", "state", "plugin", "audio", "wind",
+    "magnetic_field", "atmosphere", "spherical_coordinates",
+)  # fmt: skip
+NOT_SIMULATED = ("actor", "population", "road", "joint")
 
 
 def check_known(tag: Tag, source: Source, warned: set[str]) -> None:
     """Warn about elements that SDF does not define, inside `tag` and below; once for each, recorded in `warned`.
 
-    Elements with a namespace prefix, as `a:b`, are custom and not checked.
+    Elements with a namespace prefix, such as `a:b`, are custom and not checked.
     """
     known = KNOWN[tag.name].split()
     for child in tag.children:
@@ -131,15 +123,15 @@ def check_known(tag: Tag, source: Source, warned: set[str]) -> None:
 
 
 def check_world(tag: Tag, source: Source, warned: set[str]) -> None:
-    """As `check_known`, for the elements directly in a world, and for those that are known but not simulated."""
+    """As `check_known`, for the elements directly in a world; also warns about those that are not simulated."""
     for child in tag.children:
-        if child.name in NOT_SIMULATED.split():
+        if child.name in NOT_SIMULATED:
             source.warn(child, "is not simulated and is left out")
-        elif child.name not in IN_WORLD.split():
-            _warn_unknown(tag, child, IN_WORLD.split(), source, warned)
+        elif child.name not in IN_WORLD:
+            _warn_unknown(tag, child, IN_WORLD, source, warned)
 
 
-def _warn_unknown(outer: Tag, child: Tag, known: list[str], source: Source, warned: set[str]) -> None:
+def _warn_unknown(outer: Tag, child: Tag, known: Iterable[str], source: Source, warned: set[str]) -> None:
     key = f"{outer.name} {child.name}"
     if ":" not in child.name and key not in warned:
         warned.add(key)
@@ -152,30 +144,26 @@ def _warn_unknown(outer: Tag, child: Tag, known: list[str], source: Source, warn
 
 AROUND, UPWARDS = 16, 9  # points of a round hull: per circle, and circles from pole to pole
 
-LEFT_OUT = ("heightmap", "polyline", "image")
+UNSUPPORTED = ("heightmap", "polyline", "image")
 
 
 def read_shape(tag: Tag, frame: Pose, source: Source) -> Shape | None:
-    """A `<visual>` or `<collision>` in the link whose own frame is `frame` in the model's link; None for one that is
-    empty or left out with a warning. Raises RobotError.
+    """A `<visual>` or `<collision>`; None if it is empty, or left out with a warning. `frame` is the pose of its
+    `<link>` element in the link that this becomes part of. Raises RobotError.
 
     A capsule, a cone and an ellipsoid become the hull of points on their surface, at most 2 % smaller in cross-section.
     """
     pose = compose(frame, read_pose(tag).pose)
-    geometry = needed(tag, "geometry")
-    known = [child for child in geometry.children if child.name in (*SIZES, *LEFT_OUT, "mesh", "empty")]
-    if not known:
-        found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
-        raise geometry.wrong(f"contains {found}; it must contain {_listed()} or <mesh>")
+    geometry = geometry_of(tag, SIZES, (*UNSUPPORTED, "empty"))
     color = _color(tag, source) if tag.name == "visual" else None
-    return _shape(known[0], tag.name, pose, color, source)
+    return _shape(geometry, tag.name, pose, color, source)
 
 
 def _shape(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) -> Shape | None:
     if tag.name == "empty":
         return None
-    if tag.name in LEFT_OUT:
-        source.warn(tag, f"({use}) is left out; use {_listed()} or <mesh>")
+    if tag.name in UNSUPPORTED:
+        source.warn(tag, f"({use}) is left out; use {tags(SIZES)} or <mesh>")
         return None
     if tag.name == "mesh":
         return _mesh(tag, use, pose, color, source)
@@ -187,10 +175,6 @@ def _shape(tag: Tag, use: str, pose: Pose, color: Color | None, source: Source) 
     if tag.name in SHAPES:
         return Shape(tag.name, size, pose, color=color)
     return Shape("hull", (), pose, color=color, points=tuple(_HULLS[tag.name](size)))
-
-
-def _listed() -> str:
-    return ", ".join(f"<{name}>" for name in SIZES)
 
 
 def _upon(normal: Vector) -> Pose:
@@ -264,7 +248,7 @@ class ModelFlags:
 
 
 def read_link(tag: Tag, name: str, frame: Pose, flags: ModelFlags, source: Source) -> Link:
-    """A `<link>` whose own frame is `frame` in the frame of the robot's link. Raises RobotError."""
+    """The link of a `<link>` element. `frame` is the element's pose in that link. Raises RobotError."""
     if flag(tag, "kinematic", False) and not flags.static:
         source.warn(tag, "is kinematic, which is not simulated; gravity and contacts act on it as on any link")
     visuals = [read_shape(visual, frame, source) for visual in tag.all("visual")]
@@ -287,10 +271,10 @@ def _inertial(tag: Tag, frame: Pose, static: bool, source: Source) -> Inertial |
             source.warn(tag, "has no <inertial>; as in Gazebo it is treated as 1 kg with 1 kg m^2 about each axis")
         return None if static else GAZEBOS_INERTIAL
     if inertial.attributes.get("auto", "false").strip().lower() in ("true", "1") and not static:
-        source.warn(inertial, "is automatic, which is not supported; write <mass> and <inertia>")
+        source.warn(inertial, 'has auto="true", which is not supported; write <mass> and <inertia>')
     mass = inertial.number("mass", 1.0)
     if mass < 0:
-        raise needed(inertial, "mass").wrong(f"is {mass} kg, which is negative")
+        raise inertial.child("mass").wrong(f"is {mass} kg, which is negative")
     if mass == 0 and not static:
         source.warn(inertial, "has no mass; the link is treated as massless, with no inertia")
     pose = compose(frame, read_pose(inertial).pose)
@@ -298,7 +282,7 @@ def _inertial(tag: Tag, frame: Pose, static: bool, source: Source) -> Inertial |
 
 
 def _surface(tag: Tag, self_collide: bool, source: Source) -> Surface:
-    """The surface of a link's first collision that has one; it holds for all collisions of the link."""
+    """The surface of the first collision that has one, which is used for all collisions of the link."""
     found = [surface for collision in tag.all("collision") if (surface := collision.first("surface"))]
     values = [tuple(_first(surface, paths) for paths in SURFACE.values()) for surface in found]
     if any(other != values[0] for other in values):
@@ -341,27 +325,25 @@ NOISE = 1e-12  # rounding error of a rotated unit vector
 
 
 def read_joint(tag: Tag, name: str, ends: tuple[str, str], frames: tuple[Frame, Frame], axis: Vector) -> Joint:
-    """A `<joint>` from a parent to a child link whose frames in the world are `frames`; `axis` is a unit vector there.
-
-    Raises RobotError.
+    """The joint of a `<joint>` element. `ends` are its parent and child link, `frames` theirs in the world, and `axis`
+    is a unit vector in the world. Raises RobotError.
     """
-    (parent, child), (outer, inner) = ends, frames
+    (parent, child), (outer, inner), axis_tag = ends, frames, tag.child("axis")
     kind, pose = kind_of(tag), (outer.inverse @ inner).pose
     if kind == "fixed":
         return Joint(name, kind, parent, child, pose, (1.0, 0.0, 0.0), Limits())
-    limits = _limits(tag)
+    limits = _limits(axis_tag)
     if kind == "revolute" and (limits.lower, limits.upper) == (-math.inf, math.inf):
         kind = "continuous"
     if kind == "continuous":
         limits = Limits(limits.effort, limits.velocity)
     turned = _clean(triple(inner.inverse.rotation @ axis))
-    return Joint(name, kind, parent, child, pose, turned, limits, *read_dynamics(_axis(tag)), read_mimic(_axis(tag)))
+    return Joint(name, kind, parent, child, pose, turned, limits, *read_dynamics(axis_tag), read_mimic(axis_tag))
 
 
 def has_spring(tag: Tag) -> bool:
     """Whether a joint has a spring. Raises RobotError."""
-    dynamics = _axis(tag).first("dynamics")
-    return dynamics is not None and dynamics.number("spring_stiffness", 0.0, most=math.inf) != 0
+    return tag.child("axis").child("dynamics").number("spring_stiffness", 0.0, most=math.inf) != 0
 
 
 def kind_of(tag: Tag) -> str:
@@ -382,7 +364,7 @@ def axis_of(tag: Tag, version: tuple[int, ...]) -> tuple[Vector, str]:
     """The unit vector a joint turns about or slides along, and the name of the frame it is expressed in; empty for
     the joint's own. Raises RobotError.
     """
-    axis = _axis(tag)
+    axis = tag.child("axis")
     xyz = axis.first("xyz")
     within = "" if xyz is None else xyz.attributes.get("expressed_in", "").strip()
     # Up to SDF 1.4 axes are in the model's frame, in 1.5 and 1.6 only if the flag is set.
@@ -391,12 +373,8 @@ def axis_of(tag: Tag, version: tuple[int, ...]) -> tuple[Vector, str]:
     return axis.direction("xyz", UP), within
 
 
-def _axis(tag: Tag) -> Tag:
-    return tag.first("axis") or tag.empty("axis")
-
-
-def _limits(tag: Tag) -> Limits:
-    limit = _axis(tag).first("limit") or tag.empty("limit")
+def _limits(axis: Tag) -> Limits:
+    limit = axis.child("limit")
     effort, velocity = (limit.number(name, -1.0, most=math.inf) for name in ("effort", "velocity"))
     lower, upper = (
         limit.number(name, bound, most=math.inf) for name, bound in (("lower", -ENDLESS), ("upper", ENDLESS))
@@ -443,9 +421,9 @@ _MODEL_NAME = re.compile(r"[\w .-]+")
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A `<model>` element with its SDF version, and the file that its URIs are relative to.
+    """A `<model>` element with its SDF version, and as `source` the file that its URIs are relative to.
 
-    `chain` is the chain of including files.
+    `chain` are the files that include it, outermost first.
     """
 
     tag: Tag
@@ -456,9 +434,9 @@ class Piece:
 
 @dataclass(slots=True)
 class Includes:
-    """Models by URI, each file read once; a text received over the network may use those of known folders only.
+    """Reads included models, each file once; a text received over the network may use those of known folders only.
 
-    `warned` holds what has been warned about already.
+    `warned` are the unknown elements that have had a warning.
     """
 
     count: int = 0
@@ -530,8 +508,6 @@ def _model_of(root: Tag, include: Tag, path: Path) -> Tag:
 
 def read_file(path: Path, source: Source) -> Tag:
     """The root of an SDF file; warnings go to `source`. Raises RobotError."""
-    if path.is_file():
-        check_size(path.stat().st_size, str(path))
     return source.read(read_text(path), str(path))
 
 
@@ -559,7 +535,7 @@ def _places(source: Source, uri: str) -> Iterator[Path]:
     """Candidate folders and files of the model, in order of preference."""
     scheme, _, rest = uri.rpartition("://")
     if scheme in ("", "file") and not source.confined:
-        yield _folder(source.origin) / rest
+        yield folder_of(source.origin) / rest
     if scheme in ("", "model", "package"):
         yield from _model_places(rest, source)
 
@@ -618,13 +594,9 @@ def _configured(config: Path) -> list[str]:
 
 
 def _own_name(uri: str, path: Path) -> dict[str, Path]:
-    """The name by which an included model's mesh URIs may refer to its own folder."""
+    """The package name by which the mesh URIs of an included model may refer to its own folder -> that folder."""
     name = uri.rpartition("://")[2].strip("/").partition("/")[0]
     return {name: path.parent} if path.parent.name == name else {}
-
-
-def _folder(origin: Path) -> Path:
-    return Path(os.path.abspath(origin if os.path.isdir(origin) else origin.parent))
 
 
 def _overridden(model: Tag, include: Tag, place: str) -> Tag:

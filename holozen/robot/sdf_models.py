@@ -63,27 +63,30 @@ class Frames:
         self._found = {WORLD: Frame.of(Pose())}
         self._roots: dict[str, str] = {}  # model -> its canonical link, by its local name
 
-    def add_model(self, tag: Tag, scope: str, name: str, within: str, pose: Pose, canonical: str) -> None:
-        """Add a model; `canonical` is empty if it has no canonical link. Raises RobotError for a duplicate name."""
-        self._add(whole(scope, name), _Node(tag, scope, within, pose, "", False))
+    def add_model(self, tag: Tag, scope: str, name: str, canonical: str) -> None:
+        """Add a model, with the local name of its canonical link, empty if it has none. Raises RobotError, as do the
+        methods below, for an invalid pose and for a duplicate name.
+        """
+        self._add(whole(scope, name), tag, scope)
         self._roots[whole(scope, name)] = canonical
 
-    def add_link(self, tag: Tag, scope: str, within: str, pose: Pose) -> None:
-        """Add a link; `pose` is relative to `within`, by default the model. Raises RobotError for a duplicate name."""
-        self._add(whole(scope, tag.word("name")), _Node(tag, scope, within, pose, "", True))
+    def add_link(self, tag: Tag, scope: str) -> None:
+        """Add a link; its pose is relative to the model unless it says otherwise."""
+        self._add(whole(scope, tag.word("name")), tag, scope, is_link=True)
 
-    def add_frame(self, tag: Tag, scope: str, within: str, pose: Pose, attached: str) -> None:
-        """Add a frame attached to `attached`, by default the model. Raises RobotError for a duplicate name."""
-        node = _Node(tag, scope, within or attached, pose, attached or "__model__", False)
-        self._add(whole(scope, tag.word("name")), node)
+    def add_frames(self, tag: Tag, scope: str) -> None:
+        """Add the `<frame>` elements of a model or a world; each is attached to the model unless it says otherwise."""
+        for frame in tag.all("frame"):
+            attached = frame.attributes.get("attached_to", "").strip()
+            self._add(whole(scope, frame.word("name")), frame, scope, attached, attached or "__model__")
 
-    def add_joint(self, tag: Tag, scope: str, within: str, pose: Pose, child: str) -> str:
-        """Add a joint's own frame, relative to its child unless `within` is given; returns its full name."""
+    def add_joint(self, tag: Tag, scope: str, child: str) -> str:
+        """Add a joint's own frame, relative to its child unless it says otherwise; returns its full name."""
         name = whole(scope, tag.word("name"))
         taken = self._nodes.get(name)
         if taken and taken.is_link:  # SDF 1.6 and older let a joint and a link share a name
             name = f"{name} "
-        self._add(name, _Node(tag, scope, within or child, pose, child, False))
+        self._add(name, tag, scope, child, child)
         return name
 
     def of(self, name: str) -> Frame:
@@ -122,6 +125,7 @@ class Frames:
         return found
 
     def _next(self, tag: Tag, name: str, node: _Node | None) -> str:
+        """The full name of the frame or link that the frame `name`, which is not a link, is attached to."""
         if node is not None and node.attached:
             return self._known(node.tag, node.scope, node.attached)
         if not self._roots.get(name):
@@ -129,6 +133,7 @@ class Frames:
         return self._known(tag, name, self._roots[name])
 
     def _known(self, tag: Tag, scope: str, name: str) -> str:
+        """The full name of `name` in `scope`. Raises RobotError if there is no such frame."""
         found = WORLD if name in ("world", "__root__") and not scope else whole(scope, name)
         if found and found not in self._nodes:
             start = f"{scope}{INSIDE}" if scope else ""
@@ -136,11 +141,14 @@ class Frames:
             raise tag.wrong(f"names the unknown frame {cut(name)}; frames: {listed(inside)}")
         return found
 
-    def _add(self, name: str, node: _Node) -> None:
+    def _add(
+        self, name: str, tag: Tag, scope: str, within: str = "", attached: str = "", is_link: bool = False
+    ) -> None:
+        at = read_pose(tag)
         if name in self._nodes:
             place = self._nodes[name].tag.place
-            raise node.tag.wrong(f"has a duplicate name (first at {place}); give each a unique name")
-        self._nodes[name] = node
+            raise tag.wrong(f"has a duplicate name (first at {place}); give each a unique name")
+        self._nodes[name] = _Node(tag, scope, at.within or within, at.pose, attached, is_link)
 
 
 # A model and the models nested in it.
@@ -148,7 +156,9 @@ class Frames:
 
 @dataclass(frozen=True, slots=True)
 class Member:
-    """A model, or one nested in it, by full name; `joints` are its joint elements and their frames' full names."""
+    """A model, possibly nested in another one, by its full name; `joints` are its joint elements, each with the full
+    name of its frame.
+    """
 
     name: str
     piece: Piece
@@ -157,31 +167,24 @@ class Member:
 
 def register(piece: Piece, scope: str, frames: Frames, includes: Includes) -> list[Member]:
     """A model and those nested in it, the outer one first; their frames are added to `frames`. Raises RobotError."""
-    tag, placed = piece.tag, read_pose(piece.tag)
+    tag = piece.tag
     check_known(tag, piece.source, includes.warned)
     name = _name(piece)
     nested = list(includes.within(piece))
     names = [link.word("name") for link in tag.all("link")] + [inner.tag.word("name") for inner in nested]
     canonical = tag.attributes.get("canonical_link", "").strip() or next(iter(names), "")
-    frames.add_model(tag, scope, name, placed.within, placed.pose, canonical)
+    frames.add_model(tag, scope, name, canonical)
     inside = whole(scope, name)
     for link in tag.all("link"):
-        at = read_pose(link)
-        frames.add_link(link, inside, at.within, at.pose)
+        frames.add_link(link, inside)
     members = [member for inner in nested for member in register(inner, inside, frames, includes)]
-    add_frames(tag, inside, frames)
-    return [Member(inside, piece, tuple(_joints(tag, inside, frames))), *members]
-
-
-def add_frames(tag: Tag, scope: str, frames: Frames) -> None:
-    """Add the `<frame>` elements of a model or a world. Raises RobotError."""
-    for frame in tag.all("frame"):
-        at = read_pose(frame)
-        frames.add_frame(frame, scope, at.within, at.pose, frame.attributes.get("attached_to", "").strip())
+    frames.add_frames(tag, inside)
+    joints = ((joint, frames.add_joint(joint, inside, joint_end(joint, "child"))) for joint in tag.all("joint"))
+    return [Member(inside, piece, tuple(joints)), *members]
 
 
 def joint_end(tag: Tag, end: str) -> str:
-    """What the `<parent>` or `<child>` of a joint names. Raises RobotError."""
+    """The name in the `<parent>` or `<child>` (`end`) of a joint. Raises RobotError."""
     name = tag.given(end)
     if not name:
         raise tag.wrong(f"has no <{end}>; write the name of a link there")
@@ -196,14 +199,6 @@ def _name(piece: Piece) -> str:
     if tag.first("placement_frame") or tag.attributes.get("placement_frame"):
         piece.source.warn(tag, "has an unknown placement_frame; its own frame is used")
     return name
-
-
-def _joints(tag: Tag, scope: str, frames: Frames) -> list[tuple[Tag, str]]:
-    joints = []
-    for joint in tag.all("joint"):
-        at = read_pose(joint)
-        joints.append((joint, frames.add_joint(joint, scope, at.within, at.pose, joint_end(joint, "child"))))
-    return joints
 
 
 # The joint graph.
@@ -241,12 +236,14 @@ class JointEdge:
 
 @dataclass(slots=True)
 class JointGraph:
-    """The links of a model and its nested models, the parent joint of each, and the links fixed to the world."""
+    """The links of a model and its nested models, the parent joint of each, and the links that a joint attaches to the
+    world (`grounded`); all by full name. `top` is the model's.
+    """
 
     top: str
     frames: Frames
     links: dict[str, tuple[Member, Tag]] = field(default_factory=dict)
-    holders: dict[str, JointEdge] = field(default_factory=dict)
+    parents: dict[str, JointEdge] = field(default_factory=dict)
     grounded: set[str] = field(default_factory=set)
 
     @classmethod
@@ -269,13 +266,13 @@ class JointGraph:
 
     def root_above(self, link: str) -> str:
         """The root of the tree that contains `link`."""
-        while link in self.holders:
-            link = self.holders[link].parent
+        while link in self.parents:
+            link = self.parents[link].parent
         return link
 
     def roots(self) -> list[str]:
         """The links without a parent joint, in file order."""
-        return [name for name in self.links if name not in self.holders]
+        return [name for name in self.links if name not in self.parents]
 
     def joint(self, edge: JointEdge, placed: Mapping[str, Frame]) -> Joint:
         """The robot's joint, for links whose frames in the world are `placed`. Raises RobotError."""
@@ -288,7 +285,7 @@ class JointGraph:
 
     def check_mimics(self, joints: list[Joint], tag: Tag, source: Source) -> None:
         """Raise RobotError for a joint that mimics a missing joint, or itself."""
-        named = [replace(edge.tag, attributes={"name": edge.name}) for edge in self.holders.values()]
+        named = [replace(edge.tag, attributes={"name": edge.name}) for edge in self.parents.values()]
         check_mimics(replace(tag, children=named), {joint.name: joint for joint in joints}, source)
 
     def _check_size(self, members: list[Member]) -> None:
@@ -303,18 +300,15 @@ class JointGraph:
         if kind == GEARBOX:
             source.warn(tag, "is a gearbox, which is not simulated, and is left out")
             return
-        if tag.word("type").strip() in AS_FIXED:
+        if (written := tag.word("type").strip()) in AS_FIXED:
             slides = f", and its link {cut(joint_end(tag, 'child'))} slides without friction" if rolls(tag) else ""
-            problem = (
-                f"is of the type {tag.word('type').strip()}, which is not simulated; it is treated as fixed{slides}"
-            )
-            source.warn(tag, problem)
+            source.warn(tag, f"is of the type {written}, which is not simulated; it is treated as fixed{slides}")
         if kind != "fixed" and has_spring(tag):
             source.warn(tag, "has a spring, which is not simulated")
         parent, child = (self.frames.link(tag, member.name, joint_end(tag, end)) for end in ("parent", "child"))
         self._check_ends(tag, parent, child)
         if parent != WORLD:
-            self.holders[child] = self._edge(member, tag, frame, (parent, child))
+            self.parents[child] = self._edge(member, tag, frame, (parent, child))
             return
         if kind != "fixed":
             source.warn(
@@ -335,15 +329,15 @@ class JointGraph:
                 raise tag.wrong(f"connects {cut(self.local(name) or 'the world')}, which is not a link of this model")
         if parent == child:
             raise tag.wrong(f"connects the link {cut(self.local(child))} to itself")
-        if child in self.holders or child in self.grounded:
-            holder = repr(self.holders[child].name) if child in self.holders else "to the world"
-            problem = f"has the child link {cut(self.local(child))}, which is already the child of the joint {holder}"
+        if child in self.parents or child in self.grounded:
+            other = repr(self.parents[child].name) if child in self.parents else "to the world"
+            problem = f"has the child link {cut(self.local(child))}, which is already the child of the joint {other}"
             raise tag.wrong(f"{problem}; remove one, or swap the parent and the child of one")
 
     def _check_circles(self, tag: Tag) -> None:
         joints = {
             name: Joint(name, "fixed", edge.parent, edge.child, Pose(), edge.axis, Limits())
-            for name, edge in self.holders.items()
+            for name, edge in self.parents.items()
         }
         reached = {name for root in self.roots() for name in descend(root, joints)}
         lost = [self.local(name) for name in self.links if name not in reached]
@@ -358,8 +352,8 @@ def build(members: list[Member], frames: Frames) -> list[RobotModel]:
     """The robots of a model: the one with its canonical link, then one for each other tree of links; a static model
     is always one.
 
-    The first one's root link is in the model's own frame, which is its `pose`. A link whose frame is off its joint's
-    axis is expressed in a frame on the axis. Raises RobotError.
+    The root link of the first robot has the model's own frame, which is its `pose`. A link whose frame is off its
+    joint's axis gets a frame on the axis. Raises RobotError.
     """
     piece = members[0].piece
     graph = JointGraph.of(members, frames)
@@ -371,11 +365,11 @@ def build(members: list[Member], frames: Frames) -> list[RobotModel]:
     placed = _placed(graph, first)
     flags = ModelFlags(static, flag(piece.tag, "self_collide", False))
     links = {name: _link(name, graph, placed, flags) for name in graph.links}
-    joints = [graph.joint(edge, placed) for edge in graph.holders.values()]
+    joints = [graph.joint(edge, placed) for edge in graph.parents.values()]
     graph.check_mimics(joints, piece.tag, piece.source)
     loose = [root for root in graph.roots() if root != first]
     if static:
-        joints += [_standing(graph, first, root, placed) for root in loose]
+        joints += [_fixing(graph, first, root, placed) for root in loose]
         loose = []
     for member in members:
         for joint in member.piece.tag.all("joint"):
@@ -386,7 +380,7 @@ def build(members: list[Member], frames: Frames) -> list[RobotModel]:
 
 
 def _sensing(robot: RobotModel, graph: JointGraph, placed: Mapping[str, Frame]) -> RobotModel:
-    """The robot with the sensors of its links."""
+    """The robot, with the sensors of its links added."""
     owners = (
         (graph.local(name), (placed[name].inverse @ graph.frames.of(name)).pose, tag, member.piece.source)
         for name, (member, tag) in graph.links.items()
@@ -412,7 +406,7 @@ def _planes(tag: Tag) -> list[Tag]:
 def _placed(graph: JointGraph, first: str) -> dict[str, Frame]:
     """Link -> the frame in the world in which it is expressed."""
     placed = {name: graph.frames.of(name) for name in graph.links}
-    for name, edge in graph.holders.items():
+    for name, edge in graph.parents.items():
         if edge.turns and edge.misses(placed[name]):
             placed[name] = Frame(edge.frame.position, placed[name].rotation)
     return placed | {first: graph.frames.of(graph.top)}
@@ -422,14 +416,14 @@ def _link(name: str, graph: JointGraph, placed: Mapping[str, Frame], flags: Mode
     member, tag = graph.links[name]
     frame = (placed[name].inverse @ graph.frames.of(name)).pose
     link = read_link(tag, graph.local(name), frame, flags, member.piece.source)
-    if name not in graph.holders or not rolls(graph.holders[name].tag):
+    if name not in graph.parents or not rolls(graph.parents[name].tag):
         return link
     # A caster that should roll slides instead: one that drags keeps the robot from turning.
     return replace(link, surface=replace(link.surface, mu1=0.0, mu2=0.0))
 
 
-def _standing(graph: JointGraph, first: str, root: str, placed: Mapping[str, Frame]) -> Joint:
-    """The joint that fixes a loose link of a static model."""
+def _fixing(graph: JointGraph, first: str, root: str, placed: Mapping[str, Frame]) -> Joint:
+    """The joint that fixes a loose link of a static model to the first one."""
     ends = graph.local(first), graph.local(root)
     pose = (placed[first].inverse @ placed[root]).pose
     return Joint(f"{ends[0]} holds {ends[1]}", "fixed", *ends, pose, (1.0, 0.0, 0.0), Limits())
@@ -452,7 +446,7 @@ def _robot(
 
 
 def _driven(top: Member, robot: RobotModel) -> RobotModel:
-    """The body with the canonical link, which has the model's name and its plugins."""
+    """The robot with the canonical link, which has the model's name, drive and forces."""
     piece = top.piece
     drive = read_plugins(piece.tag, robot.links, robot.joints, robot.root, piece.source)
     drive, forces = read_forces(piece.tag, robot.links, robot.root, drive, piece.source)
@@ -473,8 +467,8 @@ def parse_sdf(root: Tag, source: Source) -> RobotModel:
 def read_models(root: Tag | str, source: Source) -> list[RobotModel]:
     """The bodies in the `<sdf>` of an object or a robot, each with its `pose`; at least one.
 
-    A model whose links no joint connects becomes several bodies, which move freely; the one with the canonical link
-    comes first and has the model's name. Raises RobotError.
+    A model whose links are not all connected by joints becomes several bodies, which move freely; the one with the
+    canonical link comes first and has the model's name. Raises RobotError.
     """
     if isinstance(root, str):
         root = read_xml(root, str(source.origin))

@@ -10,7 +10,7 @@ from holozen.robot.model import GRAVITY, STEP, RobotModel, WorldSpec
 from holozen.robot.packages import readable
 from holozen.robot.rigid import Frame, link_frames
 from holozen.robot.sdf import Includes, Piece, check_world, read_file, version_of
-from holozen.robot.sdf_models import WORLD, Frames, add_frames, models_in
+from holozen.robot.sdf_models import WORLD, Frames, models_in
 
 STRONGEST = 100.0  # m/s^2; ten times Earth's
 SHORTEST, LONGEST = 1e-4, 0.02  # s; outside this range the physics engine is far too slow or unstable
@@ -19,7 +19,7 @@ LEVEL = 1e-9  # m, and of a unit vector; tolerance for a plane to count as the g
 
 
 def load_world(path: Path, packages: Mapping[str, Path] = {}) -> WorldSpec:
-    """The world in an SDF file, read in a process apart. Raises RobotError naming file and line."""
+    """The world in an SDF file, which is read in a process of its own. Raises RobotError naming file and line."""
     return reader.run(WorldSpec, path, _load_world, path, packages, readable=partial(readable, path, packages))
 
 
@@ -34,7 +34,7 @@ def read_world(root: Tag, source: Source) -> WorldSpec:
     includes = Includes()
     check_world(world, source, includes.warned)
     frames = Frames()
-    add_frames(world, WORLD, frames)
+    frames.add_frames(world, WORLD)
     models = list(models_in(Piece(world, source, version_of(root)), frames, includes))
     step, rtf = _physics(world)
     return WorldSpec(
@@ -49,7 +49,7 @@ def read_world(root: Tag, source: Source) -> WorldSpec:
 
 
 def is_ground(model: RobotModel) -> bool:
-    """Whether a model's only collision shape is a level plane at z = 0."""
+    """Whether the collision shapes of a model are level planes at z = 0, and nothing else."""
     shapes = [(link.name, shape) for link in model.links.values() for shape in link.collisions]
     if not shapes or any(shape.kind != "plane" for _, shape in shapes):
         return False
@@ -78,9 +78,8 @@ def _world_of(root: Tag) -> Tag:
 
 def _physics(world: Tag) -> tuple[float, float]:
     """The step in s and the real-time factor."""
-    given = world.all("physics")
-    chosen = [tag for tag in given if tag.attributes.get("default", "").lower() in ("1", "true")] or given
-    physics = chosen[0] if chosen else world.empty("physics")
+    default = [tag for tag in world.all("physics") if tag.attributes.get("default", "").lower() in ("1", "true")]
+    physics = default[0] if default else world.child("physics")
     step, rtf = physics.number("max_step_size", STEP), physics.number("real_time_factor", 1.0)
     if not SHORTEST <= step <= LONGEST:
         raise (physics.first("max_step_size") or physics).wrong(f"is {step:g} s; use {SHORTEST} to {LONGEST}")

@@ -26,14 +26,15 @@ from holozen.robot.model import (
     Pose,
     Sensor,
 )
-from holozen.robot.rigid import Frame
+from holozen.robot.rigid import compose
 from holozen.suggest import cut
 
 MOST_RAYS = 10_000  # of one sensor
 MOST_PIXELS = 2_100_000  # of one camera: full HD
+FIELD_OF_VIEW = (0.01, 3.0)  # rad, horizontal
 MOST_SENSORS = 100  # of one robot
 FASTEST = 1000.0  # Hz
-OPTICAL = (-math.pi / 2, 0.0, -math.pi / 2)  # rpy of a camera's optical frame (REP 103): x right, y down, z forward
+OPTICAL = Pose(rpy=(-math.pi / 2, 0.0, -math.pi / 2))  # a camera's optical frame (REP 103): x right, y down, z forward
 SONAR_RAYS = 5  # across and up a sonar's cone
 
 WORLD = "world"  # the frame of contacts, unless a link is tagged
@@ -45,13 +46,13 @@ RATES = {"scan": 10.0, "points": 10.0, "range": 10.0, "imu": 100.0, "contact": 5
 
 
 def read_sensors(robot: Tag, links: Mapping[str, Link], names: Iterable[str], source: Source) -> list[Sensor]:
-    """The sensors of a `<robot>`. `links` are those that are simulated, `names` all that the file has. What cannot be
-    simulated causes a warning that names it, and is left out.
+    """The sensors of a `<robot>`. `links` are those that are simulated, `names` those of all links in the file. A
+    sensor that cannot be simulated is left out, with a warning that names it.
     """
     reading = _Reading(links, source)
     for gazebo in robot.all("gazebo"):
         link = gazebo.attributes.get("reference", "").strip()
-        if not link or link in names:  # a reference to no link has its warning
+        if not link or link in names:  # there is a warning already about a reference to no link
             for tag in gazebo.all("sensor"):
                 reading.take(tag, link)
     for plugin in plugins_outside_sensors(robot):
@@ -61,7 +62,9 @@ def read_sensors(robot: Tag, links: Mapping[str, Link], names: Iterable[str], so
 
 
 def sdf_sensors(owners: Iterable[tuple[str, Pose, Tag, Source]], links: Mapping[str, Link]) -> list[Sensor]:
-    """The same for SDF: the sensors in the `<link>` elements that have these names and poses in our `links`."""
+    """The same for SDF: `owners` are the name of a link in `links`, the pose in it of a `<link>` element that became
+    part of it, that element, and its source.
+    """
     reading = None
     for name, pose, owner, source in owners:
         for tag in owner.all("sensor"):
@@ -78,7 +81,7 @@ def warn_unsimulated(tag: Tag, source: Source) -> None:
 
 
 class _Reading:
-    """The sensors found so far."""
+    """Collects the sensors of a robot."""
 
     def __init__(self, links: Mapping[str, Link], source: Source) -> None:
         self._links, self._source, self._at = links, source, HERE
@@ -127,7 +130,7 @@ class _Reading:
         for other in tag.all("plugin"):
             if other is not plugin:
                 self._source.warn(other, f"is not supported in a <sensor>; {tag} publishes its ROS message anyway")
-        about = _About(tag, plugin, kind)
+        sensor = _SensorTag(tag, plugin, kind)
         for unkept in ("distortion", "lens"):
             for child in (part for owner in tag.all("camera") for part in owner.all(unkept)):
                 if any(number(value.value()) for value in child.children):
@@ -136,29 +139,27 @@ class _Reading:
             for child in tag.below(name):
                 if number(child.value()):
                     self._source.warn(child, "is ignored; noise has no bias")
-        devices = _devices(about)
-        pose, frame, mount = self._placed(about, link)
+        devices = _devices(sensor)
+        pose, frame, mount = self._placed(sensor, link)
         for topic, device in devices:
-            yield Sensor(about.name, link, pose, frame, mount, topic, about.rate(_rate_of(device)), device)
+            yield Sensor(sensor.name, link, pose, frame, mount, topic, sensor.rate(_rate_of(device)), device)
 
-    def _placed(self, about: "_About", link: str) -> tuple[Pose, str, Pose | None]:
-        """The pose of a sensor on a link, the frame of what it publishes, and where that is if it is no link: one that
-        is tagged so, or that of a sensor that is not where its link is.
+    def _placed(self, sensor: "_SensorTag", link: str) -> tuple[Pose, str, Pose | None]:
+        """The pose of a sensor on a link; the name of the frame of its messages: a tagged one, that of the link, or one
+        of its own if the sensor is not at the link's origin; and, unless that is a link, the frame's pose on the link.
         """
-        pose = _pose(about)
-        if self._at != HERE:
-            pose = (Frame.of(self._at) @ Frame.of(pose)).pose
-        tagged = about.plugin.frame("frame_name", "frame_id") or about.own.frame(
+        pose = compose(self._at, _pose(sensor))
+        tagged = sensor.plugin.frame("frame_name", "frame_id") or sensor.own.frame(
             "gz_frame_id", "ignition_frame_id", "optical_frame_id"
         )
         tagged = tagged.rpartition("/")[2]
-        if about.kind == "contact":
+        if sensor.kind == "contact":
             return HERE, tagged if tagged in self._links else WORLD, None
         if tagged in self._links or (not tagged and pose == HERE):
             return pose, tagged or link, None
-        if about.kind in CAMERAS and "optical" in tagged:
-            return pose, tagged, (Frame.of(pose) @ Frame.of(Pose(rpy=OPTICAL))).pose
-        return pose, tagged or (about.name if about.name not in self._links else f"{link}_{about.name}"), pose
+        if sensor.kind in CAMERAS and "optical" in tagged:
+            return pose, tagged, compose(pose, OPTICAL)
+        return pose, tagged or (sensor.name if sensor.name not in self._links else f"{link}_{sensor.name}"), pose
 
     def _lone_imu(self, plugin: Tag) -> Sensor:
         """gazebo_ros_imu.cpp, with its link in a tag."""
@@ -175,8 +176,8 @@ class _Reading:
         )
 
 
-class _About:
-    """A `<sensor>` of a `kind`, with the settings of its plugin, which may be missing."""
+class _SensorTag:
+    """A `<sensor>` of a `kind`, with its own settings and those of its plugin, if it has one."""
 
     def __init__(self, tag: Tag, plugin: Tag | None, kind: str) -> None:
         self.tag, self.kind, self.own = tag, kind, Settings(tag)
@@ -186,19 +187,21 @@ class _About:
         self.name = tag.attributes.get("name", "").strip() or kind
 
     def inside(self, *path: str) -> Settings:
-        """The settings of an element some levels below; an empty one where it is missing."""
+        """The settings of the element at a path, of which each part may be several names separated by spaces, the first
+        that is there; those of an empty element if it is missing.
+        """
         tag = self.tag
         for names in path:
             tag = next((child for name in names.split() if (child := tag.first(name))), None) or tag.empty(names)
         return Settings(tag)
 
     def rate(self, default: float) -> float:
-        """Hz."""
+        """The update rate in Hz."""
         rate = self.own.number(0.0, "update_rate", most=FASTEST)
         return rate or self.plugin.number(0.0, "update_rate", "update_rate_hz", most=FASTEST) or default
 
     def topic(self, default: str, *names: str) -> str:
-        """The key: of the plugin, of ROS 2's `~/out`, or of gz-sim's `<topic>`."""
+        """The key: by the plugin's tags `names`, ROS 2's `~/out`, or gz-sim's `<topic>`; else `default`."""
         if self.plugin_kind in ("gazebo_ros_ray_sensor", "gazebo_ros_imu_sensor") and not self.plugin.word(*names):
             if self.plugin.is_remapped("out"):
                 return self.plugin.topic("out")
@@ -207,19 +210,19 @@ class _About:
         return self.plugin.topic(default, *names) if self.plugin_kind else self.own.topic(default, "topic")
 
 
-def _devices(about: _About) -> list[tuple[str, Lidar | Imu | Bumper | Camera]]:
-    """What a sensor consists of, each with its key."""
-    if about.kind == "imu":
-        return [(about.topic("imu", "topic_name"), _imu(about))]
-    if about.kind == "contact":
-        default = about.inside("contact").topic("bumper_states", "topic")  # gz-sim's
-        return [(about.plugin.topic(default, "bumper_topic_name") if about.plugin_kind else default, Bumper())]
-    if about.kind in CAMERAS:
-        camera = _camera(about)
+def _devices(sensor: _SensorTag) -> list[tuple[str, Lidar | Imu | Bumper | Camera]]:
+    """The devices that a sensor consists of, each with its key."""
+    if sensor.kind == "imu":
+        return [(sensor.topic("imu", "topic_name"), _imu(sensor))]
+    if sensor.kind == "contact":
+        default = sensor.inside("contact").topic("bumper_states", "topic")  # gz-sim's
+        return [(sensor.plugin.topic(default, "bumper_topic_name") if sensor.plugin_kind else default, Bumper())]
+    if sensor.kind in CAMERAS:
+        camera = _camera(sensor)
         return [(camera.image or camera.depth, camera)]
-    lidar = _sonar(about) if about.kind == "sonar" else _lidar(about)
-    topic = about.topic(lidar.message, "topic_name")
-    if lidar.vertical.count > 1 and not about.plugin_kind and about.kind != "sonar":  # gz-sim publishes both
+    lidar = _sonar(sensor) if sensor.kind == "sonar" else _lidar(sensor)
+    topic = sensor.topic(lidar.message, "topic_name")
+    if lidar.vertical.count > 1 and not sensor.plugin_kind and sensor.kind != "sonar":  # gz-sim publishes both
         return [(topic, lidar), (f"{topic}/points", structs.replace(lidar, message="points"))]
     return [(topic, lidar)]
 
@@ -235,8 +238,8 @@ def _rate_of(device: Lidar | Imu | Bumper | Camera) -> float:
     return RATES["camera"]
 
 
-def _pose(about: _About) -> Pose:
-    tag = about.tag.first("pose")
+def _pose(sensor: _SensorTag) -> Pose:
+    tag = sensor.tag.first("pose")
     if tag is None or not tag.value():
         return HERE
     if relative := tag.attributes.get("relative_to", "").strip():
@@ -245,50 +248,50 @@ def _pose(about: _About) -> Pose:
     return Pose((x, y, z), (rpy[0], rpy[1], rpy[2]))
 
 
-# Lidars and what measures a distance.
+# Lidars, sonars and range sensors.
 
 
-def _lidar(about: _About) -> Lidar:
-    limits = about.inside("ray lidar", "range")
+def _lidar(sensor: _SensorTag) -> Lidar:
+    limits = sensor.inside("ray lidar", "range")
     near = limits.number(0.0, "min")
     far = limits.number(math.nan, "max", zero=False) if limits.word("max") else math.nan
     if math.isnan(far):
-        raise about.tag.wrong("has no <range> with a <max>, in metres")
+        raise sensor.tag.wrong("has no <range> with a <max>, in metres")
     if far <= near:
-        raise limits.owner.wrong(f"has min {near:g} and max {far:g}; the first is to be less")
-    horizontal, vertical = (_fan(about.inside("ray lidar", "scan", name)) for name in ("horizontal", "vertical"))
+        raise limits.owner.wrong(f"has min {near:g} and max {far:g}; min must be less than max")
+    horizontal, vertical = (_fan(sensor.inside("ray lidar", "scan", name)) for name in ("horizontal", "vertical"))
     if horizontal.count * vertical.count > MOST_RAYS:
-        raise about.tag.wrong(f"has {horizontal.count * vertical.count} rays; at most {MOST_RAYS} are simulated")
-    noise = _noise(about.inside("ray lidar", "noise")) or _plugin_noise(about)
-    radiation = about.plugin.word("radiation", "radiation_type").lower()
-    return Lidar(horizontal, vertical, near, far, noise, _message(about, vertical), radiation != "ultrasound")
+        raise sensor.tag.wrong(f"has {horizontal.count * vertical.count} rays; at most {MOST_RAYS} are simulated")
+    noise = _noise(sensor.inside("ray lidar", "noise")) or _plugin_noise(sensor)
+    radiation = sensor.plugin.word("radiation", "radiation_type").lower()
+    return Lidar(horizontal, vertical, near, far, noise, _message(sensor), radiation != "ultrasound")
 
 
-def _message(about: _About, vertical: Fan) -> str:
-    match about.plugin_kind:
+def _message(sensor: _SensorTag) -> str:
+    match sensor.plugin_kind:
         case "gazebo_ros_range" | "hector_gazebo_ros_sonar":
             return "range"
         case "gazebo_ros_block_laser" | "gazebo_ros_velodyne_laser":
             return "points"
         case "gazebo_ros_ray_sensor":
-            word = about.plugin.word("output_type").rpartition("/")[2] or "PointCloud2"
+            word = sensor.plugin.word("output_type").rpartition("/")[2] or "PointCloud2"
             kinds = {"LaserScan": "scan", "PointCloud2": "points", "Range": "range"}
             if word not in kinds:
                 problem = f"is {cut(word)}; sensor_msgs/{', sensor_msgs/'.join(kinds)} are supported"
-                raise about.plugin.tag("output_type").wrong(problem)
+                raise sensor.plugin.tag("output_type").wrong(problem)
             return kinds[word]
     return "scan"
 
 
-def _sonar(about: _About) -> Lidar:
+def _sonar(sensor: _SensorTag) -> Lidar:
     """`<sonar>`: a cone along x with a radius at its end."""
-    sonar = about.inside("sonar")
+    sonar = sensor.inside("sonar")
     near, far = sonar.number(0.0, "min"), sonar.number(5.0, "max", zero=False)
     if far <= near:
-        raise sonar.owner.wrong(f"has min {near:g} and max {far:g}; the first is to be less")
+        raise sonar.owner.wrong(f"has min {near:g} and max {far:g}; min must be less than max")
     half = math.atan(sonar.number(0.5, "radius") / far)
     fan = Fan(-half, half, SONAR_RAYS)
-    return Lidar(fan, fan, near, far, _plugin_noise(about), "range", infrared=False)
+    return Lidar(fan, fan, near, far, _plugin_noise(sensor), "range", infrared=False)
 
 
 def _fan(settings: Settings) -> Fan:
@@ -297,7 +300,7 @@ def _fan(settings: Settings) -> Fan:
     samples = settings.number(1.0, "samples", zero=False) * settings.number(1.0, "resolution", zero=False)
     first, last = (_angle(settings, name) for name in ("min_angle", "max_angle"))
     if last < first:
-        raise settings.owner.wrong(f"has min_angle {first:g} and max_angle {last:g}; the first is to be less")
+        raise settings.owner.wrong(f"has min_angle {first:g} and max_angle {last:g}; min_angle must be the smaller")
     count = max(1, round(samples))
     return Fan(first, last, count) if count > 1 else Fan((first + last) / 2, (first + last) / 2)
 
@@ -317,11 +320,11 @@ def _noise(settings: Settings) -> Noise | None:
     """An SDF `<noise>`; None without one. Raises RobotError."""
     if not settings.owner.children:
         return None
-    sort = (settings.owner.attributes.get("type", "").strip() or settings.word("type") or "none").lower()
-    if sort == "none":
+    kind = (settings.owner.attributes.get("type", "").strip() or settings.word("type") or "none").lower()
+    if kind == "none":
         return NO_NOISE
-    if not sort.startswith("gaussian"):
-        raise settings.owner.wrong(f"has the type {cut(sort)}; gaussian and none are supported")
+    if not kind.startswith("gaussian"):
+        raise settings.owner.wrong(f"has the type {cut(kind)}; gaussian and none are supported")
     word = settings.word("mean")
     mean = number(word) if word else 0.0
     if mean is None:
@@ -329,63 +332,64 @@ def _noise(settings: Settings) -> Noise | None:
     return Noise(mean, settings.number(0.0, "stddev"))
 
 
-def _plugin_noise(about: _About) -> Noise:
-    return Noise(stddev=about.plugin.number(0.0, "gaussian_noise"))
+def _plugin_noise(sensor: _SensorTag) -> Noise:
+    return Noise(stddev=sensor.plugin.number(0.0, "gaussian_noise"))
 
 
-def _imu(about: _About) -> Imu:
-    plain = _plugin_noise(about)
-    old = {name: _noise_in(about.inside("imu", "noise", name)) for name in ("rate", "accel")}
+def _imu(sensor: _SensorTag) -> Imu:
+    plain = _plugin_noise(sensor)
+    old = {name: _noise_in(sensor.inside("imu", "noise", name)) for name in ("rate", "accel")}
     values = []
     for name, short in (("angular_velocity", "rate"), ("linear_acceleration", "accel")):
-        x, y, z = (_noise(about.inside("imu", name, axis, "noise")) or old[short] or plain for axis in "xyz")
+        x, y, z = (_noise(sensor.inside("imu", name, axis, "noise")) or old[short] or plain for axis in "xyz")
         values.append((x, y, z))
-    return Imu(values[0], values[1], about.inside("imu").flag("enable_orientation"))
+    return Imu(values[0], values[1], sensor.inside("imu").flag("enable_orientation"))
 
 
 def _noise_in(settings: Settings) -> Noise | None:
-    """`<rate>` or `<accel>` of SDF 1.4, whose type is in the element around it."""
+    """A `<rate>` or `<accel>` of SDF 1.4, where the element around it gives the type."""
     return Noise(0.0, settings.number(0.0, "stddev")) if settings.owner.children else None
 
 
 # Cameras.
 
 
-def _camera(about: _About) -> Camera:
-    tag = about.inside("camera")
-    image, clip = about.inside("camera", "image"), about.inside("camera", "clip")
+def _camera(sensor: _SensorTag) -> Camera:
+    tag = sensor.inside("camera")
+    image, clip = sensor.inside("camera", "image"), sensor.inside("camera", "clip")
     width, height = (
         round(image.number(size, name, zero=False)) for name, size in (("width", 320.0), ("height", 240.0))
     )
     if not (0 < width * height <= MOST_PIXELS):
         raise image.owner.wrong(f"has {width} x {height} pixels; from 1 to {MOST_PIXELS} are rendered")
     field_of_view = tag.number(1.047, "horizontal_fov", zero=False)
-    if not 0.01 <= field_of_view <= 3.0:
-        raise tag.tag("horizontal_fov").wrong(f"is {field_of_view:g}; use 0.01 to 3 rad")
+    low, high = FIELD_OF_VIEW
+    if not low <= field_of_view <= high:
+        raise tag.tag("horizontal_fov").wrong(f"is {field_of_view:g}; use {low:g} to {high:g} rad")
     near, far = clip.number(0.1, "near", zero=False), clip.number(100.0, "far", zero=False)
     if far <= near:
-        raise clip.owner.wrong(f"has near {near:g} and far {far:g}; the first is to be less")
-    noise = _noise(about.inside("camera", "noise")) or NO_NOISE
-    picture, info, depth = _camera_topics(about)
+        raise clip.owner.wrong(f"has near {near:g} and far {far:g}; near must be less than far")
+    noise = _noise(sensor.inside("camera", "noise")) or NO_NOISE
+    picture, info, depth = _camera_topics(sensor)
     mono = image.word("format").upper() in ("L8", "L_INT8", "GRAY8")
     encoding = "mono8" if mono else "rgb8"
     return Camera(width, height, field_of_view, near, far, picture, info, depth, encoding, noise)
 
 
-def _camera_topics(about: _About) -> tuple[str, str, str]:
+def _camera_topics(sensor: _SensorTag) -> tuple[str, str, str]:
     """The keys of pictures, of their CameraInfo, and of depth."""
-    sees_depth = about.kind != "camera"
-    if not about.plugin_kind:  # gz-sim
-        topic = about.own.topic(f"{about.name}/image_raw", "topic")
+    sees_depth = sensor.kind != "camera"
+    if not sensor.plugin_kind:  # gz-sim
+        topic = sensor.own.topic(f"{sensor.name}/image_raw", "topic")
         place = topic.rpartition("/")[0]
         info = f"{place}/camera_info".strip("/")
-        if about.kind == "depth_camera":
+        if sensor.kind == "depth_camera":
             return "", info, topic
-        if sees_depth and about.own.word("topic"):  # its name is that of a folder
+        if sees_depth and sensor.own.word("topic"):  # which is a prefix then
             return f"{topic}/image", f"{topic}/camera_info", f"{topic}/depth_image"
         return topic, info, f"{place}/depth_image".strip("/") if sees_depth else ""
-    plugin = about.plugin
-    name = plugin.word("camera_name").strip("/") or (about.name if plugin.owner.first("ros") else "")
+    plugin = sensor.plugin
+    name = plugin.word("camera_name").strip("/") or (sensor.name if plugin.owner.first("ros") else "")
     image, info, depth = (
         plugin.topic_within(name, *names)
         for names in (

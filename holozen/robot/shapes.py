@@ -2,7 +2,7 @@
 
 import math
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import replace
 
@@ -73,7 +73,7 @@ def read_color(tag: Tag, words: str, source: Source) -> Color | None:
 
 
 def nearest_gazebo(word: str, source: Source) -> str:
-    """A suggestion for a misspelt Gazebo material; `Black` is accepted for `Gazebo/Black`."""
+    """A suggestion for a misspelt Gazebo material, with or without the prefix Gazebo/; empty if none is near."""
     return source.suggest(word if "/" in word else f"Gazebo/{word}", GAZEBO)
 
 
@@ -85,7 +85,7 @@ Materials = Mapping[str, Color | None]
 
 
 def read_materials(robot: Tag, source: Source) -> dict[str, Color | None]:
-    """The materials that a `<robot>` defines: directly, or in any visual, as in urdfdom's model.cpp."""
+    """The materials that a `<robot>` defines, directly or in any visual, as in urdfdom's model.cpp."""
     found: dict[str, Color | None] = {}
     for tag in robot.all("material"):
         name = tag.attributes.get("name", "")
@@ -164,16 +164,16 @@ LARGEST_SHAPE = 1e3  # m
 
 
 def placeholder(tag: Tag, pose: Pose) -> Shape:
-    """The box in place of a mesh of the link around `tag`: for a visual one that around the link's largest collision
-    shape, meshes left out; else the one that has the link's mass and moments, cut to WIDEST_BOX; else a cube.
+    """A box in place of the mesh `tag`. For a visual mesh it is the bounding box of the link's largest collision shape,
+    other than a mesh; else the box with the link's mass and moments of inertia, at most WIDEST_BOX wide; else a cube.
 
-    In URDF its pose is that of the collision shape or the inertial frame; in SDF, whose poses may be relative to
-    other frames, it is the shape's own `pose`, as for the cube. A box a, b, c of mass m has Ixx = m (b^2 + c^2) / 12,
-    so a^2 = 6 (Iyy + Izz - Ixx) / m. The products of inertia are ignored.
+    In URDF its pose is that of the collision shape or the inertial frame; in SDF, where poses may be relative to other
+    frames, and for the cube, it is the shape's own `pose`. A box a, b, c of mass m has Ixx = m (b^2 + c^2) / 12, so
+    a^2 = 6 (Iyy + Izz - Ixx) / m. The products of inertia are ignored.
     """
-    seen = _around(tag, "visual") is not None
+    is_visual = _around(tag, "visual") is not None
     link = _around(tag, "link")
-    solid = [found for shape in (link.all("collision") if link and seen else ()) if (found := _box(shape))]
+    solid = [found for shape in (link.all("collision") if link and is_visual else ()) if (found := _box(shape))]
     if solid:
         edges, collision = max(solid, key=lambda found: math.prod(found[0]))
         return Shape("box", edges, _origin(collision) or pose)
@@ -185,6 +185,7 @@ def placeholder(tag: Tag, pose: Pose) -> Shape:
 
 
 def _around(tag: Tag | None, name: str) -> Tag | None:
+    """The nearest element called `name` that contains `tag`."""
     while tag is not None and tag.name != name:
         tag = tag.parent
     return tag
@@ -207,7 +208,7 @@ def _box(collision: Tag) -> tuple[tuple[float, ...], Tag] | None:
 def _box_of_inertia(inertial: Tag) -> tuple[float, ...] | None:
     inertia = inertial.first("inertia")
     try:
-        mass = inertial.number("mass") if inertial.sdf else needed(inertial, "mass").number("value")
+        mass = inertial.number("mass") if inertial.sdf else inertial.needed("mass").number("value")
         moments = [inertia.number(name, most=math.inf) for name in ("ixx", "iyy", "izz")] if inertia else []
     except RobotError:
         return None
@@ -220,7 +221,7 @@ def _box_of_inertia(inertial: Tag) -> tuple[float, ...] | None:
 
 
 def _origin(tag: Tag) -> Pose | None:
-    """Where a URDF's inertial or collision frame is; None in SDF, and for invalid numbers."""
+    """The pose of a URDF's inertial or collision frame; None in SDF, and for invalid numbers."""
     try:
         return None if tag.sdf else read_pose(tag)
     except RobotError:
@@ -249,23 +250,35 @@ SIZES = {
 
 def read_shape(tag: Tag, source: Source) -> Shape:
     """A `<visual>` or `<collision>`. Raises RobotError."""
-    geometry = needed(tag, "geometry")
-    known = [child for child in geometry.children if child.name in (*SHAPES, "mesh")]
-    if not known:
-        found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
-        raise geometry.wrong(f"contains {found}; it must contain <box>, <cylinder>, <sphere> or <mesh>")
-    shape = known[0]
+    shape = geometry_of(tag, SHAPES)
     if shape.name == "mesh":
         return mesh_shape(shape, shape.word("filename"), read_pose(tag), tag.name, source)
     return Shape(shape.name, read_size(shape), read_pose(tag))
 
 
+def geometry_of(tag: Tag, shapes: Iterable[str], others: Iterable[str] = ()) -> Tag:
+    """The first element in the `<geometry>` of a visual or collision that is one of the `shapes`, a mesh, or one of
+    `others`. Raises RobotError, which names the shapes.
+    """
+    geometry = tag.needed("geometry")
+    for child in geometry.children:
+        if child.name in (*shapes, "mesh", *others):
+            return child
+    found = ", ".join(f"<{child.name[:80]}>" for child in geometry.children[:12]) or "nothing"
+    raise geometry.wrong(f"contains {found}; it must contain {tags(shapes)} or <mesh>")
+
+
+def tags(names: Iterable[str]) -> str:
+    """Names of elements, as they are written."""
+    return ", ".join(f"<{name}>" for name in names)
+
+
 def mesh_shape(tag: Tag, uri: str, pose: Pose, use: str, source: Source, color: Color | None = None) -> Shape:
     """The mesh that `uri` names, for a visual or collision (`use`) of a link around `tag`, in URDF or SDF.
 
-    A collision mesh is read, a visual one only located. A missing or invalid mesh is replaced by a box with a
-    warning, or is a RobotError with `source.strict`. In text received over the network visual meshes are not even
-    looked up; those that it holds are kept unread.
+    A collision mesh is read, a visual one only located. A missing or invalid mesh is replaced by a box, with a
+    warning; with `source.strict` it raises RobotError. The visual meshes of a text received over the network are not
+    looked up; embedded ones are kept unread.
     """
     scale = tag.vector("scale", (1.0, 1.0, 1.0))
     if min(abs(factor) for factor in scale) < SMALLEST:
@@ -291,7 +304,7 @@ def solid(shape: Shape) -> Shape:
 def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Source) -> Shape:
     source.meshes += 1
     if source.confined and source.meshes > MOST_MESHES:
-        raise RobotError(f"is number {source.meshes}; in text that was sent {MOST_MESHES} collision meshes are read")
+        raise RobotError(f"is mesh number {source.meshes}; the sim reads at most {MOST_MESHES} collision meshes")
     if is_data(uri):
         return Shape("hull", (), pose, points=data_hull(uri, scale))
     path = resolve_uri(
@@ -304,14 +317,6 @@ def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Sour
     return Shape("mesh", scale, pose, path)
 
 
-def needed(tag: Tag, name: str) -> Tag:
-    """The child called `name`. Raises RobotError if there is none."""
-    found = tag.first(name)
-    if found is None:
-        raise tag.wrong(f"has no <{name}>")
-    return found
-
-
 def read_pose(tag: Tag) -> Pose:
     """The pose of an `<origin>`; without one it is the parent's frame."""
     origin = tag.first("origin")
@@ -320,7 +325,7 @@ def read_pose(tag: Tag) -> Pose:
 
 
 def read_size(tag: Tag, default: tuple[float, ...] | None = None) -> tuple[float, ...]:
-    """The size of a shape in metres, as SIZES lists it. Raises RobotError."""
+    """The size of a shape in metres, its values in the order of SIZES. Raises RobotError."""
     size = tuple(value for name, count in SIZES[tag.name].items() for value in tag.numbers(name, count, default))
     if min(size) < SMALLEST:
         raise tag.wrong(f"has the size {size} m; each number must be {SMALLEST:g} or more")

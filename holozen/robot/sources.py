@@ -1,19 +1,18 @@
-"""The source files of a robot, and the line of each element of the expanded text in them."""
+"""The xacro files of a robot, and the line in them of each element of the expanded text."""
 
 import os
 import re
 import tempfile
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from xml.parsers import expat
 
 from holozen.robot import reader
-from holozen.robot.elements import Tag, read_xml
+from holozen.robot.elements import Tag, read_text, read_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import find_by_name, find_package, known_folders, lies_in, readable
-from holozen.robot.xacro import expand_in_child, process, read_text
+from holozen.robot.xacro import XacroFile, expand_in_child, process
 
 MARK = "holozen-line"  # the attribute that carries file and line through xacro
 MOST_FILES = 200
@@ -47,11 +46,11 @@ def read_sources(path: Path, packages: Mapping[str, Path]) -> list[SourceFile]:
     return list(files.values())
 
 
-def trace(sources: list[SourceFile], plain: Tag, packages: Mapping[str, Path]) -> list[str]:
-    """For each element of the expanded text in order: "source file number:line", or nothing if unknown.
+def trace(sources: list[SourceFile], plain: Tag, packages: Mapping[str, Path]) -> list[tuple[Tag, Path, int]]:
+    """The elements of the expanded text `plain` whose source is known, in order, each with its source file and line.
 
-    The files are expanded a second time, with a mark in each start tag. The result is used only if the text is the
-    same otherwise. Raises RobotError if the copies cannot be read.
+    Copies of the files, with a mark in each start tag, are expanded. The result is used only if it is `plain` but for
+    the marks. Raises RobotError if the copies cannot be read.
     """
     copies = {source.path: Path(f"{number}.xacro") for number, source in enumerate(sources)}
     texts = [_marked(source, number, copies) for number, source in enumerate(sources)]
@@ -59,74 +58,52 @@ def trace(sources: list[SourceFile], plain: Tag, packages: Mapping[str, Path]) -
     text = reader.ask("marked", texts, found)
     if not text:
         return []
-    marked = list(elements(read_xml(text, "marked")))
-    places = [tag.attributes.pop(MARK, "") for tag in marked]
-    same = [(tag.name, tag.attributes) for tag in marked] == [(tag.name, tag.attributes) for tag in elements(plain)]
-    return places if same else []
+    marked, expanded = list(read_xml(text, "marked").walk()), list(plain.walk())
+    marks = [tag.attributes.pop(MARK, "").partition(":") for tag in marked]
+    if [(tag.name, tag.attributes) for tag in marked] != [(tag.name, tag.attributes) for tag in expanded]:
+        return []
+    places = zip(expanded, marks, strict=True)
+    return [(tag, sources[int(number)].path, int(line)) for tag, (number, _, line) in places if line]
 
 
-def source_lines(
-    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
-) -> dict[int, str]:
+def source_lines(file: XacroFile) -> dict[int, str]:
     """Line of the expanded text -> "FILE, line N" of the element that begins there, as far as that is known."""
+    path, packages = file.path, file.packages
     try:
         found = reader.run(
-            list[tuple[int, str]], path, _source_lines, path, packages, readable=partial(readable, path, packages),
-            handlers=handlers(path, args, packages, allow_env),
+            list[tuple[int, str]], path, _source_lines, path, packages,
+            readable=partial(readable, path, packages), handlers=handlers(file),
         )  # fmt: skip
     except (RobotError, OSError):
         return {}
     return dict(reversed(found))  # of several on a line, the first
 
 
-def handlers(
-    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]
-) -> dict[str, reader.Handler]:
-    """What answers the questions "expand" and "marked" of the process that reads."""
-    return {name: partial(answer, path, args, packages, allow_env)
-            for name, answer in (("expand", process), ("marked", _expand_marked))}  # fmt: skip
+def handlers(file: XacroFile) -> dict[str, reader.Handler]:
+    """The handlers with which `reader.run` answers a worker that asks for the expansion of a file, or for `trace`."""
+    return {"expand": partial(process, file), "marked": partial(_expand_marked, file)}
 
 
 def _source_lines(path: Path, packages: Mapping[str, Path]) -> list[tuple[int, str]]:
     root = read_xml(reader.ask("expand").text, "expanded")
-    sources = read_sources(path, packages)
-    found = []
-    for tag, mark in zip(elements(root), trace(sources, root, packages), strict=False):
-        number, colon, line = mark.partition(":")
-        if colon:
-            found.append((tag.line, f"{sources[int(number)].path}, line {line}"))
-    return found
+    places = trace(read_sources(path, packages), root, packages)
+    return [(tag.line, f"{file}, line {line}") for tag, file, line in places]
 
 
-def _expand_marked(
-    path: Path,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    allow_env: Collection[str],
-    texts: list[bytes],
-    found: Mapping[str, str],
-) -> str:
-    """The text of the marked copies of `path` and of what it includes, expanded; empty if that fails. For the process
-    outside: of the packages `found` by the one that reads, only those that `path` may use count.
+def _expand_marked(file: XacroFile, texts: list[bytes], found: Mapping[str, str]) -> str:
+    """The expanded text of the marked copies of a file and its includes; empty if that fails. It runs in the parent
+    process, and uses only those of the packages `found` by a worker that the file may use.
     """
-    known = known_folders(path, packages)
+    known = known_folders(file.path, file.packages)
     given = {name: Path(folder) for name, folder in found.items() if lies_in(Path(folder, "package.xml"), known)}
     try:
         with tempfile.TemporaryDirectory(prefix="holozen-check-") as folder:
             for number, text in enumerate(texts):
                 Path(folder, f"{number}.xacro").write_bytes(text)
-            return expand_in_child(Path(folder, "0.xacro"), args, {**given, **packages}, allow_env).text
+            copy = replace(file, path=Path(folder, "0.xacro"), packages={**given, **file.packages})
+            return expand_in_child(copy).text
     except OSError:  # there is no writable folder
         return ""
-
-
-def elements(root: Tag) -> Iterator[Tag]:
-    """`root` and all below it, in file order."""
-    waiting = [root]
-    while waiting:
-        tag = waiting.pop()
-        yield tag
-        waiting += tag.children[::-1]
 
 
 def _read(path: Path, start: Path, packages: Mapping[str, Path]) -> SourceFile:
@@ -147,7 +124,7 @@ def _included(name: str, path: Path, start: Path, packages: Mapping[str, Path]) 
 
 
 def _packages(sources: list[SourceFile], packages: Mapping[str, Path]) -> dict[str, Path]:
-    """The packages as found from the original file, since the copies are elsewhere."""
+    """The packages that the files name, found from the original file: the copies are elsewhere."""
     found = {}
     for name in {name for source in sources for name in _FIND.findall(source.text)}:
         try:
@@ -158,15 +135,15 @@ def _packages(sources: list[SourceFile], packages: Mapping[str, Path]) -> dict[s
 
 
 def _marked(source: SourceFile, number: int, copies: Mapping[Path, Path]) -> bytes:
-    """The text with a mark in each start tag that is not xacro's own, and with includes of the copies."""
+    """The text with a mark in each start tag that is not xacro's own, and with its includes replaced by the copies."""
     text, pieces, done = source.text.encode("utf-8", "replace"), [], 0
-    for offset, line, name in _starts(text):
-        after = offset + 1 + len(name.encode())
+    for tag in source.root.walk():
+        after = tag.at + 1 + len(tag.name.encode())
         pieces.append(text[done:after])
         done = after
-        if not name.startswith("xacro:"):
-            pieces.append(f' {MARK}="{number}:{line}"'.encode())
-        elif name == "xacro:include" and (match := _FILENAME.search(text, after)):
+        if not tag.name.startswith("xacro:"):
+            pieces.append(f' {MARK}="{number}:{tag.line}"'.encode())
+        elif tag.name == "xacro:include" and (match := _FILENAME.search(text, after)):
             pieces += [text[after : match.start()], match[1], _copy(match[2][1:-1].decode(), source, copies)]
             done = match.end()
     return b"".join([*pieces, text[done:]])
@@ -179,12 +156,3 @@ def _copy(name: str, source: SourceFile, copies: Mapping[Path, Path]) -> bytes:
     path = str(found) if found else name
     full = path.startswith(("/", "$(find", "$(env", "$(optenv", "$(cwd", "$(dirname"))
     return f'"{path if full else source.path.parent.absolute() / path}"'.encode()
-
-
-def _starts(text: bytes) -> list[tuple[int, int, str]]:
-    """Byte offset, line and name of each start tag."""
-    found: list[tuple[int, int, str]] = []
-    parser = expat.ParserCreate("utf-8")
-    parser.StartElementHandler = lambda name, _: found.append((parser.CurrentByteIndex, parser.CurrentLineNumber, name))
-    parser.Parse(text, True)
-    return found

@@ -31,7 +31,7 @@ from holozen.robot.model import (
     descend,
 )
 from holozen.robot.sensors import read_sensors
-from holozen.robot.shapes import Materials, gazebo_color, needed, read_materials, read_pose, read_shape, urdf_color
+from holozen.robot.shapes import Materials, gazebo_color, read_materials, read_pose, read_shape, urdf_color
 from holozen.suggest import cut, listed
 
 # The tree of links and joints.
@@ -58,7 +58,7 @@ def _check_ends(tags: Mapping[str, Tag], links: Mapping[str, object], joints: Ma
     for joint in joints.values():
         for end, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in links:
-                known = listed(list(links))
+                known = listed(links)
                 raise tags[joint.name].wrong(f"names the unknown {end} link {cut(name)}; links: {known}")
 
 
@@ -81,7 +81,7 @@ def check_mimics(robot: Tag, joints: Mapping[str, Joint], source: Source) -> Non
         if other not in joints:
             near = source.suggest(other, joints)
             problem = f"follows the joint {cut(other)}, which does not exist{near}"
-            raise _wrong(robot, name, f"{problem}; joints: {listed(list(joints))}")
+            raise _wrong(robot, name, f"{problem}; joints: {listed(joints)}")
     done: set[str] = set()
     for start in followed:
         path: dict[str, None] = {}
@@ -101,7 +101,7 @@ def _wrong(robot: Tag, name: str, problem: str) -> RobotError:
 
 
 def warn_transmissions(robot: Tag, joints: Mapping[str, Joint], source: Source) -> None:
-    """Warn about transmissions of no joint. Joints take commands without one."""
+    """Warn about transmissions that name no joint of the robot. Joints take commands without a transmission."""
     for tag in robot.all("transmission"):
         names = [joint.attributes.get("name", "").strip() for joint in tag.all("joint")]
         unknown = [name for name in names if name not in joints]
@@ -127,39 +127,39 @@ def read_gazebo(
     A later element overrides an earlier one, and a material here overrides URDF's, as in sdformat's
     parser_urdf.cc. Raises RobotError.
     """
-    dressed, static = dict(links), False
+    changed, static = dict(links), False
     for tag in robot.all("gazebo"):
         name = tag.attributes.get("reference", "").strip()
         if not name:
             static = Settings(tag).flag("static", default=static)
-        elif name in dressed:
-            dressed[name] = _dressed(dressed[name], tag, source)
+        elif name in changed:
+            changed[name] = _with_settings(changed[name], tag, source)
         elif name not in joints:
             near = source.suggest(name, (*links, *joints))
             problem = f"names no link and no joint{near}; it is left out"
-            source.warn(tag, f"{problem}; links: {listed(list(links))}")
-    return dressed, static
+            source.warn(tag, f"{problem}; links: {listed(links)}")
+    return changed, static
 
 
-def _dressed(link: Link, tag: Tag, source: Source) -> Link:
+def _with_settings(link: Link, tag: Tag, source: Source) -> Link:
     settings = Settings(_with_contact(tag))
     color = gazebo_color(tag, source)
     # Two spellings: <gravity>0</gravity> of SDF, and the older <turnGravityOff>.
-    light = settings.flag("turn_gravity_off", default=not link.gravity)
+    is_off = settings.flag("turn_gravity_off", default=not link.gravity)
     return replace(
         link,
         surface=_surface(link.surface, settings),
-        gravity=settings.flag("gravity", default=not light),
+        gravity=settings.flag("gravity", default=not is_off),
         visuals=tuple(replace(shape, color=color) for shape in link.visuals) if color else link.visuals,
     )
 
 
 def _surface(before: Surface, settings: Settings) -> Surface:
     values = {
-        "mu1": settings.maybe("mu1", "mu"),
-        "mu2": settings.maybe("mu2", "mu"),
-        "kp": settings.maybe("kp", most=STIFFEST),
-        "kd": settings.maybe("kd", most=STIFFEST),
+        "mu1": settings.optional("mu1", "mu"),
+        "mu2": settings.optional("mu2", "mu"),
+        "kp": settings.optional("kp", most=STIFFEST),
+        "kd": settings.optional("kd", most=STIFFEST),
     }
     given = {name: value for name, value in values.items() if value is not None}
     self_collide = settings.flag("self_collide", default=before.self_collide)
@@ -188,10 +188,10 @@ def read_robot(robot: Tag, source: Source) -> RobotModel:
         raise robot.wrong("has no <link>; a robot has at least one")
     root = root_of(robot, links, joints)
     check_mimics(robot, joints, source)
-    dressed, static = read_gazebo(robot, links, joints, source)
+    all_links, static = read_gazebo(robot, links, joints, source)
     lost = massless(links, joints, root)
     warn_massless(robot, links, joints, lost, source)
-    kept, moving = without(dressed, joints, lost)
+    kept, kept_joints = without(all_links, joints, lost)
     drive, forces = read_forces(robot, kept, root, read_plugins(robot, kept, joints, root, source), source)
     check_drive(robot, drive, links, joints, root, lost, source)
     sensors = read_sensors(robot, kept, links, source)
@@ -200,7 +200,7 @@ def read_robot(robot: Tag, source: Source) -> RobotModel:
         name=robot.word("name"),
         root=root,
         links=kept,
-        joints=moving,
+        joints=kept_joints,
         drive=drive,
         static=static or root == WORLD,
         warnings=tuple(source.warnings),
@@ -240,8 +240,7 @@ def read_joint(tag: Tag, source: Source) -> Joint:
     kind = tag.word("type")
     if kind not in JOINT_KINDS:
         raise tag.wrong(f"has unknown type {cut(kind)}; known types: {', '.join(JOINT_KINDS)}")
-    ends = {name: tag.first(name) for name in ("parent", "child")}
-    parent, child = (needed(tag, name).word("link") for name in ends)
+    parent, child = (tag.needed(end).word("link") for end in ("parent", "child"))
     axis, limits, pose = _axis(tag, kind), _limits(tag, kind, source), read_pose(tag)
     return Joint(tag.word("name"), kind, parent, child, pose, axis, limits, *read_dynamics(tag), read_mimic(tag))
 
@@ -253,8 +252,8 @@ def _visual(tag: Tag, source: Source, materials: Materials) -> Shape:
 
 
 def read_dynamics(owner: Tag) -> tuple[float, float]:
-    """Friction and damping of a URDF's joint, or an SDF's axis. Raises RobotError."""
-    dynamics = owner.first("dynamics") or owner.empty("dynamics")
+    """Friction and damping of a URDF joint, or an SDF axis. Raises RobotError."""
+    dynamics = owner.child("dynamics")
     friction, damping = (dynamics.number(name, 0.0) for name in ("friction", "damping"))
     if min(friction, damping) < 0:
         raise dynamics.wrong(f"has friction {friction} and damping {damping}; a negative one would drive the joint")
@@ -262,7 +261,7 @@ def read_dynamics(owner: Tag) -> tuple[float, float]:
 
 
 def read_mimic(owner: Tag) -> Mimic | None:
-    """What a URDF's joint, or an SDF's axis, follows. Raises RobotError."""
+    """The joint that a URDF joint, or an SDF axis, follows; None if it follows none. Raises RobotError."""
     mimic = owner.first("mimic")
     if mimic is None:
         return None
@@ -272,9 +271,9 @@ def read_mimic(owner: Tag) -> Mimic | None:
 
 
 def _inertial(tag: Tag) -> Inertial:
-    mass = needed(tag, "mass").number("value")
+    mass = tag.needed("mass").number("value")
     if mass < 0:
-        raise needed(tag, "mass").wrong(f"value: {mass} kg is negative")
+        raise tag.needed("mass").wrong(f"value: {mass} kg is negative")
     return Inertial(read_pose(tag), mass, read_inertia(tag, 0.0) if mass else NO_INERTIA)
 
 

@@ -1,4 +1,4 @@
-"""Xacro without ROS: the xacro library in a process of its own, with results cached while no input changes."""
+"""Xacro without ROS: runs the xacro library in a process of its own, and caches texts until their inputs change."""
 
 import contextlib
 import glob
@@ -18,26 +18,38 @@ from xml.parsers.expat import ExpatError, ParserCreate
 
 from holozen.console import report
 from holozen.robot import reader
-from holozen.robot.elements import MOST_TEXT, check_size, read_xml, repair_xml
+from holozen.robot.elements import MOST_TEXT, read_text, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import VARIABLES, find_package
-from holozen.suggest import cut
+from holozen.suggest import cut, listed, suggest
 
-# The result of an expansion, and its inputs: files, wildcards, environment variables and packages.
+# What to expand; and the result, with its inputs: files, wildcards, environment variables and packages.
+
+
+@dataclass(frozen=True, slots=True)
+class XacroFile:
+    """A xacro file, the values of its `xacro:arg`, the folders of `--package NAME=DIR`, and the environment variables
+    that it may read.
+    """
+
+    path: Path
+    args: Mapping[str, str] = field(default_factory=dict)
+    packages: Mapping[str, Path] = field(default_factory=dict)
+    allow_env: Collection[str] = ()
 
 
 Answer = str | list[str] | None
 Inputs = dict[str, dict[str, Answer]]
-"""Kind ("file", "glob", "env", "find") -> input -> its value at the time."""
+"""Kind ("file", "glob", "env", "find") -> input -> its value during the expansion."""
 
-SAVED = ("file", "glob")  # the kinds that change when files are saved
+SAVED = ("file", "glob")  # the kinds that change when a file is saved
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
     """The result of an expansion: a text, or a one-line error.
 
-    `inputs` are those read up to then. `pure` means that the text depends on nothing else.
+    `inputs` are those that it read. `pure` means that the text depends on nothing else.
     """
 
     text: str = ""
@@ -55,7 +67,10 @@ def answer(kind: str, asked: str, start: Path, packages: Mapping[str, Path]) -> 
         return sorted(glob.glob(asked))
     if kind == "env":
         return os.environ.get(asked)
-    return _folder(asked, start, packages)
+    try:
+        return str(find_package(asked, start, packages))
+    except RobotError:
+        return None
 
 
 def digest(path: str) -> str | None:
@@ -70,31 +85,33 @@ def digest(path: str) -> str | None:
         return None
 
 
-def now(inputs: Inputs, start: Path, packages: Mapping[str, Path]) -> Inputs:
+def current(inputs: Inputs, start: Path, packages: Mapping[str, Path]) -> Inputs:
     """The same inputs with their current values."""
     return {
         kind: {asked: answer(kind, asked, start, packages) for asked in answers} for kind, answers in inputs.items()
     }
 
 
-def unchanged(
-    inputs: Inputs, start: Path, packages: Mapping[str, Path], kinds: tuple[str, ...] = (*SAVED, "env", "find")
-) -> bool:
-    """Whether each input of `kinds` still has the recorded value."""
-    return all(
-        answer(kind, asked, start, packages) == then for kind in kinds for asked, then in inputs.get(kind, {}).items()
+def unchanged(inputs: Inputs, start: Path, packages: Mapping[str, Path]) -> bool:
+    """Whether each input still has the recorded value."""
+    recorded = ((kind, asked, value) for kind, answers in inputs.items() for asked, value in answers.items())
+    return all(answer(kind, asked, start, packages) == value for kind, asked, value in recorded)
+
+
+def unasked(path: Path, given: Collection[str], asked: Collection[str] = ()) -> tuple[str, ...]:
+    """A warning for each argument that is `given` to a file and not among those that it has `asked` for. Xacro ignores
+    them, so that a misspelt one would be the default.
+    """
+    left = sorted(set(asked).difference(given))
+    return tuple(
+        f"{path}: nothing asks for the argument {cut(name)}{suggest(name, left)}; its arguments are: {listed(asked)}"
+        for name in given
+        if name not in asked
     )
 
 
-def _folder(name: str, start: Path, packages: Mapping[str, Path]) -> str | None:
-    try:
-        return str(find_package(name, start, packages))
-    except RobotError:
-        return None
-
-
-# Expanded texts in the user's cache folder, each with its inputs. Damaged or foreign entries are ignored, and so
-# is a folder that cannot be written.
+# Expanded texts in the user's cache folder, each with its inputs. Damaged entries, and those of other users, are
+# ignored, and so is a folder that cannot be written.
 
 
 MOST_ENTRIES = 64
@@ -109,7 +126,7 @@ def cache_folder() -> Path | None:
 
 
 def load_cached(key: str) -> dict[str, Any] | None:
-    """The entry stored under `key`, if it is complete and ours."""
+    """The entry stored under `key`, if it is complete and this user's; else None."""
     try:
         path = _cache_path(key)
         with open(path, "rb") as file:
@@ -137,24 +154,25 @@ def store_cached(key: str, entry: dict[str, Any]) -> None:
             part.replace(path)
         finally:
             part.unlink(missing_ok=True)
-        _forget(path.parent)
+        _evict(path.parent)
 
 
 def _cache_path(key: str) -> Path:
-    place = cache_folder()
-    if place is None:
+    folder = cache_folder()
+    if folder is None:
         raise OSError("no cache folder")
-    return place / f"{hashlib.sha256(key.encode('utf-8', 'surrogateescape')).hexdigest()[:32]}.json"
+    return folder / f"{hashlib.sha256(key.encode('utf-8', 'surrogateescape')).hexdigest()[:32]}.json"
 
 
 def _checksum(body: bytes) -> bytes:
     return hashlib.sha256(body).hexdigest().encode()
 
 
-def _forget(place: Path) -> None:
-    # These include temporary files of killed processes.
-    kept = sorted(place.iterdir(), key=lambda path: path.stat().st_mtime_ns)
-    for path in kept[:-MOST_ENTRIES]:
+def _evict(folder: Path) -> None:
+    by_age = sorted(
+        folder.iterdir(), key=lambda path: path.stat().st_mtime_ns
+    )  # also temporary files of killed processes
+    for path in by_age[:-MOST_ENTRIES]:
         path.unlink(missing_ok=True)
 
 
@@ -166,7 +184,7 @@ STEP_TIME = 1.2  # s of CPU time for one expression or element, after which the 
 MOST_WORDS = 100_000  # bytes of standard error
 PATIENCE = 60.0  # s; the child's own CPU time limits end it long before, unless it sleeps
 _ROOT = str(Path(__file__).resolve().parents[2])
-# Without `site`, whose search path is passed in, startup takes half as long.
+# Without `site`, whose search path is passed in instead, startup takes half as long.
 BOOT = """
 import json, sys
 asked = json.load(sys.stdin)
@@ -176,28 +194,26 @@ main(asked)
 """
 
 
-MOST_OUTSIDE = 20  # robot files that are included from outside of all known folders
+MOST_OUTSIDE = 20  # robot files that are included from outside all known folders
 
 
-def expand_in_child(
-    path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str] = ()
-) -> Outcome:
-    """Expand `path` in a process of its own, which reads only known folders. Takes 0.1 s, and terminates for any input.
+def expand_in_child(file: XacroFile) -> Outcome:
+    """Expand a file in a process of its own, which reads only known folders. Takes 0.1 s, and terminates for any input.
 
-    A robot file may be included from elsewhere: the process ends with its name, and starts anew with the answer whether
-    it is one.
+    A robot file may be included from elsewhere: the child ends with its path, and is started again with the answer
+    whether it is one.
     """
     outside: dict[str, bool] = {}
-    while isinstance(outcome := _expand_once(path, args, packages, allow_env, outside), str):
+    while isinstance(outcome := _expand_once(file, outside), str):
         if len(outside) == MOST_OUTSIDE:
-            many = f"more than {MOST_OUTSIDE} files are included from outside of all known packages"
-            return Outcome(error=f"{path}: {many}; give the package that holds them: --package NAME=DIR")
+            problem = f"more than {MOST_OUTSIDE} files are included from outside of all known packages"
+            return Outcome(error=f"{file.path}: {problem}; give the package that holds them: --package NAME=DIR")
         outside[outcome] = is_robot_file(outcome)
     return outcome
 
 
 def is_robot_file(path: str) -> bool:
-    """Whether a file is XML with a <robot> or <sdf> around all, without quoting from it."""
+    """Whether a file is XML whose root is a <robot> or an <sdf>. Nothing of its content is passed on."""
     roots: list[str] = []
     parser = ParserCreate()
 
@@ -211,26 +227,21 @@ def is_robot_file(path: str) -> bool:
     return roots[:1] in (["robot"], ["sdf"])
 
 
-def _expand_once(
-    path: Path,
-    args: Mapping[str, str],
-    packages: Mapping[str, Path],
-    allow_env: Collection[str],
-    outside: Mapping[str, bool],
-) -> Outcome | str:
-    """The outcome, or the file outside of all known folders about which the process asks."""
+def _expand_once(file: XacroFile, outside: Mapping[str, bool]) -> Outcome | str:
+    """The outcome, or the path of a file outside all known folders about which the child asks."""
     with os.fdopen(os.memfd_create("note"), "w+b") as note:  # there may be no writable folder
         asked = {
-            "path": str(path),
-            "args": dict(args),
-            "packages": {name: str(folder) for name, folder in packages.items()},
-            "allow_env": [*allow_env],
+            "path": str(file.path),
+            "args": dict(file.args),
+            "packages": _as_text(file.packages),
+            "allow_env": [*file.allow_env],
             "outside": outside,
             "set": [*os.environ],
             "modules": [*map(str, sys.path), _ROOT],
             "note": note.fileno(),
         }
-        kept = {name: os.environ[name] for name in ("LD_LIBRARY_PATH", *VARIABLES, *allow_env) if name in os.environ}
+        passed_on = ("LD_LIBRARY_PATH", *VARIABLES, *file.allow_env)
+        kept = {name: os.environ[name] for name in passed_on if name in os.environ}
         code, reply, words = _ask(json.dumps(asked).encode(), note.fileno(), kept)
         with contextlib.suppress(ValueError):
             answer = json.loads(reply)
@@ -238,7 +249,11 @@ def _expand_once(
                 return str(wanted)
             answer["warnings"] = tuple(answer["warnings"])
             return Outcome(**answer)
-        return Outcome(error=_ended(path, code, note, words))
+        return Outcome(error=_ended(file.path, code, note, words))
+
+
+def _as_text(packages: Mapping[str, Path]) -> dict[str, str]:
+    return {name: str(folder) for name, folder in packages.items()}
 
 
 def _ask(question: bytes, note: int, env: Mapping[str, str]) -> tuple[int, bytes, bytes]:
@@ -297,80 +312,46 @@ _XACRO = re.compile(r"<xacro:|\$\{|\$\((?:find|arg|env|optenv|eval|cwd|dirname|a
 _FORMAT = 1  # of a cache entry
 
 
-def expand(
-    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
-) -> str:
-    """The URDF text of a robot file; a file without xacro is not changed. Otherwise as `expand_xacro`, without its
-    warnings.
-    """
-    text = read_text(path)
-    return expanded(path, args, packages, allow_env).text if is_xacro(path, text) else text
-
-
 def expand_xacro(
     path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
 ) -> str:
     """The text that the xacro library generates from a file: the output of its command line, and of
-    `process_file(path).toprettyxml(indent="  ")`, byte for byte.
+    `process_file(path).toprettyxml(indent="  ")`, byte for byte. The arguments are those of XacroFile.
 
-    `args` are the values of `xacro:arg`, `packages` the folders of `--package NAME=DIR`. The text is sent to any
-    node that serves `spawn_entity`, so it must not leak local data: `load_yaml` reads inside known packages only, and
-    environment variables are read only if `allow_env` names them. Xacro evaluates Python expressions, in a process
-    that the kernel keeps from other files, the network and other processes: never expand text received over the network
-    all the same. The library's warnings are printed. Raises RobotError with file, line and
-    the chain of macros and includes.
+    The text is sent to any node that serves `spawn_entity`, so it must not leak local data: `load_yaml` reads inside
+    known packages only, and environment variables are read only if `allow_env` names them. Xacro evaluates Python
+    expressions, in a process that the kernel keeps from other files, the network and other processes; all the same,
+    never expand text received over the network. The library's warnings are printed. Raises RobotError with file, line
+    and the chain of macros and includes.
     """
-    outcome = expanded(path, args, packages, allow_env)
+    outcome = expanded(XacroFile(path, args, packages, allow_env))
     for warning in outcome.warnings:
         report(f"warning: {warning}")
     return outcome.text
 
 
-def expanded(
-    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
-) -> Outcome:
-    """The same, with its warnings."""
-    outcome = process(path, args, packages, allow_env)
+def expanded(file: XacroFile) -> Outcome:
+    """As `expand_xacro`, but the warnings are returned."""
+    outcome = process(file)
     if outcome.error:
         raise RobotError(outcome.error)
     return outcome
 
 
-def process(
-    path: Path, args: Mapping[str, str] = {}, packages: Mapping[str, Path] = {}, allow_env: Collection[str] = ()
-) -> Outcome:
-    """As `expand_xacro`, with the inputs of the text. A cached text is reused while none of them changed.
+def process(file: XacroFile) -> Outcome:
+    """As `expanded`, but errors of the library are returned too. A cached text is used until one of its inputs changes.
 
-    Raises RobotError only for errors before the library is called.
+    Raises RobotError for errors before the library is called.
     """
-    read_text(path)
-    key = _key(path, args, packages, allow_env)
+    read_text(file.path)
+    key = _key(file)
     entry = load_cached(key)
-    if entry and unchanged(entry["inputs"], path, packages):
+    if entry and unchanged(entry["inputs"], file.path, file.packages):
         return Outcome(entry["text"], "", entry["inputs"], tuple(entry["warnings"]), True)
-    outcome = expand_in_child(path, args, packages, allow_env)
+    outcome = expand_in_child(file)
     if outcome.pure and not outcome.error:
         store_cached(key, asdict(outcome))
     return outcome
-
-
-def read_text(path: Path) -> str:
-    """The text of a file, line endings kept. Raises RobotError if it cannot be read, is too large or is not UTF-8."""
-    try:
-        if path.is_file():
-            check_size(path.stat().st_size, str(path))
-        elif path.exists() and not path.is_dir():
-            raise RobotError(f"{path}: not a regular file; give one that can be read more than once")
-        text = path.read_bytes().decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise RobotError(f"{path}: byte {error.start} is not UTF-8 text; save the file as UTF-8") from None
-    except OSError as error:
-        raise RobotError(f"{path}: {error.strerror or error}") from None
-    except RobotError:
-        raise
-    except ValueError as error:
-        raise RobotError(f"{path}: {error}") from None
-    return text
 
 
 def is_xacro(path: Path, text: str) -> bool:
@@ -379,40 +360,32 @@ def is_xacro(path: Path, text: str) -> bool:
 
 
 def uses_xacro(text: str) -> bool:
-    """Whether any element uses xacro; comments do not count, and broken XML is another error."""
+    """Whether any element uses xacro, outside of comments; False for broken XML, which is reported elsewhere."""
     try:
         return _XACRO.search(text) is not None and reader.run(bool, "the text", _uses_xacro, text)
     except RobotError:
-        return False  # it is too much to read, which is reported later
+        return False
 
 
 def _uses_xacro(text: str) -> bool:
-    try:
-        tags = [read_xml(repair_xml(text)[0], "")]
-    except RobotError:
-        return False
-    for tag in tags:
-        tags += tag.children
+    tags = read_xml(repair_xml(text)[0], "").walk()
     words = (f"<{tag.name} {' '.join(tag.attributes.values())} {tag.text}" for tag in tags)
     return any(_XACRO.search(word) for word in words)
 
 
-def _key(path: Path, args: Mapping[str, str], packages: Mapping[str, Path], allow_env: Collection[str]) -> str:
-    """Everything besides its inputs that determines a text, as text. Relative names start at the working folder."""
-    given = {name: str(folder) for name, folder in packages.items()}
-    asked = [str(path), _here(), dict(args), given, sorted(allow_env), os.path.expanduser("~")]
+def _key(file: XacroFile) -> str:
+    """Everything besides its inputs that determines a text, as text."""
+    try:
+        here = os.getcwd()  # where relative names start
+    except OSError:
+        here = ""
+    packages, allowed = _as_text(file.packages), sorted(file.allow_env)
+    asked = [str(file.path), here, dict(file.args), packages, allowed, os.path.expanduser("~")]
     return json.dumps([_FORMAT, *asked, sys.version, _code()], sort_keys=True)
 
 
-def _here() -> str:
-    try:
-        return os.getcwd()
-    except OSError:
-        return ""
-
-
 def _code() -> list[tuple[str, int, int]]:
-    """The files of the library and our own module for it; installing another version changes them."""
+    """Name, size and time of each file of the library and of our modules for it: another version changes them."""
     here = Path(__file__).parent
     files = [*_library().glob("*.py"), here / "xacro.py", here / "xacro_child.py", here / "packages.py"]
     stats = [(str(file), file.stat()) for file in files]

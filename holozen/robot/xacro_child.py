@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from xml.dom import expatbuilder, minidom
 from xml.parsers.expat import ExpatError
 
-from holozen.robot.elements import MOST_ELEMENTS, broken_xml, check_size
+from holozen.robot.elements import MOST_ELEMENTS, broken_xml, check_file, check_size, read_text
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import (
     find_by_name,
@@ -35,7 +35,7 @@ from holozen.robot.packages import (
     without_home,
 )
 from holozen.robot.sandbox import limit, restrict
-from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, read_text, unchanged
+from holozen.robot.xacro import PROCESSOR_TIME, STEP_TIME, Answer, Inputs, answer, unasked, unchanged
 from holozen.suggest import cut, shorten, suggest
 
 # Elements annotated with file and line, in the documents that the library reads and copies.
@@ -59,7 +59,7 @@ def place_of(node: Any) -> Place | None:
 def keep_places(file: Callable[[], str]) -> None:
     """Make minidom record the place of each element it parses from now on; `file` gives the current file.
 
-    It patches minidom for the whole process. Entity declarations are refused, as in `tag.read_xml`.
+    It patches minidom for the whole process. Entity declarations are refused, as in `elements.read_xml`.
     """
     builder: Any = expatbuilder.ExpatBuilderNS
     dom: Any = minidom
@@ -415,8 +415,11 @@ class Expansion:
 
     def _expanded(self, library: Any, trace: Trace, args: dict[str, str]) -> str:
         self._recording = True
-        document = library.process_file(str(self.path), mappings=args)
+        arguments = Arguments(args)
+        document = library.process_file(str(self.path), mappings=arguments)
         trace.quiet()
+        for warning in unasked(self.path, args, arguments.asked):
+            print(warning)
         text = str(document.toprettyxml(indent="  "))
         check_size(len(text), f"{self.path} (expanded)")
         return text
@@ -532,9 +535,26 @@ class Expansion:
                 )
             self.record("glob", args[0])
         elif isinstance(args[0], (str, os.PathLike)):
-            path = str(Path(args[0]))  # the library passes ./robot.xacro
+            path = Path(args[0])  # the library passes ./robot.xacro
             check_file(path)
-            self.record("file", path)
+            self.record("file", str(path))
+
+
+class Arguments(dict[str, str]):
+    """The values of xacro's arguments, which note those that the file declares or reads."""
+
+    def __init__(self, values: Mapping[str, str]) -> None:
+        super().__init__(values)
+        self.asked = set[str]()
+
+    def __getitem__(self, name: str) -> str:
+        value = super().__getitem__(name)
+        self.asked.add(name)
+        return value
+
+    def __contains__(self, name: object) -> bool:
+        self.asked.add(str(name))  # <xacro:arg> asks whether it has to set the default
+        return super().__contains__(name)
 
 
 class Asked(dict[str, str]):
@@ -551,11 +571,3 @@ class Asked(dict[str, str]):
     def __contains__(self, name: object) -> bool:
         self._expansion.record_variable(str(name), super().__contains__(name))
         return super().__contains__(name)
-
-
-def check_file(path: str) -> None:
-    """Raise RobotError for an existing path that is not a regular file of reasonable size."""
-    if os.path.isfile(path):
-        check_size(os.path.getsize(path), path)
-    elif os.path.exists(path) and not os.path.isdir(path):
-        raise RobotError(f"{path}: not a regular file; give one that can be read more than once")

@@ -106,10 +106,10 @@ MESSAGES = {
 }  # fmt: skip
 """The messages among the re-exported names, by module; all others are rclpy's."""
 
-COMPONENTS = "there are no components here, which are C++; start each as a Node of its own: Python scripts run"
+COMPONENTS = "components are C++ and do not run here; start a Python script as a separate Node for each"
 MOVEIT = "there is no MoveIt here"
 NAV2 = "there is no Nav2 here; `holozen controller` serves navigate_to_pose and follow_waypoints"
-ROS_1 = "this belongs to ROS 1; here is ROS 2's rclpy"
+ROS_1 = "this belongs to ROS 1; use ROS 2's rclpy"
 
 HINTS = {
     "actionlib": f"{ROS_1}, which has actions in rclpy.action",

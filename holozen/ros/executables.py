@@ -46,22 +46,26 @@ def from_file(path: Path) -> Script:
     if path.is_dir():
         raise NotFound(f"{path} is a folder; give a Python file, or PACKAGE EXECUTABLE")
     if not path.exists():
-        raise NotFound(f"no file {str(path)!r}{files_there(path, '*.py', 'Python files')}")
+        raise NotFound(missing(path, "*.py", "Python files"))
     try:
         with path.open("rb") as file:
             head = file.read(_HEAD)
     except OSError as error:
         raise NotFound(f"cannot read {path}: {error.strerror}") from None
     if path.suffix != ".py" and not _is_python(head):
-        raise NotFound(f"{path} is no Python script: its name must end with .py, or it must begin #!/usr/bin/python3")
+        raise NotFound(
+            f"{path} is not a Python script: its name must end with .py, or it must begin #!/usr/bin/python3"
+        )
     path = path.absolute()
     return Script(path, path.resolve().parent)
 
 
-def files_there(path: Path, pattern: str, what: str) -> str:
-    """The end of an error line about a file that does not exist: the most similar one in its folder, or all."""
+def missing(path: Path, pattern: str, what: str) -> str:
+    """The error line about a file that does not exist, with the most similar one in its folder, or all."""
     files = sorted(each.name for each in path.parent.glob(pattern) if each.is_file())
-    return suggest(path.name, files) or f"; {what} there: {listed(files, 20)}"
+    if not files:
+        return f"{path} does not exist, and there are no {what} in that folder"
+    return f"{path} does not exist{suggest(path.name, files) or f'; {what} in that folder: {listed(files, 20)}'}"
 
 
 def find(package: str, name: str, nameless: bool = False) -> Script:

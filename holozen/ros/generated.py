@@ -43,7 +43,7 @@ Check = Callable[[Any], Any]
 _construct = StructMeta.__call__  # constructs a message from values known to be valid
 _store = Struct.__setattr__
 MADE: dict[Interface, type["RosMessage"]] = {}
-_kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by content: another registry parses the same file anew
+_kinds: dict[tuple[Any, ...], type["RosMessage"]] = {}  # by content: another registry parses the same file again
 _services: dict[tuple[str, Any, Any], type["RosService"]] = {}
 _actions: dict[tuple[Any, ...], type["RosAction"]] = {}
 _registry = Registry()
@@ -194,7 +194,7 @@ def _make(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[Ros
     kind.__interface__ = interface
     owner = f"{kind.__module__}.{kind.__name__}"
     kind.__checks__ = {field.name: _check(owner, field, nested.get(field.name)) for field in interface.fields}
-    kind.SETTLE = _settle(kind.__name__, interface, nested)
+    kind.SETTLE = _settle(owner, interface, nested)
     for field in interface.fields:
         setattr(kind, f"_{field.name}", kind.__dict__[field.name])
     kind.__slots__ = [f"_{field.name}" for field in interface.fields]
@@ -267,9 +267,6 @@ class _Invalid(Exception):
     """A value that a field cannot hold."""
 
 
-_REJECTED = (_Invalid, TypeError, ValueError, ArithmeticError)
-
-
 def _hint(field: Field, nested: type | None) -> Any:
     """The type of a field for msgspec, with its range and its length: what may arrive on the wire."""
     one: Any = nested or _CLASSES[field.type]
@@ -298,7 +295,8 @@ def _check(owner: str, field: Field, nested: type | None) -> Check:
     """The check of a field in the message called `owner`."""
     one = _element_check(field, nested)
     if field.array:
-        listed = _list_check(owner, field, nested, one)
+        is_kept = nested is not None or field.type in TEXTS  # as in ROS, which stores the very list that was assigned
+        listed = _list_check(owner, field, nested, one, is_kept)
         return _array_check(field, listed) if _typecode(field) else listed
     exact = nested or (float if field.type == "float64" else bool if field.type == "bool" else None)
 
@@ -318,25 +316,16 @@ def _settled(owner: str, field: Field, nested: type | None) -> Check:
 
     Numbers of other classes are converted as an array would: an int for a float, and numpy's.
     """
-    if _typecode(field):
-        return _settled_array(owner, field)
-    exact, one = nested or _CLASSES[field.type], _element_check(field, nested, _LENIENT.get(field.type, _same))
+    one, code = _element_check(field, nested, _LENIENT.get(field.type, _same)), _typecode(field)
+    listed = _list_check(owner, field, nested, one, is_kept=True)
 
-    def check(values: Any) -> list[Any]:
-        fault = " does not fit"
+    def check(values: Any) -> Any:
+        if code and fits_length(field, len(values)):
+            return values  # an array, which holds nothing but numbers in range
         try:
-            if fits_length(field, len(values)) and _all_exact(field, values, exact):
-                return list(values) if type(values) is not list else values
-            made = []
-            for index, value in enumerate(values):
-                fault = f"[{index}]: {_short(value)} of type '{type(value).__name__}' does not fit"
-                made.append(one(value))
-            fault = f": {len(values)} values do not fit"
-            if fits_length(field, len(values)):
-                return made
-        except _REJECTED:
-            pass
-        raise CodecError(f"{owner}.{field.name}{fault} a {field.spelled()}") from None
+            return listed(values)
+        except AssertionError as error:
+            raise CodecError(str(error)) from None
 
     return check
 
@@ -373,9 +362,9 @@ def _element_check(field: Field, nested: type | None, convert: Check = _same) ->
     return check
 
 
-def _list_check(owner: str, field: Field, nested: type | None, one: Check) -> Check:
+def _list_check(owner: str, field: Field, nested: type | None, one: Check, is_kept: bool) -> Check:
+    """The check of a sequence whose elements `one` checks. If `is_kept`, a list that is right is not copied."""
     exact = nested or _CLASSES[field.type]
-    is_kept = exact is str or nested  # as in ROS, which stores the very list that was assigned
 
     def check(given: Any) -> list[Any]:
         values = _as_list(given)
@@ -387,7 +376,7 @@ def _list_check(owner: str, field: Field, nested: type | None, one: Check) -> Ch
         for index, value in enumerate(values):
             try:
                 made.append(one(value))
-            except _Invalid:
+            except (_Invalid, TypeError, ValueError, ArithmeticError):
                 raise AssertionError(_rejection(owner, field, nested, value, f"[{index}]")) from None
         return made
 
@@ -440,17 +429,6 @@ def _array_check(field: Field, listed: Callable[[Any], list[Any]]) -> Check:
         values = given if type(given) is array and given.typecode == code else _copied(code, given)
         if values is None or 0 < most < len(values):
             return packed(code, listed(given))
-        return values
-
-    return check
-
-
-def _settled_array(owner: str, field: Field) -> Check:
-    """The check of an array's length before it is encoded, since numbers may have been appended."""
-
-    def check(values: Any) -> Any:
-        if 0 < field.bound < len(values):
-            raise CodecError(f"{owner}.{field.name}: {len(values)} values do not fit a {field.spelled()}")
         return values
 
     return check

@@ -339,10 +339,5 @@ def _fill_single_type(names: list[str]) -> Fill:
 
 def _finish(module: ModuleType, doc: str, names: list[str], get: Callable[[str], Any]) -> None:
     module.__dict__.update(
-        {
-            "__doc__": doc,
-            "__all__": names,
-            "__getattr__": get,
-            "__dir__": lambda: sorted({*module.__dict__, *names}),
-        }
+        {"__doc__": doc, "__all__": names, "__getattr__": get, "__dir__": lambda: sorted({*module.__dict__, *names})}
     )

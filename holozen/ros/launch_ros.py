@@ -1,7 +1,5 @@
 """launch_ros: nodes, their parameters, and settings for the nodes of a group."""
 
-import json
-import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -76,7 +74,7 @@ class Node(ExecuteProcess):
         for old, new in (*self.remappings, *scope.remappings):
             found += ["-r", f"{text(context, old)}:={text(context, new)}"]
         for name, value in parameter_pairs(context, [*scope.parameters, *self.parameters]):
-            found += ["-p", f"{name}:={_as_yaml(value)}"] if name else ["--params-file", str(value)]
+            found += ["-p", f"{name}:={parameter_yaml.written(value)}"] if name else ["--params-file", str(value)]
         return ["--ros-args", *found] if found else []
 
 
@@ -172,15 +170,6 @@ def _flattened(context: LaunchContext, values: Mapping[Any, Any], prefix: str) -
             yield from _flattened(context, value, f"{name}.")
         else:
             yield name, parameter_value(context, value)
-
-
-def _as_yaml(value: Any) -> str:
-    """A value as YAML that parses to the same value."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_as_yaml, value))}]"
-    if isinstance(value, float) and not math.isfinite(value):
-        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
-    return json.dumps(value) if isinstance(value, bool | str) else repr(value)
 
 
 def _is_list(value: Any) -> bool:

@@ -7,6 +7,8 @@ Only lists, maps and files need the YAML library. A file names the nodes that it
     speed: 0.3
 """
 
+import json
+import math
 import re
 import sys
 from collections.abc import Iterator
@@ -51,6 +53,20 @@ def parse(text: str) -> Value | dict[str, Any]:
         return word(stripped)
     found: Value | dict[str, Any] = _parsed(text)
     return found
+
+
+def written(value: Any) -> str:
+    """A value as YAML that is read as the same value, here and by other readers of YAML 1.1."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(written, value))}]"
+    if isinstance(value, str):
+        quoted = json.dumps(value, ensure_ascii=False)
+        return "".join(c if c.isascii() and c.isprintable() else f"\\U{ord(c):08x}" for c in quoted)
+    if isinstance(value, float) and not math.isfinite(value):
+        return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"
+    text = json.dumps(value)
+    # YAML 1.1 requires a decimal point before the exponent.
+    return text.replace("e", ".0e") if isinstance(value, float) and "." not in text else text
 
 
 def document(text: str) -> dict[str, Any]:
@@ -126,7 +142,7 @@ class Section(NamedTuple):
     values: dict[str, Value]
 
     def is_for(self, full_name: str) -> bool:
-        """Whether the node with that absolute name matches."""
+        """Whether it is for the node with that absolute name."""
         return bool(re.fullmatch("".join(_pattern(part) for part in self.place.split("/")[1:]), full_name))
 
 

@@ -118,7 +118,7 @@ def _track_files() -> None:
 def _end() -> None:
     """Write what the script has buffered, and drop its names as Python does at its end.
 
-    `holozen.process.leave` ends the process without Python's own clean-up, which Zenoh's threads do not survive.
+    `holozen.process.Ending` ends the process without Python's own clean-up, which Zenoh's threads do not survive.
     """
     threading.excepthook = lambda _: None  # daemon threads may fail now
     for file in list(_opened):
@@ -129,7 +129,7 @@ def _end() -> None:
 
 
 def _put_first_on_path(folder: str) -> None:
-    """Where Python puts the script's folder, the folder of the interpreter's own command is now."""
+    """Put the script's folder where Python would: that place holds the folder of the `holozen` command."""
     if sys.flags.safe_path or not sys.path:
         sys.path.insert(0, folder)
     else:

@@ -2,7 +2,6 @@
 
 Quaternions are x, y, z, w (transforms3d has w first), matrices 4x4 and homogeneous, angles in radians. `axes` names one
 of 24 orders of Euler angles: "s" for static, "r" for rotating axes, then their letters; "sxyz" is roll, pitch, yaw.
-
 """
 
 import math
@@ -13,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 from transforms3d import affines, axangles, euler, quaternions
 
-from holozen.rotation import slerp
+from holozen.rotation import XYZW, slerp
 
 __all__ = [
     "compose_matrix", "concatenate_matrices", "euler_from_matrix", "euler_from_quaternion", "euler_matrix",
@@ -26,7 +25,7 @@ __all__ = [
 
 Array = npt.NDArray[np.float64]
 Numbers = Sequence[float] | Array
-XYZW = tuple[float, float, float, float]
+ORIGIN = (0.0, 0.0, 0.0)
 
 
 def euler_from_quaternion(quaternion: Numbers, axes: str = "sxyz") -> tuple[float, float, float]:
@@ -128,11 +127,9 @@ def translation_from_matrix(matrix: Any) -> Array:
 
 def rotation_matrix(angle: float, direction: Numbers, point: Numbers | None = None) -> Array:
     """The 4x4 matrix that rotates by an angle about an axis through the origin, or through `point`."""
-    matrix = _homogeneous(axangles.axangle2mat(np.asarray(direction, dtype=float)[:3], angle))
-    if point is not None:
-        centre = np.asarray(point, dtype=float)[:3]
-        matrix[:3, 3] = centre - matrix[:3, :3] @ centre
-    return matrix
+    return _homogeneous(
+        axangles.axangle2mat(np.asarray(direction, dtype=float)[:3], angle), ORIGIN if point is None else point
+    )
 
 
 def rotation_from_matrix(matrix: Any) -> tuple[float, Array, Array]:
@@ -147,11 +144,7 @@ def scale_matrix(factor: float, origin: Numbers | None = None, direction: Number
     if direction is not None:
         axis = unit_vector(np.asarray(direction, dtype=float)[:3])
         part = np.outer(axis, axis)
-    matrix = _homogeneous(np.identity(3) + (factor - 1.0) * part)
-    if origin is not None:
-        centre = np.asarray(origin, dtype=float)[:3]
-        matrix[:3, 3] = centre - matrix[:3, :3] @ centre
-    return matrix
+    return _homogeneous(np.identity(3) + (factor - 1.0) * part, ORIGIN if origin is None else origin)
 
 
 def compose_matrix(
@@ -190,7 +183,7 @@ def is_same_transform(matrix0: Any, matrix1: Any) -> bool:
 
 def vector_norm(data: Any, axis: int | None = None, out: Array | None = None) -> Any:
     """The length of a vector, or of the vectors along an axis of an array."""
-    length = np.sqrt(np.sum(np.square(np.asarray(data, dtype=float)), axis=axis))
+    length = np.linalg.norm(np.asarray(data, dtype=float), axis=axis)
     if out is None:
         return float(length) if np.ndim(length) == 0 else length
     out[...] = length
@@ -200,10 +193,10 @@ def vector_norm(data: Any, axis: int | None = None, out: Array | None = None) ->
 def unit_vector(data: Any, axis: int | None = None, out: Array | None = None) -> Any:
     """The vector of length 1 with that direction, or the vectors along an axis of an array."""
     given = np.asarray(data, dtype=float)
-    length = np.sqrt(np.sum(np.square(given), axis=axis, keepdims=axis is not None))
+    unit = given / np.linalg.norm(given, axis=axis, keepdims=axis is not None)
     if out is None:
-        return given / length
-    out[...] = given / length
+        return unit
+    out[...] = unit
     return None
 
 
@@ -217,7 +210,8 @@ def _w_last(quaternion: Array) -> XYZW:
     return x, y, z, w
 
 
-def _homogeneous(rotation: Array) -> Array:
-    matrix = np.identity(4)
-    matrix[:3, :3] = rotation
+def _homogeneous(linear: Array, fixed: Numbers = ORIGIN) -> Array:
+    """The 4x4 matrix of a 3x3 one that leaves the point `fixed` in place."""
+    matrix, point = np.identity(4), np.asarray(fixed, dtype=float)[:3]
+    matrix[:3, :3], matrix[:3, 3] = linear, point - linear @ point
     return matrix

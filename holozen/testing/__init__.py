@@ -13,7 +13,7 @@
             wait_for(drives)
             wait_for(lambda: abs(odom.read()[0].twist.twist.linear.x) < 0.01)
 
-or without any wait: the sim is paused, and makes the steps that the test asks for.
+Or without waiting, in a paused sim that makes only the steps that the test asks for:
 
     def test_the_robot_drives_on_for_half_a_second(lock_step):
         sim = lock_step()
@@ -21,7 +21,7 @@ or without any wait: the sim is paused, and makes the steps that the test asks f
         assert sim.step(120).twist.twist.linear.x > 0.29
         assert abs(sim.step(12).twist.twist.linear.x) < 0.01
 
-The fixtures are in `holozen.testing.plugin`. Nothing heavy is imported here: pytest loads this in every run.
+The fixtures are in `holozen.testing.plugin`. Nothing heavy is imported here, since pytest loads this in every run.
 """
 
 from holozen.testing.lock_step import LockStep

@@ -1,4 +1,4 @@
-"""A sim in lock-step with a test: its time passes only when the test steps it."""
+"""A sim in lock-step with a test: its time passes only as the test steps it."""
 
 from collections.abc import Callable
 from functools import partial
@@ -11,16 +11,16 @@ if TYPE_CHECKING:
     from holozen.messages import CommandStatus, Odometry, SimulationStatus
     from holozen.transport.pubsub import Subscription
 
-UNSURE = ("late", "old", "unknown clock", "gone")  # refusals of commands that were held up on their way
+HELD_UP = ("late", "old", "unknown clock", "gone")  # the refusals of commands that were held up on their way
 PATIENCE = 60.0  # s for steps, or for a sim to start
 
 
 class LockStep:
     """A paused sim on a test's wire, and one of its robots, by name; `flags` are those of `holozen sim`.
 
-    A step is the world's, 1/240 s by default. What a command does in a number of steps, to the last bit, depends on no
-    computer's speed. Other processes may take part: they read and command as always. `odom` and `status` are the
-    newest.
+    A step is one of the world, 1/240 s by default. The effect of a command over a number of steps is the same, to the
+    last bit, on a slow computer and on a fast one. Other processes may take part, and read and command as always.
+    `odom` and `status` are the newest messages.
     """
 
     def __init__(self, wire: Wire, *flags: str, robot: str = "") -> None:
@@ -39,7 +39,7 @@ class LockStep:
         self._read(lambda _: True)
 
     def step(self, steps: int = 1) -> "Odometry":
-        """Let the sim make steps; returns the odom of the last one."""
+        """Let the sim make `steps`; returns the odom after the last one."""
         from holozen.messages import simulation_interfaces as si
 
         before = self.status
@@ -47,7 +47,7 @@ class LockStep:
         return self._read(lambda now: (now.epoch, now.steps) == (before.epoch, before.steps + steps))
 
     def reset(self, scope: int = 0) -> "Odometry":
-        """Begin anew, or reset what a `scope` of ResetSimulationRequest names; returns the first odom."""
+        """Reset the sim, or what a `scope` of ResetSimulationRequest names; returns the first odom after it."""
         from holozen.messages import simulation_interfaces as si
 
         before = self.status
@@ -55,14 +55,14 @@ class LockStep:
         return self._read(lambda now: now.epoch == before.epoch + 1)
 
     def drive(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
-        """Send a command (m/s and rad/s in the body frame), and wait until the robot has it, which obeys from the next
+        """Send a command (m/s and rad/s in the body frame), and wait until the robot has it; it obeys from the next
         step on. AssertionError if it is refused.
         """
         from holozen.messages import Twist
 
         wait_for(lambda: self._commands.matched, PATIENCE, "a robot that listens")
-        refusal = UNSURE[0]
-        while refusal.startswith(UNSURE):
+        refusal = HELD_UP[0]
+        while refusal.startswith(HELD_UP):
             accepted, count = self._obeyed.accepted, _count(self._obeyed)
             self._commands.put(Twist.planar(x, y, turn))
             wait_for(partial(self._is_read, count), PATIENCE, "the robot to read its command")
@@ -73,12 +73,12 @@ class LockStep:
         raise AssertionError(f"the command was refused: {refusal}")
 
     def _is_read(self, before: int) -> bool:
-        """Whether the newest command status counts more commands than before, or is that of another robot."""
+        """Whether the newest command status counts other than `before` commands: more, or those of a new robot."""
         self._obeyed = _newest(self._statuses) or self._obeyed
         return _count(self._obeyed) != before
 
     def _read(self, wanted: "Callable[[SimulationStatus], bool]") -> "Odometry":
-        """Wait for a status as wanted, and for the odom of its time."""
+        """Wait for a status that is `wanted`, and for the odom of its time."""
         from holozen.messages import Time
 
         def is_wanted() -> bool:
@@ -97,7 +97,7 @@ class LockStep:
 
 
 def _count(status: "CommandStatus") -> int:
-    """The commands that were read."""
+    """The number of commands that the robot has read."""
     return status.accepted + sum(status.refused.values())
 
 

@@ -1,4 +1,4 @@
-"""The fixtures. pytest finds them by this package's entry point; no import is needed in a test."""
+"""The pytest fixtures. pytest finds them by this package's entry point: a test needs no import."""
 
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -30,8 +30,8 @@ def terminal(wire: Wire) -> Callable[..., Terminal]:
 
 @pytest.fixture
 def lock_step(wire: Wire) -> Callable[..., LockStep]:
-    """`lock_step("--robot", "my_bot.urdf.xacro")`: a paused sim on this test's wire that makes the steps that are asked
-    for; see LockStep.
+    """`lock_step("--robot", "my_bot.urdf.xacro")`: a paused sim on this test's wire, which the test steps: see
+    LockStep.
     """
     return partial(LockStep, wire)
 

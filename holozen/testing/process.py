@@ -13,10 +13,10 @@ from holozen.process import dies_with_parent
 
 T = TypeVar("T")
 
-SOON, EVERY = 0.0005, 0.005  # s between two polls, at first and later: what is there soon is not waited for long
+SOON, EVERY = 0.0005, 0.005  # s between two polls, at first and later: a condition that is met soon is seen at once
 GRACE = 3.0  # s from SIGTERM to SIGKILL
 SETPRIV = shutil.which("setpriv")  # of util-linux; sets the signal, then becomes the program
-PATIENCE = 30.0  # s; only what fails waits so long, and a loaded machine is slow
+PATIENCE = 30.0  # s; long, since a loaded machine is slow, and only failures wait for all of it
 
 
 def wait_for(condition: Callable[[], T], within: float = PATIENCE, what: str | Callable[[], str] = "a condition") -> T:
@@ -36,9 +36,9 @@ def wait_for(condition: Callable[[], T], within: float = PATIENCE, what: str | C
 
 class Process:
     """A running program, the leader of its own session. `out` and `err` are its output so far. It gets a SIGTERM when
-    the thread that has started it ends, so that a killed test leaves nothing behind.
+    the thread that started it ends, so that a killed test leaves nothing behind.
 
-    `stdin`, `stdout` and `stderr` are as for subprocess.Popen; the first is empty and the others captured by default.
+    `stdin`, `stdout` and `stderr` are as for subprocess.Popen; by default the first is empty, the others are captured.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Process:
         # Files rather than pipes: a process with much output never blocks.
         self._out, self._err = tempfile.TemporaryFile(), tempfile.TemporaryFile()  # noqa: SIM115
         self._ended: tuple[str, str] | None = None
-        # A preexec_fn needs a fork, which takes 50 ms of a test process with 900 MB.
+        # A preexec_fn needs a fork, which takes 50 ms in a test process of 900 MB.
         wrapper = [SETPRIV, "--pdeathsig", "TERM"] if SETPRIV and shutil.which(self.words[0]) else []
         self._popen = subprocess.Popen(
             [*wrapper, *self.words],

@@ -13,7 +13,7 @@ from typing import Any, Self
 from holozen.testing.process import PATIENCE, Process, wait_for
 
 SIZE = 100, 32  # columns and rows
-LAST = 1.0  # s for the last output of a process that has ended, while another one keeps its terminal open
+LAST = 1.0  # s to wait for the last output of a process that has ended, while another one keeps its terminal open
 # Makes the terminal on standard input the controlling one, so that it delivers hang-ups and interrupts.
 _ENTER = "import fcntl, os, sys, termios; fcntl.ioctl(0, termios.TIOCSCTTY, 0); os.execvp(sys.argv[1], sys.argv[1:])"
 
@@ -84,9 +84,9 @@ class Terminal:
         termios.tcsetwinsize(self._master, (rows, columns))
 
     def freeze(self) -> None:
-        """Hang: from now on, read no output of the process until `thaw`."""
+        """Hang like a frozen terminal: read no output of the process until `thaw`."""
         self._frozen.set()
-        with self._reading:  # what it reads just now is still received
+        with self._reading:  # output that is being read is still received
             pass
 
     def thaw(self) -> None:

@@ -1,4 +1,4 @@
-"""A network of their own for the processes of a test."""
+"""A network for the processes of one test."""
 
 import contextlib
 import random

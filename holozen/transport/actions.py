@@ -32,7 +32,7 @@ MOST = 256  # goals of a server, ended ones included
 MOST_WAITING = 100  # requests for the result of one goal
 LONGEST = 86_400.0  # s of one request for a result
 GONE = 1.0  # s without a server after which the goal is lost
-POLL = 0.02  # s between two looks for it
+POLL = 0.02  # s between two checks for it
 NO_ID = bytes(16)
 
 
@@ -80,7 +80,7 @@ def new_id() -> bytes:
 
 
 class Goal:
-    """A goal of a server. `stamp` is when it was accepted, in ns; `result` the reply for those who ask for it."""
+    """A goal of a server. `stamp` is when it was accepted, in ns; `result` the reply to requests for its result."""
 
     def __init__(self, identity: bytes, stamp: int, request: Any) -> None:
         self.id, self.stamp, self.request = identity, stamp, request
@@ -151,8 +151,8 @@ class Goals:
                 self._feedback.put(message)
 
     def to_cancel(self, identity: bytes, stamp: int) -> tuple[Cancel, list[Goal]]:
-        """The goals that a request to cancel means: with an id that goal, with a stamp those accepted until then, with
-        neither all; and the answer if there are none.
+        """The goals that a request to cancel selects, and the answer if there are none. An id selects that goal, a
+        stamp those accepted until then, neither selects all.
         """
         with self.lock:
             one = self.get(identity)
@@ -214,11 +214,11 @@ def nanoseconds(stamp: Any) -> int:
 
 
 class ActionServer(Goals):
-    """Serves an action of Structs: from threads of its own after `start`, or else whenever `answer` is called.
+    """Serves an action of Structs: from its own threads after `start`, or else whenever `answer` is called.
 
-    `refuses` returns why a goal is rejected, or "": its own clients get the reason, and ROS's only that it was.
-    `begin` is called with this server and each accepted goal, and has to bring that to an end by `finish`. A goal that
-    is to be cancelled is CANCELING until then.
+    `refuses` returns why a goal is rejected, or "". Our clients receive the reason, those of ROS only the rejection.
+    `begin` is called with this server and each accepted goal, and has to end the goal by `finish`. A goal that is to be
+    cancelled is CANCELING until then.
     """
 
     def __init__(
@@ -249,19 +249,19 @@ class ActionServer(Goals):
         return self._servers[0].caller
 
     def start(self) -> None:
-        """Answer from threads of its own, until the bus is closed."""
+        """Answer from threads, until the bus is closed."""
         for server in self._servers:
             server.start()
         threading.Thread(target=self._wait_for_results, daemon=True).start()
 
     def answer(self) -> bool:
-        """Answer waiting requests for a short time. Returns whether more may wait."""
+        """Answer waiting requests, for a short time. Returns whether more may wait."""
         while (query := self._results.try_recv()) is not None:
             self._result(query)
         return answer_in_turn(self._servers)
 
     def finish(self, goal: Goal, state: State, result: Any) -> None:
-        """End a goal, and answer those who wait for its result."""
+        """End a goal, and answer the requests that wait for its result."""
         with self.lock:
             if goal.state is State.ACCEPTED:
                 self.move(goal, State.EXECUTING)

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property, partial
+from itertools import count
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import zenoh
 
+from holozen import wire
 from holozen.transport import services
 from holozen.transport.graph import Definition
 from holozen.transport.node import Node
 from holozen.transport.peer_clocks import PeerClocks, clock_key
-from holozen.transport.pubsub import Gets, Latest, Publisher, Subscription
+from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
 from holozen.transport.samples import Dealer, Declared, RawSubscriber, Replies, Ring, Sample, stamps
 from holozen.transport.services import RING, ROOM, Server
 from holozen.transport.session import one_line
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from holozen.transport.members import Verifier
 
 M = TypeVar("M", bound="Message")
+P = TypeVar("P", bound=RawPublisher)
 R = TypeVar("R", bound="Message")
 
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
@@ -53,9 +56,19 @@ class Bus(Node):
         """What answers gets, by key expression."""
         return {}
 
+    def stamps(self, key: str) -> Callable[[], bytes]:
+        """A function that makes the attachments of our samples on a key."""
+        _ = self.clock_server
+        return stamps(self._signer, self.id, self._numbers.setdefault(key, count()))
+
     @cached_property
-    def stamp(self) -> Callable[[], bytes]:
-        """Makes the attachments of our samples. From then on, readers of a stamp may ask for our clock."""
+    def _numbers(self) -> dict[str, Iterator[int]]:
+        """Numbers our samples on each key."""
+        return {}
+
+    @cached_property
+    def clock_server(self) -> Declared:
+        """Answers readers of a stamp that ask for our clock."""
         key, member = clock_key(self.id), self.member
 
         def answer(query: zenoh.Query) -> None:  # runs in Zenoh's thread, the only work done there
@@ -66,35 +79,48 @@ class Bus(Node):
                 query.reply(key, clock, express=True)
             self.clock_asked.set()
 
-        self._keep(Declared(self.session.declare_queryable(key, answer)))
-        return stamps(self._signer, self.id)
+        return self._keep(Declared(self.session.declare_queryable(key, answer)))
 
     def publisher(
-        self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False, wire: str = ""
-    ) -> Publisher[M]:
+        self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False, wire: str = "",
+        dead_man: bool = True,
+    ) -> Publisher[M]:  # fmt: skip
         """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages. `wire` is another one
-        than the node's.
+        than the node's. `dead_man`: who commands is listed as a node, so that its end stops the robot at once; without,
+        its last command counts as long as that of a foreign program.
         """
         from holozen.messages import codec
-        from holozen.wire import is_command
 
+        self.define(kind)
+        wire = wire or self.wire
+        make: Callable[..., Publisher[M]] = partial(Publisher, wire, self._queued)
+        return self._publish(make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man)
+
+    def publisher_raw(
+        self, key: str, type_name: str, encoding: str, priority: str = "DATA", *, block: bool = False,
+        dead_man: bool = True,
+    ) -> RawPublisher:  # fmt: skip
+        """A writer of bytes, in that encoding by default; otherwise as `publisher`."""
+        return self._publish(RawPublisher, key, type_name, encoding, priority, block, dead_man)
+
+    def _publish(
+        self, make: Callable[..., P], key: str, type_name: str, encoding: str, priority: str, block: bool,
+        dead_man: bool,
+    ) -> P:  # fmt: skip
+        commands = wire.is_command(key, (type_name,))
         with one_line(f"key {key!r}"):
             publisher = self.session.declare_publisher(
-                key, encoding=codec.encoding(wire or self.wire, kind), priority=getattr(zenoh.Priority, priority),
-                express=is_command(key, (kind,)),
+                key, encoding=encoding, priority=getattr(zenoh.Priority, priority), express=commands,
                 congestion_control=zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP,
             )  # fmt: skip
-        number = partial(zenoh.SourceInfo, publisher.id)
         watch = partial(publisher.declare_matching_listener, zenoh.handlers.RingChannel(1))
-        sign = None
-        if self.member and is_command(key, (kind,)):
-            sign = partial(self.member.attachment, key, priority)
-        writer: Publisher[M] = Publisher(publisher, wire or self.wire, self.stamp, number, watch, sign)
-        writer.queued = self._queued
+        sign = partial(self.member.attachment, key, priority) if self.member and commands else None
+        writer = make(publisher, self.stamps(key), watch, sign)
         self._answer_gets(writer, key)
-        self.define(kind)
+        if commands and dead_man:
+            _ = self.listing
         # Last, so that nodes that discover it can query it at once.
-        writer.ends.append(self.announce("pub", kind.ROS, key))
+        writer.ends.append(self.announce("pub", type_name, key))
         return self._keep(writer)
 
     @cached_property
@@ -108,10 +134,10 @@ class Bus(Node):
         return {}
 
     def _ring(self, key: str, depth: int, is_queryable: bool = False) -> Ring | None:
-        """A ring for a robot's key, `Fred/cmd_vel`, of what comes on those of all robots, `*/cmd_vel`; None for a key
-        without a robot's name.
+        """A ring for a robot's key, `Fred/cmd_vel`, of what comes on those of all robots, `*/cmd_vel`; None for the
+        requests to a key without a robot's name.
         """
-        if (expression := _of_all(key)) == key:
+        if (expression := _of_all(key)) == key and is_queryable:
             return None
         dealer = self._dealers.get((expression, is_queryable))
         if not dealer or not dealer.ends:
@@ -129,7 +155,7 @@ class Bus(Node):
         return dealer.ring(key, depth)
 
     @cached_property
-    def _queued(self) -> list[tuple[Publisher[Any], bytes, str | None]]:
+    def _queued(self) -> list[tuple[RawPublisher, bytes, str | None]]:
         """The messages that `send_queued` sends."""
         return []
 
@@ -139,7 +165,7 @@ class Bus(Node):
             publisher.put_bytes(payload, encoding)
         self._queued.clear()
 
-    def _answer_gets(self, writer: Publisher[Any], key: str) -> None:
+    def _answer_gets(self, writer: RawPublisher, key: str) -> None:
         """Robots share a thread: that of `Fred/odom` answers on `*/odom`."""
         expression = _of_all(key)
         writer.gets = self._gets.get(expression)
@@ -151,10 +177,12 @@ class Bus(Node):
 
     def define(self, kind: type[Message]) -> None:
         """Answer with the definition of a type that other processes may not have: one from the files of a package."""
+        interface = getattr(kind, "__interface__", None)
+        if interface is None or interface.name in self._defined:
+            return
         from holozen.messages import definitions, registry
 
-        interface = getattr(kind, "__interface__", None)
-        if interface is None or interface.name in self._defined or registry.table(interface.package):
+        if registry.table(interface.package):
             return
         self._defined.add(interface.name)
         text = definitions.whole_text(interface)
@@ -164,20 +192,21 @@ class Bus(Node):
         self, key: str, *kinds: type[M], depth: int = 64, limit: int = 0, dealt: bool = False
     ) -> Subscription[M]:
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused, and in the
-        secure set-up commands without proof. `dealt`: all robots' keys of that name share a subscriber, which a WaitSet
-        reads.
+        secure set-up commands without proof. `dealt`: for a WaitSet, which reads higher priorities first; the newest
+        `depth` of each are kept, and all robots' keys of that name share a subscriber.
         """
-        from holozen import wire
+        from holozen.messages import codec
 
         ring = self._ring(key, depth) if dealt else None
         raw = self._keep(RawSubscriber(ring, limit)) if ring else self.subscribe_raw(key, depth, limit)
         raw.ends.append(self.announce("sub", kinds[0].ROS, key))
-        is_command = wire.is_command(key, kinds)
-        return Subscription(raw, kinds, tolerant=not is_command, refusal=self._refusal if is_command else None)
+        is_command = wire.is_command(key, (kind.ROS for kind in kinds))
+        decode = codec.decoder(kinds, tolerant=not is_command)
+        return Subscription(raw, decode, self._refusal if is_command else None)
 
     def _refusal(self, sample: Sample) -> str:
         """Why a command is not read, before its payload is."""
-        if sample.encoding == NO_ENCODING and sample.payload[:1] == b"\0":
+        if sample.payload[:1] == b"\0" and sample.encoding == NO_ENCODING:
             return UNTYPED
         return self._unproven(sample) if self._unproven else ""
 
@@ -205,19 +234,19 @@ class Bus(Node):
 
     def serve(
         self, key: str, request: type[M], reply: type[R], answer: Callable[[M], R], room: int = ROOM,
-        shared: bool = False, dealt: bool = False,
+        shared: bool = False, dealt: bool = False, stops: bool = False,
     ) -> Server:  # fmt: skip
         """Answer requests on `key`. The caller runs it: `answer_pending()` in a loop, or `start()`.
 
         At most `room` requests wait; more are refused as busy. A request on a `shared` key goes to all of its servers;
         those that have no part in it raise Elsewhere. `dealt`: all robots' keys of that name share a queryable, which a
-        WaitSet reads.
+        WaitSet reads. `stops` as in Server.
         """
         token = self.announce("srv", reply.ROS, key)
         queryable: Any = self._ring(key, RING, is_queryable=True) if dealt else None
         if not queryable:
             queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=not shared)
-        server = self._keep(Server(queryable, key, request, answer, self.wire, room))
+        server = self._keep(Server(queryable, key, request, answer, self.wire, room, stops))
         server.ends.append(token)
         return server
 

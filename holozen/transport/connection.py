@@ -19,15 +19,13 @@ from holozen.transport.samples import PRIORITIES
 PORT = 7447  # Zenoh's own; the first of domain 0
 DOMAIN_PORTS = 10  # from the first port of a domain to that of the next
 LAST_DOMAIN = 232  # as in ROS
-RENDEZVOUS = tuple(f"tcp/127.0.0.1:{PORT + number}" for number in range(3))
-"""Where the processes of one machine meet in domain 0: Zenoh's own port, and two more in case its holder does not
-answer."""
 
 UNIX = "unixsock-stream/"  # before the path of a Unix socket
 LOOPBACK = "tcp/127.0.0.1:0"  # any free port, on loopback only
+HERE = ("127.0.0.1", "localhost", "::1", "0.0.0.0", "::")  # this machine
 _NEAR = (UNIX, "tcp/127.0.0.1:", "tcp/localhost:", "tcp/[::1]:")
-LEASE = 1500  # ms; a silent link is closed after this (Zenoh: 10 s), and a new one with a longer round trip too
-NEAR_LEASE = 10_000  # ms, between processes of one machine: no cable can be cut, and a busy machine holds them up
+LEASE = 1500  # ms; a link silent for that long is closed (Zenoh: 10 s), and so is a new one with a longer round trip
+NEAR_LEASE = 10_000  # ms, between processes of one machine: no cable can be cut, and a busy machine delays them
 FORBIDDEN = " (where an access control list is in force, it has to allow @holozen/**)"  # a reason to see no nodes
 CLIENT_TRY = 10.0  # s, for one attempt of a client to reach its router; a link with a delay of 0.5 s takes 3 s
 LARGEST_MESSAGE = 20_000_000  # bytes, in the secure set-up; a description with its meshes is the largest
@@ -70,14 +68,36 @@ class Connection:
 
     @property
     def where(self) -> str:
-        """Where it looks for others, as text for messages."""
+        """Where it looks for others, as text for people."""
         if self.config and self.connect is None:
             return f"the endpoints of {self.config}"
         return ", ".join(self.connect_endpoints) or ", ".join(self._listen_endpoints())
 
     @property
+    def networks(self) -> tuple[str, ...]:
+        """The networks that it is in, each by a text that is the same however its endpoints are written: one for each
+        endpoint where it connects or listens, but one for all meeting points of a domain.
+        """
+        listening = self.meeting_points if self.listen is None else self.listen
+        endpoints = [*self.connect_endpoints, *(listening if self.mode != "client" else ())]
+        if self.config:  # the file decides on what no flag gives
+            endpoints = [*(self.connect or ()), *(self.listen or ())]
+        found = [self._network(one) for one in endpoints]
+        found += [f"the endpoints of {os.path.realpath(self.config)}"] if self.config else []
+        return tuple(dict.fromkeys(filter(None, found))) or (self.where,)
+
+    def _network(self, endpoint: str) -> str:
+        """The network of those who meet at an endpoint; empty for an endpoint at any free port."""
+        points, one = self.meeting_points, _canonical(endpoint)
+        if one not in points and (place := address(one)) and place[0] == HERE[0]:
+            points = Connection(domain=min(max(place[1] - PORT, 0) // DOMAIN_PORTS, LAST_DOMAIN)).meeting_points
+        return ", ".join(points) if one in points else one
+
+    @property
     def meeting_points(self) -> tuple[str, ...]:
-        """The default endpoints where processes meet."""
+        """The default endpoints where processes meet: the domain's own port, and two spare ones in case its holder does
+        not answer.
+        """
         offset = DOMAIN_PORTS * self.domain
         if self.secure:
             return (f"tls/127.0.0.1:{PORT + offset}",)
@@ -104,18 +124,18 @@ class Connection:
 
     def settings(self) -> dict[str, str]:
         """Zenoh configuration paths and their values as JSON5, in the order to apply them."""
-        values: dict[str, object] = {"mode": self.mode, **_ALWAYS, **_INTACT}
+        values: dict[str, object] = {"mode": self.mode, **_DEFAULTS, **_NO_SHARED_MEMORY}
         if not self.config or self.connect is not None:
             values["connect/endpoints"] = self.connect_endpoints
         if not self.config or self.listen is not None:
             values["listen/endpoints"] = self._listen_endpoints()
         if self.mode == "peer" and are_near([*self.connect_endpoints, *self._listen_endpoints()]):
-            # Zenoh does not make a link anew that gossip had brought about, unless gossip comes again.
+            # Zenoh does not restore a link that it learned of by gossip, unless the gossip is repeated.
             values["transport/link/tx/lease"] = NEAR_LEASE
         if self.config:
             # The file decides; a mode of "peer" cannot be distinguished from the default.
             values = {k: v for k, v in values.items() if k.endswith("/endpoints") or (k == "mode" and v != "peer")}
-            values |= _INTACT
+            values |= _NO_SHARED_MEMORY
         if self.mode == "client":
             # Attempts time out, so that none outlives its bus by much. After a success Zenoh reconnects for ever.
             values |= {"connect/timeout_ms": round(CLIENT_TRY * 1000), "connect/exit_on_failure": True}
@@ -177,13 +197,13 @@ _ROLE_OF = {
         "topic delay", "topic plot",
     ), "viewer"),
 }  # fmt: skip
-"""Verb -> whose certificate it uses; others are scripts."""
+"""Verb -> the role whose certificate it uses; the others use that of a script."""
 
-_INTACT: dict[str, object] = {
-    # On a busy machine Zenoh frees shared memory that a receiver still reads: payloads of some 300 KB came corrupted.
+_NO_SHARED_MEMORY: dict[str, object] = {
+    # On a busy machine Zenoh frees shared memory that a receiver still reads: it corrupted payloads of some 300 KB.
     "transport/shared_memory/enabled": False,
 }
-_ALWAYS: dict[str, object] = {
+_DEFAULTS: dict[str, object] = {
     "scouting/multicast/enabled": False,
     "scouting/delay": 0,
     # Of two peers that hear of each other one connects: where both do, and one of the two links outlives the other's
@@ -204,7 +224,7 @@ _ALWAYS: dict[str, object] = {
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add Zenoh's own flags, with the names that its other tools use."""
-    where = f"{RENDEZVOUS[0]}, in domain N {DOMAIN_PORTS} N ports above"
+    where = f"tcp/127.0.0.1:{PORT}; domain N uses port {PORT} + {DOMAIN_PORTS} N"
     text = f"how to connect; by default peers meet on loopback at {where}. Where a flag is not given, "
     group = parser.add_argument_group("zenoh", f"{text}{', '.join(VARIABLES.values())} set the same.")
     group.add_argument("--mode", choices=MODES, help="Zenoh session mode (default: peer)")
@@ -239,7 +259,7 @@ def from_arguments(args: argparse.Namespace) -> Connection:
 def from_environment(role: str = "script", **given: object) -> Connection:
     """The Connection of the environment variables; `given` values win. Raises BusError for a wrong variable.
 
-    `role`: whose certificate it uses where the folder of `secure` has those of all; empty: it uses none itself.
+    `role`: the member whose certificate it uses, if the folder of `secure` has those of all; empty: it needs none.
     """
     values: dict[str, Any] = {name: _variable(name) for name in VARIABLES if name not in given} | given
     domain = values["domain"] if "domain" in given else 0
@@ -264,7 +284,7 @@ def from_environment(role: str = "script", **given: object) -> Connection:
 
 
 def _is_within(endpoints: Iterable[str], domain: int) -> bool:
-    """Whether any of the endpoints is one where a domain meets; domain 0 may meet anywhere."""
+    """Whether a domain meets at any of the endpoints; domain 0 may meet anywhere."""
     ports = range(PORT + DOMAIN_PORTS * domain, PORT + DOMAIN_PORTS * (domain + 1))
     return not domain or any((address(one) or ("", 0))[1] in ports for one in endpoints)
 
@@ -288,7 +308,7 @@ def _check_closed(values: "dict[str, Any]", flag: str, tls: tuple[str, ...]) -> 
 
 
 def secure_folder() -> str:
-    """Where certificates are without a flag: by the environment variable, else in the user's configuration."""
+    """The folder of certificates if no flag gives it: of the environment variable, else in the user's configuration."""
     config = os.environ.get("XDG_CONFIG_HOME") or os.path.expanduser("~/.config")
     return os.environ.get(VARIABLES["secure"]) or os.path.join(config, "holozen", "secure")
 
@@ -299,13 +319,14 @@ def _member(given: str, role: str) -> str:
     if not os.path.exists(os.path.join(path, "cert.pem")):
         if not os.path.isdir(path):
             why = "there is no such folder; `holozen secure init` makes certificates"
-            raise BusError(f"--secure {path}: {why}, and what follows --secure is taken for their folder")
+            raise BusError(f"--secure {path}: {why}, and the word after --secure is taken for their folder")
         path = os.path.join(path, role)
     if role:
         from holozen.transport.members import load, read_members
 
         load(path)
-        _ = role in ("sim", "router") and read_members(path)
+        if role in ("sim", "router"):
+            read_members(path)
     return path
 
 
@@ -320,7 +341,7 @@ def _tls(folder: str, mode: str) -> "dict[str, object]":
         f"{tls}enable_mtls": True,
         f"{tls}verify_name_on_connect": True,
         f"{tls}close_link_on_expiration": True,
-        # Zenoh puts a message together before it looks at its sender's permissions.
+        # Zenoh reassembles a message before it checks its sender's permissions.
         "transport/link/rx/max_message_size": LARGEST_MESSAGE,
     }
     if mode == "router":
@@ -395,7 +416,7 @@ HOW = "write PROTOCOL/HOST:PORT, such as tcp/10.0.0.2:7447"
 
 
 def fault(text: str) -> str:
-    """What is wrong with an endpoint, with the right format, in one line; empty for a valid one."""
+    """What is wrong with an endpoint, and the right format, in one line; empty for a valid one."""
     protocol, slash, address = text.partition("/")
     if not slash or not address or not text.isprintable() or " " in text:
         return f"{text!r} is not an endpoint: {HOW}"
@@ -404,7 +425,7 @@ def fault(text: str) -> str:
     if protocol not in _WITH_PORT:
         return ""
     host, colon, port = address.partition("#")[0].partition("?")[0].rpartition(":")
-    if not host or not colon or not port.isdecimal() or int(port) > 65535:
+    if not host or not colon or not _is_port(port):
         return f"{text!r} has no port from 0 to 65535: {HOW}"
     return ""
 
@@ -423,11 +444,25 @@ def address(endpoint: str) -> tuple[str, int] | None:
     """Host and port of a TCP endpoint such as tcp/127.0.0.1:7447; None for any other."""
     kind, _, place = endpoint.partition("#")[0].partition("?")[0].partition("/")
     host, _, port = place.rpartition(":")
-    return (host.strip("[]"), int(port)) if kind in ("tcp", "tls") and port.isdecimal() and int(port) < 65536 else None
+    return (host.strip("[]"), int(port)) if kind in ("tcp", "tls") and _is_port(port) else None
+
+
+def _is_port(text: str) -> bool:
+    return text.isascii() and text.isdecimal() and len(text) < 6 and int(text) < 65536
+
+
+def _canonical(endpoint: str) -> str:
+    """An endpoint in one form for the many ways to write it; empty for one at any free port."""
+    kind, _, place = endpoint.partition("#")[0].partition("?")[0].partition("/")
+    if kind not in _WITH_PORT:
+        return f"{kind}/{os.path.normpath(place)}"
+    host, _, port = place.rpartition(":")
+    host = host.strip("[]").lower()
+    return f"{kind}/{HERE[0] if host in HERE else host}:{int(port)}" if int(port) else ""
 
 
 def from_here(listening: str) -> str:
-    """The endpoint at which a process of this machine reaches one that listens there."""
+    """Where processes of this machine reach one that listens at an endpoint, such as tcp/0.0.0.0:7447."""
     kind, _, place = listening.partition("/")
     host, _, port = place.rpartition(":")
     return f"{kind}/127.0.0.1:{port}" if host in ("0.0.0.0", "[::]") else listening

@@ -6,6 +6,7 @@ after its kind. A slash in a node's name is written as `%2F`. The `@` excludes t
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import json
 import os
@@ -14,15 +15,21 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
+from holozen.transport.errors import BusError
 from holozen.transport.samples import Answers, source
 
 ALL = "@holozen/**"
 ALL_NODE_INFO = "@holozen/*/about"
 ALL_PEERS = "@holozen/*/peers"
+ALL_WITNESSES = "@holozen/*/witness"
+ROBOTS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/stop"  # the tokens of what stops a robot
+SIMS = "@holozen/*/*/srv/*/*/*/get_entities"
 LONGEST = 5.0  # s that a snapshot waits for nodes, while some come or go
-SILENT_FACTOR = 5  # how much longer to wait for nodes without tokens
+SILENT_FACTOR = 5  # how many times longer it waits for nodes without tokens
 MAX_GONE = 1000  # tokens kept until `left` is called; the oldest are dropped
 KINDS = ("node", "pub", "sub", "srv")
+LATCHED = ("tf_static", "robot_description", "map")
+"""Last names of keys whose late readers get the last message too: in ROS 2 they are transient local."""
 
 
 class Endpoint(NamedTuple):
@@ -72,11 +79,24 @@ def on_key(endpoints: Iterable[Endpoint], key: str, kind: str) -> list[Endpoint]
     return [endpoint for endpoint in endpoints if endpoint.kind == kind and includes(endpoint.key, key)]
 
 
-def subscribers(endpoints: Iterable[Endpoint], key: str, matched: bool) -> int:
-    """How many subscribe to a key; if it is `matched`, by one at least. Foreign nodes only show that there are any.
+def latched(endpoints: Iterable[Endpoint], expression: str, every: bool = False) -> list[Endpoint]:
+    """The publishers on a key expression whose last message late readers get too: of LATCHED keys, or `every` one."""
+    return [
+        one
+        for one in endpoints
+        if one.kind == "pub" and (every or is_latched(one.key)) and includes(expression, one.key)
+    ]
 
-    A sim subscribes to `*/cmd_vel`. So where a robot listens on `Fred/cmd_vel`, a match of `Ghost/cmd_vel` means
-    nothing.
+
+def is_latched(key: str) -> bool:
+    """Whether late readers of a key get its last message."""
+    return key.rpartition("/")[2] in LATCHED
+
+
+def subscribers(endpoints: Iterable[Endpoint], key: str, matched: bool) -> int:
+    """How many subscribe to a key: at least one if Zenoh has a match (`matched`), since foreign nodes have no tokens.
+
+    A sim subscribes to `*/cmd_vel`. So if a robot listens on `Fred/cmd_vel`, a match of `Ghost/cmd_vel` means nothing.
     """
     listed = [*endpoints]
     _, _, rest = key.partition("/")
@@ -102,11 +122,12 @@ def _includes(pattern: list[str], chunks: list[str]) -> bool:
 class Graph:
     """The endpoints of all nodes as their tokens come and go.
 
-    `change` returns the next token's key and whether it exists now, or None without news. `roll_call` returns when all
-    nodes that are connected by now have sent their tokens, or False after waiting for long; `met` returns their
-    sessions. `ask_peers` asks the holders of rendezvous points for the sessions that they are linked to; what it
-    returns reads those: None before an answer, an empty set if no holder answers. `undeclare` ends the subscription.
-    `took`: the seconds that the first link took. Use it in `with`, or keep it until the bus is closed.
+    `change` returns the key of the next token that changed and whether it exists, or None if there is none. `roll_call`
+    waits until all connected nodes have sent their tokens, and returns False if that took too long; `met` returns
+    their sessions. `ask_peers` asks the holders of rendezvous points for the sessions that they are linked to, and
+    returns a function that reads these, with holders that are nodes themselves: None before an answer, an empty set if
+    no holder knows of any. `undeclare` ends the subscription. `took`: the seconds that the first link took. Use it in
+    `with`, or keep it until the bus is closed.
     """
 
     def __init__(
@@ -124,7 +145,7 @@ class Graph:
         self._sessions: dict[str, set[str]] = {}  # the tokens of each
         self._publishers: dict[str, Counter[str]] = {}  # key -> sessions with a publisher there
         self.changes = 0  # how often a token came or went
-        self._sorted: tuple[int, list[Endpoint]] = (0, [])  # the endpoints after so many changes
+        self._sorted: tuple[int, list[Endpoint]] = (0, [])  # a count of changes, and the endpoints then
         self._gone: deque[Endpoint] = deque(maxlen=MAX_GONE)
 
     def __enter__(self) -> Graph:
@@ -140,7 +161,7 @@ class Graph:
     def endpoints(self) -> list[Endpoint]:
         """The known endpoints, sorted by key."""
         self._update()
-        if self._sorted[0] != self.changes:  # a fleet has thousands, and a screen asks at each picture
+        if self._sorted[0] != self.changes:  # a fleet has thousands, and displays ask at each redraw
             found = (parse(key) for key in self._tokens)
             self._sorted = self.changes, sorted(endpoint for endpoint in found if endpoint)
         return list(self._sorted[1])
@@ -163,10 +184,10 @@ class Graph:
         """The endpoints once there is a link and all nodes have sent theirs; at most `patience` seconds after the last
         change.
 
-        All are there when each session that a rendezvous point's holder is linked to has sent its tokens; those are
-        waited for. Where no holder answers, once nothing has changed for `quiet` seconds, or twice the time that the
-        first link or the last change took, since peers introduce further peers. A peer without tokens may be foreign,
-        or about to send some: it is waited for longer.
+        That is when each session that the holder of a rendezvous point is linked to has sent its tokens; or, if no
+        holder answers, when nothing has changed for `quiet` seconds, or twice the time that the first link or the last
+        change took, since peers introduce further peers. The wait is longer for a peer without tokens: it may be
+        foreign, or about to send some.
         """
         start = time.monotonic()
         while not connected():
@@ -174,7 +195,7 @@ class Graph:
                 return self.endpoints()
             time.sleep(0.001)
         deadline = time.monotonic() + patience
-        self._roll_call()  # on a new link there may be nothing yet that answers
+        self._roll_call()  # on a new link nothing may answer yet
         peers = self._ask_peers()
         self._update()
         seen, since = self.changes, time.monotonic()
@@ -185,7 +206,7 @@ class Graph:
             if self._tokens and listed is not None and listed <= self._sessions.keys():
                 if passed > SILENT_FACTOR * enough:
                     break
-                if self._have_announced(()):
+                if self._have_announced():
                     # A session's first token may have come before its others.
                     if listed and self._roll_call() and self._have_announced(peers() or ()):
                         break
@@ -198,7 +219,7 @@ class Graph:
                 deadline = min(since + patience, start + LONGEST)
         return self.endpoints()
 
-    def _have_announced(self, listed: Iterable[str]) -> bool:
+    def _have_announced(self, listed: Iterable[str] = ()) -> bool:
         """Whether each peer, and each session `listed`, has sent a token."""
         return {*self._met(), *listed} <= self._sessions.keys()
 
@@ -270,14 +291,35 @@ class Definition(Answers):
 
 
 class Peers(Answers):
-    """Answers queries for the sessions that a holder of a rendezvous point is linked to, with a space between."""
+    """Answers queries for the sessions that a holder of a rendezvous point is linked to, separated by spaces. One that
+    `is_node` names itself, too: all others are linked to it, so if it names no more there are no more.
+    """
 
-    def __init__(self, session: Any, channel: Any) -> None:
-        key = ALL_PEERS.replace("*", str(session.zid()))
-        super().__init__(
-            session.declare_queryable(key, channel),
-            lambda query: query.reply(key, " ".join(map(str, session.info.peers_zid())), encoding="text/plain"),
-        )
+    def __init__(self, session: Any, channel: Any, is_node: bool = False) -> None:
+        key, own = ALL_PEERS.replace("*", str(session.zid())), [session.zid()] if is_node else []
+
+        def answer(query: Any) -> None:
+            query.reply(key, " ".join(map(str, [*own, *session.info.peers_zid()])), encoding="text/plain")
+
+        super().__init__(session.declare_queryable(key, channel), answer)
+
+
+class Witness(Answers):
+    """Answers queries for the tokens of robots and sims in sessions other than those that the query names: those to
+    which the asker has a link. A process that hangs makes no new link, so one that comes later cannot see it; this
+    session does, until its own link lapses. `graphs` hold the tokens, and `ends` are their subscriptions.
+    """
+
+    def __init__(self, session: Any, channel: Any, graphs: list[Graph], ends: list[Any]) -> None:
+        self._graphs, self._key = graphs, ALL_WITNESSES.replace("*", str(session.zid()))
+        super().__init__(session.declare_queryable(self._key, channel), self._reply)
+        self.ends = [*ends, *self.ends]
+
+    def _reply(self, query: Any) -> None:
+        linked = {*bytes(query.payload or b"").decode(errors="replace").split()}
+        with contextlib.suppress(BusError):  # this session is being closed
+            known = [end for graph in self._graphs for end in graph.endpoints() if end.session not in linked]
+            query.reply(self._key, "\n".join(map(token, known)), encoding="text/plain")
 
 
 class NodeInfo(Answers):

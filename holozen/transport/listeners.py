@@ -12,13 +12,12 @@ from typing import NamedTuple
 
 from holozen.console import printable
 from holozen.suggest import shorten
-from holozen.transport.connection import address, socket_path
+from holozen.transport.connection import HERE, address, socket_path
 
 LONGEST = 60  # characters of a command line
 PATIENCE = 0.4  # s to connect
 REFUSED = 1.0  # s for a router to refuse a certificate
-ACCEPTS = 0x10000  # the kernel's flag of a socket that listens
-HERE = ("127.0.0.1", "localhost", "::1", "0.0.0.0", "::")  # this machine
+ACCEPTS = 0x10000  # __SO_ACCEPTCON, the kernel's flag of a socket that listens
 
 
 class Holder(NamedTuple):
@@ -55,14 +54,14 @@ def holders(endpoint: str, proc: str = "/proc") -> list[Holder]:
 
 
 def shared(endpoints: Iterable[str]) -> str:
-    """A warning that another person's process listens at one of `endpoints`, to follow a node's name; empty without."""
+    """A warning, to follow a node's name, that another user's process listens at one of `endpoints`; else empty."""
     for endpoint in endpoints:
         for number in {*_sockets(endpoint, "/proc").values()} - {-1, 0, os.geteuid()}:
             user = str(number)
             with contextlib.suppress(KeyError):
                 user = pwd.getpwuid(number).pw_name
             apart = "--domain N (or HOLOZEN_DOMAIN) or --private keeps you apart"
-            return f"shares {endpoint} with user {user}, so that each drives the robots of both; {apart}"
+            return f"shares {endpoint} with user {user}, so either can drive the other's robots; {apart}"
     return ""
 
 
@@ -133,7 +132,7 @@ class Attempts:
 
 
 def exposure(endpoints: Iterable[str]) -> str:
-    """A warning about endpoints that other machines can reach, to follow the name of a node."""
+    """A warning, to follow a node's name, about endpoints that other machines can reach."""
     where = ", ".join(endpoints)
     risk = "anyone who can reach it can drive, stop and delete robots, and set parameters"
     return f"listens at {where}, open to the network: {risk}"
@@ -165,13 +164,15 @@ def unanswered(endpoints: Iterable[str], within: float) -> str:
         if here := holders(endpoint):
             return f"{endpoint} is held by {' and '.join(map(str, here))}, which does not answer; {here[0].fix}"
         if not reason:
-            return f"{endpoint} accepts connections but does not answer as Zenoh does; check what listens there"
+            return f"{endpoint} accepts connections but does not speak Zenoh; check what listens there"
     where = ", ".join(endpoints)
     return f"no answer from {where} within {within:g} s; check address and network, and what listens there"
 
 
 def rejection(endpoint: str, folder: str) -> str:
-    """Why a router at a TLS endpoint and the member of a folder do not accept each other; empty if they may."""
+    """Why a router at a TLS endpoint and the member of a folder reject each other; empty if they do not, or if nothing
+    answers.
+    """
     host, port = address(endpoint) or ("", 0)
     try:
         context = ssl.create_default_context(cafile=f"{folder}/ca.pem")
@@ -180,9 +181,9 @@ def rejection(endpoint: str, folder: str) -> str:
             socket.create_connection((host, port), timeout=REFUSED) as plain,
             context.wrap_socket(plain, server_hostname=host) as link,
         ):
-            link.recv(1)  # a refusal of ours comes after the handshake; Zenoh itself waits
+            link.recv(1)  # it refuses our certificate only after the handshake; if it accepts it, it sends nothing
     except ssl.SSLCertVerificationError as error:
-        return f"{endpoint} is no router of this authority: {error.verify_message}"
+        return f"{endpoint} is not a router of this authority: {error.verify_message}"
     except ssl.SSLError as error:
         reason = (error.reason or str(error)).lower().replace("_", " ")
         return f"{endpoint} refuses the certificate in {folder}: {reason}"

@@ -23,12 +23,12 @@ from holozen.transport.roles import ROLES
 from holozen.transport.samples import PRIORITIES, Sample
 
 AUTHORITY, CERTIFICATE, KEY, MEMBERS = "ca.pem", "cert.pem", "key.pem", "members.json"
-LOOK = 0.5  # s between two looks for a new list
+LOOK = 0.5  # s between two checks for a new list
 SIGNATURE = 128  # hexadecimal digits
 
 
 class Member(NamedTuple):
-    """Whose certificate and key a folder holds."""
+    """The member whose certificate and key a folder holds."""
 
     name: str
     key: Ed25519PrivateKey
@@ -43,7 +43,7 @@ class Member(NamedTuple):
 
 
 def load(folder: str) -> Member:
-    """The member of a folder. Raises BusError for what is missing, expired, foreign, or readable by others."""
+    """The member of a folder. Raises BusError if a file is missing, expired, another authority's, or open to others."""
     path = Path(folder)
     try:
         authority = x509.load_pem_x509_certificate((path / AUTHORITY).read_bytes())
@@ -54,13 +54,13 @@ def load(folder: str) -> Member:
     except OSError as error:
         raise BusError(f"{error.filename}: {error.strerror}; `holozen secure init` makes certificates") from None
     except (ValueError, TypeError):
-        raise BusError(f"{path}: {AUTHORITY}, {CERTIFICATE} or {KEY} is no PEM file") from None
+        raise BusError(f"{path}: {AUTHORITY}, {CERTIFICATE} or {KEY} is not a PEM file") from None
     if not isinstance(key, Ed25519PrivateKey) or key.public_key() != certificate.public_key():
         raise BusError(f"{path / KEY}: it is not the key of {CERTIFICATE}")
     try:
         certificate.verify_directly_issued_by(authority)
     except (ValueError, TypeError, InvalidSignature):
-        raise BusError(f"{path / CERTIFICATE}: it is not of the authority {AUTHORITY}") from None
+        raise BusError(f"{path / CERTIFICATE}: it was not issued by the authority {AUTHORITY}") from None
     names = certificate.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
     name = str(names[0].value) if names else ""
     end = certificate.not_valid_after_utc
@@ -76,13 +76,15 @@ def read_members(folder: str) -> dict[str, dict[str, str]]:
         rows = json.loads(path.read_bytes())["members"]
         return {name: {key: str(row[key]) for key in ("role", "key", "expires")} for name, row in rows.items()}
     except OSError as error:
-        raise BusError(f"{path}: {error.strerror}; this folder is for no router and no sim") from None
+        raise BusError(
+            f"{path}: {error.strerror}; only the folders of a router, a sim or an autopilot have it"
+        ) from None
     except (ValueError, TypeError, KeyError, AttributeError):
         raise BusError(f"{path}: it is not a list of members; `holozen secure` writes it") from None
 
 
 def version(folder: str) -> tuple[int, int]:
-    """Which list of members a folder holds: it changes with every list. Raises OSError."""
+    """Identifies the list of members in a folder: it changes whenever the list does. Raises OSError."""
     found = os.stat(Path(folder) / MEMBERS)
     return found.st_mtime_ns, found.st_ino
 
@@ -96,15 +98,15 @@ class Verifier:
     def __init__(self, folder: str) -> None:
         self._folder, self._looked, self._seen = folder, -LOOK, (0, 0)
         self._known: dict[str, tuple[int, float, Ed25519PublicKey]] = {}
-        self.refusal_of_list = ""
+        self.list_error = ""
 
     def refusal(self, sample: Sample) -> str:
         """Why the proof of a command is refused; empty if its sender proved the name and may use the priority."""
         self._refresh(time.monotonic())
         stamp, _, proof = sample.attachment.rpartition(b";")
         name = sample.source.partition("/")[0]
-        if self.refusal_of_list:
-            return f"unproven: {self.refusal_of_list}"
+        if self.list_error:
+            return f"unproven: {self.list_error}"
         if len(proof) != SIGNATURE or sample.stamp is None:
             return "unproven: it is not signed"
         if name not in self._known:
@@ -141,9 +143,9 @@ class Verifier:
             if (seen := version(self._folder)) == self._seen:
                 return
             self._known = _commanders(read_members(self._folder))
-            self._seen, self.refusal_of_list = seen, ""
+            self._seen, self.list_error = seen, ""
         except (BusError, OSError, ValueError) as error:
-            self._known, self._seen, self.refusal_of_list = {}, (0, 0), str(error)
+            self._known, self._seen, self.list_error = {}, (0, 0), str(error)
 
 
 def _commanders(members: dict[str, dict[str, str]]) -> dict[str, tuple[int, float, Ed25519PublicKey]]:

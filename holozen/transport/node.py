@@ -1,4 +1,4 @@
-"""A node on the wire: one Zenoh session with samples as bytes, and the graph. All that looking on needs.
+"""A node on the wire: one Zenoh session, with samples as bytes, and the graph. This suffices to observe.
 
 No work is done in Zenoh's threads: samples wait in ring channels, so a slow reader delays only itself.
 """
@@ -9,7 +9,7 @@ import contextlib
 import re
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self, TypeVar
 
@@ -19,8 +19,8 @@ from holozen.console import report
 from holozen.transport import graph as graphs
 from holozen.transport.connection import UNIX, Connection, from_environment
 from holozen.transport.errors import BusError
-from holozen.transport.graph import Graph, NodeInfo, Peers
-from holozen.transport.samples import Declared, RawSubscriber, Replies, source
+from holozen.transport.graph import Graph, NodeInfo, Peers, Witness
+from holozen.transport.samples import Declared, RawSubscriber, Replies, Sample, source
 from holozen.transport.session import CLOSE_LIMIT, Opening, linked, one_line, wait_for_threads
 
 if TYPE_CHECKING:
@@ -29,8 +29,10 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Declared)
 
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
-MOST_TOKENS = 1 << 15  # that wait; Zenoh sets aside 240 bytes for each, and a process fills them in its first hours
+MOST_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
+WITNESSES = 1.0  # s for the holders of rendezvous points to tell of robots and sims
 DEFINITION_WAIT = 0.5  # s for a node to be found that answers
+LAST_WAIT = 0.5  # s for publishers to answer with their last messages
 DEFINITION_TIMEOUT = 2.0  # s for its answer
 
 
@@ -38,8 +40,8 @@ class Node:
     """A node on the wire. Use it in `with`: an open session keeps a Python process from ending.
 
     `wire` is "json", "msgpack" or "cdr", by default that of the connection. `lasting` is for long-running nodes, which
-    are listed in the graph; with `patience` and `stop` it is one of Opening. With an early Opening, the first use waits
-    for it, and raises its error.
+    are listed in the graph at once; see Opening for it, `patience` and `stop`. With an early Opening, the first use
+    waits for it, and raises its error.
     """
 
     def __init__(
@@ -55,6 +57,7 @@ class Node:
         if not isinstance(connection, Opening):
             connection = Opening(connection or from_environment(), lasting=lasting, patience=patience, stop=stop)
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
+        self.networks = connection.networks
         self._closing, self._opened, self._secure = connection.closing, connection.opened, connection.secure
         self._declared: set[Declared] = set()
         self._keeper = self._opened().keeper if lasting else None
@@ -64,14 +67,33 @@ class Node:
 
                 if warning := shared(taken):
                     report(f"{node}: {warning}")
-            if exposed := self.exposed():
+            if self.exposed:
                 from holozen.transport.listeners import exposure
 
-                report(f"{node}: {exposure(exposed)}")
+                report(f"{node}: {exposure(self.exposed)}")
             if self._opened().point:
-                self._keep(Peers(self.session, zenoh.handlers.RingChannel(16)))
-            info = self._keep(NodeInfo(self.session, zenoh.handlers.RingChannel(16), node, exposed))
-            info.ends.append(self.announce("node"))
+                self._keep(Peers(self.session, zenoh.handlers.RingChannel(16), is_node=True))
+                self._keep(self._witness())
+            _ = self.listing
+
+    def _witness(self) -> Witness:
+        keys = (graphs.ROBOTS, graphs.SIMS)
+        tokens = [self._tokens(each) for each in keys]
+        known = [Graph(partial(_token_change, each)) for each in tokens]
+        return Witness(self.session, zenoh.handlers.RingChannel(16), known, tokens)
+
+    def _tokens(self, keys: str) -> Any:
+        """A subscription to the tokens that match `keys`, those that exist included."""
+        return self.session.liveliness().declare_subscriber(keys, zenoh.handlers.RingChannel(MOST_TOKENS), history=True)
+
+    @cached_property
+    def listing(self) -> NodeInfo:
+        """Lists this node in the graph until it is closed. When it vanishes from there, the robots that it drives
+        stop.
+        """
+        info = self._keep(NodeInfo(self.session, zenoh.handlers.RingChannel(16), self.node, self.exposed))
+        info.ends.append(self.announce("node"))
+        return info
 
     @property
     def session(self) -> Any:
@@ -95,12 +117,12 @@ class Node:
 
     @property
     def _signer(self) -> str:
-        """The name that stands before the session in its stamps: in the secure set-up `member/node`."""
+        """The name before the session in its stamps: in the secure set-up `member/node`."""
         return f"{self.member.name}/{self.node}" if self.member else self.node
 
     @cached_property
     def member(self) -> Member | None:
-        """Whose certificate it uses; None outside the secure set-up."""
+        """The member whose certificate it uses; None outside the secure set-up."""
         if not self._secure:
             return None
         from holozen.transport.members import load  # loads cryptography
@@ -118,6 +140,7 @@ class Node:
         """The endpoints where this session listens, also those of a configuration file. Raises BusError."""
         return self._opened().listens
 
+    @cached_property
     def exposed(self) -> list[str]:
         """The endpoints that other machines can reach without a password, a certificate or a permission."""
         if self._opened().is_guarded or all(one.startswith(("tcp/127.0.0.1:", UNIX)) for one in self.listens):
@@ -135,8 +158,8 @@ class Node:
         wait_for_threads((closer, self._keeper, *(one.thread for one in declared)), CLOSE_LIMIT)
 
     def _leave(self, declared: list[Declared]) -> None:
-        # A link that another session opens at this moment may survive the session, and Zenoh would go on to show there
-        # all that was declared. So that goes first.
+        # A link that another session opens at this moment may outlive this session, and Zenoh would keep showing there
+        # what was declared. So that is withdrawn first.
         for one in declared:
             with contextlib.suppress(Exception):  # closed, or in use, by another thread
                 one.close()
@@ -153,7 +176,8 @@ class Node:
         """List a node or an endpoint in the graph for as long as the token is kept. Raises BusError."""
         endpoint = graphs.Endpoint(key, kind, type_name, self.node, self.id)
         with one_line(f"key {key!r}"):
-            _ = kind == "node" or zenoh.KeyExpr(key)  # the token's own error would name the token
+            if kind != "node":
+                zenoh.KeyExpr(key)  # raises ZError; that of the token would name the token
             return self.session.liveliness().declare_token(graphs.token(endpoint))
 
     def subscribe_raw(self, key: str, depth: int = 1024, limit: int = 0) -> RawSubscriber:
@@ -163,11 +187,11 @@ class Node:
         return self._keep(RawSubscriber(subscriber, limit))
 
     def ask(self, key: str, timeout: float, replier: str = "", number: str = "", **request: Any) -> Replies:
-        """Send one request, without waiting for the service. `replier`: the session whose replies are read. `number`: a
-        request that was sent before, and may have been answered, has the same.
+        """Send one request, without waiting for the service. `replier`: the session whose replies alone are read.
+        `number` identifies the request, so that a server recognizes it when it is sent again, see Attempts.
         """
         attachment = f"{self.source};{number}" if number else self.source
-        # Each reply as it comes: by default the first waits for all that might answer.
+        # Deliver each reply as it comes: by default the first one is held back until all servers have answered.
         request = {"consolidation": zenoh.ConsolidationMode.NONE} | request
         with one_line(f"key {key!r}"):
             replies = self.session.get(key, timeout=timeout, attachment=attachment, **request)
@@ -193,12 +217,26 @@ class Node:
             **request,
         )  # fmt: skip
 
+    def last_messages(self, publishers: Iterable[graphs.Endpoint]) -> Iterator[Sample]:
+        """The last message of each of these publishers, if it has sent one."""
+        deadline = time.monotonic() + LAST_WAIT
+        for one in publishers:
+            found = False
+            while not found:  # on a new link a node's tokens may be known before its queryables
+                for reply in self.ask_all(one.key, LAST_WAIT, replier=one.session):
+                    if not isinstance(reply, bytes):
+                        found = True
+                        yield reply
+                if time.monotonic() > deadline:
+                    break
+                time.sleep(0.01)
+
     def definition(self, type_name: str) -> str:
-        """The definition of a type and of those nested in it, from a node that publishes it; empty without one."""
+        """The definition of a type and of those nested in it, from a node that publishes it; empty if none does."""
         if not re.fullmatch(r"\w+/(?:msg|srv|action)/\w+", type_name):
             return ""
         deadline = time.monotonic() + DEFINITION_WAIT
-        while True:  # on a new link its tokens may be known before what it answers
+        while True:  # on a new link a node's tokens may be known before its queryables
             for reply in self.ask_all(graphs.definition_key("*", type_name), DEFINITION_TIMEOUT):
                 if not isinstance(reply, bytes):
                     return reply.payload.decode(errors="replace")
@@ -208,8 +246,7 @@ class Node:
 
     def graph(self, keys: str = graphs.ALL) -> Graph:
         """The endpoints of all nodes, or those with tokens that match `keys`, kept up to date."""
-        live = self.session.liveliness()
-        tokens = live.declare_subscriber(keys, zenoh.handlers.RingChannel(MOST_TOKENS), history=True)
+        live, tokens = self.session.liveliness(), self._tokens(keys)
 
         def roll_call() -> bool:
             # A full channel would block Zenoh's thread, and the rest, for ever: the default one is for 256 replies.
@@ -229,7 +266,7 @@ class Node:
         )
 
     def _ask_peers(self) -> Callable[[], set[str] | None]:
-        """See Graph. Who meets others at a router sees through that all there is."""
+        """See Graph. A session with a router sees everything through it."""
         if self.session.info.routers_zid():
             return set
         replies = self.ask_all(graphs.ALL_PEERS, ROLL_CALL)
@@ -247,12 +284,30 @@ class Node:
         return read
 
     def endpoints(self, keys: str = graphs.ALL, patience: float = 0.5) -> list[graphs.Endpoint]:
-        """A snapshot of the graph, as of `Graph.settled`, which leaves nothing declared.
+        """A snapshot of the graph, as `Graph.settled` returns it, without a lasting subscription.
 
         It waits as long as the session took to connect, if that is more than `patience`: the network is slow.
         """
         with self.graph(keys) as graph:
             return graph.settled(self.connected, max(patience, self.took))
+
+    def hidden(self) -> list[graphs.Endpoint]:
+        """The services of robots and sims that others know of, but to which this session has no link: they hang, or
+        cannot be reached from here. Ask once the graph has settled, when there is a link to all that answer.
+        """
+        if self.session.info.routers_zid():  # it sees everything through the router
+            return []
+        linked = " ".join([self.id, *map(str, self.session.info.peers_zid())])
+        found: set[graphs.Endpoint] = set()
+        for reply in self.ask_all(graphs.ALL_WITNESSES, max(WITNESSES, self.took), payload=linked):
+            if not isinstance(reply, bytes):
+                keys = reply.payload.decode(errors="replace").splitlines()
+                found.update(end for key in keys if (end := graphs.parse(key)) and end.kind == "srv")
+        if not found:
+            return []
+        # A client of a peer sees others through it, without a link.
+        seen = {end.session for keys in (graphs.ROBOTS, graphs.SIMS) for end in self.endpoints(keys)}
+        return sorted(end for end in found if end.session not in seen)
 
     def connected(self) -> bool:
         """Whether this session has a link to any other. Raises BusError once the bus is closed."""

@@ -38,7 +38,7 @@ class Number:
     def checked(self, value: Any) -> float:
         """`value` if it is allowed. Raises ValueError with the allowed values."""
         is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        # Its present value, such as one from a robot's file, is no change.
+        # Its present value, such as one from a robot's file, is always allowed.
         if is_number and (self.low <= value <= self.high or value == self.read()):
             return float(value)
         wanted = f"use a number from {self.low:g} to {self.high:g} {self.unit}".rstrip()

@@ -1,14 +1,14 @@
-"""How old a command is, by its sender's clock: a round trip bounds how far two monotonic clocks are apart.
+"""The age of a command by its sender's clock: a round trip bounds the offset between two monotonic clocks.
 
 The offset is the sender's clock minus ours. A round trip that began at t0, that the sender answered at s, and whose
 answer we read at t1 gives: s - t1 <= offset <= s - t0. A sample with stamp s that was read at a gives: s - a <= offset,
 since it cannot arrive before it is sent. The tightest bounds are kept, and loosened by DRIFT as they age.
 
-A first round trip that took longer than PROMPT may have been held up together with the commands that wait for it, and
-they would count as prompt. So a second one, which began after it had ended, has to confirm it.
+A first round trip that took longer than PROMPT may have been delayed together with the commands that wait for it, which
+would then count as prompt. So a second one, begun after the first has ended, has to confirm it.
 
-In the secure set-up an answer is signed, together with a number that was made for its question: a session's id is no
-proof, since anyone may open one under an id that was used before, and so make old commands look new.
+In the secure set-up an answer is signed together with its question's nonce. A session's id proves nothing: anyone may
+open a session under an id that was used before, and so make old commands look new.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ AGAIN = 1.0  # s between two round trips with one peer
 FIRST = 5  # round trips back to back, for a tight bound from the start
 GIVE_UP = 10.0  # s without an answer
 MAX_PEERS = 256  # since any node can announce tokens
-SLOW = 1.0  # s without an answer, after which others are asked besides
-MAX_ASKED = 32  # round trips under way
+SLOW = 1.0  # s without an answer, after which a round trip does not count towards MAX_ASKED
+MAX_ASKED = 32  # round trips at the same time
 
 
 def clock_key(session: str) -> str:
@@ -38,8 +38,8 @@ def clock_key(session: str) -> str:
 
 
 class _Peer:
-    """The bounds of one session's clock. `confirmed` is when its last completed round trip began, `member` signed its
-    answer, `nonce` the number that the next one has to sign. `is_bounded`: once they count.
+    """The bounds of one session's clock. `confirmed` is when its last completed round trip began, `member` who signed
+    its answer, `nonce` what the next answer has to sign. `is_bounded`: whether the bounds may be used.
     """
 
     __slots__ = (
@@ -116,10 +116,10 @@ class PeerClocks:
 
     def ages(self, session: str, sent: float, now: float, member: str = "") -> tuple[float, float] | None:
         """Bounds of the age in seconds of a sample that a session sent at `sent` by its own clock. `now` may be some
-        milliseconds past: a fleet takes time to read.
+        milliseconds in the past: a fleet takes time to read.
 
-        None while that clock is unbounded, or in the secure set-up if another `member` than the sample's signed it. The
-        sample refines the lower bound, within those of round trips.
+        None while that clock has no bounds, or in the secure set-up if its answer was not signed by `member`, the
+        sample's. The sample itself refines the lower bound, within those of round trips.
         """
         peer = self._peers.get(session)
         if peer is None or not peer.is_bounded or (self._signer and member != peer.member):
@@ -152,7 +152,7 @@ class PeerClocks:
             if peer.replies is not None:
                 self._read(session, peer, now)
             if peer.replies is not None:
-                room -= now - peer.asked < SLOW  # a peer that never answers keeps no place
+                room -= now - peer.asked < SLOW  # a peer that never answers takes no place
             elif now >= peer.due:
                 due.append((not peer.commands, peer.due, session))
         for _, _, session in sorted(due)[: max(room, 0)]:
@@ -174,7 +174,7 @@ class PeerClocks:
         answered = _seconds(reply)
         if self._signer and isinstance(reply, Sample):
             if not (member := self._signer(session, peer.nonce, reply.payload)):
-                return  # the one that counts may follow
+                return  # a signed one may follow
             if member != peer.member:
                 peer.member, peer.lowest, peer.highest, peer.is_bounded = member, None, None, False
         peer.replies = None

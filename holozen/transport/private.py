@@ -1,6 +1,6 @@
 """The folder of `--private`: its Unix sockets are the endpoints of one user's processes.
 
-To connect to a Unix socket one has to enter its folder, and the kernel lets only the owner, and root, enter this one.
+A process that connects to a Unix socket needs access to its folder, which the kernel grants only to the owner and root.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ def folder() -> str:
     text = str(path)
     if len(os.fsencode(text)) > LONGEST or not text.isprintable() or set(text) & set(" #?;"):
         raise BusError(f"cannot be private in {path}: Zenoh takes at most {LONGEST} bytes, none of them ' #?;'{advice}")
-    _remove_left(path)
+    _remove_stale(path)
     return text
 
 
@@ -43,7 +43,7 @@ def is_locked(socket: str) -> bool:
     """Whether a process listens at a socket: it holds Zenoh's lock beside it. Raises OSError."""
     try:
         with open(f"{socket}.lock", "rb") as lock:
-            # Shared: two that look at once do not see each other.
+            # A shared lock, so that two processes that check at the same time do not see each other's.
             fcntl.flock(lock, fcntl.LOCK_SH | fcntl.LOCK_NB)
     except FileNotFoundError:
         return False
@@ -52,12 +52,12 @@ def is_locked(socket: str) -> bool:
     return False
 
 
-def _remove_left(path: Path) -> None:
+def _remove_stale(path: Path) -> None:
     """Remove the sockets of processes that were killed."""
     for lock in path.glob("*-*.lock"):
         socket = lock.with_suffix("")
         pid = socket.name.partition("-")[0]
-        # A pid without a process may belong to another container, which has the lock.
+        # A pid without a process here may be one of another container, which holds the lock.
         with contextlib.suppress(OSError):
             if not Path("/proc", pid).exists() and not is_locked(str(socket)):
                 socket.unlink(missing_ok=True)

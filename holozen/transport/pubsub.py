@@ -6,9 +6,9 @@ import math
 import threading
 import time
 from collections.abc import Callable
-from itertools import count
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
+from holozen.messages import CodecError
 from holozen.transport.errors import BusError
 from holozen.transport.samples import Answers, Declared, RawSubscriber, Sample
 
@@ -22,34 +22,27 @@ SELDOM = 16  # messages between two looks whether the readers have left
 SLOWEST = 5.0  # s; after this long any stream is stale
 
 
-class Publisher(Declared, Generic[M]):
-    """Writes messages; a `get` on its key is answered with the last one, see Gets. Made by `Bus.publisher`.
+class RawPublisher(Declared):
+    """Writes encoded payloads; a `get` on its key is answered with the last one, see Gets. Made by `Bus.publisher_raw`.
 
-    Each carries the attachment that `stamp` makes, with the sender and the time of sending, and a sequence number, by
-    which readers count lost samples. `number` converts it to Zenoh's SourceInfo. `sign` makes a command's attachment
-    of a stamp, the encoding and the payload. `watch` declares a listener of whether
-    anyone subscribes.
+    Each carries the attachment that `stamp` makes, with the sender, the time of sending, and a number by which readers
+    count lost samples. `sign` makes a command's attachment of a stamp, the encoding and the payload. `watch` declares a
+    listener of whether anyone subscribes.
     """
 
     def __init__(
         self,
         publisher: Any,
-        wire: str,
         stamp: Callable[[], bytes],
-        number: Callable[[int], Any],
         watch: Callable[[], Any],
-        sign: Callable[[bytes, str, bytes], bytes] | None = None,
+        sign: Callable[[bytes, str, bytes], bytes] | None,
     ) -> None:
-        from holozen.messages import codec
-
         super().__init__(publisher)
         self.key: Any = publisher.key_expr
         self.gets: Gets | None = None  # set by the bus
-        self.queued: list[tuple[Publisher[Any], bytes, str | None]] = []  # with other publishers of the bus
-        self._publisher, self._wire, self._stamp, self._sign = publisher, wire, stamp, sign
-        self._written, self._named, self._encoding = codec.written, codec.encoding, publisher.encoding
-        self._last: tuple[bytes, Any] | None = None  # with its Encoding
-        self.numbers = map(number, count())
+        self._publisher, self._stamp, self._sign = publisher, stamp, sign
+        self._encoding = publisher.encoding
+        self._last: tuple[bytes, str | None] | None = None  # with its Encoding, where that is not this publisher's
         self._statuses: Any = None
         self._watch, self._is_matched, self._looks = watch, False, 0
         self._next: threading.Event | None = None  # set by the next message; there once `wanted` was read
@@ -75,25 +68,13 @@ class Publisher(Declared, Generic[M]):
             self._is_matched = status.matching
         return self._is_matched or not self._next.is_set()
 
-    def put(self, message: M) -> None:
-        """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
-        on its type.
-        """
-        payload, wire = self._written(message, self._wire)
-        self.put_bytes(payload, None if wire == self._wire else self._named(wire, type(message)))
-
-    def queue(self, message: M) -> None:
-        """As `put`, but `Bus.send_queued` sends it: many messages that are sent at once take Zenoh less time."""
-        payload, wire = self._written(message, self._wire)
-        self.queued.append((self, payload, None if wire == self._wire else self._named(wire, type(message))))
-
     def put_bytes(self, payload: bytes, encoding: str | None = None) -> None:
         """Send an encoded payload, by default in the encoding of this publisher."""
-        self._last = payload, encoding or self._encoding
+        self._last = payload, encoding
         attachment = self._stamp()
         if self._sign:
-            attachment = self._sign(attachment, str(self._last[1]), payload)
-        self._publisher.put(payload, encoding=encoding, attachment=attachment, source_info=next(self.numbers))
+            attachment = self._sign(attachment, str(encoding or self._encoding), payload)
+        self._publisher.put(payload, encoding=encoding, attachment=attachment)
         if self._next is not None and not self._next.is_set():
             self._next.set()
 
@@ -108,7 +89,7 @@ class Publisher(Declared, Generic[M]):
             self._next.wait(max(0.0, deadline - time.monotonic()))
         if self._last is not None:
             payload, encoding = self._last
-            query.reply(self.key, payload, encoding=encoding)
+            query.reply(self.key, payload, encoding=encoding or self._encoding)
 
     def close(self) -> None:
         """Stop publishing and answering; all declarations are removed."""
@@ -117,22 +98,46 @@ class Publisher(Declared, Generic[M]):
             self.gets.remove(self)
 
 
+class Publisher(RawPublisher, Generic[M]):
+    """Writes messages, in the encoding of its `wire`. Those in `queued` wait for `Bus.send_queued`. Made by
+    `Bus.publisher`.
+    """
+
+    def __init__(self, wire: str, queued: list[tuple[RawPublisher, bytes, str | None]], *declared: Any) -> None:
+        from holozen.messages import codec
+
+        super().__init__(*declared)
+        self._wire, self._queued, self._written, self._named = wire, queued, codec.written, codec.encoding
+
+    def put(self, message: M) -> None:
+        """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
+        on its type.
+        """
+        payload, wire = self._written(message, self._wire)
+        self.put_bytes(payload, None if wire == self._wire else self._named(wire, type(message)))
+
+    def queue(self, message: M) -> None:
+        """As `put`, but `Bus.send_queued` sends it: many messages that are sent at once take Zenoh less time."""
+        payload, wire = self._written(message, self._wire)
+        self._queued.append((self, payload, None if wire == self._wire else self._named(wire, type(message))))
+
+
 class Gets(Answers):
     """Answers each get on a key expression with the last messages of some publishers there, from one thread."""
 
     def __init__(self, queryable: Any) -> None:
-        self._publishers = set[Publisher[Any]]()
+        self._publishers = set[RawPublisher]()
         self._lock = threading.Lock()
         super().__init__(queryable, self._reply)
 
-    def add(self, publisher: Publisher[Any]) -> bool:
+    def add(self, publisher: RawPublisher) -> bool:
         """Answer for this publisher too; returns whether it can: it ended with the last one that was removed."""
         with self._lock:
             if self.ends:
                 self._publishers.add(publisher)
             return bool(self.ends)
 
-    def remove(self, publisher: Publisher[Any]) -> None:
+    def remove(self, publisher: RawPublisher) -> None:
         """Answer for a publisher no longer."""
         with self._lock:
             self._publishers.discard(publisher)
@@ -149,58 +154,58 @@ class Gets(Answers):
             publisher.reply(query, deadline)
 
 
-class Received(NamedTuple, Generic[M]):
-    """A sample with its message, or with the reason in one line why it has none."""
+class Received(Sample, Generic[M]):
+    """A sample with its `message`, or with the reason in one line why it has none, its `error`."""
 
-    sample: Sample
+    __slots__ = ()
+
     message: M | None
-    error: str = ""
 
 
 class Subscription(Generic[M]):
-    """Messages in order of arrival; if too many wait, the oldest are dropped. `refusal` returns why a sample is not
-    read, or "".
+    """Messages in order of arrival; if too many wait, the oldest are dropped.
+
+    `decode` makes a message of a sample, or raises CodecError. `refusal` returns why a sample is not read, or "".
     """
 
     def __init__(
         self,
         samples: RawSubscriber,
-        kinds: tuple[type[M], ...],
-        tolerant: bool = False,
+        decode: Callable[[Sample], M],
         refusal: Callable[[Sample], str] | None = None,
     ) -> None:
-        from holozen.messages import codec
-
-        self.raw, self._refusal = samples, refusal
-        self._decode, self._error = codec.decoder(kinds, tolerant), codec.CodecError
+        self.raw, self._decode, self._refusal = samples, decode, refusal
 
     def try_recv(self) -> Received[M] | None:
         """The next waiting message, or None."""
-        sample = self.raw.try_recv()
+        sample = self.raw.channel.try_recv()
         return None if sample is None else self._received(sample)
 
     def waiting(self, first: Any) -> list[Received[M]]:
         """The messages that wait, after the sample `first` of `raw.channel`; None: nothing waited."""
-        samples = [] if first is None else [Sample(first, self.raw.limit), *iter(self.raw.try_recv, None)]
+        samples = [] if first is None else [first, *iter(self.raw.channel.try_recv, None)]
         return [self._received(sample) for sample in samples]
 
     def recv(self) -> Received[M]:
         """The next message; waits for it. Raises BusError once the bus is closed."""
-        return self._received(self.raw.recv())
+        return self._received(self.raw.wait())
 
     def close(self) -> None:
         """Stop listening."""
         self.raw.close()
 
-    def _received(self, sample: Sample) -> Received[M]:
-        if sample.oversized:
-            return Received(sample, None, f"oversized: {sample.size} bytes")
-        if self._refusal and (reason := self._refusal(sample)):
-            return Received(sample, None, reason)
-        try:
-            return Received(sample, self._decode(sample.payload, sample.encoding))
-        except self._error as error:
-            return Received(sample, None, str(error))
+    def _received(self, sample: Any) -> Received[M]:
+        received: Received[M] = Received(sample, self.raw.limit)
+        if received.oversize:
+            received.error = f"oversized: {received.size} bytes"
+        elif self._refusal and (reason := self._refusal(received)):
+            received.error = reason
+        else:
+            try:
+                received.message = self._decode(received)
+            except CodecError as error:
+                received.error = str(error)
+        return received
 
 
 class Arrivals(Generic[M]):

@@ -2,7 +2,7 @@
 
 When a process loses one, another takes it over. Since no process holds two, processes find each other even if the
 holder of the first one is suspended, or does not speak Zenoh. Zenoh can retry a taken port by itself, but such a
-session takes 10 s to close; so this asks the kernel when a point is free.
+session takes 10 s to close; so this module asks the kernel whether a point is free.
 """
 
 import errno
@@ -97,8 +97,8 @@ def wait_for_link(
     stop: threading.Event,
     known: Sequence[str] = (),
 ) -> None:
-    """Wait until a link is up, if a process listens at one of `endpoints`, as it does at those `known`; at most
-    `patience` s.
+    """Wait for a link, at most `patience` s, as long as a process listens at any of `endpoints`. `known`: where one was
+    seen to listen.
 
     Raises BusError if one is held and does not answer. A `lasting` process goes on without remote ones: those links
     come up later. Exits with code 0 when `stop` is set.

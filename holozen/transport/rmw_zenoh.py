@@ -1,12 +1,13 @@
-"""The form that rmw_zenoh gives to ROS 2 on Zenoh: keys, liveliness tokens, attachments (design.md of ros2/rmw_zenoh).
+"""ROS 2 on Zenoh as rmw_zenoh has it: keys, liveliness tokens, attachments (see design.md of ros2/rmw_zenoh).
 
-Data travels on `domain/topic/type/hash`, a service's requests on the same with its own type. Each node and endpoint
-holds a liveliness token. Each sample, request and reply carries an attachment. In a token `%` stands for `/`.
+Messages travel on `domain/topic/type/hash`, a service's requests on such a key with the service's type. Each node and
+endpoint has a liveliness token. Each sample, request and reply has an attachment. In a token `%` stands for `/`.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
 import re
 import struct
 import time
@@ -18,20 +19,22 @@ from holozen.transport.errors import ServiceError
 from holozen.transport.samples import Sample
 
 TOPIC = re.compile(r"[A-Za-z_][A-Za-z0-9_]*(/[A-Za-z_][A-Za-z0-9_]*)*")
-"""What a topic or a service may be called, without the slash at its beginning."""
+"""A valid name of a topic or a service, without the leading slash."""
 QOS = "::,10:,:,:,,"  # ROS 2's default: reliable, volatile, the last 10
 LATCHED_QOS = ":1:,1:,:,:,,"  # transient local, the last one
+PACE = 0.3  # s between two samples that show that their publisher keeps pace
 KINDS = {"MP": "pub", "MS": "sub", "SS": "srv"}
 NO_HASH = "TypeHashNotSupported"  # in the place of hashes in ROS 2 Humble
 _CODES = {kind: code for code, kind in KINDS.items()}
 _ATTACHMENT = struct.Struct("<qqB16s")
+_NUMBER = re.compile(r"[0-9]{1,20}")
 _TYPE = re.compile(r"([A-Za-z]\w*)::(msg|srv|action)::dds_::([A-Za-z]\w*)_")
 
 
 class Endpoint(NamedTuple):
     """A publisher ("pub"), subscriber ("sub") or service ("srv") of a ROS node.
 
-    `topic` has no slash at its beginning, `type` is the ROS name, such as `std_msgs/msg/String`.
+    `topic` has no leading slash; `type` is the ROS name, such as `std_msgs/msg/String`.
     """
 
     kind: str
@@ -45,7 +48,7 @@ class Endpoint(NamedTuple):
 
 
 class Form:
-    """What the gateway writes and reads in a domain. `humble`: without the hashes of types."""
+    """The keys, tokens and attachments in a domain. `humble`: without the hashes of types."""
 
     shows_readers = True  # by their tokens
 
@@ -88,11 +91,11 @@ class Form:
         return f"its {theirs.type} is not the one known here"
 
     def attachment(self, number: int, gid: bytes) -> bytes | None:
-        """What a sample or a request of ours carries."""
+        """The attachment of a sample or a request of ours, with its sequence number and our gid."""
         return Attachment(number, time.time_ns(), gid).packed()
 
     def answered(self, request: bytes) -> bytes | None:
-        """What a reply carries, by the attachment of its request. Raises ServiceError."""
+        """The attachment of a reply, made from that of its request. Raises ServiceError if that is malformed."""
         stamp = attachment(request)
         if stamp is None:
             raise ServiceError("a request of rmw_zenoh has an attachment of 33 bytes")
@@ -103,14 +106,14 @@ class Form:
         return attachment(sample.attachment)
 
     def writer(self, stamp: Attachment) -> str:
-        """The session that must hold a token of the sample's topic and type: none, as its key has both."""
+        """The session that must have a token for the sample's topic and type; empty, as the key states both."""
         return ""
 
 
 def parse(token: str) -> Endpoint | None:
     """The endpoint that a token names; None for that of a node, and for one that is malformed."""
     parts = token.split("/")
-    if len(parts) != 13 or parts[0] != "@ros2_lv" or parts[5] not in KINDS or not parts[4].isdecimal():
+    if len(parts) != 13 or parts[0] != "@ros2_lv" or parts[5] not in KINDS or not _NUMBER.fullmatch(parts[4]):
         return None
     _, _, session, _, number, kind, _, space, node, topic, dds, hashed, qos = parts
     found, topic = _TYPE.fullmatch(dds), topic.replace("%", "/").lstrip("/")
@@ -132,8 +135,8 @@ def _mangled(name: str) -> str:
 
 
 class Attachment(NamedTuple):
-    """What a sample, a request or a reply carries: its sequence number, when it was sent (ns since 1970, by the
-    sender's clock), and the 16 bytes that name its sender (its gid). A reply repeats number and gid of its request.
+    """The attachment of a sample, a request or a reply: its sequence number, when it was sent (ns since 1970, by the
+    sender's clock), and the 16 bytes that identify its sender (gid). A reply repeats number and gid of its request.
     """
 
     number: int
@@ -159,21 +162,35 @@ def gid(token: str) -> bytes:
 
 
 class Ages:
-    """How old the samples of one publisher are. It needs no clock in common: the fastest sample so far counts as new.
+    """The ages of one publisher's samples, without a common clock: the fastest sample so far counts as new.
 
-    A sample that waited in a buffer since the link was cut is found old; a delay that all have is not.
+    So a sample that waited in a buffer while the link was cut is old; a delay that all samples have does not show.
+    The first samples may have waited themselves, so until `kept_pace` their age is that by the clocks of both machines.
+    What waited arrives at once: a publisher has kept pace when two samples came about as far apart as they were sent.
     """
 
     def __init__(self) -> None:
-        self._offset: float | None = None  # s; the least difference of arrival and sending
+        self.kept_pace = False
+        self._offset = math.inf  # s; the least difference of arrival and sending
         self._last = (-1, 0.0)
+        self._begun: tuple[float, float] | None = None  # when the sample was sent and read from which pace is measured
 
-    def of(self, stamp: Attachment, now: float) -> float:
-        """The age in s of a sample that is read at `now`, s of our monotonic clock."""
+    def of(self, stamp: Attachment, now: float, clock: float) -> float:
+        """The age in s of a sample that is read at `now`, s of our monotonic clock, and `clock`, s since 1970. It is
+        as large for one from the future.
+        """
         sent = stamp.sent / 1e9
         number, before = self._last
         if stamp.number > number and sent < before:  # the sender's clock was set back
-            self._offset = None
+            self.kept_pace, self._offset, self._begun = False, math.inf, None
         self._last = (stamp.number, sent)
-        self._offset = now - sent if self._offset is None else min(self._offset, now - sent)
-        return now - sent - self._offset
+        self._offset = min(self._offset, now - sent)
+        if not self.kept_pace:
+            self._measure_pace(sent, now)
+        return now - sent - self._offset if self.kept_pace else abs(clock - sent)
+
+    def _measure_pace(self, sent: float, now: float) -> None:
+        begun_sent, begun_now = self._begun or (sent, now)
+        self.kept_pace = sent - begun_sent >= PACE and now - begun_now >= sent - begun_sent - PACE / 2
+        if self._begun is None or sent - begun_sent >= PACE:
+            self._begun = sent, now

@@ -1,8 +1,9 @@
-"""The form that zenoh-bridge-ros2dds gives to ROS 2 on Zenoh: keys as ours, CDR without an Encoding, liveliness tokens.
+"""ROS 2 on Zenoh as zenoh-bridge-ros2dds has it: keys as ours, CDR without an Encoding, liveliness tokens.
 
-Each bridge holds a token for what its ROS nodes read, write and serve, and makes a DDS endpoint for each token of
-another; an action has one token for all its parts. In a token § stands for /. Samples carry no type and no sender: a
-token states the type, and Zenoh's timestamp the bridge's session (zenoh-plugin-ros2dds 1.x, liveliness_mgt.rs).
+Each bridge has a token for whatever its ROS nodes read, write and serve, and makes a DDS endpoint for each token of
+another bridge; an action has one token for all its parts. In a token § stands for /. Samples state neither type nor
+sender: a token states the type, and Zenoh's timestamp the bridge's session (zenoh-plugin-ros2dds 1.x,
+liveliness_mgt.rs).
 """
 
 import re
@@ -23,10 +24,10 @@ _CODES = {kind: code for code, kind in KINDS.items()}
 
 
 class Form:
-    """What the gateway writes and reads on a network of bridges."""
+    """The keys and tokens on a network of bridges."""
 
     tokens = "@/*/@ros2_lv/**"
-    shows_readers = False  # a bridge shows what we read only once it has a reader there
+    shows_readers = False  # a bridge passes on our subscription only if there is a real one besides its token
 
     def parse(self, token: str) -> Endpoint | None:
         """The endpoint that a token names; None for another kind, and for one that is malformed."""
@@ -75,11 +76,11 @@ class Form:
         return "" if theirs.hash in ("", self.hash(interface)) else f"its {theirs.type} is not the one known here"
 
     def attachment(self, number: int, gid: bytes) -> bytes | None:
-        """What a sample or a request of ours carries."""
+        """None: samples and requests have no attachment."""
         return None
 
     def answered(self, request: bytes) -> bytes | None:
-        """What a reply carries, by the attachment of its request."""
+        """None: replies have no attachment."""
         return None
 
     def stamp(self, sample: Sample) -> Attachment | None:
@@ -87,5 +88,5 @@ class Form:
         return sample.timestamp and Attachment(0, sample.timestamp[0], sample.timestamp[1].encode())
 
     def writer(self, stamp: Attachment) -> str:
-        """The session that must hold a token of the sample's topic and type."""
+        """The session that must have a token for the sample's topic and type."""
         return stamp.gid.decode()

@@ -1,10 +1,10 @@
-"""Joins the wire with a ROS 2 graph on Zenoh: what one side has appears on the other, and is carried there while
-something there reads it.
+"""Joins the wire with a ROS 2 graph on Zenoh: topics and services of each side appear on the other, and messages are
+forwarded while something there reads them.
 
-With rmw_zenoh both sides are one Zenoh network, and the gateway copies between its keys. Bridges have keys as ours with
-other bytes, so they are a network of their own, where the gateway has a second session. Either way a sample takes one
-more hop. Nothing that it carries comes back to it, as its readers take only what other sessions wrote. For that there
-must be no second gateway.
+With rmw_zenoh both sides are one Zenoh network, and the gateway copies between its keys. Bridges use keys like ours for
+other bytes, so they have a separate network, where the gateway has a second session. Either way a sample takes one more
+hop. Nothing that it forwards returns to it, since its readers take only what other sessions wrote; so there must be no
+second gateway.
 """
 
 from __future__ import annotations
@@ -48,9 +48,14 @@ if TYPE_CHECKING:
 
 NODE = "ros2"
 NODES = f"{NODE}/"  # before the names of ROS nodes on our side
-DEPTH = 64  # samples that wait in a route; of commands all count, since one may be a stop
+DEPTH = 64  # samples that wait in a route; no command may be lost, since it may be a stop
 MANY = 256  # publishers of a topic whose ages are measured
 CALL = 5.0  # s for a service to answer
+UNDER_WAY = f"a command was under way for more than {wire.COMMAND_SILENCE:g} s"
+UNKNOWN_AGE = (
+    f"a first command has a time of sending more than {wire.COMMAND_SILENCE:g} s from this machine's clock; it is late,"
+    f" or the clocks differ: set them, or go on publishing, and after {rmw.PACE:g} s commands are forwarded"
+)
 FAILED = 4  # OPERATION_FAILED of simulation_interfaces/msg/Result
 SHARED = ("tf", "tf_static")  # topics with several publishers by nature
 DESCRIPTION, STRING = "robot_description", "std_msgs/msg/String"
@@ -69,9 +74,9 @@ def open_bridges(endpoints: Sequence[str], stamped: tuple[str, str]) -> Any:
 
 
 class Gateway:
-    """Call `update` again and again; it returns why the gateway has to end, or "". `close` withdraws everything.
+    """Call `update` in a loop; it returns why the gateway has to end, or "". `close` withdraws everything.
 
-    `there` is the session on ROS 2's side, which has the `form` of its keys.
+    `there` is the session on ROS 2's side, `form` the form of keys and tokens there.
     """
 
     def __init__(self, bus: Bus, form: rmw.Form | ros2dds.Form, there: Any) -> None:
@@ -80,7 +85,7 @@ class Gateway:
         tokens: Any = zenoh.handlers.RingChannel(4096)
         self._tokens = there.liveliness().declare_subscriber(form.tokens, tokens, history=True)
         self._theirs: dict[str, rmw.Endpoint] = {}  # by token
-        # A session for bridges alone sees no node of ours, or else it is on our network.
+        # A session for bridges alone that sees a node of ours is on our network.
         same = "" if there is bus.session else graphs.ALL
         self._same = same and there.liveliness().declare_subscriber(same, zenoh.handlers.RingChannel(1), history=True)
         self._writers: set[tuple[str, str, str]] = set()  # session, topic and type of their publishers
@@ -106,20 +111,22 @@ class Gateway:
         self._report_bridges()
         everything = self._ours.endpoints()
         if any(one.kind == "node" and one.node == NODE and one.session < self._bus.id for one in everything):
-            return "another `holozen ros2` runs here; what both carry would go round and round"
+            return "another `holozen ros2` runs here; messages would loop between the two"
         if self._same and self._same.try_recv():
-            return "the bridge is on our own network, where what is carried would go round: give it one of its own"
+            return "the bridge is on our own network, where messages would loop: give it a network of its own"
         ours = [one for one in everything if one.session != self._bus.id and not one.node.startswith(NODES)]
-        wanted = {**self._announced(ours), **self._routes(ours), **self._descriptions(ours)}
+        # Routes first: a subscriber asks a publisher of a latched topic for its message once, when it sees it.
+        wanted = {**self._routes(ours), **self._descriptions(ours), **self._announced(ours)}
         for gone in self._held.keys() - wanted.keys():
             for end in self._held.pop(gone):
                 end()
-        for new in wanted.keys() - self._held.keys():
-            self._held[new] = wanted[new]()
+        for new, begin in wanted.items():
+            if new not in self._held:
+                self._held[new] = begin()
         return ""
 
     def close(self) -> None:
-        """Withdraw what was announced, and carry nothing more."""
+        """Withdraw what was announced, and forward nothing more."""
         self._closed.set()
         for ends in self._held.values():
             for end in ends:
@@ -138,7 +145,7 @@ class Gateway:
         self._bridges = now
 
     def _announced(self, ours: list[graphs.Endpoint]) -> dict[Any, Callable[[], Ends]]:
-        """What each side has to be shown of the other, with a function that shows it."""
+        """What has to be announced on each side of the other, with a function that does so."""
         wanted: dict[Any, Callable[[], Ends]] = {}
         for one in ours:
             number, name = self._named(one.node)
@@ -159,16 +166,18 @@ class Gateway:
 
     def _show(self, token: str, found: rmw.Endpoint | None = None) -> Ends:
         """Show a node or an endpoint of ours to ROS 2, and answer the calls of a service."""
-        ends = self._hold(self._there, token) if token else []
+        ends: Ends = []
         if found and found.kind == "sub" and not self._form.shows_readers:
             reader = self._there.declare_subscriber(self._form.key(found), zenoh.handlers.RingChannel(1))
             ends.append(_quietly(reader.undeclare))
         if found and found.kind == "srv":
-            ends.append(self._serve(found))
-        return ends
+            answers = ConcurrentAnswers if found.topic.endswith(RESULT) else Answers
+            ends.append(self._answers(self._there, self._form.key(found), partial(self._answer, found), answers))
+        # Last, so that whoever sees it can call it at once.
+        return [*ends, *(self._hold(self._there, token) if token else ())]
 
     def _routes(self, ours: list[graphs.Endpoint]) -> dict[Any, Callable[[], Ends]]:
-        """What has to be carried, with a function that begins it."""
+        """What has to be forwarded, with a function that begins it."""
         wanted: dict[Any, Callable[[], Ends]] = {}
         read = {(one.topic, one.type) for one in self._theirs.values() if one.kind == "sub" and self._is_known(one)}
         writers: dict[str, list[str]] = {}
@@ -178,7 +187,7 @@ class Gateway:
         for one in ours:
             found = self._exported(one) if one.kind == "pub" else None
             if found and (found.latched or (found.topic, found.type) in read):
-                # A latched message may have been put before this session heard of its publisher: a new one is asked.
+                # A latched message may have been put before this session knew its publisher: each new one is asked.
                 asked = tuple(writers[found.topic]) if found.latched else ()
                 wanted["out", found.topic, found.type, asked] = partial(self._carry_out, found)
         for theirs in self._theirs.values():
@@ -189,7 +198,7 @@ class Gateway:
     def _descriptions(self, ours: list[graphs.Endpoint]) -> dict[Any, Callable[[], Ends]]:
         """The robots whose description ROS 2 is shown, as by a robot_state_publisher, with a function that shows it.
 
-        On our side the key is a service of the sim. Where a node publishes the topic, on either side, that counts.
+        On our side the key is a service of the sim. A node that publishes the topic, on either side, takes precedence.
         """
         if self._changes != self._ours.changes:
             self._changes, scenes = self._ours.changes, []
@@ -222,17 +231,17 @@ class Gateway:
         text = next((reply.description for reply in replies if reply.number == robot.number), "")
         if not text:  # it has left
             return []
-        ends = self._hold(self._there, self._form.token(found, self._named(NODE)[0]))
         publisher, put = self._publisher(found)
         put(cdr.write(self._registry.find(STRING), {"data": text}))
-        return [*ends, _quietly(publisher.undeclare)]
+        shown = self._hold(self._there, self._form.token(found, self._named(NODE)[0]))
+        return [*shown, _quietly(publisher.undeclare)]
 
     def _exported(self, one: graphs.Endpoint) -> rmw.Endpoint | None:
-        """How one of our endpoints stands in the ROS graph; None if it cannot."""
+        """One of our endpoints as the ROS graph has it; None if it cannot have it."""
         interface = self._interface(one.type) if rmw.TOPIC.fullmatch(one.key) else None
         if not interface or (interface.kind == "srv") != (one.kind == "srv"):
             return None
-        is_latched = one.key.rpartition("/")[2] in wire.LATCHED or one.key.endswith(STATUS)
+        is_latched = graphs.is_latched(one.key) or one.key.endswith(STATUS)
         latched = one.kind == "pub" and is_latched
         number, name = self._numbers.setdefault(f"{one}", len(self._numbers)), self._named(one.node)[1]
         return rmw.Endpoint(
@@ -253,7 +262,7 @@ class Gateway:
         return self._types[name]
 
     def _may_enter(self, theirs: rmw.Endpoint, ours: list[graphs.Endpoint]) -> bool:
-        """Whether samples of theirs may be read on our side: of a robot's own reports there is one publisher."""
+        """Whether samples of theirs may be forwarded to our side. What a robot reports has one publisher."""
         interface = self._interface(theirs.type)
         if not interface:
             return self._refuse(theirs.topic, f"its type {theirs.type} is not known here")
@@ -283,8 +292,8 @@ class Gateway:
         return bool(interface and not self._form.mismatch(theirs, interface))
 
     def _refuse(self, topic: str, why: str) -> bool:
-        """Report once why something of a topic is not carried. Returns False."""
-        self._report(f"/{topic} is not carried: {why}")
+        """Report once why a topic or service is not forwarded. Returns False."""
+        self._report(f"/{topic} is not forwarded: {why}")
         return False
 
     def _report(self, text: str) -> None:
@@ -323,7 +332,7 @@ class Gateway:
         return ends
 
     def _publisher(self, found: rmw.Endpoint) -> tuple[Any, Callable[[bytes], None]]:
-        """A publisher on ROS 2's side, and what puts bytes of CDR by it."""
+        """A publisher on ROS 2's side, and a function that puts bytes of CDR with it."""
         session, numbers = self._there, count(1)
         key, gid = self._form.key(found), rmw.gid(self._form.token(found, 0))
         if found.latched:
@@ -343,18 +352,18 @@ class Gateway:
     def _carry_in(self, theirs: rmw.Endpoint) -> Ends:
         """Samples of ROS 2 to our side, with a stamp of this session and the priority of plain data.
 
-        A command that waited in a buffer on its way here is left out: our stamp would make it new.
+        A command that waited in a buffer on its way here is dropped: our stamp would make it look new.
         """
         key, encoding = theirs.topic, f"application/cdr;{theirs.type}"
         is_command = _moves(theirs.type, key)
         publisher = self._bus.session.declare_publisher(key, encoding=encoding, express=is_command)
         ages: dict[bytes, tuple[rmw.Ages, Callable[[], bytes]]] = {}
-        _ = self._bus.stamp  # from now on this session answers for its clock
+        _ = self._bus.clock_server  # from now on this session answers for its clock
 
         def put(sample: Sample) -> None:
             stamp = self._form.stamp(sample)
             if stamp is None:
-                self._refuse(key, "a sample does not say when it was sent, as all of ROS 2 do")
+                self._refuse(key, "a sample does not state when it was sent, as all of ROS 2 do")
                 return
             writer = self._form.writer(stamp)
             if writer and (writer, key, theirs.type) not in self._writers:
@@ -363,29 +372,36 @@ class Gateway:
             if stamp.gid not in ages:
                 if len(ages) == MANY:
                     ages.clear()
-                ages[stamp.gid] = (rmw.Ages(), stamps(self._source(theirs, stamp.gid), self._bus.id))
+                ages[stamp.gid] = (rmw.Ages(), stamps(self._source(theirs, stamp.gid), self._bus.id, count()))
             measured, stamped = ages[stamp.gid]
-            if is_command and measured.of(stamp, time.monotonic()) > wire.COMMAND_SILENCE:
-                self._refuse(key, f"a command was under way for more than {wire.COMMAND_SILENCE:g} s")
+            age = measured.of(stamp, time.monotonic(), time.time()) if is_command else 0.0
+            if age > wire.COMMAND_SILENCE and not self._stops(theirs.type, sample.payload):
+                self._refuse(key, UNDER_WAY if measured.kept_pace else UNKNOWN_AGE)
                 return
             publisher.put(sample.payload, attachment=stamped())
 
         return [self._reader(self._there, self._form.key(theirs), put), _quietly(publisher.undeclare)]
 
+    def _stops(self, type_name: str, payload: bytes) -> bool:
+        """Whether a command is a velocity of zero, which is forwarded at any age."""
+        if type_name not in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped"):
+            return False
+        try:
+            value = cdr.read(self._registry.find(type_name), payload)
+        except CodecError:
+            return False
+        twist = value.get("twist", value)
+        return not any(number for part in ("linear", "angular") for number in twist[part].values())
+
     def _source(self, theirs: rmw.Endpoint, gid: bytes) -> str:
-        """What a publisher is called on our side: its node, where that is the only one on the topic."""
+        """The name of a publisher on our side: that of its node, if no other publishes the topic."""
         nodes = {one.node for one in self._theirs.copy().values() if one.kind == "pub" and one.topic == theirs.topic}
         return NODES + (nodes.pop() if len(nodes) == 1 else gid[:4].hex())
-
-    def _serve(self, found: rmw.Endpoint) -> Callable[[], object]:
-        """Answer ROS 2's calls of one of our services."""
-        answers = AnswersAtOnce if found.topic.endswith(RESULT) else Answers
-        return self._answers(self._there, self._form.key(found), partial(self._answer, found), answers)
 
     def _answers(
         self, session: Any, key: str, reply: Callable[[Any], None], answers: type[Answers] = Answers
     ) -> Callable[[], object]:
-        """Answer the queries on a key by `reply`, in a thread, and those with an error for which it raises one."""
+        """Answer the queries on a key with `reply`, in a thread; where it raises an error, with that."""
         queryable = session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=True)
 
         def answer(query: Any) -> None:
@@ -401,6 +417,7 @@ class Gateway:
         return _quietly(answers(queryable, answer).close)
 
     def _answer(self, found: rmw.Endpoint, query: Any) -> None:
+        """Answer ROS 2's call of one of our services."""
         interface = self._registry.find(found.type)
         assert interface.request
         assert interface.response
@@ -410,7 +427,7 @@ class Gateway:
             reply = self._replied(found.topic, bytes(query.payload or b""), request)
             payload = codec.transcoded(interface.response, reply.payload, reply.encoding)
         except ServiceError as error:
-            # A client of ROS 2 takes no notice of an error reply, and would wait for ever.
+            # A client of ROS 2 ignores an error reply, and would wait for ever.
             fields = _refused(interface.response, error)
             if fields is None:
                 self._report(f"/{found.topic}: a caller waits, as {found.type} has no place for an error: {error}")
@@ -419,7 +436,7 @@ class Gateway:
         query.reply(self._form.key(found), payload, encoding="application/cdr", attachment=attachment)
 
     def _replied(self, key: str, payload: bytes, encoding: str) -> Sample:
-        """The reply of a service of ours. That of an action's result is waited for until the goal ends."""
+        """The reply of a service of ours. The result of an action comes when the goal has ended."""
         if not key.endswith(RESULT):
             return call_bytes(self._bus, key, payload, encoding, CALL)[0]
         found = actions.wait_for_result(self._bus, key.removesuffix(RESULT), payload, encoding, self._closed.is_set)
@@ -450,12 +467,12 @@ class Gateway:
             raise ServiceError(f"/{theirs.topic} of ROS 2 did not reply within {CALL:g} s")
 
         shown = graphs.Endpoint(theirs.topic, "srv", theirs.type, NODES + theirs.node, self._bus.id)
-        token = self._hold(self._bus.session, graphs.token(shown))
-        return [*token, self._answers(self._bus.session, theirs.topic, answer)]
+        answers = self._answers(self._bus.session, theirs.topic, answer)
+        return [*self._hold(self._bus.session, graphs.token(shown)), answers]
 
 
-class AnswersAtOnce(Answers):
-    """Answers each query in a thread of its own, as some take long; at most MANY at a time."""
+class ConcurrentAnswers(Answers):
+    """Answers each query in its own thread, as some take long; at most MANY at a time."""
 
     def _run(self) -> None:
         room = threading.BoundedSemaphore(MANY)
@@ -486,8 +503,7 @@ def _refused(response: Interface, error: ServiceError) -> dict[str, Any] | None:
 
 def _moves(type_name: str, key: str) -> bool:
     row = wire.topic(key)
-    moving = ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped", "geometry_msgs/msg/Wrench")
-    return bool(row and row.is_command) or type_name in moving
+    return bool(row and row.is_command) or type_name in wire.COMMAND_TYPES
 
 
 def _each(raw: RawSubscriber, work: Callable[[Sample], None]) -> None:

@@ -7,7 +7,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
-from itertools import count
 from typing import Any, NamedTuple
 
 from holozen.transport.errors import BusError
@@ -27,8 +26,8 @@ def source(node: str, session: str) -> str:
 
 
 class Stamp(NamedTuple):
-    """How a sample was sent: the session, an increasing sequence number, and the sender's clock in s (monotonic); and
-    whose certificate the sender claims, in the secure set-up.
+    """How a sample was sent: the session, its number among those of the session on this key, and the sender's clock in
+    s (monotonic); and whose certificate the sender claims, in the secure set-up.
     """
 
     session: str
@@ -37,9 +36,9 @@ class Stamp(NamedTuple):
     member: str = ""
 
 
-def stamps(node: str, session: str) -> Callable[[], bytes]:
+def stamps(node: str, session: str, numbers: Iterator[int]) -> Callable[[], bytes]:
     """A function that makes attachments with sender and stamp: `node@session;number;nanoseconds`."""
-    start, numbers = f"{node}@{session};", count()
+    start = f"{node}@{session};"
     return lambda: f"{start}{next(numbers)};{time.monotonic_ns()}".encode()
 
 
@@ -51,10 +50,18 @@ def source_in(attachment: Any) -> str:
     return source(name, session)[:80] if name else session[:80]
 
 
-def _stamp_in(attachment: Any) -> Stamp | None:
-    """The stamp in an attachment; None if it is missing or malformed. A signature may follow, see members.py."""
+def _stamp_parts(attachment: Any) -> list[bytes]:
+    """The parts of an attachment with a sender, its sample's number and a time; empty if those are missing or
+    malformed. A signature may follow, see members.py.
+    """
     parts = bytes(attachment).split(b";") if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else []
-    if len(parts) not in (3, 4) or not all(part.isdigit() and len(part) < 20 for part in parts[1:3]):
+    well_formed = len(parts) in (3, 4) and all(part.isdigit() and len(part) < 20 for part in parts[1:3])
+    return parts if well_formed else []
+
+
+def _stamp_in(attachment: Any) -> Stamp | None:
+    """The stamp in an attachment; None if it is missing or malformed."""
+    if not (parts := _stamp_parts(attachment)):
         return None
     name, _, session = parts[0].rpartition(b"@")
     if not 0 < len(session) <= 32 or not session.isalnum():
@@ -111,29 +118,45 @@ def _trim() -> None:
 
 
 class Sample:
-    """A received sample. It is `oversized`, and has no payload, if its `size` in bytes is over the reader's limit, or
-    its attachment is too long. A limit of 0 means no limit.
+    """A received sample. If its `size` in bytes is over the reader's limit, or its attachment is too long, that is its
+    `oversize`, else 0, and it has no payload. A limit of 0 means no limit.
 
-    Most readers need only the payload, so the rest is read from Zenoh's sample on demand.
+    Most readers need only the payload, so the rest is read from Zenoh's sample on demand. Who decodes it puts the
+    result into `message`, or the reason why not into `error`.
     """
 
-    __slots__ = ("_sample", "_stamp", "encoding", "oversized", "payload", "size")
+    __slots__ = ("_sample", "_stamp", "error", "message", "oversize", "payload")
 
     def __init__(self, sample: Any, limit: int = 0) -> None:
         self._stamp: tuple[Stamp | None] | None = None  # once it was read
-        self._sample, self.encoding = sample, str(sample.encoding)
-        if not limit:
-            self.payload = bytes(sample.payload)
-            self.size, self.oversized = len(self.payload), False
-            return
+        self._sample, self.oversize, self.error = sample, 0, ""
+        self.message: Any = None
         payload = sample.payload
-        self.size = len(payload)
-        if (named := len(sample.attachment or b"")) > MAX_ATTACHMENT_BYTES:
-            self.size += max(named, limit)
-        self.oversized = limit < self.size
-        self.payload = b"" if self.oversized else bytes(payload)
-        if self.oversized and self.size > LARGE:
-            release_memory()
+        if limit:
+            size = len(payload)
+            if (named := len(sample.attachment or b"")) > MAX_ATTACHMENT_BYTES:
+                size += max(named, limit)
+            if size > limit:
+                self.payload, self.oversize = b"", size
+                if size > LARGE:
+                    release_memory()
+                return
+        self.payload = payload.to_bytes()
+
+    @property
+    def encoding(self) -> str:
+        """Its Zenoh Encoding."""
+        return str(self._sample.encoding)
+
+    @property
+    def size(self) -> int:
+        """Bytes of its payload, and of an attachment that is too long."""
+        return self.oversize or len(self.payload)
+
+    @property
+    def is_deletion(self) -> bool:
+        """Whether it says that what has its key is gone."""
+        return str(self._sample.kind).endswith("DELETE")
 
     @property
     def key(self) -> str:
@@ -171,9 +194,9 @@ class Sample:
 
     @property
     def number(self) -> tuple[str, int] | None:
-        """The publisher's id and its sequence number; None without them."""
-        info = self._sample.source_info
-        return info and (f"{info.source_id.zid}:{info.source_id.eid}", info.source_sn)
+        """Its sender, and its number among those of the sender on this key; None without a stamp."""
+        parts = _stamp_parts(self._sample.attachment)
+        return (parts[0].decode(errors="replace"), int(parts[1])) if parts else None
 
     @property
     def delivery(self) -> tuple[str, bool]:
@@ -217,19 +240,25 @@ class Answers(Declared):
 
 
 class Ring:
-    """What came on one key of a Dealer, the newest `depth`; it stands for a ring channel of Zenoh and its declaration.
+    """What came on one key of a Dealer, the newest `depth` of each priority; it stands for a ring channel of Zenoh and
+    its declaration.
 
-    Each key has a ring of its own, so that a flood at one pushes nothing out of another.
+    A flood pushes nothing out that came on another key, or with a higher priority.
     """
 
     def __init__(self, dealer: Dealer, key: str, depth: int) -> None:
-        self.dealer, self.key, self.handler = dealer, key, self
-        self._waiting: deque[Any] = deque(maxlen=depth)
-        self.append = self._waiting.append
+        self.dealer, self.key, self.handler, self._depth = dealer, key, self, depth
+        self._waiting: dict[int, deque[Any]] = {}  # by priority, the strongest first
+
+    def append(self, one: Any, priority: int) -> None:
+        """Add what came with a priority of Zenoh."""
+        if priority not in self._waiting:
+            self._waiting = dict(sorted({**self._waiting, priority: deque(maxlen=self._depth)}.items()))
+        self._waiting[priority].append(one)
 
     def try_recv(self) -> Any:
-        """The next that waits, or None."""
-        return self._waiting.popleft() if self._waiting else None
+        """The next that waits, of the highest priority; or None."""
+        return next((waiting.popleft() for waiting in self._waiting.values() if waiting), None)
 
     def undeclare(self) -> None:
         """Get nothing more."""
@@ -267,8 +296,9 @@ class Dealer(Declared):
         for _ in range(MOST_DEALT):
             if (one := self._recv()) is None:
                 return
+            priority = 0 if self._is_queryable else int(one.priority)
             for ring in self._rings_of(one.key_expr):
-                ring.append(one)
+                ring.append(one, priority)
                 self.ready[ring] = None
 
     def _rings_of(self, key_expr: Any) -> Iterable[Ring]:
@@ -284,27 +314,31 @@ class RawSubscriber(Declared):
     def __init__(self, subscriber: Any, limit: int = 0) -> None:
         super().__init__(subscriber)
         # Reading from the handler leaves the subscriber free to be undeclared at the same time.
-        self._samples, self.limit = subscriber.handler, limit
-        self.channel = subscriber.handler  # of Zenoh's samples, for `Subscription.waiting`
+        self.channel, self.limit = subscriber.handler, limit
+        self._reads = 0  # the number of `thread`, which is found in half the time
 
     def try_recv(self) -> Sample | None:
         """The next waiting sample, or None."""
-        sample = self._samples.try_recv()
+        sample = self.channel.try_recv()
         return sample and Sample(sample, self.limit)
 
     def recv(self) -> Sample:
         """The next sample; waits for it. Raises BusError once the bus or this subscriber is closed."""
-        self.thread = threading.current_thread()
+        return Sample(self.wait(), self.limit)
+
+    def wait(self) -> Any:
+        """Zenoh's next sample, as `recv`."""
+        if (thread := threading.get_ident()) != self._reads:
+            self._reads, self.thread = thread, threading.current_thread()
         try:
-            sample = self._samples.recv()
+            return self.channel.recv()
         except Exception:  # a ZError: the session is closed. Zenoh is imported later than this module
             raise BusError("closed") from None
-        return Sample(sample, self.limit)
 
 
 class Replies:
-    """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error. With a `replier`, `try_recv`
-    skips those of any other session, by Zenoh's own id of the replier.
+    """The replies to `Bus.ask` and `ask_all`, each a sample or the bytes of an error. With a `replier`, those of any
+    other session are skipped, by Zenoh's own id of the replier.
     """
 
     def __init__(self, replies: Any, replier: str = "") -> None:
@@ -314,7 +348,7 @@ class Replies:
         """The next reply, or None. Raises BusError when there will be no more."""
         try:
             while (reply := self._replies.try_recv()) is not None:
-                if not self._replier or (reply.replier_id and str(reply.replier_id.zid) == self._replier):
+                if self._is_meant(reply):
                     return _read(reply)
         except Exception:  # a ZError: all have replied, or it timed out
             raise BusError("no more replies") from None
@@ -322,7 +356,10 @@ class Replies:
 
     def __iter__(self) -> Iterator[Sample | bytes]:
         """All replies; waits for each."""
-        return map(_read, self._replies)
+        return map(_read, filter(self._is_meant, self._replies))
+
+    def _is_meant(self, reply: Any) -> bool:
+        return not self._replier or bool(reply.replier_id and str(reply.replier_id.zid) == self._replier)
 
 
 def _read(reply: Any) -> Sample | bytes:

@@ -3,27 +3,22 @@
 from __future__ import annotations
 
 import json
+import math
 import os
+import re
 import threading
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from holozen.console import report
 from holozen.transport.errors import TIMEOUT, BusError, Elsewhere, NoReply, ServiceError
-from holozen.transport.samples import (
-    MAX_ATTACHMENT_BYTES,
-    Declared,
-    Replies,
-    Ring,
-    Sample,
-    release_memory,
-    source_in,
-)
+from holozen.transport.samples import MAX_ATTACHMENT_BYTES, Declared, Ring, Sample, release_memory, source_in
 
 if TYPE_CHECKING:
     from holozen.messages import Message
+    from holozen.transport.node import Node
 
 R = TypeVar("R", bound="Message")
 
@@ -32,8 +27,11 @@ RING = 2048  # requests in Zenoh's ring, of some 770 bytes each; beyond, the old
 ROOM = 1000  # waiting requests of one service, by default
 BATCH = 200  # requests read at once; to refuse as many takes 5 ms
 BUDGET = 0.002  # s for replies per poll of a thread with other work
-KEPT = 256  # replies that are kept
-KEPT_BYTES = 4096  # the largest of them; those that are larger are of requests that only read
+KEPT = 256  # replies that are kept, for requests that are sent again
+KEPT_BYTES = 4096  # the largest of them; requests with larger replies only read, and may be answered again
+SIMULTANEOUS = 0.05  # s; a request that was sent so shortly before an event counts as sent after it
+PROOFS = 5  # times that a caller may tell how long its request has waited: a busy computer reads a reply late
+ANSWERED = 40  # servers whose question a request answers, so that its attachment is not too long
 MAX_REQUEST_BYTES = 5_000_000  # a robot's URDF has at most 4 MB; larger ones are refused unread
 
 
@@ -45,6 +43,17 @@ def refusal(payload: bytes) -> ServiceError:
         return ServiceError(str(fields.pop("error")), **fields)
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
         return ServiceError(text or "the service answered with an error and no reason")
+
+
+class Doubt(NamedTuple):
+    """What is known of a request that may have waited in a link, by this process's clock in s: its caller was `asked`
+    then, with a random `tag`, and sent it at `sent` at the earliest. `proofs`: how often the caller has answered.
+    """
+
+    tag: str
+    asked: float
+    sent: float
+    proofs: int
 
 
 class Waiting:
@@ -84,20 +93,25 @@ class Server(Declared):
     """A service. Requests wait until `answer_pending` is called, or until the thread of `start` takes them.
 
     At most `room` of them wait; the others are refused as busy, and `Bus.call` retries those. `answer` returns the
-    reply, or a pair of it and a note.
+    reply, or the pair (reply, note). `stops`: it only stops something, so it is done whatever the request holds, each
+    time that this is sent; if that cannot be read, it counts as an empty one, and `problem` has the reason.
     """
 
     def __init__(
-        self, queryable: Any, key: str, request: type[Message], answer: Callable[[Any], Any], wire: str, room: int
-    ) -> None:
+        self, queryable: Any, key: str, request: type[Message], answer: Callable[[Any], Any], wire: str, room: int,
+        stops: bool = False,
+    ) -> None:  # fmt: skip
         from holozen.messages import codec
 
         super().__init__(queryable)
         # Reading from the handler leaves the queryable free to be undeclared at the same time.
-        self._queries = queryable.handler
         self.channel = queryable.handler  # of Zenoh's requests, for `keep`
         self._waiting, self._room = Waiting(room), room
         self.caller = ""  # the claimed sender of the request that is being answered
+        self.problem = ""  # why that request could not be read, where it is answered all the same
+        self._stops = stops
+        self._asked = b"", b""  # the number of that request, and what its caller has answered to questions
+        self._doubts: dict[bytes, Doubt] = {}  # by the number of the request, in order
         self._kept: dict[bytes, tuple[bytes, str, str]] = {}  # number of a request -> its reply, in order
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
 
@@ -128,7 +142,7 @@ class Server(Declared):
     def try_recv(self) -> Any:
         """The next request in Zenoh's ring, or None, to be answered with `read`, `reply` or `refuse`."""
         try:
-            return self._queries.try_recv()
+            return self.channel.try_recv()
         except Exception:  # a ZError: this service is closed
             return None
 
@@ -136,12 +150,12 @@ class Server(Declared):
         """The next request; waits for it. Raises BusError once the bus or this service is closed."""
         self.thread = threading.current_thread()
         try:
-            return self._queries.recv()
-        except Exception:  # zenoh's own error type, which only bus.py may name: the session is closed
+            return self.channel.recv()
+        except Exception:  # a ZError: the session is closed
             raise BusError("closed") from None
 
     def start(self) -> None:
-        """Answer from a thread of its own, until the bus is closed."""
+        """Answer from a separate thread, until the bus is closed."""
         self.thread = threading.Thread(target=self._serve, daemon=True)
         self.thread.start()
 
@@ -169,12 +183,13 @@ class Server(Declared):
 
     def _reply(self, query: Any) -> None:
         with query:
-            self.caller = source_in(query.attachment)
-            if earlier := self._kept.get(_number(query)):  # its caller asks again, since this reply was lost
+            self.caller, self._asked = source_in(query.attachment), _asked(query)
+            # Its reply was lost, so its caller asks again.
+            if (earlier := self._kept.get(self._asked[0])) and not self._stops:
                 self._send(query, *earlier)
                 return
             try:
-                answer = self._answer(self.read(query))
+                answer = self._answer(self._any(query) if self._stops else self.read(query))
                 self.reply(query, *(answer if isinstance(answer, tuple) else (answer,)))
             except ServiceError as error:
                 refuse(query, str(error), error.fields)
@@ -186,6 +201,41 @@ class Server(Declared):
                 report(f"{self._key}: {type(error).__name__}: {error}")
                 refuse(query, f"{self._key}: internal error, see the server's log")
 
+    def _any(self, query: Any) -> Any:
+        """The request, or an empty one if it cannot be read."""
+        self.problem = ""
+        try:
+            return self.read(query)
+        except Exception as error:  # of any kind: nothing that a request holds may keep it from stopping
+            self.problem = str(error)
+            return self._request()
+
+    def require_sent_after(self, event: float, now: float, refusal: str) -> None:
+        """Raise ServiceError with `refusal` unless the request that is being answered was sent after `event`; both are
+        times in s of this process's monotonic clock, and at `now` the request was read. An `event` of -inf never was.
+
+        A request may have waited in a link for as long as its caller waits for the reply, and only the caller knows how
+        long that is. So the caller is asked, by an error with a tag, and sends the request again with the time for
+        which it had waited when it read that. This gives the earliest time at which it was sent. Nobody sends it again
+        whose process is gone, or who waits no longer. A foreign caller, whose request has no number, is believed.
+        """
+        number, answers = self._asked
+        if event == -math.inf or not re.search(rb";[0-9a-f]{16}$", number):
+            return
+        doubt = self._doubts.pop(number, Doubt("", -math.inf, -math.inf, 0))
+        if (waited := _waited(answers, doubt.tag)) is not None:
+            sent = max(doubt.sent, doubt.asked - waited)
+            if event < min(doubt.asked, sent + SIMULTANEOUS):
+                return
+            doubt = doubt._replace(sent=sent, proofs=doubt.proofs + 1)
+        if doubt.proofs == PROOFS:
+            raise ServiceError(refusal, outdated=True)
+        if len(self._doubts) == KEPT:
+            self._doubts.pop(next(iter(self._doubts)))
+        tag = os.urandom(4).hex()
+        self._doubts[number] = doubt._replace(tag=tag, asked=now)
+        raise ServiceError(refusal, waited=tag)
+
     def is_addressed(self, query: Any) -> bool:
         """Whether a request names this service's key; wildcards are only used for discovery."""
         return str(query.key_expr) == self._key
@@ -194,7 +244,7 @@ class Server(Declared):
         """Answer a request. The reply's type has no place for `note`, so it is the attachment."""
         reply, wire = self._codec.written(answer, self._wire)
         encoding = self._codec.encoding(wire, type(answer))
-        if len(reply) <= KEPT_BYTES and (number := _number(query)):
+        if len(reply) <= KEPT_BYTES and (number := _asked(query)[0]):
             if len(self._kept) == KEPT:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[number] = reply, encoding, note
@@ -214,11 +264,20 @@ class Server(Declared):
         return self._codec.decode(bytes(query.payload), str(query.encoding), (self._request,))
 
 
-def _number(query: Any) -> bytes:
-    """The sender and number of a request that may be sent again; empty if it has none."""
+def _asked(query: Any) -> tuple[bytes, bytes]:
+    """The sender and number of a request that may be sent again, empty if it has none; and the times for which it has
+    waited, `TAG:NANOSECONDS,...`.
+    """
     attachment = query.attachment
     found = bytes(attachment) if attachment and len(attachment) <= MAX_ATTACHMENT_BYTES else b""
-    return found if b";" in found else b""
+    source, *parts = found.split(b";", 2)
+    return (source + b";" + parts[0], b"".join(parts[1:])) if parts else (b"", b"")
+
+
+def _waited(answers: bytes, tag: str) -> float | None:
+    """The time in s for which a request had waited when its caller was asked with `tag`; None if it does not tell."""
+    found = re.search(rb"(?:^|,)%b:([0-9]{1,18})(?:,|$)" % tag.encode(), answers) if tag else None
+    return int(found[1]) * 1e-9 if found else None
 
 
 def answer_in_turn(servers: list[Server], seconds: float = BUDGET) -> bool:
@@ -241,27 +300,38 @@ def refuse(query: Any, text: str, fields: Mapping[str, object] = {}) -> None:
     query.reply_err(json.dumps({"error": text, **fields}), encoding="application/json")
 
 
-class Asks(Protocol):
-    """What can ask on the wire: a Bus."""
+class Attempts:
+    """One request, which may have to be sent several times. Its caller has wanted it since `began` (s, monotonic)."""
 
-    wire: str
-    where: str
+    def __init__(self, began: float) -> None:
+        self._number, self._began = os.urandom(8).hex(), began
+        self._waited: dict[str, int] = {}  # tag -> ns
 
-    def ask(self, key: str, timeout: float, **request: Any) -> Replies:
-        """Ask once, without waiting for the service."""
-        ...
+    @property
+    def number(self) -> str:
+        """What identifies the request, for `Node.ask`, with how long it had waited when a server asked that."""
+        waited = ",".join(f"{tag}:{waited}" for tag, waited in self._waited.items())
+        return f"{self._number};{waited}" if waited else self._number
 
-    def ask_all(self, key: str, timeout: float, **request: Any) -> Replies:
-        """Ask all services of a key once."""
-        ...
+    def were_asked(self, refused: ServiceError) -> bool:
+        """Note how long the request has waited if a server asks that in place of a reply, see
+        `Server.require_sent_after`. Returns whether to send it again.
+        """
+        tag = refused.fields.get("waited")
+        if not isinstance(tag, str) or not re.fullmatch("[0-9a-f]{8}", tag):
+            return False
+        self._waited[tag] = int((time.monotonic() - self._began) * 1e9)
+        if len(self._waited) > ANSWERED:
+            self._waited.pop(next(iter(self._waited)))
+        return True
 
 
-def call(bus: Asks, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = False) -> list[R]:
+def call(node: Node, key: str, request: Message, reply: type[R], timeout: float, everyone: bool = False) -> list[R]:
     """See Bus.call, and Bus.call_all for `everyone`."""
     from holozen.messages import codec
 
-    payload, wire = codec.written(request, bus.wire)
-    answers = call_bytes(bus, key, payload, codec.encoding(wire, type(request)), timeout, everyone)
+    payload, wire = codec.written(request, node.wire)
+    answers = call_bytes(node, key, payload, codec.encoding(wire, type(request)), timeout, everyone)
     try:
         return [codec.decode(answer.payload, answer.encoding, (reply,), tolerant=True) for answer in answers]
     except codec.CodecError as error:
@@ -269,30 +339,34 @@ def call(bus: Asks, key: str, request: Message, reply: type[R], timeout: float, 
 
 
 def call_bytes(
-    bus: Asks, key: str, payload: bytes, encoding: str, timeout: float, everyone: bool = False
+    node: Node, key: str, payload: bytes, encoding: str, timeout: float, everyone: bool = False
 ) -> list[Sample]:
     """As `call`, without types: the samples of the replies. All attempts have one number, so a service applies the
     request once.
     """
-    number = os.urandom(8).hex()
-    deadline, pause, busy = time.monotonic() + timeout, FIRST_PAUSE, None
+    attempts, deadline = Attempts(time.monotonic()), time.monotonic() + timeout
+    pause, refused = FIRST_PAUSE, None
     while (left := deadline - time.monotonic()) > 0:
-        found = []
-        ask = bus.ask_all if everyone else bus.ask
-        for answer in ask(key, left, number=number, payload=payload, encoding=encoding):
+        found, again = [], False
+        ask = node.ask_all if everyone else node.ask
+        for answer in ask(key, left, number=attempts.number, payload=payload, encoding=encoding):
             if isinstance(answer, Sample):
                 found.append(answer)
                 if not everyone:
                     return found
             elif answer != TIMEOUT:
-                busy = refusal(answer)
+                refused = refusal(answer)
+                again |= attempts.were_asked(refused)
+        if again:
+            continue
         if found:
             return found
-        if busy and not busy.fields.get("busy"):
-            raise busy
+        if refused and not refused.fields.keys() & {"busy", "waited"}:
+            raise refused
         time.sleep(min(pause, max(left, 0)))
         pause = min(2 * pause, LONGEST_PAUSE)
-    if busy:
-        raise busy
-    text = f"no reply from {key!r} within {timeout:g} s at {bus.where}; `holozen service list` lists the servers"
-    raise NoReply(text)
+    if refused:
+        raise refused
+    raise NoReply(
+        f"no reply from {key!r} within {timeout:g} s at {node.where}; `holozen service list` lists the servers"
+    )

@@ -60,6 +60,7 @@ class Opening:
         early: bool = False,
     ) -> None:
         self.where, self.wire, self.closing = connection.where, connection.wire, threading.Event()
+        self.networks = connection.networks
         self.secure = connection.secure
         opening = partial(
             open_session, connection, lasting=lasting, stop=stop or self.closing, closing=self.closing,

@@ -1,4 +1,4 @@
-"""The camera: renders what robots see, in a process of its own, since a picture takes longer than a step."""
+"""The camera process: renders what robots see, apart from the sim, since a picture takes longer than a step."""
 
 import argparse
 import os
@@ -12,17 +12,19 @@ from holozen.process import stop_event
 from holozen.transport import connection
 from holozen.transport.errors import BusError
 
-NICE = 10  # the sim goes first
+NICE = 10  # the sim has priority
 LARGEST = 4_000_000  # bytes of an exposure
 
 
 def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen camera",
-        description="Render what the cameras of robots see. The sim starts it with the first robot that has a camera.",
+        description="render what the cameras of robots see; the sim starts it with the first robot that has a camera",
         epilog="example: holozen camera --exposures exposures",
     )
-    parser.add_argument("--exposures", default="exposures", metavar="KEY", help="of one sim (default: %(default)s)")
+    parser.add_argument(
+        "--exposures", default="exposures", metavar="KEY", help="the exposures of one sim (default: %(default)s)"
+    )
     connection.add_arguments(parser)
     return parser
 

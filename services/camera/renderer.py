@@ -1,4 +1,4 @@
-"""What a camera sees: the visual shapes of all entities, drawn by pybullet's TinyRenderer without a graphics card."""
+"""Renders what a camera sees, the visual shapes of all entities, by pybullet's TinyRenderer: no graphics card."""
 
 import contextlib
 import math
@@ -18,11 +18,11 @@ from holozen.rotation import Transform, rotate
 
 Bytes = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float32]
-GREY = (0.7, 0.7, 0.7, 1.0)  # Gazebo's, of what has no colour
+GREY = (0.7, 0.7, 0.7, 1.0)  # Gazebo's grey, for shapes without a colour
 GROUND = (0.6, 0.6, 0.6, 1.0)
-WIDE, THICK = 200.0, 0.02  # m; of the ground
-MOST_REMOVED = 100  # bodies
-MISSED = 0.9999  # of the depth buffer: nothing there
+WIDE, THICK = 200.0, 0.02  # m; width and thickness of the ground
+MOST_REMOVED = 100  # bodies that are removed before `renew` frees their memory
+MISSED = 0.9999  # in the depth buffer: nothing was hit
 
 
 with quiet():  # it prints its build time from C while it loads; no flag stops it
@@ -37,7 +37,7 @@ class Picture(NamedTuple):
 
 
 class Renderer:
-    """A scene of its own, in which the entities stand where an exposure says."""
+    """A scene with all entities, in the poses of the exposure that is rendered."""
 
     def __init__(self) -> None:
         self._begin()
@@ -46,16 +46,16 @@ class Renderer:
         self._world: int = bullet.connect(bullet.DIRECT)
         self._bodies: dict[str, tuple[int, dict[str, list[int]]]] = {}  # number and, by link, bodies of each entity
         self._ground = -1
-        self._removed = 0  # bodies, of which the engine frees almost nothing: of a mesh it keeps some 300 KB
+        self._removed = 0  # bodies; the engine frees almost none of their memory, 300 KB for a mesh
 
     def renew(self) -> None:
-        """Free the memory of what was removed, if that is much: begin anew, without the looks of any entity."""
+        """If many bodies have been removed, free their memory: start with an empty scene, which knows no entity."""
         if self._removed > max(MOST_REMOVED, len(self._bodies)):
             self.close()
             self._begin()
 
     def knows(self, name: str, number: int) -> bool:
-        """Whether it has the looks of an entity."""
+        """Whether it knows what an entity looks like."""
         return name in self._bodies and self._bodies[name][0] == number
 
     def add(self, name: str, number: int, looks: Appearance) -> None:
@@ -109,7 +109,7 @@ class Renderer:
                     bullet.resetBasePositionAndOrientation(body, at.translation, at.rotation, self._world)
 
     def _made(self, shape: Shape, meshes: tuple[Mesh, ...] = ()) -> list[int]:
-        """The bodies of a shape in the frame of its link; none for one that cannot be drawn."""
+        """Make the bodies of a shape, in the frame of its link; none for a shape that cannot be drawn."""
         visuals = [self._visual(shape, mesh) for mesh in meshes] if shape.kind == "mesh" else [self._visual(shape)]
         return [bullet.createMultiBody(0, -1, each, physicsClientId=self._world) for each in visuals if each >= 0]
 
@@ -128,7 +128,7 @@ class Renderer:
             case "sphere":
                 return int(bullet.createVisualShape(bullet.GEOM_SPHERE, radius=shape.size[0], **common))
             case "mesh" if mesh:
-                # The engine's own readers, in C++, see nothing but this file of ours.
+                # The engine's own readers, which are in C++, only ever see this file, which we have written.
                 with contextlib.suppress(bullet.error, ValueError), tempfile.NamedTemporaryFile(suffix=".stl") as file:
                     points, triangles = mesh.arrays()
                     file.write(write_stl(points[triangles.ravel()].astype(np.float64)))

@@ -14,63 +14,105 @@ from holozen.bus import Bus, Publisher, Subscription
 from holozen.console import report
 from holozen.entities import description
 from holozen.messages import CameraInfo, CompressedImage, Exposure, Header, Image
+from holozen.messages.message import not_finite
 from holozen.robot.description import read
 from holozen.robot.errors import RobotError
-from holozen.transport.errors import ServiceError
+from holozen.robot.sensors import FIELD_OF_VIEW, MOST_PIXELS
+from holozen.transport.errors import BusError, ServiceError
 
 from .renderer import Bytes, Floats, Renderer
 
 POLL = 0.005  # s between two looks for exposures
 QUALITY = 80  # of a JPEG, from 1 to 95; image_transport's default
-PATIENCE = 5.0  # s for the looks of an entity
+PATIENCE = 5.0  # s to wait for the description of an entity
+ENCODINGS = ("rgb8", "mono8")
+REPORT_EVERY = 1.0  # s between two lines about exposures that cannot be rendered
 
 
 class Studio:
-    """All cameras of a sim. Of exposures that came during a picture only the newest of each camera is rendered."""
+    """All cameras of a sim. Of the exposures that arrived while a picture was rendered, only each camera's newest is
+    rendered.
+    """
 
     def __init__(self, bus: Bus, exposures: Subscription[Exposure]) -> None:
         self._bus, self._exposures, self._renderer = bus, exposures, Renderer()
         self._cameras: dict[str, Camera] = {}
-        self._missing: dict[int, float] = {}  # number of an entity without looks: when they were asked for, in s
+        self._requested: dict[int, float] = {}  # entities not described yet: when that was requested (s), by number
+        self._reported = -math.inf  # s
 
     def run(self, stop: threading.Event) -> None:
         """Render until `stop` is set."""
         while not stop.is_set():
             waiting = [received.message for received in iter(self._exposures.try_recv, None) if received.message]
-            for exposure in {exposure.image or exposure.depth: exposure for exposure in waiting}.values():
-                self._take(exposure)
+            newest = dict[str, Exposure]()
+            for exposure in waiting:
+                name = exposure.image or exposure.depth
+                newest[name] = exposure
+                if not exposure.width and name in self._cameras:
+                    self._cameras.pop(name).close()
+            for name, exposure in newest.items():
+                if exposure.width:
+                    self._take(name, exposure)
             if not waiting:
                 stop.wait(POLL)
 
-    def _take(self, exposure: Exposure) -> None:
-        name = exposure.image or exposure.depth
+    def _take(self, name: str, exposure: Exposure) -> None:
+        if reason := fault(exposure):
+            return self._refuse(f"{name[:80]!r} cannot be rendered: {reason}")
         if name not in self._cameras:
-            self._cameras[name] = Camera(self._bus, exposure)
+            try:
+                self._cameras[name] = Camera(self._bus, exposure)
+            except BusError as error:
+                return self._refuse(str(error))
         camera = self._cameras[name]
         if camera.wanted:
             self._renderer.renew()
-            self._learn(exposure)
+            self._request_descriptions(exposure)
             camera.publish(exposure, self._renderer)
 
-    def _learn(self, exposure: Exposure) -> None:
-        """Ask for the looks of entities that are new."""
+    def _refuse(self, reason: str) -> None:
+        if (now := time.monotonic()) - self._reported >= REPORT_EVERY:
+            report(f"camera: {reason}")
+            self._reported = now
+
+    def _request_descriptions(self, exposure: Exposure) -> None:
+        """Request what new entities look like."""
         for entity in exposure.entities:
-            asked = self._missing.get(entity.number, -math.inf)
+            asked = self._requested.get(entity.number, -math.inf)
             if self._renderer.knows(entity.name, entity.number) or time.monotonic() - asked < PATIENCE:
                 continue
             now = time.monotonic()
-            self._missing = {number: at for number, at in self._missing.items() if now - at < PATIENCE}
-            self._missing[entity.number] = now
+            self._requested = {number: at for number, at in self._requested.items() if now - at < PATIENCE}
+            self._requested[entity.number] = now
             try:
                 if found := description(self._bus, entity.name, entity.number, PATIENCE):
                     self._renderer.add(entity.name, entity.number, read(found.description))
-                    self._missing.pop(entity.number, None)
+                    self._requested.pop(entity.number, None)
             except (ServiceError, RobotError) as error:
                 report(f"camera: {entity.name} cannot be seen: {error}")
 
 
+def fault(exposure: Exposure) -> str:
+    """What is wrong with an exposure, which anyone may have sent; empty if it can be rendered."""
+    low, high = FIELD_OF_VIEW
+    if bad := not_finite(exposure):
+        return f"{bad} is not a finite number"
+    if not (exposure.info and (exposure.image or exposure.depth)):
+        return "it has no key for its picture or its CameraInfo"
+    if not 0 < exposure.width * exposure.height <= MOST_PIXELS:
+        return f"it has {exposure.width} x {exposure.height} pixels; from 1 to {MOST_PIXELS} are rendered"
+    if not low <= exposure.field_of_view <= high:
+        return f"its field of view is {exposure.field_of_view:g} rad; use {low:g} to {high:g}"
+    if not 0 < exposure.near < exposure.far:
+        return f"near is {exposure.near:g} m and far {exposure.far:g} m; use 0 < near < far"
+    if exposure.encoding not in ENCODINGS:
+        return f"its encoding {exposure.encoding[:80]!r} is none of {', '.join(ENCODINGS)}"
+    wrong = (one for one in exposure.entities if len(one.links) != len(one.poses))
+    return next((f"{one.name[:80]!r} has {len(one.links)} links and {len(one.poses)} poses" for one in wrong), "")
+
+
 class Camera:
-    """The keys of a camera. They are CDR on every wire: a picture in JSON would take a second."""
+    """The publishers of a camera. Pictures are CDR whatever `--wire` says: in JSON one would take a second."""
 
     def __init__(self, bus: Bus, first: Exposure) -> None:
         self._image: Publisher[Image] | None = bus.publisher(first.image, Image, wire="cdr") if first.image else None
@@ -85,6 +127,12 @@ class Camera:
         """Whether anyone wants what `publish` sends."""
         wanted = [one.wanted for one in (self._image, self._compressed, self._depth, self._info) if one]
         return any(wanted)
+
+    def close(self) -> None:
+        """Close the keys."""
+        for publisher in (self._image, self._compressed, self._depth, self._info):
+            if publisher:
+                publisher.close()
 
     def publish(self, exposure: Exposure, renderer: Renderer) -> None:
         """Render and publish a picture."""
@@ -101,7 +149,7 @@ class Camera:
 
 
 def info(exposure: Exposure) -> CameraInfo:
-    """Of a pinhole camera without distortion."""
+    """The CameraInfo of a pinhole camera without distortion."""
     width, height = exposure.width, exposure.height
     focal = width / 2 / math.tan(exposure.field_of_view / 2)
     k = [focal, 0.0, width / 2, 0.0, focal, height / 2, 0.0, 0.0, 1.0]

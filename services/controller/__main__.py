@@ -23,7 +23,7 @@ from .goto import Gains, Leg
 
 
 class Param(NamedTuple):
-    """One of the Gains: a flag, and a parameter that can be set while the controller drives."""
+    """A gain, as a flag and as a parameter that can be set while it drives. `field` is its name in Gains."""
 
     name: str
     field: str
@@ -53,7 +53,7 @@ def parser() -> argparse.ArgumentParser:
     default = Gains()
     parser = flags.Parser(
         prog="holozen controller",
-        description="Drive a robot to the goals of next_goal.",
+        description="drive a robot to the goals of next_goal",
         epilog="example: holozen controller --laps 0",
     )
     parser.add_argument(
@@ -64,7 +64,7 @@ def parser() -> argparse.ArgumentParser:
         "--held", action="store_true", help="drive only after `holozen controller --resume` or the teleop's r"
     )
     parser.add_argument(
-        "--laps", type=flags.count(), default=1, help="laps of the list of goals; 0: for ever (default: 1)"
+        "--laps", type=flags.count(), default=1, help="number of laps around the goals; 0: for ever (default: 1)"
     )
     for param in PARAMS:
         parser.add_argument(
@@ -88,11 +88,11 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def follow(args: argparse.Namespace, where: connection.Connection) -> int:
-    """Drive `args.laps` laps, and print the results of each."""
+    """Drive `args.laps` laps (0: for ever), and print the legs of each."""
     stop, laps = stop_event(), 0
     with Bus("controller", where, lasting=True, stop=stop) as bus:
         follower = Follower(bus, args.robot, _gains(args), stop, lambda text: report(f"controller: {text}"), args.held)
-        serve_parameters(bus, args.robot, follower)
+        Parameters(bus, key_for("controller", args.robot), lambda: declared(follower)).start()
         try:
             while not stop.is_set() and (laps < args.laps or not args.laps):
                 print_legs(follower.lap(), laps := laps + 1)
@@ -102,13 +102,8 @@ def follow(args: argparse.Namespace, where: connection.Connection) -> int:
     return 0
 
 
-def serve_parameters(bus: Bus, robot: str, follower: Follower) -> None:
-    """Serve its gains and limits as parameters; changes apply from the next command on."""
-    Parameters(bus, key_for("controller", robot), lambda: declared(follower)).start()
-
-
 def declared(follower: Follower) -> Iterator[Number]:
-    """The parameters of the follower's Gains."""
+    """The follower's gains as parameters; changes apply from the next command on."""
     for param in PARAMS:
         yield Number(
             param.name, param.about, param.unit, param.low, param.high,
@@ -134,7 +129,7 @@ def resume(robot: str, where: connection.Connection) -> int:
 
 
 def print_legs(legs: list[Leg], lap: int) -> None:
-    """Print one line a leg: goal, time, worst distance from the straight line."""
+    """Print a line for each leg: goal, time, and the largest distance from the straight line."""
     for number, leg in enumerate(legs):
         x, y, theta = leg.goal
         seconds = leg.ended - leg.began

@@ -1,4 +1,4 @@
-"""Follows goals: requests one after another and drives there, while no other source drives the robot."""
+"""Drives to goals, which it requests one after another, while no other source drives the robot."""
 
 import math
 import threading
@@ -22,25 +22,26 @@ from .journeys import GoalServers, Journey
 PERIOD = 0.05  # s of the odom's clock between two commands
 PATIENCE = 0.5  # s between two attempts to reach a service
 STOP_FOR, STOP_EVERY = 1.0, 0.05  # s; how long and how often a stop is repeated
-NOTICE = 3.0  # s without any odom until the robots that there are get named
+NOTICE = 3.0  # s without any odom after which it reports the robots that there are
 LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
 LOST = 2.0  # s without fresh odom, after which the goal of an action is aborted; the robot has stopped long before
-FRAMES = ("", "odom", "map", "world")  # of a goal: all of them mean the frame of odom
+FRAMES = ("", "odom", "map", "world")  # frames of a goal that all mean the frame of odom
 GOAL = "a goal of "
 ENDS = "the controller ends"
-RESUMES = "`holozen controller --resume` or the teleop's r resumes"
+EARLIER = "an earlier source"  # one that drove before this controller's first status
+RESUME = "resume with `holozen controller --resume` or press r in the teleop"
 
 
 class YieldPolicy:
     """Whether the controller may drive: it yields when another source drives, and drives again only after a resume.
 
-    Reads cmd_vel_status, in which `source` is this controller. It starts as one that yields to `yielded_to`.
+    It reads cmd_vel_status, in which `source` is this controller. At first it yields to `yielded_to`, if that is given.
     """
 
     def __init__(self, source: str, yielded_to: str = "") -> None:
         self._source = source
-        self._resumed: float = math.inf  # of the last status: a resume before the first is none for this controller
+        self._resumed: float = math.inf  # resumes at the last status; those before the first status do not count
         self.yielded_to = yielded_to  # empty while this controller may drive
         self.stopped = ""  # the node that set the software stop, while it is set
 
@@ -48,20 +49,22 @@ class YieldPolicy:
     def reason(self) -> str:
         """Why this controller does not drive, and what would let it; empty while it may."""
         if self.stopped:
-            return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, and then {RESUMES}"
-        return f"yields to {self.yielded_to}; {RESUMES}" if self.yielded_to else ""
+            return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, then {RESUME}"
+        if self.yielded_to == EARLIER:
+            return f"another source drove this robot; {RESUME}"
+        return f"yields to {self.yielded_to}; {RESUME}" if self.yielded_to else ""
 
     def stay(self, origin: str) -> None:
-        """A goal of goal_pose or of an action, `origin`, has ended: the robot stays until a resume, or the next one."""
+        """A goal of goal_pose or of an action (`origin`) has ended: the robot stays until a resume or the next goal."""
         self.yielded_to = self.yielded_to or GOAL + origin
 
     def invited(self) -> None:
-        """The next of these goals has come."""
+        """The next such goal has arrived."""
         if self.yielded_to.startswith(GOAL):
             self.yielded_to = ""
 
     def update(self, status: CommandStatus) -> None:
-        """Apply the newest status. A restarted sim forgets which source drove; this does not."""
+        """Take the newest status. A restarted sim has forgotten which source drove, this policy has not."""
         if status.resumed > self._resumed:
             self.yielded_to = ""
         self._resumed = status.resumed
@@ -71,14 +74,15 @@ class YieldPolicy:
         elif status.obeyed and status.obeyed != self._source:
             self.yielded_to = status.obeyed
         elif status.held and not self.yielded_to:
-            self.yielded_to = "an earlier source"
+            self.yielded_to = EARLIER
 
 
 class Follower:
-    """Drives one robot from goal to goal until `stop` is set.
+    """Drives one robot from goal to goal until `stop` is set. `held`: it waits for a resume first.
 
-    A goal on `goal_pose`, or of an action, comes first: the robot drives there at once and stays, until the next one or
-    a resume. While the controller yields, the newest of goal_pose waits for the resume; that of an action is aborted.
+    A goal on `goal_pose`, or of an action, has precedence: the robot drives there at once, and stays until the next one
+    or a resume. While the controller yields, the newest goal of goal_pose waits for the resume; one of an action is
+    aborted.
     """
 
     def __init__(
@@ -91,9 +95,9 @@ class Follower:
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
-        self._wanted: Journey | None = None  # of goal_pose or an action, not ended yet
+        self._wanted: Journey | None = None  # the present one, of goal_pose or an action
         self._actions = GoalServers(bus, robot, self._refusal, report)
-        self._seen = time.monotonic()  # the last fresh odom, or the start of a journey
+        self._seen = time.monotonic()  # s; the time of the last fresh odom, or of the start of the journey
         self._policy = YieldPolicy(bus.source, "--held" if held else "")
         self._now: Planar = STOP
         self._robot, self._began, self._others = robot, time.monotonic(), ""
@@ -101,7 +105,7 @@ class Follower:
         self._reported = ""
 
     def lap(self) -> list[Leg]:
-        """Visit every goal of the list once. Returns the legs driven; fewer than the list if stopped before its end."""
+        """Visit every goal of the list once. Returns the legs that were driven: fewer if it was stopped early."""
         legs: list[Leg] = []
         while not self._stop.is_set():
             if journey := self._newest_journey():
@@ -131,20 +135,20 @@ class Follower:
                 self._now = STOP
 
     def close(self) -> None:
-        """End the goals of actions: this controller drives no more."""
+        """End all goals: this controller no longer drives."""
         self._actions.close(ENDS)
         if self._wanted:
             self._wanted.give_up(ENDS)
 
     def _newest_journey(self) -> Journey | None:
-        """Where the robot is sent by goal_pose or an action: the newest, which ends the one before."""
+        """The newest journey of goal_pose or an action. A new one ends the one before."""
         received = self._goals.try_recv()
         if received is not None:
             if reason := received.error or (received.message and self._refusal(received.message)):
                 self._report(f"goal_pose: refused: {reason}")
             elif goal := received.message:
                 x, y, theta = goal.pose.planar()
-                self._report(f"goal_pose: ({x:.2f}, {y:.2f}) by {received.sample.source or 'an unknown sender'}")
+                self._report(f"goal_pose: ({x:.2f}, {y:.2f}) by {received.source or 'an unknown sender'}")
                 self._set_out(Journey("goal_pose", [(x, y, theta)]), "a newer goal came on goal_pose")
         if journey := self._actions.take():
             self._set_out(journey, "a newer goal came")
@@ -170,7 +174,7 @@ class Follower:
         return ""
 
     def _travel(self, journey: Journey) -> None:
-        """Drive to all poses of a journey, and stay at the last, or where it is cancelled or given up."""
+        """Drive to all poses of a journey, and stay at the last one, or where it is cancelled or given up."""
         while journey.left and self._drive(journey.left[0], journey):
             journey.reached()
         if not self._stop.is_set() and self._wanted is journey:
@@ -179,8 +183,8 @@ class Follower:
             self._policy.stay(journey.origin)
 
     def _ask(self, number: int) -> NextGoalReply | None:
-        """Goal `number` of the list; waits for the service. None when `stop` is set or a goal of goal_pose comes
-        first.
+        """Goal `number` of the list; waits for the service. None if `stop` is set, a journey comes first, or the list
+        has become shorter.
         """
         while not self._stop.is_set() and not self._newest_journey():
             try:
@@ -198,8 +202,8 @@ class Follower:
         return None
 
     def _drive(self, goal: Pose, journey: Journey | None) -> Leg | None:
-        """Drive to a goal, that of a journey or of the list. None if that is not reached: `stop` is set, the robot is
-        sent elsewhere, or the journey ends here.
+        """Drive to a goal of the `journey`, or without one of the list. Returns the leg; None if the goal is not
+        reached, since `stop` is set, another journey comes first, or the journey ends here.
         """
         leg: Leg | None = None
         before = 0.0
@@ -227,7 +231,7 @@ class Follower:
         return None
 
     def _is_given_up(self, journey: Journey, odom: Odometry | None) -> bool:
-        """Whether the journey ends here since the controller may not drive, or there has been no odom for too long."""
+        """Whether the journey ends here, because the controller may not drive or there is no odom."""
         now = time.monotonic()
         if odom is not None:
             self._seen = now
@@ -238,7 +242,7 @@ class Follower:
         return False
 
     def _next_odom(self) -> Odometry | None:
-        """The next odom, if this controller may act on it; else None, and this controller sends no commands."""
+        """The next odom. None if this controller may not act on it, and then it sends no motion."""
         count = self._odom.count
         fresh = self._odom.wait(count, self._odom.stale_after)
         odom, _ = self._odom.read()
@@ -246,7 +250,7 @@ class Follower:
         if status:
             self._policy.update(status)
         if reason := self._policy.reason:
-            self._now = STOP  # another source drives: not even a stop of ours may reach the robot
+            self._now = STOP  # another source drives, which even a stop of this controller would disturb
             self._yielded = True
             self._report_hold(reason)
         elif not fresh:
@@ -256,7 +260,7 @@ class Follower:
             self.halt()
             self._report_hold(f"waiting for odom: its pose is more than {MAX_DISTANCE:g} m away")
         else:
-            if self._yielded:  # a source that commanded a stopped robot has to let go with a stop
+            if self._yielded:  # if it commanded the robot during a software stop, it has to let go by a stop
                 self._command(STOP)
             self._yielded = False
             self._report_hold("")
@@ -264,7 +268,7 @@ class Follower:
         return None
 
     def _no_odom(self) -> str:
-        """Why it waits for odom; where none came for NOTICE seconds since its start, with the robots that there are."""
+        """Why it waits for odom. If none came in NOTICE seconds since the start, it names the present robots."""
         if self._odom.count:
             self._others = ""
         elif not self._others and time.monotonic() - self._began > NOTICE:
@@ -279,7 +283,7 @@ class Follower:
         self._now = planar
 
     def _report_hold(self, text: str) -> None:
-        """Report once why this controller waits; an empty text when it goes on."""
+        """Report once why this controller waits, and with an empty text that it goes on."""
         if text and text != self._reported:
             self._report(text)
         elif self._reported and not text:

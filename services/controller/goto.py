@@ -1,4 +1,4 @@
-"""Go to a goal: errors, velocities and legs as pure functions. Metres, radians, seconds, odom frame."""
+"""Goes to a goal: errors, velocities and legs, as pure functions. Metres, radians, seconds, the frame of odom."""
 
 import math
 from dataclasses import dataclass
@@ -14,7 +14,9 @@ Pose = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Gains:
-    """The gains and limits of the controller. `linear`, `angular` in 1/s; speeds and accelerations in m, rad and s."""
+    """The gains and limits of the controller. `linear` and `angular` in 1/s, speeds in m/s and rad/s, accelerations in
+    m/s^2 and rad/s^2.
+    """
 
     linear: float = 1.5
     angular: float = 2.0
@@ -41,8 +43,8 @@ def arrived(left: Planar, now: Planar, gains: Gains) -> bool:
 def velocity(left: Planar, now: Planar, gains: Gains, dt: float) -> Planar:
     """The velocity to command `dt` seconds after `now` was commanded.
 
-    Proportional to the error, within the limits, and never too fast to stop within the remaining distance at half of
-    the acceleration: v^2 = 2 a s.
+    It is proportional to the error, within the limits, and never too fast to stop within the remaining distance at half
+    the maximum acceleration: v^2 = 2 a s.
     """
     x, y, turn = left
     wanted = (gains.linear * x, gains.linear * y, gains.angular * turn)
@@ -53,7 +55,9 @@ def velocity(left: Planar, now: Planar, gains: Gains, dt: float) -> Planar:
 
 @dataclass
 class Leg:
-    """The way to one goal: its start, its times (s, odom's clock), and the largest distance from the straight line."""
+    """The way to one goal: its start, its times (s, on odom's clock), and the largest distance (m) from a straight
+    line.
+    """
 
     start: Pose
     goal: Pose
@@ -62,7 +66,7 @@ class Leg:
     path_error: float = 0.0
 
     def update(self, pose: Pose, time: float) -> None:
-        """Apply the robot's pose at `time`."""
+        """Take the robot's pose at `time` (s)."""
         self.ended = time
         self.path_error = max(self.path_error, distance_to_line(pose, self.start, self.goal))
 

@@ -1,4 +1,4 @@
-"""Where the controller is sent: a goal of goal_pose, or those of the actions navigate_to_pose and follow_waypoints."""
+"""Where the controller is sent: by goal_pose, or by the actions navigate_to_pose and follow_waypoints."""
 
 import math
 import threading
@@ -21,52 +21,55 @@ MOST_POSES = 10_000  # of one goal, all loops included
 
 
 class Journey:
-    """Poses to visit, in order, and the key that they came on. No client waits for the end of one pose of goal_pose."""
-
-    is_canceled = False  # whether its client no longer wants it
+    """Poses to visit, in order, and the key that they came on (`origin`). This class is for goal_pose, of which no
+    client awaits the end.
+    """
 
     def __init__(self, origin: str, poses: Sequence[Pose]) -> None:
         self.origin, self.left = origin, deque(poses)
 
+    @property
+    def is_canceled(self) -> bool:
+        """Whether its client has cancelled it."""
+        return False
+
     def follow(self, leg: Leg, odom: Odometry, speed: float) -> None:
-        """Hear where the robot is on the way to the first pose left, at most as fast as `speed` (m/s)."""
+        """Called with the robot's progress towards the next pose, at no more than `speed` (m/s)."""
 
     def reached(self) -> None:
-        """Hear that the first pose left is reached."""
+        """Called when the next pose is reached."""
         self.left.popleft()
 
     def give_up(self, reason: str) -> bool:
-        """Hear why the robot cannot go on now; whether that ends the journey. Else it waits."""
+        """Called when the robot cannot go on. Returns whether that ends the journey; else it waits."""
         return False
 
     def end(self) -> None:
-        """Hear that the robot stands where it was sent, or where it was stopped as the client wished."""
+        """Called when the robot stands at the last pose, or where it stopped since the client cancelled."""
 
 
 class GoalJourney(Journey):
-    """The journey of an action's goal. Its end is published once, by whichever cause."""
+    """The journey of an action's goal. Its end is published once, whatever its cause."""
 
-    def __init__(
-        self, origin: str, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any
-    ) -> None:  # fmt: skip
+    def __init__(self, origin: str, server: ActionServer, goal: Goal, poses: Sequence[PoseStamped], kind: Any) -> None:
         super().__init__(origin, [one.pose.planar() for one in poses])
         self._server, self._goal, self._stamped, self._kind = server, goal, poses, kind
         self._began: float | None = None  # s, of the odom's clock
         self._reported = -math.inf
 
     @property
-    def is_canceled(self) -> bool:  # type: ignore[override]
-        """Whether its client no longer wants it."""
+    def is_canceled(self) -> bool:
+        """Whether its client has cancelled it."""
         return self._goal.state is State.CANCELING
 
     def begin(self) -> None:
-        """Let its client know that the robot is on the way."""
+        """Tell the client that the robot is on the way."""
         with self._server.lock:
             if self._goal.state is State.ACCEPTED:
                 self._server.move(self._goal, State.EXECUTING)
 
     def follow(self, leg: Leg, odom: Odometry, speed: float) -> None:
-        """Publish the progress, from time to time."""
+        """Publish the progress, every FEEDBACK_EVERY seconds."""
         if self._began is None or leg.began < self._began:
             self._began, self._reported = leg.began, -math.inf
         if leg.ended - self._reported < FEEDBACK_EVERY:
@@ -85,7 +88,7 @@ class GoalJourney(Journey):
         )  # fmt: skip
 
     def _index(self, ahead: int) -> int:
-        """The number of a waypoint in the goal's list, so many ahead of the next one."""
+        """The index, in the goal's list, of the waypoint that is `ahead` of the next one by that many."""
         done = len(self._stamped) - len(self.left)
         return int((self._goal.request.goal_index + done + ahead) % len(self._goal.request.poses))
 
@@ -95,7 +98,7 @@ class GoalJourney(Journey):
         return True
 
     def end(self) -> None:
-        """The goal has succeeded, or is cancelled."""
+        """Let the goal succeed, or be cancelled if poses are left."""
         if self.left:
             self._finish(State.CANCELED, "it was cancelled")
         else:
@@ -116,7 +119,7 @@ class GoalJourney(Journey):
 
 
 class GoalServers:
-    """Serves the actions, in threads of their own. `refusal` returns why the robot does not drive to a pose, or ""."""
+    """Serves both actions, each in a thread of its own. `refusal` returns why a pose is refused, or ""."""
 
     def __init__(
         self, bus: Bus, robot: str, refusal: Callable[[PoseStamped], str], report: Callable[[str], None]
@@ -133,13 +136,13 @@ class GoalServers:
             ActionServer(bus, key_for(name, robot), kind, partial(self._refuses, poses), begin).start()
 
     def take(self) -> GoalJourney | None:
-        """The newest goal that was accepted, once."""
+        """The newest accepted goal, which is returned only once; else None."""
         with self._lock:
             newest, self._newest = self._newest, None
         return newest
 
     def close(self, reason: str) -> None:
-        """Accept no more goals, and end one that waits."""
+        """Accept no more goals, and end the one that waits."""
         with self._lock:
             self._ended = reason
         if waiting := self.take():
@@ -174,7 +177,7 @@ def _one(goal: Any) -> Sequence[PoseStamped]:
 
 
 def _looped(goal: Any) -> Sequence[PoseStamped]:
-    """The poses from the index on, and then all of them once for each further loop. Raises ValueError."""
+    """The poses from goal_index on, then all of them once for each further loop. Raises ValueError."""
     count = len(goal.poses)
     if not count:
         raise ValueError("it has no poses")

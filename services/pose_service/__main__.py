@@ -30,7 +30,7 @@ def next_goal(goals: list[Goal], request: NextGoalRequest) -> NextGoalReply:
 
 
 class Route:
-    """Goals of a `file`, or without one of a `shape` with `size` metres. Raises GoalsError for a bad file."""
+    """The goals of a `file`, or else of a `shape` of `size` metres. Raises GoalsError for a file that is wrong."""
 
     def __init__(self, shape: str, size: float, file: Path | None = None) -> None:
         self._shape, self._size, self._file = shape, size, file
@@ -47,7 +47,7 @@ class Route:
             lambda shape: self._draw(shape, self._size),
         )  # fmt: skip
         yield Number(
-            "size", "its side (infinity: half its length)", "m", *SIZES, lambda: self._size,
+            "size", "side length (for infinity: half its length)", "m", *SIZES, lambda: self._size,
             lambda size: self._draw(self._shape, size),
         )  # fmt: skip
 
@@ -58,12 +58,15 @@ class Route:
 def parser() -> argparse.ArgumentParser:
     parser = Parser(
         prog="holozen pose-service",
-        description="Answer next_goal and get_pose.",
+        description="answer next_goal and get_pose",
         epilog="example: holozen pose-service --shape hexagon --size 2",
     )
     parser.add_argument("--shape", choices=SHAPES, default="square", help="the goals' shape (default: square)")
     parser.add_argument(
-        "--size", type=number(*SIZES, "m"), default=1.0, help="its side (infinity: half its length) in m (default: 1)"
+        "--size",
+        type=number(*SIZES, "m"),
+        default=1.0,
+        help="side length of the shape in metres (for infinity: half its length; default: 1)",
     )
     parser.add_argument(
         "--goals", type=Path, metavar="FILE", help="read goals from a file instead, one x y theta per line"

@@ -12,7 +12,7 @@ MAX_VALUE = 1e6  # m, rad
 
 
 class GoalsError(ValueError):
-    """An unusable list of goals; the text is one line with the reason."""
+    """A list of goals that cannot be used. The text is one line with the reason."""
 
 
 def square(size: float) -> list[Goal]:
@@ -26,7 +26,7 @@ def triangle(size: float) -> list[Goal]:
 
 
 def rectangle(size: float) -> list[Goal]:
-    """A rectangle twice as long as wide: `size` by half of it."""
+    """A rectangle of `size` by half of that."""
     return _tour([(0, 0), (size, 0), (size, size / 2), (0, size / 2)])
 
 
@@ -55,7 +55,7 @@ SHAPES: dict[str, Callable[[float], list[Goal]]] = {
 
 
 def _tour(corners: list[Point]) -> list[Goal]:
-    """From the first corner round the others and back; at each goal the robot faces the next one."""
+    """From the first corner to all others and back. At each goal the robot faces the next one."""
     goals = []
     for here, ahead in zip(corners[1:] + corners[:1], corners[2:] + corners[:2], strict=True):
         goals.append((*here, math.atan2(ahead[1] - here[1], ahead[0] - here[0])))
@@ -63,11 +63,15 @@ def _tour(corners: list[Point]) -> list[Goal]:
 
 
 def read_goals(path: Path) -> list[Goal]:
-    """The goals in a text file, one `x y theta` per line: commas count as spaces, theta is optional, # is a comment."""
+    """The goals in a text file, an `x y theta` on each line: commas count as spaces, theta is optional, and # begins a
+    comment. Raises GoalsError.
+    """
     try:
         lines = path.read_text().splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise GoalsError(f"goals {path}: {error}") from None
+    except OSError as error:
+        raise GoalsError(f"goals {path}: {error.strerror}") from None
+    except UnicodeDecodeError:
+        raise GoalsError(f"goals {path}: not a text in UTF-8") from None
     goals = [_goal(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if _content(line)]
     if not goals:
         raise GoalsError(f"goals {path}: no goals; write one x y theta per line")

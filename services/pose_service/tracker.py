@@ -8,7 +8,7 @@ from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.pubsub import Arrivals, Subscription
 from holozen.wire import key_for, robot_name, topic
 
-MAX_ROBOTS = 1000  # names come over the wire; beyond, the one with the oldest odom is dropped
+MAX_ROBOTS = 1000  # whose names come over the wire; beyond, the one with the oldest odom is dropped
 MAX_NAMES = 50  # in one reply
 MAX_ODOM_BYTES = 65_536  # larger payloads are not read
 
@@ -21,12 +21,12 @@ class Tracker:
         assert row is not None
         self._silence = row.silence
         self._odoms = odoms
-        self._last: dict[str, Arrivals[Odometry]] = {}  # by key; the one with the oldest odom first
+        self._last: dict[str, Arrivals[Odometry]] = {}  # by key, the one with the oldest odom first
         self._lock = threading.Lock()
         threading.Thread(target=self._receive, daemon=True).start()
 
     def get_pose(self, request: GetPoseRequest) -> GetPoseReply:
-        """The last odom of a robot. Raises ServiceError for a wrong name, if there is none, or if it is stale."""
+        """The last odom of a robot. Raises ServiceError for an invalid name, without odom, and if it is stale."""
         try:
             key = key_for("odom", robot_name(request.name) if request.name else "")
         except ValueError as error:
@@ -41,7 +41,7 @@ class Tracker:
             return GetPoseReply(arrivals.newest, age)
 
     def _names(self) -> str:
-        """The names of the robots, the most recent ones."""
+        """The names of the robots with the most recent odom."""
         recent = list(self._last)[-MAX_NAMES:]
         return ", ".join(sorted(key.removesuffix("odom").rstrip("/") or "'' (at the root)" for key in recent))
 
@@ -51,8 +51,8 @@ class Tracker:
                 received = self._odoms.recv()
             except BusError:
                 return
-            if received.message is not None and received.sample.key.count("/") < 2:
-                self._record(received.sample.key, received.message)
+            if received.message is not None and received.key.count("/") < 2:
+                self._record(received.key, received.message)
 
     def _record(self, key: str, odom: Odometry) -> None:
         with self._lock:

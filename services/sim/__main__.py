@@ -21,7 +21,7 @@ from holozen.transport.errors import BusError
 from holozen.transport.graph import Graph, on_key
 from holozen.wire import key_for
 
-from . import pace, shard
+from . import schedule, shard
 
 if TYPE_CHECKING:
     from .entities import Entities
@@ -34,7 +34,7 @@ JOIN = f"end it, or join it with named robots: {HOW}"
 def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen sim",
-        description="Simulate robots in a world. `holozen sim pause|play|step|reset` control one that runs.",
+        description="simulate robots in a world; `holozen sim pause|play|step|reset` control one that runs",
         epilog="example: holozen sim --robot my_bot.urdf.xacro=Fred",
     )
     add = parser.add_argument
@@ -54,11 +54,11 @@ def parser() -> argparse.ArgumentParser:
     flags.add_robot_sources(parser)
     add(
         "--rtf",
-        type=flags.number(*pace.FACTORS),
+        type=flags.number(*schedule.FACTORS),
         help="real-time factor; 0: as fast as possible (default: the world's)",
     )
     add("--seed", type=flags.count(), default=0, metavar="N",
-        help="of the noise of sensors: the same seed gives the same values (default: 0)")  # fmt: skip
+        help="seed for sensor noise: the same seed gives the same values (default: 0)")  # fmt: skip
     add("--max-linear", type=flags.number(*inputs.LINEAR, "m/s"), default=inputs.MAX_LINEAR, metavar="M/S",
         help="faster commands are clamped (default: %(default)s)")  # fmt: skip
     add("--max-angular", type=flags.number(*inputs.ANGULAR, "rad/s"), default=inputs.MAX_ANGULAR, metavar="RAD/S",
@@ -73,6 +73,8 @@ def main(argv: list[str] | None = None) -> int:
     if args.shard and (args.join or any(not name for _, name in args.robot or ())):
         options.error("--shard gives each robot to the shard of its name: use --robot FILE=NAME, and no --join")
     stop = stop_event()
+    # Its threads take longer to start than they save: the arrays here are small.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from holozen.robot import loading, reader  # they load numpy, which --help does not need
         from holozen.robot.sdf_world import load_world
@@ -83,6 +85,7 @@ def main(argv: list[str] | None = None) -> int:
         with bus, contextlib.ExitStack() as ending:
             graph = bus.graph()
             # The engine is slow to load: a wrong flag is reported first.
+            from holozen.command.stop_files import StopFiles
             from holozen.transport.parameters import Parameters
 
             from .cameras import Cameras
@@ -93,7 +96,6 @@ def main(argv: list[str] | None = None) -> int:
             from .parameters import declared
             from .physics.world import World
             from .spawn import add_models, spawn_all
-            from .stops import StopFiles
 
             other = _other_sim(graph, mine)
             joins = bool(other) or (mine is not None and mine.number != 1)
@@ -110,7 +112,7 @@ def main(argv: list[str] | None = None) -> int:
             entities = Entities(bus, world, (args.max_linear, args.max_angular), args.seed, cameras)
             name = mine.node if mine else key_for("sim", args.robot[0][1] if joins else "")
             if folder := args.state or os.environ.get("HOLOZEN_STATE"):
-                entities.keep_stops_in(StopFiles(Path(folder), connection.from_arguments(args).where))
+                entities.keep_stops_in(StopFiles(Path(folder), bus.networks))
             add_models(entities, spec.models)
             if args.robot or not (args.empty or mine):
                 spawn_all(entities, args, mine)
@@ -145,9 +147,9 @@ def main(argv: list[str] | None = None) -> int:
 
 
 class Rivals:
-    """Looks for other sims that serve the keys of the world, as one that started in the same instant or that did not
-    discover this one: of all of them the one with the lowest session id goes on. `stop` is set if that is another, the
-    `first`.
+    """Looks for other sims that serve the keys of the world: one that started in the same instant, or that did not
+    discover this one. Of them all, the one with the lowest session id goes on. If that is another one, `first` is its
+    source, and `stop` is set.
     """
 
     def __init__(self, entities: "Entities", session: str, stop: threading.Event) -> None:
@@ -155,7 +157,7 @@ class Rivals:
         self.first = ""
 
     def answer(self) -> bool:
-        """Look, if anything changed on the wire and another node publishes a clock."""
+        """Look, if the graph has changed and another node publishes a clock. Returns False: no request waits."""
         if not self.first and self._entities.has_new_clock():
             others = self._entities.others_on("spawn_entity", "srv")
             if first := next((one for one in others if one.session < self._session), None):
@@ -165,14 +167,14 @@ class Rivals:
 
 
 def _open(args: argparse.Namespace, stop: threading.Event) -> tuple[shard.Shard | None, Bus]:
-    """The bus, and which shard this is. Raises BusError."""
+    """The shard that this sim is, if it is one, and its bus. Raises BusError."""
     where = connection.from_arguments(args)
     opened = partial(Bus, connection=where, lasting=True, stop=stop)
     return shard.claim(args.shard, where, opened) if args.shard else (None, opened("sim"))
 
 
 def _other_sim(graph: Graph, mine: shard.Shard | None) -> str:
-    """The sim that serves the keys of the world already; empty if there is none, or only other shards."""
+    """The source of a sim that already serves the keys of the world; empty if there is none but other shards."""
     clocks = on_key(graph.endpoints(), "clock", "pub")
     return next((end.source for end in clocks if not (mine and shard.is_shard(end.node))), "")
 

@@ -1,4 +1,4 @@
-"""The process that renders what cameras see, and what the sim sends to it."""
+"""The process that renders what the cameras of a sim see, and the exposures that the sim sends to it."""
 
 import shlex
 import subprocess
@@ -13,8 +13,8 @@ GRACE = 1.0  # s for it to end
 
 
 class Cameras:
-    """Of a sim; the first camera starts the process. `key` is that of exposures, unlike that of any other sim; `where`
-    are the flags of its connection.
+    """The cameras of a sim. `key` is that of its exposures, which no other sim has; `where` are the connection flags
+    with which the process is started.
     """
 
     def __init__(self, bus: Bus, key: str, where: list[str]) -> None:
@@ -36,7 +36,7 @@ class Cameras:
 
     @property
     def wanted(self) -> bool:
-        """Whether exposures are read. Reports once that the process ended."""
+        """Whether exposures are read. Reports once if the process has ended."""
         if self._process and (code := self._process.poll()) is not None:
             self._process = None
             again = f"`{shlex.join(['holozen', *self._words])}` starts it again"
@@ -44,7 +44,7 @@ class Cameras:
         return self._publisher is not None and self._publisher.wanted
 
     def expose(self, exposure: Exposure) -> None:
-        """Have a picture rendered."""
+        """Send an exposure to be rendered."""
         if self._publisher:
             self._publisher.put(exposure)
 

@@ -8,22 +8,22 @@ from functools import partial
 from itertools import chain, count
 
 from holozen.bus import Bus
+from holozen.command.arbiter import CommandTime
+from holozen.command.stop_files import StopFiles
 from holozen.command.stop_services import RobotServices
-from holozen.command.time import CommandTime
 from holozen.command.wait_set import Moment, WaitSet
 from holozen.console import report
 from holozen.messages import Pose, SeenEntity
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.errors import RobotError
-from holozen.robot.model import Camera, RobotModel
-from holozen.robot.rigid import MOVING, check_shapes
+from holozen.robot.model import MOVING, Camera, RobotModel
+from holozen.robot.rigid import check_shapes
 from holozen.rotation import XYZ, XYZW
 from holozen.suggest import listed
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Endpoint, on_key
-from holozen.wire import COMMAND_SILENCE, SERVICES, key_for, robot_name
+from holozen.wire import COMMAND_SILENCE, MAX_ENTITIES, SERVICES, key_for, robot_name
 
-from .agenda import Agenda
 from .cameras import Cameras
 from .io.sensor_topics import LinkStates, Surroundings
 from .link_states import LinkState, link_tree
@@ -32,13 +32,12 @@ from .physics.movers import Mover, mover_for
 from .physics.ray_caster import RayCaster
 from .physics.world import World
 from .robot import Memory, Robot, command_key, keys_of
-from .stops import StopFiles
+from .schedule import Agenda
 
-MAX_ENTITIES = 1000  # each takes time at every step
 MAX_REASON = 300  # characters
 GRAPH_SCAN = 0.02  # s between two scans of all tokens for the senders of commands
 MAX_DISTANCE = 1e4  # m from the origin; far beyond, the engine's numbers are too coarse for contacts
-BURSTS = 4  # in a period, in which the robots' telemetry is sent: Zenoh takes less time for many messages at once
+BURSTS = 4  # in which the robots' telemetry of a period is sent: Zenoh takes less time for many messages at once
 KEYS = {"clock", "simulation_status"}  # of the sim itself
 Place = tuple[XYZ, XYZW]
 
@@ -53,8 +52,8 @@ class EntityError(ServiceError):
 
 @dataclass(slots=True, eq=False)
 class Entity:
-    """A robot or object by its name. Without a `robot` it has no keys. `prefix` goes before the keys of a robot.
-    `number` distinguishes it from any other that has had its name.
+    """A robot or object by its name. Without a `robot` it has no keys. A robot's keys begin with `prefix`. `number`
+    distinguishes it from all others that have had its name.
     """
 
     name: str
@@ -67,7 +66,7 @@ class Entity:
 
 
 class Entities:
-    """The entities of one world. `limits` are the fastest commands in m/s and rad/s, `seed` that of all noise."""
+    """The entities of one world. Commands beyond `limits` (m/s, rad/s) are clamped; `seed` is that of all noise."""
 
     def __init__(
         self, bus: Bus, world: World, limits: tuple[float, float], seed: int = 0, cameras: Cameras | None = None
@@ -76,22 +75,23 @@ class Entities:
         self._graph = bus.graph()
         self._clocks = bus.peer_clocks(self._graph.has)
         self.command_time = CommandTime()
-        self._first: list[Entity] = []  # those of the start
+        self._first: list[Entity] = []  # those that a reset restores
         self.max_age = COMMAND_SILENCE  # s; a command that may be older is refused, unless it is a stop
-        self._seen = -1  # changes of the graph at its last scan, and the time of that
-        self._seen_at = 0.0
-        self._clocks_seen = -1  # the same for other clocks
+        self._scanned = -1  # the graph's count of changes when it was last scanned for senders of commands
+        self._scanned_at = 0.0  # s; when that was
+        self._clocks_seen = -1  # the graph's count of changes when it was last scanned for clocks
         self._all: dict[str, Entity] = {}
-        self.before: dict[str, Memory] = {}  # place on the wire -> what the last robot there left
+        self.memories: dict[str, Memory] = {}  # place on the wire -> state of the last robot there
         self._stops: StopFiles | None = None
-        self._keys: dict[str, str] = {}  # those of all robots, with the robot's name
+        self._keys: dict[str, str] = {}  # of all robots: key -> robot's name
         self.robots: list[Robot] = []
         self.agenda: Agenda[Robot] = Agenda()
-        self._rays: RayCaster | None = None  # made when the first sensor looks
-        self._traced: dict[str, int] = {}  # number of the entity of that name
+        self._rays: RayCaster | None = None  # made when the first sensor measures
+        self._traced: dict[str, int] = {}  # numbers of the entities in `_rays`, by name
         self._cameras = cameras
         self._around = Surroundings(world.spec, self.look, self.seen, seed, cameras)
-        self.commands, self.requests = WaitSet(), WaitSet()  # of all robots: what moves or stops them; all else
+        # What moves or stops the robots, and all other requests.
+        self.commands, self.requests = WaitSet(), WaitSet()
 
     @property
     def time(self) -> float:
@@ -116,9 +116,9 @@ class Entities:
     def add(
         self, name: str, model: RobotModel, place: Place, prefix: str | None = None, may_overlap: bool = False
     ) -> Entity:
-        """Put a robot or object into the world, its root frame at `place`, which no other has taken unless it
-        `may_overlap`. Its keys are below `prefix`, by default its name. That the name is taken is reported last: one
-        replaces another only when nothing else is wrong. Raises EntityError.
+        """Put a robot or object into the world, with its root frame at `place`, where nothing else may be unless it
+        `may_overlap`. Its keys begin with `prefix`, by default its name. Raises EntityError: that the name is taken
+        only if nothing else is wrong, since a caller then replaces the other entity.
         """
         prefix = name if prefix is None else prefix
         model = replace(model, drive=None, forces=()) if model.static else model
@@ -147,7 +147,7 @@ class Entities:
                 if self._cameras and any(isinstance(sensor.device, Camera) for sensor in model.sensors):
                     self._cameras.start()
                 if model.sensors:
-                    entity.robot.sense(self._bus, name, self._around, phase)
+                    entity.robot.add_sensors(self._bus, name, self._around, phase)
         except Exception:
             mover.body.remove()
             raise
@@ -156,13 +156,13 @@ class Entities:
             self._keys |= dict.fromkeys(keys_of(model, prefix), name)
             self._remember(_place_of(model, prefix), entity.robot)
             self.robots.append(entity.robot)
-            entity.robot.attend(self.agenda)
+            entity.robot.schedule_on(self.agenda)
             self.commands.add(entity.robot.command_readers)
             self.requests.add(entity.robot.request_readers)
         return entity
 
     def put(self, name: str, place: Place, linear: XYZ, angular: XYZ) -> None:
-        """Move an entity to a place that no other has taken, with its velocity and rotation rate in the world. Raises
+        """Move an entity to a free place, and set its velocity (m/s) and rotation rate (rad/s) in the world. Raises
         EntityError, and then it stays where it is.
         """
         entity = self.named(name)
@@ -173,10 +173,9 @@ class Entities:
         except EntityError:
             self._world.put(entity.body, before[:2], *before[2:])
             raise
-        self._world.put(entity.body, place, linear, angular)
 
     def limit(self, linear: float, angular: float) -> None:
-        """Clamp the next commands of all robots to these limits, in m/s and rad/s."""
+        """Clamp the commands of all robots to these limits, in m/s and rad/s, from the next command on."""
         self.limits = (linear, angular)
         for robot in self.robots:
             robot.limit(linear, angular)
@@ -186,41 +185,41 @@ class Entities:
         for robot in self.robots:
             for arbiter in robot.memory:
                 arbiter.stop(by, time.monotonic())
-        for place in self.before:
+        for place in self.memories:
             self._keep_stop(place)
 
     def keep_stops_in(self, stops: StopFiles) -> None:
-        """Stop the robots that the files say, when they come, and keep those up to date from now on."""
+        """From now on, stop each robot that is added if its file says so, and keep the files up to date."""
         self._stops = stops
 
     def _keep_stop(self, place: str) -> None:
-        """Write down who stopped a robot."""
+        """Write to its file who stopped a robot."""
         if self._stops:
-            self._stops.write(place, self.before[place][0].software_stop.setter)
+            self._stops.write(place, self.memories[place][0].software_stop.setter)
 
     def require_age(self, limit: float) -> None:
-        """Refuse commands that may be older than `limit` seconds, except stops, from now on."""
+        """From now on, refuse commands that may be older than `limit` seconds, except stops."""
         self.max_age = limit
         for robot in self.robots:
             robot.require_age(limit)
 
     def watch_senders(self, moment: Moment) -> None:
-        """Stop every robot whose driver's process is gone, and measure the clocks of the others."""
+        """Stop every robot whose driver's process is gone, and measure the clocks of all senders of commands."""
         now = moment.now
         left = list(self._graph.left())
         if left:
-            self.commands.read(moment)  # their last ones
+            self.commands.read(moment)  # the last commands of those that left
         for node in left:
             for robot in self.robots:
                 robot.forget(node.source, node.session)
-        if self._graph.changes != self._seen and now - self._seen_at > GRAPH_SCAN:
-            self._seen, self._seen_at = self._graph.changes, now
+        if self._graph.changes != self._scanned and now - self._scanned_at > GRAPH_SCAN:
+            self._scanned, self._scanned_at = self._graph.changes, now
             keys = {key for robot in self.robots for key in robot.command_keys}
             self._clocks.track({session for key in keys for session in self._graph.publishers(key)}, now)
         self._clocks.poll(now)
 
     def has_new_clock(self) -> bool:
-        """Whether another node publishes the time of a world, and the graph changed since the last call."""
+        """Whether another node publishes `clock`, and the graph has changed since the last call."""
         clocks, seen = self._graph.publishers("clock"), self._clocks_seen
         self._clocks_seen = self._graph.changes
         return seen != self._graph.changes and any(session != self._bus.id for session in clocks)
@@ -230,13 +229,15 @@ class Entities:
         return [end for end in on_key(self._graph.endpoints(), key, kind) if end.session != self._bus.id]
 
     def fail(self, robot: Robot, error: Exception) -> None:
-        """Remove a robot that cannot be simulated any more, so that the others go on."""
+        """Remove a robot that can no longer be simulated, so that the others go on."""
         name = next(entity.name for entity in self if entity.robot is robot)
         report(f"sim: {name} was removed from the world: {error}")
         self.remove(name)
 
     def remove_lost(self, error: Exception) -> None:
-        """Remove all whose pose or velocity is not finite, since a step failed. Raises `error` if all are."""
+        """After a step failed with `error`, remove all entities whose pose or velocity is not finite. Raises the error
+        if there are none.
+        """
         lost = [entity.name for entity in self if not _is_finite(entity.body)]
         if not lost:
             raise error
@@ -254,8 +255,8 @@ class Entities:
     def _check_place(
         self, name: str, model: RobotModel, body: Body, code: int = si.SpawnEntityReply.INVALID_POSE
     ) -> None:
-        """What is placed deep inside something else is thrown away by the engine, with the other. An entity of the same
-        name does not count: it is refused by its name, or replaced.
+        """Raise EntityError if a body overlaps another one deeply: the engine would throw both apart. An entity of the
+        same name does not count: either the name is refused, or that entity is replaced.
         """
         if not (other := self._overlapped(name, model, body)):
             return
@@ -265,7 +266,7 @@ class Entities:
         raise EntityError(code, f"{problem}; {advice}")
 
     def _overlapped(self, name: str, model: RobotModel, body: Body) -> Entity | None:
-        """The entity that a body is inside of, if either of them can move."""
+        """The entity that a body overlaps, if either of them can move."""
         if not (numbers := self._world.overlapped(body)):
             return None
         entities = {entity.body.number: entity for entity in self if entity.name != name}
@@ -273,21 +274,21 @@ class Entities:
         return next((entity for entity in found if not (entity.model.static and model.static)), None)
 
     def _remember(self, place: str, robot: Robot) -> None:
-        """A respawned robot inherits held sources and the software stop; one that another sim had, the stop."""
-        if old := self.before.pop(place, None):
+        """A respawned robot inherits held sources and the software stop; one that was in another sim, the stop."""
+        if old := self.memories.pop(place, None):
             robot.inherit(old)
-        self.before[place] = robot.memory
+        self.memories[place] = robot.memory
         if self._stops and (by := self._stops.read(place)):
             for arbiter in robot.memory:
                 arbiter.stop(by, time.monotonic())
         self._keep_stop(place)
         if setter := robot.arbiter.software_stop.setter:
             report(f"sim: {place or 'the robot'} is still stopped by {setter}; `holozen release` lets it drive again")
-        if len(self.before) > MAX_ENTITIES:
+        if len(self.memories) > MAX_ENTITIES:
             live = {robot.arbiter, *(robot.arbiter for robot in self.robots)}
-            gone = [place for place, (arbiter, *_) in self.before.items() if arbiter not in live]
-            free = (place for place in gone if not self.before[place][0].software_stop.setter)
-            del self.before[forgotten := next(free, gone[0])]  # a stop is forgotten last
+            gone = [place for place, (arbiter, *_) in self.memories.items() if arbiter not in live]
+            not_stopped = (place for place in gone if not self.memories[place][0].software_stop.setter)
+            del self.memories[forgotten := next(not_stopped, gone[0])]  # a stop is forgotten last
             if self._stops:
                 self._stops.forget(forgotten)
 
@@ -304,16 +305,16 @@ class Entities:
         entity.body.remove()
 
     def set_start(self) -> None:
-        """The entities that are there now are those of the start, which a reset restores."""
+        """Let a reset restore the entities that there are now."""
         self._first = list(self)
 
     def remove_spawned(self) -> None:
-        """Remove all entities but those of the start."""
+        """Remove all entities that were added after `set_start`."""
         for entity in [entity for entity in self if entity not in self._first]:
             self.remove(entity.name)
 
     def rebuild(self, from_start: bool = False) -> None:
-        """Put every entity, or those of the start, into a new world, where it was added."""
+        """Put every entity, or with `from_start` those of the start, where it was added, in an empty world."""
         self._world.clear()
         before, self._all = self._all, {}
         for index, entity in enumerate(self._first if from_start else list(before.values())):
@@ -322,19 +323,19 @@ class Entities:
                 entity.body = mover.body
                 if entity not in self._first and (other := self._overlapped(entity.name, entity.model, entity.body)):
                     self._world.free_place(entity.body)
-                    report(f"sim: {entity.name} was added where {other.name} is now; it is put beside it")
+                    report(f"sim: {entity.name} was added where {other.name} is now; it is put beside that")
                 self._all[entity.name] = entity
                 if entity.robot:
                     entity.robot.rebuild(mover)
                 continue
-            try:  # it was deleted since
+            try:  # it has been deleted since the start
                 self._first[index] = self.add(entity.name, entity.model, entity.place, entity.prefix, may_overlap=True)
             except EntityError as error:
                 report(f"sim: {entity.name} did not come back: {error}")
         self.robots[:] = [entity.robot for entity in self if entity.robot]
 
     def look(self) -> RayCaster:
-        """What sensors see now."""
+        """The ray caster, with all entities where they are now."""
         if self._rays is None:
             self._rays = self._world.ray_caster()
         for name, number in list(self._traced.items()):
@@ -350,11 +351,11 @@ class Entities:
         return self._rays
 
     def seen(self) -> list[SeenEntity]:
-        """Where everything is, for pictures."""
+        """All entities with the poses of their links, for cameras."""
         return [_seen(entity) for entity in self]
 
     def free_name(self, wanted: str, owns: Callable[[str], bool] | None = None) -> str:
-        """`wanted`, with the first free number appended if it is taken, among the names that this sim `owns`."""
+        """`wanted`, or if that is taken, with the first free number appended. With `owns`, only names of this sim."""
         taken = {entity.name for entity in self} | {entity.prefix for entity in self}
         names = chain([wanted], (f"{wanted}_{number}" for number in count(1)))
         return next(name for name in names if name not in taken and (owns is None or owns(name)))
@@ -383,7 +384,7 @@ class Entities:
             self._check_alone(key_for(model.drive.odometry_topic, prefix))
 
     def _check_keys(self, keys: list[str]) -> None:
-        """Two robots on the same keys would each get the other's commands, and so would one on a key of the sim."""
+        """Raise EntityError if another robot, or the sim, has one of the keys: each would get the other's commands."""
         taken = {row.key for row in SERVICES if row.server == "sim"} - {*RobotServices.VERBS} | KEYS
         for key in keys:
             if keys.count(key) > 1 or key in taken:
@@ -395,7 +396,7 @@ class Entities:
             raise EntityError(si.SpawnEntityReply.NAME_NOT_UNIQUE, problem)
 
     def _check_alone(self, key: str) -> None:
-        """Two sims on the same keys would each get the other's commands."""
+        """Raise EntityError if another node publishes on the key: two sims would each get the other's commands."""
         if not self._graph.publishers(key):  # nearly always, and the graph of a fleet is large
             return
         for other in self.others_on(key, "pub"):
@@ -411,17 +412,17 @@ def _at(position: XYZ) -> str:
 
 
 def _place_of(model: RobotModel, prefix: str) -> str:
-    """The place of a robot on the wire: its prefix, or else the namespace in its file."""
+    """The place of a robot on the wire: its prefix, or without one the namespace in its file."""
     return prefix or command_key(model, prefix).rpartition("/")[0]
 
 
 def has_keys(model: RobotModel) -> bool:
-    """Whether a robot has keys: one with a drive, sensors, or moving joints."""
+    """Whether a model has keys: it has a drive, sensors, or moving joints."""
     return bool(model.drive or model.sensors) or any(joint.kind in MOVING for joint in model.joints.values())
 
 
 def checked_place(position: XYZ, rotation: XYZW) -> Place:
-    """A place from the wire, with its rotation normalized. Raises EntityError."""
+    """A place that came over the wire, with its rotation normalized. Raises EntityError."""
     if not all(map(math.isfinite, (*position, *rotation))) or max(map(abs, position)) > MAX_DISTANCE:
         raise EntityError(
             si.SpawnEntityReply.INVALID_POSE, f"position {position}: use finite numbers up to {MAX_DISTANCE:g} m"
@@ -440,7 +441,7 @@ def _is_finite(body: Body) -> bool:
 
 
 def _link_states(entity: Entity) -> LinkStates:
-    """How its links move; those of an object that has no joints as its root."""
+    """The states of its links; for an object without joints they follow from its root, which is taken to stand."""
     if entity.robot:
         return entity.robot.link_states()
     return link_tree(entity.model).states(LinkState(*entity.body.pose()))

@@ -1,10 +1,10 @@
-"""Where the links of a robot are and how they move, by its root and its joints: no engine, no clock."""
+"""The poses and velocities of a robot's links, from those of its root and its joints. No engine, no clock."""
 
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import NamedTuple
 
-from holozen.robot.model import Joint, Pose, RobotModel, descend
+from holozen.robot.model import Pose, RobotModel, descend
 from holozen.robot.rigid import Frame, moved_by
 from holozen.rotation import XYZ, XYZW, multiply, rotate
 
@@ -18,31 +18,30 @@ class LinkState(NamedTuple):
     angular: XYZ = (0.0, 0.0, 0.0)
 
     def at(self, xyz: XYZ, rotation: XYZW) -> "LinkState":
-        """The motion of a frame that is fixed in this one."""
+        """The state of a frame that is fixed in this one, at a position (m) and rotation."""
         (x, y, z), (a, b, c), (u, v, w) = self.xyz, rotate(self.rotation, xyz), self.angular
         along = (self.linear[0] + v * c - w * b, self.linear[1] + w * a - u * c, self.linear[2] + u * b - v * a)
         return LinkState((x + a, y + b, z + c), multiply(self.rotation, rotation), along, self.angular)
 
 
 class LinkTree:
-    """The links of a model, every parent before its children."""
+    """The links of a model. `joints` has each joint, every parent before its children, with its position (m) and
+    rotation in the parent link.
+    """
 
     def __init__(self, model: RobotModel) -> None:
         above = {joint.child: joint for joint in model.joints.values()}
         self._root = model.root
-        self._joints: list[tuple[Joint, XYZ, XYZW]] = []
-        for name in list(descend(model.root, model.joints))[1:]:
-            frame = Frame.of(above[name].pose)
-            self._joints.append((above[name], frame.xyz, frame.quaternion))
+        self.joints = [(above[name], *placed(above[name].pose)) for name in list(descend(model.root, model.joints))[1:]]
 
     def states(
         self, root: LinkState, positions: Mapping[str, float] = {}, rates: Mapping[str, float] = {}
     ) -> dict[str, LinkState]:
-        """Each link's, from those of the root and of the joints (rad or m; per s); a joint that is not given is at
-        zero, and still.
+        """The states of all links, from that of the root and the joints' positions (rad or m) and rates (rad/s or m/s).
+        A joint that is not given stands at zero.
         """
         found = {self._root: root}
-        for joint, xyz, rotation in self._joints:
+        for joint, xyz, rotation in self.joints:
             at = found[joint.parent].at(*moved_by(joint, xyz, rotation, positions.get(joint.name, 0.0)))
             if rate := rates.get(joint.name, 0.0):
                 axis = rotate(at.rotation, joint.axis)
@@ -56,7 +55,7 @@ class LinkTree:
 
 @lru_cache(64)
 def link_tree(model: RobotModel) -> LinkTree:
-    """The links of a model, which its copies share."""
+    """The link tree of a model, which all robots of that model share."""
     return LinkTree(model)
 
 

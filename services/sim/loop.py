@@ -1,4 +1,4 @@
-"""The loop: read commands, move, step, publish, at the pace of the clock or as many steps as were asked for."""
+"""The loop: read commands, move, step and publish, paced by the clock, or for as many steps as were requested."""
 
 import math
 import threading
@@ -6,35 +6,32 @@ import time
 from collections import deque
 
 from holozen.bus import Bus
-from holozen.command.time import Reads
-from holozen.command.wait_set import Moment
+from holozen.command.wait_set import Moment, ReadTimes
 from holozen.console import report
 from holozen.messages import Clock, SimulationStatus, Time
 from holozen.transport.pubsub import Publisher
 
 from .entities import Entities
 from .io.entity_services import EntityServices
-from .io.topics import Schedule
-from .pace import Pace
 from .physics.world import World
 from .robot import Robot
+from .schedule import Pace, Schedule
 from .simulation import Simulation
 
 CLOCK_RATE = 50.0  # Hz of sim time
 STATUS_RATE = 10.0  # Hz of real time
-HELD_RATE = 20.0  # Hz of real time, at which a world that is held is published: no reader takes it for lost
-HELD_POLL = 0.002  # s; the poll period while paused
+PAUSED_RATE = 20.0  # Hz of real time, at which a paused world is published, so that no reader takes it for lost
+PAUSED_POLL = 0.002  # s; how often requests are read while paused
 MEASURED = 1.0  # s of real time over which the real-time factor is measured
 REPORT_EVERY = 60.0  # s between two reports of overruns
 POLL = 0.02  # s; how often requests are read, and commands while no step is due
-READ_EVERY = 0.003  # s between two looks for commands and stops, and for nodes that left, however short the steps
+READ_EVERY = 0.003  # s between two readings of commands and stops, and of nodes that left, however short the steps
 FAULTS = (ArithmeticError, ValueError)  # of a body whose position became NaN
 
 
 class Loop:
-    """Runs one world with its entities at `rtf` times real time (0: as fast as it goes).
-
-    `is_clock`: whether it publishes its time.
+    """Runs one world with its entities at `rtf` times real time (0: as fast as possible). With `is_clock` it publishes
+    its time.
     """
 
     def __init__(
@@ -43,7 +40,7 @@ class Loop:
     ) -> None:  # fmt: skip
         self._bus, self._world, self._entities, self._robots = bus, world, entities, entities.robots
         self.pace = Pace(world.spec.step, rtf, time.monotonic())
-        self.answers = [services.answer] if services else []  # called between steps
+        self.answers = [services.answer] if services else []  # called between steps; each returns whether more wait
         self._served = self.polled = 0.0
         self._more_wait = False  # whether requests were left unanswered
         self._clock: Publisher[Clock] | None = bus.publisher("clock", Clock) if is_clock else None
@@ -55,7 +52,7 @@ class Loop:
         self._reported = 0  # overruns
         self._marks: deque[tuple[float, float]] = deque()  # real and sim time of past statuses
         self.simulation = Simulation(world, entities, self.pace, self.publish_all)
-        self._reads = Reads(time.monotonic())
+        self._reads = ReadTimes(time.monotonic())
         self._reads_at = 0.0
 
     def run(self, stop: threading.Event, steps: int | None = None) -> None:
@@ -69,28 +66,28 @@ class Loop:
             self._read_inputs(now)
             if now >= self._status_at:
                 self._publish_status(now)
-            if self.simulation.is_held:
-                self._hold(now, stop)
+            if self.simulation.is_paused:
+                self._step_on_request(now, stop)
             elif (left := pace.left(now)) > 0:
                 stop.wait(min(left, 0.0 if self._more_wait else POLL))
             else:
                 self._step(now)
                 pace.stepped(now)
 
-    def _hold(self, now: float, stop: threading.Event) -> None:
-        """Make the next step that was asked for, once all that was commanded before is read and its age known."""
+    def _step_on_request(self, now: float, stop: threading.Event) -> None:
+        """While paused: make the next requested step once all earlier commands have been read and dated."""
         steps = self.simulation.steps
         if steps and steps.may_begin and not any(robot.is_waiting for robot in self._robots):
             self._step(now)
             self.simulation.stepped()
         elif now >= self._shown_at:
             self.publish_all()
-            self._shown_at = now + 1 / HELD_RATE
+            self._shown_at = now + 1 / PAUSED_RATE
         else:
-            stop.wait(HELD_POLL)
+            stop.wait(PAUSED_POLL)
 
     def publish_all(self) -> None:
-        """Publish the state of everything as it is now."""
+        """Publish the present state of everything."""
         for robot in list(self._robots):
             try:
                 robot.publish(self._world.time, self._world.spec.step, at_once=True)
@@ -102,7 +99,7 @@ class Loop:
         self._publish_status(time.monotonic())
 
     def _publish_status(self, now: float) -> None:
-        """Publish how time passes, and report overruns."""
+        """Publish the simulation status, and report overruns."""
         sim_time, pace, simulation = self._world.time, self.pace, self.simulation
         if self._marks and sim_time < self._marks[-1][1]:
             self._marks.clear()
@@ -120,7 +117,8 @@ class Loop:
                 )
             )  # fmt: skip
         if pace.overruns > self._reported and now - self._reported_at >= REPORT_EVERY:
-            report(f"sim: {pace.overruns} overruns, {pace.lost:.1f} s lost: it runs at {factor:.2f} of real time")
+            overruns = f"{pace.overruns} overrun{'' if pace.overruns == 1 else 's'}"
+            report(f"sim: {overruns}, {pace.lost:.1f} s lost; running at {factor:.2f}x real time")
             self._reported, self._reported_at = pace.overruns, now
 
     def _read_inputs(self, now: float) -> None:
@@ -140,23 +138,23 @@ class Loop:
             self._entities.requests.read(moment._replace(since=min(since, self.polled or since)))
             self.polled = now
         if steps:
-            steps.may_begin = True  # all that was commanded before they were asked for is read
-        if now - self._served >= (HELD_POLL if self.simulation.is_held else POLL):
-            self._more_wait = sum(answer() for answer in self.answers) > 0  # each of them answers
+            steps.may_begin = True  # all commands sent before the request have been read
+        if now - self._served >= (PAUSED_POLL if self.simulation.is_paused else POLL):
+            self._more_wait = sum(answer() for answer in self.answers) > 0  # calls them all, unlike any()
             self._served = -math.inf if self._more_wait else now
         self._reads_at = now + READ_EVERY
 
     def _step(self, now: float) -> None:
         world, dt, agenda = self._world, self._world.spec.step, self._entities.agenda
         failed: dict[Robot, Exception] = {}
-        agenda.restless.update(dict.fromkeys(agenda.moves.due(now)))
-        for robot in list(agenda.restless):
+        agenda.active.update(dict.fromkeys(agenda.moves.due(now)))
+        for robot in list(agenda.active):
             try:
                 robot.move(now, dt)
             except FAULTS as error:
                 failed[robot] = error
-            if robot.body.glides and robot.arbiter.due > now:  # it continues as commanded
-                del agenda.restless[robot]
+            if robot.body.glides and robot.arbiter.due > now:  # it goes on as commanded until then
+                del agenda.active[robot]
                 agenda.moves.set(robot, robot.arbiter.due)
         try:
             world.step()

@@ -8,17 +8,17 @@ from holozen.command.inputs import ANGULAR, LINEAR
 from holozen.transport.parameters import Number
 
 from .entities import Entities
-from .pace import FACTORS, Pace
 from .robot import Robot
+from .schedule import FACTORS, Pace
 
-# A watchdog shorter than the period of 20 Hz would stop every robot between two commands; within the longest one a
+# A watchdog shorter than the period of 20 Hz would stop every robot between two commands; with the longest one a
 # robot at 5 m/s travels 10 m. Only a robot's file can switch it off.
 TIMEOUTS = (0.05, 2.0)  # s
 RATES = (1.0, 1000.0)  # Hz
 
 
 def declared(entities: Entities, pace: Pace) -> Iterator[Number]:
-    """The parameters of the sim, and of the robots that it has now."""
+    """The parameters of the sim, and of its present robots."""
     limits = entities.limits
     yield Number(
         "max_linear", "linear speed limit of all robots, from their next command on", "m/s", *LINEAR,

@@ -1,41 +1,41 @@
-"""A robot in the world: reads commands from its keys, moves at each step, publishes its state."""
+"""A robot in the world: it reads commands from its keys, moves at each step, and publishes its state."""
 
 import math
 from collections.abc import Callable
 from functools import partial
 
 from holozen.bus import Bus
-from holozen.command.arbiter import Arbiter
+from holozen.command.arbiter import Arbiter, CommandTime
 from holozen.command.freshness import Senders
-from holozen.command.inputs import CommandStats, ForceInput, JointInput, TwistInput
+from holozen.command.inputs import CommandStats, ForceInput, JointInput, Lines, TwistInput
 from holozen.command.motion import JointMotion
 from holozen.command.stop_services import RobotServices
-from holozen.command.time import CommandTime
 from holozen.command.wait_set import Reader
-from holozen.messages import TFMessage, Time
+from holozen.messages import TFMessage, Time, Wrench
 from holozen.robot.model import STEP, Balancing, Differential, Force, Pushed, RobotModel
 from holozen.suggest import listed
 from holozen.transport.pubsub import Publisher
-from holozen.wire import COMMAND_SILENCE, key_for
+from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for
 
-from .agenda import Agenda
 from .io.sensor_topics import LinkStates, SensorTopics, Step, Surroundings
-from .io.topics import JOINT_RATE, NONE, DriveTopics, ForceTopics, JointTopics, Schedule
+from .io.topics import JOINT_RATE, NONE, DriveTopics, JointTopics
 from .link_states import LinkState, link_tree
 from .physics.jointed import Forces, JointedBody, Motors
 from .physics.movers import Mover
+from .schedule import Agenda, Schedule
 
-IDLE = 0.1  # s of sim time between two looks for readers of the joints, while there are none
+IDLE = 0.1  # s of sim time; how often it checks whether anyone reads the joints, while no one does
 
 Memory = tuple[Arbiter, Arbiter, Arbiter]
+LINES = Lines()  # of all robots
 NO_DRIVE = "no drive: this robot is moved by forces, on {keys}"
 
 
 class Robot:
     """A robot with a drive, with joints, or with both.
 
-    `name` is its name in the world, `prefix` that on the wire, which is empty at the root. `phase`, from 0 to 1, sets
-    its telemetry apart from that of others in time. `keep_stop` is called with each change of its software stop.
+    `name` is its name in the world, `prefix` the one on the wire, which is empty at the root. `phase`, from 0 to 1,
+    shifts its telemetry in time from that of others. `keep_stop` is called on each change of its software stop.
     """
 
     def __init__(
@@ -44,84 +44,86 @@ class Robot:
         keep_stop: Callable[[], None] = lambda: None,
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
-        self._agenda: Agenda[Robot] = Agenda()  # unread until `attend`
-        self._embody(mover)
+        self._agenda: Agenda[Robot] = Agenda()  # unused, until `schedule_on`
+        self._set_body(mover)
         drive = model.drive
         command = command_key(model, prefix)
-        namespace = command.rpartition("/")[0]  # a namespace in the robot's file serves as a name
+        namespace = command.rpartition("/")[0]  # the robot's file may give one in place of a name
         self.arbiter = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE, time)
-        self.arbiter.changed = self._be_restless
+        self.arbiter.changed = self._activate
         self.joint_arbiter = Arbiter(COMMAND_SILENCE, time)
         self._spare = Arbiter(COMMAND_SILENCE, time)
-        # Where forces alone move a robot, a stop on cmd_vel ends them. Elsewhere they disturb one that drives.
+        # If only forces move the robot, a stop on cmd_vel ends them. Else they disturb a robot that drives.
         self.force_arbiter = self._spare if self.drives else self.arbiter
+        self.keys = command, key_for(drive.odometry_topic, prefix) if drive else ""  # of commands and odometry
         self._tf: Publisher[TFMessage] = bus.publisher(key_for("tf", namespace), TFMessage)
         keys = _forces(model, prefix)
         refusal = "" if self.drives else NO_DRIVE.format(keys=listed(keys))
         self._input = twist_input = TwistInput(
-            command, self.arbiter, senders, *limits, others=_aliases(model, prefix), refusal=refusal
+            command, self.arbiter, senders, *limits, others=_aliases(model, prefix), refusal=refusal, lines=LINES
         )
         self._drive = DriveTopics(bus, prefix, name, drive, twist_input, self._tf) if drive else None
         if self._drive:
-            self._drive.start_anew(mover.moved(0.0, STEP))
+            self._drive.reset(mover.moved(0.0, STEP))
         pairs = ((self._wheels, self.arbiter), (self._others, self.joint_arbiter))
-        self._obeys = any(motors for motors, _ in pairs)  # joint commands
+        self._obeys_joints = any(motors for motors, _ in pairs)
         groups = [(motors.names, arbiter) for motors, arbiter in pairs if motors]
-        stats = twist_input.stats if drive else CommandStats()
+        stats = twist_input.stats if drive else CommandStats(lines=LINES)
         joint_input = JointInput(key_for("joint_command", namespace), senders, stats, groups, mover.names)
         force_input = ForceInput(tuple(keys), self.force_arbiter, senders, stats)
-        self._sifters = (twist_input.freshness, joint_input.freshness, force_input.freshness)
-        self._force_topics = ForceTopics(bus, force_input)
+        self._filters = (twist_input.freshness, joint_input.freshness, force_input.freshness)
+        self._pushes = [bus.subscribe(key, Wrench, limit=MAX_COMMAND_BYTES, dealt=True) for key in keys]
+        self._push_readers = [*map(force_input.reader, self._pushes)]
         self._of_members = bus.member is not None
         self._joints = JointTopics(bus, namespace, model, mover.names, prefix, joint_input, self._tf)
         self._services = RobotServices(bus, command, self.memory, partial(self._on_stop, keep_stop))
         self._odom_due = Schedule(drive.odometry_rate if drive else 0.0, phase)
         self._joints_due = Schedule(JOINT_RATE, phase)
-        self._joints_at = -math.inf  # s of sim time until when no readers of the joints are looked for
+        self._joints_at = -math.inf  # s of sim time; when to check again whether anyone reads the joints
         self._sensors: SensorTopics | None = None
         self._tree = link_tree(model)
 
-    def attend(self, agenda: "Agenda[Robot]") -> None:
-        """Tell an agenda when it has to be moved and to publish: all at once."""
+    def schedule_on(self, agenda: "Agenda[Robot]") -> None:
+        """Move to an agenda, on which everything is due at once."""
         self._agenda.forget(self)
         self._agenda = agenda
-        self._be_restless()
+        self._activate()
         agenda.publishes.set(self, -math.inf)
         agenda.statuses.set(self, -math.inf)
 
-    def sense(self, bus: Bus, name: str, around: Surroundings, phase: float) -> None:
-        """Publish what its sensors measure in a world."""
+    def add_sensors(self, bus: Bus, name: str, around: Surroundings, phase: float) -> None:
+        """Publish what its sensors measure."""
         self._sensors = SensorTopics(bus, name, self.prefix, self._model.sensors, around, phase)
 
     def link_states(self) -> LinkStates:
-        """How its links move now."""
+        """The states of its links."""
         positions, rates = (dict(zip(self.mover.names, values, strict=True)) for values in self.mover.states()[:2])
         return self._tree.states(LinkState(*self.body.pose(), *self.body.twist()), positions, rates)
 
     @property
     def memory(self) -> Memory:
-        """Held sources and the software stop, for the robot that replaces this one."""
+        """The arbiters, with the held sources and the software stop that a robot in its place inherits."""
         return self.arbiter, self.joint_arbiter, self._spare
 
     def inherit(self, memory: Memory) -> None:
-        """Take over the held sources and the software stop of the robot that this one replaces."""
+        """Take over held sources and the software stop from the robot that was in its place."""
         for arbiter, other in zip(self.memory, memory, strict=True):
             arbiter.inherit(other)
 
     @property
     def command_readers(self) -> list[Reader]:
-        """Those of what moves or stops it."""
+        """The readers of all that moves or stops it."""
         drive = self._drive.readers if self._drive else []
-        joints = self._joints.readers if self._obeys else []
-        return [*drive, *self._force_topics.readers, *joints, *self._services.stop]
+        joints = self._joints.readers if self._obeys_joints else []
+        return [*drive, *self._push_readers, *joints, *self._services.stop]
 
     @property
     def request_readers(self) -> list[Reader]:
-        """Those of its other services; joint commands, where no joint obeys any, are refused with them."""
-        return [*self._joints.readers * (not self._obeys), *self._services.others]
+        """The readers of its other services, and of joint commands if no joint obeys them: they are only refused."""
+        return [*([] if self._obeys_joints else self._joints.readers), *self._services.others]
 
     def publish_status(self, now: float, at_once: bool = False) -> None:
-        """Publish the command status at `now` (s), if it is wanted, or `at_once`."""
+        """Publish the command status at `now` (s), if anyone wants it or `at_once`."""
         if self._drive:
             self._drive.publish_status(now, at_once)
 
@@ -132,44 +134,44 @@ class Robot:
     @property
     def is_waiting(self) -> bool:
         """Whether a command waits for its sender's clock."""
-        return any(freshness.is_waiting for freshness in self._sifters)
+        return any(freshness.is_waiting for freshness in self._filters)
 
     def rebuild(self, mover: Mover) -> None:
         """Go on with a new body, which stands. Keys, held sources and the software stop remain."""
-        self._embody(mover)
+        self._set_body(mover)
         if self._drive:
-            self._drive.start_anew(mover.moved(0.0, STEP))
+            self._drive.reset(mover.moved(0.0, STEP))
 
-    def _embody(self, mover: Mover) -> None:
+    def _set_body(self, mover: Mover) -> None:
         self.mover, self.body = mover, mover.body
-        self.body.woken = self._be_restless
-        self._be_restless()
+        self.body.woken = self._activate
+        self._activate()
         self._wheels, self._others = _motors(mover, self._model)
         self._jointed = mover.body if isinstance(mover.body, JointedBody) else None
         brakes = None if self.drives else self._others
         forces = _forces(self._model, self.prefix)
         self._forces = Forces(self._jointed, forces, self._model, brakes) if self._jointed and forces else None
 
-    def _be_restless(self) -> None:
-        self._agenda.restless[self] = None
+    def _activate(self) -> None:
+        self._agenda.active[self] = None
 
-    def start_anew(self) -> None:
+    def reset(self) -> None:
         """The world was reset: only a new command moves it, and what it publishes is due at once."""
         for arbiter in self.memory:
-            arbiter.start_anew()
+            arbiter.drop_driver()
         self._joints_at = -math.inf
         self._agenda.publishes.set(self, -math.inf)
         if self._sensors:
-            self._sensors.start_anew()
+            self._sensors.reset()
 
     @property
     def joint_names(self) -> list[str]:
-        """Its joints that move."""
+        """The names of its moving joints."""
         return self._joints.names
 
     @property
     def joint_positions(self) -> list[float]:
-        """Where those are now, in rad or m."""
+        """The positions of these, in rad or m."""
         return self.mover.states()[0]
 
     @property
@@ -183,12 +185,12 @@ class Robot:
         return self._model.drive is not None and not isinstance(self._model.drive.mechanism, Pushed)
 
     def limit(self, linear: float, angular: float) -> None:
-        """Clamp the next commands to these limits, in m/s and rad/s."""
+        """Clamp commands to these limits, in m/s and rad/s, from the next one on."""
         self._input.linear, self._input.angular = linear, angular
 
     def require_age(self, limit: float) -> None:
-        """Refuse what moves the robot and may be older than `limit` seconds, from the next command on."""
-        for freshness in self._sifters:
+        """Refuse commands that may be older than `limit` seconds, except stops, from the next one on."""
+        for freshness in self._filters:
             freshness.max_age = limit
 
     def set_timeout(self, timeout: float, now: float) -> None:
@@ -196,11 +198,11 @@ class Robot:
         self.arbiter.set_timeout(timeout, now)
 
     def forget(self, source: str, session: str) -> None:
-        """Stop if `source` drives: its process, that of `session`, is gone. Its last commands are read first.
+        """Stop if `source` drives: its process, with this `session`, is gone. Its last commands have to be read before.
 
-        A token of another session under the same name is a forgery, and changes nothing.
+        If another session uses the same name, that is a forgery, and changes nothing.
         """
-        if all(freshness.is_session(source, session) for freshness in self._sifters):
+        if all(freshness.is_session(source, session) for freshness in self._filters):
             for arbiter in self.memory:
                 arbiter.forget(source, self._of_members)
 
@@ -210,16 +212,16 @@ class Robot:
             motion = self._drive.motion(now, dt)
             if isinstance(motion, JointMotion):
                 if self._wheels:
-                    self._wheels.do(motion)
+                    self._wheels.apply(motion)
             else:
                 if self._wheels:
                     self._wheels.forget()
                 self.mover.move(motion, dt)
         if self._forces:
-            self._forces.do(self.force_arbiter.pushes(now))
+            self._forces.apply(self.force_arbiter.pushes(now))
         if self._others:
             commanded = self.joint_arbiter.motion(now)
-            self._others.do(commanded if isinstance(commanded, JointMotion) else None)
+            self._others.apply(commanded if isinstance(commanded, JointMotion) else None)
         if self._jointed:
             self._jointed.mimic()
 
@@ -235,7 +237,9 @@ class Robot:
         self._agenda.publishes.set(self, -math.inf)
 
     def publish(self, time: float, dt: float, at_once: bool = False) -> None:
-        """Queue what is due at the sim time `time`, after a step of `dt` seconds, or `at_once`, and wanted."""
+        """Queue all telemetry that is wanted and, unless `at_once`, due at the sim time `time` after a step of `dt`
+        (s).
+        """
         drive = self._drive if self._odom_due.due(time) or at_once else None
         wanted = drive.wanted if drive else NONE
         joints = None
@@ -245,14 +249,14 @@ class Robot:
                 joints, self._joints_at = None, time + IDLE
         next_at = min(self._odom_due.next, max(self._joints_due.next, self._joints_at))
         if self._sensors:
-            if time >= self._sensors.next and not at_once:  # while time does not pass there is nothing new to see
+            if time >= self._sensors.next and not at_once:  # no time has passed: there is nothing new to measure
                 self._sensors.publish(Step(time, round(time / dt)), self.link_states)
             next_at = min(next_at, self._sensors.next)
         self._agenda.publishes.set(self, next_at)
         if self.body.glides and not joints and wanted == NONE:
-            return  # else encoders, and the wheels for the eye, count on observers
+            return  # gliding robots have neither encoders nor wheels that have to be kept up to date
         stamp, moved = Time.of(time), self.mover.moved(time, dt)
-        if not math.isfinite(sum(moved[0])):  # without a reader nothing is encoded, which would show it
+        if not math.isfinite(sum(moved[0])):  # encoding would find it too, but only if there is a reader
             raise ValueError(f"its position became {moved[0]}")
         if drive:
             drive.publish(stamp, moved, wanted)
@@ -261,11 +265,12 @@ class Robot:
 
     def close(self) -> None:
         """Close its keys."""
-        self.attend(Agenda())
+        self.schedule_on(Agenda())
         if self._drive:
             self._drive.close()
         self._joints.close()
-        self._force_topics.close()
+        for pushes in self._pushes:
+            pushes.close()
         self._services.close()
         self._tf.close()
         if self._sensors:
@@ -273,12 +278,12 @@ class Robot:
 
 
 def command_key(model: RobotModel, prefix: str) -> str:
-    """The command key of a robot with this `prefix`; all its other keys but odometry share the same namespace."""
+    """The command key of a robot with this `prefix`. All its other keys but odometry are in the same namespace."""
     return key_for(model.drive.command_topic if model.drive else "cmd_vel", prefix)
 
 
 def keys_of(model: RobotModel, prefix: str) -> list[str]:
-    """All keys of a robot with this `prefix`; no other robot may have one of them."""
+    """All keys of a robot with this `prefix`. No other robot may have any of them."""
     command = command_key(model, prefix)
     namespace = command.rpartition("/")[0]
     keys = [key_for(key, namespace) for key in ("tf", "joint_states", "joint_command", *RobotServices.VERBS)]
@@ -298,13 +303,13 @@ def _forces(model: RobotModel, prefix: str) -> dict[str, list[Force]]:
 
 
 def _aliases(model: RobotModel, prefix: str) -> tuple[str, ...]:
-    """More keys for commands: wheely_boi's plugin listens on `cmd` below its model's name, twice."""
+    """Additional command keys: wheely_boi's plugin listens on `NAME/NAME/cmd`."""
     name = prefix or model.name
     return (f"{name}/{name}/cmd",) if model.drive and isinstance(model.drive.mechanism, Balancing) else ()
 
 
 def _motors(mover: Mover, model: RobotModel) -> tuple[Motors | None, Motors | None]:
-    """The motors of the wheels and of the other joints; None where commands cannot move any."""
+    """The motors of the wheels and of the other joints; None if commands cannot move any."""
     if not isinstance(mover.body, JointedBody):
         return None, None
     mechanism = model.drive.mechanism if model.drive else None
@@ -312,6 +317,6 @@ def _motors(mover: Mover, model: RobotModel) -> tuple[Motors | None, Motors | No
     if mover.wheels:
         torque = mechanism.torque if isinstance(mechanism, Differential) else math.inf
         wheels = Motors(mover.body, mover.wheels, torque, together=True)
-    if free := frozenset(mover.names) - mover.wheels - mover.kept:
+    if free := frozenset(mover.names) - mover.wheels - mover.reserved:
         others = Motors(mover.body, free)
     return wheels, others

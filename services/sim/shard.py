@@ -1,7 +1,7 @@
 """Shards: several sims on one bus that share the robots by name, each on a core or a machine of its own.
 
-Each robot belongs to one shard by a hash of its name, so that two shards never hold the same name. A shard announces
-itself as a node such as `sim_2_of_3`.
+A hash of its name assigns each robot to one shard, so that two shards never have the same name. A shard is a node with
+a name such as `sim_2_of_3`.
 """
 
 import argparse
@@ -19,8 +19,8 @@ from holozen.transport.graph import Endpoint
 from holozen.transport.node import Node
 
 MOST = 64  # shards
-AUTO = 0  # the number of a shard that takes any that is free
-TRIES = 20  # of a shard that shares its number with others that start at the same time
+AUTO = 0  # the number that stands for any free one
+TRIES = 20  # to take a number, while others that start at the same time take the same one
 SCAN = 1.0  # s between two scans of all tokens for other shards
 _NODE = re.compile(r"sim_(\d{1,2})_of_(\d{1,2})")
 
@@ -37,15 +37,15 @@ class Shard:
 
     @property
     def node(self) -> str:
-        """The name of its node."""
+        """The node name of this shard."""
         return f"sim_{self.number}_of_{self.count}"
 
     def owner(self, name: str) -> "Shard":
-        """The shard that holds the entity with a name."""
+        """The shard that the entity with a name belongs to."""
         return Shard(zlib.crc32(name.encode()) % self.count + 1, self.count)
 
     def owns(self, name: str) -> bool:
-        """Whether it is the one that holds the entity with a name."""
+        """Whether the entity with a name belongs to this shard."""
         return self.owner(name) == self
 
 
@@ -53,7 +53,7 @@ def shard(text: str) -> Shard:
     """The value of `--shard`, for argparse."""
     number, _, count = text.partition("/")
     if (number != "auto" and not number.isdecimal()) or not count.isdecimal():
-        raise refused(f"{text!r} is no shard; give K/N, such as 1/3, or auto/3 for a number that is free")
+        raise refused(f"{text!r} is no shard; give K/N, such as 1/3, or auto/3 for any free number")
     made = Shard(AUTO if number == "auto" else int(number), int(count))
     if not 1 <= made.count <= MOST or not (number == "auto" or 1 <= made.number <= made.count):
         raise refused(f"{text!r}: give K/N with K from 1 to N and N up to {MOST}")
@@ -75,7 +75,7 @@ def is_shard(node: str) -> bool:
 
 
 def claim(wanted: Shard, connection: Connection, open_bus: Callable[[str], Bus]) -> tuple[Shard, Bus]:
-    """Take a number, and open the bus as the node of that name. Raises BusError if it is taken, or none is free."""
+    """Take a number, and open the bus as the node of that shard. Raises BusError if it is taken, or none is free."""
     for _ in range(TRIES):
         with Node("sim", connection) as node:
             mine = _free(wanted, shards_of(node.endpoints()))
@@ -90,7 +90,7 @@ def claim(wanted: Shard, connection: Connection, open_bus: Callable[[str], Bus])
         bus.close()
         if wanted.number != AUTO:
             raise BusError(f"shard {mine} runs already ({min(rivals)[:6]}); take another: --shard auto/{mine.count}")
-    raise BusError(f"no shard of {wanted.count} was to be had in {TRIES} tries; start this one again")
+    raise BusError(f"no free shard of {wanted.count} was found in {TRIES} tries; start this one again")
 
 
 def _free(wanted: Shard, running: Collection[Shard]) -> Shard:
@@ -107,7 +107,7 @@ def _free(wanted: Shard, running: Collection[Shard]) -> Shard:
 
 
 class Share:
-    """The part of the entities that belongs to this shard."""
+    """Which entities belong to this shard, and which to the others."""
 
     def __init__(self, mine: Shard, bus: Bus) -> None:
         self.mine, self._bus = mine, bus
@@ -116,8 +116,8 @@ class Share:
         self._scanned = -SCAN
 
     def refusal(self, name: str) -> str:
-        """Empty for the name of an entity that belongs here, else why no shard has it. Raises Elsewhere if the shard
-        that it belongs to runs.
+        """Why no running shard has the entity with a name; empty if it belongs to this one. Raises Elsewhere if it
+        belongs to another one that runs.
         """
         owner = self.mine.owner(name)
         if owner == self.mine:

@@ -1,4 +1,4 @@
-"""Whether the world's time passes: it plays, or is held and stepped; and resets."""
+"""Plays, pauses, steps and resets the world."""
 
 from collections.abc import Callable
 
@@ -7,8 +7,8 @@ from holozen.messages import simulation_interfaces as si
 from holozen.messages.simulation_interfaces import SimulationState as State
 
 from .entities import Entities, EntityError
-from .pace import Pace
 from .physics.world import World
+from .schedule import Pace
 
 MAX_STEPS = 10_000_000  # of one request
 NAMES = {State.STATE_STOPPED: "stopped", State.STATE_PLAYING: "playing", State.STATE_PAUSED: "paused"}
@@ -21,15 +21,15 @@ TIME, STATE, SPAWNED = (
 
 
 class Steps:
-    """Steps to make while the sim is held. `done` is called after them, with the reason if they end early."""
+    """Steps to make while the sim is paused. `done` is called at their end, with the reason if that is early."""
 
     def __init__(self, left: int, done: Callable[[str], None]) -> None:
         self.left, self.done = left, done
-        self.may_begin = False  # whether what was commanded before they were asked for has been read
+        self.may_begin = False  # whether all commands sent before the request have been read
 
 
 class Simulation:
-    """The state of a sim. `publish` is called whenever it changed, for readers to know it before it is confirmed."""
+    """The state of a sim. `publish` is called on each change, so that readers know it before it is confirmed."""
 
     def __init__(self, world: World, entities: Entities, pace: Pace, publish: Callable[[], None]) -> None:
         self._world, self._entities, self._pace, self._publish = world, entities, pace, publish
@@ -38,41 +38,41 @@ class Simulation:
         self.steps: Steps | None = None
 
     @property
-    def is_held(self) -> bool:
-        """Whether only requested steps are made."""
+    def is_paused(self) -> bool:
+        """Whether only requested steps are made: it is paused or stopped."""
         return self.state != State.STATE_PLAYING
 
     def play(self, now: float) -> None:
-        """Play from `now` (s) on. What was commanded before counts no longer, unless the robot's watchdog is off."""
+        """Play from `now` (s) on. Earlier commands no longer count, unless the robot's watchdog is off."""
         self.end_steps("it plays")
         self.state = State.STATE_PLAYING
         self._entities.command_time.play(now)
         for robot in self._entities.robots:
             for arbiter in robot.memory:
-                arbiter.start_anew(lasting=False)
+                arbiter.drop_driver(without_watchdog=False)
         self._pace.set_factor(self._pace.rtf, now)
         self._publish()
 
     def pause(self, now: float) -> None:
-        """Hold the world from `now` (s) on, and end requested steps."""
+        """Pause from `now` (s) on, and end requested steps."""
         self.end_steps("it was paused")
-        self._hold(now, State.STATE_PAUSED)
+        self._pause(now, State.STATE_PAUSED)
         self._publish()
 
     def stop(self, now: float) -> None:
-        """Hold the world, and reset it."""
-        self._hold(now, State.STATE_STOPPED)
+        """Pause from `now` (s) on, and reset the world."""
+        self._pause(now, State.STATE_STOPPED)
         self.reset(ALL, now)
 
-    def _hold(self, now: float, state: int) -> None:
+    def _pause(self, now: float, state: int) -> None:
         self.state = state
-        self._entities.command_time.hold(now)
+        self._entities.command_time.pause(now)
         for robot in self._entities.robots:
             for arbiter in robot.memory:
-                arbiter.ask_again()
+                arbiter.invalidate()
 
     def step(self, count: int, done: Callable[[str], None]) -> None:
-        """Make steps, and then call `done`. Raises EntityError."""
+        """Make `count` steps, and then call `done`. Raises EntityError."""
         if self.state != State.STATE_PAUSED:
             problem = f"the sim is {NAMES[self.state]}; pause it to step: `holozen sim pause`"
             raise EntityError(si.Result.INCORRECT_STATE, problem)
@@ -96,7 +96,7 @@ class Simulation:
             steps.done(reason and f"{reason}, {steps.left} steps before the last one")
 
     def reset(self, scope: int, now: float) -> None:
-        """Reset what `scope` names, at `now` (s). Nothing moves before a new command. Raises EntityError."""
+        """Reset what `scope` names, at `now` (s). Nothing moves until it is commanded again. Raises EntityError."""
         if scope not in (*range(8), ALL):
             problem = f"scope is {scope}; use 0 or 255 (all), or a sum of 1 (time), 2 (state), 4 (spawned)"
             raise EntityError(si.Result.FEATURE_UNSUPPORTED, problem)
@@ -109,7 +109,7 @@ class Simulation:
         if scope & TIME:
             self._world.rewind()
         for robot in self._entities.robots:
-            robot.start_anew()
+            robot.reset()
         self.epoch += 1
         self._pace.set_factor(self._pace.rtf, now)
         report(f"sim: it was reset; epoch {self.epoch} begins")

@@ -1,4 +1,4 @@
-"""The initial world: the models of the world file, and the robots of `--robot` side by side."""
+"""The initial world: the models of the world file, and the robots of `--robot`, side by side."""
 
 import argparse
 import math
@@ -36,13 +36,13 @@ def add_models(entities: Entities, models: tuple[RobotModel, ...]) -> None:
 
 
 def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None = None) -> None:
-    """Add the robots of `--robot` on the ground, side by side along y, the first at the origin; in a shard those that
-    belong to it. Raises RobotError.
+    """Add the robots of `--robot` on the ground, side by side along y, the first one at the origin; in a shard only
+    those that belong to it. Raises RobotError.
     """
     robots: list[tuple[Path, str]] = args.robot or [(data.find("urdf", "hb_bot.urdf.xacro"), "")]
     read = {path: _read(path, args) for path in dict.fromkeys(path for path, _ in robots)}
     models = [read[path] for path, _ in robots]
-    # Without names, a namespace in each file is as good.
+    # Robots without names may be told apart by the namespaces in their files.
     names = [(name, command_key(model, name)) for model, (_, name) in zip(models, robots, strict=True)]
     for name, key in names:
         if (same := names.count((name, key))) > 1:
@@ -97,6 +97,6 @@ def _valid_name(name: str) -> str:
 
 
 def _reach(part: PlacedShape) -> float:
-    """An upper bound in metres of a shape's extent from the robot's z axis."""
+    """An upper bound (m) of how far a shape extends from the robot's z axis."""
     size = max((math.hypot(*point) for point in part.shape.points), default=math.hypot(*part.shape.size))
     return math.hypot(part.xyz[0], part.xyz[1]) + size

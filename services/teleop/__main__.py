@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from holozen import flags
 from holozen.console import report
+from holozen.suggest import listed
 from holozen.transport import connection
 
 if TYPE_CHECKING:
@@ -32,14 +33,14 @@ class Mode(argparse.Action):
 def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen teleop",
-        description="Drive a robot from the keyboard, with the keys of teleop_twist_keyboard.",
+        description="drive a robot from the keyboard, with the keys of teleop_twist_keyboard",
         epilog="example: holozen teleop Fred --speed 0.3",
         conflict_handler="resolve",
     )
     add = parser.add_argument
     add("robots", nargs="*", metavar="ROBOT", type=flags.robot,
         help="names; Tab switches to the next one (none: the robot at the root)")  # fmt: skip
-    add("--robot", action="append", default=[], type=flags.robot, metavar="ROBOT", help="the same as a flag")
+    add("--robot", action="append", default=[], type=flags.robot, metavar="ROBOT", help="same as the ROBOT argument")
     add("--speed", type=flags.number(0, 1000, "m/s"), default=0.5, help="m/s (default: 0.5)")
     add("--turn", type=flags.number(0, 1000, "rad/s"), default=1.0, help="rad/s (default: 1.0)")
     add("--speed-limit", type=flags.number(0, 1000, "m/s"), default=1000.0, help="m/s (default: 1000)")
@@ -55,14 +56,14 @@ def parser() -> argparse.ArgumentParser:
         "--plain",
         action=argparse.BooleanOptionalAction,
         default=False,
-        help="a line a second instead of a screen, for screen readers and logs",
+        help="one line per second instead of a screen, for screen readers and logs",
     )
     add("--script", metavar="FILE", help="drive by a script, without a terminal; - reads standard input")
     add("--stamped", action=argparse.BooleanOptionalAction, default=False, help="publish TwistStamped instead of Twist")
     add("--frame-id", default="", metavar="FRAME", help="frame_id of the TwistStamped")
     add("--cmd-vel", default="", metavar="KEY", type=flags.key,
         help="where the robot listens (default: [ROBOT/]cmd_vel)")  # fmt: skip
-    add("--name", default="teleop", help="of this node (default: teleop)")
+    add("--name", default="teleop", help="name of this node (default: teleop)")
     connection.add_arguments(parser)
     add("--mode", action=Mode, choices=(*DRIVE_MODES, *connection.MODES),
         help="hold: drive while a key is held; latch: until another (default: hold); or Zenoh's mode")  # fmt: skip
@@ -72,19 +73,21 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     from .control.layout_file import load
-    from .control.layouts import LayoutError
-    from .ros_args import RosArgError
-    from .settings import SettingsError, parse, path
+    from .settings import parse, path
+    from .toml_file import InputError
 
     try:
         args = parse(parser(), sys.argv[1:] if argv is None else argv, path())
         layout = load(args.keys)
-    except (LayoutError, SettingsError, RosArgError) as error:
+    except InputError as error:
         report(f"teleop: {error}")
         return 2
     args.robots = [*args.robot, *args.robots]
     if args.deadman and (args.script is not None or latches(args)):
         report("teleop: --deadman needs keys that are held, so neither --script nor --mode latch; or give --no-deadman")
+        return 2
+    if args.script is not None and len(set(args.robots)) > 1:
+        report(f"teleop: a script drives one robot, so name one of {listed(args.robots)}")
         return 2
     if args.script is None and not (sys.stdin.isatty() and sys.stdout.isatty()):
         from holozen.wire import key_for
@@ -96,6 +99,9 @@ def main(argv: list[str] | None = None) -> int:
 
     try:
         return read_script(args, layout) if args.script is not None else drive(args, layout)
+    except InputError as error:
+        report(f"teleop: {error}")
+        return 2
     except BusError as error:
         report(f"teleop: {error}")
         return 1
@@ -155,11 +161,7 @@ def read_script(args: argparse.Namespace, layout: "Layout") -> int:
 
     from . import script
 
-    try:
-        steps = script.load(args.script, layout)
-    except script.ScriptError as error:
-        report(f"teleop: {error}")
-        return 2
+    steps = script.load(args.script, layout)
     stop = stop_event()
     args.mode = "hold"  # a script states how long keys are held
     with open_bus(args) as bus:

@@ -28,7 +28,7 @@ from .control.twist_mapper import STILL
 from .input.gamepad import Joystick, JoystickError
 from .input.kitty import Answer, Event, Key, Keyboard
 from .input.terminal import Terminal
-from .input.terminal_liveness import ANSWERS, UNANSWERED, TerminalLiveness
+from .input.terminal_liveness import ANSWERS, LASTS, UNANSWERED, TerminalLiveness
 from .screen import STYLE, EventPress, Picture, TerminalInput, TerminalOutput
 from .session import Session
 from .telemetry import Telemetry
@@ -37,7 +37,7 @@ from .view import plain_line, render
 SHORTEST, LONGEST = 0.001, 0.05  # s between two passes
 REDRAW, LINE_EVERY, RETRY = 0.1, 1.0, 0.01  # s between pictures, lines and attempts
 STALL = 0.4  # s without a pass; keys typed during that time are outdated
-ENDS = (*SIGNALS, signal.SIGQUIT)
+ENDS = (*SIGNALS, signal.SIGQUIT)  # the signals that end it
 HELD_KEYS_NEEDED = "this terminal does not report key releases, which --deadman needs"
 
 
@@ -64,9 +64,9 @@ class TeleopApp:
         self._plain, self._ascii = plain, ascii
         self._keyboard = Keyboard()
         self._liveness = TerminalLiveness(terminal, self._keyboard)
-        self._ended = self._suspended = self._back = self._came = False
+        self._ended = self._suspended = self._is_continued = self._has_input = False
         self._stick = session.mapper.stick
-        self._looked = _uptime()
+        self._passed_at = _uptime()
         self._draw_at = 0.0
         self._error: BaseException | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -87,7 +87,7 @@ class TeleopApp:
         self._app.timeoutlen = None  # type: ignore[assignment]  # no key is the prefix of another
 
     def run(self) -> None:
-        """Drive. Stopping the robot at the end is up to the caller, also if this raises."""
+        """Drive. The caller has to stop the robot at the end, even if this raises."""
         for number in ENDS:
             signal.signal(number, self._end)
         signal.signal(signal.SIGTSTP, self._suspend)
@@ -107,7 +107,7 @@ class TeleopApp:
                 self._timer.cancel()
 
     def _begin(self) -> None:
-        """prompt_toolkit has started to read; the rest starts with the first pass."""
+        """Called once prompt_toolkit has begun to read: let the loop start the rest."""
         assert self._loop is not None
         self._loop.call_soon(self._attach)
 
@@ -132,11 +132,11 @@ class TeleopApp:
         return bindings
 
     def _read(self) -> list[KeyPress]:
-        """The keys typed; none after a pause, during which they became outdated."""
-        self._look()
+        """The typed keys; none if they were typed during a pause, and are outdated."""
+        self._check_for_pause()
         if not self._readable():
             return []
-        self._came = True
+        self._has_input = True
         counts = not self._liveness.lost  # keys read together with the answer may have been typed before it
         return [EventPress(event, counts) for event in self._keyboard.feed(self._terminal.read(), time.monotonic())]
 
@@ -149,57 +149,59 @@ class TeleopApp:
     def _take(self, event: Event, counts: bool) -> None:
         now = time.monotonic()
         if isinstance(event, Answer):
-            return self._hear(event, now)
+            return self._take_reply(event, now)
         if isinstance(event, Key) and not self._quits(event) and (not counts or self._is_old(event, now)):
             return self._session.disregard(event, now)
+        if isinstance(event, Key):
+            self._liveness.press(now)
         self._do(self._session.take(event, now))
         if isinstance(event, Key) and "ctrl+p" in (event.name, event.base) and event.kind == "press":
-            self._liveness.lend(now)
+            self._liveness.send_plain_keys_for_docker(now)
             self._session.let_go("to detach from a container: Ctrl-P Ctrl-Q within 2 s")
 
     def _quits(self, event: Event) -> bool:
-        """Whether it is Ctrl-C, on a keyboard of any script. It always counts."""
+        """Whether it is Ctrl-C, on a keyboard for any script. It always counts."""
         return isinstance(event, Key) and self._session.mapper.key(event) == "ctrl+c"
 
     def _is_old(self, event: Key, now: float) -> bool:
-        """Whether a key may have been held before the terminal was identified; only possible for typed keys."""
+        """Whether a key may have been held since before the terminal was identified, which only typed keys can."""
         return self._liveness.is_new(now) and event.kind == "typed"
 
-    def _hear(self, answer: Answer, now: float) -> None:
+    def _take_reply(self, answer: Answer, now: float) -> None:
         lost = self._liveness.lost
-        self._liveness.hear(answer, now)
+        self._liveness.take_reply(answer, now)
         if lost and not self._liveness.lost and self._session.warning in ("", UNANSWERED):
             self._session.warning = ANSWERS
         if answer.to == "terminal" and not self._terminal.releases and self._session.mapper.settings.deadman:
             raise TeleopError(HELD_KEYS_NEEDED)
 
     def _pass(self) -> None:
-        """Do everything that is due; called on input, and at the latest when the next task is due."""
+        """Do everything that is due. Called on input, and when the next task is due."""
         if self._loop is None or self._app.is_done:
             return
         if self._timer:
             self._timer.cancel()
-        self._look()
+        self._check_for_pause()
         now = time.monotonic()
         if waited := self._flush():
             self._app.key_processor.feed_multiple(waited)
             self._app.key_processor.process_keys()
-        if self._came:
-            self._came = False
-            self._liveness.came(now)
+        if self._has_input:
+            self._has_input = False
+            self._liveness.note_input(now)
         if self._joystick:
             self._steer(self._joystick, now)
         self._session.tick(now)
         self._check(now)
         if self._suspended:
-            self._sleep()
+            self._suspend_process()
         if self._ended:
             return self._finish()
         self.draw(now)
         self._timer = self._loop.call_later(self._patience(), self._pass)
 
     def _patience(self) -> float:
-        """The time until something is due."""
+        """The time (s) until the next pass."""
         mapper = self._session.mapper
         due = min(self._draw_at, mapper.key_state.expires, self._session.due if mapper.engaged else math.inf)
         return min(max(due - time.monotonic(), SHORTEST), LONGEST)
@@ -219,11 +221,14 @@ class TeleopApp:
         self._session.steer(self._stick, now)
 
     def _check(self, now: float) -> None:
-        """Stop if the operator cannot be reached."""
+        """Stop the robot if the operator cannot be reached."""
         mapper = self._session.mapper
         engaged = bool(mapper.key_state.keys) or mapper.motion != STILL
         lasting = mapper.key_state.mode == LATCH or mapper.key_state.timeout is not None
-        if why := self._liveness.check(now, engaged, lasting):
+        why = self._liveness.check(now, engaged, lasting)
+        if mapper.key_state.keys and lasting:
+            why = why or self._liveness.lapse(now)
+        if why:
             self._session.let_go(why if engaged else "")
 
     def draw(self, now: float) -> None:
@@ -234,7 +239,7 @@ class TeleopApp:
             self._draw_at = now + RETRY
             return
         self._draw_at = now + (LINE_EVERY if self._plain else REDRAW)
-        state = self._telemetry.state(self._why(), now, self._ascii)
+        state = self._telemetry.state(self._mode_reason(), now, self._ascii)
         state.detached = not self._liveness.is_attached()
         if self._plain:
             self._terminal.write(f"{plain_line(state)}\r\n")
@@ -242,13 +247,16 @@ class TeleopApp:
             self._picture.lines = render(state, *self._terminal.size())
             self._app.invalidate()
 
-    def _why(self) -> str:
+    def _mode_reason(self) -> str:
         """The reason for the mode."""
-        key_state = self._session.mapper.key_state
+        key_state, blind_in = self._session.mapper.key_state, self._liveness.blind_in
+        limit = f"for {LASTS:g} s in {blind_in}" if blind_in else ""
         if key_state.mode == LATCH:
-            return "a key sets the motion until another"
+            return f"a key sets the motion until another{limit and f', {limit}'}"
         if self._terminal.releases:
             return "this terminal reports key releases"
+        if key_state.timeout is not None and key_state.timeout > LASTS and limit:
+            return f"a key counts {limit}"
         if key_state.timeout is not None:
             return f"a key counts for {key_state.timeout:g} s"
         first, every = key_state.repeat.first, key_state.repeat.every
@@ -260,55 +268,54 @@ class TeleopApp:
         self._ended = self._ended or action == "quit"
         self._suspended = self._suspended or action == "suspend"
 
-    def _look(self) -> None:
+    def _check_for_pause(self) -> None:
         """Release all keys after a pause of this process or of the computer."""
-        before, self._looked = self._looked, _uptime()
-        if self._looked - before > STALL or self._back:
-            self._come_back("paused: keys typed in the meantime are ignored")
+        before, self._passed_at = self._passed_at, _uptime()
+        if self._passed_at - before > STALL or self._is_continued:
+            self._resume("paused: keys typed in the meantime are ignored")
 
-    def _come_back(self, why: str) -> None:
+    def _resume(self, why: str) -> None:
         if self._joystick:
             self._joystick.let_go()
         self._session.let_go(why if self._session.mapper.engaged else "")
         if self._readable():  # outdated, but for Ctrl-C
             typed = self._keyboard.feed(self._terminal.read(), time.monotonic())
             self._ended = self._ended or any(map(self._quits, typed))
-        self._liveness.meet_again()
-        self._forget()
-        self._back = False
+        self._liveness.set_up_again()
+        self._redraw_in_full()
+        self._is_continued = False
 
-    def _sleep(self) -> None:
-        """Ctrl-Z: stop the robot and return the terminal to the shell until we are resumed."""
+    def _suspend_process(self) -> None:
+        """Ctrl-Z: stop the robot, and return the terminal to the shell until this process is continued."""
         self._session.halt()
         self._terminal.leave()
         signal.signal(signal.SIGTSTP, signal.SIG_DFL)
         os.killpg(os.getpgrp(), signal.SIGTSTP)  # the whole group, since the shell waits for our parent too
         signal.signal(signal.SIGTSTP, self._suspend)
-        self._suspended, self._back = False, True
+        self._suspended, self._is_continued = False, True
 
     def _resize(self) -> None:
         """Another size may mean another terminal, attached to a container."""
-        self._liveness.look_again()
-        self._forget()
+        self._liveness.identify_again()
+        self._redraw_in_full()
         self._pass()
 
-    def _forget(self) -> None:
-        """The contents of the terminal are unknown: draw the next picture in full."""
+    def _redraw_in_full(self) -> None:
+        """Draw the next picture in full, since the contents of the terminal are unknown."""
         self._app.renderer.reset(leave_alternate_screen=False)
         self._draw_at = 0.0
 
     def _finish(self, error: BaseException | None = None) -> None:
-        """Send a stop at once, and end; `halt` then ensures the stop."""
+        """Send a stop at once, and end. The caller's `halt` then makes sure of the stop."""
         self._error = self._error or error
-        with contextlib.suppress(
-            Exception
-        ):  # the reason for the end matters more than a failed stop, which `halt` repeats
+        # The reason for the end matters more than a failed stop, which `halt` repeats.
+        with contextlib.suppress(Exception):
             self._session.let_go()
         if self._app.is_running and not self._app.is_done:
             self._app.exit()
 
     def _fail(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """Handle an exception raised in the loop."""
+        """End with an exception that was raised in the loop."""
         self._finish(context.get("exception") or RuntimeError(context.get("message")))
 
     def _end(self, _number: int, _frame: FrameType | None) -> None:
@@ -320,7 +327,7 @@ class TeleopApp:
         self._wake()
 
     def _continue(self, _number: int, _frame: FrameType | None) -> None:
-        self._back = True
+        self._is_continued = True
         self._wake()
 
     def _wake(self) -> None:

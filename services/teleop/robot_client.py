@@ -1,4 +1,4 @@
-"""One robot's keys on the bus: commands out, odometry and status in."""
+"""The keys of one robot on the bus: commands out, odometry and status in."""
 
 import math
 import time
@@ -9,11 +9,11 @@ from holozen.odometry import LOST, OdometryFeedback
 from holozen.transport.pubsub import Publisher
 from holozen.wire import PRIORITY_OF, key_for
 
-JUMP = 0.5  # m between two polls beyond what motion explains
+JUMP = 0.5  # m between two polls, more than its motion explains, that mean a reset
 
 
 class RobotClient:
-    """A robot to drive. `command` is its command key, its other keys are siblings of that; `stamped` as for Session."""
+    """A robot to drive. Its other keys are siblings of `command`, its command key; `stamped` is as for Session."""
 
     def __init__(self, bus: Bus, robot: str, command: str, stamped: str | None) -> None:
         self.robot, self.key = robot, command or key_for("cmd_vel", robot)
@@ -21,13 +21,14 @@ class RobotClient:
         kind: type[Twist] | type[TwistStamped] = Twist if stamped is None else TwistStamped
         self._commands: Publisher[Twist | TwistStamped] = bus.publisher(self.key, kind, PRIORITY_OF["teleop"])
         self.odom = OdometryFeedback(bus, self.beside("odom"))
+        self._odom_writers = bus.writers(self.beside("odom"))
         self.status_key = f"{self.key}_status"
         self.name = ""  # in the sim; empty while it is not known
         self._seen: tuple[float, float, float] | None = None  # stamp and position of the last odom seen
         self._status = bus.latest(self.status_key, CommandStatus)
 
     def beside(self, name: str) -> str:
-        """The robot's key of this name."""
+        """The robot's key with this name, beside its command key."""
         return key_for(name, self.key.rpartition("/")[0])
 
     def put(self, twist: Twist) -> None:
@@ -44,7 +45,7 @@ class RobotClient:
         return status if status and age < 3 * LOST else CommandStatus()
 
     def was_reset(self) -> bool:
-        """Whether the robot was reset since the last call: its clock went back, or its position jumped."""
+        """Whether the robot has been reset since the last call: its clock went back, or its position jumped."""
         odom, _ = self.odom.read()
         if odom is None:
             return False
@@ -55,8 +56,16 @@ class RobotClient:
         driven = 2 * math.hypot(twist.x, twist.y) * (stamp - before[0])  # at most
         return stamp < before[0] or math.dist(before[1:], self._seen[1:]) > JUMP + driven
 
+    def was_removed(self) -> bool:
+        """Whether a publisher of its odom has left since the last call: it was removed, though another one may have
+        taken its place.
+        """
+        tokens = list(iter(self._odom_writers.try_recv, None))
+        return any(token.is_deletion for token in tokens)
+
     def close(self) -> None:
         """Close its publishers and subscriptions."""
         self._commands.close()
+        self._odom_writers.close()
         self.odom.close()
         self._status.close()

@@ -1,18 +1,17 @@
-"""Arguments of teleop_twist_keyboard in ROS 1 and ROS 2 -> the flags of this teleop. Pure."""
+"""Converts arguments of teleop_twist_keyboard, in ROS 1 and ROS 2, to the flags of this teleop. Pure."""
 
 import argparse
 import re
 from collections.abc import Iterator
 
 from holozen import flags
-from holozen.console import printable
 from holozen.suggest import shorten
 
-from .toml_file import cut, one_of
+from .toml_file import InputError, cut, one_of
 
-# ROS 1 has all of them; ROS 2 has speed, turn, stamped and frame_id.
+# In ROS 1 there are all of these; in ROS 2 speed, turn, stamped and frame_id.
 PARAMETERS = ("speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "key_timeout", "stamped", "frame_id")
-# Node names that may precede a name in ROS 2.
+# The node names that may precede a parameter's name in ROS 2.
 NODES = ("teleop_twist_keyboard", "/teleop_twist_keyboard", "teleop", "/teleop", "*", "/*", "**", "/**")
 TRUE, FALSE = ("true", "yes", "on", "1"), ("false", "no", "off", "0")
 ROS_2 = {"-p": "-p", "--param": "-p", "-r": "-r", "--remap": "-r"}
@@ -24,14 +23,11 @@ RosArgument = tuple[str, str, str, str]
 """`-p` for a parameter or `-r` for a remap, its name, its value, and the argument as written."""
 
 
-class RosArgError(ValueError):
-    """An unsupported ROS argument; the text is one line that names it."""
-
-
 def ros_arguments(words: list[str]) -> list[str]:
-    """`words` with ROS arguments converted to flags, which come first; other words are unchanged. RosArgError.
+    """`words` with ROS arguments converted to flags, which come first; other words are unchanged. Raises InputError.
 
-    A remap of cmd_vel to `Fred/cmd_vel` becomes `--robot=Fred`, to another key `--cmd-vel=KEY`; a name `--name=x`.
+    A remap of cmd_vel to `Fred/cmd_vel` becomes `--robot=Fred`, one to another key `--cmd-vel=KEY`, and a node name
+    `--name=x`.
     """
     others: list[str] = []
     arguments = list(_split(words, others))
@@ -140,5 +136,5 @@ def _is_robot(name: str) -> bool:
         return False
 
 
-def _wrong(word: str, text: str) -> RosArgError:
-    return RosArgError(printable(f"{shorten(word, 60)}: {text}"))
+def _wrong(word: str, text: str) -> InputError:
+    return InputError(f"{shorten(word, 60)}: {text}")

@@ -1,7 +1,7 @@
-"""The terminal for prompt_toolkit: its input, its output, and the picture on it.
+"""The terminal as prompt_toolkit sees it: its input, its output, and the picture on it.
 
-prompt_toolkit has no key releases, so `input/kitty.py` parses the keys and each press carries its whole event. Its own
-output makes standard output block, so that a hung terminal would block the teleop: this one never blocks.
+prompt_toolkit has no key releases, so `input/kitty.py` parses the keys, and each press carries its whole event. Its own
+output blocks while a terminal hangs, and would block the teleop; this one never blocks.
 """
 
 import sys
@@ -28,8 +28,8 @@ STYLE = Style.from_dict({
     "title": "bold reverse", "driving": "bold ansicyan", "good": "ansigreen", "warning": "bold ansired", "dim": "dim",
     "alarm": "bold ansired reverse",
 })  # fmt: skip
-# Synchronized update: a terminal with support shows the picture at once, others ignore it. prompt_toolkit leaves the
-# cursor at the top left and moves it from there; another program may have moved it since.
+# A synchronized update: a terminal that supports it shows the picture at once, others ignore it. prompt_toolkit assumes
+# the cursor where it left it, at the top left, but another program may have moved it since.
 RESET = "\x1b[0m"
 BEGIN, END = "\x1b[?2026h\x1b[H", "\x1b[?2026l"
 
@@ -43,8 +43,8 @@ class EventPress(KeyPress):
 
 
 class TerminalInput(DummyInput):
-    """Reads a terminal whose modes are already set. `read` and `flush` return new keys, and those complete by timeout;
-    `taken` is called once all input was processed.
+    """Reads a terminal whose modes are already set. `read` returns new keys, `flush` those that are complete since
+    nothing more has arrived; `taken` is called once all input has been processed.
     """
 
     closed = False
@@ -59,7 +59,7 @@ class TerminalInput(DummyInput):
         self._fileno, self._read, self._flush, self._taken = fileno, read, flush, taken
 
     def fileno(self) -> int:
-        """For the loop."""
+        """The descriptor for the event loop."""
         return self._fileno
 
     def read_keys(self) -> list[KeyPress]:
@@ -67,12 +67,12 @@ class TerminalInput(DummyInput):
         return self._read()
 
     def flush_keys(self) -> list[KeyPress]:
-        """The keys that are complete by timeout."""
+        """The keys that are complete since nothing more has arrived."""
         return self._flush()
 
     @contextmanager
     def attach(self, input_ready_callback: Callable[[], None]) -> Iterator[None]:
-        """Call back when input is available."""
+        """Call `input_ready_callback` when there is input."""
 
         def ready() -> None:
             input_ready_callback()
@@ -109,7 +109,7 @@ class TerminalOutput(Vt100_Output):
             self._write(f"{BEGIN}{data}{END}")
 
     def _keep(self) -> None:
-        """`Terminal` has set this mode, and restores it at the end."""
+        """Do nothing: `Terminal` has set this mode, and restores it at the end."""
 
     enter_alternate_screen = quit_alternate_screen = enable_bracketed_paste = disable_bracketed_paste = _keep
     reset_cursor_key_mode = hide_cursor = show_cursor = _keep
@@ -120,7 +120,7 @@ class TerminalOutput(Vt100_Output):
 
 
 class Picture(Window):
-    """Lines over the whole screen. Unchanged rows are reused, which makes drawing three times as fast."""
+    """Lines that fill the screen. Unchanged rows are reused, which makes drawing three times as fast."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -1,5 +1,5 @@
-"""Scripted driving: `0.5s i` holds a key for half a second, `1s i J` two, `q` presses one, `1s` waits, and `stop`
-stops. It needs no terminal: for demonstrations and tests.
+"""Scripted driving, without a terminal, for demonstrations and tests: `0.5s i` holds a key for half a second, `1s i J`
+holds two keys for one, `q` presses a key once, `1s` waits, and `stop` stops.
 """
 
 import re
@@ -8,47 +8,49 @@ import threading
 import time
 from dataclasses import dataclass
 
+from holozen.messages import CommandStatus
+from holozen.suggest import listed, suggest
+from holozen.wire import key_for
+
 from .control.layouts import Layout
 from .input.kitty import Key
 from .session import Session
+from .toml_file import InputError
 
 LONGEST = 3600.0  # s
 LARGEST = 1_000_000  # characters
 TICK = 0.005  # s
 PATIENCE = 3.0  # s to wait for a subscriber
-DOUBT = 0.5  # s without being obeyed until it gives up; the sim reports its status at 10 Hz
+DOUBT = 0.5  # s without being obeyed after which it gives up; the sim reports its status at 10 Hz
+UNHEARD = 1.5  # s of commands after which it gives up if the sim has obeyed none; it first measures our clock
 DURATION = re.compile(r"(\d+(?:\.\d*)?|\.\d+)(ms|s)")
-
-
-class ScriptError(ValueError):
-    """An invalid script; the text is one line."""
 
 
 @dataclass(frozen=True)
 class Step:
-    """Keys held together for some seconds; none: no key is held."""
+    """Keys that are held together for some seconds; without keys, none is held."""
 
     seconds: float
     keys: tuple[str, ...]
 
 
 def load(path: str, layout: Layout) -> list[Step]:
-    """The steps of a file, or of standard input for "-", all read and checked before the first. Raises ScriptError."""
+    """The steps of a file, or of standard input for "-", all of them checked. Raises InputError."""
     try:
         if path == "-":
             return parse(sys.stdin.read(LARGEST + 1), "standard input", layout)
         with open(path, encoding="utf-8") as file:
             return parse(file.read(LARGEST + 1), path, layout)
     except OSError as error:
-        raise ScriptError(f"{path}: {error.strerror}") from None
+        raise InputError(f"{path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise ScriptError(f"{path}: not a text in UTF-8") from None
+        raise InputError(f"{path}: not a text in UTF-8") from None
 
 
 def parse(text: str, name: str, layout: Layout) -> list[Step]:
-    """The steps of a script; `#` starts a comment. Raises ScriptError with name and line."""
+    """The steps of a script, in which `#` starts a comment. Raises InputError with the `name` and the line."""
     if len(text) > LARGEST:
-        raise ScriptError(f"{name}: longer than {LARGEST} characters")
+        raise InputError(f"{name}: longer than {LARGEST} characters")
     steps = []
     for number, line in enumerate(text.splitlines(), 1):
         words = line.partition(" #")[0].split()
@@ -63,22 +65,24 @@ def _step(words: list[str], where: str, layout: Layout) -> Step:
     match = DURATION.fullmatch(words[0])
     seconds = float(match[1]) / (1000 if match[2] == "ms" else 1) if match else 0.0
     if seconds > LONGEST:
-        raise ScriptError(f"{where}: {words[0]!r} is longer than {LONGEST:g}s")
+        raise InputError(f"{where}: {words[0]!r} is longer than {LONGEST:g}s")
     keys = tuple(words[1:] if match else words)
     for key in keys:
         if key not in layout.moves and key not in layout.speeds:
-            raise ScriptError(f"{where}: {key!r} is not a key of {layout.name}; write `0.5s i`, `q` or `stop`")
+            raise InputError(f"{where}: {key!r} is not a key of {layout.name}; write `0.5s i`, `q` or `stop`")
         if key in layout.moves and not seconds:
-            raise ScriptError(f"{where}: how long is {key!r} held? write `0.5s {key}`")
+            raise InputError(f"{where}: how long is {key!r} held? write `0.5s {key}`")
     return Step(seconds, keys)
 
 
 def run(steps: list[Step], session: Session, stop: threading.Event) -> str:
-    """Drive the steps in order; keys held at the end are released. Returns why it was aborted, or ""."""
+    """Drive the steps in order. Returns why they were aborted, or ""."""
     patience = time.monotonic() + PATIENCE
     while not session.listeners() and not stop.wait(TICK):
-        if time.monotonic() > patience:
-            return f"no subscriber on {session.client.key}; start a sim in another terminal: holozen sim"
+        now = time.monotonic()
+        if now > patience:
+            return _nobody(session)
+        session.tick(now)  # it finds a robot at the root by its name
     for step in steps:
         now = time.monotonic()
         if not step.keys:
@@ -92,9 +96,19 @@ def run(steps: list[Step], session: Session, stop: threading.Event) -> str:
     return ""
 
 
+def _nobody(session: Session) -> str:
+    """That the robot is not there, and which ones are."""
+    missing = session.client.key
+    there = [key for key in (key_for("cmd_vel", robot) for robot in session.ring()) if key != missing]
+    meant = suggest(missing, there, lambda key: key.rpartition("/")[0])
+    others = f"{meant}; there are some on {listed(there)}"
+    return f"no subscriber on {missing}{others if there else '; start a sim in another terminal: holozen sim'}"
+
+
 def _hold(session: Session, until: float, stop: threading.Event) -> str:
-    """Drive until `until`. Returns why it was aborted, or ""."""
-    obeyed = now = time.monotonic()
+    """Drive until a time (s, monotonic). Returns why that was aborted, or ""."""
+    began = obeyed = now = time.monotonic()
+    heard = False
     while now < until:
         session.tick(now)
         if stop.wait(min(TICK, until - now)):
@@ -102,15 +116,18 @@ def _hold(session: Session, until: float, stop: threading.Event) -> str:
         before, now = now, time.monotonic()
         if now - before > DOUBT:
             return "it was paused, and the robot with it"
-        why = _not_obeyed(session)
+        status = session.client.status()
+        why = _not_obeyed(session, status)
         obeyed = obeyed if why else now
         if session.warning or now - obeyed > DOUBT:
             return session.warning or why
+        heard |= status.obeyed == session.bus.source or not any(session.mapper.motion)
+        if status.name and not heard and now - began > UNHEARD:
+            return "the sim has received none of the commands; does anything flood it?"
     return ""
 
 
-def _not_obeyed(session: Session) -> str:
-    status = session.client.status()
+def _not_obeyed(session: Session, status: CommandStatus) -> str:
     if status.stopped:
         return f"stopped by {status.stopped}; `holozen release` lets the robot drive again"
     if not any(session.mapper.motion):

@@ -1,4 +1,4 @@
-"""Joins mapper and robots: publishes the commands of the keys, hands over, switches between robots."""
+"""Joins the mapper with the robots: publishes commands, hands over, switches between robots."""
 
 import time
 from collections.abc import Sequence
@@ -24,8 +24,8 @@ SWITCHING = "switching to the next robot: press the key again"
 
 
 class Session:
-    """The teleop without its terminal. `stamped`: publish TwistStamped with this frame_id, else None. `command`: the
-    command key of the first robot, if it is not its own cmd_vel.
+    """The teleop without its terminal. `stamped` is the frame_id of a TwistStamped, or None to publish Twist. `command`
+    is the command key of the first robot, if it is not that robot's cmd_vel.
     """
 
     def __init__(
@@ -41,21 +41,21 @@ class Session:
         self.sent: Twist | None = None
         self.warning = ""
         self.help = False
-        self._sees = False  # whether there was odom at the last tick
-        self.due = 0.0  # when a command is to be repeated
-        self._wanted = ""  # pending until the robot is at rest: "resume" or "next_robot"
+        self._had_odom = False  # at the last tick
+        self.due = 0.0  # when the command is to be repeated
+        self._pending = ""  # the action that waits until the robot is at rest: "resume" or "next_robot"
 
     def take(self, event: Event, now: float) -> str:
-        """Take a key event, and publish any change at once. Returns "quit" or "suspend" if it requests that."""
+        """Take an event, and publish any change at once. Returns "quit" or "suspend" if it requests that."""
         if isinstance(event, Focus):
             return self.let_go(UNSEEN) if not event.gained and self.mapper.key_state.keys else ""
         if not isinstance(event, Key | Unknown):
             return ""
         key = event if isinstance(event, Key) else Key("unknown")
-        if key.kind == "press" or key.kind == "typed":
+        if key.kind in ("press", "typed"):
             if self._is_switching() and FIXED.get(self.mapper.key(key)) not in ("quit", "suspend"):
                 return self.let_go(SWITCHING)
-            self.warning, self._wanted = "", ""
+            self.warning, self._pending = "", ""
         return self.act(self.mapper.take(key, now), now)
 
     def disregard(self, key: Key, now: float) -> None:
@@ -65,10 +65,10 @@ class Session:
             self.let_go()
 
     def act(self, action: str, now: float) -> str:
-        """Do the action of a key or button. Returns "quit" or "suspend" if the caller has to do that."""
+        """Do the action of a key or button, except "quit" and "suspend", which are returned for the caller to do."""
         if action in ("resume", "next_robot"):
             self.let_go()
-            self._wanted = action
+            self._pending = action
         elif action == "help":
             self.help = not self.help
         elif action in FASTER:
@@ -77,21 +77,21 @@ class Session:
         return action if action in ("quit", "suspend") else ""
 
     def steer(self, stick: tuple[float, float, float], now: float) -> None:
-        """Take the joystick's position (forward, left, counter-clockwise; -1 to 1), and publish any change."""
+        """Take the joystick's deflection (forward, left, counter-clockwise; -1 to 1), and publish any change."""
         if stick != self.mapper.stick:
             self.mapper.steer(stick, now)
             self.publish(now)
 
     def tick(self, now: float) -> None:
-        """Publish what is due: a stop once a key is no longer held, else the repeated command."""
+        """Publish what is due: a stop if a key is no longer held, or the repeated command."""
         if self._root:
             self._find_root(self._root)
-        if self._wanted and not self.mapper.engaged:
-            self._do_wanted()
+        if self._pending and not self.mapper.engaged:
+            self._do_pending()
         lost = self.client.odom.is_lost
-        if lost and self._sees and self._drives:
+        if (self.client.was_removed() or (lost and self._had_odom)) and self._drives:
             self.let_go(BLIND)
-        self._sees = not lost
+        self._had_odom = not lost
         if self.client.was_reset() and self._drives:
             self.let_go(RESET)
         repeats = self.mapper.settings.repeat_rate > 0 or self.mapper.stopping_since() is not None
@@ -117,7 +117,7 @@ class Session:
             self.publish(time.monotonic())
 
     def publish(self, now: float) -> None:
-        """Publish the mapper's command at `now`, if any."""
+        """Publish the mapper's command at `now`, if it has one."""
         since = self.mapper.stopping_since()
         self.sent = self.mapper.command(now, since is not None and self.client.odom.rests(since))
         self.due = now + 1 / (self.mapper.settings.repeat_rate or 20.0)
@@ -125,7 +125,7 @@ class Session:
             self.client.put(self.sent)
 
     def ring(self) -> list[str]:
-        """The robots that Tab cycles through: those named, else all with a command subscriber."""
+        """The robots that Tab cycles through: those named, or else all with a command subscriber."""
         if len(self._robots) > 1:
             return self._robots
         keys = {end.key for end in self.graph.endpoints() if end.kind == "sub"}
@@ -144,14 +144,14 @@ class Session:
         return self.mapper.engaged and self.mapper.stopping_since() is None
 
     def _is_switching(self) -> bool:
-        """Whether the switch waits for this robot to come to rest; a key meant for the next one would move this one."""
-        if self._wanted == "next_robot" and not self.mapper.engaged:
-            self._do_wanted()
-        return self._wanted == "next_robot"
+        """Whether the switch still waits for this robot to rest: a key meant for the next one would move this one."""
+        if self._pending == "next_robot" and not self.mapper.engaged:
+            self._do_pending()
+        return self._pending == "next_robot"
 
-    def _do_wanted(self) -> None:
-        wanted, self._wanted = self._wanted, ""
-        if wanted == "resume":
+    def _do_pending(self) -> None:
+        pending, self._pending = self._pending, ""
+        if pending == "resume":
             return self._hand_over()
         ring = self.ring()
         robot = ring[(ring.index(self.client.robot) + 1) % len(ring)]
@@ -166,7 +166,7 @@ class Session:
         self.mapper.switch(robot)
 
     def _find_root(self, root: Latest[CommandStatus]) -> None:
-        """Take the robot at the root for one of its name, which its keys do not hold and no other robot's do."""
+        """If a named robot has no keys, but the one at the root says that this is its name, drive that one."""
         status = root.read()[0]
         name = status.name if status else ""
         if (

@@ -4,30 +4,24 @@ import argparse
 import os
 from collections.abc import Mapping
 
-from holozen.console import printable
-
 from . import toml_file
 from .control.layouts import LAYOUTS
 from .ros_args import ros_arguments
-from .toml_file import cut, one_of
+from .toml_file import InputError, cut, one_of
 
 NAMES = (
     "speed", "turn", "speed_limit", "turn_limit", "repeat_rate", "key_timeout", "stamped", "frame_id",
     "mode", "keys", "plain", "deadman", "joystick",
 )  # fmt: skip
-"""The flags allowed in the file. Robot and network are given on the command line only."""
+"""The flags that the file may set. Robot and network are given on the command line only."""
 
 MODES = ("hold", "latch")  # the flag also accepts Zenoh's modes, which belong to the network
 
 Setting = str | int | float | bool
 
 
-class SettingsError(ValueError):
-    """An invalid settings file; the text is one line with the reason."""
-
-
 def path(environ: Mapping[str, str] = os.environ) -> str | None:
-    """The path of the settings file; None without a home folder."""
+    """The path of the settings file; None if there is no home folder."""
     folder = environ.get("XDG_CONFIG_HOME", "")
     if not os.path.isabs(folder):  # must be ignored according to the XDG Base Directory Specification
         home = environ.get("HOME", "")
@@ -36,38 +30,35 @@ def path(environ: Mapping[str, str] = os.environ) -> str | None:
 
 
 def read(path: str | None) -> dict[str, Setting]:
-    """The settings in the file, with names and types checked but not values; empty without a file. SettingsError."""
+    """The settings in the file, their names and types checked; empty without a file. Raises InputError."""
     if path is None or not os.path.lexists(path):
         return {}
-    try:
-        found = toml_file.read(path)
-    except toml_file.TomlError as error:
-        raise SettingsError(str(error)) from None
+    found = toml_file.read(path)
     for name, value in found.items():
         if name not in NAMES:
-            raise _wrong(path, f"{cut(name)} is unknown{one_of(name.replace('-', '_'), [*NAMES])}")
+            raise InputError(f"{path}: {cut(name)} is unknown{one_of(name.replace('-', '_'), [*NAMES])}")
         if not isinstance(value, Setting):
-            raise _wrong(path, f"{name} is {cut(value)}; write one number, true, false or a text in quotes")
+            raise InputError(f"{path}: {name} is {cut(value)}; write one number, true, false or a text in quotes")
     return found
 
 
 def apply(parser: argparse.ArgumentParser, path: str | None) -> None:
-    """Make the file's settings the defaults of the flags, after the flags' own checks; SettingsError."""
+    """Make the file's settings the defaults of the flags, after the flags' own checks. Raises InputError."""
     actions = {action.dest: action for action in parser._actions if action.option_strings}
     values: dict[str, object] = {}
     for name, value in read(path).items():
         assert path is not None
         if name not in actions:
-            raise _wrong(path, f"{name} is not for this program")
+            raise InputError(f"{path}: {name} is not for this program")
         try:
             values[name] = _checked(actions[name], _from_here(name, value, path))
         except (argparse.ArgumentTypeError, ValueError) as error:
-            raise _wrong(path, f"{name} is {error}") from None
+            raise InputError(f"{path}: {name} is {error}") from None
     parser.set_defaults(**values)
 
 
 def parse(parser: argparse.ArgumentParser, words: list[str], path: str | None) -> argparse.Namespace:
-    """Parse flags and ROS arguments; settings of the file are the defaults. SettingsError, RosArgError."""
+    """Parse flags and ROS arguments, with the file's settings as defaults. Raises InputError."""
     words = ros_arguments(words)
     parser.parse_args(words)  # first, so that --help and errors in flags do not depend on the file
     apply(parser, path)
@@ -82,7 +73,7 @@ def _from_here(name: str, value: Setting, path: str) -> Setting:
 
 
 def _checked(action: argparse.Action, value: Setting) -> object:
-    """The value converted as by the flag; ArgumentTypeError, ValueError."""
+    """The value as the flag converts it. Raises ArgumentTypeError or ValueError."""
     if action.nargs == 0:  # a flag that takes no value
         if not isinstance(value, bool):
             raise ValueError(f"{cut(value)}: write true or false")
@@ -96,7 +87,3 @@ def _checked(action: argparse.Action, value: Setting) -> object:
     if choices is not None and made not in choices:
         raise ValueError(f"{cut(value)}{one_of(str(value), [str(choice) for choice in choices])}")
     return made
-
-
-def _wrong(path: str, text: str) -> SettingsError:
-    return SettingsError(printable(f"{path}: {text}"))

@@ -1,4 +1,4 @@
-"""What the screen shows of a robot: its position, the link to the sim, the active command source."""
+"""What the screen shows of a robot: its position, the link to the sim, and the source that drives."""
 
 import math
 import threading
@@ -10,7 +10,7 @@ from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, Odometry, TriggerRequest, Twist
 from holozen.transport.errors import BusError
 
-from .control.twist_mapper import DEAD_MAN, TwistMapper
+from .control.twist_mapper import DEAD_MAN
 from .session import Session
 from .view import Source, State
 
@@ -33,7 +33,7 @@ class RoundTrip:
         self._thread.start()
 
     def close(self) -> None:
-        """Measure no more."""
+        """End the measurement."""
         self._closing.set()
         self._thread.join(CLOSE_LIMIT)
 
@@ -53,7 +53,7 @@ class Track:
     def __init__(self) -> None:
         self.pose: tuple[float, float, float] | None = None  # x, y, yaw
         self.trail: deque[tuple[float, float]] = deque(maxlen=TRAIL_LENGTH)
-        self._times: deque[tuple[float, float]] = deque()  # of the odom's clock and of ours
+        self._times: deque[tuple[float, float]] = deque()  # times on the odom's clock and on ours
 
     def see(self, odom: Odometry, now: float) -> None:
         """Take the latest odom, read at `now`."""
@@ -72,7 +72,7 @@ class Track:
             self._times.popleft()
 
     def real_time_factor(self) -> float | None:
-        """Seconds of the odom's clock per second of ours; None if not known yet."""
+        """Seconds on the odom's clock per second on ours; None while it is unknown."""
         if len(self._times) < 2:
             return None
         (began, ours), (ended, now) = self._times[0], self._times[-1]
@@ -84,24 +84,25 @@ class Telemetry:
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self._track, self._of = Track(), session.client
+        self._track, self._tracked = Track(), session.client
         self._round_trip = RoundTrip(session.bus, session.client.status_key)
 
     def close(self) -> None:
-        """Measure no more."""
+        """End the measurement of the link."""
         self._round_trip.close()
 
     def state(self, why: str, now: float, ascii: bool) -> State:
         """The state to show. `why` is the reason for the mode."""
         session, client = self._session, self._session.client
-        if client is not self._of:
-            self._track, self._of = Track(), client
+        if client is not self._tracked:
+            self._track, self._tracked = Track(), client
         self._round_trip.key = client.status_key
         odom, age = client.odom.read()
         if odom is not None:
             self._track.see(odom, now)
         status = client.status()
-        state = State(
+        settings = session.mapper.settings
+        return State(
             robot=client.robot,
             name=client.name or client.robot,
             others=[robot for robot in session.ring() if robot != client.robot],
@@ -121,14 +122,22 @@ class Telemetry:
             warning=session.warning or _unmoved(session, status) or _refusal(status, session.bus.source),
             why=why,
             ascii=ascii,
+            mode=settings.mode,
+            deadman=settings.deadman,
+            deadman_held=DEAD_MAN in session.mapper.key_state.keys,
+            speed=settings.speed,
+            speed_limit=min(settings.speed_limit, status.max_linear or math.inf),
+            turn=settings.turn,
+            turn_limit=min(settings.turn_limit, status.max_angular or math.inf),
+            obeyed=status.obeyed,
+            held=status.held,
+            stopped=status.stopped,
+            sources=[Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources],
         )
-        _show_mapper(state, session.mapper)
-        _show_status(state, status)
-        return state
 
 
 def _unmoved(session: Session, status: CommandStatus) -> str:
-    """Why the robot moves slower than commanded, or not at all; empty if it obeys the keys."""
+    """Why the robot moves slower than the keys command, or not at all; empty if it obeys them."""
     settings, (x, y, _, turn) = session.mapper.settings, session.mapper.motion
     if y and not status.strafes:
         return "this robot cannot strafe: its drive only goes forward, backward and turns"
@@ -139,24 +148,10 @@ def _unmoved(session: Session, status: CommandStatus) -> str:
     return session.mapper.note
 
 
-def _show_mapper(state: State, mapper: TwistMapper) -> None:
-    settings = mapper.settings
-    state.mode, state.deadman, state.deadman_held = settings.mode, settings.deadman, DEAD_MAN in mapper.key_state.keys
-    state.speed, state.speed_limit = settings.speed, settings.speed_limit
-    state.turn, state.turn_limit = settings.turn, settings.turn_limit
-
-
-def _show_status(state: State, status: CommandStatus) -> None:
-    state.obeyed, state.held, state.stopped = status.obeyed, status.held, status.stopped
-    state.speed_limit = min(state.speed_limit, status.max_linear or math.inf)
-    state.turn_limit = min(state.turn_limit, status.max_angular or math.inf)
-    state.sources = [Source(s.source, s.priority, s.rate, s.obeyed, s.held) for s in status.sources]
-
-
 def _planar(twist: Twist) -> Planar:
     return twist.linear.x, twist.linear.y, twist.angular.z
 
 
 def _refusal(status: CommandStatus, source: str) -> str:
-    """Why the last of our commands was refused, if it was."""
+    """Why the last refused command was refused, if it was ours; else empty."""
     return status.last_refusal.partition(": ")[2] if status.last_refusal.startswith(f"{source}: ") else ""

@@ -1,4 +1,4 @@
-"""Reads small hand-written TOML files: an error is one line with the place."""
+"""Reads small hand-written TOML files. Errors in them, and in all other input of the teleop, are one line."""
 
 import os
 import re
@@ -13,39 +13,39 @@ LONGEST = 1000  # characters in a line; a long dotted key keeps tomllib busy for
 _PLACE = re.compile(r"(.*) \(at (?:line (\d+), column \d+|end of document)\)", re.DOTALL)
 
 
-class TomlError(ValueError):
-    """An invalid file; the text is one line."""
+class InputError(ValueError):
+    """A file or an argument that cannot be used; the text is one printable line with the place and the reason."""
 
     def __init__(self, text: str) -> None:
         super().__init__(printable(text))
 
 
 def read(path: str) -> dict[str, Any]:
-    """The contents of the file, unchecked; TomlError. It never blocks, not even on a FIFO."""
-    import tomllib  # here and below, since most runs need neither
+    """The contents of the file, unchecked. Raises InputError. It never blocks, not even on a FIFO."""
+    import tomllib  # most runs do not need it
 
     try:
         text = _bytes(path).decode()
     except UnicodeDecodeError as error:
-        raise TomlError(f"{path}: is not UTF-8 text (byte {error.start})") from None
+        raise InputError(f"{path}: is not UTF-8 text (byte {error.start})") from None
     for number, line in enumerate(text.split("\n"), 1):
         if len(line) > LONGEST:
-            raise TomlError(f"{path}:{number}: is longer than {LONGEST} characters")
+            raise InputError(f"{path}:{number}: is longer than {LONGEST} characters")
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise TomlError(f"{path}: is nested too deeply") from None
+        raise InputError(f"{path}: is nested too deeply") from None
     except ValueError as error:
-        raise TomlError(_not_toml(path, text, str(error))) from None
+        raise InputError(_not_toml(path, text, str(error))) from None
 
 
 def cut(value: object) -> str:
-    """A value for a message: as written in Python, but shortened."""
+    """A value as text for a message: its repr, shortened."""
     return shorten(repr(value), 60)
 
 
 def one_of(name: str, known: list[str]) -> str:
-    """The end of a message about an unknown name: the closest known one, or else all of them."""
+    """The end of a message about an unknown name: the closest known one, or all of them if none is close."""
     return suggest(name, known) or f"; use {', '.join(known)}"
 
 
@@ -55,13 +55,13 @@ def _bytes(path: str) -> bytes:
         with open(number, "rb") as file:
             is_file, found = stat.S_ISREG(os.fstat(number).st_mode), file.read(LARGEST + 1)
     except IsADirectoryError:
-        raise TomlError(f"{path}: is a folder") from None
+        raise InputError(f"{path}: is a folder") from None
     except (OSError, ValueError) as error:  # a path with a NUL in it is a ValueError
-        raise TomlError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+        raise InputError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if not is_file:
-        raise TomlError(f"{path}: is not a regular file")
+        raise InputError(f"{path}: is not a regular file")
     if len(found) > LARGEST:
-        raise TomlError(f"{path}: is larger than {LARGEST // 1024} KB")
+        raise InputError(f"{path}: is larger than {LARGEST // 1024} KB")
     return found
 
 

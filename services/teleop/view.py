@@ -1,4 +1,4 @@
-"""The screen as styled lines for a terminal of any size. Pure: a `State` in, lines out."""
+"""Lays the screen out as styled lines, for a terminal of any size. Pure: a `State` in, lines out."""
 
 import math
 from collections.abc import Sequence
@@ -25,9 +25,9 @@ class Source:
 
 @dataclass
 class State:
-    """Everything the screen shows. Lengths in metres, angles in radians, velocities in m/s and rad/s, times in seconds.
+    """Everything that the screen shows, in m, rad, m/s, rad/s and s.
 
-    Names and warnings may hold anything: they came over the wire, and are made printable where they are drawn.
+    Names and warnings came over the wire and may hold anything; they are made printable where they are drawn.
     """
 
     robot: str = ""  # "" is the robot at the root
@@ -44,12 +44,12 @@ class State:
     turn_limit: float = 1000.0
     command: Planar | None = None  # None: no commands are published
     measured: Planar = STOP
-    odom_age: float = math.inf  # inf before the first
+    odom_age: float = math.inf  # inf before the first odom
     stale: bool = True
-    round_trip: float | None = None  # to the sim and back; None: not known
+    round_trip: float | None = None  # to the sim and back; None: unknown
     real_time_factor: float | None = None
     listeners: list[str] = field(default_factory=list)
-    sources: list[Source] = field(default_factory=list)  # command sources as reported by the sim; may include ourselves
+    sources: list[Source] = field(default_factory=list)  # command sources that the sim reports; may include ourselves
     obeyed: str = ""
     held: bool = False  # whether the autopilot is held until `resume`
     source: str = ""  # our own name
@@ -73,11 +73,11 @@ class State:
         return self.command is not None and any(self.command)
 
 
-LINK_LIMIT = 0.25  # s round trip; beyond it the operator steers by outdated data
+LINK_LIMIT = 0.25  # s of round trip; beyond, the operator steers by outdated data
 
 
 def clean(text: str, longest: int = 200) -> str:
-    """Printable ASCII of at most `longest` characters, so that its width is its length; `?` for other characters."""
+    """The text in printable ASCII, whose width is its length, cut to `longest` characters; `?` for all others."""
     if not (text.isascii() and text.isprintable()):
         text = "".join(letter if " " <= letter <= "~" else "?" for letter in text[: longest + 1])
     return text if len(text) <= longest else text[: max(0, longest - 1)] + "~"
@@ -93,7 +93,7 @@ def number(value: float) -> str:
 
 
 def short(value: float) -> str:
-    """The same with two digits, in 5 characters below 10: +0.50."""
+    """A velocity with its sign and two digits, in 5 characters below 10: +0.50."""
     if abs(value) < 5e-3:
         value = 0.0
     return f"{value:+.2f}" if abs(value) < 9.995 else number(value)
@@ -113,13 +113,13 @@ def seconds(value: float) -> str:
 
 
 def planar(velocity: tuple[float, float, float]) -> str:
-    """A velocity as text."""
+    """A planar velocity (m/s, m/s, rad/s) as text."""
     x, y, turn = map(number, velocity)
     return f"x {x} y {y} m/s turn {turn} rad/s"
 
 
 def alarms(state: State) -> list[list[str]]:
-    """The alarms, the most severe first; each in wordings from the longest to the shortest."""
+    """The alarms, the most severe first; each is a list of wordings, from the longest to the shortest."""
     found = []
     if state.stopped:
         release = f"`holozen release{' ' * bool(state.robot)}{clean(state.robot, 64)}`"
@@ -142,7 +142,7 @@ def alarms(state: State) -> list[list[str]]:
 
 
 def driver(state: State) -> tuple[str, str]:
-    """The source that drives, with a style: a warning if it is not us while we command motion."""
+    """A style, and the source that drives: a warning if that is not us while we command motion."""
     if state.obeyed and state.obeyed == state.source:
         return "good", "you drive"
     if state.obeyed:
@@ -160,11 +160,11 @@ def mode(state: State) -> str:
 NUMBER = 7  # characters
 AXES = (("x forward", "x", "m/s"), ("y left", "y", "m/s"), ("turn left", "turn", "rad/s"))
 SHORT = 39  # columns; minimum for the bars
-LONG = 72  # columns from which the axes have their long names and units
+LONG = 72  # columns from which on the axes have long names and units
 
 
 def velocity_bars(state: State, columns: int) -> list[Line]:
-    """Five lines: a header, one for each of x, y and turn, and the set speeds with their limits."""
+    """Five lines: a header, a line for each of x, y and turn, and the set speeds with their limits."""
     long = columns >= LONG
     label, unit, gap = (11, 6, 3) if long else (6, 0, 1)
     cells = min(41, max(3, (columns - label - unit - gap) // 2 - NUMBER))
@@ -188,7 +188,7 @@ def _header(state: State, label: int, half: int) -> Line:
 
 
 def _settings(state: State, second: int) -> Line:
-    """The turn begins at the column `second`, or where the speed ends."""
+    """The line of the set speeds. The turn begins at the column `second`, or if that is 0, after the speed."""
     speed, turn = amount(state.speed), amount(state.turn)
     most, fastest = f"{state.speed_limit:.4g}", f"{state.turn_limit:.4g}"
     if not second:
@@ -199,7 +199,7 @@ def _settings(state: State, second: int) -> Line:
 
 
 def _scale(state: State, axis: int) -> float:
-    """The values of a full bar: the set speed, or more if exceeded. x and y share one scale."""
+    """The value of a full bar: the set speed, or more if it is exceeded. x and y share one scale."""
     axes, setting = ((2,), state.turn) if axis == 2 else ((0, 1), state.speed)
     shown = [state.command] if state.command else []
     shown += [state.measured] if state.known else []
@@ -221,7 +221,9 @@ def _cell(velocity: Planar | None, axis: int, most: float, cells: int, style: st
 
 
 def bar(part: float, cells: int, style: str, ascii: bool = False) -> Line:
-    """A bar of an odd number of cells from the middle to the right, or to the left for a part below zero (-1 to 1)."""
+    """A bar for a `part` from -1 to 1, in an odd number of cells: from the middle to the right, or to the left if it is
+    negative.
+    """
     full, half, rest = ("=", "=", "-") if ascii else ("▄", "▖" if part > 0 else "▗", "▁")
     side = cells // 2
     halves = min(2 * side, round(abs(part) * 2 * side))
@@ -248,7 +250,7 @@ def plain_line(state: State) -> str:
 
 
 def _plain_links(state: State) -> list[str]:
-    """Ages, subscribers and other sources; problems are among the alarms already."""
+    """Ages, subscribers and other sources. Problems are among the alarms."""
     parts = []
     if state.known:
         parts.append(f"odom {seconds(state.odom_age)} old")
@@ -264,15 +266,16 @@ def _plain_links(state: State) -> list[str]:
     return parts
 
 
-WIDE, TALL = 80, 20  # from this size on text and keys are on the left, the map is on the right
+ROOT = "the robot at the root"  # whose keys begin with no name
+WIDE, TALL = 80, 20  # from this size on, text and keys are on the left, and the map is on the right
 LEFT = 55  # columns of the left side
 LABEL = 11  # columns before a value
 KEYS = 41  # columns of a line of help
-ROOMY = 30  # rows from which everything fits
-SLOW, LATE = 0.1, 0.95  # s round trip, and real-time factor; worse values are noticeable when driving
+ROOMY = 30  # rows from which on everything fits
+SLOW, LATE = 0.1, 0.95  # s of round trip, and real-time factor; worse values are noticeable when driving
 
 Ranked = tuple[int, Line]
-"""A line and its rank: without room for all, lines of the highest rank are dropped first."""
+"""A rank and a line: if there is no room for all lines, those of the highest rank are dropped first."""
 
 ALARM, SPEED, DRIVER, SETTING, HEADER, TITLE, LINK, BLANK, SPARE = range(9)
 EMPTY: Ranked = (BLANK, [])
@@ -306,7 +309,7 @@ def _wide(state: State, loud: list[Ranked], columns: int, rows: int) -> list[Lin
 
 
 def _narrow(state: State, loud: list[Ranked], columns: int, rows: int) -> list[Line]:
-    """One side only. With few rows or columns velocities are text instead of bars."""
+    """All parts below one another. With few rows or columns, velocities are text instead of bars."""
     driving, how = [("", " "), driver(state)], [("", f" {mode(state)}")]
     if columns >= SHORT and rows >= len(loud) + 6:
         speeds = _speeds(state, columns)
@@ -323,7 +326,7 @@ def _narrow(state: State, loud: list[Ranked], columns: int, rows: int) -> list[L
 
 
 def _help(state: State, loud: list[Ranked], columns: int, rows: int) -> list[Line]:
-    """The whole layout in as many columns as needed; alarms and velocities stay."""
+    """The whole layout in as many columns as it needs, below the alarms and velocities."""
     speeds = [(SPEED, line) for line in _compact(state, columns)]
     top = _fit([_title(state, columns), *loud, *speeds, EMPTY], rows)
     room = rows - len(top) - 1
@@ -335,7 +338,7 @@ def _help(state: State, loud: list[Ranked], columns: int, rows: int) -> list[Lin
 
 
 def _columns(texts: list[str], columns: int, rows: int) -> tuple[list[str], int]:
-    """Texts in columns, as many as fit; and the number of missing ones."""
+    """As many texts as fit, in columns, and the number of those that do not fit."""
     lines, shown = [""] * min(rows, len(texts)), 0
     while shown < len(texts):
         beside = texts[shown : shown + rows]
@@ -348,7 +351,7 @@ def _columns(texts: list[str], columns: int, rows: int) -> tuple[list[str], int]
 
 
 def _alarms(state: State, columns: int, rows: int) -> list[Line]:
-    """Each alarm as wide as the screen, in the longest wording that fits; all in one line if there are too many."""
+    """The alarms, each as wide as the screen and in the longest wording that fits; all in one line if they are many."""
     found = alarms(state)
     if len(found) >= rows:
         all_of_them = " + ".join(wordings[-1] for wordings in found)
@@ -361,8 +364,8 @@ def _alarms(state: State, columns: int, rows: int) -> list[Line]:
 
 
 def _title(state: State, columns: int) -> Ranked:
-    robot = clean(state.name or state.robot, 64) or "the robot at the root"
-    others = ", ".join(clean(name, 64) for name in state.others)
+    robot = clean(state.name or state.robot, 64) or ROOT
+    others = ", ".join(clean(name, 64) or ROOT for name in state.others)
     product = "holozen teleop   " if columns >= WIDE else ""
     left = f" {product}{robot}" + (f"   Tab: {others}" if others else "")
     parts = _sides([("", left)], [("", f"{clean(state.source, 40)} ")], columns)
@@ -403,7 +406,7 @@ def _links(state: State, columns: int, most: int) -> list[Ranked]:
 
 
 def _odom(state: State) -> Line:
-    """The age of odom, in a field of constant width, since it always changes."""
+    """The age of odom, in a field of constant width, since it changes all the time."""
     if not math.isfinite(state.odom_age):
         return _labelled("odom age", ("warning", "none"))
     style, age = "good" if state.known else "warning", state.odom_age
@@ -433,7 +436,7 @@ def _labelled(label: str, *parts: tuple[str, str]) -> Line:
 
 
 def _keys(state: State, columns: int, room: int) -> list[Line]:
-    """The help; if it does not fit, with how to see the rest."""
+    """The lines of help; if they do not fit, the last one tells how to see the rest."""
     if room < 1:
         return []
     lines: list[Line] = [[("", _key(key, columns))] for key in state.keys[:room]]
@@ -449,7 +452,7 @@ def _warning(state: State) -> Line:
 
 
 def _sides(left: Line, right: Line, columns: int) -> Line:
-    """A part at the left edge and one at the right edge as far as it fits, with two blanks between them."""
+    """One part at the left edge, and one at the right edge, cut to fit, with two blanks or more between them."""
     room = columns - sum(len(text) for _, text in left) - 2
     fits = _cut(right, max(0, room))
     return [*left, ("", " " * (room + 2 - sum(len(text) for _, text in fits))), *fits]
@@ -465,7 +468,7 @@ def _beside(left: list[Line], right: list[Line], rows: int) -> list[Line]:
 
 
 def _fit(lines: list[Ranked], rows: int) -> list[Line]:
-    """The lines that fit: the last line of the highest rank is dropped first."""
+    """The lines that fit. Of those with the highest rank, the last is dropped first."""
     kept = sorted(range(len(lines)), key=lambda index: (lines[index][0], index))[: max(0, rows)]
     return [lines[index][1] for index in sorted(kept)]
 
@@ -481,7 +484,7 @@ def _cut(line: Line, columns: int) -> Line:
 
 
 PLACES = {"sign": "driving", "trail": "good", "grid": "dim", "": ""}
-"""The styles of the map's parts while odom is fresh."""
+"""The styles of the map's parts while odom is current."""
 
 
 def chart(state: State, columns: int, rows: int) -> list[Line]:

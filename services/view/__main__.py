@@ -2,6 +2,7 @@
 
 import argparse
 import contextlib
+import errno
 import io
 import re
 import secrets
@@ -34,7 +35,7 @@ NO_TOKEN = "none"
 def parser() -> argparse.ArgumentParser:
     parser = flags.Parser(
         prog="holozen view",
-        description="Show the robots and their world in a browser, and drive them from there.",
+        description="show the robots and their world in a browser, and drive them from there",
         epilog="example: holozen view square.mcap",
     )
     add = parser.add_argument
@@ -96,14 +97,14 @@ def main(argv: list[str] | None = None) -> int:
 
 
 def _serve_foxglove(args: argparse.Namespace, where: connection.Connection, token: str) -> int:
-    """Serve Foxglove until a signal."""
+    """Serve Foxglove until a signal ends it."""
     if args.bag:
         report(f"view: Foxglove opens {args.bag} itself; --foxglove serves what is on the network")
         return 2
     if where.private or where.secure:
         report("view: every user of this machine can read what --foxglove serves; leave out --private and --secure")
         return 2
-    if args.token is None:  # a page of any web site could connect else
+    if args.token is None:  # without a token, a page of any web site could connect
         token = secrets.token_urlsafe(16)
     stop = stop_event()
     try:
@@ -134,7 +135,7 @@ def _bus(bag: str | None, where: connection.Connection, stop: threading.Event) -
 
 
 def random_token(host: str, where: connection.Connection) -> str:
-    """A token where more people reach `host` than the robots; empty where they are the same."""
+    """A random token if more people can reach `host` than can reach the robots; else empty."""
     from .guard import is_loopback
 
     return "" if is_loopback(host) and not where.private and not where.secure else secrets.token_urlsafe(16)
@@ -148,7 +149,7 @@ def _word(text: str) -> str:
 
 
 def _addresses(args: argparse.Namespace, port: int, token: str, scheme: str = "http") -> Iterator[str]:
-    """Where the page is, and what that exposes."""
+    """Lines with the address of the page, and what that exposes."""
     from .guard import is_loopback
 
     host = f"[{args.host}]" if ":" in args.host else args.host
@@ -164,7 +165,7 @@ def _addresses(args: argparse.Namespace, port: int, token: str, scheme: str = "h
 
 
 def _check_port(host: str, port: int) -> None:
-    """Raise OSError if it cannot be listened on; viser would silently take the next one."""
+    """Raise OSError if the port is not free; viser would silently take the next one."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     with socket.socket(family) as probe:
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -172,23 +173,24 @@ def _check_port(host: str, port: int) -> None:
             probe.bind((host, port))
         except (OSError, OverflowError) as error:
             reason = getattr(error, "strerror", None) or error
-            raise OSError(f"cannot listen on {host} port {port}: {reason}; --port 0 takes a free one") from None
+            advice = "; --port 0 takes a free one" if getattr(error, "errno", 0) == errno.EADDRINUSE else ""
+            raise OSError(f"cannot listen on {host} port {port}: {reason}{advice}") from None
 
 
 def _serve(host: str, port: int, guard: "Guard") -> "viser.ViserServer":
-    """viser's server, guarded."""
+    """viser's server, with all its connections guarded. Raises OSError."""
     import viser
 
     class Server(viser.ViserServer):
         def request_share_url(self, verbose: bool = True) -> None:
-            """Nothing: any page could ask for it, and it would open the robots to the internet."""
+            """Do nothing: any page could request this, and it would open the robots to the internet."""
 
     with contextlib.redirect_stdout(io.StringIO()), guard.guarding():
         server = Server(host, port, label="holozen", verbose=False)
     if not guard.installed or (port and server.get_port() != port):
         server.stop()
         raise OSError(
-            f"viser {viser.__version__} did not let itself be guarded on port {port}; install the version locked"
+            f"viser {viser.__version__} cannot be guarded on port {port}; install the version in requirements.lock"
         )
     server.gui.configure_theme(show_logo=False, show_share_button=False)
     return server
@@ -209,7 +211,7 @@ def _show(
     scene, drivers = Scene(server, bus, lambda: playback is not None and playback.paused), Drivers(bus)
     pages: dict[int, Page] = {}
 
-    # All that writes to pages runs in the server's event loop: from other threads viser's buffers are not safe.
+    # Everything that writes to pages runs in the server's event loop: viser's buffers are not thread-safe.
     async def opened(client: "viser.ClientHandle") -> None:
         if playback and playback.paused and not playback.position:
             playback.toggle()

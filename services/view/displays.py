@@ -1,9 +1,9 @@
-"""What RViz calls displays, of the robot that a page has chosen: its frames, and what its topics hold in them."""
+"""Displays, as in RViz, of the robot that a page has chosen: its frames, and the messages of its topics in them."""
 
 import io
 import math
 from array import array
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Iterator, Mapping
 from functools import partial
 from typing import Any
 
@@ -26,12 +26,13 @@ from holozen.messages import (
 from holozen.rotation import Transform
 from holozen.wire import key_for
 
-from .scene import SEEN, Scene, Shown, wxyz
+from .instances import difference, wxyz
+from .scene import SEEN, Scene, Shown
 
 KINDS: dict[str, type[Message]] = {
     kind.ROS: kind for kind in (LaserScan, PointCloud2, Range, Image, CompressedImage, Path, Odometry)
 }
-WORLD = "world"  # the fixed frame in which robots are where they truly are
+WORLD = "world"  # the fixed frame in which a robot is at its true pose
 DRAW_EVERY = 4  # frames of the page
 LARGEST = 16_000_000  # bytes of a message that is shown
 RED, YELLOW, GREEN, BLUE = (230, 0, 0), (235, 200, 0), (0, 150, 0), (0, 90, 220)
@@ -39,20 +40,20 @@ POINT = 0.02  # m
 LINE = 0.015  # m
 AXES = 0.25  # m
 ELLIPSE = 32  # points
-WIDEST = 1e4  # m^2; the variance of what is not known
+WIDEST = 1e4  # m^2; a larger variance means that the position is unknown
 NUMPY = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
 PICTURES = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1}
-"""The channels of the encodings with a byte for each; others are depths."""
+"""The number of channels in the encodings with a byte for each channel."""
 DEPTHS = {"32FC1": "f4", "16UC1": "u2"}
 
 
 Place = viser.GuiFolderHandle | viser.GuiTabHandle
-"""Where in the panel."""
+"""A place in the panel."""
 
 
 class Display:
-    """The newest message of a topic, drawn in its frame below the node `root`, which is the frame `fixed` (empty: the
-    robot's body), or in the panel.
+    """The newest message of a topic: an image in the panel, or else drawn in its frame, below the node `root`, which is
+    the frame `fixed` (empty: the robot's body).
     """
 
     def __init__(
@@ -60,38 +61,53 @@ class Display:
         kind: str,
     ) -> None:  # fmt: skip
         self._client, self._place, self._frames, self._fixed, self._key = client, place, frames, fixed, key
-        self.kind = kind
         self._path = f"{root}/displays/{key.replace('/', '_')}"
         self._reader: Subscription[Any] = bus.subscribe(key, KINDS[kind], depth=1, limit=LARGEST)
+        self._message: Any = None  # the newest that is drawn in a frame
+        self._at = Transform()  # the pose in which it is drawn
         self._handles: list[Any] = []
         self.problem = "no message"
 
     def update(self) -> None:
-        """Draw what has arrived."""
+        """Draw the newest message, if there is a transform to its frame."""
         received = self._reader.try_recv()
-        if received is None:
-            return
-        if received.message is None:
+        if received:
             self.problem = received.error
+            if isinstance(received.message, Image | CompressedImage):
+                self._draw_image(received.message)
+                return
+            self._message = received.message or self._message
+        if self._message is None:
             return
-        message = received.message
-        is_picture = isinstance(message, Image | CompressedImage)
-        at = self._frames.of(message.header.frame_id, self._fixed)
-        if at is None and not is_picture:
-            to = self._fixed or self._frames.body
-            self.problem = f"no transform from {message.header.frame_id or 'no frame'} to {to}"
-            return
-        self.problem = ""
-        if is_picture:
-            self._draw_image(message)
-        else:
-            self._draw(message, at or Transform())
+        frame = self._message.header.frame_id
+        at = self._frames.of(frame, self._fixed)
+        if at is None:
+            self.problem = f"no transform from {frame or 'no frame'} to {self._fixed or self._frames.body}"
+            self._erase()
+        elif (received and received.message) or not self._handles:
+            self.problem = ""
+            self._draw(self._message, at)
+
+    def follow(self) -> None:
+        """As the robot moves, keep a message that is drawn below the robot's body in its own frame, such as a map's."""
+        if self._handles and self._message and not self._fixed:
+            at = self._frames.of(self._message.header.frame_id)
+            if at is not None and difference(at, self._at) > SEEN:
+                self._put(at)
 
     def close(self) -> None:
-        """Take it out of the page."""
+        """Remove it from the page."""
         self._reader.close()
+        self._erase()
+
+    def _erase(self) -> None:
         for handle in self._handles:
             handle.remove()
+        self._handles = []
+
+    def _put(self, at: Transform) -> None:
+        self._at, (handle,) = at, self._handles
+        handle.position, handle.wxyz = at.translation, wxyz(at.rotation)
 
     def _draw_image(self, image: Image | CompressedImage) -> None:
         pixels = picture(image) if isinstance(image, Image) else decompressed(image)
@@ -118,12 +134,12 @@ class Display:
             handle = add.add_line_segments(self._path, segments(np.array(line)), GREEN, thickness=LINE)
         else:
             handle = add.add_line_segments(self._path, segments(ellipse(message)), YELLOW, thickness=LINE)
-        handle.position, handle.wxyz = at.translation, wxyz(at.rotation)
-        self._handles = [handle]  # one of the same name has taken the place of the last
+        self._handles = [handle]  # it replaces the last one, which has the same name
+        self._put(at)
 
 
 class Displays:
-    """The displays of one page. `chosen` is its robot."""
+    """The displays of one page. `chosen` returns its robot. They stay switched on while that, or a frame, is gone."""
 
     def __init__(
         self, client: viser.ClientHandle, place: Place, bus: Bus, scene: Scene, chosen: Callable[[], Shown | None]
@@ -131,87 +147,113 @@ class Displays:
         self._client, self._place, self._bus, self._scene, self._chosen = client, place, bus, scene, chosen
         self._frames: RobotFrames | None = None
         self._robot: Shown | None = None
+        self._name = ""  # of the robot whose displays are switched on
+        self._prefix = ""  # of its keys and frames, which labels leave out
         self._topics: Mapping[str, str] = {}
         self._boxes: list[Any] = []
-        self._on: dict[str, Display] = {}
-        self._axes: dict[str, tuple[Any, Transform]] | None = None
+        self._on: dict[str, str] = {}  # the type of each topic that is switched on
+        self._has_axes = False
+        self._drawn: dict[str, Display] = {}
+        self._axes: dict[str, tuple[Any, Transform]] = {}
         self._updates = 0
         with place:
             self._fixed = client.gui.add_dropdown("Fixed frame", [WORLD], hint="the frame in which displays are drawn")
             self._problems = client.gui.add_markdown("")
 
         async def changed(_event: Any) -> None:
-            self._draw_anew()
+            self._redraw()
 
         self._fixed.on_update(changed)
 
     def update(self) -> None:
-        """Draw what is switched on, of the robot that is chosen now."""
+        """Draw the displays that are switched on, of the robot that is chosen now."""
         if self._chosen() is not self._robot or self._scene.topics is not self._topics:
             self._offer()
+        if self._frames:
+            self._frames.update()
+        for display in self._drawn.values():
+            display.follow()
         self._updates += 1
-        if self._updates % DRAW_EVERY or not self._frames:
+        if self._updates % DRAW_EVERY:
             return
-        self._frames.update()
-        if (
-            names := tuple(dict.fromkeys((WORLD, *self._frames.names())))
-        ) != self._fixed.options and self._fixed.value in names:
-            self._fixed.options = names
-        for display in self._on.values():
-            display.update()
-        if self._axes is not None and self._robot:
-            self._draw_axes(self._frames, f"{self._root}/displays/tf")
-        problems = "  \n".join(f"{key}: {one.problem}" for key, one in self._on.items() if one.problem)
+        problems = "  \n".join(self._draw(self._frames)) if self._frames else ""
         if problems != self._problems.content:
             self._problems.content = problems
 
     def close(self) -> None:
         """Stop listening."""
-        for key in list(self._on):
-            self._switch(key, "", False)
-        if self._axes:
-            self._switch_axes(False)
+        self._erase()
         if self._frames:
             self._frames.close()
         self._frames = None
 
     @property
     def _root(self) -> str:
-        """The node that is the fixed frame: a robot's own, or the origin of the world."""
+        """The node of the page that is the fixed frame: the robot's own, or one at the origin of the world."""
         assert self._robot
         return self._robot.root if self._fixed.value == WORLD else f"/fixed{self._robot.root}"
 
-    def _draw_anew(self) -> None:
-        """Draw everything in the fixed frame that was chosen."""
-        for key, display in list(self._on.items()):  # also of a topic that has gone
-            self._switch(key, display.kind, True)
-        if self._axes is not None:
-            self._switch_axes(False)
-            self._switch_axes(True)
+    @property
+    def _source(self) -> str:
+        """The name of the fixed frame in tf; empty for the robot's body, whose pose in the world is known."""
+        return "" if self._fixed.value == WORLD else self._fixed.value
+
+    def _draw(self, frames: RobotFrames) -> Iterator[str]:
+        """Draw everything. Yields a line for each problem."""
+        there, fixed = frames.names(), self._fixed.value
+        if (names := tuple(dict.fromkeys((WORLD, *there, fixed)))) != self._fixed.options:
+            self._fixed.options = names
+        if fixed != WORLD and fixed not in there:
+            yield f"**the frame {fixed} is gone**; what is drawn in it comes back with it"
+        for key, one in self._drawn.items():
+            one.update()
+            if one.problem:
+                yield f"{key.removeprefix(self._prefix)}: {one.problem}"
+        if self._has_axes:
+            self._draw_axes(frames)
+
+    def _redraw(self) -> None:
+        """Draw everything again, in the fixed frame that was chosen."""
+        self._erase()
+        for key in self._on:
+            self._add(key)
+
+    def _erase(self) -> None:
+        for display in self._drawn.values():
+            display.close()
+        for handle, _ in self._axes.values():
+            handle.remove()
+        self._drawn, self._axes = {}, {}
 
     def _offer(self) -> None:
-        """A box for each topic of the robot; what was on stays on while it is the same robot."""
+        """Make a checkbox for each topic of the robot, and for those that are gone but switched on."""
         robot, self._topics = self._chosen(), self._scene.topics
-        if robot is not self._robot:
+        is_new, self._robot = robot is not self._robot, robot
+        if is_new:
             self.close()
-            self._fixed.options = (WORLD,)
-        self._robot = robot
         for box in self._boxes:
             box.remove()
         self._boxes = []
         if robot is None:
             return
         entity = robot.entity
+        if entity.name != self._name:
+            self._name, self._on, self._has_axes = entity.name, {}, False
+            self._fixed.options = (WORLD,)
         place, odometry = entity.command.rpartition("/")[0], entity.odometry or key_for("odom", entity.name)
-        self._frames = self._frames or RobotFrames(self._bus, place, odometry)
+        self._prefix = key_for("", place)
+        if is_new:
+            self._frames = RobotFrames(self._bus, place, odometry)
+            self._redraw()
         others = {shown.entity.command.rpartition("/")[0] for shown in self._scene.shown.values()} - {place, ""}
         with self._place:
-            self._box("TF", self._axes is not None, self._switch_axes)
-            for key, kind in self._topics.items():
+            self._box("TF", self._has_axes, self._switch_axes)
+            for key, kind in {**self._topics, **self._on}.items():
                 is_own = key.startswith(f"{place}/") if place else key.partition("/")[0] not in others
-                if kind in KINDS and is_own:
+                if key in self._on or (kind in KINDS and is_own):
                     switch = partial(self._switch, key, kind)
-                    self._box(f"{KINDS[kind].__name__}: {key}", key in self._on, switch)
+                    shown = key.removeprefix(self._prefix)
+                    self._box(f"{KINDS[kind].__name__}: {shown}", key in self._on, switch)
 
     def _box(self, label: str, is_on: bool, switch: Callable[[bool], None]) -> None:
         box = self._client.gui.add_checkbox(label, is_on)
@@ -223,36 +265,46 @@ class Displays:
         self._boxes.append(box)
 
     def _switch(self, key: str, kind: str, is_on: bool) -> None:
-        if display := self._on.pop(key, None):
+        self._on.pop(key, None)
+        if display := self._drawn.pop(key, None):
             display.close()
-        if is_on and self._frames and self._robot:
-            fixed = "" if self._fixed.value == WORLD else self._fixed.value
-            self._on[key] = Display(self._client, self._place, self._bus, self._frames, self._root, fixed, key, kind)
+        if is_on:
+            self._on[key] = kind
+            self._add(key)
+
+    def _add(self, key: str) -> None:
+        if self._frames and self._robot:
+            self._drawn[key] = Display(
+                self._client, self._place, self._bus, self._frames, self._root, self._source, key, self._on[key]
+            )
 
     def _switch_axes(self, is_on: bool) -> None:
-        for handle, _ in (self._axes or {}).values():
-            handle.remove()
-        self._axes = {} if is_on else None
+        self._has_axes = is_on
+        self._keep_axes(())
 
-    def _draw_axes(self, frames: RobotFrames, path: str) -> None:
-        axes, add = self._axes, self._client.scene
-        for name in frames.names():
-            fixed = "" if self._fixed.value == WORLD else self._fixed.value
-            if axes is None or (at := frames.of(name, fixed)) is None:
-                continue
-            handle, before = axes.get(name, (None, at))
+    def _draw_axes(self, frames: RobotFrames) -> None:
+        add, path = self._client.scene, f"{self._root}/displays/tf"
+        there = {name: at for name in frames.names() if (at := frames.of(name, self._source)) is not None}
+        self._keep_axes(there)
+        for name, at in there.items():
+            handle, before = self._axes.get(name, (None, at))
             if handle is None:
                 node = f"{path}/{name.replace('/', '_')}"
                 handle = add.add_frame(node, axes_length=AXES, axes_radius=AXES / 25)
-                add.add_label(f"{node}/name", name)
-            elif max(map(abs, np.subtract(at.translation + at.rotation, before.translation + before.rotation))) < SEEN:
+                add.add_label(f"{node}/name", name.removeprefix(self._prefix))
+            elif difference(at, before) <= SEEN:
                 continue
             handle.position, handle.wxyz = at.translation, wxyz(at.rotation)
-            axes[name] = handle, at
+            self._axes[name] = handle, at
+
+    def _keep_axes(self, names: Container[str]) -> None:
+        """Remove the axes of all other frames from the page."""
+        for name in [name for name in self._axes if name not in names]:
+            self._axes.pop(name)[0].remove()
 
 
 def scan_points(scan: LaserScan) -> Any:
-    """The points (n, 3) that a scan has hit, in m in its frame."""
+    """The points (n, 3) that a scan has hit, in m, in its frame."""
     ranges = np.asarray(scan.ranges, float)
     hit = np.isfinite(ranges) & (ranges >= scan.range_min) & (ranges <= scan.range_max)
     angles = scan.angle_min + scan.angle_increment * np.arange(len(ranges))
@@ -260,15 +312,20 @@ def scan_points(scan: LaserScan) -> Any:
 
 
 def cloud_points(cloud: PointCloud2) -> Any:
-    """The finite points (n, 3) of a cloud, in m in its frame; none if it has no x, y and z."""
+    """The finite points (n, 3) of a cloud, in m, in its frame; none if it lacks x, y or z, or if they do not fit into
+    its points.
+    """
     fields = {field.name: field for field in cloud.fields}
-    if not all(name in fields and fields[name].datatype in NUMPY for name in "xyz") or not cloud.point_step:
+    if not all(name in fields and fields[name].datatype in NUMPY for name in "xyz"):
         return np.zeros((0, 3), np.float32)
     order = ">" if cloud.is_bigendian else "<"
-    kind = np.dtype({
-        "names": ["x", "y", "z"], "formats": [order + NUMPY[fields[name].datatype] for name in "xyz"],
-        "offsets": [fields[name].offset for name in "xyz"], "itemsize": cloud.point_step,
-    })  # fmt: skip
+    try:
+        kind = np.dtype({
+            "names": ["x", "y", "z"], "formats": [order + NUMPY[fields[name].datatype] for name in "xyz"],
+            "offsets": [fields[name].offset for name in "xyz"], "itemsize": cloud.point_step,
+        })  # fmt: skip
+    except ValueError:  # the fields do not fit into a point
+        return np.zeros((0, 3), np.float32)
     data = np.asarray(cloud.data, np.uint8).tobytes()
     points = np.frombuffer(data, kind, len(data) // cloud.point_step)
     found = np.stack([points[name] for name in "xyz"], axis=1).astype(np.float32)
@@ -276,8 +333,8 @@ def cloud_points(cloud: PointCloud2) -> Any:
 
 
 def picture(image: Image) -> Any:
-    """An image's pixels (height, width, 3) as red, green and blue, depths from near (bright) to far; None if it cannot
-    be shown.
+    """An image's pixels (height, width, 3) in red, green and blue; depths are shown from near (bright) to far (dark).
+    None if it cannot be shown.
     """
     shape, data = (image.height, image.width), np.asarray(image.data, np.uint8)
     if channels := PICTURES.get(image.encoding):
@@ -317,8 +374,8 @@ def decompressed(image: CompressedImage) -> Any:
 
 
 def fan(measured: Range) -> Any:
-    """The outline (n, 3) of what a distance sensor sees, up to what it has hit, in m in its frame: to its limit where
-    nothing is near (inf), its nearest where something is too near (-inf); empty if it has not measured.
+    """The outline (n, 3) of a distance sensor's cone, up to what it has hit, in m, in its frame. If nothing is near
+    (inf) it reaches to the greatest range, if something is too near (-inf) to the least; without a range it is empty.
     """
     distance = min(max(measured.range, measured.min_range), measured.max_range)
     if math.isnan(measured.range) or not math.isfinite(distance) or not math.isfinite(measured.field_of_view):
@@ -329,8 +386,8 @@ def fan(measured: Range) -> Any:
 
 
 def ellipse(odom: Odometry) -> Any:
-    """The covariance of the position (n, 3) on the plane, one standard deviation wide, in m in the frame of odometry;
-    empty if it is not known.
+    """The ellipse (n, 3) of the position's covariance in the plane, at one standard deviation, in m, in the frame of
+    odometry; empty if the covariance is unknown.
     """
     covariance = np.array(odom.pose.covariance, float).reshape(6, 6)[:2, :2]
     values, vectors = np.linalg.eigh((covariance + covariance.T) / 2)
@@ -343,6 +400,6 @@ def ellipse(odom: Odometry) -> Any:
 
 
 def segments(line: Any) -> Any:
-    """The pieces (n, 2, 3) of a line of points."""
+    """The segments (n, 2, 3) of a line through points (n + 1, 3)."""
     points = np.asarray(line, np.float32).reshape(-1, 3)
     return np.stack((points[:-1], points[1:]), axis=1) if len(points) > 1 else np.zeros((0, 2, 3), np.float32)

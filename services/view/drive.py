@@ -1,4 +1,4 @@
-"""Robots that pages drive: their pads, and the commands and goals that follow from those."""
+"""The robots that pages drive: their pads, and the commands and goals that are published for them."""
 
 import math
 import threading
@@ -14,18 +14,19 @@ from holozen.odometry import OdometryFeedback
 from holozen.rotation import Transform
 from holozen.wire import PRIORITY_OF, key_for
 
-from .pad import Pad
+from .instances import difference
+from .pad import LOST, Pad
 
 T = TypeVar("T")
 
 TICK = 0.02  # s
-REPEAT = 0.05  # s
-NEAR = 0.2  # m and of a quaternion; odometry that is so near the true pose is the true pose, at another moment
+REPEAT = 0.05  # s after which a command is repeated
+NEAR = 0.2  # m, and in a quaternion; nearer odometry is taken for the true pose, at another moment
 SPEED, TURN = 0.5, 1.0  # m/s and rad/s at first, as in teleop_twist_keyboard
 
 
 class Driver:
-    """One robot, by the keys of its commands and its odometry."""
+    """Drives one robot, given by the keys of its commands and its odometry."""
 
     def __init__(self, bus: Bus, command: str, odometry: str) -> None:
         self.namespace = command.rpartition("/")[0]
@@ -39,21 +40,21 @@ class Driver:
 
     @cached_property
     def _commands(self) -> Publisher[Twist]:
-        """Declared with the first command: an observer is no publisher."""
+        """The publisher of commands, declared with the first one: a page that only looks is no publisher."""
         return self._bus.publisher(self._command, Twist, PRIORITY_OF["view"])
 
     def use(self, act: Callable[[Pad, float], T], speeds: tuple[float, float] | None = None) -> T:
-        """Do something with its pad, at the present time; returns what that does. `speeds` in m/s and rad/s."""
+        """Call `act` with its pad and the present time (s), and return the result. `speeds` (m/s, rad/s) if new."""
         with self._lock:
             self._speeds = speeds or self._speeds
             return act(self._pad, time.monotonic())
 
     def publish(self) -> bool:
-        """Publish what is due; returns whether the pad is in use."""
+        """Publish what is due. Returns whether the pad is in use."""
         with self._lock:
             now = time.monotonic()
             if self._odom.is_lost:
-                self._pad.stop(now)
+                self._pad.stop(now, LOST)
             since = self._pad.stopping_since(now)
             motion = self._pad.command(now, since is not None and self._odom.rests(since))
             if motion is not None and (motion != self._sent or now - self._sent_at >= REPEAT):
@@ -65,17 +66,17 @@ class Driver:
             return motion is not None
 
     def is_used(self) -> bool:
-        """Whether its pad is held, or stops."""
+        """Whether a button of its pad is held, or a stop is in progress."""
         return self.use(lambda pad, now: pad.command(now, False)) is not None
 
     def close(self) -> None:
-        """Stop listening to it, and being its publisher."""
+        """Close its subscriptions and publishers."""
         made = (vars(self).get(name) for name in ("_commands", "_goals"))
         for end in (self._odom, self._status, *filter(None, made)):
             end.close()
 
     def _current(self) -> Odometry | None:
-        """Its odometry, unless that is stale."""
+        """Its odometry; None if that is stale."""
         odom, age = self._odom.read()
         return None if age > self._odom.stale_after else odom
 
@@ -97,14 +98,14 @@ class Driver:
         return self._bus.publisher(key_for("goal_pose", self.namespace), PoseStamped)
 
     def send_to(self, x: float, y: float, true_pose: Pose) -> str:
-        """Ask its controller to drive to a point of the world, in m; the robot keeps its heading. Returns what came of
-        it. `true_pose` is the robot's in the world, now.
+        """Send its controller to a point of the world (m); the robot keeps its heading. Returns a line with the
+        outcome. `true_pose` is the robot's present pose in the world.
         """
         odom = self._current()
         if odom is None:
             return "it has no odometry now"
         if not self._goals.matched:
-            return f"no controller is there for it; start one: holozen controller {self.namespace} --laps 0"
+            return f"it has no controller; start one: holozen controller {self.namespace} --laps 0"
         goal = in_odometry((x, y, true_pose.position.z), true_pose, odom.pose.pose)
         frame = odom.header.frame_id
         self._goals.put(PoseStamped(Header(frame_id=frame), Pose(Point(*goal), odom.pose.pose.orientation)))
@@ -112,7 +113,7 @@ class Driver:
 
 
 class Drivers:
-    """The drivers of all robots that are chosen in a page, and the thread that publishes for them."""
+    """The drivers of all robots that are chosen in any page, and the thread that publishes their commands."""
 
     def __init__(self, bus: Bus) -> None:
         self._bus, self._stop = bus, threading.Event()
@@ -130,7 +131,7 @@ class Drivers:
             return self._all[keys]
 
     def keep(self, chosen: Collection[Driver | None]) -> None:
-        """Drop the others, once their pads are at rest."""
+        """Close all drivers that are not `chosen`, once their pads are at rest."""
         with self._lock:
             unused = [keys for keys, one in self._all.items() if one not in chosen and not one.is_used()]
             dropped = [self._all.pop(keys) for keys in unused]
@@ -138,18 +139,18 @@ class Drivers:
             driver.close()
 
     def close(self, page: int) -> None:
-        """A page is gone: what it drives stops."""
+        """A page is gone: stop the robots that it drives."""
         with self._lock:
             for driver in self._all.values():
                 driver.use(lambda pad, now: pad.close(page, now))
 
     def halt(self) -> None:
-        """Stop what is driven from here, until odom shows rest, at most a second."""
+        """Stop the robots that are driven from here, until odom shows rest, for at most a second."""
         self._stop.set()
         self._thread.join()
         for driver in self._all.values():
             driver.use(lambda pad, now: pad.stop(now))
-        while sum(driver.publish() for driver in self._all.values()):  # each of them publishes
+        while sum(driver.publish() for driver in self._all.values()):  # calls them all, unlike any()
             time.sleep(TICK)
 
     def _run(self) -> None:
@@ -161,9 +162,8 @@ class Drivers:
 
 
 def in_odometry(point: tuple[float, float, float], true_pose: Pose, odometry: Pose) -> tuple[float, float, float]:
-    """A point of the world, in m, in the frame of a robot's odometry, which may have begun elsewhere, and drift."""
+    """A point of the world (m) in the frame of a robot's odometry, which may have begun elsewhere, and may drift."""
     true, measured = (Transform.of(pose.position, pose.orientation) for pose in (true_pose, odometry))
-    parts = zip(true.translation + true.rotation, measured.translation + measured.rotation, strict=True)
-    if max(abs(a - b) for a, b in parts) < NEAR:
+    if difference(true, measured) < NEAR:
         return point
     return (measured @ true.inverse()).apply(point)

@@ -1,7 +1,7 @@
-"""The topics, parameters and services of the network for Foxglove and Lichtblick, by foxglove-sdk's server.
+"""Serves topics, parameters and services to Foxglove and Lichtblick, by foxglove-sdk's server.
 
-That server knows neither tokens nor the age of a message, so it stays on loopback behind a relay of ours. It takes
-commands, services and parameters only of clients for which the relay vouches.
+That server checks neither tokens nor the age of messages, so it listens on loopback, behind a relay of ours. It accepts
+commands, service calls and parameters only from clients that the relay vouches for.
 """
 
 import asyncio
@@ -38,14 +38,14 @@ from .guard import Guard, TimedConnection
 
 PROTOCOL = Subprotocol("foxglove.sdk.v1")
 OLDER = Subprotocol("foxglove.websocket.v1")  # the same by another name, which older clients ask for
-MESSAGE = b"\x01"  # the first byte of what a client publishes
-LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s, for nodes that come and go, and for messages
+MESSAGE = b"\x01"  # the first byte of a frame with a message that a client publishes
+LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s; how often the graph is read, and the topics are
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
 LARGEST = 16_000_000  # bytes that a client may send at once
-TURN = 0.5  # s without a motion by the client that drives a robot, until another one may
+TURN = 0.5  # s without a motion command by the client that drives a robot, after which another one may drive
 VOUCHED = 0xFFFF_FFFF  # the number of the channel by which the relay vouches for a client
-LOOK_ONLY = "this view only looks: it was started with --look-only"
+LOOK_ONLY = "this view is read-only: it was started with --look-only"
 
 
 def publishes(data: bytes) -> bool:
@@ -54,7 +54,9 @@ def publishes(data: bytes) -> bool:
 
 
 class Relay:
-    """A WebSocket server at an address that lets the clients whom `guard` admits through to one on loopback."""
+    """A WebSocket server that relays the clients that `guard` admits to the `inner` port on loopback. It vouches for
+    them by the `secret`.
+    """
 
     def __init__(self, guard: Guard, host: str, port: int, inner: int, secret: str) -> None:
         self._guard, self._inner, self._secret = guard, f"ws://127.0.0.1:{inner}", secret
@@ -90,7 +92,7 @@ class Relay:
                 task.cancel()
 
     def close(self) -> None:
-        """Part with all clients."""
+        """Disconnect all clients, and end."""
 
         async def end() -> None:
             self._server.close()
@@ -118,13 +120,13 @@ class Topic:
         self._reported = False
 
     def drain(self) -> None:
-        """Hand over what has come, in the thread that calls it."""
+        """Pass on the messages that have arrived."""
         if not self.clients:
             self.close()
             return
         if not self._raw:
             self._raw = self._bus.subscribe_raw(self.key, DEPTH)
-            for reply in self._bus.session.get(self.key, timeout=1.0):  # the last one of a topic that seldom speaks
+            for reply in self._bus.session.get(self.key, timeout=1.0):  # the last message: the next may be far off
                 if reply.ok:
                     self._log(reply.ok.payload.to_bytes(), str(reply.ok.encoding))
         while sample := self._raw.try_recv():
@@ -139,23 +141,23 @@ class Topic:
             self._reported = True
 
     def close(self) -> None:
-        """Read it no longer."""
+        """Stop reading it."""
         if self._raw:
             self._raw.close()
             self._raw = None
 
 
 class Commands:
-    """What clients publish on the network, by the rules of the page: a person's priority, and `stop` at the end."""
+    """Publishes what clients send, by the rules of the page: with a person's priority, and with a stop at the end."""
 
     def __init__(self, bus: Bus, endpoints: Callable[[], list[Endpoint]]) -> None:
         self._bus, self._endpoints = bus, endpoints
         self._lock = threading.Lock()
         self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str]]()
-        self._drivers = dict[str, tuple[int, float]]()  # by key: the client that moved the robot last, and when
+        self._drivers = dict[str, tuple[int, float]]()  # by key: the client that last moved the robot, and when
 
     def open(self, client: int, channel: Any) -> None:
-        """Let a client publish on a channel. ValueError with the reason if no node reads that."""
+        """Let a client publish on a channel. Raises ValueError if no node reads that topic as that type."""
         key, name = channel.topic.strip("/"), _full_name(channel.schema_name)
         readers = {one.type for one in self._endpoints() if one.kind == "sub" and one.key == key}
         if name not in readers or name not in formats.known():
@@ -164,13 +166,13 @@ class Commands:
         if channel.encoding not in ("json", "cdr"):
             raise ValueError(f"/{key} cannot be published in {channel.encoding!r}; use json or cdr")
         kind = formats.known()[name]
-        priority = PRIORITY_OF["view"] if is_command(key, (kind,)) else "DATA"
+        priority = PRIORITY_OF["view"] if is_command(key, (kind.ROS,)) else "DATA"
         encoding = codec.encoding(channel.encoding, kind)
         with self._lock:
             self._open[client, channel.id] = self._bus.publisher(key, kind, priority), kind, encoding
 
     def put(self, client: int, channel: int, data: bytes) -> None:
-        """Publish a client's message. ValueError with the reason if it is malformed."""
+        """Publish a client's message. Raises ValueError if it is malformed, or while another client drives."""
         with self._lock:
             if not (found := self._open.get((client, channel))):
                 return
@@ -184,8 +186,8 @@ class Commands:
                 raise ValueError(f"/{publisher.key}: {error}") from None
 
     def _take_turn(self, key: str, client: int) -> None:
-        """The clients are one source to the robot, so they take turns here. ValueError while another one drives; a stop
-        is everybody's.
+        """To the robot all clients are one source, so they take turns here. Raises ValueError while another one drives.
+        Any client may stop it.
         """
         now = time.monotonic()
         driver, since = self._drivers.get(key, (client, now))
@@ -194,7 +196,7 @@ class Commands:
         self._drivers[key] = client, now
 
     def close(self, client: int, channel: int) -> None:
-        """A client publishes on a channel no longer: what it drives stops."""
+        """A client stops publishing on a channel: stop the robot that it drives by it."""
         with self._lock:
             if found := self._open.pop((client, channel), None):
                 publisher, kind, _ = found
@@ -203,13 +205,13 @@ class Commands:
                 publisher.close()
 
     def halt(self) -> None:
-        """Stop what is driven from here."""
+        """Stop the robots that are driven from here."""
         for client, channel in list(self._open):
             self.close(client, channel)
 
 
 class Server(ServerListener):
-    """foxglove-sdk's server with what is on the network. Its callbacks run in the library's threads."""
+    """foxglove-sdk's server, with all that is on the network. Its callbacks run in the library's threads."""
 
     def __init__(self, bus: Bus, look_only: bool) -> None:
         self.secret = f"/{secrets.token_urlsafe(16)}"
@@ -240,13 +242,13 @@ class Server(ServerListener):
                 topic.drain()
 
     def close(self) -> None:
-        """End it; what is driven from here stops."""
+        """Stop the robots that are driven from here, and end."""
         self._commands.halt()
         self._server.stop()
         self._graph.close()
 
     def _look(self) -> None:
-        """Show the topics and services that there are now."""
+        """Offer the present topics and services."""
         endpoints = self._graph.endpoints()
         topics = {one.key: one.type for one in endpoints if one.kind == "pub" and "*" not in one.key}
         for key in self._topics.keys() - topics:
@@ -274,22 +276,20 @@ class Server(ServerListener):
             return None
 
     @contextlib.contextmanager
-    def _telling(self) -> Iterator[None]:
-        """Show clients why something was refused."""
+    def _reporting_errors(self) -> Iterator[None]:
+        """Show clients why a request in this block was refused."""
         try:
             yield
         except (ValueError, BusError, ServiceError) as error:
             self._server.publish_status(str(error), foxglove.StatusLevel.Error)
 
-    # The listener.
-
     def on_subscribe(self, client: Any, channel: Any) -> None:
-        """A client reads a topic."""
+        """A client subscribes to a topic."""
         if topic := self._topics.get(channel.topic.strip("/")):
             topic.clients += 1
 
     def on_unsubscribe(self, client: Any, channel: Any) -> None:
-        """A client reads a topic no longer."""
+        """A client unsubscribes from a topic."""
         if topic := self._topics.get(channel.topic.strip("/")):
             topic.clients -= 1
 
@@ -298,19 +298,19 @@ class Server(ServerListener):
         if channel.topic == self.secret:
             self._vouched.add(client.id)
         elif client.id in self._vouched:
-            with self._telling():
+            with self._reporting_errors():
                 self._commands.open(client.id, channel)
 
     def on_client_unadvertise(self, client: Any, client_channel_id: int) -> None:
-        """A client publishes no longer, or is gone."""
+        """A client stops publishing on a channel, or is gone."""
         if client_channel_id == VOUCHED:
             self._vouched.discard(client.id)
         self._commands.close(client.id, client_channel_id)
 
     def on_message_data(self, client: Any, client_channel_id: int, data: bytes) -> None:
-        """A client publishes."""
+        """A client publishes a message."""
         if client.id in self._vouched:
-            with self._telling():
+            with self._reporting_errors():
                 self._commands.put(client.id, client_channel_id, data)
 
     def on_get_parameters(
@@ -318,7 +318,7 @@ class Server(ServerListener):
     ) -> list[foxglove.Parameter]:
         """The named parameters, or all, as `node.name`."""
         found = []
-        with self._telling():
+        with self._reporting_errors():
             nodes = Nodes(self._bus, CALL)
             for node in sorted(nodes.sessions):
                 names = nodes.names(node)
@@ -330,8 +330,8 @@ class Server(ServerListener):
     def on_set_parameters(
         self, client: Any, parameters: list[foxglove.Parameter], request_id: str | None = None
     ) -> list[foxglove.Parameter]:
-        """Set parameters; returns what they are then."""
-        with self._telling():
+        """Set parameters. Returns their new values."""
+        with self._reporting_errors():
             if self._look_only or client.id not in self._vouched:
                 raise ValueError(LOOK_ONLY)
             nodes = Nodes(self._bus, CALL)
@@ -343,7 +343,7 @@ class Server(ServerListener):
         return self.on_get_parameters(client, [parameter.name for parameter in parameters])
 
     def _call(self, key: str, interface: Interface, request: Any) -> bytes:
-        """The reply of a service of the network, in CDR."""
+        """Call a service, and return its reply in CDR."""
         if request.client_id not in self._vouched:
             raise ValueError(LOOK_ONLY)
         assert interface.request and interface.response

@@ -1,7 +1,7 @@
-"""Access to the page, and the age limit of what a page sends.
+"""Access to the page, and the age limit of the messages that a page sends.
 
-viser's server checks neither: it answers every web site that a browser shows, and takes what waited in a buffer for
-new. So each connection of it is made by this module.
+viser's server checks neither: it answers a page of any web site, and takes messages that waited in a buffer for new.
+So this module makes each of its connections.
 """
 
 import asyncio
@@ -23,13 +23,13 @@ from websockets.frames import DATA_OPCODES, Frame, Opcode
 from websockets.http11 import Request, Response
 
 PING_EVERY = 0.05  # s
-MAX_AGE = 0.3  # s; a held button that may be older moves nothing
+MAX_AGE = 0.3  # s; the report of a held button that may be older moves nothing
 LET_GO = b"""<script>
 addEventListener("blur", () => document.querySelectorAll("button").forEach(
   button => button.dispatchEvent(new PointerEvent("pointercancel", {bubbles: true}))))
 </script>"""
-"""Lets go of held buttons when another window comes to the front; viser's page would go on holding them."""
-MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage")  # in viser's messages that may move a robot
+"""A script that releases held buttons when another window comes to the front; viser's page would go on holding them."""
+MOVING = (b"GuiButtonHoldMessage", b"ScenePointerMessage")  # the names of viser's messages that may move a robot
 
 
 def moves(data: bytes) -> bool:
@@ -38,9 +38,10 @@ def moves(data: bytes) -> bool:
 
 
 class Guard:
-    """Refuses requests without `token` (if it is not empty), from another web site's page, and for another host.
+    """Refuses requests without the `token` (unless that is empty), from pages of other web sites, and for other hosts.
 
-    `moves`: whether the data of a frame may move a robot. `apps`: pages of web sites that have the token may connect.
+    `moves` tells whether the data of a frame may move a robot. `apps`: pages of other web sites may connect if they
+    have the token.
     """
 
     def __init__(self, token: str, moves: Callable[[bytes], bool] = moves, apps: bool = False) -> None:
@@ -51,10 +52,10 @@ class Guard:
         self.late_at = -1e9  # s, monotonic; when the last message came too late to move a robot
 
     def refusal(self, request: Request) -> str:
-        """Why a request is refused; empty if it is not."""
+        """Why a request is refused, or ""."""
         host, origin = request.headers.get("Host", ""), request.headers.get("Origin")
         if not self._token and not is_loopback(urlsplit(f"//{host}").hostname or ""):
-            # Else a web site whose name leads to 127.0.0.1 could read and send what it likes.
+            # Else a web site whose name resolves to 127.0.0.1 could read and send anything.
             return f"{host!r} is not this machine; open http://127.0.0.1 with the port that `holozen view` printed"
         if origin is not None and urlsplit(origin).netloc != host and not (self._apps and self._token):
             return f"a page of {origin} may not connect here"
@@ -64,7 +65,7 @@ class Guard:
 
     @contextlib.contextmanager
     def guarding(self) -> Iterator[None]:
-        """Servers that are made in this block are guarded."""
+        """Guard the servers that are made in this block."""
         real = websockets.serve
         websockets.serve = partial(self._serve, real)  # type: ignore[misc, assignment]
         try:
@@ -80,7 +81,7 @@ class Guard:
             if reason := self.refusal(request):
                 return connection.respond(http.HTTPStatus.FORBIDDEN, f"{reason}\n")  # type: ignore[no-any-return]
             if "Accept-Encoding" in request.headers:
-                del request.headers["Accept-Encoding"]  # viser's page is compressed in itself, and LET_GO goes into it
+                del request.headers["Accept-Encoding"]  # so that LET_GO can be put into viser's page
             response: Response | None = process_request(connection, request)
             if response is not None:
                 if b"</head>" in response.body:
@@ -89,7 +90,7 @@ class Guard:
                     response.headers["Content-Length"] = str(len(response.body))
                 response.headers["Referrer-Policy"] = "no-referrer"
                 response.headers["X-Frame-Options"] = "DENY"
-                if self._token:  # for the web socket, whose address the page makes without it
+                if self._token:  # for the web socket, whose address has no token
                     cookie = f"{_cookie(request)}={self._token}; HttpOnly; SameSite=Strict; Path=/"
                     response.headers["Set-Cookie"] = cookie
             return response
@@ -107,8 +108,8 @@ class Guard:
 
 
 class TimedConnection(websockets.ServerConnection):
-    """A connection that knows how old at most a message is: a browser answers pings in the order of what it sends, so
-    a message is younger than the last ping that was answered before it came.
+    """A connection that knows an upper bound of the age of each message. A browser answers pings in the order of what
+    it sends, so a message was sent after the last ping that was answered before it arrived.
     """
 
     def __init__(self, guard: Guard, *parts: Any, **options: Any) -> None:
@@ -116,14 +117,14 @@ class TimedConnection(websockets.ServerConnection):
         self._guard, self._answered = guard, time.monotonic()
 
     async def ping_often(self) -> None:
-        """Ping for as long as the connection lasts."""
+        """Send pings for as long as the connection lasts."""
         with contextlib.suppress(ConnectionClosed):
             while True:
                 await self.ping(b"%x" % time.monotonic_ns())
                 await asyncio.sleep(PING_EVERY)
 
     def process_event(self, event: Any) -> None:
-        """Take a frame; one that moves a robot and came late is dropped."""
+        """Take a frame. One that may move a robot is dropped if it may be older than MAX_AGE."""
         now = time.monotonic()
         if isinstance(event, Frame):
             if event.opcode is Opcode.PONG and bytes(event.data) in self.pending_pings:
@@ -146,7 +147,7 @@ def is_loopback(host: str) -> bool:
 
 
 def _cookie(request: Request) -> str:
-    """Cookies of a host are shared by all its ports."""
+    """The name of the cookie, which has the port in it: all ports of a host share their cookies."""
     return f"holozen_view_{urlsplit('//' + request.headers.get('Host', '')).port or 80}"
 
 

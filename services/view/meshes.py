@@ -1,4 +1,4 @@
-"""Visual shapes -> triangles with one colour, as a browser draws them."""
+"""Visual shapes -> triangles of one colour, which a browser draws."""
 
 import contextlib
 import math
@@ -14,7 +14,7 @@ from holozen.robot.description import Appearance, Mesh, read
 from holozen.robot.model import Pose, Shape
 
 RGB = tuple[int, int, int]
-PLAIN = (0.7, 0.7, 0.7, 1.0)  # Gazebo's grey, for what has no colour
+PLAIN = (0.7, 0.7, 0.7, 1.0)  # Gazebo's grey, for shapes without a colour
 ORANGE = (1.0, 0.55, 0.0, 1.0)
 FINEST = 200_000  # triangles of a shape; a phone draws no more of them well
 
@@ -34,9 +34,8 @@ Parts = list[tuple[Pose, Part]]
 
 @lru_cache(maxsize=64)
 def appearance(text: str) -> tuple[Appearance, list[Parts]]:
-    """A description's links and joints, and the parts of each link; robots of one text share them. Raises RobotError.
-
-    A mesh that cannot be read is not shown.
+    """The links and joints of a description, and the parts of each link, which all robots with that text share. A mesh
+    that cannot be read is left out. Raises RobotError.
     """
     found = read(text)
     return found, [
@@ -65,7 +64,9 @@ def _parts(shape: Shape, meshes: tuple[Mesh, ...]) -> Iterator[Part]:
 def _part(mesh: tuple[Any, Any], color: tuple[float, ...]) -> Part:
     red, green, blue, alpha = color
     rgb = (round(255 * red), round(255 * green), round(255 * blue))
-    return Part(np.asarray(mesh[0], np.float32), np.asarray(mesh[1], np.uint32), rgb, alpha)
+    # An STL has three vertices for each triangle; joined ones let the page simplify meshes that are far away.
+    vertices, corners = np.unique(np.asarray(mesh[0], np.float32), axis=0, return_inverse=True)
+    return Part(vertices, corners.reshape(-1)[mesh[1]].astype(np.uint32), rgb, alpha)
 
 
 def _solid(shape: Shape) -> tuple[Any, Any]:

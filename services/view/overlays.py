@@ -1,4 +1,4 @@
-"""What is drawn over the world: the trail and the velocities of a robot, and the goals of next_goal."""
+"""Overlays of the world: the trail and the velocities of a robot, and the goals of next_goal."""
 
 import threading
 from collections import deque
@@ -18,9 +18,9 @@ from .meshes import RGB
 GREEN, BLUE, MAGENTA, RED = (0, 150, 0), (30, 90, 255), (200, 0, 160), (220, 0, 0)
 STEP = 0.03  # m between two points of a trail
 TRAIL = 600  # points
-JUMP = 0.5  # m from one frame to the next: it was put elsewhere, and its trail begins there
+JUMP = 0.5  # m from one frame to the next; farther, it was put elsewhere, where its trail begins again
 TRAIL_EVERY = 4  # frames between two drawings of a trail
-AT_LEAST = 0.02  # m/s; slower has no arrow
+AT_LEAST = 0.02  # m/s; slower motion has no arrow
 SEEN = 0.005  # m/s; smaller changes are not sent to the pages
 HIGH = {"commanded": 0.40, "measured": 0.44}  # m above the robot's frame
 ASK_EVERY, PATIENCE = 2.0, 1.0  # s; the goals may change
@@ -29,8 +29,8 @@ FLAT = 0.02  # m above the ground
 
 
 class Track:
-    """The trail of a robot, and two arrows on it as long as it comes in a second: where it shall go (blue), and where
-    it goes (green). `root` is the path of its frame in the page.
+    """The trail of a robot, and two arrows for its velocity, 1 m for 1 m/s: as commanded (blue) and as measured
+    (green). `root` is the path of its frame in the page.
     """
 
     def __init__(self, server: viser.ViserServer, name: str, root: str) -> None:
@@ -41,7 +41,7 @@ class Track:
         self._frames = 0
 
     def update(self, position: XYZ, commanded: Planar, measured: Planar) -> None:
-        """Draw it as it is now; velocities are in the body frame."""
+        """Draw the present position (m) and velocities (m/s, in the body frame)."""
         last = self._trail[-1] if self._trail else None
         if last and max(abs(position[0] - last[0]), abs(position[1] - last[1])) > JUMP:
             self._trail.clear()
@@ -54,7 +54,7 @@ class Track:
         self._draw_arrow("measured", measured, GREEN)
 
     def close(self, with_robot: bool) -> None:
-        """Take it out of the page; the robot, and with it its arrows, may be out already."""
+        """Remove it from the page. `with_robot`: the robot, and with it the arrows, has been removed already."""
         for handle in (self._line, *(() if with_robot else self._arrows.values())):
             if handle:
                 handle.remove()
@@ -81,7 +81,7 @@ class Track:
 
 
 class Goals:
-    """The goals of next_goal, as a path with an arrow at each. `update` draws what a thread has asked for."""
+    """The goals of next_goal, as a path with an arrow at each. A thread requests them, `update` draws them."""
 
     def __init__(self, server: viser.ViserServer, bus: Bus) -> None:
         self._scene, self._bus = server.scene, bus
@@ -102,7 +102,7 @@ class Goals:
             self._drawn = list(self._draw(goals)) if goals else []
 
     def close(self) -> None:
-        """No longer ask."""
+        """Stop requesting goals."""
         self._stop.set()
         self._thread.join()
 

@@ -1,11 +1,11 @@
-"""The dead-man of one robot: held buttons of pages -> the commanded velocity. No clock, no socket; times in s."""
+"""The dead-man of one robot: held buttons of pages -> commanded velocity. No clock, no socket; times in s."""
 
 import math
 
 from holozen.limits import STOP, Planar
 
-HELD = 0.3  # s; a button that was not reported for so long is not held
-SETTLING = 1.0  # s in which a stop is repeated while the robot does not rest
+HELD = 0.3  # s without a report after which a button is not held
+SETTLING = 1.0  # s; the longest that a stop is repeated, until the robot rests
 
 DIRECTIONS: dict[str, Planar] = {
     "forward": (1.0, 0.0, 0.0), "backward": (-1.0, 0.0, 0.0),
@@ -14,25 +14,28 @@ DIRECTIONS: dict[str, Planar] = {
 }  # fmt: skip
 """What a button does: forward, left, counter-clockwise."""
 OTHER = "another page drives this robot"
+SILENT = f"the button was silent for {HELD:g} s, and counts as let go"
+LOST = "odometry was lost, and the button counts as let go"
 
 
 class Pad:
-    """One page drives at a time, until it lets go.
+    """The held buttons of a robot. One page drives at a time, until it lets go.
 
-    A button whose reports stay away counts as let go. Its page was hidden, frozen or cut off, and may go on reporting
-    it later: so it is `worn`, and counts again only once the page has a new button in its place.
+    A button that is no longer reported counts as let go. Its page was hidden, frozen or cut off, and may go on
+    reporting it later: so it has `expired`, and counts again only once the page has put a new button in its place.
     """
 
     def __init__(self) -> None:
         self._held: dict[str, float] = {}  # button -> its last report
-        self._page = -1  # that drives
-        self._worn: set[tuple[int, str]] = set()
-        self._stopping = -math.inf  # since when
+        self._page = -1  # the one that drives
+        self._expired: set[tuple[int, str]] = set()
+        self._stopping = -math.inf  # when the last stop began
+        self.why = ""  # why the buttons that were held at the last `stop` count as let go
 
     def hold(self, page: int, button: str, now: float) -> str:
-        """A page reports a held button. Returns why it does not count, or nothing."""
+        """A page reports a held button. Returns why it does not count, or ""."""
         self._expire(now)
-        if (page, button) in self._worn:
+        if (page, button) in self._expired:
             return ""
         if self._held and page != self._page:
             return OTHER
@@ -45,35 +48,36 @@ class Pad:
         if page == self._page and self._held.pop(button, None) is not None and not self._held:
             self._stopping = now
 
-    def worn(self, page: int, now: float) -> list[str]:
-        """The buttons that this page has to replace."""
+    def expired(self, page: int, now: float) -> list[str]:
+        """The buttons that a page has to replace."""
         self._expire(now)
-        return [button for other, button in self._worn if other == page]
+        return [button for other, button in self._expired if other == page]
 
     def renew(self, page: int, button: str) -> None:
         """A page has replaced a button."""
-        self._worn.discard((page, button))
+        self._expired.discard((page, button))
 
     def close(self, page: int, now: float) -> None:
-        """A page is gone: what it drives stops."""
+        """A page is gone: stop if it drives."""
         if page == self._page:
             self.stop(now)
-        self._worn = {worn for worn in self._worn if worn[0] != page}
+        self._expired = {button for button in self._expired if button[0] != page}
 
-    def stop(self, now: float) -> None:
-        """Let go of everything; what is held has to be pressed again."""
+    def stop(self, now: float, why: str = "") -> None:
+        """Let go of all buttons, and note `why`. Those that are held have to be pressed again."""
         if self._held:
-            self._worn |= {(self._page, button) for button in self._held}
+            self.why = why
+            self._expired |= {(self._page, button) for button in self._held}
             self._held.clear()
             self._stopping = now
 
     def stopping_since(self, now: float) -> float | None:
-        """Since when a stop is repeated; None if none is."""
+        """When the stop in progress began; None if there is none."""
         self._expire(now)
         return self._stopping if not self._held and now - self._stopping < SETTLING else None
 
     def command(self, now: float, rests: bool) -> Planar | None:
-        """The motion to command, each part from -1 to 1; None: nothing. `rests`: the robot stands since the stop."""
+        """The motion to command, each part from -1 to 1, or None. `rests`: the robot stands since the stop."""
         if self.stopping_since(now) is not None:
             if rests:
                 self._stopping = -math.inf
@@ -87,4 +91,4 @@ class Pad:
 
     def _expire(self, now: float) -> None:
         if self._held and now - min(self._held.values()) > HELD:
-            self.stop(now)
+            self.stop(now, SILENT)

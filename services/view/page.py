@@ -1,4 +1,4 @@
-"""The panel of one page: which robot, the camera, and the pad."""
+"""The panel of one page: the choice of a robot, the camera, and the pad."""
 
 import math
 import time
@@ -23,30 +23,31 @@ from .plots import Plots
 from .scene import FRAME, LOOK_AT, Scene, Shown
 from .world import WorldTab
 
-HOLD_RATE = 10.0  # Hz; of the reports of a held button; at 20 those of a second one would be swallowed
+HOLD_RATE = 10.0  # Hz of the reports of a held button; at 20 Hz those of a second one would be lost
 NONE = "(no robot)"
 ABOVE = 6.0  # m; the height of the top view
 PAD_WIDTH = 300  # CSS pixels
-FEW = 0.7  # of the frames; fewer are reported
-DRAGGED = 0.5  # s after a person's last drag that the time is not drawn anew
-LATE = 2.0  # s that a late message is reported
+FEW = 0.7  # of the frames; if there are fewer, the page says so
+DRAGGED = 0.5  # s after a person's last drag for which the slider of the time is left alone
+LATE = 2.0  # s for which the page reports a late message
 TIMEOUT = 2.0  # s for stop and release
+PORTRAIT = ((-2.6, -2.1, 2.1), (-1.1, -0.9, 0.0))  # m; a phone's camera and its target: the panel hides the lower half
 SLOW_LINK = "the link to this page is too slow to drive"
 
 
 class Page:
-    """What one browser shows beside the scene. With `look_only` it has nothing that changes the world."""
+    """What one browser shows beside the scene. With `look_only` it has no control that changes the world."""
 
     def __init__(
         self, client: viser.ClientHandle, bus: Bus, scene: Scene, drivers: Drivers, guard: Guard, look_only: bool,
         playback: Playback | None = None,
     ) -> None:  # fmt: skip
         self._client, self._bus, self._scene, self._drivers, self._guard = client, bus, scene, drivers, guard
-        self.robot = ""  # the one that is chosen
+        self.robot = ""  # the chosen one
         self._said = self._shown = ""
         self._buttons: dict[str, viser.GuiButtonHandle] = {}
         self._pressed: dict[str, tuple[str, int]] = {}  # button -> the entity that it was pressed for
-        self._driven: set[Driver] = set()  # by this page
+        self._driven: set[Driver] = set()  # the drivers that this page has used
         self._followed: tuple[float, float, float] | None = None
         self._world: WorldTab | None = None
         add = client.gui
@@ -63,11 +64,16 @@ class Page:
             panel = self._add_pad()
             places = [panel.add_tab(name) for name in ("Displays", "Plots")]
         self._displays = Displays(client, places[0], bus, scene, self._shown_robot)
-        self._plots = Plots(client, places[1], bus, scene, (lambda: playback.position) if playback else time.monotonic)
+        opened = time.monotonic()
+        clock = (lambda: playback.position) if playback else lambda: time.monotonic() - opened
+        self._plots = Plots(client, places[1], bus, scene, clock)
+        if client.camera.aspect < 1:
+            with client.atomic():
+                client.camera.position, client.camera.look_at = PORTRAIT
 
     def update(self, now: float) -> None:
-        """Show the robots that there are, and what the chosen one does. `now` in s (monotonic)."""
-        # Once one is chosen, only a person chooses another; one that is gone stays chosen, and may come back.
+        """Show the present robots, and what the chosen one does. `now` is in s (monotonic)."""
+        # Once a robot is chosen, only a person chooses another; while it is gone it stays chosen, and may come back.
         names = self._scene.robots()
         self.robot = self.robot or next(iter(names), "")
         options = tuple(sorted({*names, self.robot} - {""})) or (NONE,)
@@ -111,7 +117,7 @@ class Page:
 
     @property
     def driver(self) -> Driver | None:
-        """What drives the chosen robot; None if that takes no commands."""
+        """The driver of the chosen robot; None if that takes no commands."""
         return self._driver_of(self._shown_robot())
 
     def _driver_of(self, shown: Shown | None) -> Driver | None:
@@ -132,8 +138,8 @@ class Page:
         add.add_button("Stop", color="red").on_click(lambda _: self._call("stop"))
         after = add.add_button_group("", ("Release", "Resume"), hint="end a stop; let overruled sources drive again")
         after.on_click(lambda _: self._call(after.value.lower()))
-        # The pad has its own panel: of what one panel reports within 50 ms, viser's page sends only the last. Held
-        # buttons beside it would swallow a click on Stop, or the choice of another robot.
+        # The pad has its own panel: of all that one panel reports within 50 ms, viser's page sends only the last. In
+        # the same panel, held buttons would suppress a click on Stop, or the choice of another robot.
         panel = add.add_panel()
         self._pad = panel.add_tab("Drive")
         panel.float(x=15, y=-15, width=PAD_WIDTH)
@@ -172,18 +178,21 @@ class Page:
         with self._pad:
             handle = self._client.gui.add_button(button.capitalize(), hint=hint, order=order)
         self._buttons[button] = handle
-        # Coroutines: they run in the order of the messages, and not in threads.
+        # Coroutines, since these run in the order of the messages, and not in threads.
         handle.on_hold(partial(self._on_hold, button), callback_hz=HOLD_RATE)
         handle.on_click(partial(self._on_release, button))
 
     def _replace_buttons(self) -> None:
-        """What the page does not report any more it may still hold, and what was pressed for another robot than the one
-        that is chosen now; it cannot hold a button that is not there.
+        """Replace the buttons that have expired, and those that were pressed for another robot than the chosen one. The
+        page may still hold them, but it cannot hold a button that was removed.
         """
         page, chosen = self._client.client_id, _entity(self._shown_robot())
         wrong = {button for button, entity in self._pressed.items() if entity != chosen}
         for driver in self._driven:
-            wrong.update(driver.use(lambda pad, now: pad.worn(page, now)))
+            expired, why = driver.use(lambda pad, now: (pad.expired(page, now), pad.why))
+            wrong.update(expired)
+            if expired and why:
+                self._said = why
         for button in wrong:
             old = self._buttons[button]
             self._add_button(button, old.order)
@@ -240,10 +249,10 @@ class Page:
         x, y, _ = shown.position if shown else LOOK_AT
         with self._client.atomic():
             self._client.camera.up_direction = (0.0, 0.0, 1.0)
-            self._client.camera.position = (x - 0.01, y, ABOVE)  # straight down, no direction would be up
+            self._client.camera.position = (x - 0.01, y, ABOVE)  # looking straight down, it would have no up direction
             self._client.camera.look_at = (x, y, 0.0)
 
 
 def _entity(shown: Shown | None) -> tuple[str, int]:
-    """The name and number of a robot's entity; "" and 0 of none."""
+    """The name and number of a robot's entity; "" and 0 without one."""
     return (shown.entity.name, shown.entity.number) if shown else ("", 0)

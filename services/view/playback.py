@@ -1,4 +1,4 @@
-"""Plays a bag on a bus of its own, from the position that a page sets."""
+"""Plays a bag on a bus of its own, from the time that a page sets."""
 
 import threading
 import time
@@ -26,7 +26,7 @@ class Playback:
         self.duration = (summary.end - summary.start) / 1e9
         self._outlet = Outlet(bus, plan([one.channel for one in summary.streams.values()], [], commands=True))
         self._pace, self._at = Pace(1.0), self._start  # ns
-        self._target: int | None = self._start  # ns; where to go on from
+        self._target: int | None = self._start  # ns; the time to jump to
         self._paused = True
         self._changed, self._ending = threading.Condition(), False
         self._thread = threading.Thread(target=self._run, daemon=True)
@@ -34,7 +34,7 @@ class Playback:
 
     @property
     def position(self) -> float:
-        """Where it is."""
+        """The present time in the bag."""
         return (self._at - self._start) / 1e9
 
     @property
@@ -43,7 +43,7 @@ class Playback:
         return self._paused
 
     def toggle(self) -> None:
-        """Pause it, or go on; at the end, from the start."""
+        """Pause it, or go on; at the end, start again."""
         with self._changed:
             if self._paused and self.position >= self.duration:
                 self._target = self._start
@@ -52,7 +52,7 @@ class Playback:
             self._changed.notify_all()
 
     def seek(self, to: float) -> None:
-        """Go to another time, and go on from there if it is not paused."""
+        """Jump to another time, and go on from there unless it is paused."""
         with self._changed:
             self._target = self._start + round(to * 1e9)
             self._changed.notify_all()
@@ -74,7 +74,7 @@ class Playback:
                     self._changed.wait_for(lambda: self._ending or self._target is not None)
 
     def _play(self, start: int) -> bool:
-        """Publish what held at `start`, the last message of each channel, then what follows; False if a page wants
+        """Publish the last message of each channel before `start`, then those that follow. False if a page wants
         something else.
         """
         held: dict[Channel, Message] = {}

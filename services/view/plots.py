@@ -1,7 +1,6 @@
 """Plots in the page: number fields of topics over time."""
 
 import math
-import time
 from collections.abc import Callable, Iterator
 from itertools import islice
 from typing import Any
@@ -21,13 +20,14 @@ from .scene import Scene
 NONE = "(none)"
 WINDOW = 20.0  # s
 DRAW_EVERY = 4  # frames of the page
-MOST_FIELDS = 500  # of a message that are offered
+MOST_FIELDS = 500  # of a message that are offered for plotting
 HEIGHT = 140  # CSS pixels
+PADDING = (10, 10, 0, 0)  # CSS pixels at the top, right, bottom and left, for half of an axis' number
 BLUE = "#1f5fd0"
 
 
 class Chart:
-    """One field over the last seconds of `clock`, which is in s."""
+    """One field over the last seconds of `clock` (s)."""
 
     def __init__(self, client: viser.ClientHandle, bus: Bus, key: str, field: str, clock: Callable[[], float]) -> None:
         self.name = f"{key} {field}"
@@ -39,11 +39,11 @@ class Chart:
         self._plot: viser.GuiUplotHandle | None = None
 
     def take(self) -> None:
-        """Take in what has arrived."""
+        """Take the messages that have arrived."""
         try:
             self._lines.take()
         except LookupError:
-            pass  # a list may be shorter now
+            pass  # the field is in a list, which may have become shorter
 
     def draw(self) -> None:
         """Show the newest points."""
@@ -58,16 +58,18 @@ class Chart:
         with self._folder:
             series = (viser.uplot.Series(label="s"), viser.uplot.Series(label=self.name, stroke=BLUE, width=2))
             scales = {"x": viser.uplot.Scale(time=False)}
-            self._plot = self._client.gui.add_uplot(data, series, scales=scales, height=HEIGHT, order=0)
+            self._plot = self._client.gui.add_uplot(
+                data, series, scales=scales, padding=PADDING, height=HEIGHT, order=0
+            )
 
     def close(self) -> None:
-        """Take it out of the page."""
+        """Remove it from the page."""
         self._lines.close()
         self._folder.remove()
 
 
 class Plots:
-    """The plots of one page. `clock` is the time that they are drawn over, in s."""
+    """The plots of one page, drawn over the time (s) of `clock`."""
 
     def __init__(
         self,
@@ -75,7 +77,7 @@ class Plots:
         place: Place,
         bus: Bus,
         scene: Scene,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float],
     ) -> None:
         self._client, self._place, self._bus, self._scene, self._clock = client, place, bus, scene, clock
         self._charts: list[Chart] = []
@@ -91,7 +93,7 @@ class Plots:
         self._add.on_click(self._plot)
 
     def update(self) -> None:
-        """Offer the topics that there are, and draw."""
+        """Offer the present topics, and draw the plots."""
         topics = (NONE, *self._scene.topics)
         if topics != self._topic.options:
             chosen = self._topic.value

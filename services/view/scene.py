@@ -1,4 +1,4 @@
-"""The world in the page: every entity of the sims, and robots that only publish odometry, where they are now."""
+"""The world in the page: all entities of the sims, and robots that only publish odometry, in their present poses."""
 
 import math
 import time
@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
+import numpy as np
 import viser
 
 from holozen.bus import Bus, Subscription
@@ -22,61 +23,51 @@ from holozen.messages import (
 )
 from holozen.messages import Pose as PoseMessage
 from holozen.robot.errors import RobotError
-from holozen.robot.model import Joint
-from holozen.robot.rigid import moved_by
-from holozen.rotation import XYZ, XYZW, Transform, from_rpy
+from holozen.rotation import XYZ, Transform
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Endpoint
 from holozen.wire import key_for
 
 from .drive import Driver
-from .meshes import RGB, Parts, appearance, arrow
+from .instances import Instances, difference, wxyz
+from .meshes import appearance
 from .overlays import Goals, Track
 
 STALE = 0.5  # s without news of an entity
-FRAME = 0.05  # s between two looks at the sims
-JOINTS_EVERY = 2  # frames; the wheels of a fleet are most of what there is to send
-A_SECOND = 2000  # entities a second that are asked for: of many, there are fewer frames
+FRAME = 0.05  # s between two requests for the scene
+JOINTS_EVERY = 2  # frames; most of what is sent to the pages are the wheels of a fleet
+A_SECOND = 2000  # entities a second that are requested: with many of them there are fewer frames
+JOINTED_A_SECOND = 500  # entities a second whose joints are requested, which cost the sim more than poses
 PATIENCE = 0.3  # s for the sims to answer
-DESCRIBING = 0.05  # s in a frame in which new entities are asked for what they look like
+DESCRIBING = 0.05  # s of a frame for requests of what new entities look like
 NAME_AT = (0.0, 0.0, 0.6)  # m
-GREY = (120, 120, 120)
-EYE, LOOK_AT, FIELD = (-2.0, -1.6, 1.6), (0.0, 0.0, 0.0), math.radians(60)  # m; of a page that was just opened
+EYE, LOOK_AT, FIELD = (-2.0, -1.6, 1.6), (0.0, 0.0, 0.0), math.radians(60)  # m; the camera of a page that just opened
 SEEN = 1e-4  # m and of a quaternion; smaller changes are not sent to the pages
 TURNED = 0.01  # rad or m of a joint, likewise
-JOINTS = ("revolute", "continuous", "prismatic")
 LARGEST = 1_000_000  # bytes of a message that is read
 
 
 class Shown:
-    """An entity in the page. One that no sim has, or whose `text` is empty, is an arrow that its odometry moves."""
+    """An entity in the page, drawn as an instance of `kind`. It is an arrow if no sim has it, and then it follows its
+    odometry, or if it cannot be drawn.
+    """
 
-    def __init__(
-        self, server: viser.ViserServer, bus: Bus, entity: SceneEntity, text: str, joints: list[str] | None = None
-    ) -> None:
-        self.entity, self._server, self.root = entity, server, f"/entities/{entity.name}"
+    def __init__(self, server: viser.ViserServer, bus: Bus, entity: SceneEntity, kind: Instances) -> None:
+        self.entity, self.kind, self.root = entity, kind, f"/entities/{entity.name}"
         self.seen = time.monotonic()  # s; when its state arrived
-        self._meshes: list[tuple[viser.MeshHandle, RGB]] = []
-        self._joints: dict[str, tuple[Joint, viser.FrameHandle, XYZW]] = {}
-        self._at: tuple[float, ...] = ()
-        self._angles: dict[str, float] = {}
+        self._body = kind.add()
         self._grey_since = 0
         self._frame = server.scene.add_frame(self.root, show_axes=False)
-        if text:
-            self._add_links(text)
-        else:
-            self._add_parts(self.root, arrow())
         self.is_robot = bool(entity.command or entity.odometry)
         self._label = (
             server.scene.add_label(f"{self.root}/name", entity.name, position=NAME_AT) if self.is_robot else None
         )
-        self._names = joints or []  # of its joints, in the order of `turn`
         self._odom: Subscription[Odometry] | None = None
-        if not text:
+        if kind.is_arrow:
             self._odom = bus.subscribe(entity.odometry, Odometry, depth=1, limit=LARGEST)
 
     def update(self, still: bool) -> None:
-        """Show what has arrived since the last call, and how old it is; nothing is while time stands `still`."""
+        """Show the newest odometry, and how old the state is; nothing grows old while time stands `still`."""
         if self._odom and (odom := self._odom.try_recv()) and odom.message:
             self.seen = time.monotonic()
             self.place(odom.message.pose.pose)
@@ -86,86 +77,50 @@ class Shown:
         self._age(0 if age < STALE else max(1, int(age)))
 
     def place(self, pose: PoseMessage) -> None:
-        """Move it to a pose in the world."""
+        """Move it to a pose in the world. One that is not finite is ignored."""
         there = Transform.of(pose.position, pose.orientation)
-        at = (*there.translation, *there.rotation)
-        if not self._at or max(abs(a - b) for a, b in zip(at, self._at, strict=True)) > SEEN:
-            self._at, self._frame.position, self._frame.wxyz = at, there.translation, wxyz(there.rotation)
+        if SEEN < difference(there, self._body.at) < math.inf:
+            self._body.at, self.kind.changed = there, True
+            self._frame.position, self._frame.wxyz = there.translation, wxyz(there.rotation)
 
     def turn(self, joints: list[float]) -> None:
-        """Move its joints to these positions, in rad or m."""
-        for name, angle in zip(self._names, joints, strict=False):
-            self._turn(name, angle)
+        """Move its joints to these positions, in rad or m. Without any, they were not requested."""
+        if not joints or len(joints) != len(self._body.joints):
+            return
+        turned = np.where(np.isfinite(joints), joints, self._body.joints)
+        if np.any(np.abs(turned - self._body.joints) > TURNED):
+            self._body.joints, self.kind.changed = turned, True
 
     @property
     def position(self) -> XYZ:
-        """Where it is, in metres."""
-        return self._at[:3] if self._at else (0.0, 0.0, 0.0)  # type: ignore[return-value]
+        """Its position in the world, in m."""
+        return self._body.at.translation
 
     @property
     def pose(self) -> PoseMessage:
         """Its pose in the world."""
-        x, y, z, i, j, k, w = self._at or (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-        return PoseMessage(Point(x, y, z), Quaternion(i, j, k, w))
+        return PoseMessage(Point(*self._body.at.translation), Quaternion(*self._body.at.rotation))
 
     def close(self) -> None:
-        """Take it out of the page."""
+        """Remove it from the page."""
+        self.kind.remove(self._body)
         self._frame.remove()
         if self._odom:
             self._odom.close()
 
-    def _add_links(self, text: str) -> None:
-        model, parts = appearance(text)
-        joint_of = {joint.child: joint for joint in model.joints}
-        numbers = {link.name: number for number, link in enumerate(model.links)}  # names may hold a slash
-        paths: dict[str, str] = {}
-        waiting = [link.name for link in model.links if link.name not in joint_of]
-        for name in waiting:
-            joint = joint_of.get(name)
-            paths[name] = f"{paths[joint.parent] if joint else self.root}/{numbers[name]}"
-            at, turned = (joint.pose.xyz, from_rpy(*joint.pose.rpy)) if joint else ((0.0, 0.0, 0.0), from_rpy(0, 0, 0))
-            frame = self._server.scene.add_frame(paths[name], show_axes=False, position=at, wxyz=wxyz(turned))
-            if joint and joint.kind in JOINTS:
-                self._joints[joint.name] = joint, frame, turned
-            self._add_parts(paths[name], parts[numbers[name]])
-            waiting += [other.child for other in model.joints if other.parent == name and other.child in numbers]
-
-    def _add_parts(self, path: str, parts: Parts) -> None:
-        for number, (pose, part) in enumerate(parts):
-            mesh = self._server.scene.add_mesh_simple(
-                f"{path}/part{number}", part.vertices, part.faces, color=part.color,
-                opacity=part.opacity if part.opacity < 1 else None, flat_shading=True, side="double",
-                position=pose.xyz, wxyz=wxyz(from_rpy(*pose.rpy)),
-            )  # fmt: skip
-            self._meshes.append((mesh, part.color))
-
-    def _turn(self, name: str, angle: float) -> None:
-        if name not in self._joints or not math.isfinite(angle):
-            return
-        if name in self._angles and abs(self._angles[name] - angle) < TURNED:
-            return
-        self._angles[name] = angle
-        joint, frame, turned = self._joints[name]
-        at, rotation = moved_by(joint, joint.pose.xyz, turned, angle)
-        if joint.kind == "prismatic":
-            frame.position = at
-        else:
-            frame.wxyz = wxyz(rotation)
-
     def _age(self, seconds: int) -> None:
-        """Grey it after so many seconds without news; 0: it is current."""
+        """Draw it in grey, `seconds` after its last news; 0: it is current."""
         if seconds == self._grey_since:
             return
-        if bool(seconds) != bool(self._grey_since):
-            for mesh, color in self._meshes:
-                mesh.color = GREY if seconds else color
+        if bool(seconds) != self._body.grey:
+            self._body.grey, self.kind.changed = bool(seconds), True
         self._grey_since = seconds
         if self._label:
             self._label.text = f"{self.entity.name} ({seconds} s ago)" if seconds else self.entity.name
 
 
 class News(NamedTuple):
-    """All entities by name, those of them that a sim has answered for, and what new ones look like."""
+    """All entities by name, those that a sim has just reported, and what new ones look like."""
 
     there: dict[str, SceneEntity]
     answered: list[SceneEntity]
@@ -173,20 +128,22 @@ class News(NamedTuple):
 
 
 class Scene:
-    """All that is shown, by name. Call `ask` and `draw` in turns, often."""
+    """All entities that are shown, by name. Call `ask` and `draw` in turns, every `frame` seconds."""
 
     def __init__(self, server: viser.ViserServer, bus: Bus, stands_still: Callable[[], bool] = lambda: False) -> None:
         self._server, self._bus, self._graph = server, bus, bus.graph()
-        self._stands_still = stands_still  # whether silence is meant: a bag is paused
+        self._stands_still = stands_still  # whether time stands still, since a bag is paused
         self._ends: list[Endpoint] = []
-        self._changes = -1  # of the graph, at the last look
+        self._changes = -1  # of the graph, when it was last read
         self.topics: dict[str, str] = {}  # the type of each key that is published, by the graph
         self.shown: dict[str, Shown] = {}
+        self._kinds: dict[tuple[str, ...], Instances] = {}  # by description and names of joints
+        self._made = 0  # how many of these have ever been made
         self._tracks: dict[tuple[str, int], Track] = {}  # by name and number of an entity
         self._times: deque[float] = deque(maxlen=round(1 / FRAME))
-        self._drawn = 0  # frames
+        self._asked = 0  # how often the scene has been requested
         self._goals = Goals(server, bus)
-        # Shadows, reflections and an endless ground take nine tenths of the time of a computer without a graphics card.
+        # Shadows, reflections and an endless ground take nine tenths of the drawing time without a graphics card.
         server.scene.configure_default_lights(cast_shadow=False)
         server.scene.configure_environment_map(hdri=None)
         server.scene.add_light_ambient("/light", intensity=1.2)
@@ -195,8 +152,8 @@ class Scene:
         server.initial_camera.fov = FIELD
 
     def ask(self) -> News:
-        """Ask the sims what there is, and for some time what it looks like: of many new ones the first are shown while
-        the others are asked for. Raises BusError once the bus is closed.
+        """Request the scene from the sims, and for up to DESCRIBING seconds what new entities look like: the first ones
+        are shown while the others are requested. Raises BusError once the bus is closed.
         """
         self._look()
         answered = self._ask()
@@ -212,39 +169,39 @@ class Scene:
         return News(there, answered or [], appearances)
 
     def draw(self, now: float, news: News, watched: Mapping[str, Driver]) -> None:
-        """Show what is there at `now` (s, monotonic); of the robots that are `watched`, by name, also how they move.
+        """Show the scene at `now` (s, monotonic), and trail and velocities of the robots that are `watched`, by name.
 
-        To be called in the server's event loop.
+        It has to be called in the server's event loop.
         """
         self._times.append(now)
-        self._drawn += 1
         with self._server.atomic():
             self._match(news)
             for entity in news.answered:
                 if shown := self.shown.get(entity.name):
                     shown.seen = now
                     shown.place(entity.pose)
-                    if self._drawn % JOINTS_EVERY == 0:
-                        shown.turn(entity.joints)
+                    shown.turn(entity.joints)
             still = self._stands_still()
             for shown in self.shown.values():
                 shown.update(still)
+            for kind in self._kinds.values():
+                kind.draw()
             self._goals.update()
             self._follow(watched)
 
     def close(self) -> None:
-        """No longer ask for goals."""
+        """Stop requesting goals."""
         self._goals.close()
 
     @property
     def rate(self) -> float:
-        """The frames of the last second or so, in Hz."""
+        """The measured rate of frames in Hz."""
         span = self._times[-1] - self._times[0] if self._times else 0.0
         return (len(self._times) - 1) / span if span else 1 / FRAME
 
     @property
     def frame(self) -> float:
-        """Seconds from one `update` to the next: more entities cost the sim no more."""
+        """Seconds from one frame to the next: with many entities it is longer, so that they cost the sim no more."""
         return max(FRAME, len(self.shown) / A_SECOND)
 
     def robots(self) -> list[str]:
@@ -252,7 +209,7 @@ class Scene:
         return sorted(name for name, shown in self.shown.items() if shown.is_robot)
 
     def _look(self) -> None:
-        """Follow the graph."""
+        """Read the graph, if it has changed."""
         self._graph.left()
         if self._graph.changes == self._changes:
             return
@@ -265,14 +222,17 @@ class Scene:
         """The entities of all sims; None if no sim answers."""
         if not any(end.kind == "srv" and end.key == "get_scene" for end in self._ends):
             return None
+        every = max(JOINTS_EVERY, round(len(self.shown) / self.frame / JOINTED_A_SECOND))
+        self._asked += 1
+        request = GetSceneRequest(without_joints=self._asked % every != 0)
         try:
-            replies = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, PATIENCE)
+            replies = self._bus.call_all("get_scene", request, GetSceneReply, PATIENCE)
         except ServiceError:
             return None
         return [entity for reply in replies for entity in reply.entities]
 
     def _others(self, entities: list[SceneEntity]) -> list[SceneEntity]:
-        """Robots that no sim has: those that publish odometry. They stay in the page, grey, when they are gone."""
+        """Robots that no sim has, but that publish odometry. They stay in the page, in grey, once they are gone."""
         sims = {end.session for end in self._ends if end.kind == "srv" and end.key == "get_scene"}
         known = {entity.odometry for entity in entities}
         keys = [
@@ -305,16 +265,29 @@ class Scene:
                 shown.close()
                 del self.shown[name]
         for name, found in news.appearances.items():
-            self.shown[name] = Shown(self._server, self._bus, news.there[name], found.description, found.joints)
+            self.shown[name] = Shown(self._server, self._bus, news.there[name], self._kind(found))
+        for look, kind in list(self._kinds.items()):
+            if not kind.bodies:
+                kind.close()
+                del self._kinds[look]
+
+    def _kind(self, found: RobotDescriptionReply) -> Instances:
+        """The instances with that look; the first of them brings the meshes into the page."""
+        look = (found.description, *found.joints)
+        if look not in self._kinds:
+            self._made += 1
+            path = f"/instances/{self._made}"
+            self._kinds[look] = Instances(self._server.scene, path, found.description, found.joints)
+        return self._kinds[look]
 
     def _description(self, entity: SceneEntity) -> RobotDescriptionReply | None:
-        """What an entity looks like; empty if no sim has it, None if it is not there now."""
+        """What an entity looks like; empty if no sim has it or it cannot be drawn, None if it is gone."""
         if not entity.number:
             return RobotDescriptionReply()
         try:
             found = description(self._bus, entity.name, entity.number, 5.0)
             if found:
-                appearance(found.description)  # here, since it takes a while: it is kept for `draw`
+                appearance(found.description)  # cached for `draw`, which must not wait for it
         except ServiceError:
             return None
         except RobotError:
@@ -326,8 +299,3 @@ def _without_sim(key: str) -> SceneEntity:
     """The robot that publishes odometry on `key`."""
     place = key.rpartition("/")[0]
     return SceneEntity(place.replace("/", "_") or "robot", command=key_for("cmd_vel", place), odometry=key)
-
-
-def wxyz(q: XYZW) -> tuple[float, float, float, float]:
-    """viser's order of a quaternion."""
-    return q[3], q[0], q[1], q[2]

@@ -1,4 +1,4 @@
-"""What one page does to the world: goals, robots that are added, moved and deleted, and the time of the sim."""
+"""The controls of one page for the world: goals, adding, moving and deleting robots, and the time of the sim."""
 
 import asyncio
 import math
@@ -17,22 +17,22 @@ from .drive import Driver
 from .scene import Scene, Shown
 
 PATIENCE = 5.0  # s for the sims to answer
-STEPS = 24  # of the sim, that one click makes: a tenth of a second by default
+STEPS = 24  # of the sim that one click makes: a tenth of a second by default
 TIME: dict[str, tuple[Callable[[Bus], list[str]], str]] = {
     "Pause": (lambda bus: entities.set_playing(bus, False), "paused"),
     "Play": (lambda bus: entities.set_playing(bus, True), "played"),
     "Step": (lambda bus: entities.step(bus, STEPS), f"{STEPS} steps"),
     "Reset": (entities.reset, "reset"),
 }
-"""By button: what it does to the time of the sims, and the line that says so."""
+"""By button: what it does to the time of the sims, and the line that reports it."""
 FARTHEST = 100.0  # m; a click near the horizon is no goal
-GIZMO = 1.5  # the scale of the handles, whose arrows are about half as long in m
+GIZMO = 1.5  # the scale of the handles; their arrows are about half as long, in m
 Attempt = Callable[[Callable[[], str]], None]
-"""Does something and shows the line that it returns, or why it failed."""
+"""Calls a function, and shows the line that it returns, or why it failed."""
 
 
 class WorldTab:
-    """The controls of one page. `chosen` is its robot, and `driver` what drives that, if it takes commands."""
+    """The controls of one page. `chosen` returns its robot, and `driver` that robot's driver, if it takes commands."""
 
     def __init__(
         self, client: viser.ClientHandle, bus: Bus, scene: Scene, attempt: Attempt,
@@ -81,7 +81,7 @@ class WorldTab:
             self._attempt(lambda: self._put(name, pose))
 
     async def _await_click(self, _event: Any) -> None:
-        """The next click on the ground is a goal."""
+        """Take the next click on the ground as a goal."""
         scene, loop = self._client.scene, asyncio.get_running_loop()
 
         def on_click(event: viser.SceneClickEvent) -> None:
@@ -128,7 +128,7 @@ class WorldTab:
 
 
 def on_ground(origin: tuple[float, ...], direction: tuple[float, ...]) -> tuple[float, float] | None:
-    """Where a ray meets the plane z = 0, in m; None if that is behind or far away."""
+    """The point (m) where a ray meets the plane z = 0; None if that is behind its origin, or far away."""
     if direction[2] >= 0 or origin[2] <= 0:
         return None
     far = -origin[2] / direction[2]

@@ -65,7 +65,7 @@ def test_the_docs_show_the_table() -> None:
     text = (REPO / "docs" / "wire.md").read_text()
     shown = re.search(r"<!-- wire -->\n(.*)\n<!-- /wire -->", text, re.DOTALL)
     assert shown is not None
-    assert shown[1] == wire.table(), "scripts/tables writes it anew"
+    assert shown[1] == wire.table(), "scripts/tables rewrites it"
 
 
 def test_the_table_has_a_row_for_each_key_with_its_types_ends_rate_and_rule() -> None:

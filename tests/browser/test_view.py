@@ -13,8 +13,9 @@ import pytest
 from PIL import Image as Picture
 from playwright.sync_api import Browser, Page
 
-from holozen import entities
+from holozen import data, entities
 from holozen.bus import Bus
+from holozen.cli.spawn import Place, spawn_file
 from holozen.messages import (
     Header,
     Image,
@@ -22,12 +23,14 @@ from holozen.messages import (
     Odometry,
     Point,
     Pose,
+    PoseStamped,
     Range,
     SimulationStatus,
     TFMessage,
     TransformStamped,
     Vector3,
 )
+from holozen.messages import Path as PathMessage
 from holozen.messages import Transform as TransformMessage
 from holozen.messages.simulation_interfaces import (
     EntityState,
@@ -80,7 +83,9 @@ Open = Callable[..., Page]
 
 @pytest.fixture(scope="module")
 def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
-    """Opens pages, as a phone or not, once they show a robot. None fetches anything from elsewhere, or has an error."""
+    """Opens pages, as a phone or not, and waits until they show a robot. None loads anything from elsewhere, or reports
+    an error.
+    """
     faults: list[str] = []
     contexts = []
 
@@ -107,7 +112,7 @@ def opened(chromium: Browser, view: str, sim: Process) -> Iterator[Open]:
 
 @pytest.fixture(scope="module")
 def page(opened: Open) -> Page:
-    """A page for all tests; they leave it with no button held."""
+    """A page for all tests; each leaves it with no button held."""
     return opened()
 
 
@@ -125,7 +130,7 @@ def speed(odom: Latest[Odometry]) -> float:
 
 
 def pixel(x: float, y: float, z: float) -> tuple[float, float]:
-    """Where a point of the world is in the picture, from where a page that was just opened looks."""
+    """The pixel of a point of the world, as a page that was just opened shows it."""
     eye, forward = np.array(EYE), np.array(LOOK_AT) - np.array(EYE)
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, (0, 0, 1))
@@ -136,7 +141,7 @@ def pixel(x: float, y: float, z: float) -> tuple[float, float]:
 
 
 def colored(page: Page, color: Callable[[Any, Any, Any], Any]) -> list[tuple[int, int]]:
-    """The pixels x, y of a colour."""
+    """The pixels (x, y) of a colour."""
     picture = Picture.open(io.BytesIO(page.screenshot())).convert("RGB")
     red, green, blue = np.asarray(picture, float).transpose(2, 0, 1)
     rows, columns = np.nonzero(color(red, green, blue) & FREE)
@@ -144,7 +149,7 @@ def colored(page: Page, color: Callable[[Any, Any, Any], Any]) -> list[tuple[int
 
 
 def deck(page: Page) -> tuple[float, float] | None:
-    """The middle of the orange pixels, if there are some."""
+    """The middle of the orange pixels, if there are any."""
     found = colored(page, lambda r, g, b: (r > 150) & (r - b > 70) & (r - g > 25) & (g - b > 25))
     return tuple(np.mean(found, axis=0).tolist()) if len(found) > 60 else None
 
@@ -184,7 +189,7 @@ def is_soon(condition: Callable[[], bool]) -> bool:
 
 
 def stands_near(odom: Latest[Odometry], before: tuple[float, float]) -> None:
-    """It comes to rest within 0.5 s, by the way that it goes."""
+    """Check that the robot comes to rest within 0.5 s, and within the distance that it covers in that time."""
     wait_for(lambda: speed(odom) < 0.01, what="the robot to stand")
     assert math.dist(place(odom), before) < MOST
 
@@ -204,7 +209,7 @@ def test_the_robot_is_where_its_odometry_places_it_in_its_colours_and_moves_when
 
 
 def measured(red: Any, green: Any, blue: Any) -> Any:
-    """The arrow of the velocity by odometry."""
+    """The arrow of the velocity measured by odometry."""
     return (green - red > 60) & (green - blue > 60)
 
 
@@ -238,6 +243,7 @@ def test_a_page_that_hung_stops_the_robot_and_does_not_go_on_by_itself(page: Pag
     page.evaluate("{const start = Date.now(); while (Date.now() - start < 800);}")  # as a phone that sleeps
     wait_for(lambda: not turns(odom), what="the robot to stand")
     page.get_by_text("not driven").wait_for()
+    page.get_by_text("counts as let go").wait_for()
     seen = odom.count
     assert odom.wait(seen + 25, 5) and not turns(odom), "half a second later, with the button still held"
     page.mouse.up()
@@ -326,7 +332,7 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
         first, many = -turned - math.pi / 2 - 0.05, [0.8] * 11
         scans.put(LaserScan(Header(frame_id="laser"), first, angle_increment=0.01, range_max=5.0, ranges=many))
         images.put(Image(height=2, width=2, encoding="rgb8", step=6, data=[0, 0, 255] * 4))
-        found = colored(page, lambda r, g, b: (r > 180) & (g < 60) & (b < 60))
+        found = colored(page, wall)
         return bool(found) and math.dist(np.mean(found, axis=0), pixel(x + drift, y - 0.8, 0.1)) < NEAR
 
     wait_for(shown, 20, "the wall that the scan hit")
@@ -337,13 +343,101 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
     wait_for(shown, 20, "the wall where the robot truly is")
     for name in ("LaserScan: scan", "Image: eye"):
         page.get_by_text(name, exact=True).click()
-    wait_for(lambda: not colored(page, lambda r, g, b: (r > 180) & (g < 60) & (b < 60)), what="no scan")
+    wait_for(lambda: not colored(page, wall), what="no scan")
     before = len(axes(page))
     page.get_by_text("TF", exact=True).click()
     wait_for(lambda: len(axes(page)) > before + 20, what="the axes of the frames")
     page.get_by_text("TF", exact=True).click()
     wait_for(lambda: len(axes(page)) < before + 10, what="no axes")
     page.get_by_role("tab", name="Drive").click()
+
+
+def test_a_path_stays_in_its_frame_while_the_robot_moves(page: Page, bus: Bus, odom: Latest[Odometry]) -> None:
+    page.get_by_role("tab", name="Displays").click()
+    x, y = place(odom)
+    message = odom.read()[0]
+    assert message is not None
+    plan = bus.publisher("plan", PathMessage)
+    page.get_by_text("Path: plan", exact=True).click()
+    line = [PoseStamped(pose=Pose(Point(x + ahead, y - 0.8))) for ahead in (-0.1, 0.1)]
+
+    def shown() -> bool:
+        found = colored(page, measured)  # it has the same green
+        return bool(found) and math.dist(np.mean(found, axis=0), pixel(x, y - 0.8, 0.0)) < NEAR
+
+    def published() -> bool:
+        plan.put(PathMessage(Header(frame_id=message.header.frame_id), line))
+        return shown()
+
+    wait_for(published, 20, "the path")
+    for way in (0.5, 0.0):
+        request = SetEntityStateRequest("hb_bot", EntityState(pose=Pose(Point(x, y + way, -0.04))))
+        bus.call("set_entity_state", request, SetEntityStateReply)
+        wait_for(lambda way=way: shows_it_at(page, x, y + way), what="the robot elsewhere")  # type: ignore[misc]
+        wait_for(shown, what="the path where it was")
+    page.get_by_text("Path: plan", exact=True).click()
+    page.get_by_role("tab", name="Drive").click()
+
+
+def test_what_is_drawn_in_a_fixed_frame_goes_and_comes_with_that_frame_and_with_the_robot(
+    page: Page, bus: Bus, odom: Latest[Odometry]
+) -> None:
+    rover = data.find("urdf", "mecanum.urdf.xacro")
+    spawn_file(bus, rover, "rover", Place(x=8.0))  # out of sight, and so is what it sees in the world
+    scans, frames = bus.publisher("rover/scan", LaserScan), bus.publisher("rover/tf", TFMessage)
+    page.get_by_role("tab", name="Displays").click()
+    choose(page, "Robot", "rover")
+    page.get_by_text("LaserScan: scan", exact=True).click()
+    gone = page.get_by_text("the frame hall is gone")
+    x, y = place(odom)
+    seen = (x, y - 0.8)  # beside the other robot
+
+    def scan(parent: str = "") -> Any:
+        """Publish a wall, and where odometry began in `parent`. Returns the pixels of the wall."""
+        first, many = math.atan2(seen[1], seen[0]) - 0.05, [math.hypot(*seen)] * 11
+        scans.put(LaserScan(Header(frame_id="hall"), first, angle_increment=0.01, range_max=5.0, ranges=many))
+        if parent:
+            at = TransformMessage(Vector3(1.0))
+            frames.put(TFMessage([TransformStamped(Header(frame_id=parent), "rover/odom", at)]))
+        return colored(page, wall)
+
+    def shown() -> bool:
+        found = scan("hall")
+        return bool(found) and math.dist(np.mean(found, axis=0), pixel(*seen, 0.0)) < NEAR
+
+    def offered() -> bool:
+        scan("hall")
+        page.get_by_text("Fixed frame", exact=True).locator("xpath=following::input[1]").click()
+        return page.get_by_role("option", name="hall", exact=True).is_visible()
+
+    wait_for(offered, 20, "the frame to be offered")
+    page.get_by_role("option", name="hall", exact=True).click()
+    wait_for(shown, 20, "the wall in the fixed frame")
+    wait_for(lambda: not scan("cellar") and gone.is_visible(), 20, "the frame to be gone, since it has another name")
+    wait_for(shown, 20, "the wall in the fixed frame that is back")
+    wait_for(lambda: not scan() and gone.is_visible(), 20, "the frame to be gone, since nobody publishes it")
+    wait_for(shown, 20, "the wall in the fixed frame that is back")
+    assert not gone.is_visible()
+    entities.delete(bus, "rover")
+    page.get_by_text("rover is gone; choose another").wait_for()
+    wait_for(lambda: not scan("hall"), 20, "no wall of a robot that is gone")
+    spawn_file(bus, rover, "rover", Place(x=8.0))
+    wait_for(shown, 20, "the wall of the robot that is back")
+    scans.close()
+    wait_for(
+        lambda: not any(end.key == "rover/scan" and end.kind == "pub" for end in bus.endpoints()),
+        what="no publisher of scans",
+    )
+    page.get_by_text("LaserScan: scan", exact=True).click()
+    wait_for(lambda: not colored(page, wall), what="no wall, since it is switched off")
+    entities.delete(bus, "rover")
+    choose(page, "Robot", "hb_bot")
+    page.get_by_role("tab", name="Drive").click()
+
+
+def wall(red: Any, green: Any, blue: Any) -> Any:
+    """The points that a scan hit."""
+    return (red > 180) & (green < 60) & (blue < 60)
 
 
 def axes(page: Page) -> list[tuple[int, int]]:
@@ -429,6 +523,7 @@ def test_a_robot_is_moved_by_its_handles(page: Page, bus: Bus, odom: Latest[Odom
     page.get_by_role("tab", name="World").click()
     page.get_by_text("Move by handles").click()
     x, y = place(odom)
+    wait_for(lambda: colored(page, lambda r, g, b: (g - r > 40) & (g - b > 30)), what="the handles; one is green")
 
     def moved() -> bool:
         for ahead, act in ((0.96, page.mouse.down), (1.1, str), (1.3, str), (1.6, page.mouse.up)):

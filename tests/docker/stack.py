@@ -31,20 +31,20 @@ class Stack:
         self.connection = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.port}",))
 
     def words(self, *words: str) -> list[str]:
-        """The words of a compose command about this stack."""
+        """The words of a compose command for this stack."""
         return ["docker-compose", *self._files, "-p", self.name, *words]
 
     def compose(self, *words: str) -> str:
-        """Run a compose command to its end; what it printed."""
+        """Run a compose command until it ends. Returns its output."""
         return run(*self.words(*words), env=self.env)
 
     def up(self) -> None:
-        """Start everything and wait until each healthcheck is content."""
+        """Start everything and wait until every healthcheck succeeds."""
         self.compose("up", "-d")
         wait_for(lambda: set(self.healths().values()) == {"healthy"}, within=60, what="healthy containers")
 
     def down(self) -> None:
-        """End and remove all that `up` made, one-off containers too."""
+        """End and remove everything that `up` made, one-off containers too."""
         self.compose("down", "--volumes", "--remove-orphans", "--timeout", "10")
 
     def __enter__(self) -> "Stack":
@@ -70,7 +70,7 @@ class Stack:
         return self._ids()
 
     def inspect(self, service: str) -> dict[str, Any]:
-        """What the engine knows of a service's container."""
+        """What the engine reports about a service's container."""
         found: dict[str, Any] = json.loads(docker("inspect", self.container(service)))[0]
         return found
 
@@ -78,18 +78,18 @@ class Stack:
         return {service: self.inspect(service)["State"]["Health"]["Status"] for service in self.services}
 
     def starts(self, *services: str) -> dict[str, str]:
-        """When each of these started, so that a restart is seen."""
+        """When each of these was started, so that a restart is noticed."""
         return {service: self.inspect(service)["State"]["StartedAt"] for service in services}
 
     def logs(self, *services: str) -> str:
         return "\n".join(docker("logs", self.container(service)) for service in services or self.services)
 
     def complaints(self) -> list[str]:
-        """Lines of the logs that should not be there."""
+        """The lines of the logs that should not be there."""
         return [line for line in self.logs().splitlines() if re.search(r"Traceback|Error|ERROR|WARN|panicked", line)]
 
     def execute(self, service: str, *words: str) -> str:
-        """Run a command in a service's container; what it printed."""
+        """Run a command in a service's container. Returns its output."""
         return docker("exec", self.container(service), *words)
 
     def _ids(self, *filters: str) -> list[str]:
@@ -104,12 +104,12 @@ class Watcher:
         self._odom, self._status = bus.latest("odom", Odometry), bus.latest("cmd_vel_status", CommandStatus)
 
     def odom(self) -> Odometry:
-        """An odom that came after this call."""
+        """An odom that arrives after this call."""
         assert self._odom.wait(self._odom.count, 30), "no odom within 30 s"
         return self._odom.read()[0] or Odometry()
 
     def status(self) -> CommandStatus:
-        """A status that came after this call."""
+        """A status that arrives after this call."""
         assert self._status.wait(self._status.count, 30), "no cmd_vel_status within 30 s"
         return self._status.read()[0] or CommandStatus()
 
@@ -123,12 +123,12 @@ class Watcher:
 
 
 def docker(*words: str) -> str:
-    """Run a docker command; what it printed, errors too."""
+    """Run a docker command. Returns its output, including errors."""
     return run("docker", *words)
 
 
 def run(*words: str, env: dict[str, str] | None = None, within: float = 1500) -> str:
-    """Run a command to its end; what it printed, errors too. AssertionError if it fails."""
+    """Run a command until it ends. Returns its output, including errors. AssertionError if it fails."""
     done = subprocess.run(
         words, env={**os.environ, **(env or {})}, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, text=True, timeout=within,

@@ -22,7 +22,7 @@ DOCKERS_DNS = "0B00007F"  # 127.0.0.11
 
 
 def holozen(stack: Stack, *words: str) -> str:
-    """What a holozen command on this machine prints when it joins by the published port."""
+    """The output of a holozen command on this machine that joins by the published port."""
     return run(sys.executable, "-m", "holozen", *words, *stack.connection.arguments(), within=60)
 
 

@@ -27,25 +27,25 @@ class Fleet:
         self.env = {"HOLOZEN_IMAGE": image, "SHARDS": str(SHARDS)}
 
     def holozen(self, *words: str) -> str:
-        """What a command in the fleet's network prints on standard output."""
+        """The standard output of a command in the fleet's network."""
         where = ("-e", "HOLOZEN_MODE=client", "-e", "HOLOZEN_CONNECT=tcp/router:7447")
         words = ("docker", "run", "--rm", "--network", f"{self.name}_fleet", *where, self.image, *words)
         return subprocess.run(words, capture_output=True, text=True, timeout=120).stdout
 
     def health(self) -> list[str]:
-        """That of each container."""
+        """The health of each container."""
         rows = docker("ps", "--filter", f"name={self.name}", "--format", "{{json .}}").splitlines()
         return [json.loads(row)["Status"].rpartition("(")[2].rstrip(")") for row in rows]
 
     def wait(self) -> None:
-        """Until all are healthy, and all robots there."""
+        """Wait until all are healthy, and all robots are there."""
         wait_for(
             lambda: self.health() == ["healthy"] * (SHARDS + 3), 180, lambda: f"healthy containers: {self.health()}"
         )
         wait_for(lambda: [line.split()[0] for line in self.holozen("list").splitlines()] == BOTS, 60)
 
     def stopped(self) -> list[str]:
-        """By whom each robot is."""
+        """The names of the sources that stopped each robot."""
         return [self.holozen("topic", "echo", f"{bot}/cmd_vel_status", "--once", "--field", "stopped") for bot in BOTS]
 
 

@@ -23,7 +23,7 @@ print(*[f for f in files if f.endswith(".py") and not os.path.exists(importlib.u
 
 
 def inside(image: str, *words: str) -> str:
-    """What a command prints in a new container, as compose would start it."""
+    """The output of a command in a new container, started as compose would."""
     return docker("run", "--rm", "--read-only", "--network=none", "--entrypoint", words[0], image, *words[1:]).strip()
 
 
@@ -43,7 +43,7 @@ def test_the_package_is_installed_and_not_linked_to_the_tree(image: str) -> None
     assert where == "/opt/venv/lib/python3.11/site-packages/holozen/sim/__init__.py"
 
 
-def test_nothing_is_compiled_anew_at_each_start(image: str) -> None:
+def test_nothing_is_recompiled_at_each_start(image: str) -> None:
     assert inside(image, "python", "-I", "-c", UNCOMPILED) == ""
 
 

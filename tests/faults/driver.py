@@ -3,7 +3,7 @@ when it has (s, monotonic).
 
 python driver.py ENDPOINT [FOLDER]
 
-It is no lasting node, as `holozen topic pub` is none: when it dies the robot stands by the silence alone. With the
+It is not a lasting node, just like `holozen topic pub`: when it dies the robot stands by the silence alone. With the
 folder of a member it is a node, in the secure set-up.
 """
 

@@ -23,17 +23,17 @@ CLOCK = 4000  # s that the drivers' clock is ahead
 
 
 def whole_lines(process: Process) -> list[str]:
-    """What a program has printed, but for a line that it has only begun."""
+    """The lines that a program has printed, without one that it has only begun."""
     return process.out.rpartition("\n")[0].splitlines()
 
 
 def script(name: str, endpoint: str) -> list[str]:
-    """The words that run `driver.py` or `observer.py`."""
+    """The command that runs `driver.py` or `observer.py`."""
     return [sys.executable, str(Path(__file__).with_name(f"{name}.py")), endpoint]
 
 
 def newest(observer: Process) -> float:
-    """When the newest odom was sent."""
+    """The time at which the newest odom was sent."""
     return next((float(line.split()[0]) for line in reversed(whole_lines(observer))), 0.0)
 
 
@@ -84,11 +84,11 @@ class History:
         return cls(sorted(commands), odom)
 
     def moves(self, begin: float, end: float = float("inf")) -> list[Row]:
-        """Where the robot surely moved between two times."""
+        """The odom messages between two times at which the robot was certainly moving."""
         return [row for row in self.odom if row.moves and begin < row.begin and row.end < end]
 
     def longest(self, begin: float = 0.0) -> float:
-        """The longest that the robot surely moved on after the last command was sent, from `begin` on."""
+        """How long after the last command was sent the robot certainly still moved, at most, from `begin` on."""
         return max((row.begin - self._sent(row.end) for row in self.moves(begin)), default=0.0)
 
     def check_silence(self, begin: float = 0.0) -> None:
@@ -98,8 +98,8 @@ class History:
                 raise Violation(f"it moved {late:.3f} s after the last command was sent", row.begin)
 
     def check_restored(self, restored: float, until: float = float("inf")) -> None:
-        """A robot that stood when the link came back is not set moving by what was sent before, unless that was prompt:
-        a link that is reset holds nothing up, and the newest of what waited may be fresh.
+        """A robot that was at rest when the link came back is not set in motion by older commands, unless they were
+        prompt: a link that is reset delays nothing, and the newest of the commands that waited may still be fresh.
         """
         last = bisect_left(self.odom, restored, key=lambda row: row.end)
         fresh = min((each.began for each in self.commands if each.ended >= restored), default=float("inf"))
@@ -113,10 +113,10 @@ class History:
 
     @cached_property
     def _latest(self) -> list[float]:
-        """When at the latest the sending of each command and of those before it ended."""
+        """For each command, the latest time at which it and all before it had been sent."""
         return list(accumulate((each.ended for each in self.commands), max))
 
     def _sent(self, at: float) -> float:
-        """When at the latest the last command was sent of those that may have been before `at`."""
+        """The latest time at which the last of the commands that may precede `at` was sent."""
         index = bisect_left(self.commands, (at,))
         return self._latest[index - 1] if index else float("-inf")

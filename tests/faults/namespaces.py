@@ -46,7 +46,7 @@ class Lab:
         return host
 
     def cable(self, one: "Host", other: "Host") -> "Cable":
-        """Join two hosts; each gets one more interface, with an address of a network that only this cable has."""
+        """Join two hosts. Each gets one more interface, with an address in a network that only this cable has."""
         self._cables += 1
         cable = Cable(self._cables, one, other)
         end, far = cable.interface, ("peer", "name", cable.interface, "netns", str(other.pid))
@@ -70,18 +70,18 @@ class Host:
         self.name, self.pid, self._ends = name, holder.pid, ends
 
     def inside(self, *words: str) -> list[str]:
-        """The words that run a program on this host."""
+        """The command that runs a program on this host."""
         return _enter(self.pid, "-n", f"--time=/proc/{self.pid}/ns/time_for_children") + list(words)
 
     def start(self, *words: str, **options: Any) -> Process:
-        """Start a program here; it ends with the lab. Options are those of Process."""
+        """Start a program here; it ends with the lab. The options are those of Process."""
         process = self._ends.enter_context(Process(self.inside(*words), **options))
         # pytest shows it on failure
         self._ends.callback(lambda: print(f"--- {self.name}: {process}\n{process.out}{process.err}"))
         return process
 
     def run(self, *words: str, within: float = 30.0) -> subprocess.CompletedProcess[str]:
-        """Run a program here to its end."""
+        """Run a program here until it ends."""
         return subprocess.run(
             self.inside(*words), stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=within
         )
@@ -108,7 +108,9 @@ class Cable:
         return f"10.99.{self._number}.{1 + self._hosts.index(host)}"
 
     def cut(self) -> None:
-        """Pull the plug: the first host has no route, the other no carrier. `lose(1)` is a cut that none sees."""
+        """Pull the plug: the first host has no route, the other no carrier. `lose(1)` is a cut that neither end
+        notices.
+        """
         self._hosts[0].check("ip", "link", "set", self.interface, "down")
 
     def join(self) -> None:

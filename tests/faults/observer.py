@@ -17,7 +17,7 @@ def main(endpoint: str) -> None:
         while not stop.wait(0.01):
             try:
                 while (received := odometry.try_recv()) is not None:
-                    stamp = received.sample.stamp
+                    stamp = received.stamp
                     if received.message and stamp:
                         linear = received.message.twist.twist.linear
                         print(stamp.sent, f"{(linear.x**2 + linear.y**2) ** 0.5:.4f}", flush=True)

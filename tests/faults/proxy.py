@@ -45,6 +45,7 @@ class Proxy:
         self.upstream, self.downstream = Faults(), Faults()
         self._closing = threading.Event()
         self._ends: list[socket.socket] = []
+        self.ways: list[_Way] = []
         self._threads: list[threading.Thread] = []
         self._listener = socket.create_server(("127.0.0.1", 0))
         self.port: int = self._listener.getsockname()[1]
@@ -114,6 +115,7 @@ class Proxy:
                 _Way(near, far, self.upstream, back, self._closing),
                 _Way(far, near, self.downstream, there, self._closing),
             ):
+                self.ways.append(way)
                 self._start(way.read)
                 self._start(way.write)
 
@@ -126,7 +128,7 @@ class _Way:
     ) -> None:
         self._source, self._target, self._faults, self._closing = source, target, faults, closing
         self._waiting: deque[tuple[float, bytes]] = deque()  # when to deliver, and what; b"" is the end
-        self._size = 0  # bytes that wait
+        self.size = 0  # bytes that wait
         self._opened = self._due = opened
         self._broken = False
         self._changed = threading.Condition()
@@ -140,7 +142,7 @@ class _Way:
                 data = b""
             with self._changed:
                 self._put(data)
-                while self._size > BUFFER and not self._closing.is_set():
+                while self.size > BUFFER and not self._closing.is_set():
                     self._changed.wait(0.01)
 
     def _put(self, data: bytes) -> None:
@@ -153,7 +155,7 @@ class _Way:
             sent = max(sent, self._due - faults.delay) + len(data) / faults.rate
         self._due = max(self._due, sent + faults.delay + random.uniform(0, faults.jitter))
         self._waiting.append((self._due, data))
-        self._size += len(data)
+        self.size += len(data)
         self._changed.notify_all()
 
     def write(self) -> None:
@@ -167,7 +169,7 @@ class _Way:
                     self._changed.wait(min(left, 0.05))
                     continue
                 self._waiting.popleft()
-                self._size -= len(data)
+                self.size -= len(data)
                 self._changed.notify_all()
             try:
                 if data:

@@ -22,9 +22,9 @@ from typing import NamedTuple
 
 import zenoh
 
-from holozen.messages import TriggerReply, TriggerRequest
+from holozen.messages import Odometry, TriggerReply, TriggerRequest
 from holozen.messages import simulation_interfaces as si
-from holozen.testing import Process, Wire
+from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import BusError, ServiceError
 from holozen.transport.samples import Sample, Stamp
 
@@ -73,6 +73,7 @@ class Soak:
         self.sim.wait_for_line("listens on cmd_vel", 60)
         assert wire.run("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}").returncode == 0
         self._bus = wire.bus("soak")
+        self._odom = self._bus.latest("odom", Odometry)
         self.observer = Process([sys.executable, str(HERE / "observer.py"), wire.endpoint])
         self.drivers: list[Process] = []
         self.names: list[str] = []
@@ -95,6 +96,8 @@ class Soak:
             self.drive, self.drive, self.drive, self.kill, self.suspend, self.stall, self.lose, self.reset, self.delay,
             self.stop, self.spawn, self.spawn, self.spawn_many, self.spawn_many, self.delete, self.malform, self.look,
         ]  # fmt: skip
+        self.drive()
+        wait_for(self._moves, what="motion")  # else a short run may try nothing
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             if not self.figures or time.monotonic() - self.figures[-1].at > EVERY:
@@ -109,6 +112,10 @@ class Soak:
             driver.close()
         time.sleep(1.0)  # in which it has to stand
         self.observer.close()
+
+    def _moves(self) -> bool:
+        odom = self._odom.read()[0]
+        return odom is not None and odom.twist.twist.linear.x != 0.0
 
     @property
     def _alive(self) -> list[Process]:
@@ -137,14 +144,14 @@ class Soak:
         self._proxy.resume()
 
     def lose(self) -> None:
-        """Half-open connections: what was sent is lost, and so is all that follows on them."""
+        """Make connections half-open: whatever was sent is lost, and so is all that follows on them."""
         self._proxy.set(lost=True)
         time.sleep(self.random.uniform(0.1, 1.0))
         self.restored.append(time.monotonic())
         self._proxy.set(lost=False)
 
     def reset(self) -> None:
-        """Without a silence."""
+        """Reset all connections, with no silence in between."""
         self.restored.append(time.monotonic())
         self._proxy.reset()
 
@@ -154,7 +161,7 @@ class Soak:
         self._proxy.set(delay=0.0, jitter=0.0)
 
     def stop(self) -> None:
-        """Afterwards only a driver that has let go may drive, so these end."""
+        """Stop and release the robot. Afterwards only a driver that has let go may drive, so these end."""
         self._bus.call("stop", TriggerRequest(), TriggerReply)
         since = time.monotonic()
         time.sleep(self.random.uniform(0.1, 1.0))
@@ -178,7 +185,7 @@ class Soak:
         self.spawned += 1
 
     def spawn_many(self) -> None:
-        """Robots that are deleted at once."""
+        """Spawn many robots, each of which is deleted at once."""
         self.delete()
         for _ in range(BURST):
             self.spawn()
@@ -194,7 +201,7 @@ class Soak:
             self._bus.session.put("cmd_vel", payload, priority=zenoh.Priority.REAL_TIME)
 
     def look(self) -> None:
-        """Each request was applied once: what was spawned is there, what was deleted is not."""
+        """Check that each request was applied once: what was spawned is there, and what was deleted is not."""
         found = self._bus.call("get_entities", si.GetEntitiesRequest(), si.GetEntitiesReply, 20.0).entities
         robots = [name for name in found if name.startswith("bot")]
         if sorted(robots) != sorted(self.names):
@@ -204,7 +211,7 @@ class Soak:
         reader.close()
 
     def check(self) -> History:
-        """Compare all that was sent with all that moved."""
+        """Compare all commands sent with all motion."""
         history = History.of(self.drivers, self.observer, 0.0)
         checks: list[Callable[[], None]] = [
             history.check_silence,
@@ -229,8 +236,8 @@ class Soak:
         return history
 
     def story(self, history: History, at: float) -> str:
-        """All that happened around a time, in seconds from it: acts, commands sent and passed, and the odom that shows
-        that the robot starts or stops, each with the odom before it.
+        """Everything around a time, in seconds from it: acts, commands sent and passed on, and the odom messages
+        between which the robot starts or stops.
         """
         lines = [(began, f"{name}, for {ended - began:.3f} s") for began, ended, name in self.acts]
         lines += [(restored, "the link is back") for restored in self.restored]

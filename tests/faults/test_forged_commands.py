@@ -55,7 +55,7 @@ class Statuses:
     def next(self) -> CommandStatus:
         def newer() -> CommandStatus | None:
             received = self._subscription.try_recv()
-            return received and received.message
+            return received.message if received else None
 
         self._subscription.try_recv()
         return wait_for(newer) or CommandStatus()
@@ -65,7 +65,9 @@ class Statuses:
 
 
 def forge(bus: Bus, payload: str, names: int, priority: zenoh.Priority) -> None:
-    """Fast, but not so fast that the sim overlooks most of it: it reads the newest 64 between two steps."""
+    """Publish forged commands, fast, but not so fast that the sim misses most of them: it reads the newest 64 between
+    two steps.
+    """
     for number in range(names):
         time.sleep(0.02 * (number % 30 == 29))
         bus.session.put("cmd_vel", payload, attachment=f"forged{number}@{number:06x}", priority=priority)

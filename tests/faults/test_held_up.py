@@ -16,7 +16,7 @@ PEERS = 5
 
 
 def test_processes_that_are_held_up_for_seconds_stay_linked(wire: Wire, trials: Callable[[int, int], int]) -> None:
-    """A link that is lost has to be made anew, and Zenoh may fail to."""
+    """A link that is lost has to be made again, which Zenoh may fail to do."""
     held_up = [wire.start("sim"), wire.start("pose-service")]
     bus = wire.bus()
     odom, graph = bus.latest("odom", Odometry), bus.graph()

@@ -12,7 +12,7 @@ NEVER = 99.0
 
 
 def history(*commands: Command, starts: float, stands: float = NEVER) -> History:
-    """It moves from an odom at `starts` on, until `stands`."""
+    """A robot that moves from an odom at `starts` on, until `stands`."""
     ends = [9.0 + step * STEP for step in range(1000)]
     odom = [Row(end - STEP, end, starts <= end < stands) for end in ends]
     return History(sorted(commands), odom)

@@ -23,7 +23,7 @@ class Echo:
         self.far.settimeout(5)
 
     def carries(self, data: bytes = b"x") -> float:
-        """Seconds that data takes to the far end."""
+        """How long data takes to the far end, in s."""
         begin = time.monotonic()
         self.near.sendall(data)
         left = len(data)
@@ -162,7 +162,7 @@ print(back)
 
 
 def pings(hosts: tuple[Host, Host], cable: Cable, count: int = 3) -> int:
-    """How many packets of so many come back from the other host."""
+    """How many packets, of so many sent, come back from the other host."""
     return int(hosts[0].check(sys.executable, "-c", PING, cable.address(hosts[1]), str(count)))
 
 

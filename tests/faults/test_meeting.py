@@ -108,13 +108,13 @@ class Town:
         return process
 
     def run(self, verb: str, *words: str) -> Process:
-        """Run a verb here to its end."""
+        """Run a verb here until it ends."""
         process = self.start(verb, *words)
         process.wait()
         return process
 
     def asleep(self, verb: str, *words: str) -> Process:
-        """A process that has met others here, and sleeps as after Ctrl-Z."""
+        """A process that has met others here, and is suspended, as after Ctrl-Z."""
         process = self.start(verb, *words)
         process.wait_for_line("goal")
         process.signal(signal.SIGSTOP)

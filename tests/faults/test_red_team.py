@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -60,8 +61,8 @@ class Watch:
         return _new(subscription, 1)[-1]
 
     def breaches(self, what: str, counts: bool = True) -> Counter[str]:
-        """AssertionError if anything was not as it should be since the last call. Returns how many commands of each
-        kind were refused so far, or nothing if it need not wait for what `counts`.
+        """Check that nothing went wrong since the last call (AssertionError). Returns how many commands of each kind
+        were refused so far, or nothing if it need not wait for what `counts`.
         """
         # The sim answers this question after all that was sent before it; a message that comes then is later still.
         names = list(self.bus.session.get("get_entities", priority=LAST, timeout=10))
@@ -87,7 +88,7 @@ class Watch:
 
 
 def _new(subscription: "Subscription[Any]", wait: int) -> list[Any]:
-    """The messages that came since the last call, and so many that come from now on."""
+    """The messages since the last call, and this many more that are still to come."""
     received = [*iter(subscription.try_recv, None), *(wait_for(subscription.try_recv) for _ in range(wait))]
     return [each.message for each in received if each]
 
@@ -112,8 +113,8 @@ class Raid(NamedTuple):
         return self.sent.stamp.session
 
     def signed(self, key: str, priority: str, *, name: str = "", member: Member | None = None) -> dict[str, Any]:
-        """A command with this member's proof, in the name of another one."""
-        stamp = stamps(f"{name or self.name}/test", str(self.session.zid()))()
+        """A command with this member's proof, in another member's name."""
+        stamp = stamps(f"{name or self.name}/test", str(self.session.zid()), count())()
         proof = (member or self.key).attachment(key, priority, stamp, "application/json", FORWARD)
         rank = getattr(zenoh.Priority, priority)
         return {"payload": FORWARD, "encoding": "application/json", "attachment": proof, "priority": rank}
@@ -140,7 +141,7 @@ def ask(key: str, payload: bytes = b"{}", everyone: bool = False) -> Act:
 
 
 def serve(key: str) -> Act:
-    """Answer in place of the sim, as the nearest and complete."""
+    """Answer in place of the sim, as a closer and complete queryable."""
 
     def act(raid: Raid) -> None:
         def lie(query: zenoh.Query) -> None:
@@ -161,12 +162,12 @@ def serve(key: str) -> Act:
 
 
 def settle(raid: Raid) -> None:
-    """Return once the router has read all that this session has sent."""
+    """Return once the router has read everything that this session has sent."""
     assert [reply for reply in raid.session.get("odom", priority=LAST, timeout=10) if reply.ok], "it is connected"
 
 
 def forged(*tokens: str, lost: bool = False) -> Act:
-    """Announce what is not there, or withdraw it at once."""
+    """Announce something that does not exist, or withdraw it at once."""
 
     def act(raid: Raid) -> None:
         held = [raid.session.liveliness().declare_token(one.format(raid.victim)) for one in tokens]
@@ -195,7 +196,7 @@ def tampered(raid: Raid) -> None:
 
 
 def named_spawn(raid: Raid) -> None:
-    """The robot whose keys were claimed can be added all the same."""
+    """The robot whose keys were claimed can still be added."""
     forged("@holozen/{}/sim/pub/nav_msgs/msg/Odometry/Bob/odom", "@holozen/x/sim/srv/a/srv/B/spawn_entity")(raid)
     bus, text = raid.watch.bus, BOB
     bus.call("spawn_entity", si.SpawnEntityRequest("Bob", resource_string=text), si.SpawnEntityReply)
@@ -204,7 +205,7 @@ def named_spawn(raid: Raid) -> None:
 
 
 def reconfigure(raid: Raid) -> None:
-    """Through the admin space of the router, and of all."""
+    """Change the configuration through the admin space, of the router and of everyone."""
     routers = raid.session.info.routers_zid()
     for zid in (*map(str, routers), "*"):
         for change in ("access_control/enabled", "access_control"):
@@ -227,7 +228,7 @@ def ask_much(raid: Raid) -> None:
 
 
 def fill(raid: Raid) -> None:
-    """Zenoh puts a message together before it looks at its sender's permissions."""
+    """Zenoh assembles a message before it checks its sender's permissions."""
     before = peak(raid.fleet.router.pid)
     raid.session.put(f"{STANDS}/cmd_vel", bytes(BIG), congestion_control=zenoh.CongestionControl.BLOCK)
     with contextlib.suppress(AssertionError, zenoh.ZError):  # the router may have closed the link
@@ -248,7 +249,7 @@ def crowd(raid: Raid) -> None:
 
 
 def pose_as(which: str) -> Act:
-    """Open a session under the id of another one."""
+    """Open a session under another session's id."""
 
     def act(raid: Raid) -> None:
         ids = {"driver": raid.victim, "sim": sim_session(raid), "router": str(raid.session.info.routers_zid()[0])}
@@ -264,7 +265,7 @@ def sim_session(raid: Raid) -> str:
 
 
 def behind(mode: str) -> Act:
-    """As a peer or a router, which links to others past the router, and routes for them."""
+    """Connect as a peer or a router, which links to others past the router and routes for them."""
 
     def act(raid: Raid) -> None:
         with raid.fleet.tool(raid.name, mode=mode) as session:
@@ -412,7 +413,7 @@ def test_no_member_does_what_its_role_may_not(fleet: Fleet, watch: Watch, sent: 
         before = after
 
 
-def test_who_was_revoked_reads_and_does_nothing(fleet: Fleet, watch: Watch, sent: Sample) -> None:
+def test_a_revoked_member_reads_and_does_nothing(fleet: Fleet, watch: Watch, sent: Sample) -> None:
     before = watch.breaches("before all")
     with fleet.tool("Old") as session:
         raid = Raid(fleet, watch, session, "Old", sent)
@@ -440,7 +441,7 @@ def test_a_member_is_no_router_for_others(fleet: Fleet, tmp_path: Path) -> None:
 
 
 def half_open(port: int) -> contextlib.ExitStack:
-    """Connections that never go on with their handshake."""
+    """Open connections that never continue their handshake."""
     ends = contextlib.ExitStack()
     for _ in range(20):
         ends.enter_context(socket.create_connection(("127.0.0.1", port)))

@@ -140,7 +140,7 @@ def test_of_more_requests_than_can_wait_each_is_answered_or_ends_without_a_reply
 
 
 def _has_ended(replies: Replies) -> bool:
-    """Whether a request ended without a reply."""
+    """Whether a request has ended without a reply."""
     try:
         assert replies.try_recv() is None
     except BusError:

@@ -25,7 +25,7 @@ VERBS = [
 
 
 def harass(process: Process, chance: random.Random, deadly: bool) -> list[int]:
-    """Send a process some signals, at any time of its life; what was sent while it was there."""
+    """Send a process some signals at arbitrary times of its life. Returns them."""
     sent = []
     time.sleep(chance.choice([chance.uniform(0.0, 0.5), chance.uniform(0.5, 2.0)]))
     for _ in range(chance.randint(1, 5)):
@@ -38,7 +38,7 @@ def harass(process: Process, chance: random.Random, deadly: bool) -> list[int]:
 
 
 def shared_memory(process: Process) -> set[Path]:
-    """What a process has in shared memory now."""
+    """The files of shared memory that a process has mapped now."""
     with contextlib.suppress(OSError):
         maps = Path(f"/proc/{process.pid}/maps").read_text().splitlines()
         return {Path(line.split()[5]) for line in maps if "/dev/shm/" in line}
@@ -96,7 +96,7 @@ def test_random_signals_leave_a_tidy_terminal_and_a_robot_that_stands(
 
 
 def shows_traceback(text: str) -> bool:
-    """Whether there is one of our own code. Python itself shows one on Ctrl-C while it starts."""
+    """Whether a text holds a traceback of our own code. Python itself shows one on Ctrl-C while it starts."""
     traceback = text.partition("Traceback")[2]
     return any(f"{ROOT}/{folder}/" in traceback for folder in ("holozen", "services"))
 
@@ -106,6 +106,6 @@ def stands(odom: Odometry | None) -> bool:
 
 
 def assert_tidy(terminal: Terminal, what: str) -> None:
-    """What was switched on is off again: full screen, hidden cursor, bracketed paste."""
+    """Check that everything switched on is off again: the alternate screen, the hidden cursor, bracketed paste."""
     for on, off in (("1049h", "1049l"), ("25l", "25h"), ("2004h", "2004l")):
         assert terminal.raw.rfind(f"\x1b[?{on}") <= terminal.raw.rfind(f"\x1b[?{off}"), f"{what}: {on}"

@@ -1,4 +1,4 @@
-"""A while of everything at random breaks no promise; see soak.py."""
+"""Random acts of every kind, for a while, break no promise; see soak.py."""
 
 import os
 

@@ -1,4 +1,4 @@
-"""The time of day may jump by an hour while a robot is driven: nothing that is safe depends on it."""
+"""The time of day may jump by an hour while a robot is driven: no safety rule depends on it."""
 
 import json
 import subprocess
@@ -11,7 +11,7 @@ import pytest
 
 from holozen import data
 from holozen.bus import Bus
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.graph import ALL_NODE_INFO
 
@@ -38,7 +38,7 @@ class Clock:
         }  # fmt: skip
 
     def set(self, ahead: float) -> None:
-        """Be so many seconds ahead of this machine's."""
+        """Set the clock so many seconds ahead of this machine's."""
         new = self._file.with_suffix(".new")
         new.write_text(f"{ahead:+.0f}\n")
         new.replace(self._file)
@@ -53,7 +53,7 @@ def clock(tmp_path: Path) -> Clock:
 def observer(wire: Wire, clock: Clock, tmp_path: Path) -> Iterator[Process]:
     # Under faketime Python's time.sleep fails, which the sim calls only while a xacro file is expanded.
     robot = tmp_path / "hb_bot.urdf"
-    robot.write_text(expand(data.find("urdf", "hb_bot.urdf.xacro")))
+    robot.write_text(expand_xacro(data.find("urdf", "hb_bot.urdf.xacro")))
     wire.start("sim", "--robot", str(robot), env=clock.env).wait_for_line("listens on cmd_vel", 60)
     assert wire.run("param", "set", "sim", "odometry_rate", f"{1 / STEP:g}").returncode == 0
     with Process([sys.executable, str(HERE / "observer.py"), wire.endpoint]) as observer:
@@ -61,7 +61,7 @@ def observer(wire: Wire, clock: Clock, tmp_path: Path) -> Iterator[Process]:
 
 
 def ahead(bus: Bus) -> float:
-    """By how much the sim's time of day is ahead."""
+    """By how many seconds the sim's time of day is ahead."""
     for reply in bus.ask_all(ALL_NODE_INFO, 5.0):
         if not isinstance(reply, bytes) and (about := json.loads(reply.payload))["node"] == "sim":
             return float(about["time"]) - time.time()

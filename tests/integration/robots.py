@@ -38,7 +38,7 @@ class Record:
             self._received.append(received)
             if received.message is not None:
                 self._messages.append(received.message)
-            if (stamp := received.sample.stamp) and stamp.sent > began:
+            if (stamp := received.stamp) and stamp.sent > began:
                 break  # a sim that goes as fast as it can may publish more than this can read
         return self._received
 
@@ -86,7 +86,7 @@ class Part:
 
 def sent_at(received: Received[Any]) -> float:
     """When it was sent, s as of time.monotonic; infinity for what carries no stamp."""
-    return received.sample.stamp.sent if received.sample.stamp else math.inf
+    return received.stamp.sent if received.stamp else math.inf
 
 
 def record(bus: Bus, key: str, *kinds: type[Message]) -> Record:

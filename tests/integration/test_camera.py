@@ -13,7 +13,7 @@ import PIL.Image
 import pytest
 
 from holozen import entities
-from holozen.messages import CameraInfo, CompressedImage, Image, Pose
+from holozen.messages import CameraInfo, CompressedImage, Exposure, Image, Pose
 from holozen.messages.geometry_msgs import Point
 from holozen.testing import LockStep, Wire, wait_for
 
@@ -132,6 +132,29 @@ def test_the_camera_moves_with_its_robot_and_forgets_what_is_gone(eye: Eye) -> N
     assert red(eye.see()["image_raw"]) == []
 
 
+def test_the_keys_of_a_camera_leave_with_its_robot_and_come_back_with_it(eye: Eye) -> None:
+    bus, graph = eye.sim.bus, eye.sim.bus.graph()
+    keys = ("camera_info", "depth/image_raw", "image_raw", "image_raw/compressed")
+
+    def published(robot: str) -> bool:
+        """Whether the camera's process publishes on all keys of a robot's camera."""
+        eye.sim.step(24)
+        there = {end.key for end in graph.endpoints() if end.kind == "pub" and end.node == "camera"}
+        return there >= {f"{robot}cam/{key}" for key in keys}
+
+    def gone(robot: str) -> bool:
+        """Whether nobody publishes on any of them."""
+        eye.sim.step(24)
+        return not any(end.key.startswith(f"{robot}cam/") for end in graph.endpoints() if end.kind == "pub")
+
+    for _ in range(2):
+        entities.spawn(bus, "second", ROBOT, Pose(Point(0.0, 3.0, 0.0)))
+        wait_for(lambda: published("second/"), what="the keys of the second robot's camera")
+        entities.delete(bus, "second")
+        wait_for(lambda: gone("second/"), what="them to leave")
+        assert published("")
+
+
 def test_the_end_of_the_camera_is_reported(eye: Eye) -> None:
     process = eye.sim.process
     children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
@@ -143,3 +166,31 @@ def test_the_end_of_the_camera_is_reported(eye: Eye) -> None:
         return "the camera ended with exit code -9, so there are no pictures" in process.err
 
     wait_for(is_reported)
+
+
+def test_exposures_that_cannot_be_rendered_are_reported_and_the_next_one_is_rendered(wire: Wire) -> None:
+    camera = wire.start("camera")
+    camera.wait_for_line("renders what comes on exposures")
+    bus = wire.bus()
+    pictures, exposures = bus.subscribe("eye", Image), bus.publisher("exposures", Exposure)
+
+    def expose(height: int, image: str = "eye") -> None:
+        exposures.put(
+            Exposure(image=image, info="info", width=64, height=height, field_of_view=1.0, near=0.1, far=9.0,
+                     encoding="rgb8")
+        )  # fmt: skip
+
+    for height, image, line in ((0, "eye", "64 x 0 pixels"), (48, "a//b", "key 'a//b'")):
+
+        def is_reported(height: int = height, image: str = image, line: str = line) -> bool:
+            expose(height, image)
+            return line in camera.err
+
+        wait_for(is_reported)
+
+    def is_rendered() -> bool:
+        expose(48)
+        return pictures.try_recv() is not None
+
+    wait_for(is_rendered)
+    assert "Traceback" not in camera.err

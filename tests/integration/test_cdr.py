@@ -56,13 +56,13 @@ def test_what_the_sim_publishes_is_cdr_of_the_type_of_its_topic(robot: Robot, fo
         with foreign.declare_subscriber(row.key) as subscriber:
             sample = subscriber.recv()
         assert sample
-        assert str(sample.encoding) == f"application/cdr;{row.type.ROS}"
+        assert str(sample.encoding) == f"application/cdr;{row.type_name}"
         (reply,) = foreign.get(row.key)
         assert reply.ok
         assert str(reply.ok.encoding) == str(sample.encoding)
-        if row.type.ROS in TYPES:
-            message = STORE.deserialize_cdr(bytes(sample.payload), row.type.ROS)
-            assert bytes(STORE.serialize_cdr(message, row.type.ROS)) == bytes(sample.payload)
+        if row.type_name in TYPES:
+            message = STORE.deserialize_cdr(bytes(sample.payload), row.type_name)
+            assert bytes(STORE.serialize_cdr(message, row.type_name)) == bytes(sample.payload)
 
 
 def test_a_command_in_cdr_drives_with_and_without_its_type(robot: Robot, foreign: zenoh.Session) -> None:

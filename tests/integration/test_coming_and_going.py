@@ -21,7 +21,7 @@ from .conftest import foreign_config, start_sim
 from .robots import Robot, moves, place, rests
 
 
-def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pressed_anew(wire: Wire) -> None:
+def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pressed_again(wire: Wire) -> None:
     sim = start_sim(wire)
     robot = Robot(wire.bus())
     terminal = wire.terminal("teleop", "--mode", "latch")
@@ -41,7 +41,7 @@ def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pres
     robot.stands()
 
 
-def test_a_robot_starts_anew_with_its_sim(wire: Wire) -> None:
+def test_a_robot_starts_over_with_its_sim(wire: Wire) -> None:
     sim = start_sim(wire)
     robot = Robot(wire.bus())
     robot.drive(1.0, until=lambda odom: place(odom)[0] > 0.3)

@@ -66,7 +66,7 @@ class Naive:
         while not end.wait(0.2 if self._lacks == "rate" else 0.02):
             now = time.monotonic()
             for received in iter(self._commands.try_recv, None):
-                is_person = received.sample.priority == "INTERACTIVE_HIGH"
+                is_person = received.priority == "INTERACTIVE_HIGH"
                 wanted = received.message.linear.x if received.message else 0.0
                 if not (abs(wanted) < 1 or self._lacks == "check"):
                     continue
@@ -86,7 +86,7 @@ class Naive:
     ("lacks", "promise", "reason"),
     [
         ("watchdog", "it_obeys_and_stops_in_silence", "is there a watchdog"),
-        ("check", "it_refuses_what_is_no_speed", "after a speed of"),
+        ("check", "it_refuses_impossible_speeds", "after a speed of"),
         ("priority", "a_person_comes_first", "while a person commands|the robot to move back"),
         ("stop", "it_stands_while_it_is_stopped", "no reply from 'stop'"),
         ("rate", "its_odometry_is_steady_and_agrees_with_itself", "at least 10 Hz"),

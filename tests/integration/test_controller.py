@@ -123,7 +123,7 @@ def test_it_publishes_no_cmd_vel_while_a_person_has_the_robot(shared: Scene) -> 
     commands = shared.robot.commands.from_now()
     tom.drive(0.3)
     commands.next()
-    assert {received.sample.source.partition("@")[0] for received in commands.all()} == {"tom"}
+    assert {received.source.partition("@")[0] for received in commands.all()} == {"tom"}
 
 
 def test_a_person_publishing_by_hand_with_a_foreign_tool_is_yielded_to(shared: Scene) -> None:

@@ -92,7 +92,7 @@ def test_a_holder_of_the_port_that_speaks_no_zenoh_is_named(wire: Wire, mode: st
         holder.wait_for_line("up")
         _, rows = doctor(wire, "--mode", mode)
     (text,) = bad(rows, "port")
-    assert f"(pid {holder.pid}), which does not answer as Zenoh does" in text
+    assert f"(pid {holder.pid}), which does not speak Zenoh" in text
     assert f"kill {holder.pid}" in next(row["fix"] for row in rows if row["check"] == "port")
 
 
@@ -256,9 +256,9 @@ def test_variables_put_every_process_on_a_network_and_the_doctor_shows_them(wire
         shown = run("doctor", "--json", "--mode", "peer").stdout
         found = [row["text"] for row in map(json.loads, shown.splitlines()) if row["check"] == "environment"]
         assert found == [
-            "HOLOZEN_MODE=peer yields to --mode here",
-            f"HOLOZEN_CONNECT={wire.endpoint} is in force for every verb without --connect",
-            f"HOLOZEN_LISTEN={wire.endpoint} is in force for every verb without --listen",
+            "HOLOZEN_MODE=peer is overridden here by --mode",
+            f"HOLOZEN_CONNECT={wire.endpoint} applies to every verb without --connect",
+            f"HOLOZEN_LISTEN={wire.endpoint} applies to every verb without --listen",
         ]
         for verb in ("sim", "teleop", "controller", "pose-service", "up", "stop", "doctor"):
             done = run(verb, *["--script", os.devnull][: 2 * (verb == "teleop")], HOLOZEN_MODE="klient")

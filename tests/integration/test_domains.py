@@ -54,7 +54,7 @@ def test_two_stacks_side_by_side_each_see_and_stop_only_their_own_robots(machine
 def test_doctor_names_the_port_of_the_domain_and_the_variable_that_sets_it(machine: Host) -> None:
     machine.start(*command("pose-service", "--domain", "7")).wait_for_line("goal")
     reported = machine.run("env", "ROS_DOMAIN_ID=7", *command("doctor"), within=60).stdout
-    assert "ROS_DOMAIN_ID=7 is in force for every verb without --domain" in reported
+    assert "ROS_DOMAIN_ID=7 applies to every verb without --domain" in reported
     assert "tcp/127.0.0.1:7517 is held by" in reported
 
 
@@ -65,5 +65,5 @@ def test_sharing_a_port_with_another_user_is_one_warning_line(wire: Wire) -> Non
         service = wire.start("pose-service")
         service.wait_for_line("goal")
         (line,) = [line for line in service.err.splitlines() if wire.endpoint in line]
-        assert line.startswith(f"pose_service: shares {wire.endpoint} with user {OTHER}, so that each drives")
+        assert line.startswith(f"pose_service: shares {wire.endpoint} with user {OTHER}, so either can drive")
         assert line.endswith("--domain N (or HOLOZEN_DOMAIN) or --private keeps you apart")

@@ -62,7 +62,7 @@ def words_of(verb: str) -> list[str]:
     """A verb, or the verbs of a noun."""
     if verb in cli.NOUNS:
         return [f"{verb} {name}" for name in cli.VERBS[verb].split(", ")]
-    return [verb, *(f"{verb} {name}" for name in cli.OF_SERVICES.get(verb, ()))]
+    return [verb, *(f"{verb} {name}" for name in cli.SERVICE_VERBS.get(verb, ()))]
 
 
 def test_every_verb_has_a_row() -> None:
@@ -80,6 +80,7 @@ class Town:
         (tmp / "sim.yaml").write_text("sim:\n  ros__parameters:\n    max_linear: 1.5\n")
         start_sim(wire)
         spawn_file(wire.bus("setup"), BOT, "Spare", Place(x=2.0))
+        spawn_file(wire.bus("setup"), BOT, "Free", Place(x=-8.0))  # `stop Spare` runs beside `release Free`
         for n, x in (("text", -2.0), ("json", -3.0), ("pipe", -4.0)):
             spawn_file(wire.bus("setup"), tmp / "ball.urdf", f"Doomed{n}", Place(x=x))
         wire.start("pose-service").wait_for_line("goals")

@@ -191,7 +191,7 @@ def test_a_foreign_node_that_only_answers_is_reported_too(town: Wire) -> None:
         assert_one_line(town.run("topic", "type", "b/asked"), 1, expected)
         lines = town.run("topic", "info", "b/asked").stdout.splitlines()
         assert lines[:2] == ["Type: unknown", "Publisher count: 1"]
-        assert lines[2].startswith("  anonymous, when asked  DATA  application/json  ")
+        assert lines[2].startswith("  anonymous, which answers queries  DATA  application/json  ")
         del queryable
 
 

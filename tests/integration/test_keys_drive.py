@@ -49,10 +49,26 @@ def test_a_key_press_in_a_terminal_moves_the_robot(town: Wire, robot: Robot) -> 
     with start_teleop(town) as terminal:
         start, commands = robot.newest(), robot.commands.from_now()
         type_until(lambda: moves(robot.newest(), 0.5, 0, 0), terminal, "i")
-        assert {received.sample.priority for received in commands.all()} == {"INTERACTIVE_HIGH"}
+        wait_for(commands.all, what="the command, which may come after the odometry that it caused")
+        assert {received.priority for received in commands.all()} == {"INTERACTIVE_HIGH"}
         end = robot.stands()
         assert place(end)[0] > place(start)[0] + 0.1
         assert place(end)[1] == pytest.approx(place(start)[1], abs=1e-3)
+
+
+@pytest.mark.parametrize("flags", [("--mode", "latch"), ("--key-timeout", "3600")], ids=" ".join)
+def test_where_nothing_shows_that_a_terminal_hangs_a_key_counts_for_5_s(
+    town: Wire, robot: Robot, flags: tuple[str, ...]
+) -> None:
+    """This terminal answers no query."""
+    with start_teleop(town, *flags) as terminal:
+        terminal.wait_for_text("5 s in a terminal that does not answer")
+        after(robot.commands, terminal, "i")
+        terminal.freeze()
+        robot.wait_for_stop_command()
+        robot.stands()
+        terminal.thaw()
+        terminal.wait_for_text("in a terminal that does not answer a key counts for 5 s: press it again")
 
 
 @pytest.mark.parametrize("key", ["k", " ", "y", "\t", f"{ESCAPE}[15~", "ä"])

@@ -215,4 +215,4 @@ def test_the_launch_ends_when_the_sim_does(wire: Wire, launch: Launch, workspace
     process = launch("classic.launch.py")
     assert process.wait(within=60) == 1
     assert "[sim-1] sim: " in process.err
-    assert "launch: ends: sim-1 has ended, which everything here depends on" in process.err
+    assert "launch: ending: sim-1 has ended, and everything here depends on it" in process.err

@@ -3,12 +3,14 @@
 import hashlib
 import math
 import re
+import signal
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from holozen import entities
 from holozen.bus import Bus
@@ -26,6 +28,7 @@ from holozen.messages import (
     Pose,
     RobotDescriptionReply,
     RobotDescriptionRequest,
+    SimulationStatus,
     Time,
     TriggerReply,
     TriggerRequest,
@@ -243,6 +246,47 @@ def test_the_command_line_pauses_plays_steps_and_resets(lock_step: Sim, wire: Wi
     assert get_state(sim) == State.STATE_PLAYING
 
 
+def test_steps_end_with_ctrl_c_and_with_their_timeout(lock_step: Sim, wire: Wire) -> None:
+    sim = lock_step()
+    interrupted = wire.start("sim", "step", "10000000")
+    wait_for(lambda: steps_of(sim))
+    interrupted.signal(signal.SIGINT)
+    assert interrupted.wait() == 130
+    assert re.fullmatch(
+        r"holozen sim step: interrupted: the goal was cancelled, \d+ steps before the last one\n", interrupted.err
+    )
+    stands(sim)
+    late = wire.run("sim", "step", "10000000", "--timeout", "0.5")
+    assert late.returncode == 1
+    assert re.fullmatch(
+        r"holozen sim: not done within 0.5 s, and ended: the goal was cancelled, \d+ steps before the last one; "
+        r"--timeout gives them longer\n",
+        late.stderr,
+    )
+    stands(sim)
+    long = wire.start("sim", "step", "10000000")
+    before = steps_of(sim)
+    wait_for(lambda: steps_of(sim) > before)
+    beside = wire.run("sim", "step")
+    assert (beside.returncode, beside.stderr) == (1, "holozen sim: other steps are being made\n")
+    assert long.returncode is None, "whose steps go on"
+    long.signal(signal.SIGINT)
+    assert long.wait() == 130
+
+
+def stands(sim: LockStep) -> None:
+    """No step is made but those that are asked for now."""
+    before = steps_of(sim)
+    reply = sim.bus.call("step_simulation", si.StepSimulationRequest(7), si.StepSimulationReply)
+    assert reply.result.result == si.Result.OK
+    assert steps_of(sim) == before + 7
+
+
+def steps_of(sim: LockStep) -> int:
+    """How many steps there were, by what the sim published last."""
+    return sim.bus.call("simulation_status", TriggerRequest(), SimulationStatus).steps
+
+
 def set_state(sim: LockStep, state: int) -> int:
     request = si.SetSimulationStateRequest(State(state))
     return sim.bus.call("set_simulation_state", request, si.SetSimulationStateReply).result.result
@@ -301,6 +345,8 @@ def test_the_scene_has_the_joints_as_joint_states_has_them(lock_step: Sim) -> No
     entities = sim.bus.call("get_scene", GetSceneRequest(), GetSceneReply).entities
     robot = next(entity for entity in entities if entity.name == "Unread")
     assert max(map(abs, robot.joints)) > 0.5
+    without = sim.bus.call("get_scene", GetSceneRequest(without_joints=True), GetSceneReply).entities
+    assert without == [structs.replace(entity, joints=[]) for entity in entities]
     names = sim.bus.call("robot_description", RobotDescriptionRequest(robot.name), RobotDescriptionReply).joints
     states = sim.bus.latest("Unread/joint_states", JointState)
     wait_for(lambda: states.count, what="joint_states")

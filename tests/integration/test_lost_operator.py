@@ -10,7 +10,7 @@ import pytest
 
 from holozen import entities
 from holozen.messages import Pose
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 
 from .conftest import start_sim
@@ -24,9 +24,9 @@ import sys, time
 from holozen.bus import Bus
 from holozen.transport.connection import Connection
 from holozen.messages import Twist
-endpoint, key, lasting = sys.argv[1:]
-with Bus("driver", Connection(connect=(endpoint,), listen=()), lasting=bool(lasting)) as bus:
-    commands = bus.publisher(key, Twist)
+endpoint, key, dead_man = sys.argv[1:]
+with Bus("driver", Connection(connect=(endpoint,), listen=())) as bus:
+    commands = bus.publisher(key, Twist, dead_man=bool(dead_man))
     print(bus.source, flush=True)
     while True:
         commands.put(Twist.planar(0.4))
@@ -37,7 +37,7 @@ with Bus("driver", Connection(connect=(endpoint,), listen=()), lasting=bool(last
 @pytest.fixture(scope="module")
 def robots(town: Wire) -> dict[str, Robot]:
     start_sim(town, "--robot", f"{URDF / 'hb_bot.urdf.xacro'}=Fred")
-    text = expand(URDF / "hb_bot.urdf.xacro")
+    text = expand_xacro(URDF / "hb_bot.urdf.xacro")
     assert TAG in text
     bus, at = town.bus(), Pose()
     for name, watchdog in WATCHDOGS.items():
@@ -55,9 +55,9 @@ def robot(robots: dict[str, Robot], request: pytest.FixtureRequest) -> Iterator[
     robot.stop()
 
 
-def driver(wire: Wire, robot: Robot, lasting: bool = True) -> Process:
+def driver(wire: Wire, robot: Robot, dead_man: bool = True) -> Process:
     """A program that drives the robot, and does so by now."""
-    process = Process([sys.executable, "-c", DRIVER, wire.endpoint, f"{robot.name}/cmd_vel", "yes" if lasting else ""])
+    process = Process([sys.executable, "-c", DRIVER, wire.endpoint, f"{robot.name}/cmd_vel", "yes" if dead_man else ""])
     robot.odom.next(lambda odom: moves(odom, 0.4, 0, 0))
     assert robot.status().obeyed == process.wait_for_line("driver@")
     return process
@@ -78,7 +78,7 @@ def test_one_that_comes_back_is_obeyed_as_usual(town: Wire, robot: Robot) -> Non
 
 def test_what_is_no_node_keeps_the_robots_own_watchdog(town: Wire, robot: Robot) -> None:
     """`topic pub --once` and a plain `zenoh put` are gone as soon as they have spoken."""
-    with driver(town, robot, lasting=False) as process:
+    with driver(town, robot, dead_man=False) as process:
         process.kill()
         robot.pass_time(1.0)
         assert moves(robot.newest(), 0.4, 0, 0)

@@ -9,7 +9,7 @@ import pytest
 from holozen import entities
 from holozen.bus import Bus
 from holozen.messages import Pose, TriggerReply, TriggerRequest
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.testing import Wire, wait_for
 from holozen.transport.connection import Connection
 from holozen.transport.errors import TIMEOUT
@@ -69,7 +69,7 @@ def test_every_request_of_a_thousand_is_answered(robot: Robot, crowd: list[Bus],
 def test_a_flood_of_requests_holds_up_no_spawn_and_no_delete_of_others(robot: Robot, crowd: list[Bus]) -> None:
     at = Pose()
     at.position.y = 3.0
-    urdf = expand(URDF / "hb_bot.urdf.xacro")
+    urdf = expand_xacro(URDF / "hb_bot.urdf.xacro")
     asked = [ask(crowd[:1], key) for key in ("get_entities", "get_entity_state", "spawn_entity", "delete_entity")]
     entities.spawn(robot.bus, "Fred", urdf, at)
     asked.append(ask(crowd[:1], "delete_entity"))

@@ -85,7 +85,7 @@ def test_the_driver_of_fred_has_no_say_over_ann(town: Wire, fred: Robot, ann: Ro
 def test_a_teleop_with_a_name_drives_that_robot(town: Wire, fred: Robot, ann: Robot) -> None:
     with town.terminal("teleop", "Ann") as terminal:
         terminal.wait_for_text("listening")
-        assert "holozen teleop   Ann   Tab: Fred" in terminal.screen()
+        wait_for(lambda: "holozen teleop   Ann   Tab: Fred" in terminal.screen(), what=terminal.screen)
         commands = fred.commands.from_now()
         terminal.type("i")
         ann.odom.next(lambda odom: moves(odom, 0.5, 0, 0))

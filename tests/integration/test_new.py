@@ -53,7 +53,7 @@ def test_a_new_package_has_a_message_and_a_service(run: Run) -> None:
 def test_what_is_there_is_left_as_it_is(run: Run, tmp_path: Path) -> None:
     (tmp_path / "test_mine.py").write_text("mine")
     done = run(*command("new", "controller", "mine"))
-    assert done.returncode == 1 and "test_mine.py is there already" in done.stderr
+    assert done.returncode == 1 and "test_mine.py exists already" in done.stderr
     assert [path.name for path in tmp_path.iterdir()] == ["test_mine.py"]
     assert (tmp_path / "test_mine.py").read_text() == "mine"
 
@@ -72,5 +72,5 @@ def test_nothing_is_written_where_a_part_is_in_the_way(run: Run, tmp_path: Path)
     (tmp_path / "far.py").symlink_to("nowhere")
     for words, place in ((("package", "mine"), "mine/srv"), (("controller", "far"), "far.py")):
         done = run(*command("new", *words))
-        assert done.returncode == 1 and f"{place} is there already" in done.stderr
+        assert done.returncode == 1 and f"{place} exists already" in done.stderr
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["far.py", "mine", "srv"]

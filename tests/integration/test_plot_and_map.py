@@ -84,7 +84,7 @@ def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
             1,
             "odom.pose.pose.positon.x: no field 'positon'",
         ),
-        (("odom.pose.pose", "--once"), 1, "odom.pose.pose: this is no number, it has position, orientation"),
+        (("odom.pose.pose", "--once"), 1, "odom.pose.pose: it is not a number; it has position, orientation"),
         (("nobody.x", "--once", "-w", "0.2"), 1, "no messages on nobody; `holozen topic list` shows the topics"),
     ],
 )

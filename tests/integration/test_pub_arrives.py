@@ -4,10 +4,11 @@ import json
 import os
 import signal
 import subprocess
+import threading
 
 import pytest
 
-from holozen.messages import Twist
+from holozen.messages import CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 from holozen.testing.wire import command
 
@@ -27,7 +28,7 @@ def test_it_reports_the_number_of_subscribers(town: Wire, robot: Robot) -> None:
 
 def test_it_waits_for_as_many_subscribers_as_requested(town: Wire, robot: Robot) -> None:
     pub = town.start("topic", "pub", "cmd_vel", AHEAD, "--once", "-w", "3")
-    pub.wait_for_line("waiting for 3 subscribers of cmd_vel; 2 by now")
+    pub.wait_for_line("waiting for 3 subscribers to cmd_vel (2 so far)")
     other = town.bus("other").subscribe("cmd_vel", Twist)
     assert pub.wait() == 0
     assert other.recv().message == Twist.planar(0.2)
@@ -53,10 +54,10 @@ def test_it_needs_no_subscriber_where_it_does_not_wait(town: Wire) -> None:
 @pytest.mark.parametrize(
     ("value", "expected"),
     [
-        ('{"linaer": {}}', "unknown field `linaer` (did you mean 'linear'?)"),
-        ('{"linear": {"X": 1}}', "unknown field `X` - at `$.linear`"),
-        ('{"angular": {"zz": 1}}', "unknown field `zz` - at `$.angular` (did you mean 'z'?)"),
-        ('{"linear": {"x": "1"}}', "Expected `float`, got `str` - at `$.linear.x`"),
+        ('{"linaer": {}}', "has no field 'linaer' (did you mean 'linear'?)"),
+        ('{"linear": {"X": 1}}', "has no field 'linear.X'"),
+        ('{"angular": {"zz": 1}}', "has no field 'angular.zz' (did you mean 'z'?)"),
+        ('{"linear": {"x": "1"}}', "linear.x: '1' is not a valid float64"),
         ("linear: {x: .inf}", "linear.x is not a finite number; --force sends it all the same"),
     ],
 )
@@ -67,9 +68,9 @@ def test_a_wrong_field_is_refused_with_the_closest_name(town: Wire, value: str, 
 @pytest.mark.parametrize(
     ("key", "value", "expected"),
     [
-        ("cmd_vel", '{"linear": {"x": 1e308}}', "Twist.linear.x is 1e+308 m/s; at most 100"),
-        ("Fred/cmd_vel", "twist: {angular: {y: -1001}}", "TwistStamped.angular.y is -1001 rad/s; at most 1000"),
-        ("joint_command", "{name: [j], velocity: [2e3]}", "JointState.velocity[0] of joint 'j' is 2000; at most 1000"),
+        ("cmd_vel", '{"linear": {"x": 1e308}}', "linear.x is 1e+308 m/s; at most 100"),
+        ("Fred/cmd_vel", "twist: {angular: {y: -1001}}", "angular.y is -1001 rad/s; at most 1000"),
+        ("joint_command", "{name: [j], velocity: [2e3]}", "velocity[0] of joint 'j' is 2000; at most 1000"),
     ],
 )
 def test_what_no_robot_can_mean_is_refused_and_not_sent(wire: Wire, key: str, value: str, expected: str) -> None:
@@ -178,7 +179,7 @@ def test_lines_of_standard_input_are_published_and_the_robot_stops_at_their_end(
 def test_a_wrong_line_ends_it_with_its_number(town: Wire, robot: Robot) -> None:
     done = town.run("topic", "pub", "cmd_vel", "--stdin", given=f"{AHEAD}\n\n[]\n{AHEAD}\n")
     assert done.returncode == 1
-    assert done.stderr.splitlines()[-1].startswith("holozen topic pub: cmd_vel: line 3 refused: not a Twist: ")
+    assert done.stderr.splitlines()[-1].startswith("holozen topic pub: cmd_vel: line 3 refused: ")
     robot.stands()
 
 
@@ -205,15 +206,52 @@ def test_any_type_is_published_with_its_fields(town: Wire) -> None:
 
 def test_lost_samples_are_counted_by_the_publishers_numbers(town: Wire) -> None:
     """A publisher of ours that loses five samples after each."""
-    publisher = town.bus("ours").publisher("holes", Twist)
+    bus = town.bus("ours")
+    publisher, skip = bus.publisher("holes", Twist), bus.stamps("holes")
     hz = town.start("topic", "hz", "holes", "--json")
 
     def reported() -> str:
         publisher.put(Twist())
         for _ in range(5):
-            next(publisher.numbers)  # as if a sample had been sent and lost
+            skip()  # as if a sample had been sent and lost
         return hz.out
 
     wait_for(reported)
     report = json.loads(hz.out.splitlines()[0])
     assert report["lost"] == 5 * (report["window"] - 1)
+
+
+def test_the_timeout_of_hz_is_for_the_first_messages_alone(town: Wire) -> None:
+    publisher = town.bus("ours").publisher("ticks", Twist)
+    hz = town.start("topic", "hz", "ticks", "--timeout", "0.5")
+
+    def reported() -> str:
+        publisher.put(Twist())
+        return hz.out
+
+    wait_for(reported)
+    hz.wait_for_line("no new messages on ticks")
+    hz.signal(signal.SIGINT)
+    assert hz.wait() == 0
+
+
+def test_a_sim_that_receives_no_command_is_no_success(town: Wire) -> None:
+    """Its status goes on, but the commands do not get through, as in a flood of others."""
+    bus, end = town.bus("deaf"), threading.Event()
+    bus.subscribe("Deaf/cmd_vel", Twist)
+    status = bus.publisher("Deaf/cmd_vel_status", CommandStatus)
+
+    def live() -> None:
+        while not end.wait(0.05):
+            status.put(CommandStatus(name="Deaf"))
+
+    sim = threading.Thread(target=live)
+    sim.start()
+    try:
+        done = town.run("topic", "pub", "Deaf/cmd_vel", AHEAD, "--once")
+        assert (done.returncode, "not obeyed: the sim has not received it" in done.stderr) == (1, True)
+        done = town.run("teleop", "Deaf", "--script", "-", given="3s i\n")
+        assert (done.returncode, "the sim has received none of the commands" in done.stderr) == (1, True)
+    finally:
+        end.set()
+        sim.join()

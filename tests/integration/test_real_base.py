@@ -1,6 +1,9 @@
 """LeKiwi's base of the examples on a simulated port: it keeps what bases promise; its wheels stop, whatever ends it."""
 
+import contextlib
 import os
+import re
+import shlex
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -9,23 +12,50 @@ from typing import Any
 
 import pytest
 
-from holozen.messages import Odometry, Twist
-from holozen.testing import Process, Wire, wait_for
+from holozen.bus import Bus, BusError
+from holozen.command.base import Base
+from holozen.limits import STOP
+from holozen.messages import CommandStatus, Odometry, TriggerReply, TriggerRequest, Twist
+from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.testing.conformance import PROMISES, Probe, name
+from holozen.transport.graph import on_key
 
-FOLDER = Path(__file__).parents[2] / "examples" / "lekiwi"
+REPO = Path(__file__).parents[2]
+PAGE = REPO / "docs" / "real-robots.md"
+FOLDER = REPO / "examples" / "lekiwi"
 STANDS = "7:0 8:0 9:0"
+SHELL = ["env", "--default-signal", "bash", "--norc", "-i"]  # SIGQUIT is ignored below a shell's background job
 
 
 class Kiwi:
     """The base, its servos, and a wire."""
 
-    def __init__(self, wire: Wire) -> None:
+    def __init__(self, wire: Wire, state: Path) -> None:
         self.wire = wire
+        self.flags = [*wire.flags, "--state", str(state)]
         self.servos = Process([sys.executable, str(FOLDER / "simulated_servos.py")])
         self.port = self.servos.wait_for_line("/dev/")
-        self.base = Process([sys.executable, str(FOLDER / "lekiwi.py"), self.port, *wire.flags])
+        self.command = [sys.executable, str(FOLDER / "lekiwi.py"), self.port, *self.flags]
+        self.start()
+
+    def start(self) -> None:
+        self.base = Process(self.command)
         self.base.wait_for_line("drives the servos")
+
+    def kill_and_start(self) -> None:
+        self.base.kill()
+        self.base.close()
+        self.start()
+
+    def processes(self) -> list[int]:
+        """The base and its guard."""
+        found = []
+        for folder in Path("/proc").glob("[0-9]*"):
+            with contextlib.suppress(OSError):  # it has ended
+                words = (folder / "cmdline").read_bytes().split(b"\0")
+                if self.port.encode() in words and str(FOLDER / "lekiwi.py").encode() in words:
+                    found.append(int(folder.name))
+        return found
 
     def close(self) -> None:
         self.base.close()
@@ -41,9 +71,9 @@ class Kiwi:
 
 
 @pytest.fixture(scope="module")
-def kiwi() -> Iterator[Kiwi]:
+def kiwi(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Kiwi]:
     with Wire() as wire:
-        kiwi = Kiwi(wire)
+        kiwi = Kiwi(wire, tmp_path_factory.mktemp("state"))
         yield kiwi
         kiwi.close()
 
@@ -54,9 +84,9 @@ def probe(kiwi: Kiwi) -> Probe:
 
 
 @pytest.fixture
-def own(wire: Wire) -> Iterator[Kiwi]:
+def own(wire: Wire, tmp_path: Path) -> Iterator[Kiwi]:
     """A base of the test's own, which it may end."""
-    kiwi = Kiwi(wire)
+    kiwi = Kiwi(wire, tmp_path)
     yield kiwi
     kiwi.close()
 
@@ -101,12 +131,158 @@ def test_its_wheels_stop_whatever_ends_or_holds_it(number: signal.Signals, own: 
     own.servos.signal(0)  # which still run
 
 
+@pytest.mark.parametrize("end", ["\x1a", "\x1c", "kill -STOP %1\r", "kill -9 %1\r"])
+def test_its_wheels_stop_when_its_whole_job_is_suspended_or_killed(end: str, own: Kiwi) -> None:
+    own.base.terminate()
+    job = shlex.join(own.command)
+    with Terminal(SHELL, env={"PS1": "$ "}, size=(200, 32)) as shell:
+        shell.type(f"{job} {'&' if end.startswith('kill') else ''}\r")
+        wait_for(lambda: "drives the servos" in shell.raw)
+        own.drive(own.wire.bus().publisher("cmd_vel", Twist))
+
+        def is_hit() -> bool:
+            with contextlib.suppress(OSError):  # one has just ended
+                states = [Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0] for pid in own.processes()]
+                return len(states) < 2 or "T" in states
+            return True
+
+        shell.type(end)
+        wait_for(is_hit, what=lambda: f"the signal to arrive; the shell shows {shell.raw}")
+        wait_for(lambda: own.speeds() == STANDS, what=lambda: f"the wheels to stop; the shell shows {shell.raw}")
+        shell.type("kill -9 %1\r")
+        wait_for(lambda: not own.processes(), what=lambda: f"{own.processes()} to end")
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+def test_it_ends_in_one_line_without_its_guard_which_only_sigkill_ends(number: signal.Signals, own: Kiwi) -> None:
+    own.drive(own.wire.bus().publisher("cmd_vel", Twist))
+    (guard,) = set(own.processes()) - {own.base.pid}
+    os.kill(guard, number)
+    if number == signal.SIGKILL:
+        assert own.base.wait() == 1
+        assert own.base.err.splitlines()[1:] == [
+            f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start lekiwi.py again"
+        ]
+        wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
+    else:
+        own.base.kill()
+        wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
+
+
+def test_a_base_that_was_stopped_and_killed_is_still_stopped_when_it_is_started_again(own: Kiwi) -> None:
+    bus = own.wire.bus("person")
+    assert bus.call("stop", TriggerRequest(), TriggerReply, timeout=20).success
+    own.kill_and_start()
+    assert "lekiwi: the robot is still stopped by person@" in own.base.err
+    with pytest.raises(Exception, match="stopped: by person@"):
+        bus.call("resume", TriggerRequest(), TriggerReply, timeout=20)
+    statuses = bus.latest("cmd_vel_status", CommandStatus)
+    commands = bus.publisher("cmd_vel", Twist)
+
+    def is_refused() -> bool:
+        commands.put(Twist.planar(0.1))
+        status, _ = statuses.read()
+        return status is not None and status.stopped.startswith("person@") and status.refused.get("stopped", 0) > 0
+
+    wait_for(is_refused)
+    assert own.speeds() == STANDS
+    assert bus.call("release", TriggerRequest(), TriggerReply, timeout=20).success
+    own.kill_and_start()
+    assert "still stopped" not in own.base.err
+    own.drive(commands)
+
+
+def test_a_second_base_of_the_same_name_is_refused_and_the_first_is_named(own: Kiwi) -> None:
+    with Process([sys.executable, str(FOLDER / "simulated_servos.py")]) as servos:
+        port = servos.wait_for_line("/dev/")
+        start = [sys.executable, str(FOLDER / "lekiwi.py"), port]
+        with Process([*start, *own.flags]) as second:
+            assert second.wait() == 1
+            (line,) = second.err.splitlines()
+            assert re.fullmatch(
+                r"lekiwi: the robot is served by lekiwi@\w+ already: end that one, or give this one another name", line
+            )
+        with Process([*start, "Kiwi", *own.flags]) as other:
+            other.wait_for_line("drives the servos")
+    assert own.base.returncode is None
+
+
+def test_of_two_bases_that_did_not_discover_each_other_in_time_one_ends(
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOLOZEN_STATE", str(tmp_path))
+    low, high = sorted((wire.bus("one", lasting=True), wire.bus("two", lasting=True)), key=lambda bus: bus.id)
+
+    def meet(mine: Bus, other: Bus, robot: str) -> Base:
+        """A base on one bus, whose robot the other one serves after that."""
+        base, graph = Base(mine, robot), mine.graph()
+        other.serve(f"{robot}/stop", TriggerRequest, TriggerReply, lambda _: TriggerReply(True))
+        wait_for(lambda: len(on_key(graph.endpoints(), f"{robot}/stop", "srv")) == 2)
+        return base
+
+    ends, goes_on = meet(high, low, "Fred"), meet(low, high, "Ann")
+    with pytest.raises(BusError, match=rf"Fred is served by {low.node}@\w+ already"):
+        wait_for(lambda: ends.velocity() != STOP)
+    assert [goes_on.velocity() for _ in range(20)] == [STOP] * 20
+
+
+WHEELS = """
+import math
+
+class Wheels:
+    velocity = (0.0, 0.0, 0.0)
+
+    def drive(self, *velocity):
+        if velocity != self.velocity:
+            print("wheels at", *velocity, flush=True)
+        self.velocity = velocity
+
+    def measured(self):
+        if any(self.velocity):
+            {fault}
+        return self.velocity
+
+my_wheels = Wheels()
+"""
+
+
+@pytest.mark.parametrize(
+    ("fault", "reason"),
+    [
+        ("return math.nan, 0.0, 0.0", "the measured velocity (nan, 0.0, 0.0) is not finite"),
+        ("raise OSError('the port is gone')", "the port is gone"),
+        ("raise KeyError('a mistake in the program')", "a mistake in the program"),
+    ],
+)
+def test_the_documented_program_stops_its_wheels_whatever_ends_it(
+    fault: str, reason: str, wire: Wire, tmp_path: Path
+) -> None:
+    (program,) = re.findall(r"^```python\n(import sys\n.*?my_wheels.*?)^```$", PAGE.read_text(), re.M | re.S)
+    here = f"Connection(connect=({wire.endpoint!r},), listen=({wire.endpoint!r},))"
+    assert "Connection()" in program
+    (tmp_path / "my_base.py").write_text(WHEELS.format(fault=fault) + program.replace("Connection()", here))
+    with Process([sys.executable, str(tmp_path / "my_base.py")], env={"HOLOZEN_STATE": str(tmp_path)}) as base:
+        commands = wire.bus("driver").publisher("cmd_vel", Twist)
+
+        def has_ended() -> bool:
+            commands.put(Twist.planar(0.2))
+            return base.returncode is not None
+
+        wait_for(has_ended)
+        assert base.returncode == 1
+        assert base.out.splitlines() == ["wheels at 0.2 0.0 0.0", "wheels at 0 0 0"]
+        if "KeyError" in fault:
+            assert reason in base.err
+        else:
+            assert base.err.splitlines() == [f"my_base: {reason}"]
+
+
 def test_a_port_without_servos_is_reported_in_one_line(wire: Wire) -> None:
     here, there = os.openpty()
     try:
         for port, reason in (
             ("/dev/none", "lekiwi: cannot open /dev/none: No such file or directory"),
-            (os.ttyname(there), "does not answer: is it powered, is that its id?"),
+            (os.ttyname(there), "does not answer: is it powered, and is that its id?"),
         ):
             base = Process([sys.executable, str(FOLDER / "lekiwi.py"), port, *wire.flags])
             assert base.wait() == 1

@@ -13,7 +13,7 @@ import pytest
 import zenoh
 
 from holozen.bag.reader import Bag
-from holozen.messages import Odometry, codec
+from holozen.messages import Odometry, TFMessage, codec
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
@@ -83,6 +83,51 @@ def test_a_killed_recorder_leaves_a_file_that_can_be_read(wire: Wire, tmp_path: 
     assert [m.payload for m in found] == [b"%d" % i for i in range(len(found))]
     assert len(found) >= 500
     assert "the recording was cut off" in info_of(path)
+
+
+@pytest.mark.parametrize("keys", [("-a",), ("map", "tf_static", "odom")])
+def test_it_begins_with_what_latched_keys_hold(wire: Wire, tmp_path: Path, keys: tuple[str, ...]) -> None:
+    """And takes what they hold that appear later, once each."""
+    bus = wire.bus("writer")
+    grid = bus.publisher_raw("map", "nav_msgs/msg/OccupancyGrid", "application/json")
+    grid.put_bytes(b'{"info": {"width": 3}}')
+    bus.publisher("odom", Odometry).put(Odometry())
+    recorder = wire.start("record", *keys, "-o", str(tmp_path / "a"))
+    recorder.wait_for_line("recording ")
+    wait_for(lambda: read(tmp_path / "a.mcap"), what="the map")
+    wire.bus("later").publisher("tf_static", TFMessage).put(TFMessage([]))
+    wait_for(lambda: len(read(tmp_path / "a.mcap")) == 2, what="the transforms")
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0
+    found = [(m.channel.key, m.payload) for m in read(tmp_path / "a.mcap")]
+    assert found == [("map", b'{"info": {"width": 3}}'), ("tf_static", codec.encode(TFMessage([])))]
+
+
+@pytest.mark.parametrize("flags", [(), ("--ros2",)])
+def test_a_file_that_is_deleted_ends_the_recording_with_an_error(
+    wire: Wire, tmp_path: Path, flags: tuple[str, ...]
+) -> None:
+    recorder = wire.start("record", "odom", "-o", str(tmp_path / "a"), *flags)
+    session = listening(wire, "odom")
+    session.put("odom", codec.encode(Odometry()))
+    path = tmp_path / ("a/a_0.mcap" if flags else "a.mcap")
+    wait_for(lambda: read(path), what="the message to be flushed")
+    path.unlink()
+    assert recorder.wait() == 1
+    assert recorder.err.splitlines()[-1] == f"holozen record: stopped: {path} was deleted during the recording"
+    assert recorder.out == ""
+    assert not flags or list(path.parent.iterdir()) == [], "metadata about a file that is not there"
+
+
+def test_keys_on_which_nothing_arrived_are_named(wire: Wire, tmp_path: Path) -> None:
+    recorder = wire.start("record", "a/*", "b/*", "never", "-o", str(tmp_path / "a"))
+    session = listening(wire, "a/b")
+    session.put("a/b", b"x")
+    wait_for(lambda: read(tmp_path / "a.mcap"), what="the message to be flushed")
+    recorder.signal(signal.SIGINT)
+    assert recorder.wait() == 0
+    expected = "holozen record: nothing arrived on b/*, never; `holozen topic list` shows the topics"
+    assert recorder.err.splitlines()[-1] == expected
 
 
 FULL = """

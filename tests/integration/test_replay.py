@@ -2,13 +2,14 @@
 
 import json
 import signal
+import time
 from pathlib import Path
 
 import pytest
 
 from holozen.bag.formats import format_of
 from holozen.bag.writer import BagWriter
-from holozen.messages import Message, Odometry, Twist, codec
+from holozen.messages import Header, Message, Odometry, PoseStamped, Time, Twist, TwistStamped, codec
 from holozen.testing import Wire, wait_for
 from holozen.transport.samples import RawSubscriber, Sample
 
@@ -109,6 +110,30 @@ def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot,
     assert {s.priority for s in sent} == {"DATA"}
     assert all(s.source.startswith("replay@") for s in sent)
     assert [s.payload for s in sent[8:]] == STOPS
+
+
+@pytest.mark.parametrize("form", ["json", "msgpack", "cdr"])
+def test_stamped_commands_drive_with_a_stamp_of_now(town: Wire, robot: Robot, tmp_path: Path, form: str) -> None:
+    """Their own stamps are old, and those would be refused."""
+    old = TwistStamped(Header(Time(1_700_000_000), "base_link"), Twist.planar(x=0.2))
+    payload, encoding = codec.encode(old, form), codec.encoding(form, TwistStamped)
+    rows = [("cmd_vel", payload, encoding, i * 50.0) for i in range(20)]
+    path = bag(tmp_path / "a.mcap", *rows, types=(Twist, TwistStamped))
+    tap, begun = robot.bus.subscribe_raw("cmd_vel"), time.time()
+    player = town.start("replay", path, "--commands")
+    wait_for(lambda: moves(robot.newest(), 0.2, 0, 0, tolerance=0.02), what="the robot to move")
+    assert player.wait() == 0, player.err
+    first = heard(tap, count=20)[0]
+    command = codec.decode(first.payload, first.encoding, (TwistStamped,))
+    assert (first.encoding, command.header.frame_id, command.twist) == (encoding, "base_link", old.twist)
+    assert begun - 1 < command.header.stamp.seconds() < time.time() + 1
+
+
+def test_at_the_end_it_names_the_goals_that_still_drive(wire: Wire, tmp_path: Path) -> None:
+    goal = codec.encode(PoseStamped())
+    done = wire.run("replay", bag(tmp_path / "a.mcap", ("goal_pose", goal, "application/json", 0.0)), "--commands")
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == "goal_pose: the robot may drive on to the last goal, since its controller drives it\n"
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

@@ -200,7 +200,7 @@ Attack = Callable[[Bus, Captured], dict[str, Any]]
 
 
 def proved(bus: Bus, key: Member, priority: str, source: str = "") -> dict[str, Any]:
-    stamp = bus.stamp()
+    stamp = bus.stamps("cmd_vel")()
     stamp = stamp.replace(bus.source.partition("@")[0].encode(), source.encode()) if source else stamp
     proof = key.attachment("cmd_vel", priority, stamp, "application/json", FORWARD)
     return {"priority": priority, "attachment": proof}
@@ -213,7 +213,7 @@ def own(bus: Bus) -> Member:
 
 ATTACKS: dict[str, Attack] = {
     "unsigned": lambda bus, sent: {},
-    "unsigned, with a stamp": lambda bus, sent: {"attachment": bus.stamp()},
+    "unsigned, with a stamp": lambda bus, sent: {"attachment": bus.stamps("cmd_vel")()},
     "in Ann's name": lambda bus, sent: proved(bus, own(bus), "INTERACTIVE_HIGH", "Ann/test"),
     "in Ann's name, by another authority": lambda bus, sent: proved(
         bus, Member("Ann", Ed25519PrivateKey.generate()), "INTERACTIVE_HIGH", "Ann/test"
@@ -234,7 +234,7 @@ ATTACKS: dict[str, Attack] = {
         "attachment": b";".join([(parts := sent.attachment.split(b";"))[0], b"99999", *parts[2:]]),
         "payload": sent.payload, "priority": "INTERACTIVE_HIGH",
     },
-    "a signature that is no number": lambda bus, sent: {"attachment": bus.stamp() + b";" + b"x" * 128},
+    "a signature that is no number": lambda bus, sent: {"attachment": bus.stamps("cmd_vel")() + b";" + b"x" * 128},
     "captured": lambda bus, sent: {
         "attachment": sent.attachment, "payload": sent.payload, "priority": "INTERACTIVE_HIGH",
     },
@@ -282,7 +282,7 @@ def test_the_router_drops_what_a_role_may_not_put(fleet: Fleet, robot: Robot) ->
     ]:  # fmt: skip
         heard = robot.bus.subscribe_raw(key)
         with fleet.bus(name) as bus:
-            mine = own(bus).attachment(key, "DATA", bus.stamp(), "application/json", b"{}")
+            mine = own(bus).attachment(key, "DATA", bus.stamps(key)(), "application/json", b"{}")
             bus.session.put(key, b"{}", encoding="application/json", attachment=mine)
             # What a later question brings back comes after the sample.
             assert list(bus.ask_all("odom", 5.0)), name
@@ -342,12 +342,12 @@ def test_a_certificate_of_another_authority_is_refused_in_one_line(fleet: Fleet,
     listing = Process(command("node", "list", "--secure", str(tmp_path / "foreign"), "--connect", fleet.endpoint))
     with listing:
         assert listing.wait() == 1
-        where = f"holozen node list: {fleet.endpoint} is no router of this authority: "
+        where = f"holozen node list: {fleet.endpoint} is not a router of this authority: "
         assert listing.err.startswith(where) and listing.err.count("\n") == 1, listing.err
     # Ours as the root, and a certificate that it did not issue.
     mixed = tmp_path / "foreign" / "viewer"
     (mixed / "ca.pem").write_bytes((fleet.root / "ca.pem").read_bytes())
-    with pytest.raises(BusError, match="is not of the authority"):
+    with pytest.raises(BusError, match="was not issued by the authority"):
         load(str(mixed))
 
 
@@ -385,7 +385,7 @@ def absent(folder: Path) -> str:
     [
         (expired, "the certificate of Old expired on"), (readable, "other users may read it"),
         (swapped, "it is not the key of cert.pem"), (keyless, "No such file or directory; `holozen secure init`"),
-        (garbled, "is no PEM file"), (absent, "there is no such folder; `holozen secure init` makes certificates"),
+        (garbled, "is not a PEM file"), (absent, "there is no such folder; `holozen secure init` makes certificates"),
     ],
 )  # fmt: skip
 def test_a_wrong_certificate_is_reported(tmp_path: Path, spoil: Callable[[Path], str], reason: str) -> None:
@@ -465,7 +465,7 @@ def test_two_commands_make_a_network_for_members_alone(tmp_path: Path) -> None:
         with pytest.raises(BusError):
             Bus("test", Connection("client", connect=(endpoint.replace("tls/", "tcp/"),)), patience=0.5).id  # noqa: B018
         with Process(words) as second:
-            second.wait_for_line(f"up: something listens at {endpoint} already; it is taken for the router")
+            second.wait_for_line(f"up: something listens at {endpoint} already; assuming that it is the router")
         assert up.terminate(20) == 0
     with pytest.raises(ConnectionRefusedError), socket.create_connection(("127.0.0.1", int(endpoint[-5:]))):
         pass

@@ -201,7 +201,7 @@ def test_an_imu_measures_gravity_a_turn_and_the_pull_of_a_circle(eyes: Eyes) -> 
     assert spun.linear_acceleration.x == pytest.approx(0.0, abs=0.02)
 
 
-def test_while_it_is_paused_nothing_new_is_seen_and_a_reset_begins_anew(eyes: Eyes) -> None:
+def test_while_it_is_paused_nothing_new_is_seen_and_a_reset_starts_over(eyes: Eyes) -> None:
     odom = eyes.bus.subscribe("odom", Odometry, depth=1000)
     eyes.sim.step(1)
     eyes.forget()

@@ -122,7 +122,7 @@ def test_a_sim_that_hung_drops_the_commands_that_waited(sim: Process, robot: Rob
 
 
 def test_a_sim_that_hung_longer_than_a_lease_comes_back(sim: Process, robot: Robot) -> None:
-    """Zenoh gives its links up after a second; they are made anew."""
+    """Zenoh gives its links up after a second; they are made again."""
     sim.signal(signal.SIGSTOP)
     wait_for(lambda: state_of(sim.pid) == "T")
     stood = robot.odom.messages()[-1]

@@ -22,7 +22,7 @@ from holozen.messages import (
     TriggerRequest,
     Twist,
 )
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.transport.pubsub import Publisher
@@ -36,7 +36,7 @@ BOT = URDF / "hb_bot.urdf.xacro"
 TAG = "<commandTopic>"
 # With a watchdog of a minute, a source that has to let go is silent as long, however slow the machine: one that was not
 # scheduled for half a second has let go of the others.
-SLOW_BOT = expand(BOT).replace(TAG, f"<cmdTimeout>60</cmdTimeout>{TAG}")
+SLOW_BOT = expand_xacro(BOT).replace(TAG, f"<cmdTimeout>60</cmdTimeout>{TAG}")
 WHEELS = ["jFL", "jFR", "jBL", "jBR"]
 SLOW = 0.02  # m/s, rad/s; slower is standing, for what stands on wheels
 
@@ -183,6 +183,29 @@ def test_any_zenoh_tool_can_set_it_and_ask_for_it(fred: Robot, foreign: zenoh.Se
     assert get("Fred/cmd_vel_status")["stopped"] == "an unknown caller"
     get("Fred/release")
     assert get("Fred/cmd_vel_status")["stopped"] == ""
+
+
+@pytest.mark.parametrize(
+    ("payload", "encoding", "selector"),
+    [
+        (b"", "", ""),
+        (b"null", "application/json", ""),
+        (b'{"reason": "obstacle"}', "application/json", ""),
+        (b"now", "text/plain", ""),
+        (b"", "application/cdr", ""),
+        (b"\xff" * 6_000_000, "image/png", ""),
+        (None, "", "?reason=obstacle"),
+    ],
+)
+def test_a_stop_stops_the_robot_whatever_the_request_holds(
+    fred: Robot, foreign: zenoh.Session, payload: bytes | None, encoding: str, selector: str
+) -> None:
+    (reply,) = foreign.get(f"Fred/stop{selector}", payload=payload, encoding=encoding or None)
+    assert reply.ok is not None
+    answer = json.loads(bytes(reply.ok.payload))
+    assert answer["success"] is True
+    assert answer["message"].startswith("stopped by an unknown caller; the request cannot be read: ")
+    assert fred.status_when(lambda status: status.stopped == "an unknown caller")
 
 
 def refuses(robot: Robot, reason: str) -> CommandStatus:

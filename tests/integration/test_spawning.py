@@ -11,7 +11,7 @@ from holozen import entities
 from holozen.bus import Bus
 from holozen.messages import Clock
 from holozen.messages import simulation_interfaces as si
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
@@ -127,7 +127,7 @@ def test_a_repeated_name_an_unknown_robot_and_a_wrong_file_are_reported_with_the
 
 def test_a_name_that_is_none_is_refused_by_the_sim_too(wire: Wire, sim: Process) -> None:
     """A robot called `*` would drive them all; a look-alike letter would pass for another robot's."""
-    bus, text = wire.bus(), expand(Path(HB_BOT))
+    bus, text = wire.bus(), expand_xacro(Path(HB_BOT))
     for name in ("*", "**", "$*", "a/b", "..", "F\0", "Fred\n", "\u0391nn", "x" * 5000):
         request = si.SpawnEntityRequest(name, resource_string=text)
         with pytest.raises(ServiceError, match="use a letter, then") as refusal:
@@ -177,7 +177,7 @@ def test_many_robots_in_a_row_leave_no_key_and_little_memory_and_the_sim_keeps_i
 ) -> None:
     count = trials(50, 200)
     bus = wire.bus()
-    text = expand(Path(HB_BOT))
+    text = expand_xacro(Path(HB_BOT))
     before, clock = keys(bus), bus.latest("clock", Clock)
 
     def spawn_and_delete(name: str) -> None:
@@ -205,7 +205,7 @@ def resident(process: Process) -> int:
 def test_a_topic_that_the_robots_file_names_is_published_to_by_its_readers_type(
     wire: Wire, sim: Process, tmp_path: Path
 ) -> None:
-    text = expand(Path(HB_BOT)).replace("<commandTopic>cmd_vel<", "<commandTopic>go<")
+    text = expand_xacro(Path(HB_BOT)).replace("<commandTopic>cmd_vel<", "<commandTopic>go<")
     (tmp_path / "r.urdf").write_text(text)
     assert done(wire, "spawn", str(tmp_path / "r.urdf"), "--name", "Fred") == "Fred listens on Fred/go\n"
     fred = Robot(wire.bus(), "Fred")
@@ -223,7 +223,7 @@ def test_a_fleet_is_spawned_on_a_grid(wire: Wire, sim: Process) -> None:
         ("bot0", "1.000", "0.000"), ("bot1", "2.500", "0.000"), ("bot2", "4.000", "0.000"), ("bot3", "1.000", "1.500"),
         ("bot4", "2.500", "1.500"),
     ]  # fmt: skip
-    assert "5 of these are there already, such as bot0; --name gives another name" in refused(
+    assert "5 of these exist already, such as bot0; --name gives another name" in refused(
         wire, "spawn", HB_BOT, "--count", "6"
     )
     assert done(wire, "spawn", HB_BOT, "--count", "1", "--name", "Ann", "-x", "-5").startswith("Ann0 .. Ann0 ")

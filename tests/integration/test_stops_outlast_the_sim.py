@@ -1,6 +1,7 @@
 """A software stop outlasts the sim, however that ends; where nobody knows whether a robot was stopped, it is."""
 
 import signal
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -29,8 +30,15 @@ def ask(bus: Bus, what: str) -> None:
 
 def setter(bus: Bus, name: str) -> str:
     """Who stopped a robot."""
-    statuses = bus.latest(f"{name}/cmd_vel_status", CommandStatus)
-    wait_for(lambda: statuses.count)
+    key = f"{name}/cmd_vel_status"
+    statuses = bus.latest(key, CommandStatus)
+
+    def missing() -> str:  # tells a sim that does not answer from one that has lost its reader
+        ends = [(end.kind, end.node) for end in bus.endpoints() if end.key == key]
+        answers = [getattr(answer, "payload", answer) for answer in bus.ask_all(key, 5.0)]
+        return f"a status of {name}; the graph has {ends}, {statuses.bad} were bad, and a get is answered {answers}"
+
+    wait_for(lambda: statuses.count, what=missing)
     status, _ = statuses.read()
     statuses.close()
     assert status is not None
@@ -53,6 +61,24 @@ def test_a_sim_that_is_killed_and_started_again_has_the_same_robots_stopped(wire
     sim.wait()
     start(wire, tmp_path)
     assert setter(bus, "Fred") == ""
+
+
+WRITTEN: dict[str, Callable[[str], list[str]]] = {
+    "the name of this machine": lambda point: ["--connect", point.replace("127.0.0.1", "localhost"), "--listen", point],
+    "one more endpoint": lambda point: ["--connect", "tcp/127.0.0.1:1", "--connect", point, "--listen", point],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", WRITTEN)
+def test_a_stop_outlasts_other_words_for_the_same_network(wire: Wire, tmp_path: Path, how: str) -> None:
+    sim, bus = start(wire, tmp_path), wire.bus("person")
+    ask(bus, "Fred/stop")
+    sim.signal(signal.SIGKILL)
+    sim.wait()
+    with Process([*command("sim", *ROBOTS, "--state", str(tmp_path)), *WRITTEN[how](wire.endpoint)]) as sim:
+        sim.wait_for_line("sim: Fred is still stopped by person@")
+        sim.wait_for_line("Ann listens on")
+        assert "Ann is still" not in sim.err
 
 
 def test_a_robot_whose_file_is_damaged_is_stopped_until_its_release(wire: Wire, tmp_path: Path) -> None:
@@ -88,7 +114,7 @@ def test_a_full_disk_neither_delays_nor_ends_a_stop(wire: Wire, tmp_path: Path) 
         sim.wait_for_line("Ann listens on")
         bus = wire.bus("person")
         ask(bus, "Fred/stop")
-        sim.wait_for_line("No space left on device: stops hold, but not beyond the end of this sim")
+        sim.wait_for_line("No space left on device: stops hold, but not beyond the end of this process")
         assert setter(bus, "Fred").startswith("person@")
         ask(bus, "Ann/stop")
         assert (sim.out + sim.err).count("stops hold") == 1

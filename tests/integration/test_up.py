@@ -174,6 +174,15 @@ def test_a_robot_with_a_name_is_driven_by_that_name_in_the_engine_of_ones_choice
     assert "mujoco" in Path(f"/proc/{parts_at(wire)['sim']}/maps").read_text()
 
 
+def test_of_several_robots_all_are_there_and_the_first_is_driven(wire: Wire) -> None:
+    file = data.find("urdf", "hb_bot.urdf.xacro")
+    wire.start("up", "--robot", f"{file}=Fred", "--robot", f"{file}=Ann")
+    bus = wire.bus()
+    driven(Robot(bus, "Fred"))
+    assert rests(Robot(bus, "Ann").newest())
+    assert_one_line(wire.run("up", "--shards", "2", "--robot", f"{file}=Fred", "--robot", str(file)), 2, "--shards")
+
+
 def test_a_killed_sim_is_reported_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:
     up = wire.start("up", "--no-restart")
     robot = Robot(wire.bus())

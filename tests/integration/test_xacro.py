@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from holozen import data
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
@@ -29,14 +29,14 @@ def xacro(*words: str) -> subprocess.CompletedProcess[str]:
 def test_it_prints_the_text_of_the_library() -> None:
     done = xacro(str(BOT))
     assert (done.returncode, done.stderr) == (0, "")
-    assert done.stdout == expand(BOT)
+    assert done.stdout == expand_xacro(BOT)
     assert len(ET.fromstring(done.stdout).findall("joint")) == 4
 
 
 def test_it_writes_to_a_file(tmp_path: Path) -> None:
     done = xacro(str(BOT), "-o", str(tmp_path / "bot.urdf"))
     assert (done.returncode, done.stdout) == (0, "")
-    assert (tmp_path / "bot.urdf").read_text() == expand(BOT)
+    assert (tmp_path / "bot.urdf").read_text() == expand_xacro(BOT)
 
 
 def test_it_takes_arguments_and_packages(tmp_path: Path) -> None:
@@ -118,7 +118,7 @@ def reported(process: Process, count: int) -> str:
 def test_every_save_is_one_line_and_a_new_text(robot: Path, watcher: Process) -> None:
     text, out = robot.read_text(), robot.with_name("robot.urdf")
     good = f"{robot} expanded, {out} written"
-    assert (reported(watcher, 1), out.read_text()) == (good, expand(robot))
+    assert (reported(watcher, 1), out.read_text()) == (good, expand_xacro(robot))
     robot.write_text(text.replace("</robot>", '<link name="saved"/></robot>'))
     assert (reported(watcher, 2), '"saved"' in out.read_text()) == (good, True)
     materials = robot.with_name("materials.xacro")
@@ -127,6 +127,15 @@ def test_every_save_is_one_line_and_a_new_text(robot: Path, watcher: Process) ->
     (robot.parent / "new").write_text(text)
     (robot.parent / "new").rename(robot)  # as many an editor saves
     assert (reported(watcher, 4), '"saved"' in out.read_text()) == (good, False)
+
+
+def test_an_argument_that_nothing_asks_for_is_a_warning_on_every_save(robot: Path) -> None:
+    out = robot.with_name("robot.urdf")
+    with Process(command("xacro", str(robot), "nmae:=Fred", "--watch", "-o", str(out))) as watcher:
+        assert reported(watcher, 2) == f"{robot} expanded, {out} written"
+        assert watcher.err.startswith(f"warning: {robot}: nothing asks for the argument 'nmae'")
+        robot.write_text(robot.read_text().replace("</robot>", '<link name="saved"/></robot>'))
+        reported(watcher, 4)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ def row(live: str | None, wrong: tuple[str, int, str] | None = None, **more: obj
 
 
 NO_NODE = (1, "there is no node 'sim' with parameters; no node has any; `holozen up` starts a robot")
-NO_SIM = (1, "no sim answered within 3 s; start one in another terminal: holozen sim")
+NO_SIM = (1, "no sim answered within 3 s: no nodes found at ")
 NO_KEY = (1, "unknown key 'odom': no nodes found at ")
 NO_SUCH_KEY = ("odmo", 1, "unknown key 'odmo' (did you mean 'odom'?)")
 NO_FILE = (1, "No such file or directory")
@@ -49,7 +49,7 @@ PLOT = row(
 RECORD = row(
     "odom -o {tmp}/{id} --max-duration 2", ("-o {tmp}/{id}", 2, "name the keys to record, or use -a for all"),
     foreign=("a/json a/bytes a/cdr -o {tmp}/{id} --max-duration 2", "messages, "),
-    silent=("odom -o {tmp}/{id} --max-duration 0.2", 1, "nothing arrived, so no file is left"),
+    silent=("odom -o {tmp}/{id} --max-duration 0.2", 1, "no messages arrived, so no file is kept"),
     endless=Endless("odom -o {tmp}/{id}", "messages,"),
 )  # fmt: skip
 REPLAY = row(
@@ -60,7 +60,7 @@ REPLAY = row(
 VERBS = {
     "up": row(None, ("--laps", 2, "--laps: expected one argument"), endless=Endless("", "listening")),
     "stop": row("Spare", NOT_THERE, silent=STOPPED),
-    "release": row("Spare", NOT_THERE, silent=STOPPED),
+    "release": row("Free", NOT_THERE, silent=STOPPED),
     "sim": row(None, ("puase", 2, "no verb 'puase' (did you mean 'pause'?)"), endless=Endless("", "listens on")),
     "sim pause": row(None, ("now", 2, "unexpected argument 'now'"), silent=("", *NO_SIM)),
     "sim play": row("", ("--sped 2", 2, "no flag '--sped'"), silent=("", *NO_SIM)),
@@ -74,12 +74,12 @@ VERBS = {
     "pose-service": row(None, ("--goals {tmp}/none", *NO_FILE), endless=Endless("", "4 goals from square")),
     "router": row(None, endless=Endless("", "listens at")),
     "ros2": row(None, ("--ros-domain-id 300", 2, "use a number from 0 to 232"), endless=Endless("", "joins ROS 2")),
-    "secure init": row("--secure {tmp}/{id}", ("--days 0", 2, "use a whole number of days"), bus=False),
+    "secure init": row("--secure {tmp}/{id}", ("--days 0", 2, "use a whole number from 1 to 3650"), bus=False),
     "secure add": row(None, ("viewer Bob --secure {tmp}/none", *NO_FILE), bus=False),
     "secure revoke": row(None, ("Bob --secure {tmp}/none", *NO_FILE), bus=False),
     "secure show": row(None, ("--secure {tmp}/none", *NO_FILE), bus=False),
-    "run": row(None, ("{tmp}/none.py", 1, "none.py'")),  # what else it does is in tests/unit/ros
-    "launch": row(None, ("{tmp}/none.launch.py", 1, "no launch file '")),
+    "run": row(None, ("{tmp}/none.py", 1, "none.py does not exist")),  # what else it does is in tests/unit/ros
+    "launch": row(None, ("{tmp}/none.launch.py", 1, "does not exist")),
     "spawn": row("{ball} --name New{n} -x {free}", ("{tmp}/none.urdf", *NO_FILE), silent=("{ball}", *NO_SIM)),
     "delete": row("Doomed{n}", ("Nobody", 1, "there is no entity 'Nobody'"), silent=("Fred", *NO_SIM)),
     "list": row("", silent=("", *NO_SIM)),
@@ -95,15 +95,15 @@ VERBS = {
     "topic find": row("Odometry", ("Odm", 1, "no topic of type 'Odm'"), silent=("Odometry", 1, "types: none")),
     "topic echo": row("odom --once", ("odom --type geometry_msgs/msg/Twsit", 2, TYPO[1]),
         silent=("odom --timeout 0.2", *NOTHING), endless=Endless("odom", "position:", 130)),
+    "topic pub": row(PUB, (f"odom {TWIST} {{{{}}}}", 1, f"its type is nav_msgs/msg/Odometry, not {TWIST}"),
+        silent=("cmd_vel {{}} --once --max-wait 0.2", 1, "no subscribers of cmd_vel; no nodes found at "),
+        endless=Endless("Spare/cmd_vel {{}}", "subscriber")),
     "topic hz": row("odom --once", ("a//b", 1, "holozen topic hz: key 'a//b': "),
         silent=("odom --timeout 0.2", *NOTHING), endless=Endless("odom", "average rate: ")),
     "topic bw": row("odom --once", ("odom --timeout x", 2, "'x': use a number"),
         silent=("odom --timeout 0.2", *NOTHING), endless=Endless("odom", "/s from ")),
     "topic delay": row("odom --once", ("cmd_vel_status --timeout 0.2", 1, "messages have no header.stamp"),
         silent=("odom --timeout 0.2", *NOTHING), endless=Endless("odom", "average delay: ")),
-    "topic pub": row(PUB, (f"odom {TWIST} {{{{}}}}", 1, f"its type is nav_msgs/msg/Odometry, not {TWIST}"),
-        silent=("cmd_vel {{}} --once --max-wait 0.2", 1, "no subscribers of cmd_vel; no nodes found at "),
-        endless=Endless("Spare/cmd_vel {{}}", "subscriber")),
     "topic plot": PLOT,
     "service list": row("", silent=("", 0, "no services: no nodes found at ")),
     "service type": row("resume", ("resmue", 1, "did you mean 'resume'?"), silent=("odom", *NO_KEY)),
@@ -117,7 +117,7 @@ VERBS = {
     "action info": row("simulate_steps", ("simulate_stps", 1, "did you mean 'simulate_steps'?"),
         silent=("odom", *NO_KEY)),
     "action send_goal": row(None, ("simulate_steps '{{step: 1}}'", 1, "no field 'step' (did you mean 'steps'?)"),
-        silent=("simulate_steps --timeout 0.2", 1, "it has no server at ")),
+        silent=("simulate_steps --timeout 0.2", 1, "no server for simulate_steps answered within 0.2 s at ")),
     "node list": row("", silent=("", 0, "no nodes found at ")),
     "node info": row("sim", ("smi", 1, "unknown node 'smi' (did you mean 'sim'?)"), silent=("x", 1, "no nodes found")),
     "param list": row("", ("smi", 1, "did you mean 'sim'?"), silent=("sim", *NO_NODE)),
@@ -143,5 +143,5 @@ VERBS = {
     "bag record": RECORD,
     "bag play": REPLAY,
     "plot": PLOT,
-    "map": row("--once -w 2", silent=("--once -w 0.2", 1, "no robot is there"), endless=Endless("", "bot x ")),
+    "map": row("--once -w 2", silent=("--once -w 0.2", 1, "no robots found"), endless=Endless("", "bot x ")),
 }  # fmt: skip

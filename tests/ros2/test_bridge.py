@@ -179,7 +179,7 @@ def test_our_topics_and_services_stand_in_the_ros_graph(bridged: Bridged) -> Non
 
 @pytest.mark.parametrize(("key", "kind"), [("odom", Odometry), ("tf", TFMessage)])
 def test_our_telemetry_arrives_byte_for_byte(bridged: Bridged, key: str, kind: Any) -> None:
-    """Ours is CDR by our codec, theirs that of Cyclone DDS, written anew from what it read."""
+    """Ours is CDR by our codec, theirs that of Cyclone DDS, written again from what it read."""
     ours, theirs = bridged.wire.bus().subscribe(key, kind), bridged.node.subscriber(f"/{key}", kind.ROS)
     sent: set[bytes] = set()
     got: set[bytes] = set()
@@ -403,7 +403,7 @@ def test_wires_are_mixed_on_one_key(bridged: Bridged) -> None:
 def test_another_definition_of_a_type_stays_there(bridged: Bridged) -> None:
     bridged.wire.bus().subscribe("go", Twist)
     bridged.node.publisher("/go", TWIST, bridged.dds.hashed(f"RIHS01_{'0' * 64}"))
-    bridged.gateway.wait_for_line("ros2: /go is not carried: its geometry_msgs/msg/Twist is not the one known here")
+    bridged.gateway.wait_for_line("ros2: /go is not forwarded: its geometry_msgs/msg/Twist is not the one known here")
 
 
 def test_what_no_bridge_announced_moves_nothing(bridged: Bridged) -> None:

@@ -1,5 +1,7 @@
 """`holozen ros2`, with nodes of zenoh-ros2-sdk as the other side."""
 
+import itertools
+import threading
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -48,6 +50,7 @@ def test_a_ros_node_sees_reads_drives_and_stops_our_robot(wire: Wire, theirs: "T
         "/tf": ["tf2_msgs/msg/TFMessage"],
         "/cmd_vel": [TWIST],
         "/clock": ["rosgraph_msgs/msg/Clock"],
+        "/robot_description": ["std_msgs/msg/String"],
     }
     wait_for(lambda: theirs.topics().items() >= expected.items(), what=lambda: f"our topics in {theirs.topics()}")
 
@@ -109,7 +112,7 @@ def test_a_service_that_is_ours_is_not_replaced_by_theirs(wire: Wire, theirs: "T
     wire.bus("sim").serve("stop", TriggerRequest, TriggerReply, lambda _: TriggerReply(True, "ours")).start()
     gateway = joined(wire)
     theirs.serve_trigger("/stop", "theirs")
-    gateway.wait_for_line("ros2: /stop is not carried: sim serves stop here")
+    gateway.wait_for_line("ros2: /stop is not forwarded: sim serves stop here")
     assert wire.bus().call("stop", TriggerRequest(), TriggerReply).message == "ours"
 
 
@@ -138,24 +141,25 @@ def test_a_node_of_humble_is_reported_without_the_flag(wire: Wire, theirs: "Thei
     theirs.humble = True
     wire.bus().subscribe("cmd_vel", Twist)
     theirs.publisher("/cmd_vel", TWIST, "old_teleop")
-    gateway.wait_for_line("ros2: /cmd_vel is not carried: old_teleop is of ROS 2 Humble; see --humble")
+    gateway.wait_for_line("ros2: /cmd_vel is not forwarded: old_teleop is of ROS 2 Humble; see --humble")
 
 
-def test_a_latched_topic_reaches_a_late_subscriber(wire: Wire, theirs: "Theirs") -> None:
+def test_a_latched_topic_reaches_a_late_subscriber_also_one_that_asks_as_soon_as_it_is_shown(
+    wire: Wire, theirs: "Theirs"
+) -> None:
     from zenoh_ros2_sdk.qos import QosDurability, QosProfile
 
     static = wire.bus("statics").publisher("tf_static", TFMessage)
     static.put(TFMessage([TransformStamped(child_frame_id="scanner")]))
-    joined(wire)
-    wait_for(lambda: "/tf_static" in theirs.topics())
-    found: list[Any] = []
-
-    def got() -> bool:
-        qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
-        theirs.subscriber("/tf_static", "tf2_msgs/msg/TFMessage", found.append, qos=qos)
-        return bool(found)
-
-    wait_for(got, 20)
+    session, shown, found = wire.bus().session, threading.Event(), list[Any]()
+    token = "@ros2_lv/*/*/*/*/MP/*/*/*/%tf_static/**"
+    with session.liveliness().declare_subscriber(token, lambda _: shown.set()):
+        joined(wire)
+        assert shown.wait(20)
+    assert [reply for reply in session.get("*/tf_static/**/@adv/pub/**?_anyke", timeout=5.0) if reply.ok]
+    qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+    theirs.subscriber("/tf_static", "tf2_msgs/msg/TFMessage", found.append, qos=qos)
+    wait_for(lambda: found)
     assert found[0].transforms[0].child_frame_id == "scanner"
 
 
@@ -191,7 +195,7 @@ def test_beside_our_robot_no_odometry_of_theirs_comes_in(wire: Wire, theirs: "Th
     ours = wire.bus("sim").publisher("odom", Odometry)
     theirs.publisher("/odom", ODOM, "their_robot")
     reader = wire.bus("reader").latest("odom", Odometry)
-    gateway.wait_for_line("ros2: /odom is not carried: sim publishes odom here")
+    gateway.wait_for_line("ros2: /odom is not forwarded: sim publishes odom here")
     ours.put(Odometry(child_frame_id="ours"))
     wait_for(lambda: reader.count == 1)
 
@@ -200,18 +204,47 @@ def test_a_command_that_waited_on_its_way_is_left_out(wire: Wire, theirs: "Their
     gateway = joined(wire)
     reader = wire.bus().subscribe("cmd_vel", Twist)
     commands = theirs.publisher("/cmd_vel", TWIST)
-    now = time.time()
 
     def heard(number: int, sent: float, x: float) -> bool:
         commands.pub.put(codec.encode(Twist.planar(x=x), "cdr"), attachment=sample(number, sent).packed())
         return reader.try_recv() is not None
 
-    wait_for(lambda: heard(1, now, 0.1))
+    wait_for(lambda: heard(1, time.time(), 0.1))
+    now = time.time()
+    wait_for(lambda: heard(1, time.time(), 0.1) and time.time() > now + 2 * rmw.PACE, what="it to keep pace")
     heard(1, now - 1.0, 0.2)
-    gateway.wait_for_line("ros2: /cmd_vel is not carried: a command was under way for more than 0.5 s")
+    gateway.wait_for_line("ros2: /cmd_vel is not forwarded: a command was under way for more than 0.5 s")
     wait_for(lambda: heard(2, time.time(), 0.3))
     later = [received.message.linear.x for received in iter(reader.try_recv, None) if received.message]
     assert 0.2 not in later
+
+
+def test_first_commands_that_waited_are_left_out_until_their_publisher_keeps_pace(wire: Wire, theirs: "Theirs") -> None:
+    """By its clock they are 3 s old, as after a cut link; the clock of a machine may also be wrong by that."""
+    gateway = joined(wire)
+    reader = wire.bus().subscribe("cmd_vel", Twist)
+    commands = theirs.publisher("/cmd_vel", TWIST)
+    wait_for(lambda: commands.pub.matching_status.matching, what="the route")
+    burst = time.time() - 3.0
+    for number in range(20):
+        commands.pub.put(codec.encode(Twist.planar(x=0.2), "cdr"), attachment=sample(number, burst).packed())
+        burst += 0.05
+    gateway.wait_for_line("ros2: /cmd_vel is not forwarded: a first command has a time of sending more than 0.5 s from")
+    assert reader.try_recv() is None
+    commands.pub.put(codec.encode(Twist(), "cdr"), attachment=sample(20, burst).packed())
+    assert reader.recv().message == Twist(), "a stop is forwarded at any age"
+    numbers = itertools.count(21)
+
+    came: list[float] = []
+
+    def heard() -> bool:
+        sent = time.time() - 1.0
+        commands.pub.put(codec.encode(Twist.planar(x=0.3), "cdr"), attachment=sample(next(numbers), sent).packed())
+        came.extend(received.message.linear.x for received in iter(reader.try_recv, None) if received.message)
+        return bool(came)
+
+    wait_for(heard, what="the commands of a publisher that keeps pace")
+    assert set(came) == {0.3}
 
 
 def test_a_second_one_ends(wire: Wire) -> None:
@@ -254,18 +287,56 @@ def sample(number: int, sent: float) -> Attachment:
     return Attachment(number, round(sent * 1e9), bytes(16))
 
 
+THEIRS = 1_700_000_000.0  # s; a clock of another machine, which disagrees with ours
+CLOCK = 3000.0  # s; ours
+
+
+def ages_of(ages: Ages, *samples: tuple[float, float]) -> list[float]:
+    """The ages of samples, each with the times since the first at which it was sent and read."""
+    found = [ages.of(sample(i, THEIRS + sent), 50.0 + read, CLOCK + read) for i, (sent, read) in enumerate(samples)]
+    return [round(age, 6) for age in found]
+
+
 def test_age_needs_no_clock_in_common_and_finds_what_waited() -> None:
     ages = Ages()
-    assert ages.of(sample(1, 1_700_000_000.0), 50.0) == 0.0
-    assert ages.of(sample(2, 1_700_000_000.1), 50.1) == pytest.approx(0.0, abs=1e-6)
-    assert ages.of(sample(3, 1_700_000_000.2), 51.0) == pytest.approx(0.8, abs=1e-6)
-    assert ages.of(sample(4, 1_700_000_001.1), 51.1) == pytest.approx(0.0, abs=1e-6)
+    ages_of(ages, (0.0, 0.0))
+    assert not ages.kept_pace
+    assert ages.of(sample(2, THEIRS + 0.35), 50.35, CLOCK) == pytest.approx(0.0, abs=1e-6)
+    assert ages.of(sample(3, THEIRS + 0.4), 51.2, CLOCK) == pytest.approx(0.8, abs=1e-6)
+    assert ages.of(sample(4, THEIRS + 1.3), 51.3, CLOCK) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("apart", [0.02, 0.05, 0.2, 1.0])
+@pytest.mark.parametrize("ahead", [0.0, -1000.0, 1000.0])
+def test_first_commands_that_waited_together_are_old(apart: float, ahead: float) -> None:
+    """Those of a publisher whose link was cut, and which may be dead."""
+    ages = Ages()
+    for i in range(100):
+        sent, read = CLOCK + i * apart, 100 * apart + 3.0 + i * 0.001
+        assert ages.of(sample(i, sent + ahead), read, CLOCK + read) > 0.5, f"sample {i}"
+    assert not ages.kept_pace
+
+
+def test_a_publisher_is_measured_again_once_it_keeps_pace_after_a_burst() -> None:
+    burst = [(i * 0.05, 5.0 + i * 0.001) for i in range(100)]
+    live = [(5.05 + i * 0.05, 5.05 + i * 0.05) for i in range(20)]
+    found = ages_of(Ages(), *burst, *live)
+    assert min(found[: len(burst) + 5]) > 0.5
+    assert max(found[-10:]) == 0.0
+
+
+def test_a_single_command_is_new_where_the_clocks_agree() -> None:
+    assert Ages().of(sample(1, CLOCK), 50.0, CLOCK + 0.1) == pytest.approx(0.1)
+    assert Ages().of(sample(1, CLOCK), 50.0, CLOCK + 3.0) == pytest.approx(3.0)
+    assert Ages().of(sample(1, CLOCK), 50.0, CLOCK - 3.0) == pytest.approx(3.0)
 
 
 def test_a_sender_whose_clock_was_set_back_is_not_old_for_ever() -> None:
     ages = Ages()
-    ages.of(sample(1, 2000.0), 50.0)
-    assert ages.of(sample(2, 1000.0), 50.1) == 0.0
+    ages_of(ages, (0.0, 0.0), (0.35, 0.35))
+    assert ages.kept_pace
+    assert ages.of(sample(3, 1000.0), 50.4, 9000.0) == 8000.0
+    assert ages.of(sample(4, 1000.35), 50.75, 9000.35) == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize("wrong", [b"", bytes(32), bytes(34), bytes(16) + b"\x0f" + bytes(16)])
@@ -278,6 +349,7 @@ def test_another_attachment_is_none(wrong: bytes) -> None:
     [
         "@ros2_lv/0/a/0/0/NN/%/%/talker",
         "@ros2_lv/0/a/0/x/MP/%/%/talker/%chatter/std_msgs::msg::dds_::String_/RIHS01_0/::,10:,:,:,,",
+        f"@ros2_lv/0/a/0/{'9' * 5000}/MP/%/%/talker/%chatter/std_msgs::msg::dds_::String_/RIHS01_0/::,10:,:,:,,",
         "@ros2_lv/0/a/0/1/XX/%/%/talker/%chatter/std_msgs::msg::dds_::String_/RIHS01_0/::,10:,:,:,,",
         "@ros2_lv/0/a/0/1/MP/%/%/talker/%**/std_msgs::msg::dds_::String_/RIHS01_0/::,10:,:,:,,",
         "@ros2_lv/0/a/0/1/MP/%/%/talker/%chatter/String/RIHS01_0/::,10:,:,:,,",

@@ -34,7 +34,7 @@ sys.exit(teleop.main(sys.argv[1:]))
 
 
 def broken_teleop(folder: Path, part: str) -> Path:
-    """A script that runs the teleop with this part broken; its flags are the teleop's."""
+    """A script that runs the teleop with one part broken; its flags are the teleop's."""
     script = folder / f"{part.split()[-1]}.py"
     script.write_text(SCRIPT.format(root=str(ROOT), statement=PARTS[part]))
     return script

@@ -72,7 +72,7 @@ class Display:
         self._server.close()
 
     def run(self, *words: str) -> str:
-        """Run a client of the X server to its end, such as xdotool; what it printed."""
+        """Run a client of the X server, such as xdotool, until it ends. Returns its output."""
         done = subprocess.run(words, env=os.environ | self.env, capture_output=True, text=True, timeout=20, check=True)
         return done.stdout
 
@@ -91,7 +91,7 @@ class Display:
 
     @property
     def root(self) -> str:
-        """The window behind all windows."""
+        """The root window, behind all others."""
         return self.run("xdotool", "search", "--maxdepth", "0", "").split()[0]
 
 
@@ -139,7 +139,7 @@ class Kitty:
         return output
 
     def bytes(self, begin: int = 0) -> bytes:
-        """All that was written to it, or what came after the first bytes."""
+        """All that was written to it, after the first `begin` bytes."""
         with contextlib.suppress(FileNotFoundError), self._dump.open("rb") as dump:
             dump.seek(begin)
             return dump.read()
@@ -155,7 +155,7 @@ class Kitty:
         self._process.signal(number)
 
     def close_window(self) -> None:
-        """As its button does."""
+        """Close the window, as its button does."""
         self.display.run("xdotool", "windowclose", self.window)
         self._process.wait()
 
@@ -177,7 +177,7 @@ class Program:
 
     @property
     def raw(self) -> str:
-        """All that it wrote, with its control sequences."""
+        """All that it has written, with its control sequences."""
         return self.kitty.bytes(self._begin).decode(errors="replace")
 
     def screen(self) -> str:
@@ -213,7 +213,9 @@ class Program:
             self.ended()
 
     def ended(self) -> dict[str, Any]:
-        """Wait for its end: "code", whether the "modes" are as before, and the keyboard's "flags" of both screens."""
+        """Wait for its end. Returns its exit "code", whether the terminal's "modes" are as before, and the keyboard
+        "flags" of both screens.
+        """
         if self._left is None:
             self._left = self.kitty.reply()
         return self._left

@@ -28,8 +28,8 @@ def stands(robot: Robot) -> None:
 def press_until(
     shown: Callable[[], object], press: Callable[[], object], let_go: Callable[[], object], screen: Callable[[], str]
 ) -> None:
-    """Press a key, and wait for what it does. A busy machine holds a terminal up for longer than the teleop waits for
-    its answer: where the screen shows that, the key is pressed anew, as by a person.
+    """Press a key, and wait for its effect. A busy machine may hold a terminal up for longer than the teleop waits for
+    its answer: if the screen shows that, the key is pressed again, as a person would.
     """
     for _ in range(5):
         press()
@@ -49,21 +49,21 @@ class Since:
         self._odom, self._seen = odom.from_now(), 0
 
     def drove(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> bool:
-        """Whether it moved so at any time; what it shows is not looked at again."""
+        """Whether the robot has moved so at any time; each message is looked at once."""
         new = self._odom.messages()[self._seen :]
         self._seen += len(new)
         return any(moves(odom, x, y, turn) for odom in new)
 
 
 def assert_nothing_moves(robot: Robot, seconds: float = 0.3) -> None:
-    """No command on cmd_vel moves the robot for so long by the sim's clock."""
+    """Check that no command on cmd_vel moves the robot for this long by the sim's clock."""
     commands = robot.commands.from_now()
     robot.pass_time(seconds)
     assert_nothing_moved(commands)
 
 
 def assert_nothing_moved(commands: Part) -> None:
-    """Nor do these commands."""
+    """Check that none of these commands moves the robot."""
     new = [planar(command) for command in commands.messages()]
     assert not any(map(any, new)), f"commands since then (forward, left, up, turn): {new}"
 
@@ -75,7 +75,7 @@ class HeldUp:
         self._before = {pid: _waited(pid) for pid in pids}
 
     def seconds(self) -> float:
-        """The waits of the processes together; each by that of its threads which waited longest."""
+        """The sum of the processes' waits; each by the thread that waited longest."""
         return sum(
             max((at - before.get(thread, 0.0) for thread, at in _waited(pid).items()), default=0.0)
             for pid, before in self._before.items()
@@ -83,7 +83,7 @@ class HeldUp:
 
 
 def _waited(pid: int) -> dict[str, float]:
-    """Seconds for which each thread has waited so far."""
+    """The seconds for which each thread has waited so far."""
     waited = {}
     for file in Path(f"/proc/{pid}/task").glob("*/schedstat"):
         with suppress(OSError):
@@ -92,8 +92,8 @@ def _waited(pid: int) -> dict[str, float]:
 
 
 def assert_drives_on(robot: Robot, motion: tuple[float, ...], again: Callable[[], object], *pids: int) -> None:
-    """It gets this motion and no other for a second. One in which these processes waited for a processor shows
-    nothing: the robot is made to drive `again`.
+    """Check that the robot gets this motion and no other for a second. A second in which these processes waited for a
+    processor proves nothing: the robot is then made to drive `again`.
     """
     for _ in range(5):
         commands, held_up = robot.commands.from_now(), HeldUp(*pids)

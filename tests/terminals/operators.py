@@ -65,7 +65,7 @@ class Witness:
         return bool(self.seen) and self.seen[-1][1] > 0.9 * SPEED
 
     def rest_after(self, time: float) -> float:
-        """When it came to rest after `time`; waits for it."""
+        """Wait until it is at rest after `time`. Returns when that was."""
         begin = bisect(self.seen, (time, math.inf))
 
         def rest() -> float | None:
@@ -81,7 +81,7 @@ class Witness:
         with contextlib.suppress(BusError):
             while True:
                 received = self._odom.recv()
-                if (odom := received.message) and (stamp := received.sample.stamp):
+                if (odom := received.message) and (stamp := received.stamp):
                     self.seen.append((time_of(odom), max(map(abs, speeds(odom)))))
                     self._sent.append(stamp.sent)
 
@@ -102,7 +102,7 @@ class Operator:
         self.leave()
 
     def sit_down(self, script: Path | None = None, shell: bool = False, line: bool = False) -> Played:
-        """Start the teleop, or this script in its place; in a shell with job control; over a line that can be cut."""
+        """Start the teleop, or this script in its place, in a shell with job control, over a line that can be cut."""
         flags: Sequence[str] = self._wire.flags
         if line:
             self.line = Proxy(self._wire.port)
@@ -119,31 +119,31 @@ class Operator:
 
     @property
     def at(self) -> Played:
-        """The terminal that they sit at."""
+        """The operator's terminal."""
         assert self.terminal is not None
         return self.terminal
 
     def drive(self) -> None:
-        """Hold a key until the robot moves; to and fro, so that it stays where it is."""
+        """Hold a key until the robot moves; to and fro, so that it stays in place."""
         self._count += 1
         self.key = (FORWARD, BACKWARD)[self._count % 2]
         press_until(self.witness.moving, lambda: self.at.press(self.key), self.let_go, self.at.screen)
 
     def hold_on(self) -> None:
-        """The key is still down: it repeats."""
+        """Go on holding the key: it repeats."""
         self.at.type(event(self.key, kind=REPEAT))
 
     def let_go(self) -> None:
-        """Let go of the key."""
+        """Release the key."""
         self.at.release(self.key)
 
     def job(self) -> int:
-        """The process that runs in their shell."""
+        """The process that runs in the operator's shell."""
         shell = self.at.process.pid
         return int(Path(f"/proc/{shell}/task/{shell}/children").read_text().split()[0])
 
     def foreground(self) -> None:
-        """Let the job go on once it has stopped."""
+        """Bring the job to the foreground once it has stopped."""
         job = self.job()
         wait_for(lambda: Path(f"/proc/{job}/stat").read_text().rpartition(")")[2].split()[0] == "T", what="its stop")
         self.at.type("\r")
@@ -154,7 +154,7 @@ class Operator:
         self.line.stall()
 
     def restore(self) -> None:
-        """Bring the line back."""
+        """Restore the line."""
         assert self.line is not None
         self.line.resume()
 

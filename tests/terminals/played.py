@@ -1,4 +1,4 @@
-"""A terminal that is played: it answers questions as a certain one does, or late, or never.
+"""A simulated terminal: it answers queries as a certain terminal does, or late, or never.
 
 The answers were taken from kitty 0.26.5 and tmux 3.3a; those of the Linux console from its source,
 drivers/tty/vt/vt.c; those of xterm from its control sequences' documentation.
@@ -53,37 +53,37 @@ class Played(Terminal):
 
     @property
     def flags(self) -> int:
-        """The keyboard's flags that are on."""
+        """The keyboard flags that are on."""
         return self._current[-1] if self._current else 0
 
     @property
     def flags_left(self) -> dict[bool, list[int]]:
-        """The flags pushed and not popped: of the main screen (False) and of the alternate one (True)."""
+        """The flags pushed and not popped, of the main screen (False) and of the alternate one (True)."""
         return {screen: flags for screen, flags in self.pushed.items() if flags}
 
     def down(self, code: int) -> None:
-        """A key goes down, as this kind of terminal reports it."""
+        """Press a key, reported as this kind of terminal does."""
         self.type(event(code) if self.kind.keyboard else chr(code))
 
     def up(self, code: int) -> None:
-        """It goes up; only some report it."""
+        """Release a key; only some terminals report that."""
         if self.kind.keyboard:
             self.release(code)
 
     def press(self, code: int, modifiers: int = 0, *, shifted: int = 0, base: int = 0) -> None:
-        """A key goes down, on a terminal that was asked to report releases."""
+        """Press a key, on a terminal that was asked to report releases."""
         self.type(event(code, modifiers, shifted=shifted, base=base))
 
     def repeat(self, code: int, modifiers: int = 0) -> None:
-        """It repeats."""
+        """Repeat a key that is held."""
         self.type(event(code, modifiers, REPEAT))
 
     def release(self, code: int, modifiers: int = 0, *, shifted: int = 0, base: int = 0) -> None:
-        """It goes up."""
+        """Release a key."""
         self.type(event(code, modifiers, RELEASE, shifted=shifted, base=base))
 
     def received(self, data: bytes) -> None:
-        """Answer."""
+        """Answer what was written to the terminal."""
         self._rest = (self._rest + data)[-10_000:]
         end = 0
         for question in QUESTION.finditer(self._rest):
@@ -142,7 +142,7 @@ class Played(Terminal):
 
 
 def event(code: int, modifiers: int = 0, kind: int = PRESS, *, shifted: int = 0, base: int = 0) -> str:
-    """A key as kitty reports it with all flags: what is not needed is left out."""
+    """A key as kitty reports it with all flags, without the parts that are not needed."""
     codes = f"{code}:{shifted or ''}:{base}" if base else f"{code}:{shifted}" if shifted else f"{code}"
     suffix = f":{kind}" if kind != PRESS else ""
     return f"\x1b[{codes};{modifiers + 1}{suffix}u" if modifiers or suffix else f"\x1b[{codes}u"

@@ -9,7 +9,7 @@ from .played import DUMB, KITTY, TMUX, XTERM, Kind, Played
 
 
 def reported(wire: Wire, kind: Kind, **env: str) -> str:
-    """What the doctor prints in a terminal, its lines joined."""
+    """The doctor's output in a terminal, with its lines joined."""
     with Played(command("doctor", *wire.flags), kind, env=env) as terminal:
         assert terminal.process.wait() in (0, 1)
         wait_for(lambda: " odom: " in terminal.raw)

@@ -39,7 +39,7 @@ def hold(robot: Robot, terminal: Terminal) -> Hold:
     commands = robot.commands.from_now()
     typed = terminal.hold("i", DELAY + (REPEATS - 0.5) * INTERVAL, DELAY, INTERVAL)
     robot.wait_for_stop_command()
-    stamped = [(received.sample.stamp, received.message) for received in commands.all()]
+    stamped = [(received.stamp, received.message) for received in commands.all()]
     moves = [stamp.sent for stamp, message in stamped if stamp and message and any(planar(message))]
     stops = [stamp.sent for stamp, message in stamped if stamp and message and not any(planar(message))]
     read = [next((at for at in moves if at >= key), math.inf) for key in typed]  # inf: a key that was not obeyed

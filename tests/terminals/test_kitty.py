@@ -40,7 +40,7 @@ Drive = Callable[..., None]
 
 @pytest.fixture(scope="module")
 def programs() -> Iterator[dict[tuple[str, ...], Program]]:
-    """The teleop that runs in kitty, by its words: tests with the same share it."""
+    """The teleops that run in kitty, by their flags: tests with the same flags share one."""
     programs: dict[tuple[str, ...], Program] = {}
     yield programs
     for program in programs.values():

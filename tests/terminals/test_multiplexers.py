@@ -2,6 +2,7 @@
 
 import contextlib
 import os
+import signal
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -31,15 +32,15 @@ class Multiplexer:
         return Terminal([*self._tmux, "new-session", *words], env=self.env)
 
     def attach(self) -> Terminal:
-        """Another window that looks at the same program."""
+        """Another window onto the same program."""
         return Terminal([*self._tmux, "attach"], env=self.env)
 
     def shown(self) -> str:
-        """What the program shows now; empty if that cannot be read."""
+        """What the program shows now, or nothing if that cannot be read."""
         return subprocess.run([*self._tmux, "capture-pane", "-p"], capture_output=True, text=True).stdout
 
     def end(self) -> None:
-        """End it and all that runs in it."""
+        """End it and everything that runs in it."""
         subprocess.run([*self._tmux, "kill-server"], capture_output=True)
 
 
@@ -109,6 +110,25 @@ def test_a_latched_robot_stands_when_its_operator_is_lost_and_waits_for_a_new_ke
     assert window.process.wait() == 0
 
 
+def test_a_latched_robot_stands_while_the_line_to_its_operator_hangs(
+    multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot
+) -> None:
+    """tmux and screen go on answering; the operator's window is a suspended process of theirs."""
+    window = windows.enter_context(multiplexer.new(command("teleop", "--mode", "latch", *town.flags)))
+    window.wait_for_text("listening sim")
+    drive(window, robot, "i", x=0.5)
+    window.process.signal(signal.SIGSTOP)
+    try:
+        stands(robot)
+        assert_nothing_moves(robot)
+    finally:
+        window.process.signal(signal.SIGCONT)
+    window.wait_for_text("press it again")
+    drive(window, robot, "i", x=0.5)
+    window.type("\x03")
+    assert window.process.wait() == 0
+
+
 def test_a_key_drives_while_it_repeats_and_a_paste_moves_nothing(
     multiplexer: Multiplexer, windows: contextlib.ExitStack, town: Wire, robot: Robot
 ) -> None:
@@ -120,7 +140,7 @@ def test_a_key_drives_while_it_repeats_and_a_paste_moves_nothing(
         lambda: "0.360 m/s" in window.screen(), lambda: window.type("x"), lambda: None, window.screen
     )
     robot.newest()
-    assert [(r.sample.source, r.message) for r in commands.all()] == []
+    assert [(r.source, r.message) for r in commands.all()] == []
     since = Since(robot.odom)
     press_until(lambda: since.drove(x=0.9 * V), lambda: window.hold("i", 0.7), lambda: None, window.screen)
     stands(robot)

@@ -1,4 +1,4 @@
-"""Terminals of other kinds, and those that lose something: what is not sure to be held does not drive."""
+"""Terminals of other kinds, and those that lose something: a key that is not certain to be held does not drive."""
 
 import os
 import signal
@@ -58,7 +58,7 @@ def sit_down(town: Wire, kind: Kind, *flags: str, late: float = 0.0) -> Played:
 
 @pytest.fixture
 def start(town: Wire, robot: Robot) -> Iterator[Start]:
-    """`start(KITTY, "--mode", "latch")`: a teleop of its own for a test."""
+    """`start(KITTY, "--mode", "latch")`: a separate teleop for a test."""
     terminals: list[Played] = []
 
     def start(kind: Kind, *flags: str, late: float = 0.0) -> Played:
@@ -72,7 +72,7 @@ def start(town: Wire, robot: Robot) -> Iterator[Start]:
 
 @pytest.fixture(scope="module")
 def shared_terminals() -> Iterator[list[Played]]:
-    """The one that tests share, and those before it whose teleop has ended."""
+    """The terminal that tests share, and those before it whose teleop has ended."""
     terminals: list[Played] = []
     yield terminals
     for terminal in terminals:
@@ -231,8 +231,8 @@ NAMES = {KITTY: "kitty", XTERM: "xterm", TMUX: "tmux"}
 def test_keys_in_one_breath_with_the_answers_of_a_terminal_that_hung_move_nothing(
     start: Start, robot: Robot, kind: Kind, late: float, apart: float, run: int
 ) -> None:
-    """Both with those to old questions and with the first to a new one, or right after it; nor does a key that is held
-    since then.
+    """Neither with the answers to old queries nor with, or right after, the first answer to a new one; nor does a key
+    that is held from then on.
     """
     terminal = start(kind, "--plain", "--mode", "latch", late=late)
     terminal.apart = apart
@@ -261,7 +261,7 @@ def test_pasted_text_never_drives(start: Start, robot: Robot) -> None:
     commands = robot.commands.from_now()
 
     def speed() -> str:
-        """On the screen; "" where there is none."""
+        """The speed on the screen; "" if there is none."""
         return terminal.screen().partition("speed     ")[2].partition(" ")[0]
 
     def assert_moves_nothing(pasted: str) -> None:
@@ -313,13 +313,13 @@ def test_after_a_while_without_a_terminal_the_next_one_drives(start: Start, robo
     terminal.pushed = {False: [], True: []}
     terminal.kind = KITTY
     terminal.resize(99, 30)
-    wait_for(lambda: terminal.flags == 15, what="the releases to be asked for anew")
+    wait_for(lambda: terminal.flags == 15, what="the releases to be requested again")
     assert_a_new_press_drives(terminal, robot)
 
 
 def test_another_terminal_that_speaks_kitty_too_is_asked_for_releases(terminal: Played, robot: Robot) -> None:
     terminal.pushed = {False: [], True: []}  # a window that was opened just now
-    wait_for(lambda: terminal.flags == 15, what="the releases to be asked for anew")
+    wait_for(lambda: terminal.flags == 15, what="the releases to be requested again")
     assert_a_new_press_drives(terminal, robot)
 
 
@@ -339,7 +339,7 @@ def test_suspended_it_gives_the_keyboard_back_and_takes_it_again(town: Wire, sim
         stands(robot)
 
 
-def test_after_a_sleep_of_the_computer_a_key_is_to_be_pressed_anew(town: Wire, robot: Robot, tmp_path: Path) -> None:
+def test_after_the_computer_slept_a_key_must_be_pressed_again(town: Wire, robot: Robot, tmp_path: Path) -> None:
     """The monotonic clock stands still during it, and the release of a key may be lost."""
     asleep = "import time; clock = time.monotonic; time.sleep(1); time.monotonic = lambda: clock() - 1"
     script = tmp_path / "sleeps.py"

@@ -39,7 +39,7 @@ def test_every_key_commands_what_it_does_there(town: Wire, robot: Robot) -> None
             press_until(shown, lambda: terminal.type(keys), lambda: None, terminal.screen)
 
         def typed(key: str, moves: bool = True) -> tuple[float, ...]:
-            """The first motion, or stop, that is commanded after this key."""
+            """The first motion, or stop, that is commanded after this key is typed."""
             commands = robot.commands.from_now()
 
             def found() -> list[tuple[float, ...]]:
@@ -55,7 +55,7 @@ def test_every_key_commands_what_it_does_there(town: Wire, robot: Robot) -> None
             assert typed(key) == pytest.approx((x * speed, y * speed, z * speed, counter_clockwise * turn)), key
 
         def change(keys: str, speed: float, turn: float) -> None:
-            """Type the keys of speeds, which lead to these."""
+            """Type the keys that lead to these speeds."""
             type_until(
                 keys, lambda: all(f"{v:.3f} {u}" in terminal.screen() for v, u in ((speed, "m/s"), (turn, "rad/s")))
             )

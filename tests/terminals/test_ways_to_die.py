@@ -82,7 +82,7 @@ WAYS = {
 
 @pytest.fixture(scope="module")
 def operators(town: Wire) -> Iterator[list[Operator]]:
-    """Operators with a robot each, which do not meet."""
+    """Operators with a robot each, on separate networks."""
     sim = town.start("sim", "--empty")
     sim.wait_for_line("no robot yet")
     with town.bus("witness") as bus:
@@ -100,7 +100,7 @@ def operators(town: Wire) -> Iterator[list[Operator]]:
 
 @pytest.fixture(scope="module")
 def figures() -> Iterator[dict[str, list[float]]]:
-    """The times of each way; they are written down where that is wanted."""
+    """The times measured for each way; written to FIGURES if it names a file."""
     figures: dict[str, list[float]] = {name: [] for name in WAYS}
     yield figures
     if FIGURES:
@@ -108,7 +108,7 @@ def figures() -> Iterator[dict[str, list[float]]]:
 
 
 def die(way: Way, operator: Operator, script: Path | None) -> Death:
-    """The robot drives, and it happens."""
+    """Drive the robot, and let it happen."""
     operator.sit_down(script, way.shell, way.line)
     operator.drive()
     held_up = HeldUp(operator.sim, operator.job() if way.shell else operator.at.process.pid)
@@ -123,7 +123,7 @@ def die(way: Way, operator: Operator, script: Path | None) -> Death:
 
 
 def back(operator: Operator, end: float) -> None:
-    """It goes on: the key that is still down moves nothing, until it is pressed anew."""
+    """The teleop goes on: the key that is still down moves nothing until it is pressed again."""
     operator.hold_on()
     wait_for(lambda: operator.witness.now() > end + 0.3)
     wait_for(lambda: operator.at.flags == 15, what="the teleop to be back")
@@ -155,7 +155,7 @@ def test_the_robot_stands_half_a_second_and_a_step_later(
     assert late == {}
 
 
-def test_a_network_that_comes_back_moves_nothing_until_a_key_is_pressed_anew(operators: list[Operator]) -> None:
+def test_a_network_that_comes_back_moves_nothing_until_a_key_is_pressed_again(operators: list[Operator]) -> None:
     with operators[0] as operator:
         operator.sit_down(line=True)
         operator.drive()

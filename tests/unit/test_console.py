@@ -34,9 +34,12 @@ def test_a_terminal_that_is_gone_is_no_failure(monkeypatch: pytest.MonkeyPatch) 
     report("anybody?")
 
 
-def test_unread_samples_are_dropped_and_counted_when_the_reader_goes_on() -> None:
+@pytest.mark.parametrize("blocks", [True, False])
+def test_unread_samples_are_dropped_and_counted_when_the_reader_goes_on(blocks: bool) -> None:
+    """Another process that shares the terminal or pipe may make it non-blocking."""
     code = (
-        "import sys\nfrom holozen.console import KEPT, drain, report\n"
+        "import os, sys\nfrom holozen.console import KEPT, drain, report\n"
+        f"os.set_blocking(2, {blocks})\n"
         "for number in range(2000):\n report(f'{number:099}')\n"
         "print('wrote all', flush=True)\nsys.stdin.readline()\ndrain(20)"
     )

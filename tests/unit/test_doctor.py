@@ -1,6 +1,7 @@
 """What the doctor concludes from ports, nodes, clocks and commands."""
 
 import json
+import math
 from pathlib import Path
 
 import pytest
@@ -38,6 +39,9 @@ def test_a_clock_is_measured_by_half_of_the_round_trip() -> None:
     assert found == Peer("abc", "sim", "0.1.0", "there", 7, offset=1.5, error=0.5)
     for payload in [b"", b"{}", b"[]", b"\xff", b'{"time": "x"}', b"[" * 100_000, b"null"]:
         assert read_peer("@holozen/abc/about", payload, 0, 1) is None
+    for name in ("pid", "time"):
+        for number in (math.nan, math.inf):
+            assert read_peer("@holozen/abc/about", json.dumps(ABOUT | {name: number}).encode(), 0, 1) is None
 
 
 def test_the_best_measure_of_the_clock_of_another_machine_is_judged_within_its_error() -> None:

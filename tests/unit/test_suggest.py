@@ -1,5 +1,10 @@
 """Suggestions for misspelt names, and how short they stay."""
 
+from pathlib import Path
+
+import pytest
+
+from holozen.cli import main
 from holozen.suggest import article, cut, last_part, listed, suggest
 
 
@@ -16,6 +21,27 @@ def test_a_package_makes_types_no_more_similar() -> None:
     assert suggest("geometry_msgs/msg/Foo", known) != ""
     assert suggest("geometry_msgs/msg/Foo", known, last_part) == ""
     assert suggest("geometry_msgs/msg/Twsit", known, last_part) == " (did you mean 'geometry_msgs/msg/Twist'?)"
+
+
+def test_a_missing_robot_file_gets_the_closest_in_its_folder_or_among_ours(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    mine = tmp_path / "my_bot.urdf.xacro"
+    mine.touch()
+    (tmp_path / "my_bto.txt").touch()
+    for name, near in (("my_bto.urdf.xacro", mine), ("my_bot", mine), ("hb_bot", "urdf/hb_bot.urdf.xacro")):
+        word = str(tmp_path / name)
+        for verb in (["check"], ["check", "--fix"], ["spawn"], ["xacro"], ["sim", "--robot"]):
+            assert main([*verb, word]) == 1
+            message = "".join(capsys.readouterr())
+            assert "No such file or directory (did you mean '" in message and f"{near}'?)" in message, f"{verb}"
+        with pytest.raises(SystemExit):
+            main(["up", "--robot", word])
+        assert f"{near}'?)" in capsys.readouterr().err
+    assert main(["check", "--fix", str(tmp_path)]) == 1
+    assert "did you mean" not in "".join(capsys.readouterr())
+    assert main(["xacro", "zzz"]) == 1
+    assert capsys.readouterr().err == "holozen xacro: zzz: No such file or directory\n"
 
 
 def test_messages_stay_short() -> None:

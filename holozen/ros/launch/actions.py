@@ -117,7 +117,7 @@ class AppendEnvironmentVariable(SetEnvironmentVariable):
         self.prepend, self.separator = prepend, separator
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
+        """Append, or prepend, the value."""
         name = text(context, self.name)
         parts = [context.environment.get(name, ""), text(context, self.value)]
         parts = parts[::-1] if truth(context, self.prepend, "prepend") else parts
@@ -235,7 +235,7 @@ class UnregisterEventHandler(RegisterEventHandler):
     """Removes an event handler."""
 
     def execute(self, context: LaunchContext) -> None:
-        """From here on."""
+        """Remove the handler."""
         context.runner.unregister(self.event_handler)
 
 
@@ -285,7 +285,7 @@ class ExecuteProcess(Action):
 
     @property
     def process_details(self) -> dict[str, Any]:
-        """What ROS's event handlers look at: the words."""
+        """The words and the name, as event handlers read them in ROS."""
         return {"cmd": self.cmd, "name": self.name}
 
     def execute(self, context: LaunchContext) -> Entities | None:
@@ -323,7 +323,7 @@ class ExecuteProcess(Action):
         return None
 
     def _ros2(self, context: LaunchContext, words: list[str]) -> Entities | None:
-        """A verb of ROS's command line, as ours with the same name."""
+        """Run a verb of ROS's command line as ours with the same name."""
         verb, name = words[0], text(context, self.name) or f"ros2 {words[0]}"
         if verb == "run" and len(words) > 2:
             return self._run_node(context, Executable(self, words[1], words[2], words[3:]), name)

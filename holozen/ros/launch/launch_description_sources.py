@@ -3,7 +3,7 @@
 from pathlib import Path
 from types import ModuleType
 
-from holozen.ros.executables import files_there
+from holozen.ros.executables import missing
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Text, describe, here, text
 from holozen.ros.launch.launch_description import LaunchDescription
 from holozen.ros.launch.stand_ins import gazebo_launch_file
@@ -42,7 +42,7 @@ class FrontendLaunchDescriptionSource(PythonLaunchDescriptionSource):
 def read(path: Path) -> LaunchDescription:
     """The description that a launch file generates. Raises LaunchError, and what the file raises."""
     if not path.is_file():
-        raise LaunchError(f"no launch file {str(path)!r}{files_there(path, '*.launch.py', 'launch files')}")
+        raise LaunchError(missing(path, "*.launch.py", "launch files"))
     if path.suffix in (".xml", ".yaml", ".yml"):
         raise LaunchError(f"{path}: launch files in XML and YAML are not supported; Python only")
     if path.suffix != ".py":

@@ -1,8 +1,8 @@
 """LaunchService: executes a launch file in order, and supervises its processes until all have ended."""
 
 import contextlib
-import heapq
 import os
+import sched
 import select
 import selectors
 import signal
@@ -44,8 +44,7 @@ class LaunchService:
         self._queue: deque[tuple[Scope, LaunchDescriptionEntity]] = deque()
         self._later: list[tuple[Scope, Action]] = []  # executed after everything else
         self._postponed: set[int] = set()
-        self._timers: list[tuple[float, int, Scope, Entities]] = []
-        self._timer_numbers = count()
+        self._timers = sched.scheduler(time.monotonic)  # queue scopes and their actions
         self._handlers: list[tuple[Scope, EventHandler]] = []
         self._processes: list[Process] = []
         self._held: list[tuple[Action, Program]] | None = []  # until all is executed: an error then starts none of them
@@ -63,13 +62,13 @@ class LaunchService:
     def run(self, entities: Entities) -> bool:
         """Execute the entities, and wait until all processes have ended or the launch is stopped.
 
-        Whether all succeeded. Raises LaunchError, and what functions of the launch file raise.
+        Returns whether all succeeded. Raises LaunchError, and what functions of the launch file raise.
         """
         self._queue_first(self.context.scope, entities)
         self._execute()
         self._start_held()
         self.on_started()
-        while not self._stopping and (self._processes or self._timers):
+        while not self._stopping and (self._processes or self._timers.queue):
             if self._stop.is_set():
                 self.stop("")
                 break
@@ -83,7 +82,7 @@ class LaunchService:
         """The launch arguments that event handlers and timers may use later; with ANY if that is not known."""
         later = [getattr(process.action, "on_exit", None) for process in self._processes]
         later += [handler.actions for _, handler in self._handlers]
-        later += [timer[3] for timer in self._timers]
+        later += [action for timer in self._timers.queue for _, action in timer.argument[0]]
         return set(_arguments(later, set()))
 
     def start(self, action: Action, program: Program) -> None:
@@ -109,24 +108,23 @@ class LaunchService:
         self._execute()
 
     def skip(self, action: Action, ends: bool) -> None:
-        """Go on as if the process had been started, and if it `ends` had ended."""
+        """Go on as if the process had started and, if it `ends`, had ended."""
         self._emit(ProcessStarted(action, ""))
         if ends:
             self._emit(ProcessExited(action, "", 0))
 
-    def after(self, seconds: float, actions: Sequence[LaunchDescriptionEntity]) -> object:
-        """Execute actions later; the timer for `cancel`."""
-        number = next(self._timer_numbers)
-        heapq.heappush(self._timers, (time.monotonic() + seconds, number, self.context.scope, actions))
-        return number
+    def after(self, seconds: float, actions: Sequence[LaunchDescriptionEntity]) -> sched.Event:
+        """Execute actions later. Returns the timer for `cancel`."""
+        queued = [(self.context.scope, action) for action in actions]
+        return self._timers.enter(seconds, 0, self._queue.extend, (queued,))
 
-    def cancel(self, timer: object) -> None:
-        """Cancel a timer."""
-        self._timers = [each for each in self._timers if each[1] != timer]
-        heapq.heapify(self._timers)
+    def cancel(self, timer: Any) -> None:
+        """Cancel a timer, unless it is over."""
+        with contextlib.suppress(ValueError):
+            self._timers.cancel(timer)
 
     def postpone(self, action: Action) -> bool:
-        """Execute an action again after everything else; false if it was postponed before."""
+        """Execute an action again after everything else. Returns False if it was postponed before."""
         if id(action) in self._postponed:
             return False
         self._postponed.add(id(action))
@@ -146,11 +144,11 @@ class LaunchService:
         self._handlers = [each for each in self._handlers if each[1] is not handler]
 
     def stop(self, reason: str) -> None:
-        """End the launch, by a signal if there is no `reason`."""
+        """End the launch; an empty `reason` stands for a signal."""
         if not self._stopping:
             self._stopping, self._reason = True, reason or "a signal"
             if reason:
-                report(f"launch: ends: {reason}")
+                report(f"launch: ending: {reason}")
 
     def _queue_first(self, scope: Scope, entities: Iterable[LaunchDescriptionEntity]) -> None:
         self._queue.extendleft((scope, entity) for entity in reversed(list(entities)))
@@ -174,13 +172,11 @@ class LaunchService:
 
     def _wait(self) -> None:
         """Forward output, and look which processes have ended and which timers are due."""
-        due = self._timers[0][0] - time.monotonic() if self._timers else POLL
+        due = self._timers.queue[0].time - time.monotonic() if self._timers.queue else POLL
         self._forward(max(0.0, min(POLL, due)))
         for process in [each for each in self._processes if each.has_ended]:
             self._ended(process)
-        while self._timers and self._timers[0][0] <= time.monotonic():
-            _, _, scope, actions = heapq.heappop(self._timers)
-            self._queue.extend((scope, action) for action in actions)
+        self._timers.run(blocking=False)
 
     def _forward(self, seconds: float) -> None:
         for key, _ in self._selector.select(seconds):
@@ -202,7 +198,7 @@ class LaunchService:
             handler.event = ProcessExited
             self._queue_first(self.context.scope, handler.handle(event, self.context))
         if program.required:
-            self.stop(f"{process.name} has ended, which everything here depends on")
+            self.stop(f"{process.name} has ended, and everything here depends on it")
         elif program.respawn is not None:
             self.after(program.respawn, [Restart(process.action, program)])
 
@@ -309,7 +305,7 @@ class Pipe:
         os.set_blocking(source.fileno(), False)
 
     def read(self) -> bool:
-        """Forward the available lines; whether there may be more."""
+        """Forward the available lines. Returns whether there may be more."""
         try:
             data = os.read(self.source.fileno(), CHUNK)
         except BlockingIOError:

@@ -12,8 +12,8 @@ from pathlib import Path
 
 from holozen import data
 from holozen.console import report
+from holozen.robot.elements import read_text
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import read_text
 from holozen.ros import packages
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Program, Text, text
 from holozen.ros.launch.launch_description import Action, Entities, LaunchDescription
@@ -74,7 +74,7 @@ _MENTIONED_PACKAGE = re.compile(r"package://([\w-]+)")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Executable:
-    """A Node or program in the launch file; `texts` are those of its parameters that are texts."""
+    """A Node or program in the launch file; `texts` are its parameters that are texts."""
 
     action: Action
     package: str
@@ -99,7 +99,7 @@ def stand_in(context: LaunchContext, node: Executable) -> Entities | None:
 
 
 def skip(context: LaunchContext, action: Action, name: str, reason: str, ends: bool = False) -> None:
-    """Report that a process is left out. Actions that wait for its start, or if it `ends` for its end, go on."""
+    """Report that a process is left out. Actions that wait for its start go on; if it `ends`, those for its end too."""
     report(f"launch: {name} is left out: {reason}")
     context.runner.skip(action, ends)
 
@@ -346,11 +346,5 @@ NODES: dict[str, StandIn] = {
 }
 """package/executable -> its replacement."""
 
-PROGRAMS: dict[str, StandIn] = {
-    "gazebo": _classic,
-    "gzserver": _classic,
-    "gz": _gz,
-    "ign": _gz,
-    "gzclient": _window,
-}
+PROGRAMS: dict[str, StandIn] = {"gazebo": _classic, "gzserver": _classic, "gz": _gz, "ign": _gz, "gzclient": _window}
 """The first word of an ExecuteProcess -> its replacement."""

@@ -7,17 +7,10 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-from holozen.robot.xacro import expand_xacro, read_text
+from holozen.robot.elements import read_text
+from holozen.robot.xacro import expand_xacro
 from holozen.ros import executables, packages
-from holozen.ros.launch.launch_context import (
-    LaunchContext,
-    LaunchError,
-    Substitution,
-    Text,
-    describe,
-    text,
-    truth,
-)
+from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Substitution, Text, describe, text, truth
 from holozen.suggest import suggest
 
 __all__ = [

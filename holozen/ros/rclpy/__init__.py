@@ -103,7 +103,7 @@ def spin(node: Node, executor: Executor | None = None) -> None:
 
 
 def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: float | None = None) -> None:
-    """Run one callback. Waits for it at most so many seconds (None: for ever, 0: not at all)."""
+    """Run one callback. Waits for it at most `timeout_sec` seconds (None: for ever, 0: not at all)."""
     with _spinning(node, executor) as running:
         running.spin_once(timeout_sec)
 
@@ -111,7 +111,7 @@ def spin_once(node: Node, *, executor: Executor | None = None, timeout_sec: floa
 def spin_until_future_complete(
     node: Node, future: Future, executor: Executor | None = None, timeout_sec: float | None = None
 ) -> None:
-    """Run a node's callbacks until a future is done, at most so many seconds."""
+    """Run a node's callbacks until a future is done, at most `timeout_sec` seconds."""
     with _spinning(node, executor) as running:
         running.spin_until_future_complete(future, timeout_sec)
 

@@ -26,7 +26,7 @@ class CallbackGroup:
         raise NotImplementedError
 
     def beginning_execution(self, entity: Any) -> bool:
-        """Start the callback of a member, if it may start; whether it does."""
+        """Start the callback of a member, if it may start. Returns whether it does."""
         raise NotImplementedError
 
     def ending_execution(self, entity: Any) -> None:
@@ -35,7 +35,7 @@ class CallbackGroup:
 
 
 class ReentrantCallbackGroup(CallbackGroup):
-    """All its callbacks may run at the same time, the same one more than once too."""
+    """All its callbacks may run at the same time, even the same one more than once."""
 
     def can_execute(self, entity: Any) -> bool:
         """Always."""

@@ -1,6 +1,7 @@
 """Client: calls a service."""
 
 import contextlib
+import math
 import threading
 import time
 import weakref
@@ -14,17 +15,18 @@ from holozen.ros.rclpy.handle import NodeHandle, Owned, wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
 from holozen.ros.rclpy.task import Future, TaskQueue
+from holozen.ros.rclpy.waitable import deadline
 from holozen.transport.errors import BusError, NoReply, ServiceError
 
 __all__ = ["Client"]
 
-POLL = 0.01  # s between two looks for the service
-LOOK = 0.1  # s between two looks whether rclpy was shut down
+POLL = 0.01  # s between two checks for the service
+LOOK = 0.1  # s between two checks whether rclpy was shut down
 LONGEST = 86_400.0  # s for a service to answer
 
 
 class Client(Owned):
-    """Created by `Node.create_client`. Each call waits for the service, and for its reply, in a thread of its own.
+    """Created by `Node.create_client`. Each call waits for the service, and for its reply, in its own thread.
 
     So `call` works without a spinning executor. If the service refuses, the future raises ServiceError with the reason.
     """
@@ -57,14 +59,14 @@ class Client(Owned):
         return self._is_served()
 
     def wait_for_service(self, timeout_sec: float | None = None) -> bool:
-        """Wait until the service is available, at most so many seconds; whether it is.
+        """Wait until the service is available, at most `timeout_sec` seconds. Returns whether it is.
 
         Raises as `service_is_ready`, and ExternalShutdownException when a signal shuts down rclpy while it waits.
         """
-        deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
+        deadline = time.monotonic() + (math.inf if timeout_sec is None else timeout_sec)
         while not self.service_is_ready():
             self._handle.context.check_running(f"wait for {self.srv_name}")
-            left = POLL if deadline is None else min(POLL, deadline - time.monotonic())
+            left = min(POLL, deadline - time.monotonic())
             if left <= 0:
                 return False
             self._closed.wait(left)
@@ -78,7 +80,7 @@ class Client(Owned):
         return wait_for_reply(self.call_async(request), self._handle.context, self.srv_name, timeout_sec)
 
     def call_async(self, request: Any) -> Future:
-        """Call the service; the future of the reply, at once."""
+        """Call the service. Returns the future of the reply, at once."""
         if not isinstance(request, self.srv_type.Request):
             raise wrong_type(self.srv_name, f"{self.srv_type.__name__}.Request", request)
         self._handle.context.check_can_publish(f"call {self.srv_name}")
@@ -124,7 +126,7 @@ class Client(Owned):
         future.cancel()
 
     def _reply(self, request: Any, future: Future) -> Any:
-        """The reply to a request; None once nobody waits for it any more."""
+        """The reply to a request; None once its future is done or the client is closed."""
         while not (future.done() or self._closed.is_set()):
             if not self._is_served():
                 self._closed.wait(POLL)
@@ -140,11 +142,10 @@ def wait_for_reply(future: Future, context: Context, name: str, timeout_sec: flo
     Raises its exception, TimeoutError, InvalidHandle if it is cancelled, and what `Publisher.publish` raises after a
     shutdown.
     """
-    done = threading.Event()
+    done, end = threading.Event(), deadline(timeout_sec)
     future.watch(done.set)
-    deadline = None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
     while not done.is_set():
-        left = LOOK if deadline is None else min(LOOK, deadline - time.monotonic())
+        left = min(LOOK, end - time.monotonic())
         if left <= 0:
             future.cancel()
             raise TimeoutError(f"no reply from {name} within {timeout_sec:g} s")

@@ -171,7 +171,7 @@ class Clock(HelpfulAttributes):
         return JumpHandle(self._handles, threshold, pre_callback, post_callback)
 
     def sleep_until(self, until: Time, context: Any = None) -> bool:
-        """Sleep until a time; false if rclpy was shut down, or simulated time began or ended, before.
+        """Sleep until a time. Returns False if rclpy is shut down, or simulated time begins or ends, before that.
 
         Raises ValueError for a time of another clock type, NotInitializedException if rclpy is not running.
         """
@@ -283,7 +283,7 @@ def _running(context: Any) -> Any:
 
 
 class TimeSource:
-    """Gives the clocks of a node simulated time, from a thread of its own: time passes while no executor spins.
+    """Gives the clocks of a node simulated time, from its own thread: time passes while no executor spins.
 
     The node must have declared the boolean parameter `use_sim_time`.
     """

@@ -217,7 +217,9 @@ def end_all() -> None:
 
 
 def end_at_exit() -> None:
-    """At the interpreter's exit, which waits for no thread after a second Ctrl-C, or one at the end of the script."""
+    """End every context at the interpreter's exit, which waits for no thread after a second Ctrl-C, or after one at the
+    end of the script.
+    """
     end_all()
     deadline = time.monotonic() + ZENOH_THREADS_END
     for thread in threading.enumerate():

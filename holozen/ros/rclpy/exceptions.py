@@ -1,6 +1,7 @@
 """The exceptions of rclpy, under ROS's names."""
 
 from collections.abc import Sequence
+from functools import partialmethod
 from typing import Any
 
 __all__ = [
@@ -77,29 +78,25 @@ class NameValidationException(Exception):
 class InvalidNamespaceException(NameValidationException):
     """A namespace that ROS rejects."""
 
-    def __init__(self, name: str, error_msg: str, invalid_index: int) -> None:
-        super().__init__("namespace", name, error_msg, invalid_index)
+    __init__ = partialmethod(NameValidationException.__init__, "namespace")
 
 
 class InvalidNodeNameException(NameValidationException):
     """A node name that ROS rejects."""
 
-    def __init__(self, name: str, error_msg: str, invalid_index: int) -> None:
-        super().__init__("node name", name, error_msg, invalid_index)
+    __init__ = partialmethod(NameValidationException.__init__, "node name")
 
 
 class InvalidTopicNameException(NameValidationException):
     """A topic name that ROS rejects."""
 
-    def __init__(self, name: str, error_msg: str, invalid_index: int) -> None:
-        super().__init__("topic name", name, error_msg, invalid_index)
+    __init__ = partialmethod(NameValidationException.__init__, "topic name")
 
 
 class InvalidServiceNameException(NameValidationException):
     """A service name that ROS rejects."""
 
-    def __init__(self, name: str, error_msg: str, invalid_index: int) -> None:
-        super().__init__("service name", name, error_msg, invalid_index)
+    __init__ = partialmethod(NameValidationException.__init__, "service name")
 
 
 class ParameterException(Exception):
@@ -114,22 +111,19 @@ class ParameterException(Exception):
 class ParameterNotDeclaredException(ParameterException):
     """Parameters that were not declared, of a node that does not allow it."""
 
-    def __init__(self, parameters: str | Sequence[str], *args: object) -> None:
-        super().__init__("not declared; call declare_parameter() first", parameters, *args)
+    __init__ = partialmethod(ParameterException.__init__, "not declared; call declare_parameter() first")
 
 
 class ParameterAlreadyDeclaredException(ParameterException):
     """Parameters that are declared already."""
 
-    def __init__(self, parameters: str | Sequence[str], *args: object) -> None:
-        super().__init__("declared twice", parameters, *args)
+    __init__ = partialmethod(ParameterException.__init__, "declared twice")
 
 
 class InvalidParameterException(ParameterException):
     """A parameter with an invalid name."""
 
-    def __init__(self, parameter: str, *args: object) -> None:
-        super().__init__("not a valid parameter name", parameter, *args)
+    __init__ = partialmethod(ParameterException.__init__, "not a valid parameter name")
 
 
 class InvalidParameterTypeException(ParameterException):
@@ -155,12 +149,10 @@ class InvalidParameterValueException(ParameterException):
 class ParameterImmutableException(ParameterException):
     """An attempt to change a read-only parameter."""
 
-    def __init__(self, parameter: str, *args: object) -> None:
-        super().__init__("it is read-only", parameter, *args)
+    __init__ = partialmethod(ParameterException.__init__, "it is read-only")
 
 
 class ParameterUninitializedException(ParameterException):
     """A parameter that was declared by its type only was read before it got a value."""
 
-    def __init__(self, parameter: str, *args: object) -> None:
-        super().__init__("it has no value yet; set it, or give it a default", parameter, *args)
+    __init__ = partialmethod(ParameterException.__init__, "it has no value yet; set it, or give it a default")

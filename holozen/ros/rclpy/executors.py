@@ -15,7 +15,7 @@ from holozen.ros.rclpy.context import Context, ExternalShutdownException, get_de
 from holozen.ros.rclpy.exceptions import RCLError
 from holozen.ros.rclpy.task import Future, Task, TaskQueue
 from holozen.ros.rclpy.timer import Timer
-from holozen.ros.rclpy.waitable import Waitable, Waker, Work
+from holozen.ros.rclpy.waitable import Waitable, Waker, Work, deadline
 
 __all__ = [
     "ConditionReachedException", "Executor", "MultiThreadedExecutor", "ShutdownException", "SingleThreadedExecutor",
@@ -69,7 +69,7 @@ class Executor(HelpfulAttributes):
         return self._context
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task:
-        """Run a function or a coroutine in spin; its future, at once."""
+        """Run a function or a coroutine in spin. Returns its future, at once."""
         return self._tasks.create_task(callback, *args, **kwargs)
 
     def add_node(self, node: Any) -> bool:
@@ -117,18 +117,18 @@ class Executor(HelpfulAttributes):
         self._context.check_signal()  # it may have arrived between two waits
 
     def spin_until_future_complete(self, future: Future, timeout_sec: float | None = None) -> None:
-        """Run callbacks until a future is done, at most so many seconds."""
-        deadline = _deadline(timeout_sec)
+        """Run callbacks until a future is done, at most `timeout_sec` seconds."""
+        end = deadline(timeout_sec)
         while self._context.ok() and not self._is_shutdown and not future.done():
-            left = None if deadline is None else deadline - time.monotonic()
-            self.spin_once_until_future_complete(future, None if left is None else max(left, 0.0))
-            if left is not None and left <= 0:
+            left = end - time.monotonic()
+            self.spin_once_until_future_complete(future, max(left, 0.0))
+            if left <= 0:
                 return
         if not future.done():
             self._context.check_signal()
 
     def spin_once(self, timeout_sec: float | None = None) -> None:
-        """Run one callback. Waits for it at most so many seconds (None: for ever, 0: not at all)."""
+        """Run one callback. Waits for it at most `timeout_sec` seconds (None: for ever, 0: not at all)."""
         self._spin_once(timeout_sec, _never)
 
     def wait_for_ready_callbacks(
@@ -183,13 +183,13 @@ class Executor(HelpfulAttributes):
                 self.wake()
 
     def _wait_for_work(self, timeout_sec: float | None, condition: Callable[[], bool]) -> Work:
-        deadline = _deadline(timeout_sec)
+        end = deadline(timeout_sec)
         while True:
             self._check(condition)
             if found := self._next():
                 return found
-            left = None if deadline is None else deadline - time.monotonic()
-            if left is not None and left <= 0:
+            left = end - time.monotonic()
+            if left <= 0:
                 raise TimeoutException
             if found := self._block(left):
                 return found
@@ -202,7 +202,7 @@ class Executor(HelpfulAttributes):
         if condition():
             raise ConditionReachedException
 
-    def _block(self, seconds: float | None) -> Work | None:
+    def _block(self, seconds: float) -> Work | None:
         """Wait until there may be work; the work if it arrived at the last moment."""
         self.waker.waiting = True
         try:
@@ -212,7 +212,7 @@ class Executor(HelpfulAttributes):
                 return found
             # From here on a shutdown, or a future that is done, wakes this wait even before it begins.
             waits = [seconds, *(timer.wait_seconds() for timer in self._timers)]
-            self.waker.wait(min((wait for wait in waits if wait is not None), default=None))
+            self.waker.wait(min(wait for wait in waits if wait is not None))
         finally:
             self.waker.waiting = False
         return None
@@ -270,7 +270,7 @@ class MultiThreadedExecutor(Executor):
         self._errors: deque[BaseException] = deque()
 
     def shutdown(self, timeout_sec: float | None = None) -> bool:
-        """Stop spinning, and wait for the running callbacks; whether they have ended in time."""
+        """Stop spinning, and wait for the running callbacks. Returns whether they have ended in time."""
         super().shutdown()
         deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
         for _ in self._threads:
@@ -312,8 +312,3 @@ class MultiThreadedExecutor(Executor):
 
 def _never() -> bool:
     return False
-
-
-def _deadline(timeout_sec: float | None) -> float | None:
-    """None, and a negative timeout, mean no deadline."""
-    return None if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec

@@ -126,7 +126,7 @@ _quiet = False
 
 
 class RcutilsLogger(HelpfulAttributes):
-    """A logger. Its parents are the names before each dot of its own."""
+    """A logger. Its parents are the loggers with the names before each dot of its name."""
 
     def __init__(self, name: str = "") -> None:
         self.name = name
@@ -159,7 +159,7 @@ class RcutilsLogger(HelpfulAttributes):
         throttle_duration_sec: float | None = None,
         throttle_time_source_type: Any = None,
     ) -> bool:
-        """Print a line; whether it was printed.
+        """Print a line. Returns whether it was printed.
 
         `once`, `skip_first` and `throttle_duration_sec` count for each call in the script, and each logger; seconds are
         measured on the steady clock, or on the Clock given.

@@ -52,7 +52,7 @@ HIDDEN_NODE_PREFIX = "_"
 T = TypeVar("T")
 
 CLOSE_LIMIT = 0.15  # s for the threads of service calls to end
-POLL = 0.01  # s between two looks for another node
+POLL = 0.01  # s between two checks for another node
 
 _OURS = str(Path(__file__).parent)
 
@@ -79,8 +79,8 @@ class TopicEndpointInfo(NamedTuple):
 _ENDPOINT_TYPES = {"pub": TopicEndpointTypeEnum.PUBLISHER, "sub": TopicEndpointTypeEnum.SUBSCRIPTION}
 
 
-class _Inside(NodeHandle):
-    """Everything inside a Node, under its one attribute `_holozen`: all other names belong to the script."""
+class _State(NodeHandle):
+    """The state of a Node, in its one attribute `_holozen`: all other names belong to the script."""
 
     store: ParameterStore
     time_source: TimeSource
@@ -113,7 +113,7 @@ class _Inside(NodeHandle):
         return made
 
     def disown(self, made: Any) -> bool:
-        """Destroy something; whether it belonged to this node."""
+        """Destroy something. Returns whether it belonged to this node."""
         if made not in self.owned:
             return False
         self.owned = [one for one in self.owned if one is not made]
@@ -123,9 +123,9 @@ class _Inside(NodeHandle):
         return True
 
     def leave(self) -> None:
-        """Close in a thread, for which the context waits at its end.
+        """Close in a thread, which the context waits for at its end.
 
-        So many nodes of one process close at the same time: each has to announce to all others that it goes.
+        Thus many nodes of one process close at the same time: each has to announce to all others that it leaves.
         """
         self._detach()
         threading.Thread(target=self.close, daemon=True).start()
@@ -149,7 +149,7 @@ class _Inside(NodeHandle):
 
 
 class Node(HelpfulAttributes):
-    """A node of ROS: a session of its own, and visible in the graph like any other.
+    """A node of ROS, with its own session, and visible in the graph like any other.
 
     Raises NotInitializedException before `rclpy.init()`. Parameters that were not declared raise
     ParameterNotDeclaredException unless they are allowed; `create_*` raise InvalidHandle after `destroy_node()`.
@@ -173,20 +173,20 @@ class Node(HelpfulAttributes):
         context = context or get_default_context()
         given = context.arguments if use_global_arguments else Arguments()
         given = given.merged(arguments.parse(cli_args)) if cli_args is not None else given
-        self._holozen = inside = _Inside(node_name, namespace or "/", context, given)
-        values = given.parameters_for(inside.full_name)
+        self._holozen = state = _State(node_name, namespace or "/", context, given)
+        values = given.parameters_for(state.full_name)
         overrides = {name: Parameter(name, value=value) for name, value in values.items()}
         overrides |= {each.name: each for each in _parameters(parameter_overrides or ())}
-        inside.store = ParameterStore(overrides, allow_undeclared_parameters)
+        state.store = ParameterStore(overrides, allow_undeclared_parameters)
         if automatically_declare_parameters_from_overrides:
             entries = [(name, each.value) for name, each in overrides.items()]
             self.declare_parameters("", entries, ignore_override=True)
-        if USE_SIM_TIME not in inside.store.values:
+        if USE_SIM_TIME not in state.store.values:
             self.declare_parameter(USE_SIM_TIME, False)
         if start_parameter_services:
-            parameter_service.serve(self, inside.full_name, inside.store)
-        inside.time_source = TimeSource(self)
-        inside.time_source.attach_clock(inside.clock)
+            parameter_service.serve(self, state.full_name, state.store)
+        state.time_source = TimeSource(self)
+        state.time_source.attach_clock(state.clock)
 
     def __enter__(self) -> Self:
         return self
@@ -273,10 +273,10 @@ class Node(HelpfulAttributes):
 
     def destroy_node(self) -> None:
         """Destroy the node and all it owns. The other nodes see it leave shortly, at the latest at shutdown."""
-        inside = self._holozen
-        if inside.executor is not None:
-            inside.executor.remove_node(self)
-        inside.leave()
+        state = self._holozen
+        if state.executor is not None:
+            state.executor.remove_node(self)
+        state.leave()
 
     # Publishers, subscriptions, services, clients, timers
 
@@ -353,10 +353,10 @@ class Node(HelpfulAttributes):
         clock: Clock | None = None,
         autostart: bool = True,
     ) -> Timer:
-        """Call `callback()` every so many seconds of a clock, by default the node's, while the node is spun."""
-        inside, period = self._holozen, int(float(timer_period_sec) * 1e9)
-        group, clock = callback_group or inside.group, clock or inside.clock
-        return inside.own(Timer(callback, group, period, clock, context=inside.context, autostart=autostart))
+        """Call `callback()` every `timer_period_sec` seconds of a clock, by default the node's, while it is spun."""
+        state, period = self._holozen, int(float(timer_period_sec) * 1e9)
+        group, clock = callback_group or state.group, clock or state.clock
+        return state.own(Timer(callback, group, period, clock, context=state.context, autostart=autostart))
 
     def create_rate(self, frequency: float, clock: Clock | None = None) -> Rate:
         """A Rate, whose `sleep()` keeps a loop at `frequency` (Hz). It does not need the node to be spun."""
@@ -371,31 +371,31 @@ class Node(HelpfulAttributes):
         return self._holozen.own(GuardCondition(callback, callback_group or self._holozen.group))
 
     def destroy_publisher(self, publisher: Publisher) -> bool:
-        """Destroy a publisher; whether it was this node's."""
+        """Destroy a publisher. Returns whether it was this node's."""
         return self._holozen.disown(publisher)
 
     def destroy_subscription(self, subscription: Subscription) -> bool:
-        """Destroy a subscription; whether it was this node's."""
+        """Destroy a subscription. Returns whether it was this node's."""
         return self._holozen.disown(subscription)
 
     def destroy_client(self, client: Client) -> bool:
-        """Destroy a client; whether it was this node's."""
+        """Destroy a client. Returns whether it was this node's."""
         return self._holozen.disown(client)
 
     def destroy_service(self, service: Service) -> bool:
-        """Destroy a service; whether it was this node's."""
+        """Destroy a service. Returns whether it was this node's."""
         return self._holozen.disown(service)
 
     def destroy_timer(self, timer: Timer) -> bool:
-        """Destroy a timer; whether it was this node's."""
+        """Destroy a timer. Returns whether it was this node's."""
         return self._holozen.disown(timer)
 
     def destroy_rate(self, rate: Rate) -> bool:
-        """Destroy a rate; whether it was this node's."""
+        """Destroy a rate. Returns whether it was this node's."""
         return self._holozen.disown(rate)
 
     def destroy_guard_condition(self, guard: GuardCondition) -> bool:
-        """Destroy a guard condition; whether it was this node's."""
+        """Destroy a guard condition. Returns whether it was this node's."""
         return self._holozen.disown(guard)
 
     def resolve_topic_name(self, topic: str, *, only_expand: bool = False) -> str:
@@ -605,7 +605,10 @@ class Node(HelpfulAttributes):
         return [f"/{end.node}" for end in self._holozen.endpoints() if end.kind == "node"]
 
     def wait_for_node(self, fully_qualified_node_name: str, timeout: float) -> bool:
-        """Wait at most `timeout` seconds for a node; whether it is there. Raises as `Client.wait_for_service`."""
+        """Wait at most `timeout` seconds for a node. Returns whether it is there.
+
+        Raises as `Client.wait_for_service`.
+        """
         deadline = time.monotonic() + timeout
         wanted = names.expand(fully_qualified_node_name, self._holozen.name, self._holozen.namespace)
         while wanted not in self.get_fully_qualified_node_names():

@@ -16,12 +16,10 @@ Answer = Callable[[Any, Any], None]
 def serve(node: Any, full_name: str, store: ParameterStore) -> None:
     """Provide the services of a node with that absolute name and those parameters."""
     services = _ParameterServices(node, names.key(full_name), store)
-    for kind, answer in services.answers().items():
-        snake_case = "".join(f"_{letter.lower()}" if letter.isupper() else letter for letter in kind).lstrip("_")
-        node.create_service(
-            find(f"rcl_interfaces/srv/{kind}"), names.join(full_name, snake_case), services.checked(answer),
-            qos_profile=qos_profile_parameters,
-        )  # fmt: skip
+    for name, answer in services.answers().items():
+        kind = find(f"rcl_interfaces/srv/{name.title().replace('_', '')}")
+        place = names.join(full_name, name)
+        node.create_service(kind, place, services.checked(answer), qos_profile=qos_profile_parameters)
 
 
 class _ParameterServices:
@@ -29,12 +27,12 @@ class _ParameterServices:
         self._node, self._key, self._store = node, key, store
 
     def answers(self) -> dict[str, Answer]:
-        """Service type -> the function that fills in a response."""
+        """Name of a service -> the function that fills in a response."""
         return {
-            "DescribeParameters": self._describe, "GetParameterTypes": self._types, "GetParameters": self._get,
-            "SetParameters": self._set, "SetParametersAtomically": self._set_atomically,
+            "describe_parameters": self._describe, "get_parameter_types": self._types, "get_parameters": self._get,
+            "set_parameters": self._set, "set_parameters_atomically": self._set_atomically,
             # Last: once it is in the graph the others are as well.
-            "ListParameters": self._list,
+            "list_parameters": self._list,
         }  # fmt: skip
 
     def checked(self, answer: Answer) -> Callable[[Any, Any], Any]:

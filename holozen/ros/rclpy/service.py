@@ -10,7 +10,7 @@ from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile
-from holozen.ros.rclpy.waitable import Inbox, Waker
+from holozen.ros.rclpy.waitable import Inbox, Waitable, Waker
 from holozen.suggest import article
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import refuse
@@ -24,7 +24,7 @@ class Refusal(ServiceError):
     """Raised by our own callbacks to refuse a request without ending the spin."""
 
 
-class Service(Owned):
+class Service(Owned, Waitable):
     """Created by `Node.create_service`. Requests wait until its node is spun.
 
     An exception in the callback ends the spin, and the client receives it as an error.

@@ -15,7 +15,7 @@ from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.handle import NodeHandle, Owned
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import DurabilityPolicy, QoSProfile, as_profile, queue_length
-from holozen.ros.rclpy.waitable import Inbox, Waker
+from holozen.ros.rclpy.waitable import Inbox, Waitable, Waker, deadline
 from holozen.suggest import article
 from holozen.transport.errors import BusError
 from holozen.transport.samples import Sample
@@ -25,10 +25,10 @@ __all__ = ["Subscription", "wait_for_message"]
 REPLY_TIMEOUT = 1.0  # s for publishers to answer
 RETRIES = (0.0, 0.03, 0.1, 0.5)  # s between queries to a new publisher, to which the route may not be ready yet
 REMEMBERED = 100  # hashes of messages that have arrived, not the messages: a map may have megabytes
-POLL = 0.1  # s between two looks whether rclpy was shut down
+POLL = 0.1  # s between two checks whether rclpy was shut down
 
 
-class Subscription(Owned):
+class Subscription(Owned, Waitable):
     """Created by `Node.create_subscription`. Keeps the newest `depth` messages, in order, until its node is spun.
 
     A message that cannot be decoded is logged and not given to the callback; `bad` counts them.
@@ -49,7 +49,7 @@ class Subscription(Owned):
         self.callback = callback
         self.bad = 0
         self._handle, self._kinds = handle, (msg_type,)
-        self._tolerant = not wire.is_command(key(topic), self._kinds)
+        self._tolerant = not wire.is_command(key(topic), (kind.ROS for kind in self._kinds))
         depth = queue_length(qos_profile)
         self._reader = handle.bus.subscribe(key(topic), msg_type, depth=depth)
         raw_subscriber = self._reader.raw
@@ -128,7 +128,7 @@ class _LatchedMessages:
     """The last message of each publisher of a key: of those that exist, and of each that appears later.
 
     One that appears later may have published before its route to this process was established. A message that has
-    arrived the usual way is not given again.
+    arrived the usual way is not delivered again.
     """
 
     def __init__(self, bus: Bus, key: str) -> None:
@@ -188,7 +188,7 @@ def wait_for_message(
 
     Raises ExternalShutdownException when a signal shuts down rclpy while it waits, RCLError after `rclpy.shutdown()`.
     """
-    deadline = None if time_to_wait < 0 else time.monotonic() + time_to_wait
+    end = deadline(time_to_wait)
     handle, received, waker = node._holozen, list[Any](), Waker()
     full = handle.resolve(topic, "topic")
     waker.waiting = True
@@ -202,7 +202,7 @@ def wait_for_message(
             if (work := subscription.take()) is not None:
                 work()
                 continue
-            left = POLL if deadline is None else min(POLL, deadline - time.monotonic())
+            left = min(POLL, end - time.monotonic())
             if left <= 0:
                 return False, None
             waker.wait(left)

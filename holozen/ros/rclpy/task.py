@@ -9,7 +9,7 @@ from typing import Any
 
 from holozen.ros.catalog import HelpfulAttributes
 from holozen.ros.rclpy.callback_groups import CallbackGroup
-from holozen.ros.rclpy.waitable import Waker
+from holozen.ros.rclpy.waitable import Waitable
 
 __all__ = ["Future", "Task"]
 
@@ -159,13 +159,12 @@ class Task(Future):
             self._reschedule(self)
 
 
-class TaskQueue:
+class TaskQueue(Waitable):
     """Tasks that wait for an executor, in order."""
 
     def __init__(self, callback_group: CallbackGroup | None = None) -> None:
         self.callback_group = callback_group
         self._waiting: deque[Task] = deque()
-        self._waker = Waker()
 
     def create_task(self, callback: Any, *args: Any, **kwargs: Any) -> Task:
         """Queue a function or a coroutine."""
@@ -185,10 +184,6 @@ class TaskQueue:
                 task.result()
 
         return work
-
-    def arm(self, waker: Waker) -> None:
-        """Wake `waker` for the next task."""
-        self._waker = waker
 
     def _add(self, task: Task) -> None:
         self._waiting.append(task)

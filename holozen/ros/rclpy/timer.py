@@ -8,13 +8,13 @@ from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.ros.rclpy.clock import Clock
 from holozen.ros.rclpy.context import Context
 from holozen.ros.rclpy.exceptions import InvalidHandle, ROSInterruptException
-from holozen.ros.rclpy.waitable import Waker
+from holozen.ros.rclpy.waitable import Waitable
 
 __all__ = ["Rate", "Timer"]
 
 
-class Timer(HelpfulAttributes):
-    """Created by `Node.create_timer`. Missed calls are made up by one; the next keeps to the original period."""
+class Timer(HelpfulAttributes, Waitable):
+    """Created by `Node.create_timer`. One call makes up for all missed ones; the next keeps to the original period."""
 
     def __init__(
         self,
@@ -31,7 +31,6 @@ class Timer(HelpfulAttributes):
         self.callback, self.callback_group, self._clock = callback, callback_group, clock
         self._period, self._cancelled = timer_period_ns, not autostart
         self._last = self._next = 0  # ns
-        self._waker = Waker()
         self._destroyed = False
         if autostart:
             self.reset()
@@ -100,10 +99,6 @@ class Timer(HelpfulAttributes):
         missed = (now - self._next) // self._period if self._period else 0
         self._next = self._next + (missed + 1) * self._period if self._period else now
         return self.callback
-
-    def arm(self, waker: Waker) -> None:
-        """Wake `waker` when simulated time moves."""
-        self._waker = waker
 
     def wait_seconds(self) -> float | None:
         """Seconds until it is due; None if it was cancelled, or if simulated time decides."""

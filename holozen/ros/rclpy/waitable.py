@@ -4,10 +4,12 @@ No work is done in Zenoh's threads. Samples wait in a ring channel, which costs 
 blocks, one thread per inbox waits in the ring's `recv` and wakes it.
 """
 
+import math
 import threading
+import time
 from collections import deque
 from collections.abc import Callable
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, TypeVar
 
 from holozen.ros.rclpy.callback_groups import CallbackGroup
 from holozen.transport.errors import BusError
@@ -17,6 +19,11 @@ __all__ = ["GuardCondition"]
 T = TypeVar("T")
 
 LONGEST = 3600.0  # s of one wait; a lock accepts no much larger number
+
+
+def deadline(timeout_sec: float | None) -> float:
+    """When a timeout in s ends, by the monotonic clock; never for None or a negative one."""
+    return math.inf if timeout_sec is None or timeout_sec < 0 else time.monotonic() + timeout_sec
 
 
 class Waker:
@@ -35,23 +42,24 @@ class Waker:
         except RuntimeError:  # it was woken already
             pass
 
-    def wait(self, seconds: float | None) -> bool:
-        """Wait until woken, at most so long; whether it was woken."""
-        return self._lock.acquire(timeout=LONGEST if seconds is None else min(seconds, LONGEST))
+    def wait(self, seconds: float) -> bool:
+        """Wait until woken, at most `seconds`. Returns whether it was woken."""
+        return self._lock.acquire(timeout=min(seconds, LONGEST))
 
 
-class Waitable(Protocol):
+class Waitable:
     """A subscription, timer, service, guard condition or task queue, as an executor sees it."""
 
     callback_group: CallbackGroup | None
+    _waker = Waker()  # until an executor waits
 
     def take(self) -> Callable[[], Any] | None:
         """The next callback with its arguments, which the caller has to run; None if there is none."""
-        ...
+        raise NotImplementedError
 
     def arm(self, waker: Waker) -> None:
         """Wake `waker` as soon as there is something to take."""
-        ...
+        self._waker = waker
 
 
 Work = tuple[Waitable, Callable[[], Any]]
@@ -105,7 +113,7 @@ class Inbox(Generic[T]):
                 pass
 
     def _receive(self) -> bool:
-        """Receive one item; whether to wait for the next. While the executor is busy it reads the ring itself."""
+        """Receive one item. Returns whether to wait for another: a busy executor reads the ring itself."""
         try:
             self._items.append(self._recv())
         except BusError:
@@ -120,13 +128,12 @@ class Inbox(Generic[T]):
             return False
 
 
-class GuardCondition:
+class GuardCondition(Waitable):
     """Created by `Node.create_guard_condition`. Triggers that arrive before the callback runs count as one."""
 
     def __init__(self, callback: Callable[[], Any] | None, callback_group: CallbackGroup | None) -> None:
         self.callback, self.callback_group = callback, callback_group
         self._triggered = False
-        self._waker = Waker()
 
     def trigger(self) -> None:
         """Let the callback run."""
@@ -139,10 +146,6 @@ class GuardCondition:
             return None
         self._triggered = False
         return self.callback or (lambda: None)
-
-    def arm(self, waker: Waker) -> None:
-        """Wake `waker` when it is triggered."""
-        self._waker = waker
 
     def destroy(self) -> None:
         """Never run the callback again."""

@@ -26,7 +26,7 @@ from holozen.ros.tf2_ros.buffer_core import (
 )
 from holozen.rotation import Transform
 
-POLL = 0.1  # s between two looks whether a signal has shut down rclpy
+POLL = 0.1  # s between two checks whether a signal has shut down rclpy
 
 DoTransform = Callable[[Any, Any], Any]
 

@@ -104,7 +104,7 @@ class BufferCore:
         try:
             transform = Transform(transform.translation, normalize(transform.rotation))
         except ValueError as error:
-            raise InvalidArgumentException(f"from {parent!r} to {child!r} {error}") from None
+            raise InvalidArgumentException(f"from {parent!r} to {child!r}: {error}") from None
         history = self._histories.get(child)
         if history is None or static or history.static:
             history = self._histories[child] = History(static)

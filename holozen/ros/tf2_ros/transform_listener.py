@@ -19,7 +19,7 @@ WARNING_PERIOD = 5.0  # s between two warnings
 class TransformListener:
     """Fills a Buffer from `tf` and `tf_static` while its node is spun.
 
-    With `spin_thread` it spins the node in a thread of its own. `static_only` leaves out `tf`.
+    With `spin_thread` it spins the node in a separate thread. `static_only` leaves out `tf`.
     """
 
     def __init__(

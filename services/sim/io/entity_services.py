@@ -28,19 +28,17 @@ from holozen.messages.message import not_finite
 from holozen.robot.description import written
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import received
-from holozen.robot.model import Link, RobotModel
+from holozen.robot.model import RobotModel
 from holozen.robot.xacro import uses_xacro
 from holozen.rotation import XYZ, Transform
 from holozen.transport.services import answer_in_turn
-from holozen.wire import key_for
 
 from ..entities import Entities, Entity, EntityError, Place, checked_place
-from ..robot import command_key
 from ..shard import Share
 
 MAX_SPEED = 100.0  # m/s and rad/s, of a state to set
 MAX_SPAWNS = 64  # waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
-REUSED = 2.0  # s that a model with meshes in files serves all requests with its text; then they are looked for anew
+REUSED = 2.0  # s for which a model with mesh files is reused; after that its files are read again
 MOST_PARSED = 8  # texts whose models are kept, for a fleet, or a robot that is spawned again
 MAX_WARNINGS = 20  # about a robot's text in a reply
 MAX_TAGS = 20_000  # "<" in a text; parsing more of them would stall the steps
@@ -50,16 +48,18 @@ _OK = si.Result(si.Result.OK)
 
 @dataclass(frozen=True, slots=True)
 class Parsed:
-    """The model of a text, which counts `until` a time in s (monotonic)."""
+    """The model of a text, which may be reused `until` a time in s (monotonic)."""
 
     model: RobotModel
     until: float
 
 
 class EntityServices:
-    """Answers requests about entities. `packages` are those of `--package`: the only folders whose meshes are read.
+    """Answers requests about entities. `packages` are those of `--package`: the only folders from which meshes are
+    read.
 
-    Of several sims on one wire only the first `spawns`, or each shard its `share`; each answers for its own entities.
+    Of several sims on one wire only the first one `spawns`; shards spawn each its `share`. Each sim answers for its own
+    entities.
     """
 
     def __init__(
@@ -88,8 +88,8 @@ class EntityServices:
             )
 
     def answer(self) -> bool:
-        """Answer waiting requests for a short time: many at once must not stall the steps. Returns whether more may
-        wait.
+        """Answer waiting requests for a short time, since many at once must not stall the steps. Returns whether more
+        may be waiting.
         """
         return answer_in_turn(self._servers)
 
@@ -111,18 +111,18 @@ class EntityServices:
         return si.SpawnEntityReply(si.Result(si.Result.OK, _warned(model.warnings)), entity.name)
 
     def _named(self, name: str) -> Entity:
-        """An entity of this sim. Objects of the world file are in each shard, all else only in its own."""
+        """An entity of this sim. Each shard has all objects of the world file, and of the rest only its own."""
         if not self._entities.has(name):
             self._check_share(name)
         return self._entities.named(name)
 
     def _check_share(self, name: str) -> None:
-        """Raise Elsewhere if the entity with this name is another shard's, EntityError if that does not run."""
+        """Raise Elsewhere if the name belongs to another shard, and EntityError if that one does not run."""
         if self._share and (problem := self._share.refusal(name)):
             raise EntityError(si.Result.OPERATION_FAILED, problem)
 
     def _read(self, request: si.SpawnEntityRequest) -> RobotModel:
-        """The robot of a request. No expression in it is evaluated, and only files of known packages are opened."""
+        """The model in a request. No expression in it is evaluated, and only files of known packages are opened."""
         text, now = request.resource_string, time.monotonic()
         key = hashlib.sha256(text.encode()).digest()
         if key in self._parsed and now < self._parsed[key].until:
@@ -144,7 +144,8 @@ class EntityServices:
             model = received(text, self._packages)
         except RobotError as error:
             raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
-        lasting = not model.warnings and not any(map(_has_file, model.links.values()))
+        shapes = (shape for link in model.links.values() for shape in (*link.collisions, *link.visuals))
+        lasting = not model.warnings and not any(shape.path for shape in shapes)
         self._parsed = dict([*self._parsed.items()][1 - MOST_PARSED :])
         self._parsed[key] = Parsed(model, math.inf if lasting else time.monotonic() + REUSED)
         return model
@@ -174,9 +175,9 @@ class EntityServices:
         state = si.EntityState(header, Pose.of(*body.pose()), Twist(Vector3(*linear), Vector3(*angular)))
         return si.GetEntityStateReply(_OK, state=state)
 
-    def scene(self, _request: GetSceneRequest) -> GetSceneReply:
+    def scene(self, request: GetSceneRequest) -> GetSceneReply:
         """All entities, their keys and poses."""
-        return GetSceneReply([_seen(entity) for entity in self._entities])
+        return GetSceneReply([_seen(entity, request.without_joints) for entity in self._entities])
 
     def description(self, request: RobotDescriptionRequest) -> RobotDescriptionReply:
         """The URDF of an entity."""
@@ -199,20 +200,11 @@ class EntityServices:
         return si.SetEntityStateReply(_OK)
 
 
-def _has_file(link: Link) -> bool:
-    return any(shape.path for shape in (*link.collisions, *link.visuals))
-
-
-def _seen(entity: Entity) -> SceneEntity:
-    drive = entity.model.drive if entity.robot else None
-    return SceneEntity(
-        entity.name,
-        entity.number,
-        command_key(entity.model, entity.prefix) if entity.robot else "",
-        key_for(drive.odometry_topic, entity.prefix) if drive else "",
-        Pose.of(*entity.body.pose()),
-        entity.robot.joint_positions if entity.robot else [],
-    )
+def _seen(entity: Entity, without_joints: bool) -> SceneEntity:
+    robot = entity.robot
+    command, odometry = robot.keys if robot else ("", "")
+    joints = robot.joint_positions if robot and not without_joints else []
+    return SceneEntity(entity.name, entity.number, command, odometry, Pose.of(*entity.body.pose()), joints)
 
 
 def _warned(warnings: tuple[str, ...]) -> str:
@@ -221,7 +213,7 @@ def _warned(warnings: tuple[str, ...]) -> str:
 
 
 def _matching(names: list[str], wanted: str) -> list[str]:
-    """The names that a pattern matches. Only `*`, `.`, `|`, `^`, `$` are special: others can take for ever."""
+    """The names that a pattern matches. Only `*`, `.`, `|`, `^`, `$` are special: with others a match may never end."""
     if not re.fullmatch(r"[\w.*|^$-]*", wanted) or "**" in wanted or wanted.count("*") > 3:
         raise EntityError(
             si.Result.FEATURE_UNSUPPORTED, f"filter {wanted!r}: use letters, digits, '_', '-', '.', '*', '|', '^', '$'"

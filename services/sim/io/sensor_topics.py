@@ -36,10 +36,10 @@ from ..cameras import Cameras
 from ..link_states import LinkState, placed
 from ..physics.engine import Array
 from ..physics.ray_caster import RayCaster
-from .topics import Schedule
+from ..schedule import Schedule
 
 LinkStates = Mapping[str, LinkState]
-"""Those of a robot's links, by name."""
+"""The states of a robot's links, by name."""
 
 
 class Step(NamedTuple):
@@ -50,8 +50,8 @@ class Step(NamedTuple):
 
 
 class Surroundings(NamedTuple):
-    """What sensors of a world share: what rays hit and what cameras see there now, the seed of all noise, and the
-    process that renders.
+    """What the sensors of a world share: `look` gives what rays hit and `seen` what cameras see at present, `seed` is
+    that of all noise, and `cameras` is the process that renders.
     """
 
     world: WorldSpec
@@ -62,13 +62,13 @@ class Surroundings(NamedTuple):
 
 
 class SensorTopics:
-    """All sensors of the robot `name`, whose keys and frames are below `prefix`. `phase` is that of a Schedule."""
+    """All sensors of the robot `name`, whose keys and frames begin with `prefix`. `phase` is that of a Schedule."""
 
     def __init__(
         self, bus: Bus, name: str, prefix: str, sensors: Iterable[Sensor], around: Surroundings, phase: float
     ) -> None:
         self._phase = phase
-        self._all: list[tuple[LidarTopic | ImuTopic | BumperTopic | CameraTopic, Schedule]] = []
+        self._all: list[tuple[SensorTopic, Schedule]] = []
         for sensor in sensors:
             draw = Draw(around.seed, f"{name}/{sensor.name}")
             match sensor.device:
@@ -80,13 +80,13 @@ class SensorTopics:
                     self._add(BumperTopic(bus, name, prefix, sensor, around))
                 case Camera() if around.cameras:
                     self._add(CameraTopic(prefix, sensor, sensor.device, around, around.cameras))
-        self.next = -math.inf  # s of sim time from when on `publish` has something to do
+        self.next = -math.inf  # s of sim time; `publish` has nothing to do before
 
-    def _add(self, topic: "LidarTopic | ImuTopic | BumperTopic | CameraTopic") -> None:
+    def _add(self, topic: "SensorTopic") -> None:
         self._all.append((topic, Schedule(topic.sensor.rate, self._phase)))
 
     def publish(self, step: Step, links: Callable[[], LinkStates]) -> None:
-        """Publish what is due, and wanted."""
+        """Publish the sensors that are due and wanted."""
         due = [topic for topic, schedule in self._all if schedule.due(step.time) and topic.wanted]
         self.next = min((schedule.next for _, schedule in self._all), default=math.inf)
         if due:
@@ -94,12 +94,12 @@ class SensorTopics:
             for topic in due:
                 topic.publish(step, now)
 
-    def start_anew(self) -> None:
-        """The world was reset: all are due at once, and know nothing of before."""
+    def reset(self) -> None:
+        """The world was reset: forget all earlier measurements, and let all sensors be due at once."""
         self.next = -math.inf
         for topic, schedule in self._all:
             schedule.set_rate(schedule.rate)
-            topic.start_anew()
+            topic.reset()
 
     def close(self) -> None:
         """Close the keys."""
@@ -108,56 +108,72 @@ class SensorTopics:
 
 
 class Draw:
-    """Random numbers of a sensor that depend on the seed and the step alone: not on what was drawn before."""
+    """Random numbers of a sensor. They depend on the seed and the step alone, and not on what was drawn before."""
 
     def __init__(self, seed: int, sensor: str) -> None:
         self._seed = seed, zlib.crc32(sensor.encode())
 
     def noise(self, steps: int, noises: Iterable[Noise], count: int = 1) -> Array:
-        """The noise (n, count) of n quantities after so many steps."""
+        """The noise (n, count) of n quantities at the step number `steps`."""
         random = np.random.default_rng((*self._seed, steps))
         return np.array([noise.mean + noise.stddev * random.standard_normal(count) for noise in noises])
 
 
-class LidarTopic:
-    """A lidar, which sends a scan or points, or what measures a distance."""
+class SensorTopic:
+    """A sensor of a robot with this `prefix`, and its publisher; None if another process publishes for it."""
 
-    def __init__(
-        self, bus: Bus, name: str, prefix: str, sensor: Sensor, lidar: Lidar, around: Surroundings, draw: Draw
-    ) -> None:
-        self.sensor, self._lidar, self._around, self._draw = sensor, lidar, around, draw
-        self._own, self._frame = (name, sensor.link), key_for(sensor.frame, prefix)
+    def __init__(self, sensor: Sensor, prefix: str, around: Surroundings, publisher: Publisher[Any] | None) -> None:
+        self.sensor, self._around, self._publisher = sensor, around, publisher
+        self._frame = key_for(sensor.frame, prefix)
         self._xyz, self._rotation = placed(sensor.pose)
-        self._directions = directions(lidar)
-        key = key_for(sensor.topic, prefix)
-        kind, self._message = MESSAGES[lidar.message]
-        self._publisher: Publisher[Any] = bus.publisher(key, kind)
 
     @property
     def wanted(self) -> bool:
         """Whether anyone wants what `publish` sends."""
-        return self._publisher.wanted
+        return self._publisher is not None and self._publisher.wanted
 
     def publish(self, step: Step, links: LinkStates) -> None:
-        """Look, and publish it."""
-        lidar, at = self._lidar, links[self.sensor.link].at(self._xyz, self._rotation)
+        """Publish what the sensor measures after a step."""
+        if self._publisher:
+            self._publisher.put(self._measured(step, links))
+
+    def _measured(self, step: Step, links: LinkStates) -> Message:
+        raise NotImplementedError
+
+    def _at(self, links: LinkStates) -> LinkState:
+        """The state of the sensor's frame."""
+        return links[self.sensor.link].at(self._xyz, self._rotation)
+
+    def reset(self) -> None:
+        """The world was reset: forget all earlier measurements."""
+
+    def close(self) -> None:
+        """Close the key."""
+        if self._publisher:
+            self._publisher.close()
+
+
+class LidarTopic(SensorTopic):
+    """A lidar, which publishes a scan or points; or a distance sensor."""
+
+    def __init__(
+        self, bus: Bus, name: str, prefix: str, sensor: Sensor, lidar: Lidar, around: Surroundings, draw: Draw
+    ) -> None:
+        kind, self._message = MESSAGES[lidar.message]
+        super().__init__(sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), kind))
+        self._lidar, self._draw, self._own, self._directions = lidar, draw, (name, sensor.link), directions(lidar)
+
+    def _measured(self, step: Step, links: LinkStates) -> Message:
+        lidar, at = self._lidar, self._at(links)
         ranges = self._around.look().ranges(at.xyz, at.rotation, self._directions, lidar.near, lidar.far, self._own)
         if lidar.noise.mean or lidar.noise.stddev:
             noise = self._draw.noise(step.number, [lidar.noise], len(ranges))[0]
             ranges = np.where(np.isfinite(ranges), np.clip(ranges + noise, lidar.near, lidar.far), ranges)
-        header = Header(Time.of(step.time), self._frame)
-        self._publisher.put(self._message(header, self.sensor, lidar, self._directions, ranges))
-
-    def start_anew(self) -> None:
-        """Nothing is kept."""
-
-    def close(self) -> None:
-        """Close the key."""
-        self._publisher.close()
+        return self._message(Header(Time.of(step.time), self._frame), self.sensor, lidar, self._directions, ranges)
 
 
 def directions(lidar: Lidar) -> Array:
-    """The unit vectors (n, 3) of its rays: those of the lowest row first, in it counter-clockwise."""
+    """The unit vectors (n, 3) of its rays: row by row from the lowest one, each row counter-clockwise."""
     fans = (lidar.vertical, lidar.horizontal)
     up, left = np.meshgrid(*(np.linspace(fan.first, fan.last, fan.count) for fan in fans), indexing="ij")
     rays = np.stack([np.cos(up) * np.cos(left), np.cos(up) * np.sin(left), np.sin(up)], axis=-1)
@@ -165,7 +181,7 @@ def directions(lidar: Lidar) -> Array:
 
 
 def _scan(header: Header, sensor: Sensor, lidar: Lidar, _rays: Array, ranges: Array) -> LaserScan:
-    """The row at the middle of those of a lidar that looks up and down too."""
+    """The scan of the lidar's middle row."""
     fan = lidar.horizontal
     row = ranges.reshape(lidar.vertical.count, fan.count)[lidar.vertical.count // 2]
     values = array("f")
@@ -174,7 +190,7 @@ def _scan(header: Header, sensor: Sensor, lidar: Lidar, _rays: Array, ranges: Ar
 
 
 def _nearest(header: Header, _sensor: Sensor, lidar: Lidar, _rays: Array, ranges: Array) -> Range:
-    """The distance of what is nearest."""
+    """The shortest range."""
     kind, width = Range.INFRARED if lidar.infrared else Range.ULTRASOUND, lidar.horizontal.last - lidar.horizontal.first
     return Range(header, kind, width, lidar.near, lidar.far, float(ranges.min()))
 
@@ -184,7 +200,7 @@ POINT = 12  # bytes
 
 
 def _points(header: Header, _sensor: Sensor, _lidar: Lidar, rays: Array, ranges: Array) -> PointCloud2:
-    """The points that were hit, in one row."""
+    """The points that the rays hit, in one row."""
     hit = np.isfinite(ranges)
     points = (rays[hit] * ranges[hit, None]).astype("<f4")
     size = POINT * len(points)
@@ -196,28 +212,31 @@ MESSAGES: dict[str, tuple[type[Message], Callable[[Header, Sensor, Lidar, Array,
     "points": (PointCloud2, _points),
     "range": (Range, _nearest),
 }
-"""A lidar's messages, with what makes one of its rays (n, 3) and ranges (n,)."""
+"""The message types of a lidar, each with the function that makes one from its rays (n, 3) and ranges (n,)."""
 
 
-class ImuTopic:
-    """An inertial measurement unit: its acceleration is the mean since the message before."""
+class ImuTopic(SensorTopic):
+    """An inertial measurement unit. Its acceleration is the mean since the previous measurement."""
 
     def __init__(self, bus: Bus, prefix: str, sensor: Sensor, imu: Imu, around: Surroundings, draw: Draw) -> None:
-        self.sensor, self._imu, self._around, self._draw = sensor, imu, around, draw
-        self._frame = key_for(sensor.frame, prefix)
-        self._xyz, self._rotation = placed(sensor.pose)
-        self._noises = (*imu.rate, *imu.acceleration)
-        self._publisher: Publisher[ImuMessage] = bus.publisher(key_for(sensor.topic, prefix), ImuMessage)
+        super().__init__(sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), ImuMessage))
+        self._imu, self._draw, self._noises = imu, draw, (*imu.rate, *imu.acceleration)
         self._before: tuple[float, XYZ] | None = None  # s, and the velocity then
 
-    wanted = True  # also without subscribers: what is measured must not depend on them
+    @property
+    def wanted(self) -> bool:
+        """Always true: its measurements must not depend on who subscribes."""
+        return True
 
     def publish(self, step: Step, links: LinkStates) -> None:
-        """Measure, and publish it."""
-        at = links[self.sensor.link].at(self._xyz, self._rotation)
-        before, self._before = self._before, (step.time, at.linear)
-        if not self._publisher.wanted:
-            return
+        """Measure, and publish it if anyone wants it."""
+        self._now = self._at(links)
+        if super().wanted:
+            super().publish(step, links)
+        self._before = step.time, self._now.linear
+
+    def _measured(self, step: Step, links: LinkStates) -> ImuMessage:
+        before, at = self._before, self._now
         changes = [0.0] * 3
         if before and step.time > before[0]:
             seconds = step.time - before[0]
@@ -228,40 +247,29 @@ class ImuTopic:
         noise = self._draw.noise(step.number, self._noises)[:, 0]
         values = [value + extra for value, extra in zip((*turn, *force), noise.tolist(), strict=True)]
         oriented = self._imu.oriented
-        self._publisher.put(
-            ImuMessage(
-                Header(Time.of(step.time), self._frame),
-                Quaternion(*at.rotation) if oriented else Quaternion(),
-                [0.0 if oriented else -1.0, *[0.0] * 8],  # -1: not measured
-                Vector3(*values[:3]), _covariance(self._imu.rate), Vector3(*values[3:]),
-                _covariance(self._imu.acceleration),
-            )
+        return ImuMessage(
+            Header(Time.of(step.time), self._frame),
+            Quaternion(*at.rotation) if oriented else Quaternion(),
+            [0.0 if oriented else -1.0, *[0.0] * 8],  # -1: not measured
+            Vector3(*values[:3]), _covariance(self._imu.rate), Vector3(*values[3:]),
+            _covariance(self._imu.acceleration),
         )  # fmt: skip
 
-    def start_anew(self) -> None:
-        """Forget the velocity of before."""
+    def reset(self) -> None:
+        """The world was reset: forget the last velocity."""
         self._before = None
 
-    def close(self) -> None:
-        """Close the key."""
-        self._publisher.close()
 
-
-class BumperTopic:
+class BumperTopic(SensorTopic):
     """A bumper: what touches its link. Forces are not measured."""
 
     def __init__(self, bus: Bus, name: str, prefix: str, sensor: Sensor, around: Surroundings) -> None:
-        self.sensor, self._around, self._own = sensor, around, (name, sensor.link)
-        self._frame = sensor.frame if sensor.frame == WORLD else key_for(sensor.frame, prefix)
-        self._publisher: Publisher[ContactsState] = bus.publisher(key_for(sensor.topic, prefix), ContactsState)
+        super().__init__(sensor, prefix, around, bus.publisher(key_for(sensor.topic, prefix), ContactsState))
+        self._own = (name, sensor.link)
+        if sensor.frame == WORLD:
+            self._frame = WORLD
 
-    @property
-    def wanted(self) -> bool:
-        """Whether anyone wants what `publish` sends."""
-        return self._publisher.wanted
-
-    def publish(self, step: Step, links: LinkStates) -> None:
-        """Publish what touches it now."""
+    def _measured(self, step: Step, links: LinkStates) -> ContactsState:
         own = "::".join(self._own)
         states = [
             ContactState(
@@ -272,7 +280,7 @@ class BumperTopic:
             )
             for touch in self._around.look().touches(*self._own)
         ]  # fmt: skip
-        self._publisher.put(ContactsState(Header(Time.of(step.time), self._frame), states))
+        return ContactsState(Header(Time.of(step.time), self._frame), states)
 
     def _in_frame(self, vector: XYZ, links: LinkStates, place: bool = False) -> XYZ:
         if self.sensor.frame == WORLD:
@@ -283,21 +291,13 @@ class BumperTopic:
             vector = x, y, z
         return rotate(conjugate(at.rotation), vector)
 
-    def start_anew(self) -> None:
-        """Nothing is kept."""
 
-    def close(self) -> None:
-        """Close the key."""
-        self._publisher.close()
-
-
-class CameraTopic:
+class CameraTopic(SensorTopic):
     """A camera, whose pictures another process renders."""
 
     def __init__(self, prefix: str, sensor: Sensor, camera: Camera, around: Surroundings, cameras: Cameras) -> None:
-        self.sensor, self._camera, self._around, self._cameras = sensor, camera, around, cameras
-        self._frame = key_for(sensor.frame, prefix)
-        self._xyz, self._rotation = placed(sensor.pose)
+        super().__init__(sensor, prefix, around, None)
+        self._camera, self._cameras = camera, cameras
         keys = (camera.image, camera.info, camera.depth)
         self._image, self._info, self._depth = (key and key_for(key, prefix) for key in keys)
 
@@ -307,9 +307,8 @@ class CameraTopic:
         return self._cameras.wanted
 
     def publish(self, step: Step, links: LinkStates) -> None:
-        """Send what it sees."""
-        camera, around = self._camera, self._around
-        at = links[self.sensor.link].at(self._xyz, self._rotation)
+        """Send an exposure to the process that renders."""
+        camera, around, at = self._camera, self._around, self._at(links)
         self._cameras.expose(
             Exposure(
                 Header(Time.of(step.time), self._frame), self._image, self._info, self._depth, camera.width,
@@ -319,11 +318,9 @@ class CameraTopic:
             )
         )  # fmt: skip
 
-    def start_anew(self) -> None:
-        """Nothing is kept."""
-
     def close(self) -> None:
-        """It has no keys: those of its pictures are the other process's."""
+        """Have the keys closed by the process that publishes on them."""
+        self._cameras.expose(Exposure(image=self._image, depth=self._depth))
 
 
 def _covariance(noises: Iterable[Noise]) -> list[float]:

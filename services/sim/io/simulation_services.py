@@ -1,4 +1,4 @@
-"""What plays, pauses, steps and resets the simulation: the services of simulation_interfaces, and its action."""
+"""The services and the action of simulation_interfaces that play, pause, step and reset the simulation."""
 
 import math
 import time
@@ -21,6 +21,7 @@ from ..simulation import NAMES, Simulation
 
 _OK = si.Result(si.Result.OK)
 FEEDBACK_EVERY = 0.1  # s
+OUTDATED = "this may have been sent before the sim was last paused; send it again if it is still to play"
 
 
 class SimulationServices:
@@ -38,11 +39,12 @@ class SimulationServices:
             bus.serve("reset_simulation", si.ResetSimulationRequest, si.ResetSimulationReply, self.reset),
         ]
         self._action = ActionServer(bus, "simulate_steps", si.SimulateSteps, lambda _: "", self._begin)
-        self._goal: Goal | None = None  # whose steps are made
+        self._goal: Goal | None = None  # of the steps that are being made
         self._reported = -math.inf  # s; the last feedback
+        self._paused_at = -math.inf  # s; the last request to pause or stop
 
     def answer(self) -> bool:
-        """Answer waiting requests for a short time. Returns whether more may wait."""
+        """Answer waiting requests for a short time. Returns whether more may be waiting."""
         while not self._simulation.steps and (query := self._steps.try_recv()) is not None:
             self._step(query)
         if self._goal and self._goal.state is GoalState.CANCELING:
@@ -58,6 +60,10 @@ class SimulationServices:
     def set_state(self, request: si.SetSimulationStateRequest) -> si.SetSimulationStateReply:
         """Change the state of the sim."""
         wanted, now = request.state.state, time.monotonic()
+        if wanted in (State.STATE_STOPPED, State.STATE_PAUSED):
+            self._paused_at = now
+        elif wanted == State.STATE_PLAYING and self._simulation.is_paused:
+            self._setter.require_sent_after(self._paused_at, now, OUTDATED)
         if wanted == State.STATE_QUITTING:
             self._end()
         elif wanted not in NAMES:
@@ -82,7 +88,7 @@ class SimulationServices:
         return si.ResetSimulationReply(_OK)
 
     def _step(self, query: Any) -> None:
-        """Begin the steps of a request, which is answered after them."""
+        """Begin the steps of a request. It is answered after the last one."""
         if not self._steps.is_addressed(query):
             query.drop()
             return

@@ -2,14 +2,12 @@
 
 import math
 from collections.abc import Mapping
-from functools import lru_cache, partial
 from random import Random
 from typing import Any
 
 from holozen.bus import Bus
-from holozen.command.inputs import ForceInput, JointInput, TwistInput
+from holozen.command.inputs import JointInput, TwistInput
 from holozen.command.motion import AppliedForces, JointMotion
-from holozen.command.wait_set import Moment, Reader
 from holozen.limits import STOP, Planar
 from holozen.messages import (
     CommandStatus,
@@ -27,15 +25,15 @@ from holozen.messages import (
     TwistStamped,
     TwistWithCovariance,
     Vector3,
-    Wrench,
 )
 from holozen.robot.model import Drive, Mecanum, Omni, RobotModel
 from holozen.robot.model import Planar as PlanarDrive
-from holozen.robot.rigid import FLEETS, Frame, moved_by
+from holozen.robot.rigid import moved_by
 from holozen.rotation import XYZ, XYZW, conjugate, from_axis_angle, multiply, rotate
 from holozen.transport.pubsub import Publisher, Subscription
 from holozen.wire import MAX_COMMAND_BYTES, key_for
 
+from ..link_states import link_tree, placed
 from ..physics.body import Moved
 from ..physics.engine import JointStates
 from ..physics.movers import Limited
@@ -44,27 +42,17 @@ JOINT_RATE = 50.0  # Hz of sim time
 
 
 class JointTopics:
-    """The keys of a robot's joints, in the namespace `place`. `names` are those of the engine's joints."""
+    """The keys of a robot's joints, in the namespace `place`. `names` are the joints' names in the engine's order."""
 
     def __init__(
         self, bus: Bus, place: str, model: RobotModel, names: list[str], prefix: str, joint_input: JointInput,
         tf: Publisher[TFMessage],
     ) -> None:  # fmt: skip
-        self._input, self._tf, self.names = joint_input, tf, names
+        self._tf, self.names, self.command_key = tf, names, joint_input.keys[0]
         self._frames = JointFrames(model, key_for("", prefix))
-        self._commands = bus.subscribe(joint_input.key, JointState, limit=MAX_COMMAND_BYTES, dealt=True)
-        self.readers = [Reader(self._commands.raw.channel, self._read)]
+        self._commands = bus.subscribe(self.command_key, JointState, limit=MAX_COMMAND_BYTES, dealt=True)
+        self.readers = [joint_input.reader(self._commands)]
         self._states: Publisher[JointState] = bus.publisher(key_for("joint_states", place), JointState)
-
-    @property
-    def command_key(self) -> str:
-        """The key of joint commands."""
-        return self._input.key
-
-    def _read(self, first: Any, moment: Moment) -> bool:
-        """Process the commands that wait, after the sample `first`; returns whether any waits for a clock."""
-        self._input.take(self._commands.waiting(first), moment.now, moment.since)
-        return self._input.freshness.is_waiting
 
     @property
     def wanted(self) -> bool:
@@ -86,56 +74,11 @@ class JointTopics:
         self._states.close()
 
 
-class ForceTopics:
-    """The keys of a robot's forces."""
-
-    def __init__(self, bus: Bus, force_input: ForceInput) -> None:
-        self._input = force_input
-        self._commands = [bus.subscribe(key, Wrench, limit=MAX_COMMAND_BYTES, dealt=True) for key in force_input.keys]
-        self.readers = [Reader(commands.raw.channel, partial(self._read, commands)) for commands in self._commands]
-
-    def _read(self, commands: Subscription[Wrench], first: Any, moment: Moment) -> bool:
-        """Process those `commands` that wait, after the sample `first`; returns whether any waits for a clock."""
-        self._input.take(commands.waiting(first), moment.now, moment.since)
-        return self._input.freshness.is_waiting
-
-    def close(self) -> None:
-        """Close the keys."""
-        for commands in self._commands:
-            commands.close()
-
-
 UNKNOWN = 1e12  # m^2, rad^2; Gazebo's variance of what planar_move does not control
 
 
-class Schedule:
-    """When something with a rate in Hz is due, on a monotonic clock in seconds. `phase`, from 0 to 1, sets several of
-    one rate apart.
-    """
-
-    def __init__(self, rate: float, phase: float = 0.0) -> None:
-        self._phase = phase
-        self.set_rate(rate)
-
-    def set_rate(self, rate: float) -> None:
-        """Set the rate; it is due at once."""
-        self.rate, self._count = rate, -1
-
-    def due(self, time: float) -> bool:
-        """Whether a new period has begun since the last call, or the clock was set back."""
-        count = int(time * self.rate + self._phase + 1e-6)
-        began = count != self._count
-        self._count = count
-        return began
-
-    @property
-    def next(self) -> float:
-        """From when on it is due, at the earliest."""
-        return (self._count + 1 - self._phase - 1e-6) / self.rate if self.rate else math.inf
-
-
 def covariance(drive: Drive) -> list[float]:
-    """The 6 x 6 diagonal of Gazebo's planar_move."""
+    """The 36 numbers of the diagonal 6 x 6 covariance of Gazebo's planar_move."""
     x, y, yaw = drive.covariance
     diagonal = (x, y, UNKNOWN, UNKNOWN, UNKNOWN, yaw)
     return [diagonal[row] if row == column else 0.0 for row in range(6) for column in range(6)]
@@ -144,7 +87,7 @@ def covariance(drive: Drive) -> list[float]:
 def odometry(
     header: Header, child: str, position: XYZ, rotation: XYZW, velocity: Planar, variances: list[float]
 ) -> Odometry:
-    """The world pose, and the velocity in the body frame."""
+    """Odometry with a pose in the frame of `header` and a velocity in the body frame `child`."""
     pose = Pose.of(position, rotation)
     return Odometry(
         header, child, PoseWithCovariance(pose, variances), TwistWithCovariance(Twist.planar(*velocity), variances)
@@ -157,32 +100,25 @@ def transform(header: Header, child: str, position: XYZ, rotation: XYZW) -> Tran
 
 
 class JointFrames:
-    """The transforms of all links, and of sensors with a frame of their own, to their parents. `prefix` goes before the
-    name of each frame.
+    """The transforms of all links, and of sensors with a frame of their own, to their parents. The name of each frame
+    begins with `prefix`.
     """
 
     def __init__(self, model: RobotModel, prefix: str) -> None:
-        self._joints = [(joint, f"{prefix}{joint.parent}", f"{prefix}{joint.child}") for joint in model.joints.values()]
-        self._at = _places(model)
-        mounts = {one.frame: (one.link, Frame.of(one.mount)) for one in model.sensors if one.mount}
-        self._mounts: list[Any] = [
-            (f"{prefix}{link}", f"{prefix}{frame}", at.xyz, at.quaternion) for frame, (link, at) in mounts.items()
+        self._joints = [
+            (joint, f"{prefix}{joint.parent}", f"{prefix}{joint.child}", xyz, rotation)
+            for joint, xyz, rotation in link_tree(model).joints
         ]
+        mounts = {one.frame: (one.link, placed(one.mount)) for one in model.sensors if one.mount}
+        self._mounts: list[Any] = [(f"{prefix}{link}", f"{prefix}{frame}", *at) for frame, (link, at) in mounts.items()]
 
     def transforms(self, stamp: Time, positions: Mapping[str, float]) -> list[TransformStamped]:
-        """The transforms at the joint `positions` (rad; m of a prismatic joint); one that is not given is at zero."""
+        """The transforms at the joint `positions` (rad, or m if prismatic). A joint that is not given is at zero."""
         links = [
             transform(Header(stamp, parent), child, *moved_by(joint, xyz, rotation, positions.get(joint.name, 0.0)))
-            for (joint, parent, child), (xyz, rotation) in zip(self._joints, self._at, strict=True)
+            for joint, parent, child, xyz, rotation in self._joints
         ]
         return links + [transform(Header(stamp, parent), *at) for parent, *at in self._mounts]
-
-
-@lru_cache(FLEETS)
-def _places(model: RobotModel) -> list[tuple[XYZ, XYZW]]:
-    """Position and rotation of each joint in its parent link."""
-    frames = [Frame.of(joint.pose) for joint in model.joints.values()]
-    return [(frame.xyz, frame.quaternion) for frame in frames]
 
 
 NONE = (False, False)
@@ -203,22 +139,13 @@ class DriveTopics:
         self._commands: list[Subscription[Twist | TwistStamped]] = [
             bus.subscribe(key, Twist, TwistStamped, limit=MAX_COMMAND_BYTES, dealt=True) for key in twist_input.keys
         ]
-        self.readers = [Reader(commands.raw.channel, partial(self._read, commands)) for commands in self._commands]
+        self.readers = [*map(twist_input.reader, self._commands)]
+        twist_input.on_news = self.publish_status
         self._odom: Publisher[Odometry] = bus.publisher(key_for(drive.odometry_topic, prefix), Odometry)
         self._status: Publisher[CommandStatus] = bus.publisher(f"{command}_status", CommandStatus)
 
-    def _read(self, commands: Subscription[Twist | TwistStamped], first: Any, moment: Moment) -> bool:
-        """Process those `commands` that wait, after the sample `first`; returns whether any waits for its sender's
-        clock.
-        """
-        now, since, clocks = moment
-        self._input.take(commands.waiting(first), now, clocks, since)
-        if self._input.has_news:
-            self.publish_status(now)
-        return self._input.freshness.is_waiting
-
     def publish_status(self, now: float, at_once: bool = False) -> None:
-        """Publish the command status, if it is wanted, or `at_once`."""
+        """Publish the command status, if anyone wants it or `at_once`."""
         if at_once or self._status.wanted:
             status, drive = self._input.status(now), self._drive
             status.name, status.strafes = self._name, self._strafes
@@ -228,16 +155,16 @@ class DriveTopics:
 
     @property
     def wanted(self) -> tuple[bool, bool]:
-        """Whether anyone wants odometry, and whether its transform."""
+        """Whether anyone wants odometry, and whether anyone wants its transform."""
         drive = self._drive
         return drive.publish_odom and self._odom.wanted, drive.publish_odom_tf and self._tf.wanted
 
-    def start_anew(self, moved: Moved) -> None:
-        """Forget its speed: its body is a new one, which stands as `moved` says."""
+    def reset(self, moved: Moved) -> None:
+        """The robot has a new body, which stands in the state `moved`."""
         self._limited, self._start = Limited(self._drive), moved[:2]
 
     def motion(self, now: float, dt: float) -> Planar | JointMotion:
-        """The commanded motion of the next step of `dt` seconds, within the limits of its file."""
+        """The commanded motion of the next step of `dt` seconds, within the limits of the robot's file."""
         motion = self._input.arbiter.motion(now)
         assert not isinstance(motion, AppliedForces), "forces are another arbiter's where a drive is"
         if isinstance(motion, JointMotion):
@@ -245,7 +172,7 @@ class DriveTopics:
             return motion
         motion = self._limited(motion, dt)
         if not self._limited.is_reached:
-            self._input.arbiter.due = -math.inf  # it goes on to change at the next step
+            self._input.arbiter.due = -math.inf  # the next step changes it again
         return motion
 
     def publish(self, stamp: Time, moved: Moved, wanted: tuple[bool, bool]) -> None:
@@ -258,8 +185,8 @@ class DriveTopics:
             self._tf.queue(TFMessage([transform(header, self._base, position, rotation)]))
 
     def _measured(self, stamp: Time, moved: Moved) -> Moved:
-        """The pose since the start and with noise, as the file says. The noise of a time is the same for all readers
-        and looks.
+        """The state for odometry: relative to the start, and with noise, if the file says so. The noise depends on the
+        stamp alone, so that all readers get the same.
         """
         ((x, y, z), rotation, velocity), noise = moved, self._drive.odometry_noise
         if self._drive.odometry_from_start:

@@ -7,17 +7,16 @@ import numpy as np
 
 from holozen.limits import Planar, clamp
 from holozen.robot.errors import RobotError
+from holozen.robot.gazebo_plugins import round_radius
 from holozen.robot.model import Balancing, RobotModel
 from holozen.robot.rigid import assemble, joint_axes
 from holozen.robot.rotation import Array
 from holozen.rotation import rotate
 from holozen.rotation import yaw as yaw_of
 
-from .body import Moved
 from .dynamics import GRAVITY
-from .engine import JointStates
-from .jointed import JointedBody
-from .wheels import forward_sign, radius_of
+from .jointed import JointedBody, JointedMover
+from .wheels import forward_sign
 
 LEAN, LEAN_RATE, SPEED, DISTANCE, EFFORT = 0.2, 1.0, 0.1, 0.1, 0.1
 """The largest acceptable deviations in rad, rad/s, m/s, m and N m; the weights are their inverse squares (Bryson)."""
@@ -27,9 +26,9 @@ Gains = tuple[float, float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Pendulum:
-    """A body on wheels, in SI units: masses of the body and of all wheels, the wheels' radius, the height of the body's
-    centre of mass over the axle, the height of the axle in the root frame, and the inertias of the body and of all
-    wheels about the axle's direction.
+    """A body on wheels, in SI units: the masses of the body and of all wheels, the wheels' radius, the height of the
+    body's centre of mass above the axle, the height of the axle in the root frame, and the inertias of the body and of
+    all wheels about the direction of the axle.
     """
 
     body_mass: float
@@ -42,19 +41,19 @@ class Pendulum:
 
     @property
     def inertia(self) -> Array:
-        """The mass matrix (2, 2) of (distance, lean), upright."""
+        """The mass matrix (2, 2) for (distance, lean) of the upright body."""
         along, mixed = self.body_mass + self.wheel_mass + self.wheel_inertia / self.radius**2, self._moment
         return np.array([[along, mixed], [mixed, self.body_inertia + mixed * self.height]])
 
     @property
     def lean_per_acceleration(self) -> float:
-        """The lean in rad that a steady 1 m/s^2 needs."""
+        """The lean in rad for a steady acceleration of 1 m/s^2."""
         (along, mixed), _ = self.inertia
         return float(self.radius * along + mixed) / (self._moment * GRAVITY)
 
     @property
     def lag(self) -> float:
-        """The distance in m of the axle behind the point that accelerates as the body leans, per rad of lean."""
+        """The distance in m, per rad of lean, of the axle behind the point whose acceleration is that of the lean."""
         (along, mixed), (_, about) = self.inertia
         return float((self.radius * mixed + about) / (self.radius * along + mixed))
 
@@ -66,9 +65,9 @@ class Pendulum:
 def gains(pendulum: Pendulum, dt: float) -> Gains:
     """The torque in N m on the wheels per rad of lean, rad/s of lean rate, m/s of speed error and m of distance error.
 
-    Linear quadratic regulator of the pendulum linearised upright, for steps of `dt` seconds. Source of the model: Kim,
-    Kim and Kwak, "Dynamic analysis of a nonholonomic two-wheeled inverted pendulum robot", J. Intell. Robot. Syst. 44,
-    2005; of the iteration: Anderson and Moore, Optimal Control, 1990, section 2.4.
+    They are those of a linear quadratic regulator for the pendulum, linearised upright, in steps of `dt` seconds.
+    Source of the model: Kim, Kim and Kwak, "Dynamic analysis of a nonholonomic two-wheeled inverted pendulum robot", J.
+    Intell. Robot. Syst. 44, 2005; of the iteration: Anderson and Moore, Optimal Control, 1990, section 2.4.
     """
     step, push = _motion(pendulum, dt)
     weights = np.diag([1 / LEAN**2, 1 / LEAN_RATE**2, 1 / SPEED**2, 1 / DISTANCE**2])
@@ -84,7 +83,9 @@ def gains(pendulum: Pendulum, dt: float) -> Gains:
 
 
 def _motion(p: Pendulum, dt: float) -> tuple[Array, Array]:
-    """The discrete motion of (lean, lean rate, speed, distance) with a torque that drives the wheels forward."""
+    """The discrete state space of (lean, lean rate, speed, distance): the matrices (4, 4) of the state, and (4, 1) of a
+    torque that drives the wheels forward.
+    """
     falling = np.linalg.solve(p.inertia, [0.0, p.body_mass * GRAVITY * p.height])
     pushed = np.linalg.solve(p.inertia, [1 / p.radius, -1.0])
     rates = np.zeros((4, 4))
@@ -98,7 +99,7 @@ SOON, SOONER, SOONEST = 4.0, 10.0, 20.0  # 1/s: how fast speed, acceleration and
 
 
 class VelocityProfile:
-    """A speed (m/s) with its acceleration, jerk and snap. `max_acceleration` in m/s^2."""
+    """A smooth speed (m/s) with its acceleration, jerk and snap. `max_acceleration` is in m/s^2."""
 
     def __init__(self, max_acceleration: float) -> None:
         self._max_acceleration = max_acceleration
@@ -113,40 +114,44 @@ class VelocityProfile:
         self.speed += self.acceleration * dt
 
     def follow(self, speed: float, tolerance: float) -> None:
-        """Move the profile to within `tolerance` of the true speed, for a robot that was pushed."""
+        """Move the profile to within `tolerance` (m/s) of the true `speed`, for a robot that was pushed."""
         self.speed = speed + clamp(self.speed - speed, tolerance)
 
 
-FALLEN = 1.0  # rad of lean that no wheel can correct: the motors are off
+FALLEN = 1.0  # rad of lean that no wheel can correct; beyond, the motors are off
 MAX_LEAN = 0.45  # rad, to speed up or to slow down
 TURN = 8.0  # rad/s^2 of yaw
-STRAY = 0.3  # m/s from its profile that it corrects; a harder push shifts the profile
-MAX_AHEAD = 0.1  # m of position error that it remembers
+STRAY = 0.3  # m/s of speed error that it corrects; a harder push shifts the profile
+MAX_AHEAD = 0.1  # m; limit of the integrated position error
 GRIP = 0.7  # the share of the wheels' friction that is used: a wheel that slips does not steer
 STILL = 0.01  # m/s; a slower profile means standing
-NEAR = 0.01  # m
-FORGETS = 0.3  # s
-ASTRAY = 0.3  # rad of heading error that it remembers
-YAW_GAIN = 12.0  # 1/s: how fast an error of the turn rate is corrected
-YAW_TIME = 0.3  # s: the same for the heading
+NEAR = 0.01  # m of position error that decays while it stands
+FORGETS = 0.3  # s; time constant of that
+ASTRAY = 0.3  # rad; limit of the integrated heading error
+YAW_GAIN = 12.0  # 1/s; gain of the turn rate's error
+YAW_TIME = 0.3  # s; time constant in which a heading error is corrected
 
 
-class BalanceMover:
+class BalanceMover(JointedMover):
     """A body on two wheels. It leans to speed up and to slow down, so a stop takes some tenths of a second."""
 
     def __init__(self, body: JointedBody, model: RobotModel, mechanism: Balancing, dt: float) -> None:
-        self.body, self.names = body, body.names
-        self.wheels, self.kept = frozenset[str](), frozenset((mechanism.left, mechanism.right))
         self._sides = (mechanism.left, mechanism.right)
+        super().__init__(body, reserved=frozenset(self._sides))
         self._signs = [forward_sign(model, name) for name in self._sides]
         self._pendulum = pendulum_of(model, self._sides)
         self._gains = gains(self._pendulum, dt)
         self._most, self._yaw_gain = _strengths(model, self._sides, self._pendulum)
         self._max_acceleration = MAX_LEAN / self._pendulum.lean_per_acceleration
-        self._behind = 0.0  # rad of heading error
         self._rest()
         for name in self._sides:
-            body.release(name, friction=0.0)  # the plugin takes it away, whatever the file has
+            body.release(name, friction=0.0)  # Gazebo's plugin sets it to zero, whatever the file has
+
+    def _rest(self) -> None:
+        self._profile = VelocityProfile(self._max_acceleration)
+        self._ahead = 0.0  # m of position error
+        self._turn = 0.0  # rad/s; the commanded turn rate, ramped
+        self._behind = 0.0  # rad of heading error
 
     def move(self, velocity: Planar, dt: float) -> None:
         """Drive the wheels for the next step. It cannot move sideways."""
@@ -161,24 +166,18 @@ class BalanceMover:
         slow = self._turn - turning
         self._behind = clamp(self._behind + slow * dt, ASTRAY)
         if not (x or turn or self._turn) and abs(self._profile.speed) < STILL:
-            # At a stop it forgets its heading error, and a small position error: its wheels stick and slip, and it
-            # would oscillate for ever.
+            # At a stop it forgets its heading error, and a small position error: else it would oscillate for ever, as
+            # its wheels stick and slip.
             self._behind = 0.0
             if abs(self._ahead) < NEAR:
                 self._ahead *= 1 - dt / FORGETS
         drive = clamp(self._effort(state[:3], dt) / 2, self._most)
-        # Balance has priority: the turn gets the remaining torque.
+        # Balance has priority: turning gets the remaining torque.
         steer = clamp(self._yaw_gain * (slow + self._behind / YAW_TIME), self._most - abs(drive))
         return self._push(drive - steer, drive + steer)
 
-    def _rest(self) -> None:
-        self._profile = VelocityProfile(self._max_acceleration)
-        self._ahead: float = 0.0  # m of position error
-        self._turn: float = 0.0  # rad/s, the commanded turn now
-        self._behind = 0.0
-
     def _effort(self, state: tuple[float, float, float], dt: float) -> float:
-        """The torque of both wheels: feedforward of the profile, and feedback of the errors."""
+        """The torque (N m) of both wheels together: feedforward of the profile, and feedback of the errors."""
         profile, pendulum, leaning = self._profile, self._pendulum, self._pendulum.lean_per_acceleration
         lean, rate, speed = state
         bend = leaning * profile.snap  # the lean's second derivative
@@ -189,14 +188,6 @@ class BalanceMover:
         along, mixed = pendulum.inertia[0]
         feedforward = pendulum.radius * float(along * (profile.acceleration - pendulum.lag * bend) + mixed * bend)
         return feedforward - feedback
-
-    def moved(self, time: float, dt: float) -> Moved:
-        """The true pose."""
-        return *self.body.pose(), self.body.planar()
-
-    def states(self) -> JointStates:
-        """The states of the joints."""
-        return self.body.states()
 
     def _push(self, left: float, right: float) -> None:
         for name, sign, effort in zip(self._sides, self._signs, (left, right), strict=True):
@@ -221,7 +212,7 @@ def pendulum_of(model: RobotModel, wheels: tuple[str, str]) -> Pendulum:
     body = parts[0].body
     turning = [part for part in parts if part.joint and part.joint.name in wheels]
     axle = axes[wheels[0]].xyz[2]
-    radius = radius_of(model, model.joints[wheels[0]].child)
+    radius = round_radius(model.links[model.joints[wheels[0]].child])
     if len(turning) != 2 or not radius or body.centre[2] <= axle:
         raise RobotError(
             f"{model.name!r} cannot balance on {' and '.join(wheels)}: it needs two round wheels with mass,"
@@ -239,7 +230,7 @@ def pendulum_of(model: RobotModel, wheels: tuple[str, str]) -> Pendulum:
 
 
 def _strengths(model: RobotModel, wheels: tuple[str, str], pendulum: Pendulum) -> tuple[float, float]:
-    """The largest torque in N m without slip of a wheel, and the gain from an error of the turn rate to a torque."""
+    """The largest torque (N m) at which a wheel does not slip, and the gain from a turn rate error to torque."""
     mass = pendulum.body_mass + pendulum.wheel_mass
     mu = model.links[model.joints[wheels[0]].child].surface.mu1
     grip = GRIP * (1.0 if mu is None else mu) * mass * GRAVITY / 2

@@ -13,16 +13,15 @@ Moved = tuple[XYZ, XYZW, Planar]
 
 
 class Body:
-    """A body in the engine, by its root frame; the engine itself uses the centre of mass, at `centre` in that.
-
-    `number` is the engine's.
+    """A body in the engine, in terms of its root frame. The engine uses the centre of mass, which is at `centre` in the
+    root frame, and calls the body by its `number`.
     """
 
     def __init__(self, engine: Engine, number: int, centre: XYZ) -> None:
         self._engine, self.number, self._centre = engine, number, centre
         self.is_removed = False
-        self.woken: Callable[[], None] = lambda: None  # called when it glides no longer
-        self.glides = False  # whether it keeps the velocity that was set, without being set again at each step
+        self.woken: Callable[[], None] = lambda: None  # called when it stops gliding
+        self.glides = False  # whether it keeps a velocity that was set once; others are set at each step
 
     def pose(self) -> tuple[XYZ, XYZW]:
         """Position and rotation of the root frame in the world."""
@@ -42,7 +41,7 @@ class Body:
         return x, y, turn
 
     def box(self) -> Box:
-        """The corners of the box around it in the engine, along the axes of the world."""
+        """The corners of its bounding box in the engine, along the axes of the world."""
         return self._engine.box(self.number)
 
     def put(self, position: XYZ, rotation: XYZW, linear: XYZ, angular: XYZ) -> None:
@@ -68,6 +67,6 @@ class Body:
 
 
 def _at(linear: XYZ, angular: XYZ, away: XYZ) -> XYZ:
-    """The velocity of a point `away` from one that moves and turns: v + w x r."""
+    """The velocity of a point at an offset (m) from one that moves and turns: v + w x r."""
     (vx, vy, vz), (wx, wy, wz), (x, y, z) = linear, angular, away
     return vx + wy * z - wz * y, vy + wz * x - wx * z, vz + wx * y - wy * x

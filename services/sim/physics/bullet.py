@@ -1,7 +1,4 @@
-"""pybullet, loaded without its greeting, and the verbs of `Engine` and `Rays` in it.
-
-Its shapes and bodies are made once and used again.
-"""
+"""`Engine` and `Rays` in pybullet, which is loaded without its greeting. Shapes and bodies are made once and reused."""
 
 import math
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -20,13 +17,13 @@ from .engine import UPRIGHT, Array, Box, Contact, Engine, JointStates, Rays
 __all__ = ["MOST_KEPT", "Bullet", "BulletRays", "bullet"]
 
 MAX_IN_ONE = 16  # pybullet's MAX_COMPOUND_COLLISION_SHAPES; it silently drops the rest
-NOTHING = -1  # pybullet's shape that touches nothing
-MOST_KEPT = 64  # removed bodies; each takes 0.6 us a step
-MOST_SEEN = 1000  # removed bodies that rays do not hit; nothing steps there
+NOTHING = -1  # pybullet's number for no shape
+MOST_KEPT = 64  # removed bodies that are kept for reuse; each takes 0.6 us a step
+MOST_SEEN = 1000  # the same in the world of rays, which is never stepped
 FAR_AWAY: XYZ = (0.0, 0.0, 1e6)
-ASLEEP, AWAKE = 1 | 8, 2 | 4  # of pybullet's flags: it may sleep, and does; it may not, and is awake
-FREE, FIXED = (1, -1), (2, ~2)  # group, and groups that it touches; the engine's own for bodies and fixed bases
-OTHERS, OWN, ALL = 1, 1024, -1  # groups of what rays hit: 1024 is none of the engine's own, those of one sensor
+ASLEEP, AWAKE = 1 | 8, 2 | 4  # pybullet's flags: sleeping enabled and asleep; sleeping disabled and awake
+FREE, FIXED = (1, -1), (2, ~2)  # the engine's collision groups and masks, of free bodies and of fixed bases
+OTHERS, OWN, ALL = 1, 1024, -1  # groups for rays: 1024, which the engine does not use, are shapes that they do not hit
 
 
 with quiet():  # it prints its build time from C while it loads; no flag stops it
@@ -37,23 +34,24 @@ JOINTS = {"continuous": bullet.JOINT_REVOLUTE, "revolute": bullet.JOINT_REVOLUTE
 
 
 class Bullet(Engine):
-    """A world of pybullet: see `Engine`."""
+    """A world in pybullet: see `Engine`."""
 
     def __init__(self, spec: WorldSpec) -> None:
         self._gravity, self._dt = spec.gravity, spec.step
         self.id: int = bullet.connect(bullet.DIRECT)
         self._bodies = Bodies(self.id)
-        self._links: dict[int, list[int]] = {}  # of each body: the engine's number of each part
-        self._jointed: dict[int, list[int]] = {}  # of these, those with joints
-        self._masses: dict[int, tuple[float, XYZ]] = {}  # of roots, with their inertia
-        self._axes: dict[int, tuple[XYZW, XYZW]] = {}  # of roots whose principal axes are not the root's
+        self._links: dict[int, list[int]] = {}  # by body: the engine's link of each part
+        self._jointed: dict[int, list[int]] = {}  # by body: those links that have joints
+        self._masses: dict[int, tuple[float, XYZ]] = {}  # by body: mass and inertia of the root
+        self._axes: dict[int, tuple[XYZW, XYZW]] = {}  # by body: the root's principal axes, if not those of its frame
         self._floating: dict[int, dict[int, float]] = {}  # kg that gravity does not pull, by link
         bullet.setGravity(*spec.gravity, physicsClientId=self.id)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=spec.step,
             enableFileCaching=0,
             deterministicOverlappingPairs=1,
-            # With the cone a slipping wheel's grip depends on its heading in the world; with Gazebo's pyramid far less.
+            # With a friction cone, the grip of a slipping wheel depends on its heading in the world; with a pyramid, as
+            # Gazebo has, far less.
             enableConeFriction=0,
             physicsClientId=self.id,
         )
@@ -91,8 +89,8 @@ class Bullet(Engine):
         return number
 
     def _set_joint(self, number: int, link: int, part: Part, damping: float) -> None:
-        """The part's inertia, the limits of its joint, and the joint's damping in N m s/rad or N s/m. The engine's own
-        damping is off.
+        """Set the part's inertia, the limits of its joint, and the joint's damping in N m s/rad or N s/m. The engine's
+        own damping is off.
         """
         settings: dict[str, Any] = {"linearDamping": 0.0, "angularDamping": 0.0, "jointDamping": damping}
         limits = part.joint.limits if part.joint else None
@@ -103,7 +101,7 @@ class Bullet(Engine):
         bullet.changeDynamics(number, link, localInertiaDiagonal=part.body.inertia, physicsClientId=self.id)
 
     def _set_surface(self, number: int, links: Iterable[int], part: Part, contact: Contact) -> None:
-        """Set the contact parameters of a part's shapes, those of `links`."""
+        """Set the contact parameters of a part's shapes, which are in `links`."""
         settings: dict[str, Any] = {"lateralFriction": contact.friction}
         if part.joint and contact.along_axle < 1:
             # The axle keeps its direction while the wheel turns, so the link's own axes suffice.
@@ -229,13 +227,13 @@ class Bullet(Engine):
 
 
 class BulletRays(Rays):
-    """A world of pybullet that is never stepped: see `Rays`. All shapes of a kind that one body holds are in one."""
+    """A world in pybullet that is never stepped: see `Rays`."""
 
     def __init__(self, ground: bool) -> None:
         self._world: int = bullet.connect(bullet.DIRECT)
         self._made = Bodies(self._world, MOST_SEEN)
         self._bodies: dict[int, list[int]] = {}
-        self._owners: dict[int, int] = {}  # of the engine's bodies
+        self._owners: dict[int, int] = {}  # the engine's body -> the number of its shapes
         self._added = 0
         if ground:
             plane = bullet.createCollisionShape(bullet.GEOM_PLANE, physicsClientId=self._world)
@@ -293,11 +291,11 @@ class Shapes:
     def __init__(self, world: int) -> None:
         self._world = world
         self._made: dict[Any, int] = {}
-        # Without a visual the engine makes one of every collision shape: 0.5 ms and 14 KB each.
+        # Without a visual shape the engine makes one from each collision shape: 0.5 ms and 14 KB each.
         self.unseen: int = bullet.createVisualShape(bullet.GEOM_BOX, halfExtents=[1e-3] * 3, physicsClientId=world)
 
     def of(self, placed: tuple[PlacedShape, ...]) -> list[int]:
-        """The engine's ids of shapes in the frame of their part, as few as possible."""
+        """The engine's ids of the shapes `placed` in the frame of their part, joined to as few as possible."""
         simple = [part for part in placed if part.shape.kind in KINDS]
         chunks = [simple[start : start + MAX_IN_ONE] for start in range(0, len(simple), MAX_IN_ONE)]
         single = [part for part in placed if part.shape.kind in ("hull", "plane")]
@@ -337,22 +335,22 @@ def _compound(world: int, placed: list[PlacedShape]) -> int:
 
 
 class Bodies:
-    """The bodies of one world. The engine keeps 1 to 4 KB of each that it removed, for ever. So a removed body is only
-    put to sleep, far away and touching nothing, until another one like it is added; `most` of them are kept.
+    """The bodies of one world. For each body that the engine removes it keeps 1 to 4 KB for ever. So a removed body is
+    only put to sleep, far away and without contacts, until a like one is added; up to `most` of them are kept.
     """
 
     def __init__(self, world: int, most: int = MOST_KEPT) -> None:
         self.world, self.shapes, self._most = world, Shapes(world), most
-        self._kinds: dict[int, object] = {}  # of those that are there
-        self._kept: dict[int, object] = {}  # of those that are not; the first was removed first
+        self._kinds: dict[int, object] = {}  # number -> kind of the present bodies
+        self._kept: dict[int, object] = {}  # number -> kind of removed bodies, the first removed first
 
     def add(
         self, kind: object, place: tuple[XYZ, XYZW], mass: float, shape: int,
         inertial: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), UPRIGHT), **arguments: Any,
     ) -> int:  # fmt: skip
-        """A body that stands, its root frame at `place` and its inertial frame at `inertial` in that; the rest are
-        arguments of createMultiBody. `kind` equals that of another only if both are made, and have their dynamics set,
-        in the same way. Returns the engine's number.
+        """Add a body at rest, its root frame at `place`, and its inertial frame at `inertial` in the root frame; the
+        rest are arguments of createMultiBody. Bodies of equal `kind` have to be made, and have their dynamics set, in
+        the same way. Returns the engine's number.
         """
         number = next((number for number, kept in self._kept.items() if kept == kind), None)
         if number is None:
@@ -385,22 +383,22 @@ class Bodies:
             bullet.removeBody(oldest, self.world)
 
     def _place(self, number: int, at: XYZ, rotation: XYZW) -> None:
-        """Let it stand, its centre of mass at a pose, and its joints at zero."""
+        """Put the centre of mass at a pose and the joints at zero, all at rest."""
         bullet.resetBasePositionAndOrientation(number, at, rotation, self.world)
         bullet.resetBaseVelocity(number, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), self.world)
         for joint in range(bullet.getNumJoints(number, self.world)):
             bullet.resetJointState(number, joint, 0.0, 0.0, self.world)
 
     def _touch(self, number: int, base: tuple[int, int], links: tuple[int, int]) -> None:
-        """Set the groups of the shapes of a body's base and links."""
+        """Set the collision groups and masks of a body's base and of its links."""
         bullet.setCollisionFilterGroupMask(number, -1, *base, self.world)
         for link in range(bullet.getNumJoints(number, self.world)):
             bullet.setCollisionFilterGroupMask(number, link, *links, self.world)
 
 
 class Links:
-    """The arguments of `createMultiBody` for links below the base, all with the shape `visual`. Those without a joint
-    only carry shapes.
+    """The arguments of `createMultiBody` for the links below the base, all with the visual shape `visual`. Links
+    without a joint only carry shapes.
     """
 
     def __init__(self, visual: int) -> None:
@@ -420,15 +418,11 @@ class Links:
         mass: float = 0.0,
         inertial: tuple[XYZ, XYZW] = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0)),
     ) -> int:
-        """One link on link `parent` (-1: the base) with its frame `at` in the parent's. Returns its index."""
+        """Add a link to link `parent` (-1: the base), its frame `at` in the parent's. Returns its index."""
         values = (mass, shape, self._visual, *at, *inertial, parent + 1, joint, axis)
         for name, value in zip(_NAMES, values, strict=True):
             self.arguments[name].append(value)
         return len(self) - 1
-
-    def carry(self, parent: int, shapes: Iterable[int]) -> list[int]:
-        """Attach more shapes to a link that has one. Returns the indices of the links that carry them."""
-        return [self.add(parent, shape) for shape in shapes]
 
     def numbers(self, body: int, world: int) -> dict[int, int]:
         """Our index -> the engine's, which counts depth first; -1, the base, is the same in both."""
@@ -444,24 +438,15 @@ _NAMES = (
 
 
 def _link(links: Links, shapes: Shapes, parts: Sequence[Part]) -> tuple[int, list[list[int]]]:
-    """The base's shape, and the links of each part: its own, then those that only carry more shapes."""
+    """Add the links of all parts. Returns the base's shape, and the links of each part: its own, then those that only
+    carry more shapes.
+    """
     own = [shapes.of(part.body.collisions) or [NOTHING] for part in parts]
     indices = [-1]
     for part, (first, *_) in zip(parts[1:], own[1:], strict=True):
-        indices.append(_add(links, part, indices[part.parent], first))
-    others = [links.carry(index, more) for index, (_, *more) in zip(indices, own, strict=True)]
+        joint, body, parent = part.joint, part.body, indices[part.parent]
+        assert joint is not None, "only the root's part has none"
+        at, inertial = (part.xyz, part.rotation), (body.centre, body.axes)
+        indices.append(links.add(parent, first, JOINTS[joint.kind], joint.axis, at, body.mass, inertial))
+    others = [[links.add(index, shape) for shape in more] for index, (_, *more) in zip(indices, own, strict=True)]
     return own[0][0], [[index, *more] for index, more in zip(indices, others, strict=True)]
-
-
-def _add(links: Links, part: Part, parent: int, shape: int) -> int:
-    joint = part.joint
-    assert joint is not None, "only the root's part has none"
-    return links.add(
-        parent,
-        shape,
-        JOINTS[joint.kind],
-        joint.axis,
-        (part.xyz, part.rotation),
-        part.body.mass,
-        (part.body.centre, part.body.axes),
-    )

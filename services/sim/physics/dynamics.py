@@ -12,19 +12,19 @@ from .engine import Contact
 
 FRICTION = 1.0  # Gazebo's default for mu and mu2
 DRAG = 0.1  # friction of a caster whose file sets none; with more it chatters and lifts the wheels
-MAX_FRICTION = 10.0  # the engine multiplies the two surfaces'; students write 100 where they mean "does not slip"
-SIDEWAYS = 0.2  # share of it along the axles of a skid-steer, unless its file sets it
+MAX_FRICTION = 10.0  # the engine multiplies the friction of both surfaces, and some files have 100 for "does not slip"
+SIDEWAYS = 0.2  # share of the friction along the axles of a skid-steer, unless its file sets it
 GRAVITY = -GRAVITY_VECTOR[2]  # m/s^2
-GENTLE = 4.0  # steps in which a contact resolves penetration, at the fastest
+GENTLE = 4.0  # the fewest steps in which a contact resolves penetration
 SINK = 2e-4  # m that a skid-steer's tyres yield under its weight, so that all of them carry it
-MOST_LOST = 10.0  # time constants of damping in a step; beyond, a joint stands still at once
 RECOVERY = 0.1  # s; time constant of their rebound
+MOST_LOST = 10.0  # time constants of damping in a step; beyond, a joint stands still at once
 
 
 def contact_of(part: Part, dt: float, load: float = 0.0, drags: bool = False, rolls: bool = False) -> Contact:
-    """How a part touches the ground, in steps of `dt` seconds. `load` in N is the weight on a wheel that has to slide
-    along its axle, else 0. `drags`: the part is a caster, or the chassis, of a robot that wheels drive. `rolls`:
-    rollers on the part's rim take the motion along its axle.
+    """The contact parameters of a part, for steps of `dt` seconds. `load` is the weight (N) on a wheel that has to
+    slide along its axle, else 0. `drags`: the part is a caster, or the chassis, of a robot on driven wheels. `rolls`:
+    the part has rollers on its rim, and no friction along its axle.
     """
     mu, across = _friction(part.surface, load > 0, DRAG if drags else FRICTION)
     across = 0.0 if rolls else across
@@ -44,11 +44,11 @@ def load_on(parts: list[Part], wheels: int) -> float:
 
 
 def damping_of(parts: Sequence[Part], number: int, dt: float, implicit: bool = False) -> float:
-    """The damping to give the engine for steps of `dt` seconds: it slows the joint of part `number` in a step as much
-    as the file's damping does in that time.
+    """The damping to give the engine for the joint of part `number`, so that a step of `dt` seconds slows the joint as
+    much as the file's damping does in continuous time.
 
-    An engine applies to the whole step the damping force of its start, which makes a light wheel oscillate with growing
-    amplitude where damping * dt is above twice its inertia; or, if it is `implicit`, that of its end.
+    An engine applies the damping force at the start of a step to all of it, which makes a light wheel oscillate with
+    growing amplitude where damping * dt is more than twice its inertia; an `implicit` one applies that at the end.
     """
     part = parts[number]
     if part.joint is None or part.joint.damping <= 0:
@@ -60,19 +60,21 @@ def damping_of(parts: Sequence[Part], number: int, dt: float, implicit: bool = F
 
 
 def _carrier(parts: Sequence[Part], part: Part) -> float:
-    """The inertia of the part that carries another, about that one's axis."""
-    assert part.joint is not None, "the root is carried by nothing"
+    """The inertia of the part that carries this one, about this one's joint axis; its mass for a prismatic joint."""
+    assert part.joint is not None, "nothing carries the root"
     carrier = parts[part.parent].body
     return carrier.mass if part.joint.kind == "prismatic" else carrier.moment(rotate(part.rotation, part.joint.axis))
 
 
 def _inertia(part: Part, axis: XYZ) -> float:
-    """A part's own inertia on its joint: kg, or kg m^2 about its centre of mass; it never is less than that."""
+    """A part's own inertia on its joint: its mass in kg, or the moment in kg m^2 about its centre of mass, a lower
+    bound.
+    """
     return part.body.mass if part.joint and part.joint.kind == "prismatic" else part.body.moment(axis)
 
 
 def _friction(surface: Surface, slides: bool, default: float) -> tuple[float, float]:
-    """Friction as a wheel rolls, and along its axle."""
+    """The friction in a wheel's rolling direction, and along its axle."""
     along = default if surface.mu1 is None else surface.mu1
     across = along if surface.mu2 is None else surface.mu2
     return (along, across * SIDEWAYS) if slides and along == across else (along, across)

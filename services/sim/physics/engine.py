@@ -1,8 +1,8 @@
-"""What a physics engine does for the sim: the verbs of one world of bodies, and what a body is made of.
+"""The interface of a physics engine, and what a body is made of.
 
-`bullet.py` and `mujoco.py` have them, and only they import an engine. Metres, kilograms, seconds; quaternions are
-x, y, z, w; positions, velocities and forces are along the axes of the world. A body is called by the number that `add`
-gives, its parts by their indices, the root's first.
+`bullet.py` and `mujoco.py` implement it, and only they import an engine. Metres, kilograms, seconds; quaternions are
+x, y, z, w; positions, velocities and forces are in the world frame. A body is identified by the number that `add`
+returns, its parts by their indices, the root's first.
 """
 
 from collections.abc import Collection, Iterator, Sequence
@@ -16,7 +16,7 @@ from holozen.robot.rigid import Part, PlacedShape
 from holozen.rotation import XYZ, XYZW
 
 Box = tuple[XYZ, XYZ]
-"""Its corners."""
+"""The low and the high corner."""
 JointStates = tuple[list[float], list[float], list[float]]
 """Positions, rates and efforts: rad, rad/s, N m or m, m/s, N."""
 Array = npt.NDArray[np.float64]
@@ -26,8 +26,8 @@ UPRIGHT: XYZW = (0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """How a part's shapes touch others: their coefficient of friction, which is multiplied by the others', and the
-    share of it along the part's axle. `stiffness` in N/m and `damping` in N s/m; 0: the engine's own.
+    """The contact parameters of a part's shapes: the coefficient of friction, which is multiplied by that of the other
+    surface, and the share of it along the part's axle. `stiffness` in N/m and `damping` in N s/m; 0: the engine's own.
     """
 
     friction: float
@@ -42,8 +42,8 @@ class Engine(Protocol):
     ground: int | None
 
     def add(self, parts: Sequence[Part], contacts: Sequence[Contact], at: XYZ, rotation: XYZW, static: bool) -> int:
-        """A body that stands with its joints at zero, its root frame at a pose; a `static` one is fixed there. Gravity
-        does not pull the weightless share of a part. Returns its number.
+        """Add a body at rest, its root frame at a pose and its joints at zero; a `static` one is fixed there. Gravity
+        does not act on the weightless share of a part's mass. Returns its number.
         """
         ...
 
@@ -76,35 +76,35 @@ class Engine(Protocol):
         ...
 
     def freeze(self, number: int) -> None:
-        """Let a body of one part neither move nor touch anything; it can be placed."""
+        """Take a body of one part out of all dynamics and contacts; it can still be placed."""
         ...
 
     def thaw(self, number: int) -> None:
-        """Let it move and touch again."""
+        """Undo `freeze`."""
         ...
 
     def box(self, number: int) -> Box:
-        """A box around a body, along the axes of the world."""
+        """A body's bounding box, along the axes of the world."""
         ...
 
     def near(self, box: Box) -> set[int]:
-        """The bodies whose boxes overlap this one."""
+        """The bodies whose bounding boxes overlap a box."""
         ...
 
     def gap(self, one: int, other: int, within: float) -> float:
-        """The distance between two bodies, negative where they overlap; `within` if it is larger."""
+        """The distance (m) between two bodies, negative where they overlap; at most `within`."""
         ...
 
     def touched(self, number: int) -> set[int]:
-        """The bodies that it had contacts with in the last step."""
+        """The bodies that a body was in contact with in the last step."""
         ...
 
     def is_plane(self, number: int) -> bool:
-        """Whether a body is an endless plane."""
+        """Whether a body is an infinite plane."""
         ...
 
     def joints(self, number: int) -> JointStates:
-        """The states of a body's joints, in the order of its parts. The effort is that of motor and friction."""
+        """The states of a body's joints, in the order of its parts. The efforts are those of motors and friction."""
         ...
 
     def joint(self, number: int, part: int) -> tuple[float, float]:
@@ -112,17 +112,17 @@ class Engine(Protocol):
         ...
 
     def turn(self, number: int, part: int, rate: float, effort: float) -> None:
-        """Let the motor of a part's joint keep a rate from now on, with at most an effort; at rate 0 it is friction."""
+        """From now on, let the motor of a part's joint keep a rate, with at most an effort; rate 0 is friction."""
         ...
 
     def go(self, number: int, part: int, position: float, closing: float, effort: float, rate: float) -> None:
-        """Let the motor move a part's joint to a position from now on, with a time constant of `closing` seconds, at
-        most an effort and a rate.
+        """From now on, let the motor of a part's joint move it to a position, with a time constant of `closing` seconds
+        and at most an effort and a rate.
         """
         ...
 
     def push(self, number: int, part: int, effort: float) -> None:
-        """Apply an effort to a part's joint in the next step, besides its motor's."""
+        """Apply an effort to a part's joint in the next step, in addition to that of its motor."""
         ...
 
     def frame(self, number: int, part: int) -> tuple[XYZ, XYZW]:
@@ -130,17 +130,17 @@ class Engine(Protocol):
         ...
 
     def wrench(self, number: int, part: int, force: XYZ, torque: XYZ, point: XYZ) -> None:
-        """Push a part in the next step with a force at a point, and with a torque."""
+        """Apply a force at a point, and a torque, to a part in the next step."""
         ...
 
 
 class Rays(Protocol):
-    """A world of shapes that rays hit, and nothing else. `ground`: a level plane at z = 0."""
+    """A world of shapes for rays and contact queries, without dynamics. `ground`: a level plane at z = 0."""
 
     def __init__(self, ground: bool) -> None: ...
 
     def add(self, shapes: tuple[PlacedShape, ...]) -> int:
-        """Shapes that are placed together, at the origin at first. Returns their number."""
+        """Add shapes that are placed together, first at the origin. Returns their number."""
         ...
 
     def remove(self, number: int) -> None:
@@ -152,14 +152,15 @@ class Rays(Protocol):
         ...
 
     def cast(self, origin: XYZ, directions: Array, near: float, far: float, own: int) -> Array:
-        """The distances (n,) to what is hit first between `near` and `far` by rays along unit vectors (n, 3); infinite
-        for nothing. The shapes `own` are not hit.
+        """The distances (n,) to the first hits between `near` and `far` (m) of rays along unit vectors (n, 3); infinite
+        without a hit. Rays pass through the shapes `own`.
         """
         ...
 
     def touched(self, number: int, within: float, but: Collection[int]) -> Iterator[tuple[int, XYZ, XYZ, float]]:
-        """What is nearer than `within` (m) to some shapes, the shapes `but` excepted: their number, 0 for the ground, a
-        point on them, the unit vector from there out of them, and the distance, below 0 in them.
+        """The contacts of some shapes with others, except those in `but`, that are nearer than `within` (m). Of each:
+        the number of the others (0: the ground), a point on them, the unit normal out of them, and the distance,
+        negative if they overlap.
         """
         ...
 

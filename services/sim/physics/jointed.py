@@ -1,14 +1,14 @@
-"""A robot of parts with joints between them, moved by motors in the joints; or an object that nothing moves."""
+"""A robot made of parts, with motors in the joints between them; or an object that nothing drives."""
 
 import math
 
 from holozen.command.motion import AppliedForce, JointMotion
-from holozen.limits import clamp
+from holozen.limits import Planar, clamp
 from holozen.robot.model import Force, Joint, Pose, RobotModel
 from holozen.robot.rigid import Frame, Part, in_parts
 from holozen.rotation import XYZ, XYZW, multiply, rotate
 
-from .body import Body
+from .body import Body, Moved
 from .dynamics import contact_of, load_on
 from .engine import UPRIGHT, Engine, JointStates
 
@@ -19,9 +19,10 @@ FOLLOWING = 0.02  # s; the same for a joint that mimics another
 
 
 class JointedBody(Body):
-    """The parts of `assemble`, the root's first. Joints are called by their names; rad, rad/s, N m or m, m/s, N.
+    """A body of the parts of `assemble`, the root's first. Joints are called by their names; units are rad, rad/s and
+    N m, or m, m/s and N.
 
-    `wheels` names the joints of the wheels that drive it. More than two have to slide along their axles, and other
+    `wheels` names the joints of the driven wheels. More than two of them have to slide along their axles, and other
     parts slide on the ground too, unless the file sets their friction. `omni` wheels have none along their axles.
     """
 
@@ -45,7 +46,7 @@ class JointedBody(Body):
         super().__init__(engine, number, parts[0].body.centre)
         self._dt = dt
         self._joints = {part.joint.name: (index, part.joint) for index, part in enumerate(parts) if part.joint}
-        self._efforts: dict[int, float] = {}  # what `push` applies, by the index of the part
+        self._efforts: dict[int, float] = {}  # that `push` applies, by the index of the part
         self._begin()
 
     def _begin(self) -> None:
@@ -65,8 +66,8 @@ class JointedBody(Body):
         return positions, rates, efforts
 
     def wrench(self, part: int, at: Frame, along: bool, force: XYZ, torque: XYZ) -> None:
-        """Push with a force (N) and a torque (N m) during the next step, at the point `at` of a part; along the axes of
-        that frame, or of the world. `part` is an index of `assemble`.
+        """Apply a force (N) and a torque (N m) during the next step, at the origin of the frame `at` in a part.
+        `along`: they are in the axes of that frame, else of the world. `part` is an index of `assemble`.
         """
         place, rotation = self._engine.frame(self.number, part) if part else self.pose()
         x, y, z = rotate(rotation, at.xyz)
@@ -88,7 +89,7 @@ class JointedBody(Body):
     def turn(self, name: str, rate: float, effort: float = math.inf) -> None:
         """Turn a joint at a rate, within its limits. Call it before each step for a joint with position limits."""
         number, joint = self._joints[name]
-        self._turn(number, self._kept(number, joint, rate), _effort(joint, effort))
+        self._turn(number, self._within_limits(number, joint, rate), _effort(joint, effort))
 
     def go(self, name: str, position: float, closing: float = CLOSING) -> None:
         """Move a joint to a position, within its limits, with a time constant of `closing` seconds."""
@@ -99,7 +100,7 @@ class JointedBody(Body):
         self._engine.go(self.number, number, position, closing, _effort(joint), rate)
 
     def push(self, name: str, effort: float, most: float = math.inf) -> None:
-        """Apply a torque or force to a joint for the next step, within its limits. `release` it first."""
+        """Apply an effort to a joint for the next step, within its limits. `release` it first."""
         number, joint = self._joints[name]
         effort = clamp(effort, _effort(joint, most))
         if math.isfinite(joint.limits.velocity):
@@ -117,9 +118,9 @@ class JointedBody(Body):
         for name, mimic in self._mimics.items():
             self.go(name, mimic.multiplier * positions[mimic.joint] + mimic.offset, FOLLOWING)
 
-    def _kept(self, number: int, joint: Joint, rate: float) -> float:
-        """`rate` within the joint's limits, for the next step: a strong motor would overcome the engine's own. A joint
-        that is beyond its limits already may only move back.
+    def _within_limits(self, number: int, joint: Joint, rate: float) -> float:
+        """The `rate` at which the joint does not leave its limits in the next step: a strong motor would overcome those
+        of the engine. A joint that is already beyond its limits may only move back.
         """
         limits = joint.limits
         rate = clamp(rate, limits.velocity)
@@ -139,9 +140,29 @@ def _effort(joint: Joint, effort: float = math.inf) -> float:
     return min(effort, joint.limits.effort, MAX_EFFORT)
 
 
+class JointedMover:
+    """A robot or object without a drive, which subclasses add. Joint commands may move its joints."""
+
+    def __init__(
+        self, body: JointedBody, wheels: frozenset[str] = frozenset(), reserved: frozenset[str] = frozenset()
+    ) -> None:
+        self.body, self.names, self.wheels, self.reserved = body, body.names, wheels, reserved
+
+    def move(self, velocity: Planar, dt: float) -> None:
+        """Do nothing: it has no drive."""
+
+    def moved(self, time: float, dt: float) -> Moved:
+        """The true pose."""
+        return *self.body.pose(), self.body.planar()
+
+    def states(self) -> JointStates:
+        """The states of the joints."""
+        return self.body.states()
+
+
 class Motors:
     """The motors of some joints of a body, with at most `effort` in N m or N each. A joint that is no longer commanded
-    holds still; with `together`, all of them do while one is commanded, as the wheels of one base.
+    holds still. With `together`, as for the wheels of one base, all others hold still while one is commanded.
     """
 
     def __init__(
@@ -151,7 +172,7 @@ class Motors:
         self._held: frozenset[str] = frozenset()
         self._last: JointMotion | None = None
 
-    def do(self, motion: JointMotion | None) -> None:
+    def apply(self, motion: JointMotion | None) -> None:
         """Apply the motion of the next step; None: hold the joints that were moved before."""
         commanded = frozenset(name for name, _ in motion.values) if motion else frozenset[str]()
         if motion and motion != self._last:
@@ -185,7 +206,9 @@ class Motors:
 
 
 class Forces:
-    """The forces of a model on its body. While no source commands them its wheels brake, where nothing else drives."""
+    """The forces that commands apply to a model's body. While no source commands any, the wheels brake, unless a drive
+    turns them.
+    """
 
     def __init__(
         self, body: JointedBody, forces: dict[str, list[Force]], model: RobotModel, brakes: Motors | None
@@ -200,8 +223,8 @@ class Forces:
         self._turning = frozenset(joint.name for joint in model.joints.values() if joint.kind == "continuous")
         self._rolls: bool | None = None
 
-    def do(self, pushes: list[AppliedForce] | None) -> None:
-        """AppliedForce during the next step; None: no source drives."""
+    def apply(self, pushes: list[AppliedForce] | None) -> None:
+        """Apply forces during the next step; None: no source drives."""
         rolls = pushes is not None
         if self._brakes and rolls != self._rolls:
             self._brakes.brake(self._turning & self._brakes.names, on=not rolls)
@@ -212,7 +235,7 @@ class Forces:
 
 
 def _centre(model: RobotModel, part: int, link: Frame, name: str) -> tuple[int, Frame]:
-    """A link's part, and in its frame the link's centre of mass, with the link's axes."""
+    """A link's part, and the link's centre of mass in the frame of that part, with the link's axes."""
     inertial = model.links[name].inertial
     inside = Frame.of(Pose(inertial.pose.xyz)) if inertial else Frame.of(Pose())
     return part, link @ inside

@@ -1,6 +1,6 @@
-"""MuJoCo, and the verbs of `Engine` and `Rays` in it.
+"""`Engine` and `Rays` in MuJoCo.
 
-Its model is compiled anew when a body comes or goes, which costs 7 ms, and 2 ms more for each robot that there is.
+The model is recompiled when a body is added or removed, which takes 7 ms, and 2 ms more for each robot that there is.
 """
 
 import math
@@ -23,50 +23,50 @@ from .dynamics import FRICTION, damping_of
 from .engine import UPRIGHT, Array, Box, Contact, Engine, JointStates, Rays
 
 KINDS = {"box": mj.mjtGeom.mjGEOM_BOX, "cylinder": mj.mjtGeom.mjGEOM_CYLINDER, "sphere": mj.mjtGeom.mjGEOM_SPHERE}
-ENDLESS = 1e6  # m that a plane extends
-THIN = 1e-4  # m; a hull's thickness at least: the engine has none of flat ones
-MEMORY = 1 << 28  # bytes for contacts; only what is used is taken from the machine
-EXCLUDED = 1  # of a contact: it is only reported
-RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance of motors, the highest there is
-FIRM = (0.95, 0.99, 0.001, 0.5, 2.0)  # of contacts and joint limits
+ENDLESS = 1e6  # m; half the width of a plane's bounding box
+THIN = 1e-4  # m; the least thickness of a hull: the engine takes no flat ones
+MEMORY = 1 << 28  # bytes of address space for contacts; only what is used takes memory
+EXCLUDED = 1  # of a contact: it has no force
+RIGID = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # impedance of motors and joint limits, the highest that the engine allows
+FIRM = (0.95, 0.99, 0.001, 0.5, 2.0)  # impedance of contacts
 STEPS = 2.0  # time constant of motors in steps, the shortest that the engine allows
-FIRM_BACK, GENTLE_BACK = 20.0, 9.0  # 1/s; how fast contacts, and limits of joints, recover from penetration
-RIM = 0.7  # sine of the angle between a wheel's axle and what it touches with its rim, at least
-PARALLEL = 0.99  # cosine of the angle between the axle and a cylinder that is a wheel
-LEAST = 1e-3  # the least friction; with far less than across, the engine does not find rest
+FIRM_BACK, GENTLE_BACK = 20.0, 9.0  # 1/s; how fast contacts, and joint limits, recover from penetration
+RIM = 0.7  # the least sine of the angle between a wheel's axle and the normal of a contact on its rim
+PARALLEL = 0.99  # the least cosine of the angle between the axle and the axis of a cylinder that is a wheel
+LEAST = 1e-3  # the least friction; the solver does not converge if it differs too much along and across the axle
 
 
 Indices = npt.NDArray[np.intp]
 
 
-mj.set_mju_user_warning(lambda text: report(f"sim: warning: mujoco: {text}"))  # else it writes a file where it runs
+mj.set_mju_user_warning(lambda text: report(f"sim: warning: mujoco: {text}"))  # else it writes a log file
 
 
 @dataclass(eq=False)
 class _Kept:
-    """A body, and where it is in the compiled model."""
+    """A body, and its indices in the compiled model."""
 
     parts: tuple[Part, ...]
     contacts: tuple[Contact, ...]
     static: bool
     bodies: list[mj.MjsBody]  # of its parts
-    motors: list[tuple[float, float]]  # rate and effort of the joints' motors
-    goals: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # of joints: position, closing, rate
+    motors: list[tuple[float, float]]  # rate and effort of the parts' motors
+    goals: dict[int, tuple[float, float, float]] = field(default_factory=dict)  # by part: position, closing, rate
     frozen: bool = False
     ids: list[int] = field(default_factory=list)  # of the parts' bodies
     geoms: Indices = field(default_factory=lambda: np.zeros(0, np.intp))
-    at: int = 0  # its place in qpos, and in qvel
-    speed: int = 0
+    at: int = 0  # the root's index in qpos
+    speed: int = 0  # the root's index in qvel
     joints_at: list[int] = field(default_factory=list)
     joints_speed: list[int] = field(default_factory=list)
 
 
 class MuJoCo(Engine):
-    """A world of MuJoCo: see `Engine`.
+    """A world in MuJoCo: see `Engine`.
 
-    A joint's motor is its dry friction, with the commanded rate in the place of rest: the engine's solver finds it with
-    all contacts, and its effort is bounded. Coefficients of friction are multiplied, and what rolls along its axle has
-    less there: MuJoCo itself knows neither, so both are set between its collisions and its solver.
+    A joint's motor is its dry friction, about the commanded rate instead of about rest: the solver finds its effort
+    together with all contacts, and bounds it. The friction of two surfaces is multiplied, and wheels have less of it
+    along their axles: MuJoCo has neither, so both are set between collision detection and the solver.
     """
 
     def __init__(self, spec: WorldSpec) -> None:
@@ -140,20 +140,20 @@ class MuJoCo(Engine):
         geom.solref, geom.solimp = self._firm, FIRM
         geom.friction = [contact.friction, 0.0, 0.0]
         geom.condim = 3
-        if not contact.friction:  # then that of the other does not count
+        if not contact.friction:  # there is none, whatever the other surface has
             geom.condim, geom.priority = 1, 1
 
     def _compile(self) -> None:
-        # What is recompiled keeps its place and velocity.
+        # The bodies keep their poses and velocities.
         self._model, self._data = self._spec.recompile(self._model, self._data)
         self._compiled()
 
     def _compiled(self) -> None:
         model = self._model
-        self._owner = np.zeros(model.nbody, np.intp)  # number of the body of each of the model's
+        self._owner = np.zeros(model.nbody, np.intp)  # our number of each of the model's bodies
         self._turns = np.zeros(model.ngeom, bool)  # whether a shape turns on an axle
-        self._along = np.ones(model.ngeom)  # share of friction along that
-        self._axles = np.zeros((model.ngeom, 3))  # in the frame of the body of the geom
+        self._along = np.ones(model.ngeom)  # share of the friction along the axle
+        self._axles = np.zeros((model.ngeom, 3))  # in the frame of the shape's body
         self._rates = np.zeros(model.nv)
         self._mu = model.geom_friction[:, 0].copy()
         for number, kept in self._all.items():
@@ -177,7 +177,7 @@ class MuJoCo(Engine):
         self._has_wheels = bool(self._turns.any())
         ends = np.array([rotate(_xyzw(turn), (0.0, 0.0, 1.0)) for turn in model.geom_quat.tolist()]).reshape(-1, 3)
         round_ = model.geom_type == mj.mjtGeom.mjGEOM_CYLINDER
-        self._flat = round_ & (np.abs(np.sum(ends * self._axles, axis=1)) > PARALLEL)  # a wheel
+        self._flat = round_ & (np.abs(np.sum(ends * self._axles, axis=1)) > PARALLEL)  # cylinders that are wheels
         self._efforts = np.zeros(model.nv)
         self._planes = model.geom_type == mj.mjtGeom.mjGEOM_PLANE
         self._located()
@@ -223,9 +223,7 @@ class MuJoCo(Engine):
         self._located()
 
     def _set_contacts(self) -> None:
-        """Multiply the friction of both surfaces, let the parts of one body pass through each other, and let wheels
-        touch as wheels.
-        """
+        """Multiply the friction of both surfaces, exclude contacts within one body, and correct those of wheels."""
         contacts, model = self._data.contact, self._model
         pairs = contacts.geom
         owners = self._owner[model.geom_bodyid[pairs]]
@@ -236,8 +234,8 @@ class MuJoCo(Engine):
                 self._set_wheels(chosen, geoms[chosen])
 
     def _set_wheels(self, chosen: Indices, geoms: Indices) -> None:
-        """Make contacts, by their indices, those of wheels: on its rim a cylinder touches in its middle, or its edges
-        would scrub as it turns about the vertical; and its friction is that along and across the axle.
+        """Correct the contacts `chosen` of the wheels `geoms`. On the rim of a cylinder they move to its middle, since
+        its edges would scrub as it turns about the vertical; and friction differs along and across the axle.
         """
         contacts, model, data = self._data.contact, self._model, self._data
         turns = data.xmat[model.geom_bodyid[geoms]].reshape(-1, 3, 3)
@@ -327,7 +325,7 @@ class MuJoCo(Engine):
         return (x, y, z), (x2, y2, z2)
 
     def _boxes(self, geoms: "Indices | slice") -> tuple[Array, Array]:
-        """The corners (n, 3) and (n, 3) of boxes around shapes."""
+        """The low corners (n, 3) and the high corners (n, 3) of the bounding boxes of shapes."""
         if not self._is_fresh:
             self._located()
         turns = self._data.geom_xmat[geoms].reshape(-1, 3, 3)
@@ -352,7 +350,7 @@ class MuJoCo(Engine):
         least = within
         for i, j in np.argwhere(apart < within + 1e-9):
             pair = int(mine[i]), int(theirs[j])
-            # The engine has no depth for a distance of 0.
+            # With a limit of 0 the engine reports no depth.
             least = min(least, mj.mj_geomDistance(self._model, self._data, *pair, max(within, 1e-6), points))
         return least
 
@@ -412,7 +410,7 @@ class MuJoCo(Engine):
 
 
 class MuJoCoRays(Rays):
-    """A world of MuJoCo that is never stepped: see `Rays`."""
+    """A world in MuJoCo that is never stepped: see `Rays`."""
 
     def __init__(self, ground: bool) -> None:
         self._spec = mj.MjSpec()
@@ -448,7 +446,7 @@ class MuJoCoRays(Rays):
         found, geoms = np.empty(len(ways)), np.empty(len(ways), np.int32)
         body = self._bodies[own].id
         mj.mj_multiRay(model, data, start, ways.ravel(), None, True, body, geoms, found, None, len(ways), far)
-        for index in np.flatnonzero((found >= 0) & (found < near)):  # behind what is too near
+        for index in np.flatnonzero((found >= 0) & (found < near)):  # look behind what is too near
             beyond = mj.mj_ray(model, data, start + near * ways[index], ways[index], None, True, body, None)
             found[index] = near + beyond if beyond >= 0 else -1.0
         return np.where((found < 0) | (found > far), np.inf, found)
@@ -468,7 +466,7 @@ class MuJoCoRays(Rays):
                 if distance >= within:
                     continue
                 away = (fromto[:3] - fromto[3:]) * math.copysign(1.0, distance)
-                if np.linalg.norm(away) < THIN:  # it just touches: two points in one place have no direction
+                if np.linalg.norm(away) < THIN:  # they only just touch: the line between both points has no direction
                     plane = data.geom_xmat[other][2::3]
                     away = data.geom_xpos[own] - data.geom_xpos[other] if model.geom_rbound[other] else plane
                 yield owner, triple(fromto[3:]), triple(away / np.linalg.norm(away)), distance
@@ -492,7 +490,7 @@ class MuJoCoRays(Rays):
 
 
 def _add_shape(spec: mj.MjSpec, body: mj.MjsBody, placed: PlacedShape) -> mj.MjsGeom | None:
-    """A collision shape of a body; none of a kind that nothing touches."""
+    """Add a collision shape to a body. Returns None for a kind that has no collisions."""
     shape, at = placed.shape, {"pos": placed.xyz, "quat": _wxyz(placed.quaternion)}
     if shape.kind in KINDS:
         x, y, z = (*shape.size, 0.0, 0.0)[:3]
@@ -502,7 +500,7 @@ def _add_shape(spec: mj.MjSpec, body: mj.MjsBody, placed: PlacedShape) -> mj.Mjs
         return body.add_geom(type=mj.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0], **at)
     if shape.kind != "hull":
         return None
-    name = f"hull {hash(shape.points)}"  # equal ones are shared, and stay when their bodies go
+    name = f"hull {hash(shape.points)}"  # equal hulls share a mesh, which stays when their bodies are removed
     if spec.mesh(name) is None:
         inertia = mj.mjtMeshInertia.mjMESH_INERTIA_CONVEX
         spec.add_mesh(name=name, uservert=_thick(np.array(shape.points)).ravel(), inertia=inertia)
@@ -510,7 +508,7 @@ def _add_shape(spec: mj.MjSpec, body: mj.MjsBody, placed: PlacedShape) -> mj.Mjs
 
 
 def _thick(points: Array) -> Array:
-    """The points (n, 3) of a hull, or (2 n, 3) of one as thin as the engine can have, if they are in a plane."""
+    """The points (n, 3) of a hull. If they are in a plane, those (2 n, 3) of a hull as thin as the engine allows."""
     middle = points - points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(middle, full_matrices=False)
     if len(points) < 4 or sizes[-1] < THIN:

@@ -13,38 +13,38 @@ from holozen.rotation import XYZ, XYZW, from_axis_angle, rotate, yaw
 from .body import Body, Moved
 from .dynamics import GRAVITY
 from .engine import UPRIGHT, Contact, Engine, JointStates
-from .wheels import MecanumWheels, Wheels
+from .wheels import Wheels
 
 HOLD_GAIN = 0.1  # share of the distance to its place that it recovers in a step
 HOLD_LIMIT = 0.005  # m; pushed farther, it holds its new place
 LOST = 0.1  # share of its speed lost in a step that means an obstacle: more than at the foot of a slope of 15 degrees
-PUSH = 3.0  # m/s^2 with which it pushes an obstacle at most
-TIPPING = 0.2  # rad/s; an obstacle that tips it faster takes the load, and so the grip, from its wheels
-UPRIGHT_PUSH = 0.3  # share of the push at its centre of mass that would begin to tip it
-LOOK = 12  # steps between two looks of a body around itself
-FAR = 8 * LOOK  # steps until the next look of one that glides, at most: where nothing can come near it before
-SKIN = 0.03  # m; what is closer counts as near, however slow
-BRISK = 1.0  # m/s that parts of other robots may be faster than their bodies
-GRADE = 0.1  # m/s to a multiple of which the fastest speed is rounded up: each rise lets all bodies look anew
-SETTLED = 1e-5  # m and rad by which a body that has settled moves up or tilts between two looks
-STEEP = 0.7  # of its upward axis along z; where it lies farther over, it turns about the vertical
-LANDED = 0.2  # m/s along its upward axis; with more it falls, or jumps
-STEADY = 1e-3  # m/s and rad/s of deviation from the commanded velocity
+PUSH = 3.0  # m/s^2; the most with which it pushes an obstacle
+TIPPING = 0.2  # rad/s; an obstacle that tips it faster takes the load, and so the grip, off its wheels
+UPRIGHT_PUSH = 0.3  # share of the acceleration at its centre of mass that would begin to tip it
+LOOK = 12  # steps between two looks of a body at what is around it
+FAR = 8 * LOOK  # the most steps until the next look of one that glides, if nothing can come near it before
+SKIN = 0.03  # m; what is closer counts as near, however slow it is
+BRISK = 1.0  # m/s by which parts of other robots may be faster than their bodies
+GRADE = 0.1  # m/s; the fastest speed is rounded up to a multiple, since each rise lets all bodies look again
+SETTLED = 1e-5  # m and rad; a body that has settled rises or tilts less than this between two looks
+STEEP = 0.7  # z component of its upward axis; tilted farther, it turns about the vertical
+LANDED = 0.2  # m/s along its upward axis; faster, it falls or jumps
+STEADY = 1e-3  # m/s and rad/s; the largest deviation from the commanded velocity
 
 
 class Field:
-    """The planar bodies of a world, by the engine's numbers. `level` is the number of a level ground below them, if the
-    world has one; `steps` counts those of the world, of `step` seconds. `gravity` is in m/s^2.
+    """The planar bodies of a world, by the engine's numbers. `level` is the number of a level ground, if the world has
+    one; `steps` counts the world's steps, of `step` seconds each. `gravity` is in m/s^2.
     """
 
     def __init__(self, engine: Engine, step: float, level: int | None, gravity: XYZ) -> None:
         self.engine, self.step, self.level, self.gravity = engine, step, level, gravity
         self.steps = 0
         self.bodies: dict[int, PlanarBody] = {}
-        self._looks: dict[int, list[PlanarBody]] = {}  # step -> the bodies that look around then
-        self._fastest = 0.0  # m/s
-        self.others: list[Body] = []  # what moves in the engine besides
-        self.gliding = 0  # how many of `bodies` do
+        self._looks: dict[int, list[PlanarBody]] = {}  # step -> the bodies that look around at it
+        self._fastest = 0.0  # m/s; an upper bound of the speeds of all that moves
+        self.others: list[Body] = []  # the other bodies that move in the engine
+        self.gliding = 0  # how many of `bodies` glide
 
     @property
     def time(self) -> float:
@@ -57,24 +57,26 @@ class Field:
         return not self.others and self.gliding == len(self.bodies)
 
     def add(self, body: "PlanarBody") -> None:
-        """Let a body look around from time to time."""
+        """Add a body, which looks around from time to time."""
         self.bodies[body.number] = body
         self.let_look(body, LOOK)
         self.hasten()
 
     def remove(self, body: "PlanarBody") -> None:
-        """Forget a body."""
+        """Remove a body."""
         del self.bodies[body.number]
 
     def stepped(self) -> None:
-        """Count a step of the world, and let the bodies whose turn it is look around."""
+        """Count a step of the world, and let the bodies that are due look around. Raises ValueError or ArithmeticError
+        if the numbers of a body are not finite.
+        """
         self.steps += 1
         looks = self._looks.pop(self.steps, ())
         try:
             self._look_around(looks)
         except (ValueError, ArithmeticError):
             for body in self.bodies.values():
-                if body.looks_at <= self.steps:  # it may not have looked
+                if body.looks_at <= self.steps:  # it may have missed its look
                     self.let_look(body, LOOK)
             raise
 
@@ -90,34 +92,34 @@ class Field:
                 body.look()
 
     def let_look(self, body: "PlanarBody", steps: int) -> None:
-        """Let a body look around in that many steps, LOOK or more, or before: each has a turn of its own in LOOK."""
+        """Let a body look around within that many steps, LOOK or more; the looks of bodies are spread out."""
         at = self.steps + steps - (self.steps + steps - body.number) % LOOK
         if body.looks_at != at:
             body.looks_at = at
             self._looks.setdefault(at, []).append(body)
 
     def hasten(self) -> None:
-        """Let all bodies look around within LOOK steps: something may be nearer or faster than they could know."""
+        """Let all bodies look around within LOOK steps: something may be nearer or faster than they assume."""
         for body in self.bodies.values():
             if body.looks_at > self.steps + LOOK:
                 self.let_look(body, LOOK)
 
     def closing(self, speed: float) -> float:
-        """How fast in m/s a body with this speed and another may come nearer."""
+        """The greatest speed (m/s) at which a body with this speed and another one can approach each other."""
         if speed > self._fastest:
             self._fastest = _graded(speed)
             self.hasten()
         return speed + self._fastest
 
     def margin(self, speed: float) -> float:
-        """The distance in m within which others may come near a body with this speed (m/s) before its next look, also
-        where the engine has them at the place of their own last looks.
+        """The distance (m) within which others may come near a body with this speed (m/s) before its next look. It also
+        covers gliding ones, which the engine still has where they last looked.
         """
         return SKIN + (self.closing(speed) + self._fastest) * FAR * self.step
 
 
 def _within(distance: float, way: float) -> int:
-    """The steps of that `way` in a distance, at most FAR."""
+    """The number of steps in which something covers a distance (m), `way` metres a step; at most FAR."""
     return int(min(FAR, max(0.0, distance) / way))
 
 
@@ -127,7 +129,7 @@ def _graded(speed: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Glide:
-    """A motion at a constant body-frame velocity over level ground, from a pose of the root frame at time `start`."""
+    """A motion over level ground at a constant body-frame velocity. The root frame is at a pose at time `start` (s)."""
 
     start: float
     position: XYZ
@@ -136,13 +138,13 @@ class Glide:
     heading: float  # rad, at the start
 
     def at(self, time: float) -> XYZ:
-        """The position of the root frame; its height stays as it is."""
+        """The position of the root frame at a time (s), at a constant height."""
         x, y, z = self.position
         dx, dy = travelled(self.velocity, self.heading, time - self.start)
         return x + dx, y + dy, z
 
     def pose(self, time: float) -> tuple[XYZ, XYZW]:
-        """The pose of the root frame; its tilt stays as it is."""
+        """The pose of the root frame at a time (s), with a constant tilt."""
         i, j, k, w = self.rotation
         half = self.velocity[2] * (time - self.start) / 2
         c, s = math.cos(half), math.sin(half)
@@ -150,11 +152,11 @@ class Glide:
 
 
 class PlanarBody(Body):
-    """The drive sets its speed over ground and its turn; the engine keeps gravity, tilt and contacts. Its contacts have
-    no friction: rolling wheels do not brake. At a stop it holds its place, also on a slope.
+    """A body whose drive sets its velocity over the ground and its turn rate; the engine adds gravity, tilt and
+    contacts. These have no friction, since rolling wheels do not brake. At a stop it holds its place, also on a slope.
 
-    Where it has settled on level ground and nothing is near, contacts change nothing: it glides, outside of the
-    engine's steps and in closed form, until something comes near or it is moved by other than its drive.
+    When it has settled on level ground and nothing is near, contacts change nothing. Then it glides: its motion is
+    computed in closed form, without the engine, until something comes near or anything but its drive moves it.
     """
 
     def __init__(self, field: Field, body: rigid.Body, at: XYZ, rotation: XYZW = UPRIGHT) -> None:
@@ -165,7 +167,7 @@ class PlanarBody(Body):
         self._may_glide = field.level is not None and not self._floats
         self._glide: Glide | None = None
         self._commanded = STOP  # the last velocity of the drive
-        self.speed = 0.0  # m/s that any point of it has had at most since its last look
+        self.speed = 0.0  # m/s; the greatest speed of any of its points since its last look
         self.looks_at = -1  # the step at which it looks around next
         self._stood: tuple[float, ...] = ()  # height and upward axis at the last look
         self._held: tuple[float, float] | None = None  # the place to hold
@@ -174,30 +176,30 @@ class PlanarBody(Body):
         low, high = self.box()
         self._reach = max(map(rigid.reach, body.collisions), default=0.0)  # m from the root frame to any point
         x, y, z = (place + centre for place, centre in zip(at, body.centre, strict=True))
-        edge = max(0.0, min(x - low[0], high[0] - x, y - low[1], high[1] - y))  # of what it stands on
+        edge = max(0.0, min(x - low[0], high[0] - x, y - low[1], high[1] - y))  # m to the edge of its support
         self._push = min(PUSH, UPRIGHT_PUSH * GRAVITY * edge / max(z - low[2], 1e-3))
         field.add(self)
 
     def look(self) -> None:
-        """Wake whatever glides near it, and glide if nothing is near; then look again before anything can be."""
+        """Wake all gliding bodies near it, or if nothing is near, glide. Look again before anything can come near."""
         self.speed = self._speed_of(self._commanded)
         clear = self._clear()
         stood, self._stood = self._stood, self._standing() if clear >= LOOK and not self._glide else ()
         if clear >= LOOK and stood and self._stood and math.dist(stood, self._stood) < SETTLED:
-            self._glide_on()
+            self._begin_to_glide()
         self._look_after(clear)
 
     def _look_after(self, clear: int) -> None:
-        """Look again before the end of that many `clear` steps."""
+        """Look again before the `clear` steps are over."""
         self._field.let_look(self, clear if self._glide and not self._field.others else LOOK)
 
     def _speed_of(self, velocity: Planar) -> float:
-        """The speed in m/s that no point of it exceeds at a velocity, rounded up, so that few changes exceed it."""
+        """An upper bound (m/s) of the speeds of its points at a velocity, rounded up so that few changes exceed it."""
         return _graded(math.hypot(velocity[0], velocity[1]) + abs(velocity[2]) * self._reach)
 
     def _clear(self) -> int:
-        """The steps, at most FAR, in which nothing but the ground can come near it. Fewer than LOOK: something is near,
-        and no planar body there glides any more, nor does this one.
+        """The number of steps (at most FAR) in which nothing but the ground can come near it. If it is less than LOOK,
+        something is near, and this body and the planar bodies there have been woken.
         """
         here = self.locate()
         if not self._glide:
@@ -216,11 +218,11 @@ class PlanarBody(Body):
         return min(steps.values(), default=FAR)
 
     def _steps_to(self, number: int, here: XYZ) -> int:
-        """The steps, at most FAR, in which another body of the engine cannot come near this one, whose root frame is
-        `here`.
+        """The number of steps (at most FAR) in which another body of the engine cannot come near this one, whose root
+        frame is `here`.
         """
         field, other = self._field, self._field.bodies.get(number)
-        way = max(field.closing(self.speed) * field.step, 1e-9)  # in a step
+        way = max(field.closing(self.speed) * field.step, 1e-9)  # m in a step
         if other and other._glide:
             apart = math.dist(here, other._glide.at(field.time)) - self._reach - other._reach
             if (steps := _within(apart - SKIN, way)) >= LOOK:
@@ -229,13 +231,13 @@ class PlanarBody(Body):
         return _within(self._gap(number), way)
 
     def _gap(self, number: int) -> float:
-        """The distance in m from another body, where the engine has it, to what counts as near."""
+        """The distance (m) to where the engine has another body, less SKIN."""
         within = self._field.margin(self.speed)
         return self._engine.gap(self.number, number, within) - SKIN
 
     def locate(self) -> XYZ:
-        """While it glides, the engine's body is where the last look was: move it to where this one is. Returns where
-        its root frame is.
+        """Move the engine's body, which stays at the place of the last look while this one glides, to its true place.
+        Returns the position of the root frame.
         """
         position, rotation = self.pose()
         if self._glide:
@@ -243,7 +245,7 @@ class PlanarBody(Body):
         return position
 
     def _standing(self) -> tuple[float, ...]:
-        """Its height and upward axis, if it only touches the level ground, does not tilt, and moves as commanded."""
+        """Its height and upward axis if it touches only the level ground, is not tilting, and moves as commanded."""
         _, (rolling, pitching, _) = self._engine.velocity(self.number)
         if not self._may_glide or self._is_blocked or self._engine.touched(self.number) != {self._field.level}:
             return ()
@@ -252,8 +254,8 @@ class PlanarBody(Body):
         (_, _, z), rotation = self.pose()
         return z, *rotate(rotation, (0.0, 0.0, 1.0))
 
-    def _glide_on(self) -> None:
-        """Glide from here at the drive's velocity; the engine keeps a body that neither moves nor touches anything."""
+    def _begin_to_glide(self) -> None:
+        """Glide from here at the drive's velocity. The engine's body is frozen meanwhile."""
         self._glide_from(self._commanded)
         self.glides = True
         self._field.gliding += 1
@@ -264,7 +266,7 @@ class PlanarBody(Body):
         self._glide = Glide(self._field.time, position, rotation, velocity, yaw(rotation))
 
     def wake(self) -> None:
-        """Return to the engine, where it is and as it moves; from the next step on it has contacts again."""
+        """Stop gliding: hand its pose and velocity to the engine, where it has contacts from the next step on."""
         if self._glide is None:
             return
         (position, rotation), (linear, angular) = self.pose(), self.twist()
@@ -312,7 +314,7 @@ class PlanarBody(Body):
             self._held = None
         up, axis = _axes(rotation)
         if axis is up and abs(vx * up[0] + vy * up[1] + falling * up[2]) < LANDED and not self._floats:
-            # On a slope, gravity and contact would take it downhill within the step: its wheels hold that.
+            # On a slope, gravity and contact would take it downhill within the step: its wheels prevent that.
             gravity = self._field.gravity
             into = sum(g * u for g, u in zip(gravity, up, strict=True))
             vx, vy = vx - (gravity[0] - into * up[0]) * dt, vy - (gravity[1] - into * up[1]) * dt
@@ -331,9 +333,9 @@ class PlanarBody(Body):
     def _pushed(
         self, now: tuple[float, float], wanted: tuple[float, float], tipping: float, dt: float
     ) -> tuple[float, float]:
-        """The velocity of the centre for the next step. An obstacle takes speed from the robot within a step; from
-        then on it pushes no harder than wheels with grip could, until it regains its speed: a robot that is forced
-        against an edge would tip over it. While it tips (rad/s), it does not push.
+        """The velocity of the centre for the next step. A robot that loses speed within a step has met an obstacle.
+        From then on, until it regains its speed, it pushes no harder than wheels could by their grip: forced against an
+        edge it would tip over it. While it tips (`tipping` in rad/s), it does not push.
         """
         if self._driven is not None and math.dist(self._driven, now) > LOST * math.hypot(*self._driven):
             self._is_blocked = True
@@ -355,7 +357,7 @@ class PlanarBody(Body):
         super().put(position, rotation, linear, angular)
 
     def _back(self, x: float, y: float, dt: float) -> tuple[float, float]:
-        """The velocity towards the place that is held; a strong push moves the hold point."""
+        """The velocity towards the place that it holds; a strong push moves that place."""
         if self._held is None or math.dist(self._held, (x, y)) > HOLD_LIMIT:
             self._held = x, y
         return (self._held[0] - x) * HOLD_GAIN / dt, (self._held[1] - y) * HOLD_GAIN / dt
@@ -390,14 +392,14 @@ class PlanarBody(Body):
 
 
 def _axes(rotation: XYZW) -> tuple[XYZ, XYZ]:
-    """The upward axis of a body, and the one that it turns about: the same, unless it lies on its side."""
+    """The upward axis of a body, and the axis that it turns about: the same, unless it lies on its side."""
     up = rotate(rotation, (0.0, 0.0, 1.0))
     return up, up if up[2] > STEEP else (0.0, 0.0, 1.0)
 
 
 def _orbit(axis: XYZ, turn: float, centre: XYZ, dt: float) -> tuple[float, float]:
-    """The horizontal velocity of the centre, away from the root, of a body that turns about `axis`; evaluated at
-    mid-step, as the heading, so that it stays on its circle.
+    """The horizontal velocity of a body's centre of mass relative to its root, as it turns about `axis`. Like the
+    heading it is that of mid-step, so that the body stays on its circle.
     """
     if not turn:
         return 0.0, 0.0
@@ -406,13 +408,13 @@ def _orbit(axis: XYZ, turn: float, centre: XYZ, dt: float) -> tuple[float, float
 
 
 class PlanarMover:
-    """The whole body moves over the plane; its wheels turn only visually."""
+    """Moves a whole body over the plane. Its wheels turn only visually."""
 
-    def __init__(self, body: PlanarBody, wheels: Wheels | MecanumWheels) -> None:
+    def __init__(self, body: PlanarBody, wheels: Wheels) -> None:
         self.body = body
         self._wheels = wheels
         self.names = wheels.names
-        self.wheels, self.kept = frozenset[str](), frozenset(wheels.names)
+        self.wheels, self.reserved = frozenset[str](), frozenset(wheels.names)
         self._rolled = 0.0  # sim time up to which the wheels have turned
 
     def move(self, velocity: Planar, dt: float) -> None:
@@ -424,7 +426,7 @@ class PlanarMover:
     def moved(self, time: float, dt: float) -> Moved:
         """The true pose."""
         velocity = self.body.velocity(dt)
-        if not self.body.glides:  # else its wheels roll evenly until someone looks
+        if not self.body.glides:  # else its wheels are rolled when their states are read
             self._roll(velocity)
         return *self.body.pose(), velocity
 
@@ -434,7 +436,7 @@ class PlanarMover:
         self._rolled = self.body.time
 
     def states(self) -> JointStates:
-        """Angles and rates of the wheels, as rolling without slip would turn them; no motor has an effort."""
+        """Angles and rates of the wheels as they would roll without slip. There are no efforts."""
         if self.body.glides:
             self._roll(self.body.commanded)
         return self._wheels.angles, self._wheels.rates, []

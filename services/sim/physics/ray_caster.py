@@ -1,7 +1,7 @@
 """What sensors see: the collision shapes of all entities, in an engine of their own.
 
-There every link is a body, so that a sensor learns which link of its own robot it would hit, and so are those of
-robots that glide, which touch nothing in the engine that moves them.
+In it every link is a body, so that rays can pass through the link that carries the sensor; and robots that glide are
+present too, which have no contacts in the engine that moves them.
 """
 
 from collections.abc import Mapping
@@ -10,14 +10,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from holozen.robot.model import RobotModel
-from holozen.robot.rigid import Frame, PlacedShape
-from holozen.robot.shapes import solid
+from holozen.robot.rigid import Frame, placed_shape
 from holozen.rotation import XYZ, XYZW, rotate
 
 from .engine import Array, Rays
 
 Pose = tuple[XYZ, XYZW]
-TOUCHING = 2e-3  # m; what is nearer touches: the engine that moves bodies keeps them apart by less
+TOUCHING = 2e-3  # m; nearer links count as touching: the engine that moves them keeps them apart by less
 GROUND = ("ground_plane", "link")
 
 
@@ -36,8 +35,8 @@ class Placed(Protocol):
 
 
 class Touch(NamedTuple):
-    """Where a link touches another one, of the entity and link `other`: points (m) on that one, unit vectors out of it,
-    and how deep the link is in it (m).
+    """The contacts of a link with the entity and link `other`: points (m) on that, unit normals out of it, and depths
+    (m).
     """
 
     other: tuple[str, str]
@@ -47,22 +46,19 @@ class Touch(NamedTuple):
 
 
 class RayCaster:
-    """The shapes, by the name of their entity."""
+    """The collision shapes of all entities, by the entities' names."""
 
     def __init__(self, rays: Rays) -> None:
         self._rays = rays
-        self._bodies: dict[str, dict[str, int]] = {}  # numbers of links
-        self._at: dict[tuple[str, str], Pose] = {}  # of each link
+        self._bodies: dict[str, dict[str, int]] = {}  # entity -> link -> number
+        self._at: dict[tuple[str, str], Pose] = {}  # (entity, link) -> pose
         self._roots: dict[str, Pose] = {}
 
     def add(self, name: str, model: RobotModel) -> None:
         """Add an entity."""
         self._bodies[name] = {}
         for link in model.links.values():
-            parts = []
-            for shape in link.collisions:
-                frame = Frame.of(shape.pose)
-                parts.append(PlacedShape(link.name, solid(shape), frame.xyz, frame.quaternion))
+            parts = (placed_shape(link.name, shape, Frame.of(shape.pose)) for shape in link.collisions)
             self._bodies[name][link.name] = self._rays.add(tuple(parts))
 
     def remove(self, name: str) -> None:
@@ -73,7 +69,7 @@ class RayCaster:
             self._rays.remove(body)
 
     def has_moved(self, name: str, root: Pose) -> bool:
-        """Whether the root of an entity is not where it was when it was placed."""
+        """Whether the root of an entity is not where it was last placed."""
         return self._roots.get(name) != root
 
     def place(self, name: str, root: Pose, links: Mapping[str, Placed]) -> None:
@@ -88,15 +84,15 @@ class RayCaster:
     def ranges(
         self, origin: XYZ, rotation: XYZW, directions: Array, near: float, far: float, own: tuple[str, str]
     ) -> Array:
-        """The distances (n,) in m from `origin` to what is hit first between `near` and `far`; infinite for nothing.
+        """The distances (n,) in m from `origin` to the first hits between `near` and `far`; infinite without a hit.
 
-        `directions` (n, 3) are unit vectors in a frame of that rotation. The link `own` of an entity is not hit.
+        `directions` (n, 3) are unit vectors in a frame with that rotation. Rays pass through `own`, an entity's link.
         """
         turned = directions @ np.array([rotate(rotation, axis) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))])
         return self._rays.cast(origin, turned, near, far, self._bodies[own[0]][own[1]])
 
     def touches(self, name: str, link: str) -> list[Touch]:
-        """What touches a link of an entity, but for its own other links."""
+        """The contacts of an entity's link, except those with other links of the same entity."""
         own = self._bodies[name]
         owners = {body: (entity, part) for entity, links in self._bodies.items() for part, body in links.items()}
         found: dict[tuple[str, str], Touch] = {}

@@ -1,4 +1,4 @@
-"""Wheels: where they are on a robot, and how they turn as it moves; those of a planar base only visually."""
+"""Wheels: where they are on a robot, and how they turn as it moves. Those of a planar base turn only visually."""
 
 import math
 from collections.abc import Sequence
@@ -6,13 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from holozen.kinematics import Wheel, mecanum_rates, travelled, wheel_rate
-from holozen.limits import STOP, Planar
-from holozen.robot.gazebo_plugins import ROUND, radius_across
+from holozen.kinematics import Wheel, mecanum_rates, wheel_rate
+from holozen.limits import Planar
+from holozen.robot.gazebo_plugins import ROUND, radius_across, round_radius
 from holozen.robot.model import HERE, Mecanum, RobotModel, Shape
 from holozen.robot.rigid import Axis, Part, PlacedShape, joint_axes
 from holozen.robot.rotation import quaternion_of, triple
-from holozen.rotation import XYZ, XYZW
 
 from .engine import UPRIGHT
 
@@ -20,7 +19,7 @@ FLAT = 0.1  # sine of the axle's angle to the ground; a steeper joint is not a w
 
 
 class Wheels:
-    """Angles (rad) and rates (rad/s) of the moving joints, in the order of `names`; those of no wheel stay at 0."""
+    """Angles (rad) and rates (rad/s) of the moving joints, in the order of `names`. Joints of no wheel stay at 0."""
 
     def __init__(self, model: RobotModel) -> None:
         self.names = list(joint_axes(model))
@@ -31,51 +30,31 @@ class Wheels:
 
     def roll(self, velocity: Planar, dt: float) -> None:
         """Roll for `dt` seconds at the body-frame `velocity`."""
-        self.rates = [wheel_rate(velocity, wheel) if wheel else 0.0 for wheel in self._wheels]
+        self.rates = self._rates(velocity)
         self.angles = [angle + rate * dt for angle, rate in zip(self.angles, self.rates, strict=True)]
 
+    def _rates(self, velocity: Planar) -> list[float]:
+        return [wheel_rate(velocity, wheel) if wheel else 0.0 for wheel in self._wheels]
 
-class MecanumWheels:
-    """As Wheels, for four wheels with rollers at 45 degrees; other joints stay at 0."""
+
+class MecanumWheels(Wheels):
+    """Four wheels with rollers at 45 degrees that are not links of the file."""
 
     def __init__(self, model: RobotModel, mechanism: Mecanum) -> None:
-        axes = joint_axes(model)
-        self.names = list(axes)
+        super().__init__(model)
         self._driven = (mechanism.front_left, mechanism.front_right, mechanism.back_left, mechanism.back_right)
-        fl, fr, bl, _ = (axes[name].xyz for name in self._driven)
-        self._arm = ((mechanism.separation or abs(fl[1] - fr[1])) + (mechanism.wheelbase or abs(fl[0] - bl[0]))) / 2
-        self._radius = mechanism.radius or radius_of(model, model.joints[self._driven[0]].child)
+        self._arm, self._radius = (mechanism.separation + mechanism.wheelbase) / 2, mechanism.radius
         self._signs = [forward_sign(model, name) for name in self._driven]
-        self.angles = [0.0] * len(self.names)
-        self.rates = [0.0] * len(self.names)
 
-    def roll(self, velocity: Planar, dt: float) -> None:
-        """Roll for `dt` seconds at the body-frame `velocity`."""
+    def _rates(self, velocity: Planar) -> list[float]:
         turning = mecanum_rates(velocity, self._arm, self._radius)
         rates = {name: sign * rate for name, sign, rate in zip(self._driven, self._signs, turning, strict=True)}
-        self.rates = [rates.get(name, 0.0) for name in self.names]
-        self.angles = [angle + rate * dt for angle, rate in zip(self.angles, self.rates, strict=True)]
-
-
-class Odometer:
-    """Planar odometry from what wheels have rolled, on exact arcs. It starts at zero."""
-
-    def __init__(self) -> None:
-        self._x = self._y = self._yaw = 0.0
-        self._seen = STOP
-
-    def update(self, rolled: Planar) -> tuple[XYZ, XYZW]:
-        """The pose after the wheels have rolled, in total: forward and left (m), counter-clockwise (rad)."""
-        x, y, turn = (now - before for now, before in zip(rolled, self._seen, strict=True))
-        self._seen = rolled
-        dx, dy = travelled((x, y, turn), self._yaw, 1.0)
-        self._x, self._y, self._yaw = self._x + dx, self._y + dy, self._yaw + turn
-        return (self._x, self._y, 0.0), (0.0, 0.0, math.sin(self._yaw / 2), math.cos(self._yaw / 2))
+        return [rates.get(name, 0.0) for name in self.names]
 
 
 def rolling_wheels(model: RobotModel) -> list[Wheel]:
-    """The wheels of a model: continuous joints with a level axle and a round collision shape, or with rollers. What
-    turns on a wheel is no wheel.
+    """The wheels of a model: continuous joints with a level axle and a round collision shape, or with rollers. A joint
+    that is carried by a wheel is no wheel.
     """
     turning = {name: axis for name, axis in joint_axes(model).items() if model.joints[name].kind == "continuous"}
     carried = {name: model.joints[name].parent for name in turning}
@@ -92,13 +71,13 @@ def rolling_wheels(model: RobotModel) -> list[Wheel]:
 
 
 def has_rollers(model: RobotModel, wheel: Wheel) -> bool:
-    """Whether a wheel touches the ground with links that turn on it."""
+    """Whether links turn on a wheel, as rollers on its rim."""
     return any(model.joints[name].parent == model.joints[wheel.joint].child for name in joint_axes(model))
 
 
 def on_spheres(parts: list[Part], wheels: Sequence[Wheel]) -> list[Part]:
-    """The parts with a sphere in the place of each wheel: it touches the ground at a point below the axle, as a wheel
-    with rollers on its rim does. One axis of its inertia is its axle.
+    """The parts, with a sphere in place of each wheel: it touches the ground at a point below the axle, as a wheel with
+    rollers on its rim does. One of its principal axes is the axle.
     """
     radii = {wheel.joint: wheel.radius for wheel in wheels}
     return [_on_sphere(part, radii[part.joint.name]) if part.joint and part.joint.name in radii else part
@@ -117,13 +96,13 @@ def _on_sphere(part: Part, radius: float) -> Part:
 
 
 def forward_sign(model: RobotModel, joint: str) -> float:
-    """1 where a positive rate of a wheel rolls the robot forward, so its axis points left; else -1."""
+    """1 if a positive rate of a wheel rolls the robot forward, since its axis points left; else -1."""
     return -1.0 if joint_axes(model)[joint].direction[1] < 0 else 1.0
 
 
 def _wheel(model: RobotModel, name: str, axis: Axis, rollers: list[str] | None) -> Wheel | None:
     length = math.hypot(axis.direction[0], axis.direction[1])
-    radius, skew = _rim(model, axis, rollers) if rollers else (radius_of(model, model.joints[name].child), 0.0)
+    radius, skew = _rim(model, axis, rollers) if rollers else (round_radius(model.links[model.joints[name].child]), 0.0)
     if not radius or abs(axis.direction[2]) > FLAT:
         return None
     ax, ay = axis.direction[0] / length, axis.direction[1] / length
@@ -131,12 +110,12 @@ def _wheel(model: RobotModel, name: str, axis: Axis, rollers: list[str] | None) 
 
 
 def _rim(model: RobotModel, wheel: Axis, rollers: list[str]) -> tuple[float, float]:
-    """The radius (m) of a wheel with rollers, from its axle to where a roller reaches at its middle; and its skew. 0, 0
-    where its rollers have no shapes, or cannot roll.
+    """The radius (m) of a wheel with rollers, from its axle to the outside of a roller at its middle; and its skew.
+    Both are 0 if the rollers have no shapes, or cannot roll.
     """
     axis, link = joint_axes(model)[rollers[0]], model.links[model.joints[rollers[0]].child]
     along, axle = np.array(axis.direction), np.array(wheel.direction)
-    out = np.cross(along, axle)  # along the radius to where the roller's axis is nearest to the axle
+    out = np.cross(along, axle)  # along the radius to the point of the roller's axis that is nearest to the axle
     radii = [shape.size[0] for shape in link.collisions if shape.kind in ROUND]
     thick = max(radii, default=radius_across(link, model.joints[rollers[0]].axis))
     sine = float(np.linalg.norm(out))
@@ -145,14 +124,8 @@ def _rim(model: RobotModel, wheel: Axis, rollers: list[str]) -> tuple[float, flo
     away = float((np.array(axis.xyz) - np.array(wheel.xyz)) @ out) / sine
     # At the lowest point of the wheel the radius points down, and axle x up is the rolling direction: radius x axle.
     forward = float(along @ np.cross(out, axle)) / sine
-    # A roller is straight: at an angle of the rim from its middle, its axis has the cosine of that angle less of the
-    # rolling direction. This is the mean over its part of the rim.
+    # A roller is straight: away from its middle, the share of its axis in the rolling direction shrinks by the cosine
+    # of the angle on the rim. This is the mean over the roller's part of the rim.
     half = math.pi / max(len(rollers), 3)
     mean = math.asinh(math.tan(half)) / half
     return abs(away) + thick, mean * float(along @ axle) / forward * math.copysign(1.0, away)
-
-
-def radius_of(model: RobotModel, link: str) -> float:
-    """The radius in metres of a link's first round collision shape; 0 if it has none."""
-    round_shapes = (shape for shape in model.links[link].collisions if shape.kind in ROUND)
-    return next((shape.size[0] for shape in round_shapes), 0.0)

@@ -1,10 +1,10 @@
-"""The physics engine behind a small interface.
+"""A world of bodies in a physics engine.
 
-Metres, kilograms, seconds; quaternions are x, y, z, w; positions and velocities are those of the world frame.
+Metres, kilograms, seconds; quaternions are x, y, z, w; positions and velocities are in the world frame.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from holozen.kinematics import Wheel
 from holozen.robot import rigid
@@ -12,49 +12,44 @@ from holozen.robot.model import RobotModel, WorldSpec
 from holozen.rotation import XYZ, XYZW
 
 from .body import Body
-from .engine import UPRIGHT, Engine
+from .engine import UPRIGHT, Engine, Rays
 from .jointed import JointedBody
 from .planar import Field, PlanarBody
 from .ray_caster import RayCaster
 from .wheels import on_spheres
 
-OVERLAP = 0.01  # m that bodies may be in each other when they are placed; the engine throws apart what is far deeper
-RINGS = 8  # of places around a taken one, in which a free one is looked for
+OVERLAP = 0.01  # m by which bodies may overlap when they are placed; the engine throws apart what overlaps far more
+RINGS = 8  # of places around a taken one that are searched for a free one
+
+
+def _classes(engine: str) -> tuple[Callable[[WorldSpec], Engine], type[Rays]]:
+    """The classes of an engine, given by name. The other engine is not loaded."""
+    if engine == "mujoco":
+        from .mujoco import MuJoCo, MuJoCoRays
+
+        return MuJoCo, MuJoCoRays
+    from .bullet import Bullet, BulletRays
+
+    return Bullet, BulletRays
 
 
 class World:
-    """One world of bodies in an engine: pybullet or mujoco. `step` advances it by `spec.step` seconds; `time` is the
-    simulated time.
-    """
+    """One world of bodies in an engine: pybullet or mujoco. `step` advances it by `spec.step` seconds."""
 
     def __init__(self, spec: WorldSpec, engine: str = "pybullet") -> None:
         self.spec, self._engine_name = spec, engine
-        self._steps_before = 0  # steps that `steps` counts besides those of the field
+        self._steps_before = 0  # added to the steps of the field, which begins at 0 after each `clear`
         self._begin()
 
     def _begin(self) -> None:
         spec = self.spec
-        self.engine: Engine
-        if self._engine_name == "mujoco":
-            from .mujoco import MuJoCo  # the other engine stays unloaded
-
-            self.engine = MuJoCo(spec)
-        else:
-            from .bullet import Bullet
-
-            self.engine = Bullet(spec)
+        self.engine = _classes(self._engine_name)[0](spec)
         level = None if any(spec.gravity[:2]) or spec.gravity[2] >= 0 else self.engine.ground
         self._field = Field(self.engine, spec.step, level, spec.gravity)
 
     def ray_caster(self) -> RayCaster:
-        """A new world of what sensors see, in the same engine."""
-        if self._engine_name == "mujoco":
-            from .mujoco import MuJoCoRays
-
-            return RayCaster(MuJoCoRays(self.spec.ground))
-        from .bullet import BulletRays
-
-        return RayCaster(BulletRays(self.spec.ground))
+        """A new ray caster, in the same kind of engine."""
+        return RayCaster(_classes(self._engine_name)[1](self.spec.ground))
 
     @property
     def steps(self) -> int:
@@ -63,7 +58,7 @@ class World:
 
     @property
     def time(self) -> float:
-        """Simulated seconds of these; from the count of steps, so that no error accumulates."""
+        """Simulated seconds: the time of these steps, so that no rounding error accumulates."""
         return self.steps * self.spec.step
 
     def rewind(self) -> None:
@@ -71,16 +66,16 @@ class World:
         self._steps_before = -self._field.steps
 
     def clear(self) -> None:
-        """Remove all bodies; the time goes on. The engine is a new one: the same bodies move in it as they did in the
-        first one, to the last bit.
+        """Remove all bodies; the time goes on. The engine is a new one, in which the same bodies move as in the first
+        one, to the last bit.
         """
         self._steps_before = self.steps
         self.close()
         self._begin()
 
     def step(self) -> None:
-        """Advance the world by one step. Raises ValueError or ArithmeticError, after it, if a body's numbers are not
-        finite.
+        """Advance the world by one step. Raises ValueError or ArithmeticError after the step if the numbers of a body
+        are not finite.
         """
         if not self._field.rests:
             self.engine.step()
@@ -98,8 +93,8 @@ class World:
         wheels: frozenset[str] = frozenset(),
         omni: Sequence[Wheel] = (),
     ) -> JointedBody:
-        """Add a robot with motors in its joints, or an object. `wheels` names the joints of the wheels that drive it,
-        if not `omni` does. Raises RobotError if it has too many joints, or no mass.
+        """Add a robot with motors in its joints, or an object. `wheels` are the joints of the driven wheels; `omni`
+        wheels, which become spheres, take their place. Raises RobotError if it has too many joints, or no mass.
         """
         parts = on_spheres(rigid.simulated_parts(model), omni)
         names = frozenset(wheel.joint for wheel in omni) or wheels
@@ -110,8 +105,8 @@ class World:
         return body
 
     def overlapped(self, body: Body) -> list[int]:
-        """The engine's numbers of other bodies that `body` is deep in, the deepest first. Grounds do not count: what
-        is in them only rises.
+        """The engine's numbers of other bodies that `body` overlaps by more than OVERLAP, the deepest first. Planes do
+        not count: a body that overlaps one only rises.
         """
         (x, y, z), (x2, y2, z2) = body.box()
         margin = self._field.margin(0.0)
@@ -126,9 +121,7 @@ class World:
         return sorted(depths, key=lambda number: (-depths[number], number))
 
     def free_place(self, body: Body) -> XYZ | None:
-        """The nearest free position of its root frame on a grid around `body`, which is moved there; None if all are
-        taken.
-        """
+        """Move `body` to the nearest free position on a grid around it, and return that; None if all are taken."""
         ((x, y, z), rotation), (low, high) = body.pose(), body.box()
         step = max(high[0] - low[0], high[1] - low[1], 0.1) / 2
         grid = range(-RINGS, RINGS + 1)

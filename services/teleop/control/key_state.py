@@ -1,9 +1,9 @@
 """Which keys are held. Pure: times are arguments, in seconds.
 
-`hold`: a key counts while it is held: from press to release where the terminal reports both, else while it repeats. A
-terminal without key releases only repeats a held key: once after a first delay, then at an interval. Both
-are learned, and a key counts as held until a repeat is overdue.
-`latch`: a key counts until another one is pressed.
+In the mode `hold` a key counts while it is held: from press to release if the terminal reports both, else while it
+repeats. A terminal without key releases only repeats a held key, once after a first delay, and then at an interval.
+Both are measured, and a key counts as held until a repeat is overdue. In the mode `latch` a key counts until another
+one is pressed.
 """
 
 import math
@@ -20,19 +20,19 @@ SURE = 4  # repeats; fewer may be taps
 
 
 class Repeat:
-    """Follows one key at a time. `patience` is how long after its last event it still counts as held."""
+    """Measures the repeats of one key at a time, and tells them from new presses."""
 
     def __init__(self) -> None:
         self.first: float | None = None  # s; the measured first delay
         self._gaps: deque[float] = deque(maxlen=LAST)
         self._key = ""
-        self._at = 0.0  # when its last event came
+        self._at = 0.0  # time of its last event
         self._repeats = 0
         self._maybe = 0.0  # a gap that is the first delay if repeats follow
 
     @property
     def every(self) -> float | None:
-        """The interval in seconds; None until it was measured."""
+        """The interval in seconds; None until it has been measured."""
         return statistics.median(self._gaps) if self._gaps else None
 
     def see(self, key: str, now: float) -> bool:
@@ -40,7 +40,7 @@ class Repeat:
         gap, same = now - self._at, key == self._key
         again = same and self._is_repeat(gap)
         if same and not again and self._repeats > 1 and gap < SLOWEST:
-            self._gaps.append(gap)  # a late repeat on a slow line; the next one may be late as well
+            self._gaps.append(gap)  # a late repeat on a slow line; the next one may be as late
         self._key, self._at = key, now
         if not again:
             self._repeats, self._maybe = 0, 0.0
@@ -55,7 +55,7 @@ class Repeat:
         return True
 
     def patience(self) -> float:
-        """How long its key counts as held after the last event."""
+        """How long (s) the key counts as held after its last event."""
         if self._repeats == 0:
             return (FIRST if self.first is None else 1.1 * self.first) + SLACK
         return (max(self._gaps) if self._gaps else EVERY) + SLACK
@@ -83,8 +83,8 @@ class KeyState:
         self._pressed: dict[str, str] = {}  # code -> key
         self._typed = ""
         self._at = 0.0  # when it was typed
-        self._spent = ""  # a typed key that was let go while it repeats: only a new press makes it drive again
-        self._ignored = -math.inf  # when the spent key was seen last, if it must not count until it was released
+        self._spent = ""  # a typed key, released while it repeats: it counts again only once it is pressed again
+        self._ignored = -math.inf  # when the spent key was last seen, if it must not count before it is released
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -106,7 +106,7 @@ class KeyState:
         """Take a typed key, whose release will not be reported; returns whether it counts as held."""
         again = self.repeat.see(key, now)
         if self._spent == key and now - self._ignored <= LONGEST:
-            self._ignored = now  # it may have been held the whole time
+            self._ignored = now  # it may have been held all the time
             return False
         if again and self._spent == key:
             return False
@@ -114,17 +114,17 @@ class KeyState:
         return True
 
     def interrupt(self, key: str, now: float) -> None:
-        """Take a typed key that moves nothing. It ends the repeats of others: typed again, they are new presses."""
+        """Take a typed key that moves nothing. It ends the repeats of other keys: typed again, they are new presses."""
         self.repeat.see(key, now)
         self._spent = ""
 
     def ignore(self, key: str, now: float) -> None:
-        """Take a typed key that does not count until it was released for longer than any first delay."""
+        """Take a typed key that counts only after it has been released for longer than any first delay."""
         self.repeat.see(key, now)
         self._spent, self._ignored = key, now
 
     def let_go(self) -> None:
-        """Release all keys; one that is still down counts again once it was released and pressed."""
+        """Release all keys; one that is still down counts again once it is released and pressed."""
         if self._typed:
             self._spent, self._ignored = self._typed, -math.inf
         self._pressed, self._typed = {}, ""

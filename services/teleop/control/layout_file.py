@@ -1,15 +1,13 @@
-"""A layout in a TOML file -> a checked `Layout`."""
+"""Reads a layout from a TOML file, and checks it."""
 
 import os
 import re
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from holozen.console import printable
-
 from .. import toml_file
-from ..toml_file import cut, one_of
-from .layouts import ACTIONS, FIXED, LAYOUTS, Direction, KeyNameError, Layout, LayoutError, key_name
+from ..toml_file import InputError, cut, one_of
+from .layouts import ACTIONS, FIXED, LAYOUTS, Direction, KeyNameError, Layout, key_name
 
 T = TypeVar("T")
 
@@ -25,24 +23,22 @@ _TOP = ["name", "positional", "moves", "speeds", "actions"]
 
 
 def load(name_or_path: str) -> Layout:
-    """The layout with this name, else the one in this file; LayoutError."""
+    """The layout with this name, or else the one in this file. Raises InputError."""
     return LAYOUTS.get(name_or_path) or read(name_or_path)
 
 
 def read(path: str) -> Layout:
-    """The layout in the file at `path`; LayoutError."""
+    """The layout in the file at `path`. Raises InputError."""
     if not os.path.lexists(path) and os.sep not in path:
-        raise LayoutError(printable(f"{path}: no such file, and no such layout{one_of(path, [*LAYOUTS])}"))
+        raise InputError(f"{path}: no such file, and no such layout{one_of(path, [*LAYOUTS])}")
     try:
         return _layout(path, toml_file.read(path))
-    except toml_file.TomlError as error:
-        raise LayoutError(str(error)) from None
     except _Wrong as error:
-        raise LayoutError(printable(f"{path}: {error}")) from None
+        raise InputError(f"{path}: {error}") from None
 
 
 class _Wrong(ValueError):
-    """An error at a place of the file."""
+    """An error in the file; the text begins with its place."""
 
 
 def _layout(path: str, found: Mapping[str, Any]) -> Layout:
@@ -67,7 +63,7 @@ def _layout(path: str, found: Mapping[str, Any]) -> Layout:
 def _section(
     found: Mapping[str, Any], section: str, meaning: Callable[[str], T], taken: dict[str, str]
 ) -> dict[str, T]:
-    """A section by canonical key names. `taken`: the keys of the previous sections, which is extended."""
+    """The meanings in a section, by canonical key names. `taken`, the keys of earlier sections, is extended."""
     lines = found.get(section, {})
     if not isinstance(lines, dict):
         raise _Wrong(f"{section} is {cut(lines)}; write a section [{section}] of lines")

@@ -1,4 +1,4 @@
-"""The meaning of each key as data: the layouts `ttk`, `wasd` and `arrows`, and the help generated from them."""
+"""What each key means, as data: the layouts `ttk`, `wasd` and `arrows`, and the help that is made from them."""
 
 import re
 import textwrap
@@ -14,7 +14,7 @@ NAMED = (
     "insert", "delete", "home", "end", "pageup", "pagedown", *(f"f{number}" for number in range(1, 13)),
 )  # fmt: skip
 SAME = {"ctrl+i": "tab", "ctrl+m": "enter", "ctrl+j": "enter", "ctrl+h": "backspace", "ctrl+[": "escape"}
-"""Keys that a terminal sends as another key: the two cannot be distinguished."""
+"""Keys for which a terminal sends the same bytes as for another key."""
 
 FIXED = {
     "ctrl+c": "quit", "ctrl+z": "suspend", "?": "help", "tab": "next_robot", "space": "stop", "escape": "stop",
@@ -26,11 +26,11 @@ _SPLIT = re.compile(r"((?:(?:ctrl|alt|shift)\+)*)(.+)", re.DOTALL | re.IGNORECAS
 
 
 class KeyNameError(ValueError):
-    """No key has this name; the text suggests the valid name if there is one."""
+    """No key has this name. The text suggests a valid name if there is one."""
 
 
 def key_name(text: str) -> str:
-    """The canonical name of the key that `text` names; KeyNameError."""
+    """The canonical name of the key that `text` names. Raises KeyNameError."""
     if text == " ":
         return "space"
     match = _SPLIT.fullmatch(text)
@@ -129,13 +129,9 @@ def _speeds(speeds: Mapping[str, tuple[float, float]]) -> list[tuple[str, str]]:
 
 
 Direction = tuple[int, int, int, int]
-"""Forward, left, up, counter-clockwise: each -1, 0 or 1, times the speed (the last: times the turn)."""
+"""Forward, left, up, counter-clockwise: each is -1, 0 or 1, to be multiplied by the speed, the last by the turn."""
 
 ACTIONS = ("stop", "resume", "next_robot", "help", "quit", "suspend")
-
-
-class LayoutError(ValueError):
-    """An invalid layout; the text is one line with the reason."""
 
 
 @dataclass(frozen=True)
@@ -184,15 +180,15 @@ class Layout:
         return lines
 
     def key_for(self, typed: str, base: str) -> str:
-        """The key of this layout that was pressed. `typed` is what it types, `base` what its place types on a
-        US keyboard with shift applied, or "" if the terminal does not report it.
+        """The key of this layout that was pressed. `typed` is what it types, `base` what the same place types on a US
+        keyboard, with shift applied, or "" if the terminal does not report it.
 
-        Fixed keys count by what they type, and so do symbols in a positional layout with nothing at their place. On a
-        keyboard of another script no letter of a layout can be typed, so the place counts in every layout.
+        Fixed keys count by what they type, and so do symbols in a positional layout that has nothing at their place. On
+        a keyboard for another script no letter of a layout can be typed, so the place counts in every layout.
         """
         if typed in FIXED:
             return typed
-        if self.positional and base and base not in FIXED and (base in self or _is_letter(typed)):
+        if self.positional and base and base not in FIXED and (base in self or (len(typed) == 1 and typed.isalpha())):
             return base
         if typed in self or not base:
             return typed
@@ -201,10 +197,6 @@ class Layout:
 
     def __contains__(self, key: str) -> bool:
         return key in self.moves or key in self.speeds or key in self.actions
-
-
-def _is_letter(key: str) -> bool:
-    return len(key) == 1 and key.isalpha()
 
 
 FORWARD, BACK = (1, 0, 0, 0), (-1, 0, 0, 0)

@@ -1,4 +1,4 @@
-"""Keys to commands. No clock, screen or socket: times are arguments, in seconds."""
+"""Maps keys to commands. No clock, screen or socket: times are arguments, in seconds."""
 
 import math
 from collections.abc import Callable
@@ -11,17 +11,19 @@ from .key_state import HOLD, KeyState
 from .layouts import Direction, Layout
 
 Motion = tuple[float, float, float, float]
-"""Forward, left, up, counter-clockwise: each from -1 to 1, times the speed (the last: times the turn)."""
+"""Forward, left, up, counter-clockwise: each is from -1 to 1, to be multiplied by the speed, the last by the turn."""
 
 STILL: Motion = (0.0, 0.0, 0.0, 0.0)
 STOP_FOR = 1.0  # s; a stop is repeated until the robot is at rest, but no longer than this
 DEAD_MAN = "space"
-PIECES = ("unknown", "escape")  # possibly parts of a repeating key on a slow line
+PIECES = ("unknown", "escape")  # may be parts of a repeating key on a slow line
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The parameters of teleop_twist_keyboard: m/s, rad/s, Hz, s. A `key_timeout` of None follows the terminal."""
+    """The parameters of teleop_twist_keyboard, in m/s, rad/s, Hz and s. With a `key_timeout` of None a key counts while
+    the terminal repeats it.
+    """
 
     speed: float = 0.5
     turn: float = 1.0
@@ -34,7 +36,7 @@ class Settings:
 
 
 class TwistMapper:
-    """Computes what to publish: a command while keys drive, a stop until the robot is at rest, then nothing."""
+    """Decides what to publish: a command while keys drive, then a stop until the robot is at rest, then nothing."""
 
     def __init__(self, settings: Settings, layout: Layout) -> None:
         self.settings = replace(
@@ -44,7 +46,7 @@ class TwistMapper:
         )
         self.layout = layout
         self.key_state = KeyState(settings.mode, settings.key_timeout)
-        self.stick: tuple[float, float, float] = (0.0, 0.0, 0.0)  # a joystick: forward, left, counter-clockwise
+        self.stick: tuple[float, float, float] = (0.0, 0.0, 0.0)  # the joystick: forward, left, counter-clockwise
         self.note = ""
         self._stopping: float | None = None  # when the stop in progress began
         self._speeds: dict[str, tuple[float, float]] = {}  # of the other robots
@@ -52,7 +54,7 @@ class TwistMapper:
 
     @property
     def motion(self) -> Motion:
-        """The motion of the held keys together, else that of the joystick."""
+        """The combined motion of the held keys, or without any that of the joystick."""
         keys = self.key_state.keys
         if self.settings.deadman and DEAD_MAN not in keys and keys:
             return STILL
@@ -70,7 +72,7 @@ class TwistMapper:
         return self.layout.key_for(key.name, key.base)
 
     def take(self, key: Key, now: float) -> str:
-        """Take a key event; returns the action it requests, such as "resume", or "". Unknown keys stop the robot."""
+        """Take a key event. Returns the requested action, such as "resume", or "". Unknown keys stop the robot."""
         name = self.key(key)
         if key.kind == "release":
             return self._moved(lambda: self.key_state.release(key.code), now)
@@ -84,7 +86,7 @@ class TwistMapper:
         return action
 
     def disregard(self, key: Key, now: float) -> None:
-        """Take a key that does not count, nor do its repeats."""
+        """Take a key that does not count; neither do its repeats."""
         if key.kind == "typed" and key.name not in PIECES:
             self.key_state.ignore(self.key(key), now)
 
@@ -123,7 +125,7 @@ class TwistMapper:
         self.note = f"limit of {' and '.join(over)} reached" if over else ""
 
     def command(self, now: float, rests: bool) -> Twist | None:
-        """The command to publish at `now`, or None. `rests`: odom newer than the stop shows no motion."""
+        """The command to publish at `now`, or None. `rests`: an odom after the stop shows no motion."""
         self.expire(now)
         if self._stopping is not None and (now - self._stopping > STOP_FOR or rests):
             self._stopping = None
@@ -177,7 +179,7 @@ class TwistMapper:
 
 
 def combined(moves: list[Direction]) -> Motion:
-    """The sum of several keys, in the plane no faster than one of them. A single key is used as in its table."""
+    """The sum of several keys' motions, no faster in the plane than one of them. A single key counts unchanged."""
     x, y, z, turn = (max(-1.0, min(1.0, float(sum(axis)))) for axis in zip(*moves, strict=True))
     scale = max(1.0, math.hypot(x, y)) if len(moves) > 1 else 1.0
     return x / scale, y / scale, z, turn

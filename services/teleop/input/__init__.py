@@ -1,1 +1,1 @@
-"""Terminal and gamepad -> events."""
+"""Terminal, gamepad -> events."""

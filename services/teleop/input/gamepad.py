@@ -1,7 +1,7 @@
 """A Linux gamepad: its direction and its buttons.
 
-The few structs and ioctls of linux/input.h are decoded here, so that nothing has to be compiled or installed: this
-kernel interface is stable. Button and axis codes are those of the kernel's gamepad specification.
+The few structs and ioctls of linux/input.h, a stable interface of the kernel, are decoded here, so that nothing has to
+be compiled or installed. Button and axis codes are those of the kernel's gamepad specification.
 """
 
 import contextlib
@@ -23,7 +23,7 @@ Event = tuple[int, int, int]
 """Type, code, value."""
 
 Range = tuple[int, int]
-"""An axis' lowest and highest value."""
+"""The lowest and highest value of an axis."""
 
 EVENT = struct.Struct("llHHi")  # struct input_event: two of time, then type, code, value; 24 bytes on 64-bit machines
 _ABSINFO = struct.Struct("6i")  # struct input_absinfo: value, minimum, maximum, fuzz, flat, resolution
@@ -82,7 +82,7 @@ class Device:
         return value, (low, high)
 
     def events(self) -> Iterator[Event]:
-        """The pending events, oldest first. EOFError: there will be no more."""
+        """The pending events, oldest first. Raises EOFError if there will be no more."""
         try:
             found = os.read(self._number, _AT_ONCE * EVENT.size)
         except BlockingIOError:
@@ -109,23 +109,23 @@ ABS_X, ABS_Y, ABS_RX, ABS_HAT0Y = 0x00, 0x01, 0x03, 0x11
 BTN_SOUTH, BTN_TL, BTN_START, BTN_DPAD_UP, BTN_DPAD_DOWN = 0x130, 0x136, 0x13B, 0x220, 0x221
 
 AXES = {ABS_X: "ABS_X", ABS_Y: "ABS_Y", ABS_RX: "ABS_RX"}
-"""The left stick, up being negative, and the right stick's x."""
+"""The left stick, where up is negative, and the right stick's x."""
 BUTTONS = {BTN_SOUTH: "BTN_SOUTH", BTN_TL: "BTN_TL"}
-"""The button that defines a gamepad, and the left shoulder, which is the dead-man."""
+"""The button that every gamepad has, and the left shoulder button, which is the dead-man."""
 DEADMAN = BTN_TL
 PRESSES = {BTN_START: "resume", BTN_DPAD_UP: "faster", BTN_DPAD_DOWN: "slower"}
 DEAD_ZONE = 0.15  # of a stick's travel, since worn sticks do not rest at zero
 
 Deflection = tuple[float, float, float]
-"""Forward, left, counter-clockwise: each -1..1, the first two together at most 1 long."""
+"""Forward, left, counter-clockwise: each from -1 to 1, and the vector of the first two at most 1 long."""
 REST: Deflection = (0.0, 0.0, 0.0)
 
 
 class Gamepad:
-    """The state of a gamepad's sticks and buttons. `ranges`: of the axes in AXES, each with low < high.
+    """The state of a gamepad's sticks and buttons. `ranges` are those of the axes in AXES, each with low < high.
 
-    It gives a direction only while the dead-man is held, and only after it was seen released: a button that is stuck or
-    was held from the start does not drive.
+    It has a direction only while the dead-man is held, and only after that was seen released: a button that is stuck,
+    or held from the start, does not drive.
     """
 
     def __init__(self, ranges: Mapping[int, Range]) -> None:
@@ -133,8 +133,7 @@ class Gamepad:
         self._values: dict[int, int] = {}
         self._hat = 0
         self._armed = self._held = False
-        self.lost = False
-        """Events were lost: the state is unknown, and events are ignored until it was read again."""
+        self.lost = False  # whether events were lost: until the state is read again, events are ignored
 
     def begin(self, values: Mapping[int, int], down: AbstractSet[int]) -> None:
         """Restart from the current axis values and pressed buttons."""
@@ -144,7 +143,7 @@ class Gamepad:
         self.lost = False
 
     def let_go(self) -> None:
-        """Rest until the dead-man was released and is pressed again."""
+        """Rest until the dead-man is released and pressed again."""
         self._armed = self._held = False
 
     def take(self, kind: int, code: int, value: int) -> str:
@@ -188,7 +187,7 @@ class Gamepad:
 
 
 def stick(x: float, y: float) -> tuple[float, float]:
-    """A stick's position -> the same direction, with the length 0 in the dead zone, growing to 1 from its edge."""
+    """A stick's deflection without the dead zone: in the same direction, from 0 at the zone's edge to 1."""
     length = math.hypot(x, y)
     if length <= DEAD_ZONE:
         return 0.0, 0.0
@@ -197,7 +196,7 @@ def stick(x: float, y: float) -> tuple[float, float]:
 
 
 FOLDER = "/dev/input"
-MOST_READS = 16  # of 64 events each; the rest waits for the next call
+MOST_READS = 16  # of up to 64 events each; the rest waits for the next call
 GONE = (OSError, EOFError)
 GROUP = "join the group that may: sudo usermod -aG input $USER, then log in again"
 
@@ -217,7 +216,7 @@ class Joystick:
     """An open gamepad, to be closed by `with`. The left shoulder button is the dead-man: nothing moves without it."""
 
     def __init__(self, device: Device, path: str) -> None:
-        """Take an open device; OSError, or JoystickError if it is not a gamepad."""
+        """Take an open device. Raises OSError, and JoystickError if it is not a gamepad."""
         self._device, self._path = device, path
         self.name = printable(device.name())
         axes = device.axes()
@@ -234,7 +233,7 @@ class Joystick:
 
     @classmethod
     def open(cls, device: str) -> "Joystick":
-        """The gamepad at a path such as /dev/input/event7, or the first one if the path is "". JoystickError."""
+        """The gamepad at a path such as /dev/input/event7, or the first one if that is "". Raises JoystickError."""
         return cls._at(device) if device else cls._first(FOLDER)
 
     def __enter__(self) -> "Joystick":
@@ -256,11 +255,11 @@ class Joystick:
 
     @property
     def direction(self) -> Deflection:
-        """Forward, left, counter-clockwise, each -1..1, as of the last `read`; zeros unless the dead-man is held."""
+        """Forward, left, counter-clockwise (-1 to 1) at the last `read`; zeros unless the dead-man is held."""
         return self._pad.direction
 
     def let_go(self) -> None:
-        """Rest until the dead-man was released and is pressed again; pending events are dropped.
+        """Rest until the dead-man is released and pressed again, and drop pending events.
 
         Called after a stop, so that earlier input moves nothing.
         """
@@ -272,9 +271,9 @@ class Joystick:
             self._begin()
 
     def read(self) -> list[str]:
-        """Take the pending events; returns the actions pressed: "resume", "faster", "slower". Does not block.
+        """Take the pending events, without blocking. Returns the requested actions: "resume", "faster", "slower".
 
-        JoystickError: it is gone; `direction` is zero from then on.
+        Raises JoystickError if it is gone; `direction` is zero from then on.
         """
         try:
             return self._read()
@@ -317,7 +316,7 @@ class Joystick:
 
     @classmethod
     def _first(cls, folder: str) -> "Joystick":
-        """The first gamepad in a folder; else a JoystickError that describes the devices found."""
+        """The first gamepad in a folder. Raises JoystickError, which describes the devices found."""
         paths = _devices(folder)
         closed = 0
         for path in paths:

@@ -1,8 +1,8 @@
 """Parses a terminal's input into events: keys, replies to queries, focus. Pure: bytes and times in, events out.
 
 It parses the traditional sequences and the Kitty keyboard protocol, which also reports releases
-(sw.kovidgoyal.net/kitty/keyboard-protocol). Any unknown sequence becomes one `Unknown`: no letter of a longer
-sequence is ever mistaken for a key.
+(sw.kovidgoyal.net/kitty/keyboard-protocol). An unknown sequence becomes one `Unknown`, so that none of its letters is
+taken for a key.
 """
 
 import math
@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 
 class Key(NamedTuple):
-    """A key event. `name` is what it types ("i", "I", "space", "shift+left", "ctrl+c"), `base` the same by its place on
-    a US keyboard ("" if unknown). `kind` is "press", "repeat" or "release" of the key `code`, or "typed" where the
-    terminal reports no releases.
+    """A key event. `name` is what the key types ("i", "I", "space", "shift+left", "ctrl+c"), `base` what its place
+    types on a US keyboard ("" if unknown). `kind` is "press", "repeat" or "release", and `code` identifies the key; or
+    "typed" if the terminal reports no releases.
     """
 
     name: str
@@ -47,7 +47,7 @@ US_SHIFTED = dict(zip("`1234567890-=[]\\;',./", '~!@#$%^&*()_+{}|:"<>?', strict=
 
 
 def key(fields: list[list[int]], final: str, releases: bool) -> Key | Unknown | None:
-    """The key of a control sequence with these parameters; None for a modifier key."""
+    """The key event of a control sequence with these parameters; None for a modifier key."""
     code, modifiers, kind = fields[0][0], 0, 0
     if len(fields) > 1:
         modifiers, kind = max(fields[1][0] - 1, 0), fields[1][1] if len(fields[1]) > 1 else 0
@@ -76,11 +76,11 @@ def _kitty(codes: list[int], modifiers: int, kind: str) -> Key | Unknown | None:
             place = name  # Ctrl combinations count by the letter, not the place
     else:
         return Unknown(f"key {code}")
-    return Key(name, place, kind, str(base or codes[0]))  # the layout may change before the release
+    return Key(name, place, kind, str(base or codes[0]))  # by place: the layout may change before the release
 
 
 def _typed(text: str, shifted: str, modifiers: int) -> str:
-    """What a key types with these modifiers; it types `text` alone and `shifted` with Shift."""
+    """What a key types with these modifiers, if it types `text` alone and `shifted` with Shift."""
     if modifiers & (CTRL | ALT | SUPER):
         return _with(modifiers, text.lower())
     if bool(modifiers & SHIFT) != (bool(modifiers & CAPS) and text.isalpha()):
@@ -93,15 +93,15 @@ def _with(modifiers: int, name: str) -> str:
     return "+".join([*held, name])
 
 
-ESCAPE_WAIT = 0.05  # s until an Escape is the key rather than the start of a sequence
+ESCAPE_WAIT = 0.05  # s after which an Escape is the key, and not the start of a sequence
 LATE = 0.5  # s within which the rest of a sequence may arrive on a slow line
-LONG_PASTE = 10.0  # s without a byte until an unfinished paste is given up
+LONG_PASTE = 10.0  # s without a byte after which an unfinished paste is given up
 LONGEST = 4096  # bytes; longer sequences are discarded
 
 
 class Answer(NamedTuple):
-    """A reply of the terminal: "keyboard" (it supports the Kitty protocol, with these flags on), "terminal" (its
-    identity) or "alive".
+    """A reply of the terminal. `to` is the query: "keyboard" (it supports the Kitty protocol, and has these flags on),
+    "terminal" (its identity) or "alive".
     """
 
     to: str
@@ -128,24 +128,26 @@ OPEN_PASTE = b"\x1b[200~"
 
 
 class Keyboard:
-    """Parses input of a terminal; times in seconds. `releases`: it reports them, so untyped events are presses."""
+    """Parses the input of a terminal; times in seconds. `releases`: the terminal reports key releases, so an event
+    without a kind is a press.
+    """
 
     def __init__(self) -> None:
         self.releases = False
         self.rest = b""  # an incomplete sequence
         self._since = 0.0  # when its last byte arrived
         self._escaped = -LATE  # when an Escape was last taken for the key
-        self._reported = False  # as unfinished
+        self._reported = False  # whether the incomplete sequence was reported
 
     def feed(self, data: bytes, now: float) -> list[Event]:
-        """The events that are complete with `data`."""
+        """The events that are complete once `data` has arrived."""
         if not self.rest and data[:1] in (b"[", b"O") and now - self._escaped < LATE:
             data = b"\x1b" + data  # the rest of a sequence whose Escape arrived much earlier
         self.rest, self._since, self._reported = self.rest + data, now, False
         return list(self._events())
 
     def wait(self, now: float) -> list[Event]:
-        """Events that are complete by timeout: a lone Escape, or an unfinished sequence."""
+        """The events that are complete since nothing more has arrived: a lone Escape, or an unfinished sequence."""
         silent = now - self._since
         if self.rest == b"\x1b" and silent >= ESCAPE_WAIT:
             self.rest, self._escaped = b"", now
@@ -175,14 +177,14 @@ class Keyboard:
 
 
 def _patience(rest: bytes) -> float:
-    """How long an incomplete sequence is kept, so that its end is never mistaken for keys."""
+    """How long (s) an incomplete sequence is kept, so that its end is not taken for keys."""
     if UNFINISHED_KEY.fullmatch(rest):
         return math.inf
     return LONG_PASTE if rest.startswith(OPEN_PASTE) else LATE
 
 
 def _split(data: bytes, releases: bool) -> tuple[Event | None, int] | None:
-    """The first event of `data` (None: ignored) and its number of bytes; None if it is incomplete."""
+    """The first event of `data` (None: to be ignored) and its number of bytes; None if it is incomplete."""
     if data[0] != 0x1B:
         return _character(data)
     if match := PASTE.match(data) or STRING.match(data):
@@ -202,7 +204,7 @@ def _split(data: bytes, releases: bool) -> tuple[Event | None, int] | None:
 
 
 def _after_escape(data: bytes) -> tuple[Event | None, int] | None:
-    """The event of an Escape that starts no sequence: a character with Alt, two Escapes, or an aborted sequence."""
+    """The event of an Escape that starts no known sequence: a character with Alt, two Escapes, an aborted sequence."""
     if data[1] == 0x1B:
         return Key("escape"), 1
     if data[1] == 0x5B:
@@ -224,7 +226,8 @@ def _character(data: bytes) -> tuple[Event, int] | None:
         text = data[:length].decode()
     except UnicodeDecodeError:
         return Unknown(repr(data[:1])), 1
-    return Key("space" if text == " " else text, _shown(text)), length
+    name = "space" if text == " " else text
+    return Key(name, name if text.isascii() else ""), length
 
 
 def _control_character(byte: int) -> str:
@@ -233,12 +236,8 @@ def _control_character(byte: int) -> str:
     return "ctrl+space" if byte == 0 else f"ctrl+{chr(byte + 0x40).lower()}"
 
 
-def _shown(text: str) -> str:
-    return "space" if text == " " else text if text.isascii() else ""
-
-
 def _control(parameters: str, final: str, releases: bool) -> Event | None:
-    """The event of `CSI parameters final`; None for reports other than keys."""
+    """The event of the sequence `CSI parameters final`; None for reports that are to be ignored."""
     if (parameters, final) == ("0", "n"):
         return Answer("alive")
     if parameters.startswith("?"):

@@ -1,4 +1,4 @@
-"""The terminal itself: its modes, its bytes, its size. Always restored when the teleop ends."""
+"""The terminal: its modes, input, output and size. It is restored however the teleop ends."""
 
 import contextlib
 import os
@@ -11,19 +11,19 @@ from typing import Any, Self
 from holozen.terminal import ASK_KEYBOARD, ASK_TERMINAL
 
 FULL = "\x1b[?1049h\x1b[?25l\x1b[H", "\x1b[m\x1b[?7h\x1b[?25h\x1b[?1049l"  # the alternate screen without a cursor
-REPORTS = "\x1b[?2004h\x1b[?1004h", "\x1b[?1004l\x1b[?2004l"  # pastes and focus changes are distinguished from keys
+REPORTS = "\x1b[?2004h\x1b[?1004h", "\x1b[?1004l\x1b[?2004l"  # brackets around pastes, and reports of focus changes
 ASK_ALIVE = "\x1b[5n"
-# Of the Kitty protocol: unambiguous codes, releases, the key's place on a US keyboard, all keys.
+# The Kitty protocol, with unambiguous codes, releases, the key's place on a US keyboard, for all keys.
 RELEASES_ON, RELEASES_SET, RELEASES_OFF = "\x1b[>15u", "\x1b[=15;1u", "\x1b[<u"
-FAREWELL = 0.1  # s to wait for pending replies, which would otherwise reach the shell
+FAREWELL = 0.1  # s to wait at the end for pending replies, which would else reach the shell
 MOST = 65536  # bytes read at once
 
 
 class Terminal:
-    """Keys in, picture out, in `with`. `full`: on the alternate screen. `fileno`: of a terminal other than stdin's."""
+    """A terminal, set up in a `with` block: stdin's, or that of `fileno`. `full`: on the alternate screen."""
 
     def __init__(self, full: bool = True, fileno: int | None = None) -> None:
-        self.releases = False  # whether it was asked to report them
+        self.releases = False  # whether it has been asked to report key releases
         self._full = full
         self._in = sys.stdin.fileno() if fileno is None else fileno
         self._out = _writer(sys.stdout.fileno() if fileno is None else fileno)
@@ -54,8 +54,8 @@ class Terminal:
         self.greet()
 
     def greet(self) -> None:
-        """Set up screen and reports, and query the terminal's identity, which may have changed. Does nothing while the
-        terminal is the shell's: a signal may come after `leave`.
+        """Set up screen and reports, and query the terminal's identity, which may have changed. Does nothing after
+        `leave`, when a late signal may call it: the terminal is the shell's.
         """
         if not self._before:
             return
@@ -63,7 +63,7 @@ class Terminal:
         self.ask(ASK_KEYBOARD + ASK_TERMINAL)
 
     def leave(self) -> None:
-        """Restore the terminal. One that is gone is ignored."""
+        """Restore the terminal, unless it is gone."""
         if not self._before:
             return
         with contextlib.suppress(OSError, termios.error):
@@ -74,7 +74,7 @@ class Terminal:
         self.releases, self._before, self._unsent = False, [], b""
 
     def fileno(self) -> int:
-        """For select."""
+        """The descriptor to wait for input on."""
         return self._in
 
     def read(self) -> bytes:
@@ -84,7 +84,7 @@ class Terminal:
         return data
 
     def ask(self, question: str) -> None:
-        """Send a query that it replies to."""
+        """Send a query, to which the terminal replies."""
         self._asked += 1
         self.write(question)
 
@@ -93,7 +93,7 @@ class Terminal:
         self._asked = max(0, self._asked - 1)
 
     def report_releases(self, flags: int) -> None:
-        """Make it report releases; `flags` are those currently on."""
+        """Make it report key releases; `flags` are the protocol's flags that are on now."""
         if not self.releases:
             self.write(RELEASES_ON)
         elif flags != 15:
@@ -107,12 +107,12 @@ class Terminal:
         self.releases = False
 
     def write(self, text: str) -> None:
-        """Write text without blocking: what the terminal does not accept now is sent later."""
+        """Write text without blocking; the part that the terminal does not accept now is sent later."""
         self._unsent += text.encode()
         self.ready()
 
     def ready(self) -> bool:
-        """Whether all text was sent."""
+        """Send pending text. Returns whether all of it has been sent."""
         while self._unsent:
             try:
                 sent = os.write(self._out, self._unsent)
@@ -140,7 +140,7 @@ class Terminal:
 
 
 def _writer(fileno: int) -> int:
-    """A descriptor of the same terminal that never blocks; ours is shared with the shell, which requires blocking."""
+    """A descriptor of the same terminal that never blocks; the shell shares the given one, and needs it to block."""
     try:
         return os.open(os.ttyname(fileno), os.O_WRONLY | os.O_NOCTTY | os.O_NONBLOCK)
     except OSError:

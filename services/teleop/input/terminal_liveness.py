@@ -1,12 +1,14 @@
 """Whether the terminal, and the operator at it, can still be reached.
 
-A held key sends nothing, and a latched one is never repeated: if the connection to the terminal broke,
-the robot would keep driving. So the terminal is polled, and a missing reply is a stop. tmux and screen reply even
-while they are detached, but their socket is executable only while a client is attached.
+Where the terminal reports releases a held key sends nothing, and a latched key is never repeated: if the connection to
+the terminal broke, the robot would keep driving. So the terminal is polled, and a missing reply stops the robot. tmux
+and screen reply even while they are detached, but their socket is executable only while a client is attached. They also
+reply while the line to an attached client hangs, which nothing shows: there a latched key has to be pressed again and
+again.
 
-A terminal that hung delivers buffered keys and replies to earlier queries, in any order. That only shows
-that it is back. Keys count again once it has replied in time to a query sent after that: it replies in the
-order of the queries, so the replies to earlier ones are discounted first.
+A terminal that hung delivers, once it is back, buffered keys and replies to earlier queries, in any order. Keys count
+again once it has replied in time to queries sent after that. It replies in the order of the queries, so the replies to
+earlier ones are discounted first.
 """
 
 import math
@@ -22,10 +24,12 @@ from .kitty import Answer, Keyboard
 from .terminal import ASK_ALIVE, Terminal
 
 FOLDERS = ("/run/screen", "/var/run/screen")
+LASTS = 5.0  # s for which a key without repeats counts where a lost operator would not be noticed
+MUTE = "a terminal that does not answer"
 
 
 def attached(environ: Mapping[str, str] = os.environ) -> Callable[[], bool]:
-    """A function that returns whether an operator may be watching; always true outside of tmux and screen."""
+    """A function that tells whether an operator may be attached; it always does outside of tmux and screen."""
     socket = _socket(environ)
     if socket is None or not socket.exists():
         return lambda: True
@@ -37,6 +41,16 @@ def attached(environ: Mapping[str, str] = os.environ) -> Callable[[], bool]:
             return False
 
     return look
+
+
+def multiplexer(environ: Mapping[str, str] = os.environ) -> str:
+    """The multiplexer between this program and the operator's terminal: "tmux", "screen", or "" if none is known.
+
+    Over ssh only TERM shows it, and many a tmux has screen's.
+    """
+    if environ.get("TMUX") or environ.get("TERM", "").startswith("tmux"):
+        return "tmux"
+    return "screen" if environ.get("STY") or environ.get("TERM", "").startswith("screen") else ""
 
 
 def _socket(environ: Mapping[str, str]) -> Path | None:
@@ -53,24 +67,24 @@ def _user(environ: Mapping[str, str]) -> str:
 
 
 EVERY, IDLE = 0.05, 0.5  # s between two queries, while driving and while not
-LIMIT = 0.4  # s for a reply; with EVERY less than the half second in which a robot must stop
+LIMIT = 0.4  # s for a reply; LIMIT and EVERY together are less than the half second in which a robot must stop
 RETRY = 2.0  # s from a missed reply to the next query, doubled each time after that
-ROUNDS = 2  # consecutive replies after it is back; by then it has delivered its buffered keys
+ROUNDS = 2  # consecutive replies in time after which it is back; by then it has delivered its buffered keys
 
 
 class Heartbeat:
-    """Queries and replies. A terminal that never replied is not polled."""
+    """Keeps account of queries and replies. A terminal that has never replied is not polled."""
 
     def __init__(self) -> None:
         self.answers = False  # whether this terminal is known to reply
-        self.lost = False  # a reply was overdue, and no fresh one arrived since
+        self.lost = False  # whether a reply was overdue, and the terminal is not yet back
         self._asked: deque[float] = deque()  # times of the queries without a reply
         self._last = 0.0  # time of the last query
         self._lost_at = 0.0
-        self._sent = self._heard = 0  # identity queries, and replies to those
-        self._old = 0  # replies that may belong to queries from before it was back
-        self._probed: float | None = None  # time of the query after it was back; None until there was input
-        self._rounds = 0  # such queries with a reply in time
+        self._sent = self._heard = 0  # identity queries, and replies to them
+        self._old = 0  # replies that may belong to queries from before there was input again
+        self._probed: float | None = None  # time of the query after there was input again; None before
+        self._rounds = 0  # such queries in a row with a reply in time
 
     def due(self, now: float, drives: bool) -> bool:
         """Whether to send a query now."""
@@ -83,7 +97,7 @@ class Heartbeat:
         return True
 
     def asked_terminal(self, times: int = 1) -> None:
-        """Count identity queries."""
+        """Count identity queries that were sent."""
         self._sent += times
 
     def answered(self, now: float, terminal: bool) -> None:
@@ -101,8 +115,8 @@ class Heartbeat:
             self.lost = False
             self._asked.clear()
 
-    def came(self, now: float) -> int:
-        """Take note of input from a lost terminal; returns the number of identity queries to send now."""
+    def note_input(self, now: float) -> int:
+        """Note that there was input. Returns the number of identity queries to send now, if the terminal is lost."""
         if not self.lost or (self._probed is not None and now - self._probed <= LIMIT):
             return 0
         if self._probed is not None:
@@ -110,7 +124,7 @@ class Heartbeat:
         self._old, self._probed = self._sent, now
         return self._sent - self._heard + 1
 
-    def miss(self, now: float) -> bool:
+    def has_missed(self, now: float) -> bool:
         """Whether a reply has just become overdue."""
         if self.lost or not self._asked or now - self._asked[0] <= LIMIT:
             return False
@@ -118,7 +132,7 @@ class Heartbeat:
         return True
 
     def restart(self, now: float) -> None:
-        """Expect no replies to earlier queries; keys do not count until it replies again."""
+        """Expect no replies to earlier queries; the terminal is lost until it replies again."""
         self._asked.clear()
         if self.answers:
             self._lose(now)
@@ -128,44 +142,45 @@ class Heartbeat:
         self._probed, self._rounds = None, 0
 
 
-GREETING = 0.2  # s for the terminal to report whether it has releases; keys typed until then were held before
-LENT = 2.0  # s of plain keys for Docker
+GREETING = 0.2  # s for the terminal to report whether it has releases; keys typed before may have been held earlier
+PLAIN_FOR = 2.0  # s of plain keys for Docker
 UNANSWERED = "the terminal does not answer: stopped"
 ANSWERS = "the terminal answers again: press a key to drive"
 DETACHED = "no client is attached: stopped"
 
 
 class TerminalLiveness:
-    """Polls the terminal, and takes its replies. Times in seconds."""
+    """Polls the terminal, and evaluates its replies. Times in seconds."""
 
     def __init__(self, terminal: Terminal, keyboard: Keyboard) -> None:
         self._terminal, self._keyboard, self._heartbeat = terminal, keyboard, Heartbeat()
-        self.is_attached = attached()
+        self.is_attached, self._multiplexer = attached(), multiplexer()
+        self._pressed_at = -math.inf
         self._heartbeat.asked_terminal()  # by `Terminal.enter`
-        self._speaks = False  # the Kitty protocol, since the last identity query
-        self._known = False  # whether it reports releases
+        self._speaks_kitty = False  # whether it has replied in the Kitty protocol since the last identity query
+        self._known = False  # whether it is known if it reports releases
         self._greeted = time.monotonic()
-        self._lent_until = math.inf
+        self._plain_until = math.inf
 
     def begin(self) -> None:
-        """Start: from now on its replies are read."""
+        """Begin: its replies are read from now on."""
         self._greeted = time.monotonic()
 
     def is_new(self, now: float) -> bool:
-        """Whether the terminal has yet to report its features; a key that repeats now was held before the start."""
+        """Whether the terminal has yet to report its features; a key that repeats now may have been held before."""
         return not self._known and now - self._greeted < GREETING
 
     @property
     def lost(self) -> bool:
-        """Whether the terminal is lost, or has yet to reply since it came back; no key counts until then."""
+        """Whether the terminal is lost, or has yet to reply since it came back. No key counts meanwhile."""
         return self._heartbeat.lost
 
-    def came(self, now: float) -> None:
-        """Input of the terminal was read and processed."""
-        if times := self._heartbeat.came(now):
+    def note_input(self, now: float) -> None:
+        """Note that input of the terminal was read and processed."""
+        if times := self._heartbeat.note_input(now):
             self._ask_terminal(times)
 
-    def hear(self, answer: Answer, now: float) -> None:
+    def take_reply(self, answer: Answer, now: float) -> None:
         """Take a reply of the terminal."""
         self._terminal.answered()
         self._heartbeat.answered(now, answer.to == "terminal")
@@ -173,34 +188,51 @@ class TerminalLiveness:
             first = not self._terminal.releases
             self._terminal.report_releases(answer.flags)
             if first:
-                self._terminal.ask(ASK_KEYBOARD)  # after the reply to this, all its keys report releases
+                self._terminal.ask(ASK_KEYBOARD)  # once it has replied to this, all its keys report releases
             self._known = not first
-            self._keyboard.releases = self._speaks = True
+            self._keyboard.releases = self._speaks_kitty = True
         elif answer.to == "terminal":
-            # Replies arrive in the order of the queries: one that reports releases has replied to that before.
-            if not self._speaks:
+            # Replies arrive in the order of the queries: one with releases has already replied to the other query.
+            if not self._speaks_kitty:
                 self._terminal.send_plain_keys()
                 self._known, self._keyboard.releases = True, False
-            self._speaks = False
+            self._speaks_kitty = False
+
+    def press(self, now: float) -> None:
+        """Note that a key was pressed: there is an operator."""
+        self._pressed_at = now
+
+    @property
+    def blind_in(self) -> str:
+        """What hides a lost operator, so that a key without repeats counts for LASTS alone: tmux, screen, or a terminal
+        that has never replied; else "".
+        """
+        return self._multiplexer or ("" if self._heartbeat.answers else MUTE)
+
+    def lapse(self, now: float) -> str:
+        """Why a key without repeats no longer counts; "" while it does."""
+        if not self.blind_in or now - self._pressed_at <= LASTS:
+            return ""
+        return f"in {self.blind_in} a key counts for {LASTS:g} s: press it again"
 
     def check(self, now: float, engaged: bool, lasting: bool) -> str:
         """Send due queries. Returns why the robot must stop, or "". `lasting`: keys drive without repeats."""
         if self._heartbeat.due(now, engaged and (lasting or self._terminal.releases)):
             self._ask()
-        if now > self._lent_until:
-            self._lent_until = math.inf
+        if now > self._plain_until:
+            self._plain_until = math.inf
             self._ask_terminal()
-        if self._heartbeat.miss(now):
+        if self._heartbeat.has_missed(now):
             return UNANSWERED
         return DETACHED if engaged and not self.is_attached() else ""
 
-    def lend(self, now: float) -> None:
-        """Send plain keys for a while: Docker recognizes its detach keys, Ctrl-P Ctrl-Q, only in that form."""
+    def send_plain_keys_for_docker(self, now: float) -> None:
+        """Let the terminal send plain keys for a while, since Docker knows its detach keys only in that form."""
         self._terminal.send_plain_keys()
-        self._keyboard.releases, self._lent_until = False, now + LENT
+        self._keyboard.releases, self._plain_until = False, now + PLAIN_FOR
 
-    def meet_again(self) -> None:
-        """After a pause: set up and identify the terminal again."""
+    def set_up_again(self) -> None:
+        """Set up and identify the terminal again, after a pause."""
         self._terminal.enter()
         self._keyboard.forget()
         self._keyboard.releases = self._known = False
@@ -208,9 +240,9 @@ class TerminalLiveness:
         self._heartbeat.restart(self._greeted)
         self._heartbeat.asked_terminal()
 
-    def look_again(self) -> None:
-        """Another size may mean another terminal, attached to a container."""
-        self._speaks = False
+    def identify_again(self) -> None:
+        """Identify the terminal again: it may be another one, attached to a container."""
+        self._speaks_kitty = False
         self._terminal.greet()
         self._heartbeat.asked_terminal()
 
@@ -221,8 +253,8 @@ class TerminalLiveness:
             self._terminal.ask(ASK_KEYBOARD if self._terminal.releases else ASK_ALIVE)
 
     def _ask_terminal(self, times: int = 1) -> None:
-        """Query its identity: a different one may have been attached."""
-        self._speaks = False
+        """Query its identity: another one may have been attached."""
+        self._speaks_kitty = False
         for _ in range(times):
             self._terminal.ask(ASK_KEYBOARD + ASK_TERMINAL)
         self._heartbeat.asked_terminal(times)

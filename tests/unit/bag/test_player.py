@@ -1,5 +1,9 @@
 """What of a bag is played, where to and when."""
 
+import itertools
+import os
+import subprocess
+import sys
 import threading
 import time
 
@@ -42,7 +46,7 @@ class Played:
         self.done: list[str] = []
         self.slow = slow  # s that it takes to publish
         self.stop, self.keys = threading.Event(), Pressed(*keys)
-        self.player = Player(self._publish, lambda: self.done.append("hold"), self.keys, self.stop, rate)
+        self.player = Player(self._publish, lambda: self.done.append("hold"), self.keys.read, self.stop, rate)
         self.end_after = 10**9
 
     def _publish(self, message: Message) -> None:
@@ -50,6 +54,20 @@ class Played:
         time.sleep(self.slow)
         if len(self.done) >= self.end_after:
             self.stop.set()
+
+
+def test_a_terminal_that_does_not_control_the_process_has_no_keys() -> None:
+    """As under setsid."""
+    leader, terminal = os.openpty()
+    code = (
+        "import threading\nfrom holozen.bag.player import keys\nwith keys(threading.Event()) as key:\n print([key(0)])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], stdin=terminal, start_new_session=True, capture_output=True, text=True, timeout=60
+    )
+    os.close(terminal)
+    os.close(leader)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "['']\n", "")
 
 
 @given(st.floats(0.01, 1000), st.integers(0, 2**62), st.floats(0, 1e6), st.integers(0, 10**13))
@@ -110,6 +128,37 @@ def test_after_a_pause_it_goes_on_where_it_was() -> None:
     assert played.player.play(messages(0, 100))
     assert time.monotonic() - begun >= 0.1 + 2 * LOOK
     assert played.done == ["0", "hold", "100"]
+
+
+def test_after_a_suspension_it_goes_on_from_where_it_was_at_its_pace(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The clock goes on by 60 s while a key is waited for."""
+    now, gaps, times = [0.0], list[float](), list[float]()
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+
+    def wait(timeout: float) -> str:
+        now[0] += 60.0 if 0.2 < now[0] < 60.0 else timeout
+        return ""
+
+    stop = threading.Event()
+    player = Player(lambda _: times.append(now[0]), lambda: None, wait, stop, on_gap=gaps.append)
+    assert player.play(messages(*range(0, 1000, 100)))
+    assert times[:3] == pytest.approx([0.0, 0.1, 0.2], abs=0.001)
+    assert gaps == pytest.approx([60.0])
+    assert [b - a for a, b in itertools.pairwise(times[3:])] == pytest.approx([0.1] * 6, abs=0.001)
+
+
+def test_a_suspension_in_a_pause_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, gaps, times, pressed = [0.0], list[float](), list[float](), ["", PAUSE, "", PAUSE]
+    monkeypatch.setattr(time, "monotonic", lambda: now[0])
+
+    def wait(timeout: float) -> str:
+        now[0] += 60.0 if len(pressed) == 2 else min(timeout, 0.01)
+        return pressed.pop(0) if pressed else ""
+
+    player = Player(lambda _: times.append(now[0]), lambda: None, wait, threading.Event(), on_gap=gaps.append)
+    assert player.play(messages(0, 100))
+    assert times[1] == pytest.approx(60.1, abs=0.03)
+    assert gaps == []
 
 
 def test_keys_are_looked_at_also_when_every_message_is_late() -> None:

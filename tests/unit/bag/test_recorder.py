@@ -83,7 +83,7 @@ def test_samples_that_never_came_are_counted_by_their_publishers_numbers() -> No
     for publisher, number in (("a", 7), ("b", 0), ("a", 8), ("a", 11), ("b", 1), ("a", 0), ("a", 1), ("b", 3)):
         intake.add("k", b"", "", (publisher, number))
     intake.add("k", b"", "")
-    assert intake.lost == 2 + 1  # a starts anew at 0
+    assert intake.lost == 2 + 1  # a starts over at 0
     assert [sample.missed for sample in intake.take()] == [0, 0, 0, 2, 0, 0, 0, 1, 0]
 
 

@@ -63,6 +63,18 @@ def test_properties_and_macros_that_nothing_uses(findings: Findings) -> None:
     assert message == ["macro 'part' is not used", "property 'size' is not used"]
 
 
+def test_an_argument_that_nothing_asks_for_is_a_finding(findings: Findings, good: str) -> None:
+    found = findings(good, args={"size": "1"})
+    assert [(finding.rule, finding.place.line) for finding in found] == [("load-note", 0)]
+    assert found[0].problem == "nothing asks for the argument 'size'; its arguments are: none"
+    text = good.replace('<robot name="good">', HEAD).replace("<link ", '<xacro:arg name="size" default="1"/><link ', 1)
+    assert findings(text, "r.xacro", args={"size": "1"}) == []
+    found = findings(text, "r.xacro", args={"szie": "1"})
+    assert [(finding.rule, finding.place.line) for finding in found] == [("load-note", 0)]
+    problem = "nothing asks for the argument 'szie' (did you mean 'size'?); its arguments are: size"
+    assert found[0].problem == problem
+
+
 def test_what_xacro_warns_of_is_a_finding(findings: Findings) -> None:
     text = HEAD + '<xacro:property name="z" valeu="2" value="1"/><link name="a${z}"><inertial><mass value="1"/>'
     found = findings(text + f'<inertia ixx="1" iyy="1" izz="1"/></inertial>{BALL}</link></robot>', "r.xacro")
@@ -93,7 +105,7 @@ def test_a_file_for_others_to_include_is_no_robot_and_no_mistake(rules: Callable
 def test_a_part_of_a_robot_without_a_name_is_to_be_checked_with_its_robot(findings: Findings) -> None:
     found = findings(HEAD.replace(' name="r"', "") + f'<link name="base">{BALL}</link></robot>', "core.xacro")
     assert [finding.fix for finding in found if finding.rule == "load"] == [
-        "add one; a file that others include is checked with the one that includes it"
+        "add one; to check a file that others include, check the file that includes it"
     ]
 
 

@@ -88,7 +88,7 @@ BROKEN = [
     ("attribute", '<mass value="2"/>', '<mass vlaue="2"/>', "write value="),
     ("heavy", BASE, '<mass value="2000"/><inertia ixx="9" iyy="17" izz="24"/>', "2000 kg"),
     ("inertia", 'ixx="0.009"', 'ixx="-0.009"', "not positive definite"),
-    ("inertia", 'ixx="0.009" ', "", "has no ixx, and what is left out is 0"),
+    ("inertia", 'ixx="0.009" ', "", "has no ixx; omitted values are 0"),
     ("number", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0 abc"/>', "'abc' is not a finite number"),
     ("number", '<origin xyz="0 0 0.05"/>', '<origin xyz="0 0"/>', "write 3"),
     ("inertia", 'ixx="0.009" ixy="0"', 'ixx="0.009" ixy="0.02"', "not positive definite"),

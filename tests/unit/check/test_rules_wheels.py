@@ -3,11 +3,13 @@
 from collections.abc import Callable
 from math import atan, degrees, pi
 
+import numpy as np
 import pytest
 
 from holozen.check.geometry import Placed
 from holozen.check.rules_wheels import stand
 from holozen.robot.model import Pose, Shape
+from holozen.robot.rigid import Frame
 from tests.unit.check.conftest import Findings
 
 Rules = Callable[..., list[str]]
@@ -67,11 +69,9 @@ def test_what_moves_the_robot_as_a_whole_may_drag_it(good: str, rules: Rules) ->
     assert rules(good.replace(BODY, LOW).replace(plugin, PLANAR)) == []
 
 
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-
 def ball(x: float, y: float, z: float, radius: float = 0.1) -> Placed:
-    return Placed("ball", "collision", Shape("sphere", (radius,), Pose()), (x, y, z), AXES, (radius,) * 3)
+    shape, frame = Shape("sphere", (radius,), Pose()), Frame.of(Pose((x, y, z)))
+    return Placed("ball", "collision", shape, shape, frame, frame.position, np.full(3, radius))
 
 
 def test_on_four_equal_balls_it_stands_level() -> None:

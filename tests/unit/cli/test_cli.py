@@ -71,6 +71,14 @@ def test_every_verb_has_help(capsys: pytest.CaptureFixture[str]) -> None:
         assert verb in NOUNS or "example: " in " ".join(reported.split())
 
 
+def test_every_summary_is_lower_case_without_a_full_stop() -> None:
+    for verb in cli.VERBS:
+        command = cli.command(verb)
+        within = [command.verb(name) for name in command.modules] if isinstance(command, Noun) else []
+        for text in [cli.VERBS[verb], *(one.parser().description or "" for one in (command, *within))]:
+            assert re.fullmatch(r"[a-z].*[^.]", text), f"{verb}: {text}"
+
+
 def test_a_verb_that_starts_others_explains_its_own_flags() -> None:
     assert "as for" not in " ".join(cli.command("up").parser().format_help().split())
 
@@ -129,6 +137,20 @@ def test_an_interrupt_is_exit_code_130(monkeypatch: pytest.MonkeyPatch) -> None:
     assert cli.main(["node", "list"]) == 130
 
 
+def test_so_is_one_that_comes_while_a_class_is_made(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Interrupted:
+        def __set_name__(self, owner: type, name: str) -> None:
+            raise KeyboardInterrupt
+
+    with pytest.raises((RuntimeError, KeyboardInterrupt)) as raised:
+        type("Made", (), {"attribute": Interrupted()})
+    failing(monkeypatch, raised.value)
+    assert cli.main(["node", "list"]) == 130
+    failing(monkeypatch, RuntimeError("something else"))
+    with pytest.raises(RuntimeError):
+        cli.main(["node", "list"])
+
+
 @pytest.mark.parametrize("links", [1, 1000])  # less and more than one buffer
 def test_a_reader_that_has_seen_enough_is_no_failure(links: int, tmp_path: Path) -> None:
     path = tmp_path / "robot.xacro"
@@ -148,14 +170,14 @@ def test_output_into_a_full_disk_is_one_line(words: str) -> None:
         line = [sys.executable, "-m", "holozen", *words.split()]
         done = subprocess.run(line, stdout=full, stderr=subprocess.PIPE, text=True, timeout=60)
     assert done.returncode == 1
-    assert done.stderr == "holozen: cannot write what was asked for: No space left on device\n"
+    assert done.stderr == "holozen: cannot write the output: No space left on device\n"
 
 
 def test_a_service_is_found_in_the_tree() -> None:
-    for verb, name in cli.SERVICES.items():
+    for verb in cli.SERVICES:
         command = cli.command(verb)
         module = command.module if isinstance(command, Service) else command
-        assert module.__name__ == f"services.{name}.__main__"
+        assert module.__name__ == f"services.{verb.replace('-', '_')}.__main__"
 
 
 @pytest.mark.parametrize("words", ["param load sim -", "topic pub cmd_vel -", "teleop --script -", "teleop"])

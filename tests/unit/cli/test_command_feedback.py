@@ -4,7 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from holozen.bus import Bus
-from holozen.cli.publish import HELD, verdict
+from holozen.cli.publish import HELD, LEFT, verdict
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 
@@ -42,7 +42,7 @@ def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus]) -> str:
     def answer() -> None:
         wait_for(lambda: statuses.matched)
         statuses.put(CommandStatus(obeyed=TELEOP))  # which was on its way already
-        statuses.put(judged(commands.recv().sample.source))
+        statuses.put(judged(commands.recv().source))
 
     with ThreadPoolExecutor() as pool:
         answered = pool.submit(answer)
@@ -59,5 +59,13 @@ def test_a_single_command_that_is_obeyed_is_not_called_refused(wire: Wire, run: 
 
 
 def test_a_single_command_that_is_not_obeyed_is_reported(wire: Wire, run: Run) -> None:
-    reported = once(wire, run, lambda source: CommandStatus(TELEOP, sources=[CommandSource(source)]))
-    assert reported.splitlines()[-1] == f"not obeyed: {TELEOP} drives"
+    """With the driver, and that it has left if it is none of the nodes that are there."""
+    teleop = wire.bus("teleop")
+    teleop.publisher("cmd_vel", Twist)
+
+    def reported() -> str:
+        return once(wire, run, lambda source: CommandStatus(teleop.source, sources=[CommandSource(source)]))
+
+    assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives"
+    teleop.close()
+    assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives{LEFT}"

@@ -74,9 +74,20 @@ def test_deleted_ones_are_an_object_a_line_as_json(sim: FakeSim, run: Run) -> No
     assert (code, err) == (1, f"holozen delete: {reason}\n")
 
 
+def test_wildcards_stand_for_names_as_in_a_shell(sim: FakeSim, run: Run) -> None:
+    for name in ("bot0", "bot1", "bot22", "Bot3"):
+        sim.put(name)
+    assert run("delete", "bot?", "x*") == (
+        1,
+        "bot0 is deleted\nbot1 is deleted\n",
+        "holozen delete: no name matches 'x*'; there are Bot3, bot0, bot1, bot22\n",
+    )
+    assert list(sim.entities) == ["bot22", "Bot3"]
+
+
 def test_an_illegal_name_is_wrong_usage_and_asks_nothing(sim: FakeSim, run: Run) -> None:
     sim.put("Fred")
-    for name in ("*", "a/b", "", "9"):
+    for name in ("a/b", "", "9"):
         code, _, err = run("delete", "Fred", name)
         assert code == 2 and f"robot name {name!r}: use a letter" in err
     assert sim.log == []

@@ -10,7 +10,7 @@ VERBS = [(noun, verb) for noun in ("topic", "service", "node", "param") for verb
 
 
 def test_the_table_of_the_verbs_is_current() -> None:
-    assert f"<!-- table -->\n{table()}\n<!-- /table -->\n" in PAGE.read_text(), "scripts/tables writes it anew"
+    assert f"<!-- table -->\n{table()}\n<!-- /table -->\n" in PAGE.read_text(), "scripts/tables rewrites it"
 
 
 def test_a_row_has_three_cells() -> None:

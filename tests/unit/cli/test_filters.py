@@ -119,7 +119,7 @@ def test_a_field_is_picked_by_its_path() -> None:
 
 def test_what_is_no_path_is_refused() -> None:
     for text in ["", ".", "..", "a.", ".a", "a..b", "a[", "a[x]", "a[-1]", "[", "a" * 501]:
-        with pytest.raises(ValueError, match="is no field; write names with dots"):
+        with pytest.raises(ValueError, match="is not a field; write names with dots"):
             path(text)
 
 

@@ -69,7 +69,7 @@ class Numbered(Sample):
     __slots__ = ("number",)
 
     def __init__(self, size: int, number: int | None = None) -> None:
-        self.size, self.payload = size, b""
+        self.oversize, self.payload = size, b""
         self.number = None if number is None else ("a", number)  # type: ignore[misc]
 
 

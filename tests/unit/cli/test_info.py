@@ -46,7 +46,7 @@ def test_each_source_is_reported_with_its_priority_rate_and_whether_it_is_obeyed
         "  anonymous (DATA)  DATA  50.0 Hz  held",
         "Subscription count: 1",
         f"  sim ({sim.id[:6]})",
-        f"Obeyed: {teleop.source}; sources below a person are held until `resume`",
+        f"Obeyed: {teleop.source}; sources of a lower priority are held until `resume`",
     ]
     output = json.loads(run("topic", "info", "Fred/cmd_vel", "--json")[1])
     assert [(row["source"], row["obeyed"], row["held"]) for row in output["publishers"]] == [

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from holozen import cli
-from holozen.cli.publish import read_message
+from holozen.cli.values import checked
 from holozen.messages import Odometry, Twist
 from holozen.messages.codec import convert
 from holozen.messages.definitions import completed
@@ -93,8 +93,9 @@ def test_a_type_in_json_has_its_fields_and_constants(capsys: pytest.CaptureFixtu
 def test_a_prototype_is_yaml_that_can_be_published(capsys: pytest.CaptureFixture[str]) -> None:
     text = run(capsys, "proto", "geometry_msgs/msg/Twist")
     assert text == "linear:\n  x: 0.0\n  y: 0.0\n  z: 0.0\nangular:\n  x: 0.0\n  y: 0.0\n  z: 0.0\n"
-    assert read_message(text, (Twist,)) == Twist()
-    assert read_message(run(capsys, "proto", "nav_msgs/msg/Odometry"), (Odometry,)) == Odometry()
+    for kind in (Twist, Odometry):
+        message = checked(run(capsys, "proto", kind.ROS), Registry().find(kind.ROS))
+        assert convert(message, (kind,), strict=True) == kind()
 
 
 def test_every_prototype_is_a_message_in_yaml_and_in_json(capsys: pytest.CaptureFixture[str]) -> None:
@@ -120,7 +121,7 @@ def test_a_prototype_in_json_is_what_our_messages_begin_with(capsys: pytest.Capt
             ("show", "geometry_msgs/msg/Twsit"),
             "no type 'geometry_msgs/msg/Twsit' (did you mean 'geometry_msgs/msg/Twist'?)",
         ),
-        (("proto", "Twist"), "'Twist' is not a type: the package is missing (did you mean 'geometry_msgs/msg/Twist'?)"),
+        (("proto", "Twist"), "'Twist' has no package; write geometry_msgs/msg/Twist"),
         (("show", "a b\x1b"), "'a b\\x1b' is not a type; write PACKAGE/msg/NAME, such as geometry_msgs/msg/Twist"),
     ],
     ids=str,

@@ -12,7 +12,7 @@ from holozen.testing import Wire
 
 SLOW = {
     "shutil", "msgspec", "numpy", "prompt_toolkit", "pybullet", "dataclasses", "inspect", "yaml",
-    "pathlib", "subprocess", "asyncio", "difflib", "ast", "holozen.messages",
+    "pathlib", "subprocess", "asyncio", "difflib", "ast", "holozen.messages.definitions",
 }  # fmt: skip
 
 ECHO = {

@@ -218,7 +218,7 @@ def test_flags_of_ros2_that_change_nothing_are_taken(sim: Bus, run: Run) -> None
 def test_help_lists_the_flags_that_change_nothing(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         main(["topic", "echo", "--help"])
-    assert "They change nothing here." in capsys.readouterr().out.partition("accepted for compatibility with ros2:")[2]
+    assert "They have no effect here." in capsys.readouterr().out.partition("accepted for compatibility with ros2:")[2]
 
 
 def test_nodes_are_listed(sim: Bus, run: Run, wire: Wire) -> None:

@@ -59,7 +59,7 @@ def test_pub_checks_the_fields_of_a_package_that_is_given(run: Run, wire: Wire, 
     assert "did you mean 'width'?" in run(*words, "{widht: 2}", "--package", thing)[2]
     tap = wire.bus("reader").subscribe_raw("thing")
     assert run(*words, "{width: 2}", "--package", thing)[0] == 0
-    assert tap.recv().payload == b'{"width": 2.0, "name": ""}'
+    assert tap.recv().payload == b'{"width":2.0,"name":""}'
 
 
 def test_pub_takes_the_type_of_the_subscribers(run: Run, wire: Wire, thing: str) -> None:
@@ -68,7 +68,7 @@ def test_pub_takes_the_type_of_the_subscribers(run: Run, wire: Wire, thing: str)
     tap.ends.append(reader.announce("sub", TYPE, "thing"))
     assert "'thing' has no known type" in run("topic", "pub", "--once", "thing", "{width: 2}")[2]
     assert run("topic", "pub", "--once", "thing", "{width: 2}", "--package", thing)[0] == 0
-    assert tap.recv().payload == b'{"width": 2.0, "name": ""}'
+    assert tap.recv().payload == b'{"width":2.0,"name":""}'
 
 
 def test_a_given_package_comes_before_ours(run: Run, wire: Wire, thing: str) -> None:
@@ -76,4 +76,4 @@ def test_a_given_package_comes_before_ours(run: Run, wire: Wire, thing: str) -> 
     (folder / "msg" / "Twist.msg").write_text("bool mine\n")
     words = ("topic", "pub", "--once", "--no-wait", "a/key", "geometry_msgs/msg/Twist", "{mine: true}")
     assert run(*words, "--package", f"geometry_msgs={folder}")[0] == 0
-    assert "unknown field `mine`" in run(*words)[2]
+    assert "has no field 'mine'" in run(*words)[2]

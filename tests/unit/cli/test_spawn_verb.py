@@ -4,10 +4,12 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import trimesh
 
+from holozen import entities
 from holozen.bus import Bus
 from holozen.cli.spawn import Place, spawn_file
 from holozen.messages import Point, Pose, Quaternion
@@ -121,6 +123,14 @@ def test_values_of_xacro_args_may_stand_anywhere(sim: FakeSim, run: Run, tmp_pat
     assert {pose(sim, name).position.z for name in "abc"} == {2}
 
 
+def test_a_value_that_the_file_does_not_ask_for_is_a_warning(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    path = ball(tmp_path)
+    code, _, err = run("spawn", path, "radius:=2")
+    assert (code, list(sim.entities)) == (0, ["ball"])
+    warning = f"{path}: nothing asks for the argument 'radius'; its arguments are: none"
+    assert err == f"holozen spawn: warning: {warning}\n"
+
+
 @pytest.mark.parametrize("gravity", ["true", "false"])
 def test_a_body_without_collision_shape_falls_only_by_gravity(
     sim: FakeSim, run: Run, tmp_path: Path, gravity: str
@@ -205,7 +215,7 @@ def test_an_illegal_name_is_refused(sim: FakeSim, run: Run, tmp_path: Path) -> N
 
 
 @pytest.mark.parametrize(
-    "words", [(), ("a.urdf", "b.urdf"), ("a:=1",), ("a.urdf", "-x", "far"), ("a.urdf", "-z", "nan")]
+    "words", [(), ("a.urdf", "b.urdf"), ("a:=1",), ("a.urdf", ":=1"), ("a.urdf", "-x", "far"), ("a.urdf", "-z", "nan")]
 )
 def test_words_without_meaning_are_wrong_usage(run: Run, words: tuple[str, ...]) -> None:
     code, out, err = run("spawn", *words)
@@ -233,9 +243,38 @@ def test_angles_in_degrees_are_refused(run: Run, tmp_path: Path, flag: str) -> N
     assert (code, "use a number from -6.2832 to 6.2832 rad" in err) == (2, True)
 
 
-def test_without_a_sim_it_explains_how_to_start_one(run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fleet_for_which_the_sim_has_no_room_is_refused_as_a_whole(sim: FakeSim, run: Run, tmp_path: Path) -> None:
+    sim.put("Fred")
+    for count in (1000, 10_000_000):
+        expected = (
+            f"--count {count} is too many: a sim holds 1000 entities, and there are 1 in 1 sim; `holozen up --shards"
+        )
+        code, out, err = run("spawn", ball(tmp_path), "--count", count)
+        assert (code, out, err.count("\n")) == (1, "", 1) and err.startswith(f"holozen spawn: {expected}")
+    assert sim.log == []
+
+
+def test_after_ctrl_c_it_reports_how_much_of_a_fleet_there_is(
+    sim: FakeSim, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    spawn = entities.spawn
+
+    def interrupted(bus: Bus, name: str, *rest: Any) -> tuple[str, list[str]]:
+        if name == "bot3":
+            raise KeyboardInterrupt
+        return spawn(bus, name, *rest)
+
+    monkeypatch.setattr(entities, "spawn", interrupted)
+    expected = "holozen spawn: spawned 3 of 9 (bot0 .. bot2); `holozen delete 'bot[0-9]*'` removes them\n"
+    assert run("spawn", ball(tmp_path), "--count", 9) == (130, "", expected)
+
+
+def test_without_a_sim_it_explains_how_to_start_one(
+    wire: Wire, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("holozen.entities.NOTICE", 0.2)
-    expected = "no sim answered within 0.2 s; start one in another terminal: holozen sim"
+    why = f"no nodes found at {wire.endpoint}"
+    expected = f"no sim answered within 0.2 s: {why}; start one in another terminal: holozen sim"
     assert run("spawn", ball(tmp_path)) == (1, "", f"holozen spawn: {expected}\n")
     assert run("spawn", ball(tmp_path), "-timeout", "0.1")[2] == f"holozen spawn: {expected.replace('0.2', '0.1')}\n"
     assert run("list") == (1, "", f"holozen list: {expected}\n")

@@ -25,7 +25,7 @@ class Robots:
     """Robots that only remember that they were called; `refusals` are their replies before they obey."""
 
     def __init__(self, wire: Wire) -> None:
-        self.wire, self.refusals = wire, list[str]()
+        self.wire, self.refusals, self.message = wire, list[str](), "whatever"
         self.called = set[tuple[str, str]]()  # keys, and the sims whose they are
         self.first_called = threading.Event()
         self._servers = list[Server]()
@@ -46,7 +46,7 @@ class Robots:
                 raise ServiceError(self.refusals.pop())
             self.called.add((key, sim))
             self.first_called.set()
-            return TriggerReply(True, "whatever")
+            return TriggerReply(True, self.message)
 
         return answer
 
@@ -139,6 +139,8 @@ def test_it_looks_for_robots_until_its_timeout(robots: Robots, run: Run, monkeyp
 def test_release_reports_the_sims_reply(robots: Robots, run: Run) -> None:
     robots.add("Fred/stop", "Fred/release")
     assert run("release") == (0, "Fred is released: whatever\n", "")
+    robots.message = "the robot was not stopped"
+    assert run("release") == (0, "Fred was not stopped\n", "")
     assert robots.keys() == {"Fred/release"}
 
 

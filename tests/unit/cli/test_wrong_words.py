@@ -29,7 +29,7 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
         ),
         ("topic list --listen tcp/h", "holozen topic list: argument --listen: 'tcp/h' has no port from 0 to 65535: "),
         ("topic echo odom --filter (", "holozen topic echo: filter '(': "),
-        ("topic echo odom --field a..b", "holozen topic echo: 'a..b' is no field; write names with dots"),
+        ("topic echo odom --field a..b", "holozen topic echo: 'a..b' is not a field; write names with dots"),
         ("topic echo odom --type nav_msgs/msg/Odmetry", "holozen topic echo: no type 'nav_msgs/msg/Odmetry' (did you"),
         ("service cal x", "holozen service: argument VERB: 'cal' (did you mean 'call'?); there are list, type, "),
         ("node lits", "holozen node: argument VERB: 'lits' (did you mean 'list'?); there are list, info"),
@@ -43,6 +43,12 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
             "holozen check: argument --package: 'hb=/nope': there is no folder '/nope'; ",
         ),
         ("sim --wrold x", "holozen sim: no flag '--wrold' (did you mean '--world'?); "),
+        ("sim --list", "holozen sim: no flag '--list' (did you mean '--listen'?); "),
+        ("topic echo odom --onc", "holozen topic echo: no flag '--onc' (did you mean '--once'?); "),
+        (
+            "topic pub x {} --rate -3",
+            "holozen topic pub: argument -r/--rate: '-3': use a number from 0.01 to 10000 Hz; ",
+        ),
         ("controller --lapse 3", "holozen controller: no flag '--lapse' (did you mean '--laps'?); "),
         ("pose-service --shape sqare", "holozen pose-service: argument --shape: 'sqare' (did you mean 'square'?); "),
         (

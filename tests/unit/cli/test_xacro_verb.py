@@ -72,8 +72,7 @@ def test_values_may_stand_on_both_sides_of_the_flags(file: Path, capsys: pytest.
     [
         (
             b"",
-            "robot.xacro, line 1: broken XML: no element found; "
-            "close each element, inner ones first: </name>, or /> at the end of its tag",
+            "robot.xacro, line 1: broken XML: the file is empty; `holozen new robot NAME` writes one to start from",
         ),
         (
             b'<robot name="r"><xacro:property name="x" value="1"/></robot>',

@@ -1,4 +1,4 @@
-"""The follower on a real bus, with a robot that moves exactly as commanded."""
+"""When the controller leaves the robot to others, and when it drives again."""
 
 import math
 import threading
@@ -50,12 +50,12 @@ class Robot:
         self._time = 0.0
 
     def status(self, **fields: object) -> bool:
-        """Publish a status of the driver; whether there is a reader."""
+        """Publish a status that names the driver; whether anyone reads it."""
         self._status.put(CommandStatus(**fields))  # type: ignore[arg-type]
         return self._status.matched
 
     def live(self, end: threading.Event) -> None:
-        """Receive, move and publish until the end; pauses while `moving` is not set."""
+        """Receive, move and publish until the end; pause while `moving` is not set."""
         while not end.wait(STEP / 10):
             if self.moving.is_set():
                 self._step()
@@ -180,7 +180,7 @@ def test_it_yields_to_any_other_driver_and_sends_not_even_a_stop(case: Case) -> 
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.reports)
-    assert "yields to teleop@9; `holozen controller --resume` or the teleop's r resumes" in case.reports
+    assert "yields to teleop@9; resume with `holozen controller --resume` or press r in the teleop" in case.reports
     assert case.robot.heard == []
     case.robot.status(resumed=1)
     assert len(lap.result(30)) == 2
@@ -203,7 +203,7 @@ def test_a_stopped_robot_is_not_commanded_and_after_the_resume_it_begins_with_a_
 
 
 def test_a_controller_that_drives_lets_go_without_a_word_when_another_takes_over(case: Case) -> None:
-    """A stop of its own would hold up the person who drives now."""
+    """A stop command of its own would hold up the person who drives now."""
     case.goals()
     lap = case.lap()
     wait_for(lambda: case.robot.heard)
@@ -276,7 +276,10 @@ def test_a_goal_of_goal_pose_comes_before_the_list_and_the_robot_stays_until_a_r
     send(case, -0.4, 0.3)
     lap = case.lap()
     wait_for(
-        lambda: "yields to a goal of goal_pose; `holozen controller --resume` or the teleop's r resumes" in case.reports
+        lambda: (
+            "yields to a goal of goal_pose; resume with `holozen controller --resume` or press r in the teleop"
+            in case.reports
+        )
     )
     assert any(line.startswith("goal_pose: (-0.40, 0.30) by sim@") for line in case.reports)
     assert case.robot.pose == pytest.approx((-0.4, 0.3, 0.0), abs=0.03)
@@ -305,7 +308,7 @@ def test_a_goal_of_goal_pose_waits_while_another_drives(case: Case) -> None:
     ("x", "frame", "reason"),
     [(1.0, "camera", "its frame is 'camera'; give it in 'odom'"), (2e6, "odom", "it is more than 1e+06 m away")],
 )
-def test_a_goal_that_cannot_be_meant_is_refused(case: Case, x: float, frame: str, reason: str) -> None:
+def test_an_implausible_goal_is_refused(case: Case, x: float, frame: str, reason: str) -> None:
     case.goals()
     lap = case.lap()
     send(case, x, 0.0, frame)

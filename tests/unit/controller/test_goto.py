@@ -17,7 +17,7 @@ numbers = st.floats(-1e3, 1e3)
 
 
 def drive(start: Pose, goal: Pose, gains: Gains, seconds: float = 60.0) -> list[tuple[Pose, Planar]]:
-    """The pose and the command of an ideal robot, step by step, until it has arrived."""
+    """The poses and commands of an ideal robot, step by step, until it has arrived."""
     pose, now = start, STOP
     way: list[tuple[Pose, Planar]] = []
     for _ in range(round(seconds / DT)):

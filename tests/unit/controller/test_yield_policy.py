@@ -44,7 +44,9 @@ def test_it_yields_to_the_last_driver(policy: YieldPolicy) -> None:
 
 def test_a_robot_that_others_drove_before_it_came_is_not_taken(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(held=True))
-    assert policy.yielded_to == "an earlier source"
+    assert policy.reason.startswith(
+        "another source drove this robot; resume with `holozen controller --resume` or press r"
+    )
 
 
 def test_after_resume_it_drives_again(policy: YieldPolicy) -> None:
@@ -59,7 +61,7 @@ def test_a_resume_that_it_missed_while_it_was_away_counts(policy: YieldPolicy) -
     assert policy.yielded_to == ""
 
 
-def test_an_old_resume_is_none(policy: YieldPolicy) -> None:
+def test_an_old_resume_does_not_count(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(resumed=1))
     policy.update(CommandStatus(obeyed=PERSON, held=True, resumed=1))
     policy.update(CommandStatus(resumed=1))
@@ -85,16 +87,14 @@ def test_it_yields_to_a_software_stop_and_reports_what_frees_the_robot(policy: Y
     policy.update(CommandStatus(obeyed=ME))
     assert policy.reason == ""
     policy.update(CommandStatus(held=True, stopped="stop@3"))
-    message = (
-        "yields: the robot is stopped by stop@3; `holozen release` ends that, and then `holozen controller --resume`"
-    )
+    message = "yields: the robot is stopped by stop@3; `holozen release` ends that, then resume with `holozen"
     assert policy.reason.startswith(message)
 
 
 def test_after_the_release_it_still_waits_for_the_resume(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(held=True, stopped="stop@3"))
     policy.update(CommandStatus(held=True))
-    assert policy.reason.startswith("yields to the stop by stop@3; `holozen controller --resume`")
+    assert policy.reason.startswith("yields to the stop by stop@3; resume with `holozen controller --resume`")
     policy.update(CommandStatus(resumed=1))
     assert policy.reason == ""
 

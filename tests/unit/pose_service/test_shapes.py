@@ -14,7 +14,7 @@ sizes = st.floats(0.01, 1000)
 
 
 def sides(goals: list[Goal]) -> list[float]:
-    """The lengths of the ways between the goals, from the origin round to it again."""
+    """The distances between successive goals, starting at the origin and returning to it."""
     starts = [(0.0, 0.0, 0.0), *goals[:-1]]
     return [math.dist(start[:2], goal[:2]) for start, goal in zip(starts, goals, strict=True)]
 

@@ -27,7 +27,7 @@ class Robots:
         self._wait: dict[str, Publisher[Odometry]] = {}
 
     def publish(self, key: str, x: float = 0.0) -> None:
-        """One odom of the robot with this key."""
+        """Publish one odom of the robot with this key."""
         odom = Odometry()
         odom.pose.pose.position.x = x
         if key not in self._wait:
@@ -41,7 +41,7 @@ class Robots:
         return str(error.value)
 
     def heard(self, name: str, x: float) -> GetPoseReply | None:
-        """The reply, if it is fresh and of the odom with this x."""
+        """The reply, if it is fresh and comes from the odom with this x."""
         try:
             reply = self.tracker.get_pose(GetPoseRequest(name))
         except ServiceError:

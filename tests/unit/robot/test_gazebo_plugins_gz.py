@@ -49,13 +49,13 @@ def test_velocity_control_moves_the_whole_robot() -> None:
 
 
 def test_a_diff_drive_has_the_defaults_of_gz_sim() -> None:
-    expected = Differential(("fl", "rl"), ("fr", "rr"))
+    expected = Differential(("fl", "rl"), ("fr", "rr"), 0.4, 0.1)
     assert drive(plugin("diff-drive", PAIRS)) == Drive(odometry_rate=50, robot_base_frame="base", mechanism=expected)
 
 
 def test_each_tag_of_a_diff_drive_is_read() -> None:
     tags = (
-        f"{PAIRS}<wheel_separation>0.4</wheel_separation><wheel_radius>0.1</wheel_radius><topic>/go</topic>"
+        f"{PAIRS}<wheel_separation>0.5</wheel_separation><wheel_radius>0.2</wheel_radius><topic>/go</topic>"
         "<odom_topic>where</odom_topic><tf_topic>/tf</tf_topic><frame_id>map</frame_id>"
         "<child_frame_id>bot/base</child_frame_id><odom_publish_frequency>30</odom_publish_frequency>"
         "<max_linear_velocity>1</max_linear_velocity><min_linear_velocity>-1</min_linear_velocity>"
@@ -63,7 +63,7 @@ def test_each_tag_of_a_diff_drive_is_read() -> None:
         "<min_angular_acceleration>-4</min_angular_acceleration>"
     )
     expected = Drive(
-        "go", "where", "map", 30, "base", mechanism=Differential(("fl", "rl"), ("fr", "rr"), 0.4, 0.1),
+        "go", "where", "map", 30, "base", mechanism=Differential(("fl", "rl"), ("fr", "rr"), 0.5, 0.2),
         max_linear=1, max_angular=2, max_linear_acceleration=3, max_angular_acceleration=4,
     )  # fmt: skip
     assert drive(plugin("diff-drive", tags)) == expected
@@ -121,14 +121,14 @@ def test_a_system_in_an_sdf_model_knows_the_models_name() -> None:
 
 
 def test_a_mecanum_drive_has_a_wheel_at_each_corner() -> None:
-    measures = "<wheel_separation>0.4</wheel_separation><wheelbase>0.5</wheelbase><wheel_radius>0.1</wheel_radius>"
-    assert drive(plugin("mecanum-drive", CORNERS)).mechanism == Mecanum(*WHEELS)
-    assert drive(plugin("mecanum-drive", CORNERS + measures)).mechanism == Mecanum(*WHEELS, 0.4, 0.5, 0.1)
+    measures = "<wheel_separation>0.5</wheel_separation><wheelbase>0.6</wheelbase><wheel_radius>0.2</wheel_radius>"
+    assert drive(plugin("mecanum-drive", CORNERS)).mechanism == Mecanum(*WHEELS, 0.4, 0.4, 0.1)
+    assert drive(plugin("mecanum-drive", CORNERS + measures)).mechanism == Mecanum(*WHEELS, 0.5, 0.6, 0.2)
 
 
 def test_a_second_wheel_at_a_corner_is_reported() -> None:
     model = robot(plugin("mecanum-drive", f"{CORNERS}<front_left_joint>rr</front_left_joint>"))
-    assert model.drive is not None and model.drive.mechanism == Mecanum(*WHEELS)
+    assert model.drive is not None and model.drive.mechanism == Mecanum(*WHEELS, 0.4, 0.4, 0.1)
     assert message(model) == [
         "<front_left_joint> of <plugin name='p'> is a second wheel at one corner; only 'fl' drives"
     ]
@@ -141,7 +141,7 @@ def test_an_odometry_publisher_publishes_the_true_pose_of_a_drive(first: bool) -
         "<odom_publish_frequency>10</odom_publish_frequency><dimensions>3</dimensions>"
     )
     pair = [plugin("odometry-publisher", tags), plugin("diff-drive", PAIRS)]
-    wheels = Differential(("fl", "rl"), ("fr", "rr"), encoder=False)
+    wheels = Differential(("fl", "rl"), ("fr", "rr"), 0.4, 0.1, encoder=False)
     expected = Drive("cmd_vel", "where", "map", 10, "l_fl", mechanism=wheels)
     assert drive(*(pair if first else pair[::-1])) == expected
 
@@ -150,7 +150,7 @@ def test_an_odometry_publisher_keeps_the_frame_of_the_drive() -> None:
     tags = f"{CORNERS}<child_frame_id>l_rr</child_frame_id>"
     found = drive(plugin("mecanum-drive", tags), plugin("odometry-publisher"))
     assert found.robot_base_frame == "l_rr" and found.odometry_topic == "odom"
-    assert found.mechanism == Mecanum(*WHEELS, encoder=False)
+    assert found.mechanism == Mecanum(*WHEELS, 0.4, 0.4, 0.1, encoder=False)
 
 
 def test_a_system_has_no_default_names_for_joints() -> None:
@@ -163,7 +163,7 @@ def test_a_system_has_no_default_names_for_joints() -> None:
 def test_an_odometry_publisher_without_a_drive_is_reported() -> None:
     model = robot(plugin("odometry-publisher"))
     assert model.drive is None
-    assert message(model) == ["<plugin name='p'> publishes the odometry of a drive, but there is no drive"]
+    assert message(model) == ["<plugin name='p'> publishes odometry, but the robot has no drive"]
 
 
 def test_a_mistake_is_refused_with_the_tag() -> None:

@@ -60,20 +60,20 @@ def refusal(tags: str, filename: str = DIFF) -> str:
 
 
 def test_without_tags_the_defaults_of_gazebo_hold_and_the_links_measure_the_wheels() -> None:
-    expected = Differential(("fl",), ("fr",), 0, 0, torque=5, encoder=False)
+    expected = Differential(("fl",), ("fr",), 1, 0.1, torque=5, encoder=False)
     assert drive(PAIR) == Drive("cmd_vel", "odom", "odom", 100, "base", mechanism=expected)
 
 
 def test_the_tags_of_ros_1_are_read() -> None:
     tags = (
         f"{PAIR}<rosDebugLevel>Debug</rosDebugLevel><robotNamespace>/</robotNamespace><wheelSeparation>0.4</wheelSeparation>"
-        "<wheelDiameter>0.2</wheelDiameter><wheelTorque>20</wheelTorque><wheelAcceleration>1.8</wheelAcceleration>"
+        "<wheelDiameter>0.4</wheelDiameter><wheelTorque>20</wheelTorque><wheelAcceleration>1.8</wheelAcceleration>"
         "<commandTopic>go</commandTopic><odometryTopic>where</odometryTopic><odometryFrame>map</odometryFrame>"
         "<odometrySource>encoder</odometrySource><updateRate>30</updateRate><robotBaseFrame>base</robotBaseFrame>"
         "<publishTf>1</publishTf><publishOdomTF>false</publishOdomTF><publishWheelTF>true</publishWheelTF>"
         "<publishWheelJointState>true</publishWheelJointState><legacyMode>false</legacyMode>"
     )
-    expected = Differential(("fl",), ("fr",), 0.4, 0.1, 20, True, 1.8)
+    expected = Differential(("fl",), ("fr",), 0.4, 0.2, 20, True, 1.8)
     assert drive(tags) == Drive("go", "where", "map", 30, "base", publish_odom_tf=False, mechanism=expected)
 
 
@@ -83,23 +83,23 @@ def test_the_tags_of_ros_2_are_read() -> None:
         "<update_rate>30</update_rate><num_wheel_pairs>2</num_wheel_pairs><left_joint>fl</left_joint>"
         "<right_joint>fr</right_joint><left_joint>rl</left_joint><right_joint>rr</right_joint>"
         "<wheel_separation>0.4</wheel_separation><wheel_separation>0.4</wheel_separation>"
-        "<wheel_diameter>0.2</wheel_diameter><max_wheel_torque>20</max_wheel_torque>"
+        "<wheel_diameter>0.4</wheel_diameter><max_wheel_torque>20</max_wheel_torque>"
         "<max_wheel_acceleration>1.0</max_wheel_acceleration><publish_odom>true</publish_odom>"
         "<publish_odom_tf>true</publish_odom_tf><publish_wheel_tf>true</publish_wheel_tf>"
         "<odometry_frame>map</odometry_frame><robot_base_frame>base</robot_base_frame>"
         "<odometry_source>0</odometry_source><covariance_x>0.1</covariance_x>"
     )
-    expected = Differential(("fl", "rl"), ("fr", "rr"), 0.4, 0.1, 20, True, 1)
+    expected = Differential(("fl", "rl"), ("fr", "rr"), 0.4, 0.2, 20, True, 1)
     found = Drive("demo/go", "where", "map", 30, "base", covariance=(0.1, 1e-5, 1e-3), mechanism=expected)
     assert drive(tags) == found
 
 
 def test_both_spellings_may_be_mixed() -> None:
     tags = (
-        "<leftJoint>fl</leftJoint><right_joint>fr</right_joint><wheelSeparation>1</wheelSeparation>"
+        "<leftJoint>fl</leftJoint><right_joint>fr</right_joint><wheelSeparation>2</wheelSeparation>"
         "<ros><remapping>/cmd_vel:=/x</remapping></ros>"
     )
-    assert wheels(tags) == Differential(("fl",), ("fr",), 1, 0, 5, False)
+    assert wheels(tags) == Differential(("fl",), ("fr",), 2, 0.1, 5, False)
     assert drive(tags).command_topic == "x"
 
 
@@ -136,9 +136,7 @@ def test_pairs_that_differ_are_reported_and_the_first_counts() -> None:
     model = robot(f"{pairs}<wheel_diameter>0.2</wheel_diameter><wheel_diameter>0.3</wheel_diameter>")
     assert model.drive is not None and isinstance(model.drive.mechanism, Differential)
     assert model.drive.mechanism.radius == 0.1
-    message = (
-        "<wheel_diameter> of <plugin name='p'> differs from the first; one measure is kept for all pairs, the first"
-    )
+    message = "<wheel_diameter> of <plugin name='p'> differs from the first; the first is used for all pairs of wheels"
     assert model.warnings == (f"{ORIGIN}, line 3: {message}",)
 
 
@@ -147,15 +145,15 @@ def test_a_skid_steer_has_four_wheels_and_publishes_the_true_pose() -> None:
         odometry_rate=100,
         robot_base_frame="base",
         covariance=(1e-4, 1e-4, 1e-2),
-        mechanism=Differential(("fl", "rl"), ("fr", "rr"), 0, 0, 5, False),
+        mechanism=Differential(("fl", "rl"), ("fr", "rr"), 1, 0.1, 5, False),
     )
     tags = (
-        f"{CORNERS}<wheelSeparation>0.4</wheelSeparation><wheelDiameter>0.2</wheelDiameter><torque>7</torque>"
+        f"{CORNERS}<wheelSeparation>0.4</wheelSeparation><wheelDiameter>0.4</wheelDiameter><torque>7</torque>"
         "<covariance_x>0</covariance_x><covariance_yaw>0.5</covariance_yaw><broadcastTF>0</broadcastTF>"
         "<robotNamespace>/ns</robotNamespace><updateRate>50</updateRate>"
     )
     found = drive(tags, SKID)
-    assert found.mechanism == Differential(("fl", "rl"), ("fr", "rr"), 0.4, 0.1, 7, False)
+    assert found.mechanism == Differential(("fl", "rl"), ("fr", "rr"), 0.4, 0.2, 7, False)
     assert (found.covariance, found.publish_odom_tf, found.odometry_rate) == ((0, 1e-4, 0.5), False, 50)
     assert (found.command_topic, found.odometry_topic) == ("ns/cmd_vel", "ns/odom")
 
@@ -167,8 +165,8 @@ def test_the_joints_of_a_skid_steer_have_default_names() -> None:
 
 
 def test_hectors_plugin_names_all_wheels_of_a_side_in_one_tag() -> None:
-    tags = "<leftJoints>fl  rl</leftJoints><rightJoints>fr rr</rightJoints><wheelDiameter>0.2</wheelDiameter>"
-    assert wheels(tags, MULTI) == Differential(("fl", "rl"), ("fr", "rr"), 0, 0.1, 5, False)
+    tags = "<leftJoints>fl  rl</leftJoints><rightJoints>fr rr</rightJoints><wheelDiameter>0.4</wheelDiameter>"
+    assert wheels(tags, MULTI) == Differential(("fl", "rl"), ("fr", "rr"), 1, 0.2, 5, False)
 
 
 def test_hectors_plugin_understands_the_tags_of_the_others_and_has_their_default_names() -> None:

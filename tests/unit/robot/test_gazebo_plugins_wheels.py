@@ -58,9 +58,9 @@ def radius(model: RobotModel) -> float:
     return model.drive.mechanism.radius
 
 
-def test_round_wheels_are_left_to_their_links() -> None:
+def test_round_wheels_have_the_radius_of_their_shape() -> None:
     for filename, tags in DRIVES.items():
-        assert radius(robot(filename, tags)) == 0
+        assert radius(robot(filename, tags)) == 0.1
 
 
 def test_other_wheels_have_half_of_their_larger_extent_across_the_axle() -> None:
@@ -121,7 +121,7 @@ def test_a_joint_is_one_wheel() -> None:
         (
             "libgazebo_ros_skid_steer_drive.so",
             SKID.replace("rl", "fl"),
-            "has the joint 'fl' twice on the left; each wheel turns on its own",
+            "has the joint 'fl' twice on the left; each wheel needs a joint of its own",
         ),
         ("libdiffdrive_plugin_multi_wheel.so", "<leftJoints>fl</leftJoints><rightJoints>fr fr</rightJoints>", "twice"),
         ("gz-sim-mecanum-drive-system", CORNERS.replace("rr", "rl"), "has the joint 'rl' on the left and on the right"),

@@ -139,7 +139,7 @@ def test_what_is_no_mesh_is_reported_in_one_line_with_its_place() -> None:
         (ENTITY, "a.dae, line 2: the entity 'a' is declared; write out its text instead"),
         (dae('<unit meter="0"/>'), "<unit> meter is 0; a length must be positive"),
         (dae('<unit meter="nan"/>'), "meter: 'nan' is not a finite number"),
-        (dae("<up_axis>W_UP</up_axis>"), "<up_axis> is 'W_UP'; there are Z_UP, Y_UP, X_UP"),
+        (dae("<up_axis>W_UP</up_axis>"), "<up_axis> is 'W_UP'; it must be one of Z_UP, Y_UP, X_UP"),
         (dae(nodes='<node><instance_geometry url="#h"/></node>'), "url='h' names no <geometry> of this file"),
         (dae(nodes='<node><instance_node url="#n"/></node>', more=LOOP), "in its scene, or one that contains itself"),
         (dae(nodes=f"<node><skew>1 2</skew>{HERE}</node>"), "<skew> is not supported; apply the transforms"),

@@ -50,18 +50,18 @@ def test_an_ascii_file_may_hold_several_solids() -> None:
 
 @pytest.mark.parametrize("data", [ASCII[:-20], ASCII[: len(ASCII) // 2], b"solid " + b"x" * 100])
 def test_an_ascii_file_that_is_cut_off_is_reported(data: bytes) -> None:
-    assert refusal(data) == "a.stl: is cut off: it does not end with 'endsolid'; export it again as STL"
+    assert refusal(data) == "a.stl: is truncated: it does not end with 'endsolid'; export it again as STL"
 
 
 def test_a_facet_of_two_vertices_is_reported() -> None:
     first = ASCII.index(b"vertex")
-    assert "is cut off" in refusal(ASCII[:first] + ASCII[ASCII.index(b"vertex", first + 1) :])
+    assert "is truncated" in refusal(ASCII[:first] + ASCII[ASCII.index(b"vertex", first + 1) :])
 
 
 def test_a_long_file_without_facets_is_not_gathered(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(meshes, "BLOCK", 100)
     file = io.BytesIO(b"solid" + b" " * 10_000)
-    with pytest.raises(RobotError, match="is cut off"):
+    with pytest.raises(RobotError, match="is truncated"):
         list(read_stl(file, 10_005, "a.stl"))
     assert file.tell() < 1000
 

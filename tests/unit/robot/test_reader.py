@@ -1,4 +1,4 @@
-"""The process that reads hostile files: what it may, and what becomes of one that is taken over, hangs or crashes."""
+"""The worker that reads untrusted files: what it may do, and what happens if it is compromised, hangs or crashes."""
 
 import ctypes
 import errno
@@ -104,7 +104,7 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         (forever, "it takes longer than 1 s to read"),
         (much, "it takes more than"),
         (crashed, r"its reader crashed \(SIGSEGV\)"),
-        (wrong, "its reader was taken over"),
+        (wrong, "its reader was compromised"),
     ],
 )
 def test_one_that_hangs_swells_crashes_or_lies_is_an_error(function: Callable[[], int], reason: str) -> None:
@@ -137,4 +137,4 @@ def test_a_mesh_elsewhere_is_read_but_not_what_a_link_makes_look_like_one(tmp_pa
     for name, warnings in ((elsewhere / "box.stl", 0), ("link.stl", 1)):
         robot.write_text(mesh(str(name)))
         assert len(load(robot).warnings) == warnings
-        assert parse(robot.read_text(), robot).warnings == ()  # only the process apart keeps it from that
+        assert parse(robot.read_text(), robot).warnings == ()  # only the worker prevents that

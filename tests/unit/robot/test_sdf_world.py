@@ -26,6 +26,9 @@ def path(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "home" / "my.world"
 
 
+NOT_FINITE = "is not a finite number; write numbers such as 0.25, separated by spaces"
+
+
 def loaded(path: Path, body: str, name: str = ' name="w"', version: str = "1.9") -> WorldSpec:
     path.write_text(f'<sdf version="{version}"><world{name}>\n{body}</world></sdf>')
     return load_world(path)
@@ -190,14 +193,14 @@ def test_a_number_that_no_engine_survives_is_refused(path: Path) -> None:
         ("max_step_size", "0", " is 0 s; use 0.0001 to 0.02"),
         ("max_step_size", "-1", " is -1 s; use 0.0001 to 0.02"),
         ("max_step_size", "1", " is 1 s; use 0.0001 to 0.02"),
-        ("max_step_size", "nan", ": 'nan' is not a finite number; write 0.25, and spaces between several"),
+        ("max_step_size", "nan", f": 'nan' {NOT_FINITE}"),
         ("max_step_size", "", ": '' has 0 numbers instead of 1"),
         ("real_time_factor", "-1", " is -1; use 0 (as fast as possible) to 1000"),
         ("real_time_factor", "1001", " is 1001; use 0 (as fast as possible) to 1000"),
-        ("real_time_factor", "fast\nest", ": 'fast' is not a finite number; write 0.25, and spaces between several"),
+        ("real_time_factor", "fast\nest", f": 'fast' {NOT_FINITE}"),
         ("gravity", "0 0", ": '0 0' has 2 numbers instead of 3"),
-        ("gravity", "0 0 down", ": 'down' is not a finite number; write 0.25, and spaces between several"),
-        ("gravity", "0 0 -inf", ": '-inf' is not a finite number; write 0.25, and spaces between several"),
+        ("gravity", "0 0 down", f": 'down' {NOT_FINITE}"),
+        ("gravity", "0 0 -inf", f": '-inf' {NOT_FINITE}"),
         ("gravity", "0 0 1e300", ": '1e300' is beyond 1e+06; use metres, kilograms and radians"),
         ("gravity", "0 0 101", " is 0 0 101; use at most 100 m/s^2 along each axis"),
     ]:

@@ -100,7 +100,7 @@ def test_a_data_uri_is_a_hull_at_the_urdf_s_scale(source: Source, home: Path) ->
 def test_a_bad_data_uri_is_a_box_and_a_warning_that_stays_one_short_line(source: Source) -> None:
     uri = "data:model/stl;base64," + base64.b64encode(b"x" * 90_000).decode()
     assert shape(source, uri).kind == "box"
-    assert "data: URI: is cut off" in source.warnings[0] and len(source.warnings[0]) < 300
+    assert "data: URI: is truncated" in source.warnings[0] and len(source.warnings[0]) < 300
 
 
 def test_a_confined_text_opens_no_file_beside_it_nor_a_guess(source: Source, home: Path) -> None:
@@ -116,7 +116,7 @@ def test_a_confined_text_has_a_limited_number_of_meshes(
     monkeypatch.setattr(shapes, "MOST_MESHES", 2)
     uri, wire = data_uri(home / "box.stl"), replace(source, confined=True)
     assert [shape(wire, uri).kind for _ in range(3)] == ["hull", "hull", "box"]
-    assert "is number 3; in text that was sent 2 collision meshes are read" in wire.warnings[0]
+    assert "is mesh number 3; the sim reads at most 2 collision meshes" in wire.warnings[0]
     assert [shape(source, uri).kind for _ in range(3)] == ["hull"] * 3
 
 

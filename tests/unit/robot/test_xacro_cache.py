@@ -8,7 +8,7 @@ import pytest
 
 from holozen.robot import xacro
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import digest, expand
+from holozen.robot.xacro import digest, expand_xacro
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 BODY = """
@@ -66,8 +66,8 @@ def package(folder: Path) -> None:
 
 
 def test_the_second_time_nothing_is_expanded(robot: Path, runs: Runs) -> None:
-    first = expand(robot)
-    assert (expand(robot), runs.count) == (first, 1)
+    first = expand_xacro(robot)
+    assert (expand_xacro(robot), runs.count) == (first, 1)
 
 
 CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
@@ -86,33 +86,33 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
 def test_whatever_changes_makes_a_new_text(robot: Path, runs: Runs, what: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HOLOZEN_TEST", "before")  # so that it is put back
     change, shown = CHANGES[what]
-    assert shown not in expand(robot, allow_env=["HOLOZEN_TEST"])
+    assert shown not in expand_xacro(robot, allow_env=["HOLOZEN_TEST"])
     change(robot)
-    assert shown in expand(robot, allow_env=["HOLOZEN_TEST"])
+    assert shown in expand_xacro(robot, allow_env=["HOLOZEN_TEST"])
     assert runs.count == 2
 
 
 def test_arguments_and_packages_have_texts_of_their_own(robot: Path, home: Path, runs: Runs) -> None:
-    plain = expand(robot)
-    assert 'arg="2"' in expand(robot, {"n": "2"})
-    assert f'find="{home}"' in expand(robot, packages={"wheels": home})
-    assert (expand(robot), runs.count) == (plain, 3)
+    plain = expand_xacro(robot)
+    assert 'arg="2"' in expand_xacro(robot, {"n": "2"})
+    assert f'find="{home}"' in expand_xacro(robot, packages={"wheels": home})
+    assert (expand_xacro(robot), runs.count) == (plain, 3)
 
 
 def test_a_save_that_leaves_size_and_times_the_same_is_seen(robot: Path, runs: Runs) -> None:
     yaml = robot.with_name("values.yaml")
     before = yaml.stat()
-    expand(robot)
+    expand_xacro(robot)
     yaml.write_text("v: 7")
     os.utime(yaml, ns=(before.st_atime_ns, before.st_mtime_ns))
-    assert 'v="7"' in expand(robot)
+    assert 'v="7"' in expand_xacro(robot)
 
 
 def test_a_file_that_went_away_is_reported_and_not_remembered(robot: Path, runs: Runs) -> None:
-    expand(robot)
+    expand_xacro(robot)
     robot.with_name("part.xacro").unlink()
     with pytest.raises(RobotError, match=r"No such file or directory: .*part\.xacro"):
-        expand(robot)
+        expand_xacro(robot)
 
 
 def test_what_is_wrong_is_not_kept(home: Path, place: Path, runs: Runs) -> None:
@@ -120,7 +120,7 @@ def test_what_is_wrong_is_not_kept(home: Path, place: Path, runs: Runs) -> None:
     bad.write_text(f'{HEAD}<l n="${{nope}}"/></robot>')
     for _ in range(2):
         with pytest.raises(RobotError):
-            expand(bad)
+            expand_xacro(bad)
     assert (runs.count, place.exists()) == (2, False)
 
 
@@ -130,8 +130,8 @@ def test_what_is_wrong_is_not_kept(home: Path, place: Path, runs: Runs) -> None:
 def test_a_text_that_is_another_each_time_is_not_kept(home: Path, runs: Runs, expression: str) -> None:
     path = home / "robot.xacro"
     path.write_text(f'{HEAD}<l n="${{{expression}}}"/></robot>')
-    expand(path)
-    expand(path)
+    expand_xacro(path)
+    expand_xacro(path)
     assert runs.count == 2
 
 
@@ -148,22 +148,22 @@ def test_a_text_that_is_another_each_time_is_not_kept(home: Path, runs: Runs, ex
 def test_a_damaged_entry_is_as_good_as_none(
     robot: Path, place: Path, runs: Runs, damage: Callable[[bytes], bytes]
 ) -> None:
-    text = expand(robot)
+    text = expand_xacro(robot)
     (entry,) = place.iterdir()
     whole = entry.read_bytes()
     assert damage(whole) != whole
     entry.write_bytes(damage(whole))
-    assert (expand(robot), runs.count) == (text, 2)
-    assert (expand(robot), runs.count) == (text, 2)
+    assert (expand_xacro(robot), runs.count) == (text, 2)
+    assert (expand_xacro(robot), runs.count) == (text, 2)
 
 
 def test_an_entry_of_another_file_is_as_good_as_none(robot: Path, home: Path, place: Path, runs: Runs) -> None:
-    expand(robot)
+    expand_xacro(robot)
     (entry,) = place.iterdir()
-    expand(robot, {"n": "2"})
+    expand_xacro(robot, {"n": "2"})
     (other,) = set(place.iterdir()) - {entry}
     entry.write_bytes(other.read_bytes())
-    assert 'arg="1"' in expand(robot)
+    assert 'arg="1"' in expand_xacro(robot)
 
 
 def test_a_cache_folder_that_cannot_be_made_is_no_reason_to_fail(
@@ -172,11 +172,11 @@ def test_a_cache_folder_that_cannot_be_made_is_no_reason_to_fail(
     (tmp_path / "file").touch()
     for home in (tmp_path / "file", Path("relative"), Path("/proc/none")):
         monkeypatch.setenv("XDG_CACHE_HOME", str(home))
-        assert "<part" in expand(robot)
+        assert "<part" in expand_xacro(robot)
     monkeypatch.delenv("XDG_CACHE_HOME")
     monkeypatch.setenv("HOME", "nowhere")
     assert xacro.cache_folder() is None
-    assert "<part" in expand(robot)
+    assert "<part" in expand_xacro(robot)
 
 
 def test_the_folder_is_that_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 
 SECRET = "correct-horse"
 ROBOT = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro"><l t="${%s}"/></robot>'
@@ -80,7 +80,7 @@ def test_a_hostile_expression_has_no_way_out(home: Path, monkeypatch: pytest.Mon
         for name, expression in HOSTILE.items():
             robot.write_text(ROBOT % (expression % {"home": home, "bot": package, "port": server.getsockname()[1]}))
             try:
-                out = expand(robot)
+                out = expand_xacro(robot)
             except RobotError as error:
                 out = str(error)
                 assert any(reason in out for reason in REFUSED) and "\n" not in out, f"{name}: {out}"
@@ -99,4 +99,4 @@ def test_what_an_expression_may_do_it_still_may(home: Path) -> None:
     (package / "sizes.yaml").write_text("length: 0.25\n")
     robot = package / "urdf" / "robot.xacro"
     robot.write_text(ROBOT % "xacro.load_yaml('../sizes.yaml')['length'] * cos(0)")
-    assert 't="0.25"' in expand(robot)
+    assert 't="0.25"' in expand_xacro(robot)

@@ -9,7 +9,7 @@ import pytest
 from holozen.robot import xacro
 from holozen.robot.elements import MOST_ELEMENTS
 from holozen.robot.errors import RobotError
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 
@@ -49,7 +49,7 @@ def failure(folder: Path, body: str, head: str = HEAD) -> str:
     path = folder / "robot.xacro"
     path.write_text(f"{head}\n{body}\n</robot>")
     with pytest.raises(RobotError) as error:
-        expand(path)
+        expand_xacro(path)
     message = str(error.value).removeprefix(f"{folder}/")
     assert "\n" not in message
     assert len(message) < 1500
@@ -106,7 +106,7 @@ def test_a_file_of_100_mb_is_refused_unread(folder: Path) -> None:
     with big.open("wb") as file:
         file.truncate(100_000_000)
     with pytest.raises(RobotError, match=r"big\.xacro: the file contains 100\.0 MB of XML; .* at most 4 MB"):
-        expand(big)
+        expand_xacro(big)
     for body in ('<xacro:include filename="big.xacro"/>', "<l n=\"${xacro.load_yaml('big.xacro')}\"/>"):
         reported = failure(folder, body)
         assert "big.xacro: the file contains 100.0 MB" in reported
@@ -115,10 +115,10 @@ def test_a_file_of_100_mb_is_refused_unread(folder: Path) -> None:
 
 def test_what_is_no_file_is_not_waited_for(folder: Path) -> None:
     os.mkfifo(folder / "pipe.xacro")
-    with pytest.raises(RobotError, match=r"pipe\.xacro: not a regular file"):
-        expand(folder / "pipe.xacro")
-    assert "pipe.xacro: not a regular file" in failure(folder, '<xacro:include filename="pipe.xacro"/>')
-    assert "pipe.xacro: not a regular file" in failure(folder, "<l n=\"${xacro.load_yaml('pipe.xacro')}\"/>")
+    with pytest.raises(RobotError, match=r"pipe\.xacro: is not a regular file"):
+        expand_xacro(folder / "pipe.xacro")
+    assert "pipe.xacro: is not a regular file" in failure(folder, '<xacro:include filename="pipe.xacro"/>')
+    assert "pipe.xacro: is not a regular file" in failure(folder, "<l n=\"${xacro.load_yaml('pipe.xacro')}\"/>")
 
 
 def test_an_expansion_that_waits_for_ever_is_ended(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -137,4 +137,4 @@ def test_an_honest_large_robot_is_expanded(folder: Path) -> None:
     calls = "".join(f'<xacro:l i="{i}"/>' for i in range(1000))
     path = folder / "robot.xacro"
     path.write_text(f"{HEAD}{macro}{calls}</robot>")
-    assert expand(path).count("<link") == 1000
+    assert expand_xacro(path).count("<link") == 1000

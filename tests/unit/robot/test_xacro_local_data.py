@@ -8,7 +8,7 @@ from holozen.check.report import check
 from holozen.cli import main
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import load
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 
 HEAD = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
 SECRET = "correct-horse"
@@ -42,7 +42,7 @@ def write(path: Path, body: str) -> Path:
 
 def refusal(path: Path) -> str:
     with pytest.raises(RobotError) as error:
-        expand(path)
+        expand_xacro(path)
     message = str(error.value)
     assert "\n" not in message and SECRET not in message
     return message
@@ -66,12 +66,12 @@ def test_load_yaml_reads_inside_known_packages_only(robot: Path, home: Path) -> 
 def test_load_yaml_reads_what_a_package_holds(robot: Path, home: Path) -> None:
     read = "<l n=\"${xacro.load_yaml('%s')['length']}\"/>"
     for name in ("../config/sizes.yaml", f"{robot.parents[1]}/config/sizes.yaml"):
-        assert 'n="0.25"' in expand(write(robot, read % name))
+        assert 'n="0.25"' in expand_xacro(write(robot, read % name))
     (home / "data").mkdir()
     (home / "data" / "sizes.yaml").write_text("length: 7")
     write(robot, read % f"{home}/data/sizes.yaml")
     assert "--package NAME=DIR" in refusal(robot)
-    assert 'n="7"' in expand(robot, packages={"data": home / "data"})
+    assert 'n="7"' in expand_xacro(robot, packages={"data": home / "data"})
 
 
 def test_a_home_folder_is_no_package_even_if_it_looks_like_one(robot: Path, home: Path) -> None:
@@ -89,14 +89,14 @@ def test_an_environment_variable_is_read_only_if_it_is_allowed(robot: Path, use:
         f"{robot}, line 2: reads the environment variable 'TOKEN', whose value would be sent on with the robot;"
         " allow that with --allow-env TOKEN"
     )
-    assert f't="{SECRET}"' in expand(robot, allow_env=["TOKEN"])
+    assert f't="{SECRET}"' in expand_xacro(robot, allow_env=["TOKEN"])
     assert message == refusal(robot), "the text that was allowed is not used again"
 
 
 def test_a_variable_that_is_not_set_has_its_default(robot: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("TOKEN")
     write(robot, '<l t="$(optenv TOKEN none)"/>')
-    assert 't="none"' in expand(robot)
+    assert 't="none"' in expand_xacro(robot)
     monkeypatch.setenv("TOKEN", SECRET)
     assert "--allow-env TOKEN" in refusal(robot), "nor is the text from when it was not set"
 
@@ -118,7 +118,7 @@ def test_robot_files_are_included_from_anywhere_and_other_xml_from_the_package(r
     (robot.parent / "part.xml").write_text("<part><a/></part>")
     (home / "arm.xacro").write_text(f"{HEAD}<b/></robot>")
     names = ("part.xml", f"{home}/arm.xacro")
-    text = expand(write(robot, "".join(f'<xacro:include filename="{name}"/>' for name in names)))
+    text = expand_xacro(write(robot, "".join(f'<xacro:include filename="{name}"/>' for name in names)))
     assert "<a/>" in text and "<b/>" in text
 
 

@@ -103,7 +103,7 @@ def test_older_than_ten_seconds_is_forgotten(frames):
     assert frames.histories()["base"].stamps[0] == 2 * S
 
 
-def test_a_clock_that_was_set_back_begins_anew(frames: BufferCore) -> None:
+def test_a_clock_that_was_set_back_starts_over(frames: BufferCore) -> None:
     for tenth in range(5):
         frames.put("odom", "base", tenth * S // 10, moved(-tenth))
     assert frames.lookup("odom", "base") == (4 * S // 10, moved(-4))
@@ -164,7 +164,7 @@ def test_what_cannot_be_is_refused(frames: BufferCore) -> None:
         ("", "a", Transform(), "'' is not a frame"),
         ("a", None, Transform(), "None is not a frame"),
         ("a", "b", moved(math.nan), "the translation from 'a' to 'b'"),
-        ("a", "b", Transform(rotation=(0.0, 0.0, 0.0, 0.0)), "from 'a' to 'b' the rotation"),
+        ("a", "b", Transform(rotation=(0.0, 0.0, 0.0, 0.0)), "from 'a' to 'b': the quaternion"),
     ]
     for parent, child, rigid, message in rows:
         with pytest.raises(InvalidArgumentException, match=message):

@@ -73,7 +73,7 @@ def table() -> str:
 
 
 def test_the_table_of_names_is_current(table: str) -> None:
-    assert f"<!-- api -->\n{table}<!-- /api -->\n" in DOCS_PAGE.read_text(), "scripts/tables writes it anew"
+    assert f"<!-- api -->\n{table}<!-- /api -->\n" in DOCS_PAGE.read_text(), "scripts/tables rewrites it"
 
 
 def test_every_row_has_as_many_cells_as_its_head(table: str) -> None:

@@ -26,7 +26,7 @@ def test_a_script_without_ending_has_to_be_executable_and_python(my_bot: Path, w
     path.chmod(0o755)
     assert find("my_bot", "drive").path == path
     path.write_text("\x7fELF\0")
-    with pytest.raises(NotFound, match="drive is no Python script: its name must end"):
+    with pytest.raises(NotFound, match="drive is not a Python script: its name must end"):
         find("my_bot", "drive")
 
 
@@ -138,9 +138,9 @@ def test_a_package_in_a_repository_of_packages_is_found(my_bot: Path, write: Wri
 
 def test_a_file_that_is_not_there_is_reported_with_its_neighbours(write: Write) -> None:
     path = write("scripts/controller.py")
-    with pytest.raises(NotFound, match=r"no file '.*/controler.py' \(did you mean 'controller.py'\?\)"):
+    with pytest.raises(NotFound, match=r"controler.py does not exist \(did you mean 'controller.py'\?\)"):
         from_file(path.with_name("controler.py"))
-    with pytest.raises(NotFound, match=r"Python files there: controller\.py"):
+    with pytest.raises(NotFound, match=r"x\.py does not exist; Python files in that folder: controller\.py"):
         from_file(path.with_name("x.py"))
     with pytest.raises(NotFound, match="is a folder; give a Python file, or PACKAGE EXECUTABLE"):
         from_file(path.parent)

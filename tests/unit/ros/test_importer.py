@@ -278,7 +278,7 @@ def test_what_a_module_of_ros_lacks_is_reported(pretend: ModuleType) -> None:
     assert refused("from rclpy.pretend import Other") == f"rclpy.pretend has no 'Other' here; it is in rclpy{page}"
     assert refused("import rclpy\nrclpy.__file__", AttributeError) == "rclpy has no '__file__'"
     assert "did you mean 'rclpy.pretend'?" in refused("import rclpy.pretens", ModuleNotFoundError)
-    assert "this belongs to ROS 1; here is ROS 2's rclpy" in refused("import rospy", ModuleNotFoundError)
+    assert "this belongs to ROS 1; use ROS 2's rclpy" in refused("import rospy", ModuleNotFoundError)
     assert "numpy.frombuffer(image.data" in refused("from cv_bridge import CvBridge", ModuleNotFoundError)
 
 
@@ -300,7 +300,7 @@ def test_lifecycle_nodes_and_components_are_refused_in_one_line() -> None:
     importer.install()
     for line in ("from rclpy.lifecycle import Node", "import rclpy.lifecycle"):
         assert "there are no lifecycle nodes here; use rclpy.node.Node" in refused(line, ModuleNotFoundError)
-    assert "there are no components here" in refused("import rclpy_components", ModuleNotFoundError)
+    assert "components are C++ and do not run here" in refused("import rclpy_components", ModuleNotFoundError)
 
 
 def test_the_module_of_one_type_has_the_same_class(package: Path) -> None:

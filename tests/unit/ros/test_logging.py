@@ -91,7 +91,7 @@ def test_a_throttle_counts_on_the_clock_it_is_given(capsys: Capture) -> None:
         clock.set_ros_time_override(Time(seconds=second, clock_type=ClockType.ROS_TIME))
         logging.get_logger("tom").info(str(second), throttle_duration_sec=2.0, throttle_time_source_type=clock)
     shown = [line.partition(": ")[2] for line in capsys.readouterr().err.splitlines()]
-    assert shown == ["0", "2", "1"], "a clock that was set back begins anew"
+    assert shown == ["0", "2", "1"], "a clock that was set back starts over"
     for _ in range(3):
         logging.get_logger("tom").info("steady", throttle_duration_sec=1000)
     assert capsys.readouterr().err.count("steady") == 1

@@ -131,8 +131,8 @@ def test_a_name_that_is_not_there_is_reported_in_the_users_traceback(run: Run, w
 
 def test_what_is_not_there_is_one_line(run: Run, write: Write, my_bot: Path) -> None:
     for words, message in [
-        (["q.py"], "no file 'q.py'; Python files there: controller.py"),
-        (["scripts/b.py"], "no file 'scripts/b.py'"),
+        (["q.py"], "q.py does not exist; Python files in that folder: controller.py"),
+        (["scripts/b.py"], "scripts/b.py does not exist, and there are no Python files in that folder"),
         (["my_boot", "a.py"], "no package 'my_boot' around "),
         (["my_bot", "c.py"], "package 'my_bot' has no executable 'c.py'"),
         (["my_bot"], "give an executable; executables in "),

@@ -57,7 +57,7 @@ def test_a_message_of_our_bus_comes_as_rosss_and_the_other_way_round(ros: Wire, 
     mine.publish(twist(0.25))
     received = here.recv()
     assert received.message == OurTwist.planar(0.25)
-    assert (received.sample.priority, received.sample.source) == ("DATA", node._holozen.bus.source)
+    assert (received.priority, received.source) == ("DATA", node._holozen.bus.source)
 
 
 def test_a_slow_subscriber_gets_the_newest_in_order(ros: Wire) -> None:

@@ -1,5 +1,6 @@
 """What comes while an executor is busy waits in the ring, in order, the newest of it."""
 
+import math
 import threading
 from collections.abc import Callable
 from functools import partial
@@ -135,7 +136,7 @@ def test_a_wake_is_kept_for_the_next_wait_but_not_counted() -> None:
     waker = Waker()
     waker.wake()
     waker.wake()
-    assert waker.wait(None)
+    assert waker.wait(math.inf)
     assert not waker.wait(0.0)
 
 

@@ -166,32 +166,22 @@ def test_numbers_of_numpy_may_be_put_into_lists() -> None:
 
 JOINTS, VALUE, ODOMETRY = "sensor_msgs/msg/JointState", "rcl_interfaces/msg/ParameterValue", "nav_msgs/msg/Odometry"
 MARKER = generated.find("visualization_msgs/msg/Marker")
+COVARIANCE = "' field of geometry_msgs.msg.PoseWithCovariance"
+BYTE = "' field of rcl_interfaces.msg.ParameterValue must be of type 'int'"
 
 
 def test_what_no_list_holds_is_refused_when_it_is_written() -> None:
     for name, place, put, reason in [
-        (JOINTS, "name", 3, "JointState.name[0]: 3 of type 'int' does not fit a string[]"),
-        (
-            ODOMETRY,
-            "pose.covariance",
-            "1",
-            "PoseWithCovariance.covariance[36]: '1' of type 'str' does not fit a float64[",
-        ),
-        (ODOMETRY, "pose.covariance", None, "PoseWithCovariance.covariance[36]: None of type 'NoneType' does not fit"),
-        (VALUE, "byte_array_value", 256, "ParameterValue.byte_array_value[0]: 256 of type 'int' does not fit a byte["),
-        (
-            VALUE,
-            "byte_array_value",
-            1.5,
-            "ParameterValue.byte_array_value[0]: 1.5 of type 'float' does not fit a byte",
-        ),
-        ("nav_msgs/msg/Path", "poses", m.Pose(), "Path.poses[0]: Pose(position=Point(x=0.0, y=0.0, z=0.0), orie"),
-        (ODOMETRY, "pose.covariance", 0.0, "PoseWithCovariance.covariance: 37 values do not fit a "),
+        (JOINTS, "name", 3, "The 'name[0]' field of sensor_msgs.msg.JointState must be of type 'str', not 'int' (3)"),
+        (ODOMETRY, "pose.covariance", 0.0, f"The 'covariance{COVARIANCE} must be a sequence of exactly 36 values "),
+        (VALUE, "byte_array_value", 256, f"The 'byte_array_value[0]{BYTE} in [0, 255], not 'int' (256)"),
+        (VALUE, "byte_array_value", 1.5, f"The 'byte_array_value[0]{BYTE} in [0, 255], not 'float' (1.5)"),
+        ("nav_msgs/msg/Path", "poses", m.Pose(), "The 'poses[0]' field of nav_msgs.msg.Path must be a sub message of"),
         (
             "visualization_msgs/msg/MarkerArray",
             "markers",
             copy.deepcopy(MARKER()),
-            "Marker.points[0]: 1 of type 'int' does not fit a geometry_msgs/Point[]",
+            "The 'points[0]' field of visualization_msgs.msg.Marker must be a sub message of type 'Point',",
         ),
     ]:
         for wire in WIRES:
@@ -203,6 +193,15 @@ def test_what_no_list_holds_is_refused_when_it_is_written() -> None:
                 encode(message, wire)
             assert str(error.value).startswith(reason)
             assert "\n" not in str(error.value)
+
+
+def test_what_is_put_into_a_fixed_list_is_refused_when_it_is_written() -> None:
+    for put in ("1", None):
+        for wire in WIRES:
+            message = generated.find(ODOMETRY)()
+            message.pose.covariance[35] = put
+            with pytest.raises(CodecError, match=rf"^The 'covariance\[35\]{COVARIANCE} must be of type 'float', not"):
+                encode(message, wire)
 
 
 def test_two_types_with_one_name_in_one_message() -> None:

@@ -21,26 +21,26 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
 @pytest.fixture
 def engine(request: pytest.FixtureRequest) -> str:
-    """The name of the engine of this test's worlds."""
+    """The name of the engine that this test's worlds use."""
     return str(getattr(request, "param", ENGINES[0]))
 
 
 @pytest.fixture
 def space(engine: str) -> Iterator[World]:
-    """Nothing, and no gravity."""
+    """A world with nothing in it, and no gravity."""
     with closing(World(WorldSpec(gravity=(0, 0, 0), ground=False), engine)) as world:
         yield world
 
 
 @pytest.fixture
 def air(engine: str) -> Iterator[World]:
-    """Gravity, and no ground."""
+    """A world with gravity and no ground."""
     with closing(World(WorldSpec(ground=False), engine)) as world:
         yield world
 
 
 @pytest.fixture
 def ground(engine: str) -> Iterator[World]:
-    """Gravity and a flat ground."""
+    """A world with gravity and a flat ground."""
     with closing(World(WorldSpec(ground=True), engine)) as world:
         yield world

@@ -4,9 +4,11 @@ from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import TypeVar
 
+import zenoh
+
 from holozen.messages import Message
 from holozen.transport.pubsub import Received
-from holozen.transport.samples import PRIORITIES, Sample
+from holozen.transport.samples import PRIORITIES
 
 M = TypeVar("M", bound=Message)
 
@@ -48,5 +50,9 @@ def received(
 ) -> Received[M]:
     """A sample as Zenoh hands it over, with its message."""
     rank = PRIORITIES.index(priority) + 1
-    sample = SimpleNamespace(key_expr=key, payload=b"", encoding="", priority=rank, attachment=attachment.encode())
-    return Received(Sample(sample), message, error)
+    sample = SimpleNamespace(
+        key_expr=key, payload=zenoh.ZBytes(b""), encoding="", priority=rank, attachment=attachment.encode()
+    )
+    made: Received[M] = Received(sample)
+    made.message, made.error = message, error
+    return made

@@ -208,6 +208,28 @@ def test_resume_is_refused_while_a_person_moves_the_robot(arbiter: Arbiter) -> N
     assert arbiter.resume(2.1) == ""
 
 
+def test_it_knows_when_a_source_last_made_others_wait(arbiter: Arbiter) -> None:
+    assert arbiter.taken_at == -math.inf
+    arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
+    arbiter.resume(1.1)
+    assert arbiter.taken_at == -math.inf, "an autopilot that drives alone"
+    arbiter.offer("teleop", PERSON, STOP, 1.2)
+    assert arbiter.taken_at == 1.2, "a person stops it"
+    arbiter.offer("teleop", PERSON, STOP, 1.3)
+    assert arbiter.taken_at == 1.2, "a person who goes on sending zeros holds up no resume"
+    arbiter.offer("teleop", PERSON, FORWARD, 1.4)
+    arbiter.offer("teleop", PERSON, FORWARD, 1.5)
+    arbiter.offer("controller", CONTROLLER, FORWARD, 1.6)
+    assert arbiter.taken_at == 1.5, "a person drives"
+    assert arbiter.stopped_at == -math.inf
+    arbiter.stop("person", 2.0)
+    arbiter.stop("person", 3.0)
+    assert (arbiter.taken_at, arbiter.stopped_at) == (3.0, 3.0), "a stop is set, and set again"
+    other = Arbiter(timeout=0.5)
+    other.inherit(arbiter)
+    assert (other.taken_at, other.stopped_at) == (3.0, 3.0)
+
+
 def test_resume_leaves_an_autopilot_that_drives_at_the_wheel(arbiter: Arbiter) -> None:
     arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
     assert arbiter.resume(1.1) == ""
@@ -252,7 +274,7 @@ class TestWithoutATimeout:
         assert arbiter.offer("teleop", PERSON, STOP, 9.1) == ""
         assert arbiter.motion(9.1) == STOP
 
-    def test_an_autopilot_waits_for_resume_all_the_same(self, arbiter: Arbiter) -> None:
+    def test_an_autopilot_still_waits_for_resume(self, arbiter: Arbiter) -> None:
         arbiter.offer("teleop", PERSON, STOP, 1.0)
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == HELD
         assert arbiter.resume(9.1) == ""
@@ -444,7 +466,7 @@ class Robot(RuleBasedStateMachine):
             assert bool(refused) == (source in self.lost and velocity != STOP)
 
     def speak_against(self, driver: Driver, source: str, velocity: Planar, refused: bool) -> None:
-        """While another one drives: the higher one wins, and an equal one may stop."""
+        """Send commands while another source drives: a higher priority takes over, an equal one may only stop."""
         rank = SOURCES[source]
         stops = velocity == STOP and rank <= driver.rank
         assert refused == (not stops and (rank >= driver.rank or source in self.lost))

@@ -1,4 +1,4 @@
-"""wheely_boi in the real engine: it stands, drives, stops and bears kicks, and so do those that students make of it."""
+"""wheely_boi in the real engine: it stands, drives, stops and withstands kicks, and so do students' variants of it."""
 
 import math
 import re
@@ -13,7 +13,7 @@ from holozen.robot.errors import RobotError
 from holozen.robot.loading import load, parse
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import lowest
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.rotation import rotate
 from holozen.rotation import yaw as yaw_of
 from services.sim.physics.balance import BalanceMover
@@ -48,7 +48,7 @@ class Rider:
         self.world, self.mover, self.most = world, mover, 0.0
 
     def drive(self, seconds: float, velocity: Planar = STOP, dt: float = DT) -> Planar:
-        """The velocity at the end."""
+        """Drive, and return the velocity at the end."""
         for _ in range(round(seconds / dt)):
             self.mover.move(velocity, dt)
             self.world.step()
@@ -209,7 +209,7 @@ def test_what_a_student_makes_of_it_rides_as_well(ground: World, values: dict[st
 )
 def test_what_cannot_balance_is_refused(ground: World, spoil: Callable[[str], str]) -> None:
     with pytest.raises(RobotError, match=r"cannot balance on jointL|balances on the wheel"):
-        mover_for(ground, parse(spoil(expand(FILE)), FILE), (0, 0, 1), UPRIGHT)
+        mover_for(ground, parse(spoil(expand_xacro(FILE)), FILE), (0, 0, 1), UPRIGHT)
 
 
 @pytest.mark.parametrize("before", [(0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, 1.0)])

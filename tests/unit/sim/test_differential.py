@@ -1,6 +1,7 @@
 """Wheels on two sides in the real engine: forward is forward whichever way an axis points, and encoders add up."""
 
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,13 +12,13 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 from holozen.limits import STOP, Planar
-from holozen.robot.loading import load
+from holozen.robot.loading import load, parse
 from holozen.robot.model import Differential, RobotModel
 from holozen.robot.rigid import lowest
+from holozen.robot.xacro import expand_xacro
 from holozen.rotation import yaw as yaw_of
-from services.sim.physics.differential import WheelMover, separation_of
 from services.sim.physics.movers import mover_for
-from services.sim.physics.wheels import Odometer
+from services.sim.physics.rolling import DifferentialMover, Odometer
 from services.sim.physics.world import World
 
 URDF = Path(__file__).parents[3] / "urdf"
@@ -42,7 +43,7 @@ def mechanism(model: RobotModel) -> Differential:
 
 
 def turned_over(model: RobotModel, name: str) -> RobotModel:
-    """With a joint's axis pointing the other way."""
+    """The robot with one joint's axis pointing the other way."""
     joint = model.joints[name]
     x, y, z = joint.axis
     return replace(model, joints={**model.joints, name: replace(joint, axis=(-x, -y, -z))})
@@ -53,12 +54,12 @@ class Driven:
 
     def __init__(self, world: World, model: RobotModel) -> None:
         mover = mover_for(world, model, (0, 0, -lowest(model)))
-        assert isinstance(mover, WheelMover)
+        assert isinstance(mover, DifferentialMover)
         self.world, self.mover, self.turned = world, mover, 0.0
         self.drive(0.3)
 
     def drive(self, seconds: float, velocity: Planar = STOP) -> Planar:
-        """Where it is then."""
+        """Drive, and return where the robot is then."""
         for _ in range(round(seconds / DT)):
             before = self.place[2]
             self.mover.move(velocity, DT)
@@ -156,8 +157,14 @@ def test_its_motors_give_no_more_than_their_torque(ground: World) -> None:
 
 
 def test_what_the_file_does_not_measure_is_measured(ground: World) -> None:
-    robot = Driven(ground, with_wheels(TWO, separation=0.0, radius=0.0))
-    assert separation_of(TWO, mechanism(TWO)) == pytest.approx(0.31)
+    file = URDF / "differential.urdf.xacro"
+    text, count = re.subn(
+        r"<(wheel_?(?:separation|diameter|radius))>.*?</\1>", "", expand_xacro(file), flags=re.IGNORECASE
+    )
+    model = parse(text, file)
+    assert count == 2
+    assert (mechanism(model).separation, mechanism(model).radius) == pytest.approx((0.31, 0.06))
+    robot = Driven(ground, model)
     robot.drive(1, (0.5, 0, 0.5))
     assert robot.mover.body.planar()[0::2] == pytest.approx((0.5, 0.5), abs=0.01)
 

@@ -1,4 +1,4 @@
-"""What joints and surfaces are to the engine."""
+"""How joints and surfaces are given to the engine."""
 
 import math
 from pathlib import Path

@@ -16,6 +16,7 @@ from typing import Any
 import pytest
 import zenoh
 
+from holozen.command.stop_files import StopFiles
 from holozen.messages import (
     Header,
     JointState,
@@ -30,7 +31,7 @@ from holozen.messages import (
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.loading import parse
 from holozen.robot.model import WorldSpec
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import ServiceError
 from services.sim import entities as entities_module
@@ -40,10 +41,9 @@ from services.sim.loop import Loop
 from services.sim.physics.engine import UPRIGHT
 from services.sim.physics.planar import PlanarBody
 from services.sim.physics.world import World
-from services.sim.stops import StopFiles
 
 REPO = Path(__file__).parents[3]
-HB_BOT = expand(REPO / "urdf" / "hb_bot.urdf.xacro")
+HB_BOT = expand_xacro(REPO / "urdf" / "hb_bot.urdf.xacro")
 BALL = (
     '<robot name="ball"><link name="a"><inertial><mass value="1"/><inertia ixx="0.1" iyy="0.1" izz="0.1"/>'
     '</inertial><collision><geometry><sphere radius="0.2"/></geometry></collision></link></robot>'
@@ -71,7 +71,7 @@ class Town:
         wait_for(self.client.connected)
 
     def spawn(self, name: str = "Fred", text: str = HB_BOT, z: float = 0.0, x: float = 0.0, **fields: object) -> Entity:
-        """Put one in without the wire."""
+        """Spawn an entity by a call, not over the wire."""
         request = si.SpawnEntityRequest(name=name, resource_string=text, initial_pose=at(x, 0, z), **fields)  # type: ignore[arg-type]
         return self.entities.named(self.services.spawn(request).entity_name)
 
@@ -84,11 +84,11 @@ class Town:
         return result["result"], str(error.value)
 
     def wait_for_keys(self, *keys: str) -> None:
-        """Wait until the sim is on them."""
+        """Wait until the sim has declared these keys."""
         wait_for(lambda: set(keys) <= self.tokens(), what=lambda: f"{keys} among {self.tokens()}")
 
     def tokens(self) -> set[str]:
-        """The keys that the sim stands on."""
+        """The keys of the sim's liveliness tokens."""
         return {endpoint.key for endpoint in self.client.graph().settled(self.client.connected) if endpoint.key}
 
 
@@ -284,7 +284,7 @@ def test_a_reset_puts_no_two_robots_into_one_place(town: Town, capsys: pytest.Ca
     town.services.put(si.SetEntityStateRequest("Fred", si.EntityState(pose=at(5, 0, 0).pose)))
     ann = town.spawn("Ann")
     town.loop.simulation.reset(si.ResetSimulationRequest.SCOPE_STATE, time.monotonic())
-    assert "sim: Ann was added where Fred is now; it is put beside it" in capsys.readouterr().err
+    assert "sim: Ann was added where Fred is now; it is put beside that" in capsys.readouterr().err
     town.loop.run(steps(), 120)
     assert math.hypot(*fred.body.pose()[0]) < 0.1 and 1.4 < math.hypot(*ann.body.pose()[0]) < 3.0
 
@@ -410,9 +410,9 @@ ARM = (
 )
 
 
-def test_a_robot_that_cannot_be_leaves_nothing_in_the_world(town: Town) -> None:
+def test_a_robot_that_is_refused_leaves_nothing_in_the_world(town: Town) -> None:
     """wheely_boi upside down: its plugin refuses it after the engine has it."""
-    text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
+    text = expand_xacro(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
     town.spawn("ball", BALL, z=1.0)
     code, reported = town.refusal(lambda: town.spawn("Fred", text, z=0.3))
     assert (code, "cannot balance" in reported) == (si.SpawnEntityReply.RESOURCE_PARSE_ERROR, True)
@@ -442,7 +442,7 @@ def test_robots_that_come_and_go_under_the_same_names_leave_nothing_in_memory(to
 
 def test_errors_of_a_robot_are_reported_before_its_name_is_checked(town: Town) -> None:
     town.spawn("Fred")
-    text = expand(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
+    text = expand_xacro(REPO / "urdf" / "wheely_boi.xacro").replace("-0.04", "0.04")
     assert town.refusal(lambda: town.spawn("Fred", text))[0] == si.SpawnEntityReply.RESOURCE_PARSE_ERROR
 
 
@@ -490,7 +490,7 @@ def test_a_stop_outlives_its_robot_and_a_thousand_others(
         if name == "Fred":
             robot.arbiter.stop("ann@1", 10.0)
         town.services.delete(si.DeleteEntityRequest(name))
-    assert len(town.entities.before) == 2
+    assert len(town.entities.memories) == 2
     town.spawn("Fred")
     (robot,) = town.entities.robots
     assert robot.arbiter.offer("person", 1, (0.5, 0, 0), 20.0).startswith("stopped: by ann@1; ")
@@ -501,13 +501,13 @@ def test_a_robot_that_lives_is_remembered_however_many_come_after_it(
     town: Town, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(entities_module, "MAX_ENTITIES", 2)
-    town.entities.keep_stops_in(StopFiles(tmp_path, "here"))
+    town.entities.keep_stops_in(StopFiles(tmp_path, ("here",)))
     town.spawn("Fred")
     for name in ("Ann", "Bob", "Eve"):
         town.spawn(name, x=5.0)
         town.services.delete(si.DeleteEntityRequest(name))
     town.entities.stop("ann@1")
-    assert StopFiles(tmp_path, "here").read("Fred") == "ann@1"
+    assert StopFiles(tmp_path, ("here",)).read("Fred") == "ann@1"
 
 
 def test_an_arm_can_be_stopped_too(town: Town, capsys: pytest.CaptureFixture[str]) -> None:

@@ -10,6 +10,7 @@ import pytest
 from holozen.command.arbiter import Arbiter
 from holozen.command.inputs import CommandStats, ForceInput
 from holozen.command.motion import AppliedForce
+from holozen.command.wait_set import Moment
 from holozen.messages import Vector3, Wrench
 from holozen.robot.loading import parse
 from holozen.robot.model import Force, Pushed
@@ -45,7 +46,7 @@ def test_a_wrench_moves_a_free_body_by_newton_and_euler(space: World, frame: str
     )
     body = space.add_jointed(model, (0, 0, 0), from_rpy(*TILT))
     force, torque = np.array([1.0, 2.0, -3.0]), np.array([-0.5, 0.2, 0.4])
-    Forces(body, {"k": list(model.forces)}, model, None).do([AppliedForce("k", (*force, *torque), 0.0)])
+    Forces(body, {"k": list(model.forces)}, model, None).apply([AppliedForce("k", (*force, *torque), 0.0)])
     space.step()
     base = matrix_of(TILT)
     axes = np.eye(3) if frame == "world" else base @ (matrix_of(HAND) if link == "hand" else np.eye(3))
@@ -60,7 +61,7 @@ def test_a_wrench_moves_a_free_body_by_newton_and_euler(space: World, frame: str
 def test_a_torque_on_a_wheel_turns_it_against_its_base(space: World) -> None:
     model = parse(f"{TOP}{WHEEL}{plugin('<link_name>wheel</link_name>')}</robot>", TOP_FILE)
     body = space.add_jointed(model, (0, 0, 0))
-    Forces(body, {"k": list(model.forces)}, model, None).do([AppliedForce("k", (0, 0, 0, 0, 1.0, 0), 0.0)])
+    Forces(body, {"k": list(model.forces)}, model, None).apply([AppliedForce("k", (0, 0, 0, 0, 1.0, 0), 0.0)])
     space.step()
     _, (rate,), _ = body.states()
     assert rate == pytest.approx(1 / 0.2 * space.spec.step, rel=1e-3)
@@ -75,8 +76,8 @@ def test_without_a_source_its_wheels_brake_and_with_one_they_turn_freely(space: 
 
     def rate(pushes: list[AppliedForce] | None, steps: int = 60) -> float:
         for _ in range(steps):
-            drive.do(pushes)
-            motors.do(None)
+            drive.apply(pushes)
+            motors.apply(None)
             space.step()
         return body.states()[1][0]
 
@@ -123,7 +124,7 @@ class Topics:
 
     def take(self, key: str, x: float, now: float, source: str = "me@1", priority: str = "DATA") -> None:
         message = Wrench(Vector3(x))
-        self._input.take([received(message, source, priority, key)], now, now)
+        self._input.take([received(message, source, priority, key)], Moment(now, now, ()))
 
     def pushes(self, now: float) -> dict[str, float] | None:
         pushes = self.arbiter.pushes(now)

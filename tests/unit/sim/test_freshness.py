@@ -128,7 +128,7 @@ def test_a_command_waits_for_its_senders_clock_and_the_newest_is_judged_then(rob
     assert robot.freshness.is_waiting
     robot.senders.known.add("aa")
     (judged,) = robot.freshness.sift([], 10.02, 10.016)
-    assert (judged.received.sample.stamp and judged.received.sample.stamp.number, judged.refusal) == (2, "")
+    assert (judged.received.stamp and judged.received.stamp.number, judged.refusal) == (2, "")
     assert not robot.freshness.is_waiting
 
 

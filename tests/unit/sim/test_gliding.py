@@ -43,7 +43,7 @@ def crate(world: World, size: str, *at: float, static: bool = True) -> Body:
 
 
 def run(world: World, seconds: float, *driven: tuple[PlanarBody, Planar]) -> Iterator[None]:
-    """Drive on, and look after each step. In no step does a robot jump."""
+    """Drive on, and check each step: in none does a robot jump."""
     for _ in range(round(seconds / DT)):
         before = [(base.pose()[0], math.hypot(*base.twist()[0])) for base, _ in driven]
         for base, velocity in driven:
@@ -60,7 +60,7 @@ def settle(world: World, *bases: PlanarBody) -> None:
 
 
 def settled(world: World, *at: float) -> PlanarBody:
-    """A robot that stands there, and glides."""
+    """A robot that has settled there, and glides."""
     base = put(world, *at)
     settle(world, base)
     assert base.glides
@@ -179,7 +179,7 @@ def test_it_falls_where_it_is_put_and_glides_again_once_it_stands(ground: World)
     assert base.pose()[0] == pytest.approx((3, 1, REST), abs=1e-3)
 
 
-def test_it_glides_no_longer_where_something_is_put_beside_it_until_it_left(ground: World) -> None:
+def test_it_stops_gliding_where_something_is_put_beside_it_until_that_has_left(ground: World) -> None:
     base = settled(ground)
     crate(ground, "0.2 2 1", 0.83, 0, 0.5)
     settle(ground, base)

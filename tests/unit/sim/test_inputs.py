@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.command.arbiter import Arbiter
-from holozen.command.inputs import REPORT_EVERY, TwistInput
+from holozen.command.inputs import MOST_LINES, REPORT_EVERY, CommandStats, Lines, TwistInput
 from holozen.command.motion import Motion
+from holozen.command.wait_set import Moment
 from holozen.limits import STOP
 from holozen.messages import CommandSource, Header, Time, Twist, TwistStamped, Vector3
 from holozen.wire import MAX_STAMP_AGE
@@ -31,7 +32,7 @@ class Judge:
         self, message: Twist | TwistStamped | None, now: float = 10.0, error: str = "", priority: str = "DATA",
         source: str = "me@1", key: str = "Fred/cmd_vel", waited: float = 0.0,
     ) -> None:  # fmt: skip
-        self.twist_input.take([received(message, source, priority, key, error)], now, CLOCKS, now - waited)
+        self.twist_input.take([received(message, source, priority, key, error)], Moment(now, now - waited, CLOCKS))
 
     def motion(self, now: float = 10.0) -> Motion:
         return self.twist_input.arbiter.motion(now)
@@ -78,6 +79,14 @@ def test_a_faster_command_is_clamped_in_its_direction_and_reported(judge: Judge)
     ]  # fmt: skip
 
 
+def test_a_report_on_any_of_its_keys_names_the_robot_by_its_cmd_vel() -> None:
+    reports: list[str] = []
+    both = TwistInput("bot/cmd_vel", Arbiter(0.5), FakeSenders(), 1, 1, reports.append, others=("bot/twist",))
+    both.take([received(Twist.planar(2), "me@1", "DATA", "bot/twist", "")], Moment(10.0, 10.0, CLOCKS))
+    assert both.arbiter.motion(10.0) == (1, 0, 0)
+    assert reports == ["bot/cmd_vel: from me@1: over the limits of 1 m/s and 1 rad/s, clamped: (2, 0.0, 0.0)"]
+
+
 def test_a_number_that_is_not_finite_never_drives() -> None:
     for part, axis, bad in product(("linear", "angular"), "xyz", (math.nan, math.inf, -math.inf)):
         twist = Twist()
@@ -111,7 +120,7 @@ def test_a_stamp_may_be_off_by_half_a_second_by_the_clock_it_is_nearest_to() -> 
         judge = Judge()
         judge.take(stamped(stamp))
         assert judge.motion() == STOP
-        assert judge.reports == [f"Fred/cmd_vel: from me@1: stamp is {age} s old; at most {MAX_STAMP_AGE} s"]
+        assert judge.reports == [f"Fred/cmd_vel: from me@1: stale: its stamp is {age} s old; at most {MAX_STAMP_AGE} s"]
         assert judge.twist_input.status(10.0).refused == {"stale": 1}
 
 
@@ -220,6 +229,26 @@ def test_refusals_are_reported_once_a_second_with_the_number_of_the_others(judge
     assert judge.twist_input.status(3.5).refused == {"malformed": 6}
 
 
+def test_a_command_whose_link_was_held_up_is_refused_and_counted(judge: Judge) -> None:
+    """0.3 s, by its sender's clock, which is 5000 s ahead."""
+    judge.take(Twist.planar(1), now=10.0, source="me@aa;0;5009700000000")
+    assert judge.motion(10.0) == STOP
+    assert judge.twist_input.status(10.0).refused == {"late": 1}
+    judge.take(Twist.planar(1), now=10.0, source="me@bb;0;5010000000000")
+    assert judge.motion(10.0) == (1, 0, 0)
+
+
+def test_a_fleet_reports_some_lines_a_second_and_counts_the_others() -> None:
+    lines, reports = Lines(), list[str]()
+    robots = [CommandStats(reports.append, lines) for _ in range(300)]
+    for robot in robots:
+        robot.refuse("Fred/cmd_vel", "old", "old: it was late", "pilot@1", 10.0)
+    assert len(reports) == MOST_LINES
+    robots[-1].refuse("Fred/cmd_vel", "old", "old: it was late", "pilot@1", 10.0 + REPORT_EVERY)
+    assert reports[MOST_LINES:] == ["Fred/cmd_vel: from pilot@1: old: it was late (and 1 more)"]
+    assert robots[-1].refused == {"old": 2}
+
+
 def test_a_long_reason_is_cut(judge: Judge) -> None:
     judge.take(None, error="x" * 5000)
     assert len(judge.twist_input.status(10.0).last_refusal) == 300
@@ -264,7 +293,7 @@ def test_by_default_refusals_are_reported_on_standard_error(capsys: pytest.Captu
         (Twist(Vector3(), Vector3(0, 0, 1001)), "angular.z is 1001 rad/s; at most 1000"),
     ],
 )
-def test_what_no_robot_can_mean_is_refused_by_name_and_is_no_stop_either(
+def test_an_implausible_value_is_refused_by_name_and_does_not_stop_the_robot_either(
     judge: Judge, twist: Twist, reason: str
 ) -> None:
     judge.take(Twist.planar(1), source="me@1", priority="INTERACTIVE_HIGH")

@@ -63,7 +63,7 @@ def state(body: JointedBody, name: str = "j") -> tuple[float, float]:
 
 
 def spun(world: World, body: JointedBody, rate: float) -> None:
-    """Its joint turns at a rate, and nothing drives it any more."""
+    """A body whose joint turns at a rate, and is no longer driven."""
     body.turn("j", rate)
     run(world, 0.1)
     body.release("j")

@@ -29,7 +29,7 @@ class Bench:
 
     def do(self, motion: JointMotion | None, seconds: float = 0.5) -> None:
         for _ in range(round(seconds * 240)):
-            self.motors.do(motion)
+            self.motors.apply(motion)
             self.world.step()
 
     def rates(self) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """The loop with a real engine and a real bus: commands in, odometry out, at the pace that was asked for."""
 
 import json
+import re
 import threading
 import time
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from types import SimpleNamespace
 import pytest
 import zenoh
 
-from holozen.command.time import DISTRUST
+from holozen.command.wait_set import DISTRUST
 from holozen.limits import STOP
 from holozen.messages import (
     Clock,
@@ -377,7 +378,9 @@ def test_a_changed_timeout_applies_to_the_current_driver(clock: list[float], sim
     assert sim.robot.mover.body.twist()[0] == (0, 0, 0)
 
 
-def test_a_stall_is_an_overrun_in_the_status(clock: list[float], wire: Wire, world: World) -> None:
+def test_a_stall_is_an_overrun_in_the_status(
+    clock: list[float], wire: Wire, world: World, capsys: pytest.CaptureFixture[str]
+) -> None:
     sim = Sim(wire, world, rtf=1.0)
     status = sim.bus.subscribe("simulation_status", SimulationStatus)
 
@@ -395,3 +398,4 @@ def test_a_stall_is_an_overrun_in_the_status(clock: list[float], wire: Wire, wor
     assert newest.overruns == 1 and newest.lost == pytest.approx(1.0, abs=0.2)
     assert newest.steps - before < 0.2 * 240, "no burst followed"
     assert newest.real_time_factor < 0.3
+    assert re.fullmatch(r"sim: 1 overrun, \d\.\d s lost; running at 0\.\d\dx real time\n", capsys.readouterr().err)

@@ -9,7 +9,7 @@ import pytest
 from holozen.limits import STOP
 from holozen.robot.loading import parse
 from holozen.robot.rigid import lowest, lump
-from holozen.robot.xacro import expand
+from holozen.robot.xacro import expand_xacro
 from services.sim.physics.movers import mover_for
 from services.sim.physics.world import World
 
@@ -36,7 +36,7 @@ def test_a_box_without_inertia_rests_on_the_ground(ground: World, jointed: bool)
 
 
 def test_a_rover_without_any_inertia_stands_still(ground: World) -> None:
-    text, count = re.subn(r"<inertia .*?/>", "", expand(ROVER), flags=re.DOTALL)
+    text, count = re.subn(r"<inertia .*?/>", "", expand_xacro(ROVER), flags=re.DOTALL)
     assert count >= 2
     model = parse(text, ROVER)
     mover = mover_for(ground, model, (0, 0, -lowest(model)))

@@ -1,25 +1,26 @@
-"""The wheels of a mecanum base turn for the eye, forward where it drives forward."""
+"""The wheels of a mecanum base are only drawn turning: forward when it drives forward."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from msgspec import structs
 
-from holozen.robot.loading import load
+from holozen.robot.loading import load, parse
 from holozen.robot.model import Mecanum, RobotModel
+from holozen.robot.xacro import expand_xacro
 from services.sim.physics.wheels import MecanumWheels
 
-MODEL = load(Path(__file__).parents[3] / "urdf" / "mecanum.urdf.xacro")
+FILE = Path(__file__).parents[3] / "urdf" / "mecanum.urdf.xacro"
+MODEL = load(FILE)
 NAMES = ["front_left_joint", "front_right_joint", "back_left_joint", "back_right_joint"]
 RADIUS, ARM = 0.076, 0.17 + 0.18
 
 
-def wheels(model: RobotModel = MODEL, **changes: Any) -> MecanumWheels:
+def wheels(model: RobotModel = MODEL) -> MecanumWheels:
     assert model.drive is not None
     assert isinstance(model.drive.mechanism, Mecanum)
-    return MecanumWheels(model, structs.replace(model.drive.mechanism, **changes))
+    return MecanumWheels(model, model.drive.mechanism)
 
 
 def rates(rolling: MecanumWheels, velocity: tuple[float, float, float]) -> dict[str, float]:
@@ -53,7 +54,9 @@ def test_a_wheel_with_its_axis_the_other_way_turns_the_other_way() -> None:
 
 
 def test_what_the_file_does_not_measure_is_measured() -> None:
-    reported, measured = wheels(), wheels(separation=0.0, wheelbase=0.0, radius=0.0)
+    text, count = re.subn(r"<(wheel_separation|wheelbase|wheel_radius)>.*?</\1>", "", expand_xacro(FILE))
+    assert count == 3
+    reported, measured = wheels(), wheels(parse(text, FILE))
     assert rates(reported, (0.5, -0.2, 2)) == pytest.approx(rates(measured, (0.5, -0.2, 2)))
 
 

@@ -16,7 +16,7 @@ from holozen.robot.model import Planar as PlanarDrive
 from holozen.robot.rigid import lowest
 from holozen.rotation import yaw
 from services.sim.physics.movers import mover_for
-from services.sim.physics.omni import OmniMover
+from services.sim.physics.rolling import OmniMover
 from services.sim.physics.world import World
 
 HB_BOT_FILE = Path(__file__).parents[3] / "urdf/hb_bot.urdf.xacro"
@@ -25,7 +25,7 @@ OMNI = driven(HB_BOT, "omni")
 
 
 def put(world: World, model: RobotModel = OMNI) -> OmniMover:
-    """On the ground, after it has settled."""
+    """Put the robot on the ground, and let it settle."""
     mover = mover_for(world, model, (0, 0, -lowest(model)))
     assert isinstance(mover, OmniMover)
     drive(world, mover, STOP, 0.5)
@@ -51,7 +51,7 @@ def test_it_goes_where_the_twist_commands(ground: World) -> None:
 
 
 def goes(world: World, mover: OmniMover, velocity: Planar, within: float) -> None:
-    """It drives as commanded for 2 s once it has sped up, to so many metres and radians, and stops."""
+    """Check that it drives as commanded for 2 s once it has sped up, to within these metres and radians, and stops."""
     drive(world, mover, velocity, 0.5)
     x, y, heading = place(mover)
     drive(world, mover, velocity, 2.0)
@@ -169,7 +169,7 @@ def test_a_plugin_puts_planar_move_on_the_wheels_or_drives_alone() -> None:
     assert both and (both.command_topic, both.mechanism) == ("go", Omni(encoder=True))
     alone = read("holozen_omni_drive <commandTopic>go</commandTopic>").drive
     assert alone and (alone.command_topic, alone.mechanism) == ("go", Omni())
-    with pytest.raises(RobotError, match="is a second drive, beside 'wb_plugin'"):
+    with pytest.raises(RobotError, match="is a second drive beside 'wb_plugin'"):
         text = '<link name="l"/><link name="r"/>' + "".join(
             f'<joint name="joint{side}" type="continuous"><parent link="a"/><child link="{side.lower()}"/></joint>'
             for side in "LR"

@@ -1,8 +1,8 @@
-"""Steps are due one after another without drift, and a stall is not raced after."""
+"""Steps are due one after another without drift, and none are rushed to make up for a stall."""
 
 import pytest
 
-from services.sim.pace import STALL, Pace
+from services.sim.schedule import STALL, Pace
 
 
 def test_the_first_step_is_due_at_once() -> None:
@@ -62,7 +62,7 @@ def test_a_factor_of_zero_never_waits() -> None:
         pace.stepped(now)
 
 
-def test_another_factor_holds_from_now_on_and_nothing_is_raced_after() -> None:
+def test_another_factor_holds_from_now_on_and_no_steps_are_rushed() -> None:
     pace = Pace(0.01, 0.001, now=0.0)
     pace.stepped(0.0)
     assert pace.left(0.0) == pytest.approx(10)

@@ -21,7 +21,7 @@ DT = 1 / 240
 
 
 def accelerations(p: Pendulum, lean: float, rate: float, torque: float) -> tuple[float, float]:
-    """Of the lean and of the way: Lagrange's equations, not linearised, by hand."""
+    """The accelerations of the lean and along the ground: Lagrange's equations, not linearised, derived by hand."""
     sine, cosine = math.sin(lean), math.cos(lean)
     moving, turning = (
         p.body_mass + p.wheel_mass + p.wheel_inertia / p.radius**2,
@@ -35,7 +35,7 @@ def accelerations(p: Pendulum, lean: float, rate: float, torque: float) -> tuple
 
 
 def held(real: Pendulum, known: Pendulum, lean: float, seconds: float, dt: float = DT) -> list[float]:
-    """Lean, its rate, speed and way after being held with the gains for `known`."""
+    """The lean, its rate, the speed and the distance after the gains for `known` have balanced it."""
     found = gains(known, dt)
     state = [lean, 0.0, 0.0, 0.0]
     for _ in range(round(seconds / dt)):

@@ -1,4 +1,4 @@
-"""What rays hit: the links of other entities, and those of the own robot but the one that carries the sensor."""
+"""What rays hit: the links of other entities, and those of the sensor's own robot, except the link that carries it."""
 
 from collections.abc import Iterator
 from contextlib import closing

@@ -12,7 +12,8 @@ from holozen.messages import Header, Quaternion, Time, Twist
 from holozen.robot.loading import load
 from holozen.robot.model import Drive, Joint, Limits, Link, Pose, RobotModel
 from holozen.robot.rotation import Array, matrix_of, quaternion_of
-from services.sim.io.topics import JointFrames, Schedule, covariance, odometry, transform
+from services.sim.io.topics import JointFrames, covariance, odometry, transform
+from services.sim.schedule import Schedule
 
 REPO = Path(__file__).parents[3]
 HB_BOT = load(REPO / "urdf" / "hb_bot.urdf.xacro")

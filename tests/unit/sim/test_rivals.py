@@ -1,4 +1,4 @@
-"""Of two sims on the same keys one goes on, whenever they learn of each other."""
+"""Of two sims on the same keys one goes on, no matter when they learn of each other."""
 
 import threading
 from contextlib import closing

@@ -104,7 +104,7 @@ def test_a_second_stop_remembers_sources_that_still_have_to_let_go(stop: Softwar
     assert stop.refusal("me", RANK, False, 2.3) == LET_GO
 
 
-def test_where_the_watchdog_is_slow_the_silence_is_as_long() -> None:
+def test_a_slow_watchdog_means_an_equally_long_silence() -> None:
     stop = SoftwareStop(2.0)
     set_at(stop, 1.0)
     stop.refusal("slow", RANK, False, 2.0)

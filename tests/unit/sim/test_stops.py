@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from services.sim.stops import UNREADABLE, StopFiles
+from holozen.command.stop_files import UNREADABLE, StopFiles
 
 
-def made(folder: Path, where: str = "tcp/127.0.0.1:7447") -> StopFiles:
-    return StopFiles(folder, where)
+def made(folder: Path, *networks: str) -> StopFiles:
+    return StopFiles(folder, networks or ("tcp/127.0.0.1:7447",))
 
 
 def test_the_next_reader_finds_what_was_written_last(tmp_path: Path) -> None:
@@ -22,7 +22,7 @@ def test_the_next_reader_finds_what_was_written_last(tmp_path: Path) -> None:
             files.write(robot, by)
             assert (made(folder).read(robot), made(folder).read("Eve")) == (by, ""), robot
             if by:
-                assert os.stat(files.path(robot)).st_mode & 0o077 == 0
+                assert os.stat(files.paths(robot)[0]).st_mode & 0o077 == 0
 
 
 def test_two_sims_on_one_folder_keep_the_stops_of_both(tmp_path: Path) -> None:
@@ -35,9 +35,33 @@ def test_two_sims_on_one_folder_keep_the_stops_of_both(tmp_path: Path) -> None:
 
 def test_networks_and_robots_have_files_of_their_own(tmp_path: Path) -> None:
     networks = ["tcp/127.0.0.1:7447", "tcp/127.0.0.1:7457", "a" * 99 + "1", "a" * 99 + "2"]
-    files = {made(tmp_path, where).path(robot) for where in networks for robot in ("", "Fred", "fred", "a/b", "a_b")}
+    files = {
+        made(tmp_path, where).paths(robot)[0] for where in networks for robot in ("", "Fred", "fred", "a/b", "a_b")
+    }
     assert len(files) == 20
     assert all(file.parent.parent == tmp_path for file in files)
+
+
+def test_a_sim_in_several_networks_keeps_its_stops_in_all_and_has_those_of_any(tmp_path: Path) -> None:
+    made(tmp_path, "a", "b").write("Fred", "ann@1")
+    assert [made(tmp_path, *networks).read("Fred") for networks in ("a", "b", "bc", "c")] == [*3 * ["ann@1"], ""]
+    for spoilt, setter in ((b"", "ann@1"), (b"ann@1", "ann@1")):
+        made(tmp_path, "a").paths("Fred")[0].write_bytes(spoilt)
+        assert made(tmp_path, "a", "b").read("Fred") == setter
+    files = made(tmp_path, "a", "b")
+    assert files.read("Fred") == "ann@1"
+    files.write("Fred", "")
+    assert not any(path.exists() for path in files.paths("Fred"))
+
+
+def test_a_stop_in_another_network_stops_nothing_and_is_reported(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    there = made(tmp_path, "a")
+    there.write("Fred", "ann@1")
+    assert [made(tmp_path, "b").read(robot) for robot in ("Fred", "Ann")] == ["", ""]
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == f"sim: {there.paths('Fred')[0]}: Fred is stopped in another network, and not in this one"
 
 
 def loop(path: Path) -> None:
@@ -54,11 +78,11 @@ def test_what_cannot_be_read_stops_its_robot(
     tmp_path: Path, spoil: Callable[[Path], object], capsys: pytest.CaptureFixture[str]
 ) -> None:
     files = made(tmp_path)
-    files.path("Fred").parent.mkdir()
-    spoil(files.path("Fred"))
+    files.paths("Fred")[0].parent.mkdir()
+    spoil(files.paths("Fred")[0])
     assert (files.read("Fred"), files.read("Ann")) == (UNREADABLE, "")
     (line,) = capsys.readouterr().err.splitlines()
-    assert str(files.path("Fred")) in line and "so Fred is stopped until `holozen release`" in line
+    assert str(files.paths("Fred")[0]) in line and "so Fred is stopped until `holozen release`" in line
 
 
 def test_a_file_in_the_place_of_the_folder_stops_everyone_and_what_cannot_be_written_is_reported_once(
@@ -70,4 +94,4 @@ def test_a_file_in_the_place_of_the_folder_stops_everyone_and_what_cannot_be_wri
     capsys.readouterr()
     for by in ("ann@1", "", "bob@2"):
         files.write("Fred", by)
-    assert capsys.readouterr().err.count("stops hold, but not beyond the end of this sim") == 1
+    assert capsys.readouterr().err.count("stops hold, but not beyond the end of this process") == 1

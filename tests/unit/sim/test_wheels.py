@@ -1,4 +1,4 @@
-"""The wheels turn for the eye, as wheels that roll without slipping would."""
+"""Wheels are only drawn turning, as if they rolled without slipping."""
 
 import math
 from dataclasses import replace

@@ -35,7 +35,7 @@ def shape(kind: str, size: tuple[float, ...], z: float, rotation: tuple[float, .
 def body(
     *shapes: PlacedShape, centre: Vector = (0, 0, 0.1), tilt: float = 0.0, inertia: Vector = (0.1, 0.1, 0.1)
 ) -> Body:
-    """One kilogram; the principal axes are tilted about x by `tilt`."""
+    """A body of one kilogram, with its principal axes tilted about x by `tilt`."""
     return Body(1.0, centre, inertia, (math.sin(tilt / 2), 0, 0, math.cos(tilt / 2)), shapes)
 
 
@@ -64,7 +64,7 @@ def pose(base: PlanarBody) -> Vector:
 
 
 def arc(velocity: Planar, seconds: float) -> tuple[float, float]:
-    """Where a body at the origin is after driving `velocity` for a time."""
+    """Where a body that begins at the origin is after driving with `velocity` for a time."""
     x, y, turn = velocity
     if not turn:
         return x * seconds, y * seconds

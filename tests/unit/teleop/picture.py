@@ -1,4 +1,4 @@
-"""The picture of the teleop for the README: a state that never changes, drawn by the view, the painter and a terminal.
+"""The picture of the teleop for the README: a state that never changes, drawn by the view, the screen and a terminal.
 
 `python -m tests.unit.teleop.picture` prints it as SVG.
 """
@@ -39,7 +39,7 @@ DOTS = (
 
 
 def scene() -> State:
-    """A robot that has driven most of an eight, and is driven on."""
+    """A robot that has driven most of a figure of eight, and is being driven."""
     way = [index / 300 * math.tau for index in range(252)]
     trail = [(1.5 * math.sin(t), 0.95 * math.sin(2 * t)) for t in way]
     (x0, y0), (x, y) = trail[-2:]
@@ -70,12 +70,12 @@ class Drawing:
         )
 
     def draw(self, lines: list[Line]) -> None:
-        """Show them."""
+        """Show these lines."""
         self._picture.lines = lines
         self._app.renderer.render(self._app, self._app.layout)
 
     def forget(self) -> None:
-        """What is shown is not known any more."""
+        """Treat the screen's content as unknown from now on."""
         self._app.renderer.reset(leave_alternate_screen=False)
 
 

@@ -1,4 +1,4 @@
-"""States to show: one in which all is amiss, and any."""
+"""States to show: one in which everything is wrong, and arbitrary ones."""
 
 from dataclasses import replace
 
@@ -25,7 +25,7 @@ _planar = st.tuples(_floats, _floats, _floats)
 
 
 def states() -> st.SearchStrategy[State]:
-    """Any state, also such as there should not be."""
+    """Any state, including those that should never occur."""
     sources = st.builds(Source, _words, _words, _floats, st.booleans(), st.booleans())
     return st.builds(
         State,

@@ -34,7 +34,7 @@ class Seat:
         self.commands: list[float] = []  # forward, m/s
 
     def wrote(self, text: bytes) -> bool:
-        """Whether the teleop has written it by now. Reads no more than there is."""
+        """Whether the teleop has written this by now. Reads no further than that."""
         while select.select([self.master], [], [], 0)[0]:
             self._read += os.read(self.master, 65536)
         return text in self._read
@@ -43,7 +43,7 @@ class Seat:
         os.write(self.master, data)
 
     def commanded(self) -> list[float]:
-        """All so far."""
+        """All commands so far."""
         while received := self._commands.try_recv():
             assert received.message
             self.commands.append(received.message.linear.x)

@@ -37,7 +37,7 @@ def test_each_table_of_keys_is_current(name: str) -> None:
 def test_every_motion_action_and_setting_is_named() -> None:
     text = DOCS.read_text()
     assert [word for word in (*MOTIONS, *ACTIONS) if f"`{word}`" not in text] == []
-    assert f"There are {' '.join(f'`{name}`' for name in NAMES)}. " in " ".join(text.split())
+    assert f"The names are {' '.join(f'`{name}`' for name in NAMES)}. " in " ".join(text.split())
 
 
 def test_the_example_of_keys_is_a_layout(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A gamepad's events become a direction: only while the dead-man is held, without the sticks' slack, never too fast."""
+"""A gamepad's events become a direction: only while the dead-man is held, without the sticks' play, never too fast."""
 
 import math
 
@@ -109,7 +109,7 @@ def test_another_button_is_no_dead_man() -> None:
     assert made.direction == REST
 
 
-def test_lost_events_let_go_until_the_state_is_read_and_the_dead_man_pressed_anew() -> None:
+def test_lost_events_let_go_until_the_state_is_read_and_the_dead_man_pressed_again() -> None:
     made = held()
     made.take(EV_ABS, ABS_Y, -32768)
     made.take(EV_SYN, SYN_DROPPED, 0)

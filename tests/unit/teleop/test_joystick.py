@@ -135,7 +135,7 @@ def test_an_event_that_comes_in_two_parts_is_put_together(device: Recorded) -> N
         assert joystick.read() == ["resume"]
 
 
-def test_after_lost_events_the_state_is_read_anew_and_the_dead_man_must_be_released(device: Recorded) -> None:
+def test_after_lost_events_the_state_is_read_again_and_the_dead_man_must_be_released(device: Recorded) -> None:
     with Joystick(device, "") as joystick:
         device.play((EV_KEY, BTN_TL, 1), (EV_ABS, ABS_Y, -32768), REPORT)
         joystick.read()

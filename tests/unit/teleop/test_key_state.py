@@ -16,14 +16,14 @@ Times = list[float]
 
 
 def run(first: float, every: float, seconds: float, late: float = 0.0, seed: int = 0) -> Times:
-    """When a key that is held so long is typed; each repeat may be late by up to `late`."""
+    """The times at which a key that is held for so long is typed; each repeat may come up to `late` seconds late."""
     noise = random.Random(seed)
     repeats = (first + number * every for number in itertools.count())
     return [0.0, *(at + noise.uniform(0, late) for at in itertools.takewhile(lambda at: at < seconds, repeats))]
 
 
 def held(key_state: KeyState, typed: Times, key: str = "i", start: float = 0.0) -> list[tuple[float, float]]:
-    """From when to when the key counts as held, looked at as often as the teleop does."""
+    """From when to when the key counts as held, polled as often as the teleop does."""
     spans: list[tuple[float, float]] = []
     began: float | None = None
     left = sorted(typed)
@@ -104,7 +104,7 @@ def test_another_key_takes_the_place_of_a_typed_one() -> None:
     assert list(key_state.keys) == ["J"]
 
 
-def test_with_a_timeout_a_typed_key_counts_so_long() -> None:
+def test_a_typed_key_counts_for_the_timeout() -> None:
     key_state = KeyState(timeout=0.3)
     for now in (1.0, 1.2):
         key_state.type("i", now)
@@ -138,7 +138,7 @@ def test_latched_a_key_counts_until_another() -> None:
 
 
 @pytest.mark.parametrize("mode", [HOLD, LATCH])
-def test_a_key_that_was_let_go_while_it_repeats_counts_only_when_pressed_anew(mode: str) -> None:
+def test_a_key_that_was_let_go_while_it_repeats_counts_only_when_pressed_again(mode: str) -> None:
     key_state = KeyState(mode)
     typed = run(0.5, 0.03, 3.0)
     for now in typed[:20]:
@@ -153,7 +153,7 @@ def test_a_key_that_was_let_go_while_it_repeats_counts_only_when_pressed_anew(mo
     assert list(key_state.keys) == ["i"]
 
 
-def test_a_pressed_key_that_was_let_go_counts_only_when_pressed_anew() -> None:
+def test_a_pressed_key_that_was_let_go_counts_only_when_pressed_again() -> None:
     key_state = KeyState()
     key_state.press("i", "105")
     key_state.let_go()
@@ -167,7 +167,7 @@ def test_a_key_that_was_ignored_does_not_count_while_it_repeats() -> None:
     key_state.ignore("i", 1.0)
     assert not any(key_state.type("i", 1.0 + count * 0.04) for count in range(1, 50))
     assert key_state.keys == ()
-    assert key_state.type("i", 4.0), "it was let go and pressed anew"
+    assert key_state.type("i", 4.0), "it was let go and pressed again"
 
 
 def test_a_key_that_was_ignored_does_not_count_however_it_repeats() -> None:
@@ -176,4 +176,4 @@ def test_a_key_that_was_ignored_does_not_count_however_it_repeats() -> None:
         held(key_state, run(0.5, 0.03, 1.5))  # another keyboard, which it knows
         key_state.ignore("i", 10.0)
         assert not any(key_state.type("i", 10.0 + at) for at in run(first, every, 3.0)[1:])
-        assert key_state.type("i", 14.0), "it was let go and pressed anew"
+        assert key_state.type("i", 14.0), "it was let go and pressed again"

@@ -1,4 +1,4 @@
-"""Bytes of real terminals become keys; what is no key becomes no motion."""
+"""Bytes of real terminals become keys; bytes that are no key move nothing."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -20,7 +20,7 @@ PASTED = b"\x1b[200~i J\n\x1b[A\x1b[201~"
 
 
 def read(*parts: bytes, releases: bool = False) -> list[Event]:
-    """The events of bytes that come at once, or in parts."""
+    """The events of bytes that arrive all at once, or in pieces."""
     keyboard = Keyboard()
     keyboard.releases = releases
     return [event for part in parts for event in keyboard.feed(part, 0.0)]

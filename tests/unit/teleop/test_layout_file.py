@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from services.teleop.control.layout_file import MOTIONS, load
-from services.teleop.control.layouts import FIXED, LayoutError
+from services.teleop.control.layouts import FIXED
+from services.teleop.toml_file import InputError
 
 GOOD = """
 name = "my keys"
@@ -35,7 +36,7 @@ def written(folder: Path, text: str) -> str:
 
 def refusal(folder: Path, text: str) -> str:
     file = written(folder, text)
-    with pytest.raises(LayoutError) as error:
+    with pytest.raises(InputError) as error:
         load(file)
     assert str(error.value).startswith(f"{file}:")
     assert str(error.value).isprintable()
@@ -113,10 +114,10 @@ def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path: Path) -> None
         ("none", "No such file"),
         ("a\0b", "null"),
     ):
-        with pytest.raises(LayoutError, match=words) as error:
+        with pytest.raises(InputError, match=words) as error:
             load(f"{tmp_path}/{name}")
         assert str(error.value).isprintable()
-    with pytest.raises(LayoutError, match="is not a regular file"):
+    with pytest.raises(InputError, match="is not a regular file"):
         load(f"{tmp_path}/ttk")  # with a slash it is a file, though there is a layout of this name
 
 
@@ -142,7 +143,7 @@ def test_any_file_is_a_layout_or_one_line(
     file = written(tmp_path_factory.getbasetemp(), text)
     try:
         layout = load(file)
-    except LayoutError as error:
+    except InputError as error:
         assert str(error).startswith(file)
         assert str(error).isprintable()
     else:

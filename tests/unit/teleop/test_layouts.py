@@ -13,9 +13,9 @@ from services.teleop.control.layouts import (
     WASD,
     WIDTH,
     Layout,
-    LayoutError,
     key_name,
 )
+from services.teleop.toml_file import InputError
 
 # Key, forward, left, up, turn: the bindings of teleop_twist_keyboard 2.4, shifted keys strafe.
 TABLE = """
@@ -176,7 +176,7 @@ def test_layouts_are_loaded_by_name() -> None:
     assert {load(name).name for name in ("ttk", "wasd", "arrows")} == {"ttk", "wasd", "arrows"}
 
 
-def test_a_name_that_is_none_is_refused_with_those_that_are() -> None:
-    with pytest.raises(LayoutError) as error:
+def test_an_unknown_name_is_refused_with_those_that_exist() -> None:
+    with pytest.raises(InputError) as error:
         load("wsad")
     assert str(error.value) == "wsad: no such file, and no such layout (did you mean 'wasd'?)"

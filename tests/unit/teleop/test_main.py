@@ -27,3 +27,8 @@ def test_keys_latch_unless_a_closer_setting_is_hold(tmp_path: Path) -> None:
 def test_a_dead_man_without_held_keys_is_refused(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--deadman", *words]) == 2
     assert capsys.readouterr().err.startswith("teleop: --deadman needs keys that are held")
+
+
+def test_a_script_for_several_robots_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bot1", "bot999", "--script", "no/such/file"]) == 2
+    assert capsys.readouterr().err == "teleop: a script drives one robot, so name one of bot1, bot999\n"

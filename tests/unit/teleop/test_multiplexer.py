@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from services.teleop.input.terminal_liveness import attached
+from services.teleop.input.terminal_liveness import attached, multiplexer
 
 
 def test_outside_a_multiplexer_an_operator_is_always_present() -> None:
@@ -12,12 +12,20 @@ def test_outside_a_multiplexer_an_operator_is_always_present() -> None:
     assert attached({"TMUX": "/no/such/socket,1,0"})()
 
 
-@pytest.mark.parametrize("multiplexer", ["tmux", "screen"])
-def test_a_detached_multiplexer_has_no_operator(tmp_path: Path, multiplexer: str) -> None:
+def test_a_multiplexer_is_known_by_its_variables_and_over_ssh_by_its_terminal() -> None:
+    assert multiplexer({"TMUX": "/tmp/s,1,0", "TERM": "screen-256color"}) == "tmux"
+    assert multiplexer({"STY": "1.pts-0"}) == "screen"
+    assert multiplexer({"TERM": "tmux-256color"}) == "tmux"
+    assert multiplexer({"TERM": "screen"}) == "screen"
+    assert multiplexer({"TERM": "xterm-256color", "TMUX": "", "STY": ""}) == ""
+
+
+@pytest.mark.parametrize("kind", ["tmux", "screen"])
+def test_a_detached_multiplexer_has_no_operator(tmp_path: Path, kind: str) -> None:
     socket = tmp_path / "1234.pts-0"
     socket.touch(0o700)
     message = {"tmux": {"TMUX": f"{socket},42,0"}, "screen": {"STY": socket.name, "SCREENDIR": str(tmp_path)}}
-    look = attached(message[multiplexer])
+    look = attached(message[kind])
     assert look()
     socket.chmod(0o600)
     assert not look()

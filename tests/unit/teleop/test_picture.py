@@ -9,7 +9,7 @@ PICTURE = Path(__file__).parents[3] / "docs" / "teleop.svg"
 
 
 def test_the_picture_in_the_docs_is_what_the_script_makes_now() -> None:
-    assert PICTURE.read_text() == svg(terminal(scene())), "scripts/teleop-picture draws it anew"
+    assert PICTURE.read_text() == svg(terminal(scene())), "scripts/teleop-picture redraws it"
 
 
 def test_the_picture_is_small_and_holds_every_letter() -> None:

@@ -4,7 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from services.teleop.ros_args import PARAMETERS, RosArgError, ros_arguments
+from services.teleop.ros_args import PARAMETERS, ros_arguments
+from services.teleop.toml_file import InputError
 
 
 def test_the_words_of_ros_1_become_flags() -> None:
@@ -64,19 +65,19 @@ def test_what_cannot_be_followed_is_named_in_one_line() -> None:
         ("--ros-args -p speed=1", "-p speed=1: write NAME:=VALUE after it, such as -p speed:=0.9"),
         ("--ros-args -p turtle:speed:=1", "-p turtle:speed:=1: is meant for the node 'turtle'; leave that out"),
     ]:
-        with pytest.raises(RosArgError) as error:
+        with pytest.raises(InputError) as error:
             ros_arguments(words.split())
         assert str(error.value) == line
 
 
 def test_other_flags_of_ros_2_are_named_too() -> None:
     for flag in ["--params-file", "--log-level", "--enclave", "--disable-stdout-logs", "speed:=1"]:
-        with pytest.raises(RosArgError, match=f"^{flag}: cannot be followed; .*-p NAME:=VALUE"):
+        with pytest.raises(InputError, match=f"^{flag}: cannot be followed; .*-p NAME:=VALUE"):
             ros_arguments(["--ros-args", flag, "x"])
 
 
 def test_a_parameter_of_ros_that_is_not_here_is_named_with_those_that_are() -> None:
-    with pytest.raises(RosArgError, match=f"use_sim_time.*{', '.join(PARAMETERS)}"):
+    with pytest.raises(InputError, match=f"use_sim_time.*{', '.join(PARAMETERS)}"):
         ros_arguments(["--ros-args", "-p", "use_sim_time:=true"])
 
 
@@ -87,7 +88,7 @@ WORDS = st.lists(st.one_of(st.sampled_from(["--", "--ros-args", "-p", "-r", "spe
 def test_any_words_give_words_or_one_line(words: list[str]) -> None:
     try:
         made = ros_arguments(words)
-    except RosArgError as error:
+    except InputError as error:
         assert str(error).isprintable()
     else:
         assert all(isinstance(word, str) for word in made)

@@ -28,13 +28,13 @@ class Terminal:
         self.stream.feed(text)
 
     def resize(self, columns: int, rows: int) -> None:
-        """As its window does; the teleop is notified: it moves the cursor home and redraws."""
+        """Do what the window does on a resize, of which it notifies the teleop: move the cursor home and redraw."""
         self.screen.resize(rows, columns)
         self.drawing.size = columns, rows
         self.drawing.forget()
 
     def paint(self, *lines: Line) -> str:
-        """Show the lines; what was written for it."""
+        """Show the lines, and return what was written to do so."""
         before = len(self.written)
         self.drawing.draw(list(lines))
         return "".join(self.written[before:])
@@ -118,7 +118,7 @@ def test_what_was_forgotten_is_painted_whole() -> None:
 
 
 def test_lines_that_are_too_long_or_too_many_are_cut() -> None:
-    """The window was made smaller just now."""
+    """The window has just been made smaller."""
     terminal = Terminal(columns=4, rows=2)
     terminal.paint([("", "abcdefgh")], [("", "second")], [("", "third")])
     assert terminal.text() == ["abcd", "seco"]

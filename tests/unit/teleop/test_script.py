@@ -1,4 +1,4 @@
-"""A drive that is written down: checked whole before anything moves, then driven as if keys were held."""
+"""A scripted drive: checked as a whole before anything moves, then driven as if keys were held."""
 
 import signal
 import threading
@@ -13,8 +13,9 @@ from holozen.transport.pubsub import Subscription
 from services.teleop import script
 from services.teleop.control.layouts import TTK
 from services.teleop.control.twist_mapper import Settings, TwistMapper
-from services.teleop.script import ScriptError, Step
+from services.teleop.script import Step
 from services.teleop.session import Session
+from services.teleop.toml_file import InputError
 
 FORWARD, STRAFE, STOP, END = Twist.planar(0.5), Twist.planar(0, 0.5), Twist(), Twist.planar(-1.0)
 
@@ -43,21 +44,21 @@ def test_a_wrong_line_is_reported_with_its_number() -> None:
         ("stop now", "'stop' is not a key"),
         ("1s \x1b[A", "is not a key"),
     ]:
-        with pytest.raises(ScriptError, match=r"^drive\.txt, line 2: ") as expected:
+        with pytest.raises(InputError, match=r"^drive\.txt, line 2: ") as expected:
             parse(f"0.1s i\n{line}\n0.1s J")
         assert reason in str(expected.value)
         assert "\n" not in str(expected.value)
 
 
 def test_a_script_without_an_end_is_refused() -> None:
-    with pytest.raises(ScriptError, match="longer than"):
+    with pytest.raises(InputError, match="longer than"):
         parse("1s i\n" * 300_000)
 
 
 def test_what_cannot_be_read_is_reported_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "binary").write_bytes(b"\xff\xfe1s i")
     for path in ("none", ".", "binary"):
-        with pytest.raises(ScriptError) as expected:
+        with pytest.raises(InputError) as expected:
             script.load(str(tmp_path / path), TTK)
         assert str(tmp_path / path) in str(expected.value)
 
@@ -125,6 +126,33 @@ def test_the_keys_of_a_script_are_held_whatever_those_of_a_terminal_are(
     (tmp_path / "drive").write_text("100ms i J")
     assert wire.run("teleop", "--script", str(tmp_path / "drive"), *words).returncode == 0
     assert [command for command in heard(commands) if command and command.linear.x and command.linear.y]
+
+
+def test_without_its_robot_it_names_those_that_are_there(wire: Wire, commands: Subscription[Twist]) -> None:
+    done = wire.run("teleop", "bto1", "--script", "-", given="1s i")
+    assert (done.returncode, done.stderr) == (1, "teleop: no subscriber on bto1/cmd_vel; there are some on cmd_vel\n")
+    other = wire.bus("other").subscribe("bot1/cmd_vel", Twist)
+    done = wire.run("teleop", "bto1", "--script", "-", given="1s i")
+    expected = "no subscriber on bto1/cmd_vel (did you mean 'bot1/cmd_vel'?); there are some on bot1/cmd_vel, cmd_vel"
+    assert (done.returncode, done.stderr) == (1, f"teleop: {expected}\n")
+    commands.close()
+    other.close()
+    done = wire.run("teleop", "--script", "-", given="1s i")
+    assert (done.returncode, done.stderr) == (
+        1, "teleop: no subscriber on cmd_vel; start a sim in another terminal: holozen sim\n"
+    )  # fmt: skip
+
+
+def test_the_robot_at_the_root_is_driven_by_its_name(wire: Wire, commands: Subscription[Twist], tmp_path: Path) -> None:
+    status = wire.bus("status").publisher("cmd_vel_status", CommandStatus)
+    (tmp_path / "drive").write_text("60s i")
+    wire.start("teleop", "Fred", "--script", str(tmp_path / "drive"))
+
+    def drives() -> bool:
+        status.put(CommandStatus(name="Fred"))
+        return FORWARD in heard(commands)
+
+    wait_for(drives)
 
 
 def test_a_script_that_was_paused_does_not_drive_on(wire: Wire, commands: Subscription[Twist], tmp_path: Path) -> None:

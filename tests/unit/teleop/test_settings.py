@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from holozen import flags
-from services.teleop.ros_args import RosArgError
-from services.teleop.settings import NAMES, SettingsError, apply, parse, path, read
+from services.teleop.settings import NAMES, apply, parse, path, read
+from services.teleop.toml_file import InputError
 
 
 def parser() -> argparse.ArgumentParser:
@@ -39,7 +39,7 @@ def given(folder: Path, text: str, *words: str) -> argparse.Namespace:
 
 def refusal(folder: Path, text: str) -> str:
     file = written(folder, text)
-    with pytest.raises(SettingsError) as error:
+    with pytest.raises(InputError) as error:
         apply(parser(), file)
     assert str(error.value).startswith(f"{file}:")
     assert str(error.value).isprintable()
@@ -82,7 +82,7 @@ def test_a_flag_and_a_ros_spelling_can_take_back_what_the_file_switches_on(tmp_p
 
 def test_a_ros_spelling_wins_over_the_file(tmp_path: Path) -> None:
     assert given(tmp_path, "speed = 0.9", "_speed:=0.3").speed == 0.3
-    with pytest.raises(RosArgError):
+    with pytest.raises(InputError):
         given(tmp_path, "", "_sped:=0.3")
 
 
@@ -138,7 +138,7 @@ def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path: Path) -> None
     os.mkfifo(tmp_path / "fifo")
     (tmp_path / "loop").symlink_to(tmp_path / "loop")
     for name, words in (("", "is a folder"), ("fifo", "is not a regular file"), ("loop", "Too many levels")):
-        with pytest.raises(SettingsError, match=words):
+        with pytest.raises(InputError, match=words):
             read(str(tmp_path / name))
 
 
@@ -154,6 +154,6 @@ def test_what_is_no_file_is_refused_and_never_waited_for(tmp_path: Path) -> None
 )
 def test_what_no_person_writes_is_refused_too(tmp_path: Path, content: bytes, words: str) -> None:
     (tmp_path / "teleop.toml").write_bytes(content)
-    with pytest.raises(SettingsError, match=words) as error:
+    with pytest.raises(InputError, match=words) as error:
         read(str(tmp_path / "teleop.toml"))
     assert len(str(error.value)) < 400

@@ -1,4 +1,6 @@
-"""Keys to commands: a key drives, its release stops, a stop is made sure of, and then there is silence."""
+"""Keys to commands: a key drives, its release stops, the stop is repeated until it takes effect, and then nothing is
+sent.
+"""
 
 import math
 from dataclasses import replace
@@ -24,7 +26,7 @@ def mapper() -> TwistMapper:
 
 
 def typed(mapper: TwistMapper, key: str, now: float) -> str:
-    """A key in a terminal that reports no releases."""
+    """A key typed in a terminal that reports no releases."""
     return mapper.take(Key(key, key), now)
 
 
@@ -102,7 +104,7 @@ def test_a_repeated_key_keeps_the_robot_going(mapper: TwistMapper) -> None:
 
 
 def test_a_speed_key_does_not_prolong_a_typed_key(mapper: TwistMapper) -> None:
-    """The terminal repeats the speed key from then on: whether the other is still held cannot be known."""
+    """The terminal repeats the speed key from then on: whether the other key is still held is unknown."""
     typed(mapper, "i", 1.0)
     typed(mapper, "w", 1.4)
     assert commanded(mapper, 1.45) == Twist.planar(0.55)
@@ -139,7 +141,7 @@ def test_a_stop_is_given_up_after_a_second(mapper: TwistMapper) -> None:
     assert STOP_FOR == 1.0
 
 
-def test_a_robot_that_rests_is_driven_all_the_same(mapper: TwistMapper) -> None:
+def test_a_robot_at_rest_can_still_be_driven(mapper: TwistMapper) -> None:
     typed(mapper, "i", 1.0)
     assert commanded(mapper, 1.0, rests=True) == Twist.planar(0.5)
 

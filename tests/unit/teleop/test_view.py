@@ -21,7 +21,7 @@ every_size = pytest.mark.parametrize("size", SIZES, ids=lambda size: f"{size[0]}
 
 
 def rows(state: State, size: tuple[int, int] = (80, 24)) -> list[str]:
-    """What a terminal of this size shows."""
+    """The lines that a terminal of this size shows."""
     return [line.rstrip() for line in terminal(state, *size).display]
 
 
@@ -36,7 +36,7 @@ def row(state: State, label: str, size: tuple[int, int] = (80, 24)) -> str:
 
 
 def loud(state: State, size: tuple[int, int]) -> list[str]:
-    """The lines that are reverse, bold and red from edge to edge."""
+    """The lines that are reversed, bold and red across the whole width."""
     screen = terminal(state, *size)
     lines = [[screen.buffer[row][column] for column in range(size[0])] for row in range(size[1])]
     return [
@@ -69,7 +69,7 @@ def test_when_all_is_well_nothing_is_loud(size: tuple[int, int]) -> None:
     assert not {"alarm", "warning"} & {style for line in render(GOOD, *size) for style, _ in line}
 
 
-def test_what_is_amiss_is_loud_at_every_size() -> None:
+def test_what_is_wrong_is_loud_at_every_size() -> None:
     for size in [*SIZES, (80, 12), (20, 5), (40, 4)]:
         found = loud(BROKEN, size)
         for words in ALARMS:
@@ -105,7 +105,7 @@ def test_before_any_sample_the_alarms_are_shown() -> None:
 
 @every_size
 def test_at_every_size_one_sees_what_matters_for_safety(size: tuple[int, int]) -> None:
-    """Also when every alarm takes its line."""
+    """Also when every alarm takes a line of its own."""
     for state, driver in ((GOOD, "you drive"), (BROKEN, "teleop@2b3c4d drives, not you")):
         shown = text(state, size)
         assert driver in shown
@@ -144,7 +144,7 @@ def test_a_command_that_moves_the_robot_stands_out() -> None:
 
 
 def bars(state: State, label: str) -> list[tuple[int, int]]:
-    """The filled cells to the left and to the right of the middle, of command and of measured."""
+    """The filled cells left and right of the middle, of the command and of the measured velocity."""
     line = row(state, label)
     middles = [index for index, letter in enumerate(line) if letter == "|"]
     sides = []
@@ -221,6 +221,7 @@ def test_the_mode_is_shown_with_its_reason() -> None:
 
 def test_the_title_names_the_robot_those_that_tab_switches_to_and_us() -> None:
     assert rows(GOOD)[0].split("   ")[:3] == [" holozen teleop", "Fred", "Tab: Barney"]
+    assert "Tab: the robot at the root, Ann" in rows(replace(GOOD, others=["", "Ann"]))[0]
     assert rows(GOOD)[0].endswith("teleop@1a2b3c")
     assert "the robot at the root" in rows(replace(GOOD, robot="", others=[]))[0]
     assert "Tab:" not in rows(replace(GOOD, others=[]))[0]
@@ -272,7 +273,7 @@ def cells(lines: list[Line], *wanted: str) -> str:
 
 
 def dots(state: State, style: str) -> int:
-    """How many dots of braille have a style."""
+    """How many braille dots have a style."""
     return sum(
         (ord(letter) - 0x2800).bit_count() for letter in cells(render(state, 80, 24), style) if letter >= "\u2800"
     )
@@ -296,7 +297,7 @@ def test_the_scale_of_the_map_grows_in_steps() -> None:
     assert message == ["0.5 m", "0.5 m", "2 m", "5 m", "20 m", "500 m", "50000 m"]
 
 
-def test_places_that_cannot_be_are_not_on_the_map() -> None:
+def test_impossible_places_are_not_on_the_map() -> None:
     nowhere = [(math.nan, 0.0), (0.0, 1.7e308), (-1.7e308, 0.0), (math.inf, math.inf)]
     assert text(replace(GOOD, trail=[*nowhere, *GOOD.trail])) == text(GOOD)
     for pose in ((0.0, 1.7e308, 0.0), (math.nan, 0.0, 0.0), (0.0, 0.0, math.inf)):
@@ -332,8 +333,8 @@ def test_what_came_over_the_wire_cannot_move_the_cursor_or_the_columns() -> None
         assert "?[2J???e?xxx" in text(state, size)
 
 
-def test_after_a_change_only_a_little_is_drawn_anew() -> None:
-    """Lines are made of parts, so that the painter finds what stayed."""
+def test_after_a_change_only_a_little_is_redrawn() -> None:
+    """Lines are made of parts, so that the screen finds those that have not changed."""
     before, after = (
         render(GOOD, 80, 24),
         render(replace(GOOD, odom_age=0.007, measured=(0.46, 0.2214, -0.8126)), 80, 24),

@@ -2,6 +2,7 @@
 
 import argparse
 import json
+from typing import Any
 
 import pytest
 import zenoh
@@ -13,13 +14,14 @@ from holozen.transport.connection import (
     LEASE,
     LOOPBACK,
     NEAR_LEASE,
-    RENDEZVOUS,
     Connection,
     add_arguments,
     from_arguments,
     from_environment,
 )
 from holozen.transport.errors import BusError
+
+RENDEZVOUS = ("tcp/127.0.0.1:7447", "tcp/127.0.0.1:7448", "tcp/127.0.0.1:7449")
 
 endpoints = st.none() | st.lists(
     st.sampled_from(["tcp/127.0.0.1:7447", "tcp/10.0.0.2:1", "udp/[::1]:9", "unixsock-stream//tmp/x"]), min_size=1
@@ -190,6 +192,7 @@ def test_a_domain_is_a_number_from_0_to_232(wrong: str, capsys: pytest.CaptureFi
         ("HOLOZEN_MODE", "klient", "='klient' (did you mean 'client'?); use peer, client, router, or unset it"),
         ("HOLOZEN_CONNECT", "10.0.0.2", "'10.0.0.2' is not an endpoint: write PROTOCOL/HOST:PORT"),
         ("HOLOZEN_LISTEN", "tcp/a:1 tcp/b:2", "is not an endpoint: write PROTOCOL/HOST:PORT"),
+        ("HOLOZEN_LISTEN", f"tcp/a:{'9' * 5000}", "has no port from 0 to 65535"),
         ("HOLOZEN_CONFIG", "/nowhere.json5", "='/nowhere.json5': there is no such file"),
     ],
 )
@@ -215,3 +218,41 @@ def test_a_domain_that_an_endpoint_leaves_is_refused(monkeypatch: pytest.MonkeyP
     monkeypatch.setenv("ROS_DOMAIN_ID", "5")  # for ROS 2 alone, perhaps
     where = from_environment(connect=there)
     assert (where.connect, "--domain" in where.arguments()) == (there, False)
+
+
+HOME, POINT = ", ".join(RENDEZVOUS), "tcp/127.0.0.1:9000"
+NETWORKS: list[tuple[dict[str, Any], set[str]]] = [
+    ({}, {HOME}),
+    ({"listen": ("tcp/0.0.0.0:7447",)}, {HOME}),
+    ({"connect": ("tcp/LocalHost:7448",), "listen": ()}, {HOME}),
+    ({"mode": "client", "connect": ("tcp/[::1]:7447",)}, {HOME}),
+    ({"mode": "router"}, {HOME}),
+    *(({"connect": (one,), "listen": (POINT,)}, {POINT}) for one in (
+        POINT, "tcp/localhost:9000", "tcp/[::1]:9000", "tcp/127.0.0.1:09000", "tcp/127.0.0.1:9000#so_sndbuf=65000",
+    )),
+    ({"connect": (POINT,), "listen": ("tcp/127.0.0.1:0",)}, {POINT}),
+    ({"connect": ("tcp/127.0.0.1:1", POINT), "listen": (POINT,)}, {POINT, "tcp/127.0.0.1:1"}),
+    ({"listen": ("tcp/[::]:9000",)}, {POINT, HOME}),  # it connects to the meeting points
+    ({"connect": (POINT,)}, {POINT, HOME}),  # it listens there
+    ({"connect": ("tcp/Robot:7447",), "mode": "client"}, {"tcp/robot:7447"}),
+    ({"private": "/run/me"}, {", ".join(f"unixsock-stream//run/me/{number}" for number in (1, 2, 3))}),
+    ({"secure": "/run/me/sim", "mode": "client"}, {"tls/127.0.0.1:7447"}),
+    ({"secure": "/run/me/sim", "mode": "client", "connect": ("tls/localhost:7447",)}, {"tls/127.0.0.1:7447"}),
+    ({"config": "/etc/../a.json5", "connect": (POINT,)}, {"the endpoints of /a.json5", POINT}),
+    ({"connect": ("tcp/127.0.0.1:0",), "listen": ("tcp/127.0.0.1:0",)}, {"tcp/127.0.0.1:0"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("flags", "networks"), NETWORKS)
+def test_networks_are_known_by_their_endpoints_however_these_are_written(
+    flags: dict[str, Any], networks: set[str]
+) -> None:
+    assert {*Connection(**flags).networks} == networks
+
+
+def test_a_domain_is_the_network_of_its_meeting_points_and_no_other() -> None:
+    for domain in (1, 232):
+        (network,) = Connection(domain=domain).networks
+        for point in Connection(domain=domain).meeting_points:
+            assert Connection(connect=(point,), listen=(point,)).networks == (network,)
+    assert len({Connection(domain=domain).networks for domain in range(233)}) == 233

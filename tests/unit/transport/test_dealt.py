@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import pytest
 import zenoh
 
 from holozen.bus import Bus
@@ -41,6 +42,25 @@ class Heard:
     def has(self, name: str, *values: float) -> bool:
         self.inputs.read(NOW)
         return self.all[name] == list(values)
+
+
+@pytest.mark.parametrize("key", ["cmd_vel", "Fred/cmd_vel"])
+def test_a_flood_pushes_nothing_of_a_higher_priority_out(wire: Wire, key: str) -> None:
+    bus, read, inputs = wire.bus(), list[float](), WaitSet()
+    commands = bus.subscribe(key, Twist, depth=4, dealt=True)
+
+    def take(first: Any, _moment: Moment) -> bool:
+        read.extend(one.message.linear.x for one in commands.waiting(first) if one.message)
+        return False
+
+    inputs.add([Reader(commands.raw.channel, take)])
+    person, script = bus.publisher(key, Twist, "INTERACTIVE_HIGH"), bus.publisher(key, Twist)
+    script.put(Twist.planar(-1))
+    person.put(Twist.planar(1))
+    for _ in range(100):  # within a session they arrive at once
+        script.put(Twist.planar(2))
+    inputs.read(NOW)
+    assert read == [1, 2, 2, 2, 2]
 
 
 def test_each_hears_its_own_key_the_newest_of_a_flood_and_what_is_for_all(wire: Wire) -> None:

@@ -185,6 +185,22 @@ def test_a_session_that_a_rendezvous_point_lists_is_waited_for_and_then_nothing(
     assert {end.node for end in graph.settled(lambda: True) if end.key == ODOM.key} == {ODOM.node, "late"}
 
 
+def test_a_node_at_a_rendezvous_point_that_lists_itself_alone_is_called_once_more_and_no_more_waited_for() -> None:
+    late = ODOM._replace(key="tf")
+    calls = iter([(token(ODOM), True), (token(late), True)])
+    changes = deque[tuple[str, bool]]()
+
+    def roll_call() -> bool:
+        changes.append(next(calls))  # a third is an error
+        return True
+
+    def read() -> tuple[str, bool] | None:
+        return changes.popleft() if changes else None
+
+    graph = Graph(read, roll_call, ask_peers=lambda: lambda: {ODOM.session})
+    assert graph.settled(lambda: True, patience=30, quiet=30) == [ODOM, late]
+
+
 def test_where_the_first_link_took_long_so_may_the_next() -> None:
     late = ODOM._replace(session="b2")
     looks = iter([*[None] * 30, (token(late), True)])

@@ -1,5 +1,7 @@
 """Requests are typed, and every failure is a reply with the reason."""
 
+import math
+import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +15,15 @@ from holozen.messages.codec import WIRES, encoding
 from holozen.testing import Wire, wait_for
 from holozen.transport.errors import NoReply, ServiceError
 from holozen.transport.samples import Replies, Sample
-from holozen.transport.services import MAX_REQUEST_BYTES, Server, answer_in_turn, call_bytes, refusal
+from holozen.transport.services import (
+    MAX_REQUEST_BYTES,
+    PROOFS,
+    Attempts,
+    Server,
+    answer_in_turn,
+    call_bytes,
+    refusal,
+)
 
 R = TypeVar("R")
 
@@ -180,6 +190,68 @@ def test_a_server_knows_its_caller(wire: Wire) -> None:
     caller.call("stop", TriggerRequest(), TriggerReply)
     list(caller.session.get("stop"))
     assert callers == [caller.source, ""]
+
+
+class Guarded:
+    """A service that obeys only what was sent after `event`, in s."""
+
+    def __init__(self, wire: Wire) -> None:
+        self.event = -math.inf
+        self.server = wire.bus("server").serve("release", TriggerRequest, TriggerReply, self._answer)
+
+    def _answer(self, _request: TriggerRequest) -> TriggerReply:
+        self.server.require_sent_after(self.event, time.monotonic(), "send it again")
+        return TriggerReply(True)
+
+
+def ask(caller: Bus, server: Server, attempts: Attempts) -> ServiceError | None:
+    """Send a request once; why it was refused, or None."""
+
+    def replies() -> list[Sample | bytes]:
+        return list(caller.ask("release", 60.0, number=attempts.number))
+
+    (reply,) = answered_while(server, replies)
+    return None if isinstance(reply, Sample) else refusal(reply)
+
+
+def test_a_request_that_was_sent_after_an_event_is_obeyed(wire: Wire) -> None:
+    guarded, caller = Guarded(wire), wire.bus("caller")
+    for guarded.event in (-math.inf, time.monotonic() - 1.0):
+        reply = answered_while(guarded.server, lambda: caller.call("release", TriggerRequest(), TriggerReply, 60.0))
+        assert reply.success
+
+
+def test_a_request_that_was_sent_before_an_event_is_refused(wire: Wire) -> None:
+    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded.event = time.monotonic()
+    attempts, asked = Attempts(guarded.event - 1.0), 0
+    while (refused := ask(caller, guarded.server, attempts)) and attempts.were_asked(refused):
+        asked += 1
+    assert refused and (str(refused), refused.fields, asked) == ("send it again", {"outdated": True}, PROOFS)
+
+
+def test_an_event_after_the_caller_was_asked_counts_too(wire: Wire) -> None:
+    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded.event, attempts = 0.0, Attempts(time.monotonic())
+    refused = ask(caller, guarded.server, attempts)
+    assert refused and attempts.were_asked(refused)
+    guarded.event = time.monotonic()
+    assert ask(caller, guarded.server, attempts), "however short the time since"
+
+
+def test_an_answer_to_another_question_proves_nothing(wire: Wire) -> None:
+    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded.event, attempts = 0.0, Attempts(time.monotonic())
+    assert attempts.were_asked(ServiceError("", waited="0123abcd"))
+    assert not attempts.were_asked(ServiceError("", waited="0;1"))
+    assert (refused := ask(caller, guarded.server, attempts)) and attempts.were_asked(refused)
+    assert ask(caller, guarded.server, attempts) is None
+
+
+def test_a_foreign_request_which_tells_no_number_is_believed(wire: Wire) -> None:
+    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded.event = time.monotonic() + 60.0
+    assert answered_while(guarded.server, lambda: outcome(caller.ask("release", 60.0))) == "answered"
 
 
 def outcome(replies: Replies) -> str:

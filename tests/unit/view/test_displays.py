@@ -39,6 +39,13 @@ def test_a_cloud_is_read_by_its_fields() -> None:
     assert len(cloud_points(PointCloud2(fields=named[:2], point_step=16, data=array("B", data)))) == 0
 
 
+@pytest.mark.parametrize(("offset", "step"), [(100, 16), (0, 4), (0, 2**32 - 1)])
+def test_a_cloud_whose_fields_do_not_fit_into_its_points_has_none(offset: int, step: int) -> None:
+    named = [PointField(name, offset + 4 * axis, PointField.FLOAT32, 1) for axis, name in enumerate("xyz")]
+    cloud = PointCloud2(fields=named, point_step=step, width=2, height=1, data=array("B", bytes(32)))
+    assert len(cloud_points(cloud)) == 0
+
+
 @pytest.mark.parametrize(
     ("encoding", "data", "pixel"),
     [
@@ -55,11 +62,11 @@ def test_a_picture_has_the_colours_of_its_encoding(encoding: str, data: "list[in
 
 
 @pytest.mark.parametrize(("encoding", "size"), [("yuv422", 2), ("rgb8", 2), ("rgb8", 0), ("32FC1", 3)])
-def test_what_is_no_picture_is_not_shown(encoding: str, size: int) -> None:
+def test_an_invalid_picture_is_not_shown(encoding: str, size: int) -> None:
     assert picture(Image(height=1, width=1, encoding=encoding, data=[0] * size)) is None
 
 
-def test_a_compressed_picture_is_decoded_unless_it_is_none_or_too_large() -> None:
+def test_a_compressed_picture_is_decoded_unless_it_is_invalid_or_too_large() -> None:
     def compressed(size: tuple[int, int], form: str) -> CompressedImage:
         file = io.BytesIO()
         Picture.new("RGB", size, (250, 10, 20)).save(file, form)
@@ -80,7 +87,7 @@ def test_a_distance_is_shown_as_far_as_it_was_measured() -> None:
     assert fan(Range(field_of_view=0.1, max_range=4.0, range=math.inf))[:, 0].max() == pytest.approx(4.0, rel=0.01)
 
 
-def test_a_distance_that_is_too_near_is_not_shown_as_far_and_none_is_not_shown() -> None:
+def test_a_distance_that_is_too_near_is_not_shown_as_far_and_a_missing_one_is_not_shown() -> None:
     near = fan(Range(field_of_view=0.1, min_range=0.2, max_range=4.0, range=-math.inf))
     assert near[:, 0].max() == pytest.approx(0.2, rel=0.01)
     for limit, measured in ((4.0, math.nan), (math.inf, math.inf), (math.nan, 1.0)):

@@ -1,4 +1,6 @@
-"""What drives a robot: it believes no stale odometry, and goes when no page has the robot any more."""
+"""What drives a robot from the page: it ignores stale odometry, and leaves when no page has the robot selected any
+more.
+"""
 
 from typing import Any
 from unittest.mock import MagicMock
@@ -13,7 +15,7 @@ STALE_AFTER = 0.2
 
 
 def feedback(age: float) -> Any:
-    """Odometry of that age, in s."""
+    """Odometry of this age, in s."""
     made = MagicMock(is_lost=False, stale_after=STALE_AFTER)
     made.read.return_value = (Odometry(), age)
     return made

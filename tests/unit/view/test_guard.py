@@ -19,7 +19,7 @@ Run = Callable[[int, list[bytes]], Coroutine[Any, Any, None]]
 
 
 def run(guard: Guard, test: Run) -> None:
-    """Run `test(port, heard)` beside a guarded server; `heard` are the messages that got through."""
+    """Run `test(port, heard)` next to a guarded server; `heard` has the messages that got through."""
 
     async def main() -> None:
         heard: list[bytes] = []
@@ -90,7 +90,7 @@ def test_with_a_token_the_page_and_the_web_socket_need_it() -> None:
 
 @pytest.mark.parametrize("late", [False, True])
 def test_what_moves_a_robot_is_dropped_if_it_waited_on_its_way(late: bool) -> None:
-    """A relay holds back what the page sends, as a radio link does that is cut for a moment."""
+    """A relay holds back what the page sends, as a radio link does when it is cut for a moment."""
     guard = Guard("")
 
     async def test(port: int, heard: list[bytes]) -> None:

@@ -34,7 +34,7 @@ DAE = """<?xml version="1.0"?>
 
 
 def shown(folder: Path, geometry: str, material: str = "") -> list[tuple[list[float], tuple[int, int, int], float]]:
-    """The size along x, y, z, the colour and the opacity of each part that is shown."""
+    """The size along x, y and z, the colour and the opacity of each visible part."""
     file = folder / "r.urdf"
     file.write_text(URDF.format(geometry=geometry, material=material))
     _, ((*parts,),) = appearance(written(load(file)))

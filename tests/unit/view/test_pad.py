@@ -1,6 +1,6 @@
 """A pad moves a robot while a button is held, and by nothing else."""
 
-from services.view.pad import HELD, OTHER, SETTLING, Pad
+from services.view.pad import HELD, OTHER, SETTLING, SILENT, Pad
 
 STOP = (0.0, 0.0, 0.0)
 FORWARD = (1.0, 0.0, 0.0)
@@ -38,7 +38,7 @@ def test_silence_is_a_stop_and_what_is_reported_afterwards_counts_only_for_a_new
     pad.hold(1, "forward", 0.0)
     late = HELD + 0.01
     assert pad.command(late, False) == STOP
-    assert pad.worn(1, late) == ["forward"]
+    assert pad.expired(1, late) == ["forward"] and pad.why == SILENT
     pad.hold(1, "forward", late)
     assert pad.command(late, True) is None
     pad.renew(1, "forward")
@@ -70,3 +70,13 @@ def test_a_release_by_another_page_changes_nothing() -> None:
     pad.hold(1, "forward", 0.0)
     pad.release(2, "forward", 0.01)
     assert pad.command(0.02, False) == FORWARD
+
+
+def test_a_stop_needs_no_reason_when_a_person_asks_for_it() -> None:
+    pad = Pad()
+    pad.hold(1, "forward", 0.0)
+    pad.command(HELD + 0.01, False)
+    pad.renew(1, "forward")
+    pad.hold(1, "forward", 1.0)
+    pad.stop(1.1)
+    assert pad.expired(1, 1.1) == ["forward"] and not pad.why

@@ -6,12 +6,14 @@ from types import SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock
 
+import numpy as np
 import pytest
 
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, Pose, SceneEntity
 from services.view.pad import Pad
-from services.view.page import Page
+from services.view.page import PORTRAIT, Page
+from services.view.scene import FIELD
 
 FORWARD = (1.0, 0.0, 0.0)
 
@@ -60,11 +62,13 @@ class Robots:
 class Buttons:
     """A page for robots a and b, of which a is chosen."""
 
-    def __init__(self) -> None:
+    def __init__(self, aspect: float = 3.0) -> None:
         self.robots = Robots()
         self.robots.add("a", 1)
         self.robots.add("b", 2)
         self.client = MagicMock(client_id=7)
+        self.client.camera.aspect = aspect
+        self.client.gui.add_checkbox.return_value.value = False
         self.made: dict[str, list[Any]] = {}
         self.client.gui.add_button = self._add
         dropdowns = [MagicMock() for _ in range(20)]  # more than there are
@@ -85,12 +89,12 @@ class Buttons:
         self.page.update(0.0)
 
     def hold(self) -> None:
-        """The finger that first pressed the button reports that it holds it; unless its button is gone."""
+        """Report that the finger that first pressed the button still holds it, unless its button is gone."""
         first = self.made["Forward"][0]
         if not first.remove.called:
             asyncio.run(first.on_hold.call_args.args[0](None))
 
-    def press_anew(self) -> None:
+    def press_again(self) -> None:
         asyncio.run(self.made["Forward"][-1].on_hold.call_args.args[0](None))
 
 
@@ -133,8 +137,22 @@ def test_a_held_button_drives_the_robot_that_it_was_pressed_for_and_no_other(cha
     assert robots.motion("b") is None
     assert robots.motion("a") in (None, STOP), "the one that it was pressed for stands"
     if change == "deleted":
-        it.press_anew()
+        it.press_again()
         assert robots.motion("b") is None, "nobody has chosen it"
         it.choose("b")
-    it.press_anew()
+    it.press_again()
     assert robots.motion(now) == FORWARD, "pressed again, it drives the one that is chosen now"
+
+
+@pytest.mark.parametrize(("aspect", "looks"), [(390 / 844, PORTRAIT), (1280 / 800, None)])
+def test_a_phone_looks_so_that_the_start_is_above_its_panel(aspect: float, looks: object) -> None:
+    camera = Buttons(aspect).client.camera
+    if not looks:
+        assert isinstance(camera.position, MagicMock), "it was not set"
+        return
+    assert (camera.position, camera.look_at) == looks
+    eye, at = np.array(camera.position), np.array(camera.look_at)
+    forward = (at - eye) / np.linalg.norm(at - eye)
+    up = np.cross(np.cross(forward, (0.0, 0.0, 1.0)), forward)
+    above = (up @ -eye) / np.linalg.norm(up) / (forward @ -eye) / np.tan(FIELD / 2)  # 1 at the upper edge
+    assert 0.3 < above < 0.7

@@ -26,7 +26,7 @@ class Shown:
 
     @property
     def x(self) -> float:
-        """The newest."""
+        """The newest x."""
         odom = self._odom.read()[0]
         return odom.pose.pose.position.x if odom else -1.0
 

@@ -1,12 +1,13 @@
 """Who needs a token to open the page, and which ones there are."""
 
+import socket
 from types import SimpleNamespace
 
 import pytest
 
 from holozen.cli import up
 from holozen.transport.connection import Connection
-from services.view.__main__ import parser, random_token
+from services.view.__main__ import main, parser, random_token
 
 OPEN, PRIVATE, SECURE = Connection(), Connection(private="/run/user/1/holozen"), Connection(secure="/members/operator")
 
@@ -25,6 +26,15 @@ def test_a_token_needs_no_quoting(capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(SystemExit):
             parser().parse_args([f"--token={wrong}"])
         assert f"{wrong!r}: use letters, digits and any of . _ ~ -" in capsys.readouterr().err
+
+
+def test_only_a_taken_port_is_a_reason_for_another(capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert main(["--port", str(port)]) == 1
+        assert capsys.readouterr().err.endswith("Address already in use; --port 0 takes a free one\n")
+    assert main(["--host", "192.0.2.1"]) == 1
+    assert capsys.readouterr().err.endswith("port 8080: Cannot assign requested address\n")
 
 
 def test_up_starts_no_page_whose_token_the_teleop_would_hide(

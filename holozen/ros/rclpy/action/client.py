@@ -1,5 +1,6 @@
 """ActionClient: sends goals."""
 
+import math
 import time
 from collections.abc import Callable
 from functools import partial
@@ -43,7 +44,7 @@ class ClientGoalHandle(HelpfulAttributes):
         return self._client._result(self.cancel_goal_async())
 
     def cancel_goal_async(self) -> Future:
-        """Ask to cancel it; the future of the CancelGoal.Response."""
+        """Ask to cancel it. Returns the future of the CancelGoal.Response."""
         return self._client._cancel(self)
 
     def get_result(self) -> Any:
@@ -101,10 +102,10 @@ class ActionClient(HelpfulAttributes):
             _ResultClient(node._holozen, self._name, travels.GetResultService, name, group, result_service_qos_profile)
         )
         self._subscriptions = [
-            node.create_subscription(kind, f"{below}/{part}", heard, profile, callback_group=callback_group)
-            for part, kind, heard, profile in (
-                (FEEDBACK, travels.FeedbackMessage, self._hear_feedback, feedback_sub_qos_profile),
-                (STATUS, travels.GoalStatusMessage, self._hear_status, status_sub_qos_profile),
+            node.create_subscription(kind, f"{below}/{part}", callback, profile, callback_group=callback_group)
+            for part, kind, callback, profile in (
+                (FEEDBACK, travels.FeedbackMessage, self._on_feedback, feedback_sub_qos_profile),
+                (STATUS, travels.GoalStatusMessage, self._on_status, status_sub_qos_profile),
             )
         ]
         self._feedback_callbacks: dict[bytes, Callable[[Any], Any]] = {}
@@ -116,12 +117,10 @@ class ActionClient(HelpfulAttributes):
         return all(client.service_is_ready() for client in (self._sender, self._canceler, self._results))
 
     def wait_for_server(self, timeout_sec: float | None = None) -> bool:
-        """Wait until the action has a server, at most so many seconds; whether it has."""
-        deadline = None if timeout_sec is None else time.monotonic() + timeout_sec
-        for client in (self._sender, self._canceler, self._results):
-            if not client.wait_for_service(None if deadline is None else max(0.0, deadline - time.monotonic())):
-                return False
-        return True
+        """Wait until the action has a server, at most `timeout_sec` seconds. Returns whether it has."""
+        end = time.monotonic() + (math.inf if timeout_sec is None else timeout_sec)
+        clients = (self._sender, self._canceler, self._results)
+        return all(client.wait_for_service(max(0.0, end - time.monotonic())) for client in clients)
 
     def send_goal(self, goal: Any, feedback_callback: Callable[[Any], Any] | None = None, goal_uuid: Any = None) -> Any:
         """Send a goal and wait for its end: a message with `status` and `result`; None if it was rejected."""
@@ -131,7 +130,7 @@ class ActionClient(HelpfulAttributes):
     def send_goal_async(
         self, goal: Any, feedback_callback: Callable[[Any], Any] | None = None, goal_uuid: Any = None
     ) -> Future:
-        """Send a goal; the future of a ClientGoalHandle. `feedback_callback(message)` is called with each progress."""
+        """Send a goal. Returns the future of a ClientGoalHandle. Progress goes to `feedback_callback(message)`."""
         if not isinstance(goal, self._type.Goal):
             raise wrong_type(self._name, f"{self._type.__name__}.Goal", goal)
         request = self._type.Impl.SendGoalService.Request()
@@ -182,7 +181,7 @@ class ActionClient(HelpfulAttributes):
     def _result(self, future: Future) -> Any:
         return wait_for_reply(future, self._node.context, self._name)
 
-    def _hear_feedback(self, message: Any) -> None:
+    def _on_feedback(self, message: Any) -> None:
         identity = bytes(message.goal_id.uuid)
         if identity in self._early:
             self._early[identity].append(message)
@@ -194,9 +193,9 @@ class ActionClient(HelpfulAttributes):
             self._sender.tasks.create_task(self._report_early, identity, True)
             return
         for message in self._early.pop(identity, ()):
-            self._hear_feedback(message)
+            self._on_feedback(message)
 
-    def _hear_status(self, message: Any) -> None:
+    def _on_status(self, message: Any) -> None:
         for one in message.status_list:
             identity = bytes(one.goal_info.goal_id.uuid)
             if handle := self._handles.get(identity):

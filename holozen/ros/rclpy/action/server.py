@@ -53,7 +53,7 @@ class ServerGoalHandle(HelpfulAttributes):
     def __init__(self, server: "ActionServer", goal: Goal, goal_id: Any) -> None:
         self._server, self._goal = server, goal
         self.goal_id, self.request = goal_id, goal.request
-        self.outcome = Future()  # of the reply to those who ask for the result
+        self.outcome = Future()  # of the reply to requests for the result
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, ServerGoalHandle) and other._goal is self._goal
@@ -68,7 +68,7 @@ class ServerGoalHandle(HelpfulAttributes):
 
     @property
     def is_cancel_requested(self) -> bool:
-        """Whether it should be canceled: the callback that executes it looks at this."""
+        """Whether it should be canceled: the callback that executes it checks this."""
         return self._goal.state is State.CANCELING
 
     @property
@@ -134,8 +134,8 @@ def default_cancel_callback(cancel_request: Any) -> CancelResponse:
 
 
 class _GoalService(Service):
-    """Answers new goals. What is done with an accepted one begins after the answer: its client knows it before it hears
-    of its progress.
+    """Answers new goals. Work on an accepted one begins after the answer, so that its client knows the goal before its
+    progress.
     """
 
     def __init__(self, *words: Any) -> None:
@@ -149,7 +149,7 @@ class _GoalService(Service):
 
 class ActionServer(HelpfulAttributes):
     """Serves an action while its node is spun. A callback that executes a goal for long needs an executor with several
-    threads, and a reentrant callback group, for requests to cancel it to be answered meanwhile.
+    threads, and a reentrant callback group, so that requests to cancel it are answered meanwhile.
     """
 
     def __init__(

@@ -50,8 +50,8 @@ def described(*entities: str) -> str:
 
 def test_a_launch_file_with_components_or_missing_modules_gets_a_hint(launch: Launch, write: Write) -> None:
     for imported, hint in [
-        ("from launch_ros.actions import ComposableNodeContainer", "start each as a Node of its own"),
-        ("from launch_ros.descriptions import ComposableNode", "start each as a Node of its own"),
+        ("from launch_ros.actions import ComposableNodeContainer", "start a Python script as a separate Node for each"),
+        ("from launch_ros.descriptions import ComposableNode", "start a Python script as a separate Node for each"),
         ("import interactive_markers.interactive_marker_server", "there are no interactive markers here"),
     ]:
         path = write("a.launch.py", f"import os\n{imported}\n")
@@ -186,7 +186,7 @@ def test_what_cannot_be_followed_is_one_line(launch: Launch, write: Write) -> No
 
 def test_a_file_that_is_not_there_is_one_line(launch: Launch) -> None:
     for words, code, message in [
-        (["b.launch.py"], 1, "no launch file 'b.launch.py'"),
+        (["b.launch.py"], 1, "b.launch.py does not exist, and there are no launch files in that folder"),
         (["my_bot", "b.launch.py"], 1, "no launch file 'b.launch.py' in "),
         (["my_boot", "a.launch.py"], 1, "no package 'my_boot' around "),
         (["a", "b", "c"], 2, "give FILE, or PACKAGE FILE, not 'a b c'"),

@@ -83,7 +83,7 @@ def test_a_required_process_ends_all(play: Play) -> None:
             context.runner.start(self, Program("sim", ["true"], environment=dict(os.environ), required=True))
 
     good, _, err = play(sh("sleep 60"), Needed(msg=""))
-    assert (good, err) == (True, ["launch: ends: sim-2 has ended, which everything here depends on"])
+    assert (good, err) == (True, ["launch: ending: sim-2 has ended, and everything here depends on it"])
 
 
 def test_what_waits_for_a_start_or_an_end_is_done_then(play: Play) -> None:
@@ -120,7 +120,7 @@ def test_handlers_of_the_end_are_told_why(play: Play) -> None:
 
 def test_on_exit_shutdown_ends_the_others(play: Play) -> None:
     good, _, err = play(sh("sleep 60"), sh("true", on_exit=a.Shutdown(reason="the window is closed")))
-    assert (good, err) == (True, ["launch: ends: the window is closed"])
+    assert (good, err) == (True, ["launch: ending: the window is closed"])
 
 
 def test_a_process_that_is_left_out_has_begun(play: Play) -> None:
@@ -155,7 +155,7 @@ def test_respawn_starts_it_again(play: Play, tmp_path: Path) -> None:
     end = OnProcessExit(on_exit=lambda event, _context: [a.Shutdown()] if event.returncode else None)
     _, _, err = play(a.RegisterEventHandler(end), sh(script, respawn=True))
     assert count.read_text() == "x\n" * 3
-    assert err == ["launch: p-3 failed with exit code 1", "launch: ends: the launch file requested it"]
+    assert err == ["launch: p-3 failed with exit code 1", "launch: ending: the launch file requested it"]
 
 
 def test_a_program_that_is_not_there_is_reported_with_its_place(play: Play) -> None:

@@ -1,0 +1,156 @@
+"""A request that would let a robot move, and waited in a link while somebody stopped it, does not end the stop."""
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.messages import CommandStatus, TriggerReply, TriggerRequest, Twist
+from holozen.messages import simulation_interfaces as si
+from holozen.messages.simulation_interfaces import SimulationState as State
+from holozen.testing import Process, Wire, wait_for
+from holozen.transport.connection import Connection
+from holozen.transport.errors import ServiceError
+from holozen.transport.services import SIMULTANEOUS
+
+from .proxy import Proxy
+
+LONG = 60.0  # s that a caller waits
+AGAIN = "; send it again if that is still to end"
+
+
+@pytest.fixture
+def sim(wire: Wire) -> Bus:
+    """A bus beside a sim with one robot."""
+    wire.start("router").wait_for_line("listens")  # whose link to the sim is not the one that is cut
+    wire.start("sim").wait_for_line("listens on")
+    bus = wire.bus("near")
+    trigger(bus, "release")
+    return bus
+
+
+@pytest.fixture
+def far(sim: Bus, proxy: Proxy) -> Iterator[Bus]:
+    """A bus whose link to the sim the test can cut."""
+    with Bus("far", Connection("client", connect=(proxy.endpoint,))) as bus:
+        trigger(bus, "release")
+        yield bus
+
+
+def trigger(bus: Bus, key: str) -> TriggerReply:
+    return bus.call(key, TriggerRequest(), TriggerReply, LONG)
+
+
+def set_state(bus: Bus, state: int) -> si.SetSimulationStateReply:
+    request = si.SetSimulationStateRequest(State(state))
+    return bus.call("set_simulation_state", request, si.SetSimulationStateReply, LONG)
+
+
+def held_up(proxy: Proxy, ask: Callable[[], object], meanwhile: Callable[[], object]) -> str:
+    """Why a request is refused that is sent into a cut link, and delivered only after `meanwhile`."""
+    proxy.stall()
+    with ThreadPoolExecutor() as pool:
+        waited = waits(proxy)
+        asked: Future[object] = pool.submit(ask)
+        wait_for(lambda: waits(proxy) > waited, what="the request to wait in the link")
+        pass_time()
+        meanwhile()
+        proxy.resume()
+        with pytest.raises(ServiceError) as refused:
+            asked.result()
+    return str(refused.value)
+
+
+def pass_time() -> None:
+    """Let so much time pass that a request of now is older than what comes next."""
+    began = time.monotonic()
+    wait_for(lambda: time.monotonic() > began + 2 * SIMULTANEOUS)
+
+
+def waits(proxy: Proxy) -> int:
+    """How many bytes wait in the link."""
+    return sum(way.size for way in proxy.ways)
+
+
+def test_a_release_from_before_a_stop_leaves_the_robot_stopped(sim: Bus, far: Bus, proxy: Proxy) -> None:
+    trigger(sim, "stop")
+
+    def stop_again() -> None:
+        trigger(sim, "release")
+        trigger(sim, "stop")
+
+    refused = held_up(proxy, lambda: trigger(far, "release"), stop_again)
+    assert refused == f"this release may have been sent before the last stop of the robot{AGAIN}"
+    status = sim.latest("cmd_vel_status", CommandStatus)
+    now = wait_for(lambda: status.read()[0])
+    assert now and now.stopped == sim.source
+    assert trigger(far, "release").message.startswith("sources that commanded")
+
+
+def test_so_does_one_while_the_stop_holds_that_somebody_else_has_confirmed(sim: Bus, far: Bus, proxy: Proxy) -> None:
+    trigger(sim, "stop")
+    refused = held_up(proxy, lambda: trigger(far, "release"), lambda: trigger(sim, "stop"))
+    assert refused.startswith("this release may have been sent before the last stop")
+
+
+def test_a_resume_from_before_a_person_drove_leaves_the_autopilot_held(sim: Bus, far: Bus, proxy: Proxy) -> None:
+    status = sim.latest("cmd_vel_status", CommandStatus)
+    person = sim.publisher("cmd_vel", Twist, "INTERACTIVE_HIGH")
+
+    def obeys(source: str, twist: Twist) -> bool:
+        person.put(twist)
+        return (now := status.read()[0]) is not None and now.obeyed == source
+
+    def drive() -> None:
+        wait_for(lambda: obeys(sim.source, Twist.planar(0.1)))
+        person.put(Twist())
+
+    trigger(far, "resume")
+    refused = held_up(proxy, lambda: trigger(far, "resume"), drive)
+    assert refused == f"this resume may have been sent before a source took over or stopped the robot{AGAIN}"
+    now = status.read()[0]
+    assert now and now.held
+    assert trigger(far, "resume").success
+
+
+def test_a_play_from_before_a_pause_leaves_the_sim_paused(sim: Bus, far: Bus, proxy: Proxy) -> None:
+    set_state(sim, State.STATE_PAUSED)
+    refused = held_up(proxy, lambda: set_state(far, State.STATE_PLAYING), lambda: set_state(sim, State.STATE_PAUSED))
+    assert refused.startswith("this may have been sent before the sim was last paused")
+    reply = sim.call("get_simulation_state", si.GetSimulationStateRequest(), si.GetSimulationStateReply)
+    assert reply.state.state == State.STATE_PAUSED
+    assert set_state(far, State.STATE_PLAYING).result.result == si.Result.OK
+
+
+def test_a_stop_that_waited_in_a_link_stops_the_robot(sim: Bus, far: Bus, proxy: Proxy) -> None:
+    status = sim.latest("cmd_vel_status", CommandStatus)
+    proxy.stall()
+    with ThreadPoolExecutor() as pool:
+        asked = pool.submit(trigger, far, "stop")
+        trigger(sim, "release")
+        proxy.resume()
+        assert asked.result().success
+    wait_for(lambda: (now := status.read()[0]) and now.stopped == far.source)
+
+
+def test_holozen_release_that_was_begun_before_a_stop_leaves_the_robot_stopped(
+    wire: Wire, sim: Bus, proxy: Proxy
+) -> None:
+    trigger(sim, "stop")
+    proxy.stall()
+    flags = ("--mode", "client", "--connect", proxy.endpoint, "--timeout", str(LONG))
+    with Process([sys.executable, "-m", "holozen", "release", *flags]) as release:
+        wait_for(lambda: waits(proxy), 30, "it to connect")
+        pass_time()
+        trigger(sim, "release")
+        trigger(sim, "stop")
+        proxy.resume()
+        assert release.wait() == 1
+    assert release.out == ""
+    assert f"hb_bot is not released: this release may have been sent before the last stop of the robot{AGAIN}" in (
+        release.err
+    )
+    assert wire.run("release").returncode == 0
