@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from holozen.messages import rcl_interfaces as r
 
 LIST = "/list_parameters"
-TOKENS = "@holozen/*/*/srv/rcl_interfaces/srv/ListParameters/**"
 
 _PLAIN = re.compile(r"/?[A-Za-z][A-Za-z0-9_./]*")
 _NO_NAMES = ("y", "n", "yes", "no", "on", "off", "true", "false", "null")  # not strings in YAML 1.1
@@ -44,7 +43,7 @@ class Nodes:
     def __init__(self, bus: Bus, timeout: float) -> None:
         self._bus, self._timeout = bus, timeout
         self.sessions: dict[str, list[str]] = {}
-        looking = background(lambda: bus.endpoints(TOKENS))
+        looking = background(bus.endpoints)
         with deferred_interrupt():  # while nodes are discovered
             from holozen.messages import codec, rcl_interfaces  # noqa: F401
 

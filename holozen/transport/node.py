@@ -286,7 +286,8 @@ class Node:
     def endpoints(self, keys: str = graphs.ALL, patience: float = 0.5) -> list[graphs.Endpoint]:
         """A snapshot of the graph, as `Graph.settled` returns it, without a lasting subscription.
 
-        It waits as long as the session took to connect, if that is more than `patience`: the network is slow.
+        It waits as long as the session took to connect, if that is more than `patience`: the network is slow. One of
+        `keys` alone is complete only after a whole one, since it does not wait for links that are still being made.
         """
         with self.graph(keys) as graph:
             return graph.settled(self.connected, max(patience, self.took))

@@ -150,7 +150,7 @@ class Displays:
         self._name = ""  # of the robot whose displays are switched on
         self._prefix = ""  # of its keys and frames, which labels leave out
         self._topics: Mapping[str, str] = {}
-        self._boxes: list[Any] = []
+        self._boxes: dict[str, Any] = {}  # the checkboxes, by label
         self._on: dict[str, str] = {}  # the type of each topic that is switched on
         self._has_axes = False
         self._drawn: dict[str, Display] = {}
@@ -226,14 +226,15 @@ class Displays:
         self._drawn, self._axes = {}, {}
 
     def _offer(self) -> None:
-        """Make a checkbox for each topic of the robot, and for those that are gone but switched on."""
+        """Make a checkbox for each topic of the robot, and for those that are gone but switched on.
+
+        Those that are there already stay: a click on one that is replaced just then would be lost.
+        """
         robot, self._topics = self._chosen(), self._scene.topics
         is_new, self._robot = robot is not self._robot, robot
         if is_new:
             self.close()
-        for box in self._boxes:
-            box.remove()
-        self._boxes = []
+            self._keep_boxes(())
         if robot is None:
             return
         entity = robot.entity
@@ -246,23 +247,30 @@ class Displays:
             self._frames = RobotFrames(self._bus, place, odometry)
             self._redraw()
         others = {shown.entity.command.rpartition("/")[0] for shown in self._scene.shown.values()} - {place, ""}
+        boxes: dict[str, tuple[bool, Callable[[bool], None]]] = {"TF": (self._has_axes, self._switch_axes)}
+        for key, kind in {**self._topics, **self._on}.items():
+            is_own = key.startswith(f"{place}/") if place else key.partition("/")[0] not in others
+            if key in self._on or (kind in KINDS and is_own):
+                label = f"{KINDS[kind].__name__}: {key.removeprefix(self._prefix)}"
+                boxes[label] = key in self._on, partial(self._switch, key, kind)
+        self._keep_boxes(boxes)
         with self._place:
-            self._box("TF", self._has_axes, self._switch_axes)
-            for key, kind in {**self._topics, **self._on}.items():
-                is_own = key.startswith(f"{place}/") if place else key.partition("/")[0] not in others
-                if key in self._on or (kind in KINDS and is_own):
-                    switch = partial(self._switch, key, kind)
-                    shown = key.removeprefix(self._prefix)
-                    self._box(f"{KINDS[kind].__name__}: {shown}", key in self._on, switch)
+            for label, (is_on, switch) in boxes.items():
+                if label not in self._boxes:
+                    self._box(label, is_on, switch)
+
+    def _keep_boxes(self, labels: Container[str]) -> None:
+        """Remove all other checkboxes from the page."""
+        for label in [label for label in self._boxes if label not in labels]:
+            self._boxes.pop(label).remove()
 
     def _box(self, label: str, is_on: bool, switch: Callable[[bool], None]) -> None:
-        box = self._client.gui.add_checkbox(label, is_on)
+        self._boxes[label] = box = self._client.gui.add_checkbox(label, is_on)
 
         async def changed(_event: Any) -> None:
             switch(box.value)
 
         box.on_update(changed)
-        self._boxes.append(box)
 
     def _switch(self, key: str, kind: str, is_on: bool) -> None:
         self._on.pop(key, None)

@@ -336,7 +336,7 @@ def test_displays_show_what_topics_hold_in_the_frames_of_tf(page: Page, bus: Bus
         return bool(found) and math.dist(np.mean(found, axis=0), pixel(x + drift, y - 0.8, 0.1)) < NEAR
 
     wait_for(shown, 20, "the wall that the scan hit")
-    page.locator("img[src^=blob]").wait_for()
+    wait_for(lambda: shown() and page.locator("img[src^=blob]").is_visible(), what="the image beside it")
     choose(page, "Fixed frame", "map")
     wait_for(lambda: shown(0.3), 20, "the wall where it is in that frame")
     choose(page, "Fixed frame", "world")

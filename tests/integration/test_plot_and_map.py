@@ -1,6 +1,7 @@
 """`holozen plot` and `holozen map` beside a live robot, in a terminal and in a pipe."""
 
 import json
+import re
 import subprocess
 
 import pytest
@@ -67,9 +68,9 @@ def test_every_wire_is_drawn(wire: Wire) -> None:
 
 
 def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
-    for verb, words, text in (("plot", (FIELD,), f"{FIELD}: "), ("map", (), "hb_bot x")):
+    for verb, words, shown in (("plot", (FIELD,), f"{FIELD}: [-0-9]"), ("map", (), "hb_bot x")):
         terminal = town.terminal(verb, *words)
-        terminal.wait_for_text(text)
+        wait_for(lambda terminal=terminal, shown=shown: re.search(shown, terminal.screen()), what=shown)
         terminal.type("\x03")
         assert terminal.process.wait() == 0
         assert terminal.modes() == terminal.modes_before
