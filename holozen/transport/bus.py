@@ -17,7 +17,7 @@ from holozen.transport.graph import Definition
 from holozen.transport.node import Node
 from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
-from holozen.transport.samples import Dealer, Declared, RawSubscriber, Replies, Ring, Sample, stamps
+from holozen.transport.samples import Dealer, Declared, RawSubscriber, Replies, Ring, stamps
 from holozen.transport.services import RING, ROOM, Server
 from holozen.transport.session import one_line
 
@@ -30,10 +30,6 @@ P = TypeVar("P", bound=RawPublisher)
 R = TypeVar("R", bound="Message")
 
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
-NO_ENCODING = "zenoh/bytes"  # Zenoh's default
-UNTYPED = (
-    "CDR without an Encoding, so of no certain type; what a bridge to ROS 2 sends comes in by `holozen ros2 --bridge`"
-)
 DEALT = 1 << 14  # samples, or requests, of all keys of a Dealer that wait for it
 GETS = 256  # waiting queries for a publisher's last value; beyond, the oldest get no reply
 
@@ -202,18 +198,7 @@ class Bus(Node):
         raw.ends.append(self.announce("sub", kinds[0].ROS, key))
         is_command = wire.is_command(key, (kind.ROS for kind in kinds))
         decode = codec.decoder(kinds, tolerant=not is_command)
-        return Subscription(raw, decode, self._refusal if is_command else None)
-
-    def _refusal(self, sample: Sample) -> str:
-        """Why a command is not read, before its payload is."""
-        if sample.payload[:1] == b"\0" and sample.encoding == NO_ENCODING:
-            return UNTYPED
-        return self._unproven(sample) if self._unproven else ""
-
-    @cached_property
-    def _unproven(self) -> Callable[[Sample], str] | None:
-        """Why a command is refused for want of proof; None outside the secure set-up."""
-        return self._verifier.refusal if self._verifier else None
+        return Subscription(raw, decode, self._verifier.refusal if is_command and self._verifier else None)
 
     @cached_property
     def _verifier(self) -> Verifier | None:
