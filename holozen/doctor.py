@@ -33,7 +33,7 @@ ANSWER = 0.4  # s for nodes to answer
 ROUNDS = 3  # queries to each node; the fastest answer measures its clock best
 CLOCK_WARNING, CLOCK_ERROR = 0.05, 0.5  # s of offset; from 0.5 s on, stamps are refused (wire.MAX_STAMP_AGE)
 EXCLUSIVE = ("nav_msgs/msg/Odometry", "rosgraph_msgs/msg/Clock", "holozen/msg/CommandStatus")  # one publisher per key
-MOST_KEYS, MOST_ROBOTS = 3, 50  # keys named in a finding; robots listened to
+MAX_KEYS, MAX_ROBOTS = 3, 50  # keys named in a finding; robots listened to
 OPTIONAL = ("foxglove-sdk", "matplotlib", "mujoco-core")  # not in requirements.lock
 USERS = {"foxglove": "view --foxglove", "mujoco": "sim --engine mujoco", "bag": "bag plot"}
 """The commands that need an extra, where its name is not a verb."""
@@ -259,7 +259,7 @@ def read_peer(key: str, payload: bytes, before: float, now: float) -> Peer | Non
         offset = float(row["time"]) - before - error
         if not math.isfinite(offset):
             return None
-        exposed = tuple(str(endpoint)[:80] for endpoint in row.get("exposed", ())[:MOST_KEYS])
+        exposed = tuple(str(endpoint)[:80] for endpoint in row.get("exposed", ())[:MAX_KEYS])
         return Peer(session, node, number, host, int(row["pid"]), offset, error, exposed)
     return None
 
@@ -328,8 +328,8 @@ def duplicates(endpoints: Iterable[Endpoint], peers: Mapping[str, Peer]) -> Iter
             groups.setdefault(tuple(sorted(sessions.items())), []).append(key)
     for group, keys in groups.items():
         names = [str(peers[s]) if s in peers else f"{node} ({s[:6]})" for s, node in group]
-        more = f" and {len(keys) - MOST_KEYS} more keys" if len(keys) > MOST_KEYS else ""
-        text = f"{' and '.join(names)} share {', '.join(keys[:MOST_KEYS])}{more}; only one node should have each"
+        more = f" and {len(keys) - MAX_KEYS} more keys" if len(keys) > MAX_KEYS else ""
+        text = f"{' and '.join(names)} share {', '.join(keys[:MAX_KEYS])}{more}; only one node should have each"
         yield Finding("duplicates", ERROR, text, "end one, or give its robot another name: --robot FILE=NAME")
 
 
@@ -347,9 +347,9 @@ class Robots:
         for end in published:
             self._writers.setdefault(end.key, []).append(end.node)
         # Samples are not decoded: it is enough that they arrive.
-        self._odoms = {key: bus.subscribe_raw(key, depth=1) for key in sorted(self._nodes)[:MOST_ROBOTS]}
+        self._odoms = {key: bus.subscribe_raw(key, depth=1) for key in sorted(self._nodes)[:MAX_ROBOTS]}
         self._statuses: dict[str, Latest[CommandStatus]] = {}
-        if statuses := sorted({end.key for end in published if end.type == EXCLUSIVE[2]})[:MOST_ROBOTS]:
+        if statuses := sorted({end.key for end in published if end.type == EXCLUSIVE[2]})[:MAX_ROBOTS]:
             from holozen import messages
 
             self._statuses = {key: bus.latest(key, messages.CommandStatus) for key in statuses}
@@ -364,7 +364,7 @@ class Robots:
             text = f"{key} is stale: nothing from {self._nodes[key]} for {seconds:.1f} s"
             yield Finding("odom", ERROR, text, "continue or restart that node (fg, kill -CONT), or raise its --rtf")
         if not stale:
-            yield Finding("odom", OK, f"fresh on {', '.join(list(self._odoms)[:MOST_KEYS])} ({self.count} robots)")
+            yield Finding("odom", OK, f"fresh on {', '.join(list(self._odoms)[:MAX_KEYS])} ({self.count} robots)")
         alike: dict[tuple[str, str], list[Finding]] = {}  # the robots of a fleet have much the same findings
         for key, latest in self._statuses.items():
             if status := latest.read()[0]:
@@ -373,10 +373,10 @@ class Robots:
                     alike.setdefault((found.level, found.text.replace(status.name, "", 1)), []).append(found)
         for group in alike.values():
             first = group[0]
-            if len(group) <= MOST_KEYS:
+            if len(group) <= MAX_KEYS:
                 yield from group
             else:
-                others = listed([one.check for one in group[1:]], MOST_KEYS)
+                others = listed([one.check for one in group[1:]], MAX_KEYS)
                 yield first._replace(text=f"{first.text}; the same holds for {others}")
 
 

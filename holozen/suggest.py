@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 LONGEST = 80  # characters of a name or a value in a message
-MOST = 1000  # names that are compared with one
+MAX_NAMES = 1000  # names that are compared with one
 ROBOT_FILES = {".xacro", ".urdf", ".sdf", ".world"}
 
 
@@ -47,7 +47,7 @@ def closest(word: str, known: Iterable[str], part: Callable[[str], str] = str, a
         """Among equals, the one with the same letters wins: two were swapped."""
         return likeness(name), sorted(part(name).casefold()) == sorted(plain)
 
-    best = max(islice(known, MOST), key=rank, default="")
+    best = max(islice(known, MAX_NAMES), key=rank, default="")
     return best if best and likeness(best) > alike else ""
 
 

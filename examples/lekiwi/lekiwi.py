@@ -32,7 +32,7 @@ ROLLS = {7: 150, 8: -90, 9: 30}  # servo -> its wheel's rolling direction, in de
 MAX_LINEAR, MAX_ANGULAR = 0.2, 1.0  # m/s, rad/s
 MAX_RATE = 4.6  # rad/s of a wheel, 3000 steps/s; beyond, all turn slower, so that the robot keeps its direction
 SILENCE = 0.3  # s without a pass of the loop after which the guard stops the wheels
-MOST_LOST = 5  # missing answers in a row; beyond, the process ends
+MAX_LOST = 5  # missing answers in a row; beyond, the process ends
 
 
 def wheel(degrees: float) -> Wheel:
@@ -123,7 +123,7 @@ def run(base: Base, servos: Servos, guard: Guard, stop: threading.Event) -> None
             lost = 0
         except ServoError:
             lost += 1  # without odom a controller stops
-            if lost > MOST_LOST:
+            if lost > MAX_LOST:
                 raise
 
 

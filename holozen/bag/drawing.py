@@ -14,7 +14,7 @@ FORMATS = (".png", ".svg")
 SIZE = (12.0, 6.0)  # inches
 PANELS = ((3, "forward in m/s"), (4, "left in m/s"), (5, "turn in rad/s"))  # column of a track, title
 FARTHEST = 1e9  # m, m/s; larger values are not drawn
-MOST = 20_000  # rows of a track; when it has more, every other row is dropped
+MAX_ROWS = 20_000  # rows of a track; when it has more, every other row is dropped
 TWISTS = (Twist, TwistStamped)
 
 
@@ -36,7 +36,7 @@ class Track:
         if self.count % self._stride == 0:
             self.rows.append(row)
         self.count += 1
-        if len(self.rows) >= MOST:
+        if len(self.rows) >= MAX_ROWS:
             self.rows, self._stride = self.rows[::2], 2 * self._stride
 
     def column(self, number: int) -> list[float]:

@@ -132,7 +132,7 @@ SARIF = "https://json.schemastore.org/sarif-2.1.0.json"
 # The findings.
 
 
-MOST = 100  # findings of one rule
+MAX_FINDINGS = 100  # findings of one rule
 LONGEST = 2000  # characters of a problem, and of its fix
 WHOLE = ("tree", "no-inertia", "place", "tag")  # rules that name a link where the loader reports on the whole robot
 
@@ -213,10 +213,10 @@ def _order(place: Place, file: str) -> tuple[bool, str, bool, int]:
 
 
 def _first(rule: Rule, subject: Subject) -> list[Mistake]:
-    """The first findings of a rule, at most MOST: a file full of mistakes has to finish soon too."""
-    found = list(islice(rule.find(subject), MOST + 1))
-    more = [Mistake(None, f"there are more than {MOST} findings of this kind", "fix these first")]
-    return found if len(found) <= MOST else found[:MOST] + more
+    """The first findings of a rule, at most MAX_FINDINGS: a file full of mistakes has to finish soon too."""
+    found = list(islice(rule.find(subject), MAX_FINDINGS + 1))
+    more = [Mistake(None, f"there are more than {MAX_FINDINGS} findings of this kind", "fix these first")]
+    return found if len(found) <= MAX_FINDINGS else found[:MAX_FINDINGS] + more
 
 
 def _fatal(path: Path, message: str) -> Finding:

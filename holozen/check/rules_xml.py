@@ -126,7 +126,7 @@ SDF = frozenset(KNOWN_IN_SDF).union(IN_WORLD, NOT_SIMULATED, *(map(_set, KNOWN_I
 # Spelling.
 
 
-MOST_GUESSES = 500  # of different words
+MAX_GUESSES = 500  # of different words
 FREE = ("gazebo", "transmission")  # may contain non-URDF elements
 SDF_JOINT_KINDS = (*JOINT_KINDS, "revolute2", "universal", "ball", "screw", "gearbox")
 
@@ -141,7 +141,7 @@ def _misspelt_tags(subject: Subject) -> Iterator[Mistake]:
     """Unknown elements similar to one allowed in their place."""
     guessed: dict[tuple[str, frozenset[str]], str | None] = {}
     for tag, known, shortest in _read_elements(subject):
-        if tag.name in known or ":" in tag.name or len(guessed) > MOST_GUESSES:
+        if tag.name in known or ":" in tag.name or len(guessed) > MAX_GUESSES:
             continue
         if (tag.name, known) not in guessed:
             guessed[tag.name, known] = nearest(tag.name, known, shortest)

@@ -54,7 +54,7 @@ def _missing(value: Any, part: str | int) -> str:
 
 
 LONGEST = 1000  # characters of an expression
-MOST_NODES = 200  # parts of an expression
+MAX_NODES = 200  # parts of an expression
 
 ALLOWED = (
     ast.Compare, ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq, ast.In, ast.NotIn, ast.BoolOp, ast.And, ast.Or,
@@ -79,8 +79,8 @@ def compiled(text: str) -> Callable[[Any], bool]:
         except (SyntaxError, ValueError, MemoryError, RecursionError) as error:
             why = error.msg if isinstance(error, SyntaxError) else "nested too deeply"
             raise ValueError(f"filter {text!r}: {why}; write one such as m.linear.x > 0.2") from None
-        if sum(1 for _ in ast.walk(tree.body)) > MOST_NODES:
-            raise ValueError(f"the filter has more than {MOST_NODES} parts")
+        if sum(1 for _ in ast.walk(tree.body)) > MAX_NODES:
+            raise ValueError(f"the filter has more than {MAX_NODES} parts")
         tree.body = _Lookups(text.strip()).visit(tree.body)
         code = compile(ast.fix_missing_locations(tree), "<filter>", "eval")
     names = {"__builtins__": {}, "number": _number, **CALLS}

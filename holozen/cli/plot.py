@@ -27,13 +27,13 @@ from holozen.transport.samples import RawSubscriber
 Field = tuple[str, str, tuple[str | int, ...]]
 """A field: as written on the command line, its key, and its path in the messages."""
 
-MOST = 5000  # points of a line in the plot
+MAX_POINTS = 5000  # points of a line in the plot
 TICK = 0.02  # s between two polls
 TRAIL = 2000  # points
 STEP = 0.02  # m between two points of a trail
 ASK_EVERY = 2.0  # s between two requests to the sim and the pose service
-MOST_GOALS = 100
-MOST_PLACES = 12  # robots whose places are written out
+MAX_GOALS = 100
+MAX_PLACES = 12  # robots whose places are written out
 PATIENCE = 1.0  # s for a service to answer
 
 
@@ -65,7 +65,7 @@ class Lines:
     def __init__(
         self, bus: Bus, fields: list[Field], reader: Reader, clock: Callable[[], float] = time.monotonic
     ) -> None:
-        self.points: dict[str, deque[tuple[float, float]]] = {name: deque(maxlen=MOST) for name, _, _ in fields}
+        self.points: dict[str, deque[tuple[float, float]]] = {name: deque(maxlen=MAX_POINTS) for name, _, _ in fields}
         self.bad = 0  # messages that could not be decoded
         self._fields, self._bus, self._reader, self._clock = fields, bus, reader, clock
         self._subscribers: dict[str, RawSubscriber] = {}
@@ -247,8 +247,8 @@ class Watcher:
             for name, (x, y, yaw) in sorted(self.poses.items())
         ]
         others = {name: at for name, at in self.objects.items() if name not in self.poses and name != root}
-        first = ", ".join(map(_place, robots[:MOST_PLACES]))
-        more = f" and {len(robots) - MOST_PLACES} more" if len(robots) > MOST_PLACES else ""
+        first = ", ".join(map(_place, robots[:MAX_PLACES]))
+        more = f" and {len(robots) - MAX_PLACES} more" if len(robots) > MAX_PLACES else ""
         seen = [point for scanner in self._scanners.values() for point in scanner.points]
         return Plane(robots, self.goals, others, first + more, seen)
 
@@ -296,7 +296,7 @@ class Watcher:
     def _goals_of(self, key: str) -> Iterator[Point]:
         from holozen.messages import NextGoalReply, NextGoalRequest
 
-        for index in range(MOST_GOALS):
+        for index in range(MAX_GOALS):
             reply = self._bus.call(key, NextGoalRequest(index), NextGoalReply, PATIENCE)
             yield reply.x_goal, reply.y_goal
             if reply.end_of_list:

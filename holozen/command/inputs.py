@@ -29,7 +29,7 @@ RECENT = 3.0  # s for which a source is listed
 SPAN = 1.0  # s over which the rate is measured
 MARK = 0.1  # s between two samples of a count
 REPORT_EVERY = 1.0  # s
-MOST_LINES = 10  # a second by all robots: if a fleet's driver fails, each of them has something to report
+MAX_LINES = 10  # a second by all robots: if a fleet's driver fails, each of them has something to report
 M = TypeVar("M", bound=Message)
 
 UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its sender's name
@@ -323,7 +323,7 @@ class SourceRates:
 
 
 class Lines:
-    """Limits the lines about refused commands: MOST_LINES a second, by all robots that share this."""
+    """Limits the lines about refused commands: MAX_LINES a second, by all robots that share this."""
 
     def __init__(self) -> None:
         self._since, self._written = -math.inf, 0
@@ -333,7 +333,7 @@ class Lines:
         if not 0 <= now - self._since < REPORT_EVERY:
             self._since, self._written = now, 0
         self._written += 1
-        return self._written <= MOST_LINES
+        return self._written <= MAX_LINES
 
 
 class CommandStats:

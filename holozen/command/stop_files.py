@@ -14,7 +14,7 @@ from holozen.console import report
 from holozen.suggest import cut
 
 UNREADABLE = "the robot's own process, which could not read who did"
-MOST_BYTES = 1000
+MAX_BYTES = 1000
 
 
 def default_folder() -> Path | None:
@@ -123,7 +123,7 @@ def _setter_in(path: Path) -> str:
     with open(path, "rb", opener=lambda path, flags: os.open(path, flags | os.O_NOFOLLOW | os.O_NONBLOCK)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise ValueError
-        text = file.read(MOST_BYTES).decode()
+        text = file.read(MAX_BYTES).decode()
     if not text:
         raise ValueError
     return text

@@ -15,7 +15,7 @@ from holozen.console import Failure
 from holozen.suggest import shorten, suggest
 
 LARGEST = 16_000_000  # bytes of the smallest message of a type; nested fixed arrays multiply
-MOST_FIELDS = 10_000  # of a type, nested ones included; each level can double them
+MAX_FIELDS = 10_000  # of a type, nested ones included; each level can double them
 
 INTEGERS = {
     "byte": (0, 2**8 - 1),
@@ -117,7 +117,7 @@ class Interface:
         self.response = parts[1] if kind == "srv" else None
         self.least: int = max(1, sum(map(_field_size, fields)))  # bytes; an empty message has one
         self.width: int = 1 + sum(field.nested.width if field.nested else 1 for field in fields)
-        if self.least > LARGEST or self.width > MOST_FIELDS:
+        if self.least > LARGEST or self.width > MAX_FIELDS:
             raise InterfaceError(f"{name} is too large: at least {self.least} bytes and {self.width} fields")
 
     @property

@@ -23,8 +23,8 @@ KINDS = ("msg", "srv", "action")
 _SECTIONS = {"msg": 1, "srv": 2, "action": 3}  # of a file
 _NAME = re.compile(r"([A-Za-z][A-Za-z0-9_]*)/(?:(msg|srv|action)/)?([A-Za-z][A-Za-z0-9_]*)")
 DEEPEST = 50  # levels of nesting
-MOST_LOST = 100  # unknown names that are remembered, so that they are not looked up again
-MOST = 20  # names in an error
+MAX_LOST = 100  # unknown names that are remembered, so that they are not looked up again
+MAX_SHOWN = 20  # names in an error
 _HALVES = ("_Request", "_Response")
 _PARTS = tuple(f"_{part}{half}" for part in ACTION_PARTS for half in ("", *_HALVES))  # ends of names within an action
 
@@ -198,7 +198,7 @@ class Registry:
         try:
             found = self._found[name] = self._find(name)
         except InterfaceError as error:
-            if not self._open and len(self._lost) < MOST_LOST:
+            if not self._open and len(self._lost) < MAX_LOST:
                 self._lost[name] = error
             raise
         return found
@@ -210,7 +210,7 @@ class Registry:
         try:
             return self.find(name)
         except InterfaceError:
-            if name in self._asked or len(self._asked) == MOST_LOST or not (text := define(name)):
+            if name in self._asked or len(self._asked) == MAX_LOST or not (text := define(name)):
                 raise
         self._asked.add(name)
         learned = split_text(name, text)
@@ -293,9 +293,9 @@ class Registry:
         known = [f"{package}/{each}" for each in self.places.names(package)]
         if not known:
             there = self.places.packages()
-            hint = suggest(package, there) or f"; known: {listed(there, MOST)}"
+            hint = suggest(package, there) or f"; known: {listed(there, MAX_SHOWN)}"
             return f"no package {package!r} with interfaces{hint}; give its folder: --package {package}=DIR"
-        return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MOST)}"
+        return f"no type {name!r}{suggest(name, known, last_part) or '; known: ' + listed(known, MAX_SHOWN)}"
 
 
 def _file(name: str) -> str:

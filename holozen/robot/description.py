@@ -16,7 +16,7 @@ from holozen.robot.packages import NOWHERE
 from holozen.robot.rigid import compose
 from holozen.robot.urdf import read_joint, read_link
 
-MOST_SHOWN = 3_000_000  # characters of embedded meshes in a text; a reader accepts MOST_TEXT characters in all
+MAX_SHOWN = 3_000_000  # characters of embedded meshes in a text; a reader accepts MAX_TEXT characters in all
 THIN = 0.002  # m; the thickness at which a plane is drawn
 
 
@@ -59,14 +59,14 @@ class Appearance:
 
 
 def written(model: RobotModel) -> str:
-    """The URDF of a model's links, visual shapes and joints, with up to MOST_SHOWN characters of embedded meshes.
+    """The URDF of a model's links, visual shapes and joints, with up to MAX_SHOWN characters of embedded meshes.
 
     A model without any visual shape is written with its collision shapes, and so is a link whose meshes cannot be
     embedded. A plane becomes a thin box, a hull its bounding box.
     """
     robot = ElementTree.Element("robot", name=model.name)
     has_visuals = any(link.visuals for link in model.links.values())
-    room = MOST_SHOWN
+    room = MAX_SHOWN
     for link in model.links.values():
         shapes = list(map(_portable, link.visuals if has_visuals else link.collisions))
         room -= sum(len(shape.data) for shape in shapes)

@@ -15,8 +15,8 @@ Vector = tuple[float, float, float]
 SHORTEST = 1e-6  # length of a vector that gives a direction
 LARGEST = 1e6  # m, kg, kg m^2; larger numbers are mistakes, and 1e308 makes the engine compute NaN
 
-MOST_TEXT = 4_000_000  # characters, or bytes of a file; these three keep malicious files from stalling the reader
-MOST_ELEMENTS = 50_000
+MAX_TEXT = 4_000_000  # characters, or bytes of a file; these three keep malicious files from stalling the reader
+MAX_ELEMENTS = 50_000
 DEEPEST = 200
 
 
@@ -180,7 +180,7 @@ def number(word: str) -> float | None:
     return value if math.isfinite(value) and "_" not in word else None
 
 
-def read_xml(text: str, place: str, most: int = MOST_TEXT) -> Tag:
+def read_xml(text: str, place: str, most: int = MAX_TEXT) -> Tag:
     """The root element of an XML text of at most `most` characters; `place` names the text in messages.
 
     Raises RobotError with the line for broken XML and for entity declarations: robots need none, and they
@@ -272,7 +272,7 @@ def _is_well_formed(text: str) -> bool:
     return True
 
 
-def check_size(size: int, place: str, most: int = MOST_TEXT) -> None:
+def check_size(size: int, place: str, most: int = MAX_TEXT) -> None:
     """Raise RobotError for an XML text of more than `most` characters, or a file of more bytes."""
     if size > most:
         content = f"{size / 1e6:.1f} MB of XML; a robot or world has at most {most / 1e6:g} MB"
@@ -280,7 +280,7 @@ def check_size(size: int, place: str, most: int = MOST_TEXT) -> None:
 
 
 def check_file(path: Path) -> None:
-    """Raise RobotError for a special file, such as a pipe, and for a file of more than MOST_TEXT bytes."""
+    """Raise RobotError for a special file, such as a pipe, and for a file of more than MAX_TEXT bytes."""
     if path.is_file():
         check_size(path.stat().st_size, str(path))
     elif path.exists() and not path.is_dir():
@@ -319,8 +319,8 @@ class _Reader:
         tag = Tag(name, attributes, f"{self.place}, line {self.parser.CurrentLineNumber}", self.open)
         tag.sdf, tag.at = self.open.sdf or name == "sdf", self.parser.CurrentByteIndex
         self.count += 1
-        if self.count > MOST_ELEMENTS:
-            raise tag.wrong(f"is element number {self.count}; a file may have at most {MOST_ELEMENTS}")
+        if self.count > MAX_ELEMENTS:
+            raise tag.wrong(f"is element number {self.count}; a file may have at most {MAX_ELEMENTS}")
         if len(self.texts) > DEEPEST:
             raise tag.wrong(f"lies inside {DEEPEST} others; elements may be nested at most {DEEPEST} deep")
         self.open.children.append(tag)
@@ -383,8 +383,8 @@ def _advice(reason: str, lines: list[str]) -> str:
     return 'write each element as <name attribute="value"> and close it'
 
 
-MOST_WARNINGS = 200
-MOST_GUESSES = 20  # each compares every name; a file full of mistakes has to finish soon too
+MAX_WARNINGS = 200
+MAX_GUESSES = 20  # each compares every name; a file full of mistakes has to finish soon too
 
 
 @dataclass(slots=True)
@@ -405,10 +405,10 @@ class Source:
 
     def warn(self, tag: Tag, problem: str) -> None:
         """Record a mistake that does not make the robot unusable."""
-        if len(self.warnings) < MOST_WARNINGS:
+        if len(self.warnings) < MAX_WARNINGS:
             self.warnings.append(str(tag.wrong(problem)))
-        elif len(self.warnings) == MOST_WARNINGS:
-            self.warnings.append(f"{tag.place}: there are more than {MOST_WARNINGS} warnings; the rest are not listed")
+        elif len(self.warnings) == MAX_WARNINGS:
+            self.warnings.append(f"{tag.place}: there are more than {MAX_WARNINGS} warnings; the rest are not listed")
 
     def read(self, text: str, place: str = "") -> Tag:
         """The root element of a text. What only Gazebo's parser accepts is tolerated, with a warning.
@@ -418,10 +418,10 @@ class Source:
         place = place or str(self.origin)
         check_size(len(text), place)
         text, mistakes = repair_xml(text)
-        self.warnings += [f"{place}, line {line}: {problem}" for line, problem in mistakes[:MOST_WARNINGS]]
+        self.warnings += [f"{place}, line {line}: {problem}" for line, problem in mistakes[:MAX_WARNINGS]]
         return read_xml(text, place)
 
     def suggest(self, name: str, known: Iterable[str], part: Callable[[str], str] = str, alike: float = 0.65) -> str:
-        """As `holozen.suggest.suggest`; empty after MOST_GUESSES calls."""
+        """As `holozen.suggest.suggest`; empty after MAX_GUESSES calls."""
         self.guesses += 1
-        return "" if self.guesses > MOST_GUESSES else suggest(name, known, part, alike)
+        return "" if self.guesses > MAX_GUESSES else suggest(name, known, part, alike)

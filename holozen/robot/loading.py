@@ -64,7 +64,7 @@ def received(text: str, packages: Mapping[str, Path] = {}) -> RobotModel:
     known = partial(readable_by_strangers, packages)
     return reader.run(
         RobotModel, origin, partial(parse, confined=True), text, origin, packages,
-        readable=known, only_known=True, seconds=MOST_SECONDS,
+        readable=known, only_known=True, seconds=MAX_SECONDS,
     )  # fmt: skip
 
 
@@ -99,9 +99,9 @@ def parse(
     return read_robot(tag, source)
 
 
-MOST_SECONDS = 3  # s of processor time for a text received over the network: the sim waits for it
+MAX_SECONDS = 3  # s of processor time for a text received over the network: the sim waits for it
 USES = ("collision", "visual")
-MOST_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accepts MOST_TEXT characters in all
+MAX_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accepts MAX_TEXT characters in all
 
 _FILENAME = re.compile(rb"""\sfilename\s*=\s*("[^"]*"|'[^']*')""")
 
@@ -121,12 +121,12 @@ def _in_source(place: str, file: XacroFile, messages: Sequence[str]) -> tuple[st
 
 def with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[str, tuple[str, ...]]:
     """The text with its meshes embedded as `data:` URIs, and warnings about those that are not: of a collision mesh the
-    convex hull, of a visual mesh the file itself, up to MOST_SHOWN characters in all.
+    convex hull, of a visual mesh the file itself, up to MAX_SHOWN characters in all.
     """
     text, _ = repair_xml(text)
     data = text.encode()
     warnings: list[str] = []
-    room = MOST_SHOWN
+    room = MAX_SHOWN
     for use, start, end, uri in reversed([*_meshes(read_xml(text, str(path)), data)]):  # so earlier offsets stay valid
         if not uri.strip() or is_data(uri):
             continue
@@ -137,7 +137,7 @@ def with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[st
         try:
             sent = data_uri(file) if use == "collision" else file_uri(file)
             if use == "visual" and (room := room - len(sent)) < 0:
-                raise RobotError(f"the visual meshes take more than {MOST_SHOWN / 1e6:g} MB compressed; simplify them")
+                raise RobotError(f"the visual meshes take more than {MAX_SHOWN / 1e6:g} MB compressed; simplify them")
         except RobotError as error:
             if use == "visual":
                 warnings.append(f"{path}: the visual mesh {cut(uri)} is not sent: {error}")

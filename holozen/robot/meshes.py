@@ -247,8 +247,8 @@ UP = {
     "X_UP": ((0, -1, 0), (0, 0, -1), (1, 0, 0)),
 }
 """The rotation that takes each up axis to z."""
-MOST_NODES = 20_000  # nodes that instantiate nodes can make a short file expand without bound
-MOST_POINTS = 20_000_000  # and one geometry may be instantiated by many nodes
+MAX_NODES = 20_000  # nodes that instantiate nodes can make a short file expand without bound
+MAX_POINTS = 20_000_000  # and one geometry may be instantiated by many nodes
 
 
 def read_dae(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
@@ -260,8 +260,8 @@ def read_dae(file: BinaryIO, size: int, place: str) -> Iterator[Surface]:
     for geometry, frame, instance in scene.placed(root):
         for surface, material in scene.surfaces(geometry):
             total += len(surface.points)
-            if total > MOST_POINTS:
-                raise RobotError(f"{place}: has more than {MOST_POINTS} corners in its scene; simplify it")
+            if total > MAX_POINTS:
+                raise RobotError(f"{place}: has more than {MAX_POINTS} corners in its scene; simplify it")
             if len(surface.points):
                 points = (surface.points @ frame[:3, :3].T + frame[:3, 3]) @ turned.T
                 yield Surface(points, surface.triangles, scene.color(instance, material))
@@ -309,7 +309,7 @@ class _Scene:
         """Each `<geometry>` of the scene, its 4 x 4 frame, and the element that places it there."""
         scenes = root.child("scene").all("instance_visual_scene")
         waiting = [(self.named("visual_scene", tag), np.eye(4)) for tag in scenes]
-        for _ in range(MOST_NODES):
+        for _ in range(MAX_NODES):
             if not waiting:
                 return
             node, above = waiting.pop()
@@ -318,7 +318,7 @@ class _Scene:
             yield from (self._skin(tag, frame) for tag in node.all("instance_controller"))
             waiting += [(tag, frame) for tag in node.all("node")]
             waiting += [(self.named("node", tag), frame) for tag in node.all("instance_node")]
-        raise root.wrong(f"has more than {MOST_NODES} nodes in its scene, or one that contains itself")
+        raise root.wrong(f"has more than {MAX_NODES} nodes in its scene, or one that contains itself")
 
     def _skin(self, tag: Tag, frame: Array) -> tuple[Tag, Array, Tag]:
         controller = self.named("controller", tag)
@@ -479,7 +479,7 @@ def _numbers(tag: Tag, text: str) -> npt.NDArray[np.float64]:
 
 T = TypeVar("T")
 UNSCALED = (1.0, 1.0, 1.0)
-MOST_DATA = 1_000_000  # characters of a data: URI; the hull of any mesh takes 6000
+MAX_DATA = 1_000_000  # characters of a data: URI; the hull of any mesh takes 6000
 POINTER = b"version https://git-lfs.github.com/spec/v1"  # the start of a placeholder for a file that was not fetched
 
 Reader = Callable[[BinaryIO, int, str], Iterator[Surface]]
@@ -490,7 +490,7 @@ READERS: dict[str, tuple[Reader, int]] = {
 }
 """File name extension -> its reader, and the maximum size in bytes: what a slow machine reads in 10 s."""
 
-MOST_SHOWN = 20_000_000  # bytes of a visual mesh that is embedded
+MAX_SHOWN = 20_000_000  # bytes of a visual mesh that is embedded
 KINDS = {".dae": "vnd.collada+xml", ".obj": "obj", ".stl": "stl"}  # file name extension -> media type below model/
 
 _FILE = re.compile(r"data:model/(vnd\.collada\+xml|obj|stl)\+gzip;base64,")
@@ -519,8 +519,8 @@ def data_uri(path: Path) -> str:
 
 def data_hull(uri: str, scale: Vector = UNSCALED) -> tuple[Vector, ...]:
     """The hull of the STL that a `data:` URI holds, as `hull`. Raises RobotError."""
-    if len(uri) > MOST_DATA:
-        raise RobotError(f"a data: URI of {len(uri)} characters; at most {MOST_DATA} are read")
+    if len(uri) > MAX_DATA:
+        raise RobotError(f"a data: URI of {len(uri)} characters; at most {MAX_DATA} are read")
     head = _DATA.match(uri.lstrip())
     if head is None:
         raise RobotError(f"{cut(uri)} is not supported; write data:model/stl;base64,...")
@@ -543,11 +543,11 @@ def file_in(uri: str) -> tuple[str, bytes]:
         raise RobotError(f"{cut(uri)} holds no mesh; write data:model/stl+gzip;base64,...")
     try:
         unpacker = zlib.decompressobj(wbits=31)  # of gzip
-        content = unpacker.decompress(base64.b64decode(uri.lstrip()[head.end() :], validate=True), MOST_SHOWN)
+        content = unpacker.decompress(base64.b64decode(uri.lstrip()[head.end() :], validate=True), MAX_SHOWN)
     except (binascii.Error, ValueError, zlib.error) as error:
         raise RobotError(f"{cut(uri)} is not valid: {error}") from None
     if unpacker.unconsumed_tail:
-        raise RobotError(f"{cut(uri)} holds more than {MOST_SHOWN / 1e6:.0f} MB")
+        raise RobotError(f"{cut(uri)} holds more than {MAX_SHOWN / 1e6:.0f} MB")
     return next(suffix for suffix, kind in KINDS.items() if kind == head[1]), content
 
 
@@ -562,8 +562,8 @@ def surfaces_in(uri: str) -> Iterator[Surface]:
 @lru_cache(maxsize=64)
 def _packed(path: str, _mtime: int, size: int) -> str:
     kind = KINDS.get(os.path.splitext(os.path.realpath(path))[1].lower())  # a link may lead to private data
-    if kind is None or not 0 < size <= MOST_SHOWN:
-        raise RobotError(f"{path}: a mesh to show is a {', '.join(KINDS)} file of up to {MOST_SHOWN / 1e6:.0f} MB")
+    if kind is None or not 0 < size <= MAX_SHOWN:
+        raise RobotError(f"{path}: a mesh to show is a {', '.join(KINDS)} file of up to {MAX_SHOWN / 1e6:.0f} MB")
     try:
         content = Path(path).read_bytes()
     except OSError as error:

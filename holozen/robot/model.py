@@ -349,7 +349,7 @@ class Sensor:
 
 
 HERE = Pose()
-MOST_PARTS = 1000  # links, and joints; far beyond what an engine simulates in real time
+MAX_PARTS = 1000  # links, and joints; far beyond what an engine simulates in real time
 
 
 @dataclass(frozen=True, slots=True, eq=False)

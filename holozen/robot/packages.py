@@ -15,7 +15,7 @@ from holozen.robot.errors import RobotError
 from holozen.suggest import cut, listed, suggest
 
 PACKAGE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*")
-MOST = 200  # folders below a workspace that are searched for packages
+MAX_SEARCHED = 200  # folders below a workspace that are searched for packages
 _LARGEST = 1_000_000  # bytes of a package.xml
 
 
@@ -97,7 +97,7 @@ def folders_above(start: Path) -> list[Path]:
 
 def folders_below(start: Path) -> list[Path]:
     """The folders below a workspace, and below its src, that may contain packages or repositories of packages."""
-    return [each for folder in (start / "src", start) for each in (folder, *_folders_in(folder)[:MOST])]
+    return [each for folder in (start / "src", start) for each in (folder, *_folders_in(folder)[:MAX_SEARCHED])]
 
 
 def _folders_in(folder: Path) -> list[Path]:
@@ -198,7 +198,7 @@ def readable_by_strangers(given: Mapping[str, Path] = {}) -> list[str]:
 # Mesh URIs -> files.
 
 
-MOST_FOLDERS = 5000  # searched for a missing mesh in one package; bounds the search if a home folder looks like one
+MAX_FOLDERS = 5000  # searched for a missing mesh in one package; bounds the search if a home folder looks like one
 MODEL_PATHS = ("GAZEBO_MODEL_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH")
 VARIABLES = ("HOME", "AMENT_PREFIX_PATH", "ROS_PACKAGE_PATH", *MODEL_PATHS)  # environment variables used for the search
 MARKS = ("model.config", "package.xml", "meshes")  # one of these is in the folder of a model or a package
@@ -353,7 +353,7 @@ def portable_name(file: Path, start: Path, given: Mapping[str, Path] = {}, packa
 
 
 def _files_called(name: str, root: Path) -> Iterator[Path]:
-    for folder, children, files in islice(os.walk(root), MOST_FOLDERS):
+    for folder, children, files in islice(os.walk(root), MAX_FOLDERS):
         children[:] = sorted(child for child in children if not child.startswith("."))
         if name in files:
             yield Path(folder, name)

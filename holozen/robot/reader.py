@@ -33,9 +33,9 @@ from holozen.robot.sandbox import limit, restrict
 T = TypeVar("T")
 PROCESSOR_TIME = 20  # s of a call; the largest mesh that is read takes 10 on a slow machine
 PATIENCE = 60.0  # s of wall time of a call, which may sleep, or run on a busy machine
-MOST_MEMORY = 1_500_000_000  # bytes that a call may use beyond those of the server: a mesh of 100 MB takes 700 MB
-MOST_REPLY = 200_000_000  # bytes
-MOST_ASKED = 200  # questions of one call
+MAX_MEMORY = 1_500_000_000  # bytes that a call may use beyond those of the server: a mesh of 100 MB takes 700 MB
+MAX_REPLY = 200_000_000  # bytes
+MAX_ASKED = 200  # questions of one call
 SUFFIXES = (".stl", ".obj", ".dae", ".sdf", ".world", ".urdf", ".xacro", ".config")
 """Suffixes of the files that may be read outside the known folders: a robot's, not private data."""
 
@@ -107,8 +107,8 @@ def run(
             except (msgspec.MsgspecError, TypeError, ValueError):
                 raise RobotError(f"{what}: its reader was compromised, or has a bug: the reply is no {kind}") from None
         name, *rest = reply.asked
-        if len(answers) >= MOST_ASKED:
-            raise RobotError(f"{what}: refers to more than {MOST_ASKED} files outside of its folder and known packages")
+        if len(answers) >= MAX_ASKED:
+            raise RobotError(f"{what}: refers to more than {MAX_ASKED} files outside of its folder and known packages")
         if name not in handlers:
             raise RobotError(f"{what}: its reader was compromised: it asked for {name!r}")
         answers[msgspec.msgpack.encode(reply.asked)] = handlers[name](*rest)
@@ -250,7 +250,7 @@ def _forked(request: bytes, connection: socket.socket) -> tuple[int, bytes]:
     os.close(begin)
     found, until, poll = bytearray(), time.monotonic() + PATIENCE, select.poll()
     poll.register(end, select.POLLIN | select.POLLHUP)
-    while (left := until - time.monotonic()) > 0 and len(found) <= MOST_REPLY and poll.poll(1000 * left):
+    while (left := until - time.monotonic()) > 0 and len(found) <= MAX_REPLY and poll.poll(1000 * left):
         part = os.read(end, 1 << 20)
         if not part:
             break
@@ -275,7 +275,7 @@ def _work(request: bytes, end: int) -> NoReturn:
     _inside = True
     for name in {*os.environ}.difference(VARIABLES):
         del os.environ[name]
-    limit(_memory() + MOST_MEMORY, seconds, 0)
+    limit(_memory() + MAX_MEMORY, seconds, 0)
     granted = [path for asked, yes in _answers.items() if yes is True and (path := _opened(asked))]
     remember_folders()
     allowed = [*readable(), *granted, *_CODE]
@@ -288,7 +288,7 @@ def _work(request: bytes, end: int) -> NoReturn:
     except RobotError as error:
         reply = _Reply(lacks=lacks, error=str(error))
     except MemoryError:
-        reply = _Reply(lacks=lacks, error=f"{what}: it takes more than {MOST_MEMORY >> 20} MB of memory to read")
+        reply = _Reply(lacks=lacks, error=f"{what}: it takes more than {MAX_MEMORY >> 20} MB of memory to read")
     except Exception as error:  # a bug that untrusted input triggers must not end the sim
         reply = _Reply(lacks=lacks, error=f"{what}: it cannot be read: {type(error).__name__}: {error}")
     with os.fdopen(end, "wb") as file:

@@ -398,7 +398,7 @@ def _clean(axis: Vector) -> Vector:
 
 
 DEEPEST = 20  # nesting of includes
-MOST_PARTS = 5000  # models and links of one world; a few short files can expand to a million
+MAX_PARTS = 5000  # models and links of one world; a few short files can expand to a million
 
 SUN = "sun"  # a light, not a model
 PLANE = """
@@ -483,8 +483,8 @@ class Includes:
 
     def _count(self, tag: Tag) -> None:
         self.count += 1 + len(tag.all("link"))
-        if self.count > MOST_PARTS:
-            raise tag.wrong(f"brings the number of models and links above {MOST_PARTS}; remove some models")
+        if self.count > MAX_PARTS:
+            raise tag.wrong(f"brings the number of models and links above {MAX_PARTS}; remove some models")
 
     def _read(self, path: Path, source: Source) -> Tag:
         if path not in self._files:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 
 from holozen.robot.elements import Source, Tag, Vector, read_xml
 from holozen.robot.gazebo_plugins import read_forces, read_plugins
-from holozen.robot.model import MOST_PARTS, Joint, Limits, Link, Pose, RobotModel, descend
+from holozen.robot.model import MAX_PARTS, Joint, Limits, Link, Pose, RobotModel, descend
 from holozen.robot.rigid import Frame
 from holozen.robot.rotation import triple
 from holozen.robot.sdf import (
@@ -290,8 +290,8 @@ class JointGraph:
 
     def _check_size(self, members: list[Member]) -> None:
         links, joints = len(self.links), sum(len(member.joints) for member in members)
-        if max(links, joints) > MOST_PARTS:
-            problem = f"has {links} links and {joints} joints; a model has at most {MOST_PARTS} of each"
+        if max(links, joints) > MAX_PARTS:
+            problem = f"has {links} links and {joints} joints; a model has at most {MAX_PARTS} of each"
             raise members[0].piece.tag.wrong(problem)
 
     def _add_edge(self, member: Member, tag: Tag, frame: str) -> None:

@@ -29,10 +29,10 @@ from holozen.robot.model import (
 from holozen.robot.rigid import compose
 from holozen.suggest import cut
 
-MOST_RAYS = 10_000  # of one sensor
-MOST_PIXELS = 2_100_000  # of one camera: full HD
+MAX_RAYS = 10_000  # of one sensor
+MAX_PIXELS = 2_100_000  # of one camera: full HD
 FIELD_OF_VIEW = (0.01, 3.0)  # rad, horizontal
-MOST_SENSORS = 100  # of one robot
+MAX_SENSORS = 100  # of one robot
 FASTEST = 1000.0  # Hz
 OPTICAL = Pose(rpy=(-math.pi / 2, 0.0, -math.pi / 2))  # a camera's optical frame (REP 103): x right, y down, z forward
 SONAR_RAYS = 5  # across and up a sonar's cone
@@ -117,8 +117,8 @@ class _Reading:
             self._source.warnings.append(f"{error}; {tag} is left out")
 
     def _add(self, sensor: Sensor, tag: Tag) -> None:
-        if len(self.found) == MOST_SENSORS:
-            raise tag.wrong(f"is one of more than {MOST_SENSORS} sensors")
+        if len(self.found) == MAX_SENSORS:
+            raise tag.wrong(f"is one of more than {MAX_SENSORS} sensors")
         if taken := self._topics.intersection(sensor.topics):
             self._source.warn(tag, f"publishes on {min(taken)!r} as another sensor does; it is left out")
             return
@@ -260,8 +260,8 @@ def _lidar(sensor: _SensorTag) -> Lidar:
     if far <= near:
         raise limits.owner.wrong(f"has min {near:g} and max {far:g}; min must be less than max")
     horizontal, vertical = (_fan(sensor.inside("ray lidar", "scan", name)) for name in ("horizontal", "vertical"))
-    if horizontal.count * vertical.count > MOST_RAYS:
-        raise sensor.tag.wrong(f"has {horizontal.count * vertical.count} rays; at most {MOST_RAYS} are simulated")
+    if horizontal.count * vertical.count > MAX_RAYS:
+        raise sensor.tag.wrong(f"has {horizontal.count * vertical.count} rays; at most {MAX_RAYS} are simulated")
     noise = _noise(sensor.inside("ray lidar", "noise")) or _plugin_noise(sensor)
     radiation = sensor.plugin.word("radiation", "radiation_type").lower()
     return Lidar(horizontal, vertical, near, far, noise, _message(sensor), radiation != "ultrasound")
@@ -360,8 +360,8 @@ def _camera(sensor: _SensorTag) -> Camera:
     width, height = (
         round(image.number(size, name, zero=False)) for name, size in (("width", 320.0), ("height", 240.0))
     )
-    if not (0 < width * height <= MOST_PIXELS):
-        raise image.owner.wrong(f"has {width} x {height} pixels; from 1 to {MOST_PIXELS} are rendered")
+    if not (0 < width * height <= MAX_PIXELS):
+        raise image.owner.wrong(f"has {width} x {height} pixels; from 1 to {MAX_PIXELS} are rendered")
     field_of_view = tag.number(1.047, "horizontal_fov", zero=False)
     low, high = FIELD_OF_VIEW
     if not low <= field_of_view <= high:

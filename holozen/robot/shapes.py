@@ -231,8 +231,8 @@ def _origin(tag: Tag) -> Pose | None:
 # Visual and collision elements.
 
 
-MOST_MESHES = 200  # in a text received over the network: each takes up to 1 ms of the sim's loop
-MOST_BYTES = 5_000_000  # of a file that such a text refers to: 0.3 s
+MAX_MESHES = 200  # in a text received over the network: each takes up to 1 ms of the sim's loop
+MAX_BYTES = 5_000_000  # of a file that such a text refers to: 0.3 s
 SMALLEST = 1e-6  # of a size in metres, and of a mesh's scale
 
 SHAPES = ("box", "cylinder", "sphere")  # of URDF
@@ -303,15 +303,15 @@ def solid(shape: Shape) -> Shape:
 
 def _found(tag: Tag, uri: str, scale: Vector, pose: Pose, use: str, source: Source) -> Shape:
     source.meshes += 1
-    if source.confined and source.meshes > MOST_MESHES:
-        raise RobotError(f"is mesh number {source.meshes}; the sim reads at most {MOST_MESHES} collision meshes")
+    if source.confined and source.meshes > MAX_MESHES:
+        raise RobotError(f"is mesh number {source.meshes}; the sim reads at most {MAX_MESHES} collision meshes")
     if is_data(uri):
         return Shape("hull", (), pose, points=data_hull(uri, scale))
     path = resolve_uri(
         uri, source.origin, source.packages, source.confined, lambda taken: source.warn(tag, f"({use}): {taken}")
     )
     if use == "collision":
-        if source.confined and os.path.getsize(path) > MOST_BYTES:
+        if source.confined and os.path.getsize(path) > MAX_BYTES:
             raise RobotError(f"{path}: is too large to be read by the sim; send the mesh itself (holozen spawn does)")
         return Shape("mesh", scale, pose, path, points=hull(path, scale))
     return Shape("mesh", scale, pose, path)

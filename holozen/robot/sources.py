@@ -15,7 +15,7 @@ from holozen.robot.packages import find_by_name, find_package, known_folders, li
 from holozen.robot.xacro import XacroFile, expand_in_child, process
 
 MARK = "holozen-line"  # the attribute that carries file and line through xacro
-MOST_FILES = 200
+MAX_FILES = 200
 
 _FIND = re.compile(r"\$\(find\s+([^)\s]+)\s*\)")
 _FILENAME = re.compile(rb"""(filename\s*=\s*)("[^"]*"|'[^']*')""")
@@ -38,7 +38,7 @@ def read_sources(path: Path, packages: Mapping[str, Path]) -> list[SourceFile]:
     """
     files: dict[Path, SourceFile] = {}
     waiting = [path]
-    while waiting and len(files) < MOST_FILES:
+    while waiting and len(files) < MAX_FILES:
         here = waiting.pop()
         if here not in files:
             files[here] = _read(here, path, packages)

@@ -19,7 +19,7 @@ from holozen.robot.inertia import (
 )
 from holozen.robot.model import (
     JOINT_KINDS,
-    MOST_PARTS,
+    MAX_PARTS,
     Inertial,
     Joint,
     Limits,
@@ -211,8 +211,8 @@ def read_robot(robot: Tag, source: Source) -> RobotModel:
 
 def _by_name(robot: Tag, name: str, read: Callable[[Tag], Part]) -> dict[str, Part]:
     tags = robot.all(name)
-    if len(tags) > MOST_PARTS:
-        raise robot.wrong(f"has {len(tags)} {name}s; a robot has at most {MOST_PARTS} links and {MOST_PARTS} joints")
+    if len(tags) > MAX_PARTS:
+        raise robot.wrong(f"has {len(tags)} {name}s; a robot has at most {MAX_PARTS} links and {MAX_PARTS} joints")
     parts: dict[str, Part] = {}
     for tag in tags:
         part = read(tag)

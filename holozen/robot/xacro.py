@@ -18,7 +18,7 @@ from xml.parsers.expat import ExpatError, ParserCreate
 
 from holozen.console import report
 from holozen.robot import reader
-from holozen.robot.elements import MOST_TEXT, read_text, read_xml, repair_xml
+from holozen.robot.elements import MAX_TEXT, read_text, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import VARIABLES, find_package
 from holozen.suggest import cut, listed, suggest
@@ -77,7 +77,7 @@ def digest(path: str) -> str | None:
     """A file is identified by its content: two saves within a clock tick may leave size and times unchanged."""
     try:
         state = os.stat(path)
-        if not stat.S_ISREG(state.st_mode) or state.st_size > MOST_TEXT:
+        if not stat.S_ISREG(state.st_mode) or state.st_size > MAX_TEXT:
             return f"{state.st_mode} {state.st_size} {state.st_mtime_ns}"  # nothing that is expanded
         with open(path, "rb") as file:
             return hashlib.sha256(file.read()).hexdigest()
@@ -114,8 +114,8 @@ def unasked(path: Path, given: Collection[str], asked: Collection[str] = ()) -> 
 # ignored, and so is a folder that cannot be written.
 
 
-MOST_ENTRIES = 64
-MOST_BYTES = 1_000_000  # per entry
+MAX_ENTRIES = 64
+MAX_BYTES = 1_000_000  # per entry
 
 
 def cache_folder() -> Path | None:
@@ -131,7 +131,7 @@ def load_cached(key: str) -> dict[str, Any] | None:
         path = _cache_path(key)
         with open(path, "rb") as file:
             mine = os.fstat(file.fileno()).st_uid == os.getuid()
-            head, _, body = file.read(2 * MOST_BYTES).partition(b"\n")
+            head, _, body = file.read(2 * MAX_BYTES).partition(b"\n")
         if not mine or head != _checksum(body):
             return None
         entry = json.loads(body)
@@ -141,9 +141,9 @@ def load_cached(key: str) -> dict[str, Any] | None:
 
 
 def store_cached(key: str, entry: dict[str, Any]) -> None:
-    """Store an entry atomically; then delete the oldest beyond MOST_ENTRIES."""
+    """Store an entry atomically; then delete the oldest beyond MAX_ENTRIES."""
     body = json.dumps(entry | {"key": key}).encode()
-    if len(body) > MOST_BYTES:
+    if len(body) > MAX_BYTES:
         return
     with contextlib.suppress(OSError, ValueError):
         path = _cache_path(key)
@@ -172,7 +172,7 @@ def _evict(folder: Path) -> None:
     by_age = sorted(
         folder.iterdir(), key=lambda path: path.stat().st_mtime_ns
     )  # also temporary files of killed processes
-    for path in by_age[:-MOST_ENTRIES]:
+    for path in by_age[:-MAX_ENTRIES]:
         path.unlink(missing_ok=True)
 
 
@@ -181,7 +181,7 @@ def _evict(folder: Path) -> None:
 
 PROCESSOR_TIME = 6  # s for a whole expansion; the largest robots take 2
 STEP_TIME = 1.2  # s of CPU time for one expression or element, after which the kernel ends the process
-MOST_WORDS = 100_000  # bytes of standard error
+MAX_WORDS = 100_000  # bytes of standard error
 PATIENCE = 60.0  # s; the child's own CPU time limits end it long before, unless it sleeps
 _ROOT = str(Path(__file__).resolve().parents[2])
 # Without `site`, whose search path is passed in instead, startup takes half as long.
@@ -194,7 +194,7 @@ main(asked)
 """
 
 
-MOST_OUTSIDE = 20  # robot files that are included from outside all known folders
+MAX_OUTSIDE = 20  # robot files that are included from outside all known folders
 
 
 def expand_in_child(file: XacroFile) -> Outcome:
@@ -205,8 +205,8 @@ def expand_in_child(file: XacroFile) -> Outcome:
     """
     outside: dict[str, bool] = {}
     while isinstance(outcome := _expand_once(file, outside), str):
-        if len(outside) == MOST_OUTSIDE:
-            problem = f"more than {MOST_OUTSIDE} files are included from outside of all known packages"
+        if len(outside) == MAX_OUTSIDE:
+            problem = f"more than {MAX_OUTSIDE} files are included from outside of all known packages"
             return Outcome(error=f"{file.path}: {problem}; give the package that holds them: --package NAME=DIR")
         outside[outcome] = is_robot_file(outcome)
     return outcome
@@ -280,7 +280,7 @@ def _ask(question: bytes, note: int, env: Mapping[str, str]) -> tuple[int, bytes
                     child.stdin.close()
         out.seek(0)
         err.seek(0)
-        return child.returncode, out.read(), err.read(MOST_WORDS)
+        return child.returncode, out.read(), err.read(MAX_WORDS)
 
 
 def _ended(path: Path, code: int, note: IO[bytes], words: bytes) -> str:

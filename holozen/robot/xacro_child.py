@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 from xml.dom import expatbuilder, minidom
 from xml.parsers.expat import ExpatError
 
-from holozen.robot.elements import MOST_ELEMENTS, broken_xml, check_file, check_size, read_text
+from holozen.robot.elements import MAX_ELEMENTS, broken_xml, check_file, check_size, read_text
 from holozen.robot.errors import RobotError
 from holozen.robot.packages import (
     find_by_name,
@@ -85,7 +85,7 @@ def keep_places(file: Callable[[], str]) -> None:
 # The current position in the files, the call chain, and limits on both.
 
 
-MOST_CALLS = 5_000  # of macros, blocks and includes; the library takes 1 s for this many, and superlinear time for more
+MAX_CALLS = 5_000  # of macros, blocks and includes; the library takes 1 s for this many, and superlinear time for more
 # These differ between processes: string hashes, set order, and generated names.
 _IMPURE = re.compile(r"\b(hash|set|frozenset|anon)\b")
 
@@ -126,8 +126,8 @@ class Trace:
             return
         self._element, self.place = node, place_of(node) or self.place
         self._elements += 1
-        if self._elements > MOST_ELEMENTS:
-            raise RobotError(f"{self._here()}it expands without end; at most {MOST_ELEMENTS} elements are expanded")
+        if self._elements > MAX_ELEMENTS:
+            raise RobotError(f"{self._here()}it expands without end; at most {MAX_ELEMENTS} elements are expanded")
         if node.nodeName == "xacro:insert_block":
             self._count_call()
         self._step("")
@@ -150,10 +150,10 @@ class Trace:
 
     def _count_call(self) -> None:
         self._calls += 1
-        if self._calls > MOST_CALLS:
+        if self._calls > MAX_CALLS:
             raise RobotError(
                 f"{self._here()}macros, blocks and includes call each other without end;"
-                f" at most {MOST_CALLS} calls are made"
+                f" at most {MAX_CALLS} calls are made"
             )
 
     def _entering(self, function: Any) -> Any:
@@ -237,8 +237,8 @@ def names(table: Any) -> list[str]:
 # The library's errors as one line.
 
 
-MOST_REPLY = 64 << 20  # bytes; a text of 4 MB takes at most 24 in JSON
-MOST_MEMORY = 512 << 20  # bytes of address space of the child
+MAX_REPLY = 64 << 20  # bytes; a text of 4 MB takes at most 24 in JSON
+MAX_MEMORY = 512 << 20  # bytes of address space of the child
 
 
 def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[str, Path]) -> str:
@@ -293,7 +293,7 @@ def _reason(cause: BaseException, suffix: str) -> str:
     if isinstance(cause, RecursionError):
         return "a macro, a property or an include calls itself without end, or elements are nested too deep"
     if isinstance(cause, MemoryError):
-        return f"it needs too much memory; an expansion has {MOST_MEMORY >> 20} MB {suffix}".rstrip()
+        return f"it needs too much memory; an expansion has {MAX_MEMORY >> 20} MB {suffix}".rstrip()
     if kind == "ArgException":
         return f"$(arg {cause}) has no value; give one with {cause}:=VALUE or a default in <xacro:arg>"
     words = str(cause) if not isinstance(cause, KeyError) else f"there is no {cause}"
@@ -333,7 +333,7 @@ def _guessed(guesses: Mapping[str, Path]) -> str:
 
 
 DEEPEST_CALLS = 4000  # Python frames; the library's own 1000 and what the trace adds
-MOST_WORDS = 10_000  # characters of warnings
+MAX_WORDS = 10_000  # characters of warnings
 
 
 def main(asked: dict[str, Any]) -> None:
@@ -342,13 +342,13 @@ def main(asked: dict[str, Any]) -> None:
     signal.pthread_sigmask(signal.SIG_SETMASK, ())
     for number in (signal.SIGPROF, signal.SIGXCPU):
         signal.signal(number, signal.SIG_DFL)
-    limit(MOST_MEMORY, PROCESSOR_TIME, MOST_REPLY)
+    limit(MAX_MEMORY, PROCESSOR_TIME, MAX_REPLY)
     sys.setrecursionlimit(DEEPEST_CALLS)
     words = io.StringIO()
     with redirect_stdout(words), redirect_stderr(words):
         packages = {name: Path(folder) for name, folder in asked["packages"].items()}
         reply = Expansion(Path(asked["path"]), packages, asked).run(asked)
-    reply["warnings"] = words.getvalue()[:MOST_WORDS].splitlines()
+    reply["warnings"] = words.getvalue()[:MAX_WORDS].splitlines()
     with os.fdopen(out, "wb") as file:
         file.write(json.dumps(reply).encode())
     os._exit(0)  # freeing a large document takes as long as building it

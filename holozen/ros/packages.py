@@ -12,7 +12,7 @@ from holozen.robot.packages import find_named, folders_above, folders_below, nea
 from holozen.suggest import listed, suggest
 
 LEVELS = 3  # of folders below the working folder that are searched
-MOST_FOLDERS = 500  # on each level: a home folder has thousands
+MAX_FOLDERS = 500  # on each level: a home folder has thousands
 BUILT = ("build", "install", "log", "node_modules", "__pycache__")  # folders without sources
 
 given: dict[str, Path] = {}
@@ -66,7 +66,7 @@ def _in_working_folder() -> dict[str, Path]:
     """The packages up to LEVELS below the working folder, where colcon would find them."""
     found, level = list[Path](), starts[-1:]
     for _ in range(LEVELS):
-        level = [child for folder in level for child in _subfolders(folder)][:MOST_FOLDERS]
+        level = [child for folder in level for child in _subfolders(folder)][:MAX_FOLDERS]
         found += [folder for folder in level if (folder / "package.xml").is_file()]
         level = [folder for folder in level if not (folder / "package.xml").is_file()]
     return packages_in(found)

@@ -19,7 +19,7 @@ Value = bool | int | float | str | list[bool] | list[int] | list[float] | list[s
 
 LARGEST = 1_000_000  # characters of a file or a value
 DEEPEST = 20  # maps within maps
-MOST = 100_000  # values in one text
+MAX_VALUES = 100_000  # values in one text
 YES = frozenset(("y", "Y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"))
 NO = frozenset(("n", "N", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"))
 INTEGER = re.compile(r"[+-]?(0[xX][0-9a-fA-F]+|[0-9]+)")
@@ -103,8 +103,8 @@ def _parsed(text: str) -> Any:
         if node is None:
             return ""
         seen += 1  # aliases count every time: a few lines can expand to millions of values
-        if depth > DEEPEST or seen > MOST:
-            raise ValueError(f"it is nested deeper than {DEEPEST}, or has more than {MOST} values")
+        if depth > DEEPEST or seen > MAX_VALUES:
+            raise ValueError(f"it is nested deeper than {DEEPEST}, or has more than {MAX_VALUES} values")
         line = node.start_mark.line + 1
         if node.id == "scalar":
             quoted = node.style is not None or node.tag == "!!str"

@@ -28,8 +28,8 @@ BELOW = "_action"
 SEND, CANCEL, RESULT, FEEDBACK, STATUS = "send_goal", "cancel_goal", "get_result", "feedback", "status"
 
 KEPT = 10.0  # s that the result of a goal is kept after its end, as in ROS 2
-MOST = 256  # goals of a server, ended ones included
-MOST_WAITING = 100  # requests for the result of one goal
+MAX_GOALS = 256  # goals of a server, ended ones included
+MAX_WAITING = 100  # requests for the result of one goal
 LONGEST = 86_400.0  # s of one request for a result
 GONE = 1.0  # s without a server after which the goal is lost
 POLL = 0.02  # s between two checks for it
@@ -121,7 +121,7 @@ class Goals:
         """Why no goal with this id can be accepted; empty if one can."""
         if self.get(identity):
             return "there is a goal with this id already"
-        return f"there are {MOST} goals already" if len(self._all) >= MOST else ""
+        return f"there are {MAX_GOALS} goals already" if len(self._all) >= MAX_GOALS else ""
 
     def accept(self, identity: bytes, stamp: int, request: Any) -> Goal:
         """Add a goal. Raises ValueError with the `refusal`."""
@@ -304,11 +304,11 @@ class ActionServer(Goals):
                 return refuse(query, str(error))
         with self.lock:
             goal = self.get(identity)
-            if goal and goal.is_active and len(goal.waiting) < MOST_WAITING:
+            if goal and goal.is_active and len(goal.waiting) < MAX_WAITING:
                 return goal.waiting.append(query)
         if goal and goal.is_active:
             with query:
-                return refuse(query, f"{MOST_WAITING} requests wait for the result of this goal already")
+                return refuse(query, f"{MAX_WAITING} requests wait for the result of this goal already")
         return self._reply(query, goal.result if goal else self._result_type())
 
     def _reply(self, query: Any, reply: Any) -> None:

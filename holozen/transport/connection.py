@@ -1,6 +1,6 @@
 """How a process connects to others: Zenoh's own flags, environment variables for the same, and the default.
 
-By default nothing leaves this machine: peers meet on loopback at the rendezvous points; no router, no multicast.
+By default nothing leaves this machine: peers meet on loopback at the meeting points; no router, no multicast.
 Each domain has its own points. With `--private` they meet at Unix sockets in a folder that only their user can enter,
 with `--secure` at a router, by mutual TLS.
 """

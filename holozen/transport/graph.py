@@ -124,7 +124,7 @@ class Graph:
 
     `change` returns the key of the next token that changed and whether it exists, or None if there is none. `roll_call`
     waits until all connected nodes have sent their tokens, and returns False if that took too long; `met` returns
-    their sessions. `ask_peers` asks the holders of rendezvous points for the sessions that they are linked to, and
+    their sessions. `ask_peers` asks the holders of meeting points for the sessions that they are linked to, and
     returns a function that reads these, with holders that are nodes themselves: None before an answer, an empty set if
     no holder knows of any. `undeclare` ends the subscription. `took`: the seconds that the first link took. Use it in
     `with`, or keep it until the bus is closed.
@@ -184,7 +184,7 @@ class Graph:
         """The endpoints once there is a link and all nodes have sent theirs; at most `patience` seconds after the last
         change.
 
-        That is when each session that the holder of a rendezvous point is linked to has sent its tokens; or, if no
+        That is when each session that the holder of a meeting point is linked to has sent its tokens; or, if no
         holder answers, when nothing has changed for `quiet` seconds, or twice the time that the first link or the last
         change took, since peers introduce further peers. The wait is longer for a peer without tokens: it may be
         foreign, or about to send some.
@@ -291,7 +291,7 @@ class Definition(Answers):
 
 
 class Peers(Answers):
-    """Answers queries for the sessions that a holder of a rendezvous point is linked to, separated by spaces. One that
+    """Answers queries for the sessions that a holder of a meeting point is linked to, separated by spaces. One that
     `is_node` names itself, too: all others are linked to it, so if it names no more there are no more.
     """
 

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Declared)
 
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
-MOST_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
-WITNESSES = 1.0  # s for the holders of rendezvous points to tell of robots and sims
+MAX_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
+WITNESSES = 1.0  # s for the holders of meeting points to tell of robots and sims
 DEFINITION_WAIT = 0.5  # s for a node to be found that answers
 LAST_WAIT = 0.5  # s for publishers to answer with their last messages
 DEFINITION_TIMEOUT = 2.0  # s for its answer
@@ -84,7 +84,7 @@ class Node:
 
     def _tokens(self, keys: str) -> Any:
         """A subscription to the tokens that match `keys`, those that exist included."""
-        return self.session.liveliness().declare_subscriber(keys, zenoh.handlers.RingChannel(MOST_TOKENS), history=True)
+        return self.session.liveliness().declare_subscriber(keys, zenoh.handlers.RingChannel(MAX_TOKENS), history=True)
 
     @cached_property
     def listing(self) -> NodeInfo:
@@ -250,7 +250,7 @@ class Node:
 
         def roll_call() -> bool:
             # A full channel would block Zenoh's thread, and the rest, for ever: the default one is for 256 replies.
-            replies: Any = zenoh.handlers.FifoChannel(MOST_TOKENS)
+            replies: Any = zenoh.handlers.FifoChannel(MAX_TOKENS)
             timeout, began = max(ROLL_CALL, self.took), time.monotonic()
             for _ in live.get(keys, replies, timeout=timeout):
                 pass

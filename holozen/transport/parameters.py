@@ -18,7 +18,7 @@ from holozen.transport.services import Server, answer_in_turn
 if TYPE_CHECKING:
     from holozen.bus import Bus
 
-MOST = 1000  # names in one request
+MAX_NAMES = 1000  # names in one request
 LONGEST = 80  # characters of a value or a name in a message
 ELSE = "not set, since another parameter of the request was refused"
 
@@ -178,8 +178,8 @@ def unknown(node: str, name: str, known: Iterable[str]) -> str:
 
 
 def _check_count(asked: list[r.Parameter] | list[str]) -> None:
-    if len(asked) > MOST:
-        raise ServiceError(f"{len(asked)} parameters in one request; at most {MOST}")
+    if len(asked) > MAX_NAMES:
+        raise ServiceError(f"{len(asked)} parameters in one request; at most {MAX_NAMES}")
 
 
 def is_below(name: str, prefixes: list[str], depth: int) -> bool:

@@ -1,4 +1,4 @@
-"""Rendezvous points: the endpoints where processes meet. Each long-running process holds at most one of them.
+"""Meeting points: the endpoints where processes meet. Each long-running process holds at most one of them.
 
 When a process loses one, another takes it over. Since no process holds two, processes find each other even if the
 holder of the first one is suspended, or does not speak Zenoh. Zenoh can retry a taken port by itself, but such a

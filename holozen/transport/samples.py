@@ -13,7 +13,7 @@ from holozen.transport.errors import BusError
 
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
 LARGE = 1_000_000  # bytes; memory of larger payloads is returned to the system
-MOST_DEALT = 4096  # samples at a time
+MAX_DEALT = 4096  # samples at a time
 TRIM_AFTER = (1.0, 2.0, 4.0, 8.0)  # s
 M_TRIM_THRESHOLD = -1  # mallopt(3)
 PRIORITIES = ("REAL_TIME", "INTERACTIVE_HIGH", "INTERACTIVE_LOW", "DATA_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
@@ -292,8 +292,8 @@ class Dealer(Declared):
             self.close()
 
     def deal(self) -> None:
-        """Deal what waits, but no more than MOST_DEALT."""
-        for _ in range(MOST_DEALT):
+        """Deal what waits, but no more than MAX_DEALT."""
+        for _ in range(MAX_DEALT):
             if (one := self._recv()) is None:
                 return
             priority = 0 if self._is_queryable else int(one.priority)

@@ -34,7 +34,7 @@ class Opened:
         self.listens: list[str] = []  # the endpoints of this session itself
         self.taken: list[str] = []  # the endpoints where it would have listened, but meets another process that does
         self.is_guarded = False  # whether connections need a password, a certificate or a permission
-        self.point = ""  # the rendezvous point that this session itself holds
+        self.point = ""  # the meeting point that this session itself holds
 
     def close(self) -> None:
         """Close it, even if it is closed already."""
@@ -46,7 +46,7 @@ class Opening:
     """A session that is being opened: `early` in a thread, while the caller loads and checks what it needs, else by the
     time that this returns. `opened` waits for it, and raises its error. `closing`: set it to give up.
 
-    If `lasting`, it holds a rendezvous point, and as a client waits for its router until `stop`. Others give up after
+    If `lasting`, it holds a meeting point, and as a client waits for its router until `stop`. Others give up after
     `patience` seconds, by default 5, where a process listens and does not answer, or there is no router.
     """
 
@@ -76,7 +76,7 @@ class Opening:
 def open_session(
     connection: Connection, *, lasting: bool, patience: float | None, stop: threading.Event, closing: threading.Event
 ) -> Opened:
-    """Open a session; if `lasting` it holds a free rendezvous point until `closing` is set.
+    """Open a session; if `lasting` it holds a free meeting point until `closing` is set.
 
     A client waits for its router, at most `patience` s (None: for ever), a peer for a process that is there to answer.
     Exits with code 0 when `stop` is set. Raises BusError.

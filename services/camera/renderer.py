@@ -21,7 +21,7 @@ Floats = npt.NDArray[np.float32]
 GREY = (0.7, 0.7, 0.7, 1.0)  # Gazebo's grey, for shapes without a colour
 GROUND = (0.6, 0.6, 0.6, 1.0)
 WIDE, THICK = 200.0, 0.02  # m; width and thickness of the ground
-MOST_REMOVED = 100  # bodies that are removed before `renew` frees their memory
+MAX_REMOVED = 100  # bodies that are removed before `renew` frees their memory
 MISSED = 0.9999  # in the depth buffer: nothing was hit
 
 
@@ -50,7 +50,7 @@ class Renderer:
 
     def renew(self) -> None:
         """If many bodies have been removed, free their memory: start with an empty scene, which knows no entity."""
-        if self._removed > max(MOST_REMOVED, len(self._bodies)):
+        if self._removed > max(MAX_REMOVED, len(self._bodies)):
             self.close()
             self._begin()
 

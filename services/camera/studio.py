@@ -17,7 +17,7 @@ from holozen.messages import CameraInfo, CompressedImage, Exposure, Header, Imag
 from holozen.messages.message import not_finite
 from holozen.robot.description import read
 from holozen.robot.errors import RobotError
-from holozen.robot.sensors import FIELD_OF_VIEW, MOST_PIXELS
+from holozen.robot.sensors import FIELD_OF_VIEW, MAX_PIXELS
 from holozen.transport.errors import BusError, ServiceError
 
 from .renderer import Bytes, Floats, Renderer
@@ -99,8 +99,8 @@ def fault(exposure: Exposure) -> str:
         return f"{bad} is not a finite number"
     if not (exposure.info and (exposure.image or exposure.depth)):
         return "it has no key for its picture or its CameraInfo"
-    if not 0 < exposure.width * exposure.height <= MOST_PIXELS:
-        return f"it has {exposure.width} x {exposure.height} pixels; from 1 to {MOST_PIXELS} are rendered"
+    if not 0 < exposure.width * exposure.height <= MAX_PIXELS:
+        return f"it has {exposure.width} x {exposure.height} pixels; from 1 to {MAX_PIXELS} are rendered"
     if not low <= exposure.field_of_view <= high:
         return f"its field of view is {exposure.field_of_view:g} rad; use {low:g} to {high:g}"
     if not 0 < exposure.near < exposure.far:

@@ -17,7 +17,7 @@ from holozen.wire import key_for
 from .goto import Leg, Pose
 
 FEEDBACK_EVERY = 0.2  # s of the odom's clock
-MOST_POSES = 10_000  # of one goal, all loops included
+MAX_POSES = 10_000  # of one goal, all loops included
 
 
 class Journey:
@@ -183,6 +183,6 @@ def _looped(goal: Any) -> Sequence[PoseStamped]:
         raise ValueError("it has no poses")
     if goal.goal_index >= count:
         raise ValueError(f"goal_index is {goal.goal_index}; use 0 to {count - 1}")
-    if count * (goal.number_of_loops + 1) > MOST_POSES:
-        raise ValueError(f"{count} poses in {goal.number_of_loops + 1} rounds; at most {MOST_POSES} in all")
+    if count * (goal.number_of_loops + 1) > MAX_POSES:
+        raise ValueError(f"{count} poses in {goal.number_of_loops + 1} rounds; at most {MAX_POSES} in all")
     return [*goal.poses[goal.goal_index :], *list(goal.poses) * goal.number_of_loops]

@@ -18,7 +18,7 @@ from holozen.transport.errors import BusError, Elsewhere
 from holozen.transport.graph import Endpoint
 from holozen.transport.node import Node
 
-MOST = 64  # shards
+MAX_SHARDS = 64  # shards
 AUTO = 0  # the number that stands for any free one
 TRIES = 20  # to take a number, while others that start at the same time take the same one
 SCAN = 1.0  # s between two scans of all tokens for other shards
@@ -55,8 +55,8 @@ def shard(text: str) -> Shard:
     if (number != "auto" and not number.isdecimal()) or not count.isdecimal():
         raise refused(f"{text!r} is no shard; give K/N, such as 1/3, or auto/3 for any free number")
     made = Shard(AUTO if number == "auto" else int(number), int(count))
-    if not 1 <= made.count <= MOST or not (number == "auto" or 1 <= made.number <= made.count):
-        raise refused(f"{text!r}: give K/N with K from 1 to N and N up to {MOST}")
+    if not 1 <= made.count <= MAX_SHARDS or not (number == "auto" or 1 <= made.number <= made.count):
+        raise refused(f"{text!r}: give K/N with K from 1 to N and N up to {MAX_SHARDS}")
     return made
 
 

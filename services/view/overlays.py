@@ -24,7 +24,7 @@ AT_LEAST = 0.02  # m/s; slower motion has no arrow
 SEEN = 0.005  # m/s; smaller changes are not sent to the pages
 HIGH = {"commanded": 0.40, "measured": 0.44}  # m above the robot's frame
 ASK_EVERY, PATIENCE = 2.0, 1.0  # s; the goals may change
-MOST_GOALS = 200
+MAX_GOALS = 200
 FLAT = 0.02  # m above the ground
 
 
@@ -127,7 +127,7 @@ class Goals:
             self._stop.wait(ASK_EVERY)
 
     def _list(self) -> Iterator[Planar]:
-        for number in range(MOST_GOALS):
+        for number in range(MAX_GOALS):
             goal = self._bus.call("next_goal", NextGoalRequest(number), NextGoalReply, PATIENCE)
             yield goal.x_goal, goal.y_goal, goal.theta_goal
             if goal.end_of_list:

@@ -20,7 +20,7 @@ from .scene import Scene
 NONE = "(none)"
 WINDOW = 20.0  # s
 DRAW_EVERY = 4  # frames of the page
-MOST_FIELDS = 500  # of a message that are offered for plotting
+MAX_FIELDS = 500  # of a message that are offered for plotting
 HEIGHT = 140  # CSS pixels
 PADDING = (10, 10, 0, 0)  # CSS pixels at the top, right, bottom and left, for half of an axis' number
 BLUE = "#1f5fd0"
@@ -100,7 +100,7 @@ class Plots:
             self._topic.options = topics
             self._topic.value = chosen if chosen in topics else NONE  # type: ignore[misc]
         if self._probe and (sample := self._probe.try_recv()):
-            found = list(islice(fields(self._reader.read(sample, self._bus)), MOST_FIELDS))
+            found = list(islice(fields(self._reader.read(sample, self._bus)), MAX_FIELDS))
             self._field.options = tuple(found) or (NONE,)
             self._end_probe()
         self._updates += 1

@@ -54,7 +54,7 @@ FREE = (np.arange(SIZE["width"]) > 320) & (np.arange(SIZE["width"]) < 620)  # co
 COARSE = 0.2  # of the pixels that a page draws which is not looked at
 DECK = 0.295  # m; the height of hb_bot's orange deck
 NEAR = 14  # pixels between the middle of what is seen of the deck, and the robot's
-MOST = 0.5 * 0.5 + 0.05  # m; what a robot at 0.5 m/s goes in the 0.5 s that a stop may take, and a little
+FARTHEST = 0.5 * 0.5 + 0.05  # m; what a robot at 0.5 m/s goes in the 0.5 s that a stop may take, and a little
 TWO_FRAMES = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
 PHONE = {"width": 390, "height": 844}
 
@@ -191,7 +191,7 @@ def is_soon(condition: Callable[[], bool]) -> bool:
 def stands_near(odom: Latest[Odometry], before: tuple[float, float]) -> None:
     """Check that the robot comes to rest within 0.5 s, and within the distance that it covers in that time."""
     wait_for(lambda: speed(odom) < 0.01, what="the robot to stand")
-    assert math.dist(place(odom), before) < MOST
+    assert math.dist(place(odom), before) < FARTHEST
 
 
 def test_the_robot_is_where_its_odometry_places_it_in_its_colours_and_moves_when_driven(

@@ -1,4 +1,4 @@
-"""Processes meet over slow links, and where the holder of the rendezvous point sleeps or is not Zenoh."""
+"""Processes meet over slow links, and where the holder of the meeting point sleeps or is not Zenoh."""
 
 import json
 import signal
@@ -87,7 +87,7 @@ time.sleep(999)
 
 
 class Town:
-    """Processes that meet at any of three rendezvous points, as they do by default at ports 7447 to 7449."""
+    """Processes that meet at any of three meeting points, as they do by default at ports 7447 to 7449."""
 
     def __init__(self) -> None:
         self.ports = sorted(free_port() for _ in range(3))

@@ -49,7 +49,7 @@ def bad(rows: Rows, check: str) -> list[str]:
 
 @pytest.fixture
 def door(wire: Wire) -> Bus:
-    """A process that holds the rendezvous point."""
+    """A process that holds the meeting point."""
     return wire.bus("door", lasting=True)
 
 

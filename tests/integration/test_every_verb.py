@@ -35,7 +35,7 @@ SIDE_BY_SIDE, MANY = 6, 20  # processes at once: those that work, and those that
 
 RACE = "dispatcher/resource.rs"
 """Where a thread of Zenoh's panics when many sessions come and go beside each other: eclipse-zenoh/zenoh#2624."""
-MOST_RACES = 3  # of some 300 tries; nothing is tried again
+MAX_RACES = 3  # of some 300 tries; nothing is tried again
 RACED: list[str] = []
 
 Done = subprocess.CompletedProcess[str]
@@ -285,4 +285,4 @@ def test_ctrl_c_ends_what_waits(place: Town) -> None:
 
 
 def test_zenohs_own_race_was_rare() -> None:
-    assert len(RACED) <= MOST_RACES, RACED
+    assert len(RACED) <= MAX_RACES, RACED

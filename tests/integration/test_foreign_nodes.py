@@ -23,7 +23,7 @@ SHOWN = "linear:\n  x: 1.5\n  y: 0.0\n  z: -2.0\nangular:\n  x: 0.0\n  y: 0.0\n 
 
 @pytest.fixture(scope="module")
 def town() -> Iterator[Wire]:
-    """A place where a foreign node puts all of PUTS at 100 Hz; of ours there is only a rendezvous holder."""
+    """A place where a foreign node puts all of PUTS at 100 Hz; of ours only one that holds a meeting point."""
     with Wire() as wire:
         wire.bus("door")
         done = threading.Event()

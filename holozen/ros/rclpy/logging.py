@@ -78,7 +78,7 @@ def _colored(stream: TextIO) -> bool:
     return setting == "1" if setting in ("0", "1") else stream.isatty()
 
 
-MOST_CALLS = 10_000  # that are remembered: generated code must not fill the memory
+MAX_CALLS = 10_000  # that are remembered: generated code must not fill the memory
 
 Call = tuple[str, Place]  # the name of a logger, and where it is called
 
@@ -98,7 +98,7 @@ def _passes(
     if seconds is not None and (isinstance(seconds, bool) or not isinstance(seconds, int | float)):
         raise TypeError(f"throttle_duration_sec is {article(type(seconds).__name__)}; use seconds, as a number")
     with _filter_lock:
-        if len(_call_levels) >= MOST_CALLS:
+        if len(_call_levels) >= MAX_CALLS:
             return True
         is_first = call not in _call_levels
         if (before := _call_levels.setdefault(call, level)) != level:

@@ -8,7 +8,7 @@ from holozen.ros.rclpy import names
 from holozen.ros.rclpy.parameter import Parameter, ParameterStore, set_result
 from holozen.ros.rclpy.qos import qos_profile_parameters
 from holozen.ros.rclpy.service import Refusal
-from holozen.transport.parameters import ELSE, MOST, unknown
+from holozen.transport.parameters import ELSE, MAX_NAMES, unknown
 
 Answer = Callable[[Any, Any], None]
 
@@ -40,8 +40,8 @@ class _ParameterServices:
 
         def callback(request: Any, response: Any) -> Any:
             requested: list[Any] = getattr(request, "names", None) or getattr(request, "parameters", [])
-            if len(requested) > MOST:
-                raise Refusal(f"{len(requested)} parameters in one request; at most {MOST}")
+            if len(requested) > MAX_NAMES:
+                raise Refusal(f"{len(requested)} parameters in one request; at most {MAX_NAMES}")
             for name in getattr(request, "names", ()):
                 if reason := self._unknown(name):
                     raise Refusal(reason)

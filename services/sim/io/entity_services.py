@@ -39,7 +39,7 @@ from ..shard import Share
 MAX_SPEED = 100.0  # m/s and rad/s, of a state to set
 MAX_SPAWNS = 64  # waiting requests; each takes some 20 ms, and the last one is to be answered within a caller's 5 s
 REUSED = 2.0  # s for which a model with mesh files is reused; after that its files are read again
-MOST_PARSED = 8  # texts whose models are kept, for a fleet, or a robot that is spawned again
+MAX_PARSED = 8  # texts whose models are kept, for a fleet, or a robot that is spawned again
 MAX_WARNINGS = 20  # about a robot's text in a reply
 MAX_TAGS = 20_000  # "<" in a text; parsing more of them would stall the steps
 WORLD = ("", "world", "odom", "map")  # frames that mean the world
@@ -146,7 +146,7 @@ class EntityServices:
             raise EntityError(si.SpawnEntityReply.RESOURCE_PARSE_ERROR, str(error)) from None
         shapes = (shape for link in model.links.values() for shape in (*link.collisions, *link.visuals))
         lasting = not model.warnings and not any(shape.path for shape in shapes)
-        self._parsed = dict([*self._parsed.items()][1 - MOST_PARSED :])
+        self._parsed = dict([*self._parsed.items()][1 - MAX_PARSED :])
         self._parsed[key] = Parsed(model, math.inf if lasting else time.monotonic() + REUSED)
         return model
 

@@ -14,12 +14,12 @@ from holozen.rotation import XYZ, XYZW, conjugate, multiply, rotate
 from .dynamics import FRICTION, damping_of
 from .engine import UPRIGHT, Array, Box, Contact, Engine, JointStates, Rays
 
-__all__ = ["MOST_KEPT", "Bullet", "BulletRays", "bullet"]
+__all__ = ["MAX_KEPT", "Bullet", "BulletRays", "bullet"]
 
 MAX_IN_ONE = 16  # pybullet's MAX_COMPOUND_COLLISION_SHAPES; it silently drops the rest
 NOTHING = -1  # pybullet's number for no shape
-MOST_KEPT = 64  # removed bodies that are kept for reuse; each takes 0.6 us a step
-MOST_SEEN = 1000  # the same in the world of rays, which is never stepped
+MAX_KEPT = 64  # removed bodies that are kept for reuse; each takes 0.6 us a step
+MAX_SEEN = 1000  # the same in the world of rays, which is never stepped
 FAR_AWAY: XYZ = (0.0, 0.0, 1e6)
 ASLEEP, AWAKE = 1 | 8, 2 | 4  # pybullet's flags: sleeping enabled and asleep; sleeping disabled and awake
 FREE, FIXED = (1, -1), (2, ~2)  # the engine's collision groups and masks, of free bodies and of fixed bases
@@ -231,7 +231,7 @@ class BulletRays(Rays):
 
     def __init__(self, ground: bool) -> None:
         self._world: int = bullet.connect(bullet.DIRECT)
-        self._made = Bodies(self._world, MOST_SEEN)
+        self._made = Bodies(self._world, MAX_SEEN)
         self._bodies: dict[int, list[int]] = {}
         self._owners: dict[int, int] = {}  # the engine's body -> the number of its shapes
         self._added = 0
@@ -339,7 +339,7 @@ class Bodies:
     only put to sleep, far away and without contacts, until a like one is added; up to `most` of them are kept.
     """
 
-    def __init__(self, world: int, most: int = MOST_KEPT) -> None:
+    def __init__(self, world: int, most: int = MAX_KEPT) -> None:
         self.world, self.shapes, self._most = world, Shapes(world), most
         self._kinds: dict[int, object] = {}  # number -> kind of the present bodies
         self._kept: dict[int, object] = {}  # number -> kind of removed bodies, the first removed first

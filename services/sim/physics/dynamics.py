@@ -18,7 +18,7 @@ GRAVITY = -GRAVITY_VECTOR[2]  # m/s^2
 GENTLE = 4.0  # the fewest steps in which a contact resolves penetration
 SINK = 2e-4  # m that a skid-steer's tyres yield under its weight, so that all of them carry it
 RECOVERY = 0.1  # s; time constant of their rebound
-MOST_LOST = 10.0  # time constants of damping in a step; beyond, a joint stands still at once
+MAX_LOST = 10.0  # time constants of damping in a step; beyond, a joint stands still at once
 
 
 def contact_of(part: Part, dt: float, load: float = 0.0, drags: bool = False, rolls: bool = False) -> Contact:
@@ -56,7 +56,7 @@ def damping_of(parts: Sequence[Part], number: int, dt: float, implicit: bool = F
     beside = sum(other.parent == part.parent for other in parts)  # all of them may turn against the same part
     inertia = 1 / (1 / _inertia(part, part.joint.axis) + beside / _carrier(parts, part))
     lost = part.joint.damping * dt / inertia
-    return inertia / dt * (math.expm1(min(lost, MOST_LOST)) if implicit else -math.expm1(-lost))
+    return inertia / dt * (math.expm1(min(lost, MAX_LOST)) if implicit else -math.expm1(-lost))
 
 
 def _carrier(parts: Sequence[Part], part: Part) -> float:

@@ -17,7 +17,7 @@ MOTIONS: dict[str, Direction] = {
     "up": (0, 0, 1, 0), "down": (0, 0, -1, 0),
     "turn-left": (0, 0, 0, 1), "turn-right": (0, 0, 0, -1),
 }  # fmt: skip
-MOST_PERCENT = 90.0
+MAX_PERCENT = 90.0
 _FACTOR = re.compile(r"(\S+)\s+([+-]\d{1,3}(?:\.\d{1,3})?)\s?%")
 _TOP = ["name", "positional", "moves", "speeds", "actions"]
 
@@ -111,8 +111,8 @@ def _motion(text: str) -> Direction:
 
 def _factors(text: str) -> tuple[float, float]:
     match = _FACTOR.fullmatch(text.strip())
-    if not match or abs(float(match[2])) > MOST_PERCENT:
-        raise _Wrong(f"write both, speed or turn and up to {MOST_PERCENT:.0f} %, such as 'both +10%'")
+    if not match or abs(float(match[2])) > MAX_PERCENT:
+        raise _Wrong(f"write both, speed or turn and up to {MAX_PERCENT:.0f} %, such as 'both +10%'")
     factor = round(1 + float(match[2]) / 100, 6)
     which = {"both": (factor, factor), "speed": (factor, 1.0), "turn": (1.0, factor)}
     if match[1] not in which:

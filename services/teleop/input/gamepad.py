@@ -196,7 +196,7 @@ def stick(x: float, y: float) -> tuple[float, float]:
 
 
 FOLDER = "/dev/input"
-MOST_READS = 16  # of up to 64 events each; the rest waits for the next call
+MAX_READS = 16  # of up to 64 events each; the rest waits for the next call
 GONE = (OSError, EOFError)
 GROUP = "join the group that may: sudo usermod -aG input $USER, then log in again"
 
@@ -265,7 +265,7 @@ class Joystick:
         """
         self._pad.let_go()
         with contextlib.suppress(*GONE):  # the next `read` reports it
-            for _ in range(MOST_READS):
+            for _ in range(MAX_READS):
                 if not list(self._device.events()):
                     break
             self._begin()
@@ -283,7 +283,7 @@ class Joystick:
 
     def _read(self) -> list[str]:
         actions: list[str] = []
-        for _ in range(MOST_READS):
+        for _ in range(MAX_READS):
             events = list(self._device.events())
             actions += [action for event in events if (action := self._pad.take(*event))]
             if self._pad.lost:

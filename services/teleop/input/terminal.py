@@ -16,7 +16,7 @@ ASK_ALIVE = "\x1b[5n"
 # The Kitty protocol, with unambiguous codes, releases, the key's place on a US keyboard, for all keys.
 RELEASES_ON, RELEASES_SET, RELEASES_OFF = "\x1b[>15u", "\x1b[=15;1u", "\x1b[<u"
 FAREWELL = 0.1  # s to wait at the end for pending replies, which would else reach the shell
-MOST = 65536  # bytes read at once
+MAX_READ = 65536  # bytes read at once
 
 
 class Terminal:
@@ -79,7 +79,7 @@ class Terminal:
 
     def read(self) -> bytes:
         """The available input; blocks until there is some. Raises OSError if the terminal is gone."""
-        if not (data := os.read(self._in, MOST)):
+        if not (data := os.read(self._in, MAX_READ)):
             raise OSError("the terminal was closed")
         return data
 

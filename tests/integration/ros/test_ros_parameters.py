@@ -18,7 +18,7 @@ from holozen.ros.rclpy.node import Node
 from holozen.ros.rclpy.parameter import Parameter, set_result
 from holozen.testing import Wire
 from holozen.transport.errors import ServiceError
-from holozen.transport.parameters import ELSE, MOST
+from holozen.transport.parameters import ELSE, MAX_NAMES
 
 Descriptor = find("rcl_interfaces/msg/ParameterDescriptor")
 Range = find("rcl_interfaces/msg/FloatingPointRange")
@@ -159,8 +159,8 @@ def test_what_is_asked_wrongly_is_refused_and_the_node_spins_on(wire: Wire, run:
         1, "", "holozen param get: lab/tom has no parameter 'sped' (did you mean 'speed'?)\n",
     )  # fmt: skip
     caller = wire.bus("caller")
-    with pytest.raises(ServiceError, match=f"at most {MOST}"):
-        caller.call("lab/tom/get_parameters", r.GetParametersRequest(["speed"] * (MOST + 1)), r.GetParametersReply)
+    with pytest.raises(ServiceError, match=f"at most {MAX_NAMES}"):
+        caller.call("lab/tom/get_parameters", r.GetParametersRequest(["speed"] * (MAX_NAMES + 1)), r.GetParametersReply)
     wrong = r.SetParametersRequest([r.Parameter("laps", r.ParameterValue(type=77))])
     (refused,) = caller.call("lab/tom/set_parameters", wrong, r.SetParametersReply).results
     assert refused.reason == "77 is not a parameter type; they go from 0 to 9"

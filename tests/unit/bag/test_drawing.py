@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from holozen.bag import BagError, Channel, Message
-from holozen.bag.drawing import MOST, Track, draw, tracks
+from holozen.bag.drawing import MAX_ROWS, Track, draw, tracks
 from holozen.messages import Odometry, Twist, TwistStamped
 from holozen.messages.codec import encode
 
@@ -38,12 +38,12 @@ def test_odometry_and_commands_become_rows_of_numbers() -> None:
 
 def test_a_long_track_is_thinned_out_and_keeps_its_ends() -> None:
     track = Track("odom")
-    for i in range(5 * MOST):
+    for i in range(5 * MAX_ROWS):
         track.add((float(i),))
-    assert MOST / 2 <= len(track.rows) < MOST
-    assert track.count == 5 * MOST
+    assert MAX_ROWS / 2 <= len(track.rows) < MAX_ROWS
+    assert track.count == 5 * MAX_ROWS
     assert track.rows[0] == (0.0,)
-    assert track.rows[-1][0] >= 5 * MOST - 16
+    assert track.rows[-1][0] >= 5 * MAX_ROWS - 16
     assert len({b[0] - a[0] for a, b in zip(track.rows, track.rows[1:], strict=False)}) == 1
 
 

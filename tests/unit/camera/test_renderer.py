@@ -5,7 +5,7 @@ from pathlib import Path
 
 from holozen.robot.description import read, written
 from holozen.robot.loading import load
-from services.camera.renderer import MOST_REMOVED, Renderer
+from services.camera.renderer import MAX_REMOVED, Renderer
 
 REPO = Path(__file__).parents[3]
 
@@ -21,8 +21,8 @@ def test_the_looks_of_robots_that_left_take_a_bounded_memory() -> None:
             renderer.renew()
         return resident()
 
-    before = come_and_go(MOST_REMOVED)
-    assert come_and_go(MOST_REMOVED) - before < 40e6  # each takes 0.8 MB until the renderer is renewed
+    before = come_and_go(MAX_REMOVED)
+    assert come_and_go(MAX_REMOVED) - before < 40e6  # each takes 0.8 MB until the renderer is renewed
     renderer.close()
 
 

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from holozen.cli.fields import LONGEST, MOST_NODES, compiled, path, pick
+from holozen.cli.fields import LONGEST, MAX_NODES, compiled, path, pick
 
 MESSAGE = {"linear": {"x": 0.3, "y": 0}, "name": ["a", "b"], "frame_id": "odom", "m": 5, "ok": True, "from": 1}
 
@@ -94,7 +94,7 @@ def test_anything_else_is_refused_in_one_line() -> None:
         "await x",
         "x" * (LONGEST + 1),
         "(" * 300 + "1" + ")" * 300,
-        "1+" * (MOST_NODES // 2) + "1",
+        "1+" * (MAX_NODES // 2) + "1",
         "\0",
         "-" * 900 + "1",
     ]:

@@ -252,7 +252,7 @@ def test_without_a_router_it_reports_that(capsys: pytest.CaptureFixture[str]) ->
     assert err.startswith("holozen stop: no robot was reached: cannot open Zenoh: ")
 
 
-def test_a_process_that_does_not_answer_at_the_rendezvous_point_is_named(run: Run, wire: Wire) -> None:
+def test_a_process_that_does_not_answer_at_the_meeting_point_is_named(run: Run, wire: Wire) -> None:
     with socket.create_server(("127.0.0.1", wire.port)):  # the kernel connects for it, and it never answers
         code, out, err = run("stop", "--timeout", "0.5")
     assert (code, out, err.count("\n")) == (1, "", 1)

@@ -6,10 +6,10 @@ import pytest
 
 from holozen.robot.elements import (
     DEEPEST,
-    MOST_ELEMENTS,
-    MOST_GUESSES,
-    MOST_TEXT,
-    MOST_WARNINGS,
+    MAX_ELEMENTS,
+    MAX_GUESSES,
+    MAX_TEXT,
+    MAX_WARNINGS,
     Source,
     Tag,
     read_xml,
@@ -37,17 +37,17 @@ def test_a_text_of_many_pieces_is_put_together() -> None:
 
 
 def test_too_much_text_is_refused_with_its_size_and_what_is_allowed() -> None:
-    assert refusal("x" * (MOST_TEXT + 1)) == (
+    assert refusal("x" * (MAX_TEXT + 1)) == (
         "f: the file contains 4.0 MB of XML; a robot or world has at most 4 MB: move its meshes to separate files"
     )
-    assert "broken XML" in refusal("x" * MOST_TEXT)
+    assert "broken XML" in refusal("x" * MAX_TEXT)
 
 
 def test_one_element_too_many_is_refused_before_the_rest_is_read() -> None:
-    most = "<b/>" * (MOST_ELEMENTS - 1)
-    assert len(read_xml(f"<a>{most}</a>", "f").children) == MOST_ELEMENTS - 1
+    most = "<b/>" * (MAX_ELEMENTS - 1)
+    assert len(read_xml(f"<a>{most}</a>", "f").children) == MAX_ELEMENTS - 1
     message = refusal(f"<a>{most}\n<b/> < broken")
-    assert message == f"f, line 2: <b> is element number {MOST_ELEMENTS + 1}; a file may have at most {MOST_ELEMENTS}"
+    assert message == f"f, line 2: <b> is element number {MAX_ELEMENTS + 1}; a file may have at most {MAX_ELEMENTS}"
 
 
 def test_elements_lie_two_hundred_deep_and_no_deeper() -> None:
@@ -63,11 +63,11 @@ def test_a_value_is_the_attribute_or_else_the_text() -> None:
 
 def test_more_warnings_than_anyone_reads_are_cut() -> None:
     source, tag = Source(Path("r.urdf"), {}), Tag("a", {}, "f, line 3")
-    for index in range(MOST_WARNINGS + 5):
+    for index in range(MAX_WARNINGS + 5):
         source.warn(tag, f"is wrong {index}")
-    assert len(source.warnings) == MOST_WARNINGS + 1
+    assert len(source.warnings) == MAX_WARNINGS + 1
     assert source.warnings[0] == "f, line 3: <a> is wrong 0"
-    assert source.warnings[-1] == f"f, line 3: there are more than {MOST_WARNINGS} warnings; the rest are not listed"
+    assert source.warnings[-1] == f"f, line 3: there are more than {MAX_WARNINGS} warnings; the rest are not listed"
 
 
 def test_the_nearest_name_is_reported_whatever_its_case() -> None:
@@ -90,8 +90,8 @@ def test_what_names_have_in_common_makes_them_no_nearer() -> None:
 
 def test_guessing_ends_in_a_file_of_nothing_but_mistakes() -> None:
     source = Source(Path("r.urdf"), {})
-    message = [source.suggest("whel", ["wheel"]) for _ in range(MOST_GUESSES + 1)]
-    assert message == [" (did you mean 'wheel'?)"] * MOST_GUESSES + [""]
+    message = [source.suggest("whel", ["wheel"]) for _ in range(MAX_GUESSES + 1)]
+    assert message == [" (did you mean 'wheel'?)"] * MAX_GUESSES + [""]
 
 
 HEADER = '<?xml version="1.0"?>'

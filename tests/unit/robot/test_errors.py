@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from holozen.robot.errors import MOST, RobotError
+from holozen.robot.errors import MAX_MESSAGE, RobotError
 from holozen.robot.loading import parse
 from holozen.suggest import cut, listed
 
@@ -19,8 +19,8 @@ def test_a_word_is_cut_and_a_short_one_is_not() -> None:
 
 
 def test_a_message_has_an_end() -> None:
-    assert str(RobotError("x" * MOST)) == "x" * MOST
-    assert str(RobotError(LONG)) == "x" * (MOST - 3) + "..."
+    assert str(RobotError("x" * MAX_MESSAGE)) == "x" * MAX_MESSAGE
+    assert str(RobotError(LONG)) == "x" * (MAX_MESSAGE - 3) + "..."
 
 
 def test_a_long_word_of_the_file_does_not_make_a_long_message() -> None:

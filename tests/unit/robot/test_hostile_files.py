@@ -17,12 +17,12 @@ from holozen.check.report import check
 from holozen.robot.description import read
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import both, load, parse, received
-from holozen.robot.meshes import MOST_SHOWN, file_in
+from holozen.robot.meshes import MAX_SHOWN, file_in
 from holozen.robot.sdf_world import load_world
 from holozen.robot.xacro import expand_xacro
 from tests.hostile import MESHES, data, laid_out
 
-MOST_MEMORY = 200e6  # bytes that all of them may take beyond what was taken before
+MAX_MEMORY = 200e6  # bytes that all of them may take beyond what was taken before
 
 
 class Watch:
@@ -59,7 +59,7 @@ def test_a_hostile_text_opens_nothing_takes_little_and_is_reported_in_a_line(tmp
             watch.is_on = False
         opened = [one for one in watch.opened if not one.endswith((".py", ".pyc"))]  # what Python imports late
         assert all(one in allowed for one in opened), (name, opened)
-    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MOST_MEMORY
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MAX_MEMORY
 
 
 def test_a_packed_mesh_that_unpacks_to_more_than_is_shown_is_refused_before_it_is_unpacked() -> None:
@@ -67,8 +67,8 @@ def test_a_packed_mesh_that_unpacks_to_more_than_is_shown_is_refused_before_it_i
     before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     for packed in (zeros * 300, zeros[:-4] + b"yyyy", b"", b"x" * 1000):
         with contextlib.suppress(RobotError):
-            assert len(file_in(data("stl+gzip", packed))[1]) <= MOST_SHOWN
-    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MOST_MEMORY
+            assert len(file_in(data("stl+gzip", packed))[1]) <= MAX_SHOWN
+    assert (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before) * 1024 < MAX_MEMORY
 
 
 WAYS: dict[str, Callable[[Path, Path], object]] = {

@@ -508,7 +508,7 @@ def test_a_mesh_that_cannot_be_sent_is_left_with_a_warning(folder: Path, monkeyp
     text, warnings = sent(folder, URDF % "gone.stl")
     assert "'gone.stl'" in text and len(DATA.findall(text)) == 1
     assert len(warnings) == 1 and "(collision) is replaced by a box" in warnings[0]
-    monkeypatch.setattr(loading, "MOST_SHOWN", 100)
+    monkeypatch.setattr(loading, "MAX_SHOWN", 100)
     text, warnings = loading.with_meshes(URDF % "box.stl", folder / "robot.urdf", {"p": folder})
     assert "box.stl" in text and len(DATA.findall(text)) == 2
     assert set(warnings) == {warnings[0]} and "the visual mesh" in warnings[0] and "take more than" in warnings[0]

@@ -156,7 +156,7 @@ def test_what_is_no_mesh_is_reported_in_one_line_with_its_place() -> None:
 
 
 def test_a_geometry_that_stands_everywhere_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(meshes, "MOST_POINTS", 20)
+    monkeypatch.setattr(meshes, "MAX_POINTS", 20)
     assert len(points(dae(nodes=f"<node>{HERE * 2}</node>"))) == 16
     assert refusal(dae(nodes=f"<node>{HERE * 3}</node>")) == "a.dae: has more than 20 corners in its scene; simplify it"
 

@@ -76,7 +76,7 @@ def forever() -> int:
 
 
 def much() -> int:
-    return len(bytearray(2 * reader.MOST_MEMORY))
+    return len(bytearray(2 * reader.MAX_MEMORY))
 
 
 def crashed() -> int:

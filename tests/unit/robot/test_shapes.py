@@ -113,7 +113,7 @@ def test_a_confined_text_opens_no_file_beside_it_nor_a_guess(source: Source, hom
 def test_a_confined_text_has_a_limited_number_of_meshes(
     source: Source, home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(shapes, "MOST_MESHES", 2)
+    monkeypatch.setattr(shapes, "MAX_MESHES", 2)
     uri, wire = data_uri(home / "box.stl"), replace(source, confined=True)
     assert [shape(wire, uri).kind for _ in range(3)] == ["hull", "hull", "box"]
     assert "is mesh number 3; the sim reads at most 2 collision meshes" in wire.warnings[0]
@@ -121,7 +121,7 @@ def test_a_confined_text_has_a_limited_number_of_meshes(
 
 
 def test_no_large_file_is_read_for_a_confined_text(source: Source, home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(shapes, "MOST_BYTES", len(STL) - 1)
+    monkeypatch.setattr(shapes, "MAX_BYTES", len(STL) - 1)
     wire = replace(source, confined=True, packages={"p": home})
     assert shape(wire, "package://p/box.stl").kind == "box"
     assert f"{home}/box.stl: is too large to be read by the sim; send the mesh itself" in wire.warnings[0]

@@ -188,7 +188,7 @@ def test_the_folder_is_that_of_the_user(monkeypatch: pytest.MonkeyPatch) -> None
 def test_the_oldest_entries_and_the_parts_of_killed_processes_are_forgotten(
     place: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(xacro, "MOST_ENTRIES", 3)
+    monkeypatch.setattr(xacro, "MAX_ENTRIES", 3)
     place.mkdir(parents=True)
     (place / "x.12.part").touch()
     os.utime(place / "x.12.part", ns=(0, 0))
@@ -201,7 +201,7 @@ def test_the_oldest_entries_and_the_parts_of_killed_processes_are_forgotten(
 
 
 def test_a_large_text_is_not_kept(place: Path) -> None:
-    xacro.store_cached("key", {"text": "x" * xacro.MOST_BYTES})
+    xacro.store_cached("key", {"text": "x" * xacro.MAX_BYTES})
     assert not place.exists()
 
 

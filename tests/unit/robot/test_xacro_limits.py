@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from holozen.robot import xacro
-from holozen.robot.elements import MOST_ELEMENTS
+from holozen.robot.elements import MAX_ELEMENTS
 from holozen.robot.errors import RobotError
 from holozen.robot.xacro import expand_xacro
 
@@ -86,7 +86,7 @@ def test_a_runaway_ends_in_a_line(folder: Path) -> None:
         ('<xacro:property name="a" value="${a}"/><l n="${a}"/>', 2, "circular variable definition: a -> a"),
         (f"{MACROS}<xacro:m8/>", 3, CALLS),
         (f'{BLOCKS}<xacro:insert_block name="b8"/>', 3, CALLS),
-        ("<a/>" * (MOST_ELEMENTS + 1), 2, f"it expands without end; at most {MOST_ELEMENTS} elements are expanded"),
+        ("<a/>" * (MAX_ELEMENTS + 1), 2, f"it expands without end; at most {MAX_ELEMENTS} elements are expanded"),
     ]  # fmt: skip
     for body, line, expected in rows:
         check(folder, body, line, expected)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen.command.arbiter import Arbiter
-from holozen.command.inputs import MOST_LINES, REPORT_EVERY, CommandStats, Lines, TwistInput
+from holozen.command.inputs import MAX_LINES, REPORT_EVERY, CommandStats, Lines, TwistInput
 from holozen.command.motion import Motion
 from holozen.command.wait_set import Moment
 from holozen.limits import STOP
@@ -243,9 +243,9 @@ def test_a_fleet_reports_some_lines_a_second_and_counts_the_others() -> None:
     robots = [CommandStats(reports.append, lines) for _ in range(300)]
     for robot in robots:
         robot.refuse("Fred/cmd_vel", "old", "old: it was late", "pilot@1", 10.0)
-    assert len(reports) == MOST_LINES
+    assert len(reports) == MAX_LINES
     robots[-1].refuse("Fred/cmd_vel", "old", "old: it was late", "pilot@1", 10.0 + REPORT_EVERY)
-    assert reports[MOST_LINES:] == ["Fred/cmd_vel: from pilot@1: old: it was late (and 1 more)"]
+    assert reports[MAX_LINES:] == ["Fred/cmd_vel: from pilot@1: old: it was late (and 1 more)"]
     assert robots[-1].refused == {"old": 2}
 
 

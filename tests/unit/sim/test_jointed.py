@@ -10,7 +10,7 @@ import pytest
 from holozen.robot.errors import RobotError
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
-from services.sim.physics.bullet import MOST_KEPT, Bullet, bullet
+from services.sim.physics.bullet import MAX_KEPT, Bullet, bullet
 from services.sim.physics.jointed import JointedBody
 from services.sim.physics.world import World
 
@@ -352,10 +352,10 @@ def test_what_touched_a_body_that_was_removed_falls(ground: World) -> None:
 def test_a_bounded_number_of_removed_bodies_is_kept(ground: World) -> None:
     model = robot(link("a", 1, 1.7e-3, CUBE))
     assert isinstance(ground.engine, Bullet)
-    for body in [ground.add_jointed(model, (number, 0, 1)) for number in range(MOST_KEPT + 3)]:
+    for body in [ground.add_jointed(model, (number, 0, 1)) for number in range(MAX_KEPT + 3)]:
         body.remove()
-    assert bullet.getNumBodies(ground.engine.id) == 1 + MOST_KEPT
+    assert bullet.getNumBodies(ground.engine.id) == 1 + MAX_KEPT
     body = ground.add_jointed(model, (0, 0, 1))
-    assert bullet.getNumBodies(ground.engine.id) == 1 + MOST_KEPT
+    assert bullet.getNumBodies(ground.engine.id) == 1 + MAX_KEPT
     run(ground, 1)
     assert body.pose()[0] == pytest.approx((0, 0, 0.05), abs=1e-3)

@@ -67,7 +67,7 @@ def test_by_default_every_endpoint_is_on_loopback_and_multicast_is_off(mode: str
     assert value(connection, "scouting/multicast/enabled") is False
 
 
-def test_a_peer_listens_at_the_first_rendezvous_point_and_at_a_port_of_its_own() -> None:
+def test_a_peer_listens_at_the_first_meeting_point_and_at_a_port_of_its_own() -> None:
     assert value(Connection(), "listen/endpoints") == [RENDEZVOUS[0], LOOPBACK]
     assert value(Connection(), "connect/endpoints") == [*RENDEZVOUS]
     given = Connection(listen=("tcp/10.0.0.1:7",), connect=("tcp/10.0.0.2:8",))
@@ -123,7 +123,7 @@ def test_a_configuration_file_decides_what_no_flag_names() -> None:
     assert given.settings() == {"mode": '"client"', "connect/endpoints": '["tcp/h:1"]', "a": "1", **TRIES, **INTACT}
 
 
-def test_where_a_process_both_listens_and_connects_is_a_rendezvous_point() -> None:
+def test_where_a_process_both_listens_and_connects_is_a_meeting_point() -> None:
     one, two, three = (f"tcp/127.0.0.1:{port}" for port in (9, 10, 11))
     for connection, points in [
         (Connection(), RENDEZVOUS),

@@ -165,7 +165,7 @@ def test_a_peer_that_has_declared_nothing_yet_is_waited_for_longer() -> None:
     assert graph.settled(lambda: True) == [ODOM, late]
 
 
-def test_a_session_that_a_rendezvous_point_lists_is_waited_for_and_then_nothing() -> None:
+def test_a_session_that_a_meeting_point_lists_is_waited_for_and_then_nothing() -> None:
     """It is met after the others have been quiet for longer than a silent peer is waited for. Its first token comes
     before the others."""
     late = ODOM._replace(session="b2", node="late")
@@ -185,7 +185,7 @@ def test_a_session_that_a_rendezvous_point_lists_is_waited_for_and_then_nothing(
     assert {end.node for end in graph.settled(lambda: True) if end.key == ODOM.key} == {ODOM.node, "late"}
 
 
-def test_a_node_at_a_rendezvous_point_that_lists_itself_alone_is_called_once_more_and_no_more_waited_for() -> None:
+def test_a_node_at_a_meeting_point_that_lists_itself_alone_is_called_once_more_and_no_more_waited_for() -> None:
     late = ODOM._replace(key="tf")
     calls = iter([(token(ODOM), True), (token(late), True)])
     changes = deque[tuple[str, bool]]()

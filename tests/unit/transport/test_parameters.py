@@ -10,7 +10,7 @@ from holozen.messages import rcl_interfaces as r
 from holozen.messages.codec import WIRES
 from holozen.testing import Wire
 from holozen.transport.errors import ServiceError
-from holozen.transport.parameters import ELSE, MOST, Choice, Number, Parameter, Parameters
+from holozen.transport.parameters import ELSE, MAX_NAMES, Choice, Number, Parameter, Parameters
 
 
 class Node:
@@ -167,5 +167,5 @@ def test_the_same_name_twice_in_a_request_is_refused(node: Node) -> None:
 
 
 def test_a_request_with_too_many_names_is_refused(node: Node) -> None:
-    with pytest.raises(ServiceError, match=f"^{MOST + 1} parameters in one request; at most {MOST}$"):
-        node.set(*[("speed", of(1.0))] * (MOST + 1))
+    with pytest.raises(ServiceError, match=f"^{MAX_NAMES + 1} parameters in one request; at most {MAX_NAMES}$"):
+        node.set(*[("speed", of(1.0))] * (MAX_NAMES + 1))

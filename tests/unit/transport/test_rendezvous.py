@@ -1,4 +1,4 @@
-"""Rendezvous points are held by one process each, and by the next as soon as that one is gone."""
+"""Meeting points are held by one process each, and by the next as soon as that one is gone."""
 
 import os
 import socket
@@ -38,7 +38,7 @@ def test_what_is_no_endpoint_of_this_machine_is_not_free() -> None:
 
 
 class Points:
-    """Stands for Zenoh: opens sockets at rendezvous points, and remembers where it tried."""
+    """Stands for Zenoh: opens sockets at meeting points, and remembers where it tried."""
 
     def __init__(self) -> None:
         self.tries: list[str] = []

@@ -16,7 +16,7 @@ from holozen.ros.rclpy.handle import wrong_type
 from holozen.ros.rclpy.names import key
 from holozen.ros.rclpy.qos import QoSProfile, qos_profile_action_status_default, qos_profile_services_default
 from holozen.ros.rclpy.task import Future
-from holozen.transport.actions import CANCEL, FEEDBACK, MOST, RESULT, SEND, STATUS, State, new_id, wait_for_result
+from holozen.transport.actions import CANCEL, FEEDBACK, MAX_GOALS, RESULT, SEND, STATUS, State, new_id, wait_for_result
 
 __all__ = ["ActionClient", "ClientGoalHandle"]
 
@@ -203,7 +203,7 @@ class ActionClient(HelpfulAttributes):
 
 
 def _keep(table: dict[bytes, Any], identity: bytes, value: Any) -> None:
-    """Add to a table that forgets the oldest of more than MOST: progress may arrive after the result."""
+    """Add to a table that forgets the oldest of more than MAX_GOALS: progress may arrive after the result."""
     table[identity] = value
-    if len(table) > MOST:
+    if len(table) > MAX_GOALS:
         del table[next(iter(table))]
