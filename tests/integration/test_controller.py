@@ -72,7 +72,10 @@ class Scene:
         wait_for(lambda: person.drive(0, -0.3) and f"yields to {name}@" in self.controller.err)
 
     def controller_drives(self) -> None:
-        wait_for(lambda: self.robot.status().obeyed.startswith("controller@"))
+        wait_for(
+            lambda: self.robot.status().obeyed.startswith("controller@"),
+            what=lambda: f"the controller to drive: {self.robot.status()}, {self.controller.err[-500:]}",
+        )
         self.robot.odom.next(lambda odom: not rests(odom))
 
 

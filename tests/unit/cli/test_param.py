@@ -34,7 +34,7 @@ class Node:
 def node(wire: Wire) -> Node:
     """One that is called sim."""
     node = Node()
-    Parameters(wire.bus("sim"), "sim", node.declared, lambda _: None).start()
+    Parameters(wire.bus("sim", lasting=True), "sim", node.declared, lambda _: None).start()
     return node
 
 
