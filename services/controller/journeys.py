@@ -45,7 +45,7 @@ class Journey:
         return False
 
     def end(self) -> None:
-        """Called when the robot stands at the last pose, or where it stopped since the client cancelled."""
+        """Called when the robot rests at the last pose, or where it stopped since the client cancelled."""
 
 
 class GoalJourney(Journey):
