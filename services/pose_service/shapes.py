@@ -9,6 +9,7 @@ Point = tuple[float, float]
 
 INFINITY_POINTS = 24
 MAX_VALUE = 1e6  # m, rad
+MAX_TEXT = 1_000_000  # characters of a file of goals; a device may have no end
 
 
 class GoalsError(ValueError):
@@ -67,11 +68,15 @@ def read_goals(path: Path) -> list[Goal]:
     comment. Raises GoalsError.
     """
     try:
-        lines = path.read_text().splitlines()
+        with path.open() as file:
+            text = file.read(MAX_TEXT + 1)
     except OSError as error:
         raise GoalsError(f"goals {path}: {error.strerror}") from None
     except UnicodeDecodeError:
         raise GoalsError(f"goals {path}: not a text in UTF-8") from None
+    if len(text) > MAX_TEXT:
+        raise GoalsError(f"goals {path}: more than {MAX_TEXT:,} characters; give a shorter file")
+    lines = text.splitlines()
     goals = [_goal(line, f"{path}:{number}") for number, line in enumerate(lines, 1) if _content(line)]
     if not goals:
         raise GoalsError(f"goals {path}: no goals; write one x y theta per line")

@@ -101,10 +101,10 @@ def test_a_file_without_a_goal_is_refused(tmp_path: Path) -> None:
         assert str(error.value) == f"goals {path}: no goals; write one x y theta per line"
 
 
-def test_a_file_that_cannot_be_read_is_one_line(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_read_or_has_no_end_is_one_line(tmp_path: Path) -> None:
     latin = tmp_path / "latin"
     latin.write_bytes(b"1 2 3 # k\xfcche\n")
-    for path in (tmp_path / "nothing", tmp_path, latin):
+    for path in (tmp_path / "nothing", tmp_path, latin, Path("/dev/zero")):
         with pytest.raises(GoalsError) as error:
             read_goals(path)
         assert str(error.value).startswith(f"goals {path}: ")
