@@ -26,9 +26,8 @@ JSON = {"", "zenoh/bytes", "zenoh/string", "text/plain", "text/json", "applicati
 
 LONGEST = 200  # characters of a reason
 N = ord("n")
-NO_ENCODING = "zenoh/bytes"  # Zenoh's default
 UNTYPED = (
-    "CDR without an Encoding, so of no certain type; what a bridge to ROS 2 sends comes in by `holozen ros2 --bridge`"
+    "CDR without its Encoding, so of no certain type; what a bridge to ROS 2 sends comes in by `holozen ros2 --bridge`"
 )
 
 _encode_json = msgspec.json.Encoder(enc_hook=listed).encode
@@ -122,7 +121,7 @@ def decoder(types: tuple[type[M], ...], tolerant: bool = False) -> Callable[[Enc
     """`decode` for these types, faster for the first one in JSON.
 
     If `tolerant`, an object in JSON is read whatever its Encoding says: to ask takes as long as to decode a Twist. If
-    not, CDR without an Encoding is refused.
+    not, CDR without its Encoding is refused.
     """
     first: Callable[[bytes], M] = _decoders(types, "", "json")[0][1]
 
@@ -133,7 +132,7 @@ def decoder(types: tuple[type[M], ...], tolerant: bool = False) -> Callable[[Enc
                 return first(payload)
             except (msgspec.DecodeError, UnicodeDecodeError, RecursionError, CodecError):
                 pass  # the long way has the reason
-        if not tolerant and payload[:1] == b"\0" and sample.encoding == NO_ENCODING:
+        if not tolerant and payload[:1] == b"\0" and sample.encoding.partition(";")[0] in JSON:
             raise CodecError(UNTYPED)
         return decode(payload, sample.encoding, types, tolerant)
 

@@ -26,7 +26,6 @@ ROBOTS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/stop"  # the tokens of what s
 SIMS = "@holozen/*/*/srv/*/*/*/get_entities"
 LONGEST = 5.0  # s that a snapshot waits for nodes, while some come or go
 SILENT_FACTOR = 5  # how many times longer it waits for nodes without tokens
-MISSING_FACTOR = 2  # how many times its patience it has for a session that a holder is linked to and this one is not
 MAX_GONE = 1000  # tokens kept until `left` is called; the oldest are dropped
 KINDS = ("node", "pub", "sub", "srv")
 LATCHED = ("tf_static", "robot_description", "map")
@@ -183,7 +182,7 @@ class Graph:
 
     def settled(self, connected: Callable[[], bool], patience: float = 0.5, quiet: float = 0.015) -> list[Endpoint]:
         """The endpoints once there is a link and all nodes have sent theirs; at most `patience` seconds after the last
-        change, or twice that long if a holder lists a session to which there is no link yet.
+        change.
 
         That is when each session that the holder of a meeting point is linked to has sent its tokens; or, if no
         holder answers, when nothing has changed for `quiet` seconds, or twice the time that the first link or the last
@@ -201,12 +200,9 @@ class Graph:
         self._update()
         seen, since = self.changes, time.monotonic()
         deadline = since + patience if seen else deadline  # more may be on its way from a slow node
-        while True:
-            now, listed = time.monotonic(), peers()
-            is_missing = listed is not None and not listed <= {*self._met(), *self._sessions}
-            if now > deadline + (MISSING_FACTOR - 1) * patience * is_missing:
-                break
+        while (now := time.monotonic()) < deadline:
             passed, enough = now - since, max(quiet, 2 * self._took, 2 * (since - start))
+            listed = peers()
             if self._tokens and listed is not None and listed <= self._sessions.keys():
                 if passed > SILENT_FACTOR * enough:
                     break

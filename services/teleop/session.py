@@ -1,12 +1,11 @@
 """Joins the mapper with the robots: publishes commands, hands over, switches between robots."""
 
-import threading
 import time
 from collections.abc import Sequence
 
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, TriggerReply, TriggerRequest, Twist
-from holozen.transport.errors import BusError, ServiceError
+from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Graph, on_key
 from holozen.transport.pubsub import Latest
 from holozen.wire import key_for, robot_name
@@ -17,8 +16,7 @@ from .input.kitty import Event, Focus, Key, Unknown
 from .robot_client import RobotClient
 
 FASTER = {"faster": 1.1, "slower": 0.9}  # a gamepad's buttons
-RESUME_TIMEOUT = 2.0  # s
-HANDING_OVER = "handing over ..."
+RESUME_TIMEOUT = 0.2  # s; the keys wait while the sim is asked
 UNSEEN = "the window lost focus: stopped"
 BLIND = "odom was lost: stopped; press a key again to drive"
 RESET = "the robot was reset: stopped; press a key again to drive"
@@ -46,7 +44,6 @@ class Session:
         self._had_odom = False  # at the last tick
         self.due = 0.0  # when the command is to be repeated
         self._pending = ""  # the action that waits until the robot is at rest: "resume" or "next_robot"
-        self._asking: threading.Thread | None = None  # the last request to `resume`
 
     def take(self, event: Event, now: float) -> str:
         """Take an event, and publish any change at once. Returns "quit" or "suspend" if it requests that."""
@@ -82,6 +79,8 @@ class Session:
     def steer(self, stick: tuple[float, float, float], now: float) -> None:
         """Take the joystick's deflection (forward, left, counter-clockwise; -1 to 1), and publish any change."""
         if stick != self.mapper.stick:
+            if self._pending == "resume":  # as a key does: who steers has not handed over
+                self._pending = ""
             self.mapper.steer(stick, now)
             self.publish(now)
 
@@ -153,8 +152,6 @@ class Session:
         return self._pending == "next_robot"
 
     def _do_pending(self) -> None:
-        if self._pending == "resume" and self._asking and self._asking.is_alive():
-            return
         pending, self._pending = self._pending, ""
         if pending == "resume":
             return self._hand_over()
@@ -189,23 +186,12 @@ class Session:
         return RobotClient(self.bus, robot, self._command if robot == self._first else "", self._stamped)
 
     def _hand_over(self) -> None:
-        """Allow held sources to drive again. The keys do not wait for the answer; the sim refuses a request that is
-        older than the last takeover or stop.
-        """
-        key, self.warning = self.client.beside("resume"), HANDING_OVER
-
-        def ask() -> None:
-            try:
-                answer = self.bus.call(key, TriggerRequest(), TriggerReply, RESUME_TIMEOUT).message
-            except ServiceError as error:
-                answer = f"not handed over: {error}"
-            except BusError:  # the teleop ends
-                return
-            if self.warning == HANDING_OVER:
-                self.warning = answer
-
-        self._asking = threading.Thread(target=ask, daemon=True)
-        self._asking.start()
+        """Allow held sources to drive again."""
+        try:
+            key = self.client.beside("resume")
+            self.warning = self.bus.call(key, TriggerRequest(), TriggerReply, RESUME_TIMEOUT).message
+        except ServiceError as error:
+            self.warning = f"not handed over: {error}"
 
 
 def _is_robot_name(text: str) -> bool:

@@ -77,7 +77,7 @@ class Pad:
         return self._stopping if not self._held and now - self._stopping < SETTLING else None
 
     def command(self, now: float, rests: bool) -> Planar | None:
-        """The motion to command, each part from -1 to 1, or None. `rests`: the robot has come to rest since the stop."""
+        """The motion to command, each part from -1 to 1, or None. `rests`: the robot has rested since the stop."""
         if self.stopping_since(now) is not None:
             if rests:
                 self._stopping = -math.inf

@@ -55,6 +55,7 @@ BAD = {
     "an unknown encoding": ("malformed", b'{"linear":{"x":1}}', "image/png"),
     "CDR that is cut off": ("malformed", b"\0\1\0\0" + struct.pack("<5d", 1, 0, 0, 0, 0), "application/cdr"),
     "CDR of no stated type": ("malformed", b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0), "zenoh/bytes"),
+    "CDR that says it is JSON": ("malformed", b"\0\1\0\0" + struct.pack("<6d", 1, 0, 0, 0, 0, 0), "application/json"),
     "10 MB": ("oversized", b'{"linear":{"x":1}}' + b" " * 10_000_000, JSON),
     "just over the limit": ("oversized", b'{"linear":{"x":1}}'.ljust(65_537), JSON),
     "a stamp of yesterday": ("stale", stamped(time.time() - 86_400), JSON),

@@ -185,21 +185,6 @@ def test_a_session_that_a_meeting_point_lists_is_waited_for_and_then_nothing() -
     assert {end.node for end in graph.settled(lambda: True) if end.key == ODOM.key} == {ODOM.node, "late"}
 
 
-@pytest.mark.parametrize(("met", "found"), [((), True), (("a1", "b2"), False)])
-def test_a_session_that_a_meeting_point_lists_has_more_time_while_there_is_no_link_to_it(
-    met: tuple[str, ...], found: bool
-) -> None:
-    late = ODOM._replace(session="b2", node="late")
-    looks = iter([*[None] * 600, (token(late), True)])  # 0.6 s
-    changes = deque([(token(ODOM), True)])
-
-    def read() -> tuple[str, bool] | None:
-        return changes.popleft() if changes else next(looks, None)
-
-    graph = Graph(read, met=lambda: met, ask_peers=lambda: lambda: {"a1", "b2"})
-    assert (late in graph.settled(lambda: True)) is found
-
-
 def test_a_node_at_a_meeting_point_that_lists_itself_alone_is_called_once_more_and_no_more_waited_for() -> None:
     late = ODOM._replace(key="tf")
     calls = iter([(token(ODOM), True), (token(late), True)])

@@ -106,8 +106,7 @@ def test_the_holder_of_a_later_point_moves_to_an_earlier_one_when_that_is_free(
     keep(first, later)
     wait_for(lambda: list(points.open) == [later])
     listener.close()
-    wait_for(lambda: list(points.open) == [first])
-    assert rendezvous.held == {first}
+    wait_for(lambda: list(points.open) == [first] and rendezvous.held == {first})
 
 
 def test_a_process_holds_one_point_and_leaves_the_others_to_others(points: Points, keep: Keep) -> None:
