@@ -5,6 +5,7 @@ import random
 import socket
 import subprocess
 import sys
+from collections import deque
 from typing import TYPE_CHECKING, Any, Self
 
 from holozen.testing.process import Process
@@ -66,10 +67,23 @@ def command(verb: str, *words: str) -> list[str]:
     return [sys.executable, "-m", "holozen", verb, *words]
 
 
+KEPT = 200  # marks of ports
+_marks = deque[socket.socket]()
+
+
 def free_port() -> int:
-    """A free TCP port on loopback, below the range of ephemeral ports."""
+    """A free TCP port on loopback, below the range of ephemeral ports.
+
+    A UDP socket on the same port marks it, so that no other test process is given it too before it is listened on.
+    """
     while True:
-        port = random.randint(10_000, 32_000)
+        port = random.SystemRandom().randint(10_000, 32_000)  # Hypothesis seeds the other generator
+        mark = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         with socket.socket() as probe, contextlib.suppress(OSError):
+            mark.bind(("127.0.0.1", port))
             probe.bind(("127.0.0.1", port))
+            _marks.append(mark)
+            if len(_marks) > KEPT:
+                _marks.popleft().close()
             return port
+        mark.close()

@@ -3,6 +3,7 @@
 import json
 import re
 import subprocess
+from functools import partial
 
 import pytest
 
@@ -10,7 +11,7 @@ from holozen.messages import Odometry, Pose, Quaternion, Twist, codec
 from holozen.messages.geometry_msgs import Point
 from holozen.messages.simulation_interfaces import EntityState, SetEntityStateReply, SetEntityStateRequest
 from holozen.rotation import from_rpy
-from holozen.testing import Wire, wait_for
+from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command
 
 from .robots import URDF, Robot
@@ -67,10 +68,14 @@ def test_every_wire_is_drawn(wire: Wire) -> None:
     assert [json.loads(line)["cmd_vel.linear.x"] for line in plot.out.splitlines()] == [1.0, 2.0, 3.0]
 
 
+def shows(terminal: Terminal, pattern: str) -> bool:
+    return bool(re.search(pattern, terminal.screen()))
+
+
 def test_a_terminal_is_left_as_it_was(town: Wire, robot: Robot) -> None:
     for verb, words, shown in (("plot", (FIELD,), f"{FIELD}: [-0-9]"), ("map", (), "hb_bot x")):
         terminal = town.terminal(verb, *words)
-        wait_for(lambda terminal=terminal, shown=shown: re.search(shown, terminal.screen()), what=shown)
+        wait_for(partial(shows, terminal, shown), what=shown)
         terminal.type("\x03")
         assert terminal.process.wait() == 0
         assert terminal.modes() == terminal.modes_before

@@ -81,9 +81,16 @@ class Theirs:
 
     def type(self, name: str) -> Any:
         """The class of a message type that a publisher or subscriber uses."""
+        return self._shared().store.types[name]
+
+    def session(self) -> Any:
+        """Zenoh's session of all of them."""
+        return self._shared().session
+
+    def _shared(self) -> Any:
         from zenoh_ros2_sdk import ZenohSession
 
-        return ZenohSession.get_instance("127.0.0.1", self._wire.port).store.types[name]
+        return ZenohSession.get_instance("127.0.0.1", self._wire.port)
 
     def topics(self) -> dict[str, list[str]]:
         """What `ros2 topic list -t` shows: topics and their types."""
@@ -99,10 +106,8 @@ class Theirs:
 
     def close(self) -> None:
         """End all of them."""
-        from zenoh_ros2_sdk import ZenohSession
-
         self._ends.close()
-        ZenohSession.get_instance("127.0.0.1", self._wire.port).close()
+        self._shared().close()
 
 
 def definition(name: str) -> str:
