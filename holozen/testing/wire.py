@@ -74,13 +74,13 @@ _marks = deque[socket.socket]()
 def free_port() -> int:
     """A free TCP port on loopback, below the range of ephemeral ports.
 
-    A UDP socket on the same port marks it, so that no other test process is given it too before it is listened on.
+    A Unix socket of that number marks it, so that no other test process is given it too before it is listened on.
     """
     while True:
         port = random.SystemRandom().randint(10_000, 32_000)  # Hypothesis seeds the other generator
-        mark = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        mark = socket.socket(socket.AF_UNIX)
         with socket.socket() as probe, contextlib.suppress(OSError):
-            mark.bind(("127.0.0.1", port))
+            mark.bind(f"\0holozen-test-{port}")  # abstract: there is no file of it
             probe.bind(("127.0.0.1", port))
             _marks.append(mark)
             if len(_marks) > KEPT:
