@@ -79,9 +79,14 @@ def test_a_robot_is_driven_without_any_port_and_processes_meet_after_the_holder_
     assert [holder.pid for holder in holders(first)] == [sim.pid]
     sim.kill()
     wait_for(lambda: [holder.pid for holder in holders(first)] == [service.pid])
-    listing = start("node", "list")
-    assert listing.wait() == 0
-    assert listing.out == "pose_service\n"
+
+    def listed() -> str:
+        listing = start("node", "list")
+        assert listing.wait() == 0
+        return listing.out
+
+    # It links to the new holder at once, and to the service only when that has introduced them.
+    wait_for(lambda: listed() == "pose_service\n")
 
 
 def test_a_router_and_its_client_are_private_too(start: Start) -> None:
