@@ -111,24 +111,18 @@ class Publisher(RawPublisher, Generic[M]):
 
         super().__init__(*declared)
         self._wire, self._queued, self._written, self._named = wire, queued, codec.written, codec.encoding
-        self._quick = codec.quick_json if wire == "json" else lambda message: None
 
     def put(self, message: M) -> None:
         """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
         on its type.
         """
-        if quick := self._quick(message):
-            self.put_bytes(quick)
-        else:
-            self.put_bytes(*self._write(message))
+        payload, wire = self._written(message, self._wire)
+        self.put_bytes(payload, None if wire == self._wire else self._named(wire, type(message)))
 
     def queue(self, message: M) -> None:
         """As `put`, but `Bus.send_queued` sends it: many messages that are sent at once take Zenoh less time."""
-        self._queued.append((self, *self._write(message)))
-
-    def _write(self, message: M) -> tuple[bytes, str | None]:
         payload, wire = self._written(message, self._wire)
-        return payload, None if wire == self._wire else self._named(wire, type(message))
+        self._queued.append((self, payload, None if wire == self._wire else self._named(wire, type(message))))
 
 
 class Gets(Answers):
