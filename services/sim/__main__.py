@@ -114,19 +114,13 @@ def main(argv: list[str] | None = None) -> int:
             if folder := args.state or os.environ.get("HOLOZEN_STATE"):
                 entities.keep_stops_in(StopFiles(Path(folder), bus.networks))
             add_models(entities, spec.models)
-            if args.robot or not (args.empty or mine):
-                spawn_all(entities, args, mine)
+            added = spawn_all(entities, args, mine) if args.robot or not (args.empty or mine) else []
             if args.stopped:
                 entities.stop("the start of this sim")
             for warning in spec.warnings:
                 report(f"sim: warning: {warning}")
             share = shard.Share(mine, bus) if mine else None
             services = EntityServices(bus, entities, dict(args.package), spawns=not joins or bool(mine), share=share)
-            if mine:
-                robots = "its robots do not collide with those of other shards"
-                report(f"sim: this is shard {mine}; {robots}; add some with `holozen spawn FILE`")
-            elif not entities.robots:
-                report("sim: no robot yet; add one with `holozen spawn FILE`")
             entities.set_start()
             loop = Loop(bus, world, entities, spec.rtf if args.rtf is None else args.rtf, services, is_clock=not joins)
             loop.answers.append(SimulationServices(bus, loop.simulation, stop.set).answer)
@@ -136,6 +130,14 @@ def main(argv: list[str] | None = None) -> int:
             rivals = Rivals(entities, bus.id, stop)
             if not joins and not mine:
                 loop.answers.append(rivals.answer)
+            # Last: who reads it may ask for all of the above.
+            for robot in added:
+                report(f"sim: {robot}")
+            if mine:
+                robots = "its robots do not collide with those of other shards"
+                report(f"sim: this is shard {mine}; {robots}; add some with `holozen spawn FILE`")
+            elif not entities.robots:
+                report("sim: no robot yet; add one with `holozen spawn FILE`")
             loop.run(stop)
             if rivals.first:
                 report(f"sim: {rivals.first} simulates here too; {JOIN}")

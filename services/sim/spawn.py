@@ -35,9 +35,9 @@ def add_models(entities: Entities, models: tuple[RobotModel, ...]) -> None:
             raise RobotError(f"model {model.name!r} of the world: {error}") from None
 
 
-def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None = None) -> None:
+def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None = None) -> list[str]:
     """Add the robots of `--robot` on the ground, side by side along y, the first one at the origin; in a shard only
-    those that belong to it. Raises RobotError.
+    those that belong to it. Returns on which keys each listens, as text for people. Raises RobotError.
     """
     robots: list[tuple[Path, str]] = args.robot or [(data.find("urdf", "hb_bot.urdf.xacro"), "")]
     read = {path: _read(path, args) for path in dict.fromkeys(path for path, _ in robots)}
@@ -47,16 +47,17 @@ def spawn_all(entities: Entities, args: argparse.Namespace, mine: Shard | None =
     for name, key in names:
         if (same := names.count((name, key))) > 1:
             raise RobotError(f"{same} robots are called {name!r}; give each a name: --robot FILE=NAME")
-    y = 0.0
+    added, y = list[str](), 0.0
     for number, (model, (path, name)) in enumerate(zip(models, robots, strict=True)):
         reach = max(map(_reach, lump(model).collisions), default=0.0)
         y += reach if number else 0.0
         if not mine or mine.owns(name):
-            _add(entities, path, name, model, y)
+            added.append(_add(entities, path, name, model, y))
         y += reach + GAP
+    return added
 
 
-def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float) -> None:
+def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float) -> str:
     try:
         entity = entities.add(
             name or entities.free_name(_valid_name(model.name)), model, ((0.0, y, -lowest(model)), UPRIGHT), name
@@ -68,10 +69,10 @@ def _add(entities: Entities, path: Path, name: str, model: RobotModel, y: float)
     assert drive is not None, "_read refuses a robot without a drive"
     pushed = isinstance(drive.mechanism, Pushed)
     keys = [key_for(force.topic, name) for force in model.forces] if pushed else [key_for(drive.command_topic, name)]
-    report(f"sim: {entity.name} listens on {listed(keys)}")
     for topic, known in ((drive.command_topic, "cmd_vel"), (drive.odometry_topic, "odom")):
         if topic.rpartition("/")[2] != known:
             report(f"sim: warning: {path}: topic {topic!r}: the teleop and the controller use {known!r}")
+    return f"{entity.name} listens on {listed(keys)}"
 
 
 def _read(path: Path, args: argparse.Namespace) -> RobotModel:

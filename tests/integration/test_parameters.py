@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import sys
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ import pytest
 from holozen.bus import Bus
 from holozen.messages import NextGoalReply, NextGoalRequest, Twist
 from holozen.messages import rcl_interfaces as r
-from holozen.testing import LockStep, Wire, wait_for
+from holozen.testing import LockStep, Process, Wire, wait_for
 from holozen.transport.pubsub import Subscription
 
 from .robots import Robot, moves, rests, time_of
@@ -33,6 +34,27 @@ def as_it_was(robot: Robot) -> Iterator[None]:
     """The sim's parameters are the defaults before and after a test."""
     yield
     assert put(robot.bus, "sim", **DEFAULTS) == []
+
+
+HELD = """
+import signal, sys
+from holozen import console
+
+def report(text, said=console.report):
+    said(text)
+    if "listens on" in text:
+        signal.pause()  # it goes no further until it is to end
+
+console.report = report
+from services.sim.__main__ import main
+main(sys.argv[1:])
+"""
+
+
+def test_a_sim_says_that_it_listens_once_its_parameters_can_be_found(wire: Wire) -> None:
+    with Process([sys.executable, "-c", HELD, *wire.flags]) as sim:
+        sim.wait_for_line("listens on cmd_vel")
+        assert "sim/set_parameters" in {end.key for end in wire.bus().endpoints()}
 
 
 def test_a_lower_limit_applies_at_the_next_command(robot: Robot) -> None:

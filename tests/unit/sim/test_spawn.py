@@ -58,14 +58,13 @@ def keys(bus: Bus) -> set[str]:
     return {endpoint.key for endpoint in graph.endpoints()}
 
 
-def test_without_a_file_hb_bot_stands_at_the_root_of_the_keys(
-    bus: Bus, world: World, capsys: pytest.CaptureFixture[str]
-) -> None:
-    (entity,) = spawn(bus, world, wanted())
+def test_without_a_file_hb_bot_stands_at_the_root_of_the_keys(bus: Bus, world: World) -> None:
+    entities = Entities(bus, world, (5.0, 10.0))
+    assert spawn_all(entities, wanted()) == ["hb_bot listens on cmd_vel"]
+    (entity,) = entities
     assert entity.name == "hb_bot"
     assert entity.body.pose()[0] == pytest.approx((0, 0, -0.04), abs=1e-6)
     assert keys(bus) == KEYS
-    assert capsys.readouterr().err == "sim: hb_bot listens on cmd_vel\n"
 
 
 def test_named_robots_have_keys_of_their_own_and_stand_side_by_side(bus: Bus, world: World) -> None:
