@@ -209,13 +209,13 @@ def topic(key: str) -> Topic | None:
 
 
 def is_command(key: str, type_names: Iterable[str]) -> bool:
-    """Whether messages of these types on `key` move a robot. On a key that is not in the table the types decide.
+    """Whether messages of any of these types on `key` move a robot, by the key's row in the table or by a type.
 
     Commands are sent at once, and refused if they have an unknown field: a typo would leave the robot standing.
     Telemetry is batched, and unknown fields are ignored: a newer sim may send more than an older reader knows.
     """
     row = topic(key)
-    return row.is_command if row else not COMMAND_TYPES.isdisjoint(type_names)
+    return bool(row and row.is_command) or not COMMAND_TYPES.isdisjoint(type_names)
 
 
 def implausible(command: Any, type_name: str) -> str:

@@ -30,8 +30,3 @@ class Message(NamedTuple):
     at: int
     payload: bytes
     number: int = 0
-
-
-def cdr_encoding(kind: str) -> str:
-    """The Zenoh Encoding of CDR of a type; of an unknown one if `kind` is empty."""
-    return f"application/cdr;{kind}" if kind else "application/cdr"

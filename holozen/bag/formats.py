@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 import msgspec
 
 from holozen import wire
-from holozen.bag import cdr_encoding
-from holozen.messages import Message, codec
+from holozen.messages import Message, codec, encoding_of
 from holozen.messages.definitions import MAPPED, Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 from holozen.transport.graph import is_latched
@@ -66,7 +65,7 @@ def offered_qos(topic: str) -> str:
 
 def interface_as_cdr(name: str, payload: bytes, encoding: str) -> tuple[Format, bytes]:
     """A message of a type without a Struct as ROS 2 writes it, and its format. Raises CodecError, InterfaceError."""
-    form = Format("cdr", cdr_encoding(name), name, "ros2msg", msg_schema(name))
+    form = Format("cdr", encoding_of("cdr", name), name, "ros2msg", msg_schema(name))
     return form, codec.transcoded(REGISTRY.find(name), payload, encoding)
 
 

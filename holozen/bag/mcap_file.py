@@ -14,7 +14,8 @@ from mcap.records import Message as MessageRecord
 from mcap.stream_reader import CRCValidationError, StreamReader, breakup_chunk, read_magic
 from mcap.writer import MCAP0_MAGIC
 
-from holozen.bag import ENCODING, BagError, Channel, Message, cdr_encoding
+from holozen.bag import ENCODING, BagError, Channel, Message
+from holozen.messages import encoding_of
 
 LARGEST = 256 << 20  # bytes of a record, compressed and uncompressed
 NAMES = 64 << 20  # bytes of all schemas and channels of a file
@@ -146,6 +147,6 @@ def _decompressed(data: bytes, compression: str, size: int) -> bytes:
 def _channel(record: ChannelRecord, types: dict[int, str]) -> Channel:
     form = record.message_encoding
     kind = record.metadata.get("type") or types.get(record.schema_id, "")
-    encoding = record.metadata.get(ENCODING) or (cdr_encoding(kind) if form == "cdr" else _ZENOH.get(form, form))
+    encoding = record.metadata.get(ENCODING) or (encoding_of("cdr", kind) if form == "cdr" else _ZENOH.get(form, form))
     # Topics of ROS begin with a slash, keys of Zenoh do not.
     return Channel(record.topic.removeprefix("/"), encoding, form, kind)

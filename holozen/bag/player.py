@@ -81,8 +81,7 @@ def _check_known(topics: list[str], remap: Mapping[str, str], channels: list[Cha
 def _is_command(channel: Channel, target: str, endpoints: list[Endpoint]) -> bool:
     """Whether it may move a robot, judged by its key in the bag or here, its type, or the key's subscribers."""
     types = {channel.type} | {endpoint.type for endpoint in on_key(endpoints, target, "sub")}
-    has_row = any(row and row.is_command for row in map(wire.topic, (channel.key, target)))
-    return has_row or not types.isdisjoint(wire.COMMAND_TYPES)
+    return any(wire.is_command(key, types) for key in (channel.key, target))
 
 
 def _why_not(target: str, moves: bool, nodes: str) -> str:

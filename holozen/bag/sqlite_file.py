@@ -4,7 +4,8 @@ import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
 
-from holozen.bag import BagError, Channel, Message, cdr_encoding
+from holozen.bag import BagError, Channel, Message
+from holozen.messages import encoding_of
 
 LARGEST = 256 << 20  # bytes of a message
 TABLES = ("topics", "messages")
@@ -60,4 +61,4 @@ class SqliteFile:
         if not all(isinstance(word, bytes) for word in words):
             raise BagError(f"{self.path} is damaged: a topic without a name, a type or a format")
         name, kind, form = (word.decode() for word in words if isinstance(word, bytes))
-        return Channel(name.removeprefix("/"), cdr_encoding(kind) if form == "cdr" else form, form, kind)
+        return Channel(name.removeprefix("/"), encoding_of("cdr", kind) if form == "cdr" else form, form, kind)

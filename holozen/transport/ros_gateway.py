@@ -355,7 +355,7 @@ class Gateway:
         A command that waited in a buffer on its way here is dropped: our stamp would make it look new.
         """
         key, encoding = theirs.topic, f"application/cdr;{theirs.type}"
-        is_command = _moves(theirs.type, key)
+        is_command = wire.is_command(key, (theirs.type,))
         publisher = self._bus.session.declare_publisher(key, encoding=encoding, express=is_command)
         ages: dict[bytes, tuple[rmw.Ages, Callable[[], bytes]]] = {}
         _ = self._bus.clock_server  # from now on this session answers for its clock
@@ -499,11 +499,6 @@ def _refused(response: Interface, error: ServiceError) -> dict[str, Any] | None:
     if kinds.get("result") == "simulation_interfaces/msg/Result":
         return {"result": error.fields.get("result") or {"result": FAILED, "error_message": str(error)}}
     return None
-
-
-def _moves(type_name: str, key: str) -> bool:
-    row = wire.topic(key)
-    return bool(row and row.is_command) or type_name in wire.COMMAND_TYPES
 
 
 def _each(raw: RawSubscriber, work: Callable[[Sample], None]) -> None:
