@@ -277,12 +277,12 @@ def _pushes_nothing(message: Wrench) -> bool:
 
 
 class SourceRate:
-    """One source: its rank, the time and the `delay` of its last command (s), and the number of its commands."""
+    """One source: the time and the `delay` of its last command (s), and the number of its commands."""
 
-    __slots__ = ("_marks", "count", "delay", "last", "rank")
+    __slots__ = ("_marks", "count", "delay", "last")
 
     def __init__(self, now: float) -> None:
-        self.rank, self.last, self.count, self.delay = 0, now, 0, 0.0
+        self.last, self.count, self.delay = now, 0, 0.0
         self._marks: deque[tuple[float, int]] = deque([(now, 0)])  # past counts, the oldest about SPAN ago
 
     def rate(self, now: float) -> float:
@@ -311,7 +311,7 @@ class SourceRates:
             if len(self._all) >= MAX_RATES:
                 del self._all[max(self._all, key=lambda name: (name[1], -self._all[name].last))]
             each = self._all[source, rank] = SourceRate(now)
-        each.rank, each.last, each.delay = rank, now, delay
+        each.last, each.delay = now, delay
         each.count += 1
         return is_new
 

@@ -157,9 +157,10 @@ class Bus(Node):
 
     def send_queued(self) -> None:
         """Send what publishers have queued."""
-        for publisher, payload, encoding in self._queued:
+        queued = self._queued.copy()
+        self._queued.clear()  # publishers hold this list
+        for publisher, payload, encoding in queued:
             publisher.put_bytes(payload, encoding)
-        self._queued.clear()
 
     def _answer_gets(self, writer: RawPublisher, key: str) -> None:
         """Robots share a thread: that of `Fred/odom` answers on `*/odom`."""
@@ -251,10 +252,7 @@ class Bus(Node):
 
         def ask(session: str, nonce: bytes, timeout: float) -> Replies:
             # All servers are asked, since any session may serve this key.
-            return self.ask(
-                clock_key(session), timeout, session, payload=nonce or None, target=zenoh.QueryTarget.ALL,
-                consolidation=zenoh.ConsolidationMode.NONE, priority=zenoh.Priority.REAL_TIME, express=True,
-            )  # fmt: skip
+            return self.ask_all(clock_key(session), timeout, replier=session, payload=nonce or None)
 
         return PeerClocks(ask, has, signer=self._verifier.answerer if self._verifier else None)
 

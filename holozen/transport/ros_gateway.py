@@ -106,8 +106,8 @@ class Gateway:
             endpoint = self._form.parse(token)
             if change.kind == zenoh.SampleKind.PUT and endpoint and endpoint.session != self._id:
                 self._theirs[token] = endpoint
-            # Replaced as a whole, since the routes' threads read it.
-            self._writers = {(one.session, one.topic, one.type) for one in self._theirs.values() if one.kind == "pub"}
+        # Replaced as a whole, since the routes' threads read it.
+        self._writers = {(one.session, one.topic, one.type) for one in self._theirs.values() if one.kind == "pub"}
         self._report_bridges()
         everything = self._ours.endpoints()
         if any(one.kind == "node" and one.node == NODE and one.session < self._bus.id for one in everything):
@@ -478,16 +478,18 @@ class ConcurrentAnswers(Answers):
         room = threading.BoundedSemaphore(MANY)
 
         def one(query: Any) -> None:
-            with query, room:
-                self._answer(query)
+            try:
+                with query:
+                    self._answer(query)
+            finally:
+                room.release()
 
         while True:
             try:
                 query = self._queries.recv()
             except Exception:  # as in RawSubscriber.recv
                 return
-            with room:  # waits while there are too many
-                pass
+            room.acquire()  # waits while there are too many
             threading.Thread(target=one, args=(query,), daemon=True).start()
 
 

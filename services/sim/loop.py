@@ -88,15 +88,23 @@ class Loop:
 
     def publish_all(self) -> None:
         """Publish the present state of everything."""
+        failed: dict[Robot, Exception] = {}
         for robot in list(self._robots):
             try:
                 robot.publish(self._world.time, self._world.spec.step, at_once=True)
             except FAULTS as error:
-                self._entities.fail(robot, error)
-        self._bus.send_queued()
+                failed[robot] = error
+        self._send(failed)
         if self._clock:
             self._clock.put(Clock(Time.of(self._world.time)))
         self._publish_status(time.monotonic())
+
+    def _send(self, failed: dict[Robot, Exception]) -> None:
+        """Send what robots have queued, and only then take out those that failed, with their publishers."""
+        self._bus.send_queued()
+        for robot, why in failed.items():
+            if robot in self._robots:
+                self._entities.fail(robot, why)
 
     def _publish_status(self, now: float) -> None:
         """Publish the simulation status, and report overruns."""
@@ -165,9 +173,6 @@ class Loop:
                 robot.publish(world.time, dt)
             except FAULTS as error:
                 failed[robot] = error
-        self._bus.send_queued()
-        for robot, why in failed.items():
-            if robot in self._robots:
-                self._entities.fail(robot, why)
+        self._send(failed)
         if self._clock and self._clock_due.due(world.time):
             self._clock.put(Clock(Time.of(world.time)))

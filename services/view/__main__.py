@@ -117,6 +117,7 @@ def _serve_foxglove(args: argparse.Namespace, where: connection.Connection, toke
             ending.callback(server.close)
             relay = Relay(Guard(token, publishes, apps=True), args.host, args.port, server.port, server.secret)
             ending.callback(relay.close)
+            ending.callback(server.halt)  # first: clients may take their time
             for line in _addresses(args, relay.port, token, "ws"):
                 report(f"view: {line}")
             server.run(stop)

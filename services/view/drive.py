@@ -105,7 +105,8 @@ class Driver:
         if odom is None:
             return "it has no odometry now"
         if not self._goals.matched:
-            return f"it has no controller; start one: holozen controller {self.namespace} --laps 0"
+            command = " ".join(filter(None, ("holozen controller", self.namespace, "--laps 0")))
+            return f"it has no controller; start one: {command}"
         goal = in_odometry((x, y, true_pose.position.z), true_pose, odom.pose.pose)
         frame = odom.header.frame_id
         self._goals.put(PoseStamped(Header(frame_id=frame), Pose(Point(*goal), odom.pose.pose.orientation)))
@@ -148,9 +149,11 @@ class Drivers:
         """Stop the robots that are driven from here, until odom shows rest, for at most a second."""
         self._stop.set()
         self._thread.join()
-        for driver in self._all.values():
-            driver.use(lambda pad, now: pad.stop(now))
-        while sum(driver.publish() for driver in self._all.values()):  # calls them all, unlike any()
+        with self._lock:  # pages are still open
+            drivers = list(self._all.values())
+        for driver in drivers:
+            driver.use(lambda pad, now: pad.end(now))
+        while sum(driver.publish() for driver in drivers):  # calls them all, unlike any()
             time.sleep(TICK)
 
     def _run(self) -> None:

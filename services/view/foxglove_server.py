@@ -98,7 +98,8 @@ class Relay:
             self._server.close()
             await self._server.wait_closed()
 
-        asyncio.run_coroutine_threadsafe(end(), self._loop).result(2.0)
+        with contextlib.suppress(TimeoutError):  # a client that hangs does not say goodbye
+            asyncio.run_coroutine_threadsafe(end(), self._loop).result(2.0)
         self._loop.call_soon_threadsafe(self._loop.stop)
 
 
@@ -154,6 +155,7 @@ class Commands:
         self._bus, self._endpoints = bus, endpoints
         self._lock = threading.Lock()
         self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str]]()
+        self._ends = False
         self._drivers = dict[str, tuple[int, float]]()  # by key: the client that last moved the robot, and when
 
     def open(self, client: int, channel: Any) -> None:
@@ -169,6 +171,8 @@ class Commands:
         priority = PRIORITY_OF["view"] if is_command(key, (kind.ROS,)) else "DATA"
         encoding = codec.encoding(channel.encoding, kind)
         with self._lock:
+            if self._ends:
+                raise ValueError("the view ends, and publishes no more")
             self._open[client, channel.id] = self._bus.publisher(key, kind, priority), kind, encoding
 
     def put(self, client: int, channel: int, data: bytes) -> None:
@@ -205,8 +209,10 @@ class Commands:
                 publisher.close()
 
     def halt(self) -> None:
-        """Stop the robots that are driven from here."""
-        for client, channel in list(self._open):
+        """Stop the robots that are driven from here; from now on clients publish nothing."""
+        with self._lock:
+            self._ends, channels = True, list(self._open)
+        for client, channel in channels:
             self.close(client, channel)
 
 
@@ -217,10 +223,10 @@ class Server(ServerListener):
         self.secret = f"/{secrets.token_urlsafe(16)}"
         self._bus, self._look_only = bus, look_only
         self._context, self._registry = foxglove.Context(), Registry()
-        self._graph = bus.graph()
+        self._graph, self._reading = bus.graph(), threading.Lock()
         self._topics, self._services = dict[str, Topic](), set[str]()
         self._vouched = set[int]()
-        self._commands = Commands(bus, self._graph.endpoints)
+        self._commands = Commands(bus, self._endpoints)
         capabilities = [Capability.Parameters]
         if not look_only:
             capabilities += [Capability.ClientPublish, Capability.Services]
@@ -241,15 +247,22 @@ class Server(ServerListener):
             for topic in list(self._topics.values()):
                 topic.drain()
 
-    def close(self) -> None:
-        """Stop the robots that are driven from here, and end."""
+    def halt(self) -> None:
+        """Stop the robots that are driven from here, for good."""
         self._commands.halt()
+
+    def close(self) -> None:
+        """End it; after `halt`."""
         self._server.stop()
         self._graph.close()
 
+    def _endpoints(self) -> list[Endpoint]:
+        with self._reading:  # the library's threads read it too
+            return self._graph.endpoints()
+
     def _look(self) -> None:
         """Offer the present topics and services."""
-        endpoints = self._graph.endpoints()
+        endpoints = self._endpoints()
         topics = {one.key: one.type for one in endpoints if one.kind == "pub" and "*" not in one.key}
         for key in self._topics.keys() - topics:
             topic = self._topics.pop(key)

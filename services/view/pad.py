@@ -15,6 +15,7 @@ DIRECTIONS: dict[str, Planar] = {
 """What a button does: forward, left, counter-clockwise."""
 OTHER = "another page drives this robot"
 SILENT = f"the button was silent for {HELD:g} s, and counts as let go"
+ENDS = "the view ends, and drives no more"
 LOST = "odometry was lost, and the button counts as let go"
 
 
@@ -30,11 +31,14 @@ class Pad:
         self._page = -1  # the one that drives
         self._expired: set[tuple[int, str]] = set()
         self._stopping = -math.inf  # when the last stop began
+        self._ended = False
         self.why = ""  # why the buttons that were held at the last `stop` count as let go
 
     def hold(self, page: int, button: str, now: float) -> str:
         """A page reports a held button. Returns why it does not count, or ""."""
         self._expire(now)
+        if self._ended:
+            return ENDS
         if (page, button) in self._expired:
             return ""
         if self._held and page != self._page:
@@ -70,6 +74,11 @@ class Pad:
             self._expired |= {(self._page, button) for button in self._held}
             self._held.clear()
             self._stopping = now
+
+    def end(self, now: float) -> None:
+        """Stop for good: no button counts from now on."""
+        self._ended = True
+        self.stop(now)
 
     def stopping_since(self, now: float) -> float | None:
         """When the stop in progress began; None if there is none."""

@@ -105,7 +105,7 @@ class WorldTab:
         there = entities.names(self._bus)
         base = path.name.partition(".")[0]
         name = next(name for number in range(1, 1002) if (name := f"{base}{number}") not in there)
-        taken = [one.position for one in self._scene.shown.values()]
+        taken = [one.position for one in list(self._scene.shown.values())]
         free = (float(y) for y in range(1000) if all(math.hypot(x - 1.0, y - other) > 1.5 for x, other, _ in taken))
         return str(spawn_file(self._bus, path, name, Place(x=1.0, y=next(free))))
 

@@ -2,12 +2,13 @@
 more.
 """
 
+import threading
 from typing import Any
 from unittest.mock import MagicMock
 
 import pytest
 
-from holozen.messages import Odometry, Point, Pose, SceneEntity
+from holozen.messages import Odometry, Point, Pose, SceneEntity, Twist
 from services.view import drive
 from services.view.drive import Driver, Drivers
 
@@ -46,3 +47,28 @@ def test_a_driver_goes_when_no_page_has_its_robot_and_its_pad_rests(monkeypatch:
     odom["other/odom"].close.assert_called_once()
     odom["one/odom"].close.assert_not_called()
     drivers.halt()
+
+
+def test_a_view_that_ends_stops_what_it_drives_and_no_button_counts_from_then_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    odom, bus = feedback(0.0), MagicMock()
+    monkeypatch.setattr(drive, "OdometryFeedback", lambda *_: odom)
+    drivers = Drivers(bus)
+    driver = drivers.of(SceneEntity("one", command="cmd_vel"))
+    sent = bus.publisher.return_value.put
+
+    presses = list[threading.Thread]()
+
+    def rests(_since: float) -> bool:  # another button is pressed while the stop is repeated
+        presses.append(threading.Thread(target=driver.use, args=(lambda pad, now: pad.hold(1, "left", now),)))
+        presses[-1].start()
+        return len(presses) > 3
+
+    odom.rests.side_effect = rests
+    driver.use(lambda pad, now: pad.hold(1, "forward", now))
+    drivers.halt()
+    for thread in presses:
+        thread.join()
+    assert sent.call_args.args == (Twist(),)
+    assert not driver.is_used()
