@@ -113,10 +113,16 @@ class SoftwareStop:
             return now - sources[source] <= self._silence + ROUNDING
         return now - max(self._stopped, self._others.get(rank, -math.inf)) <= COMMAND_SILENCE + ROUNDING
 
-    def inherit(self, other: "SoftwareStop") -> None:
-        """Copy the state of another one."""
+    def inherit(self, other: "SoftwareStop", now: float) -> None:
+        """Take over the state of another one at `now`. If that is set, whoever has not sent a stop may have commanded
+        until now: nothing listened.
+        """
         self.setter, self._stopped, self._others = other.setter, other._stopped, dict(other._others)
         self._last_moves = deepcopy(other._last_moves)
+        if self.setter:
+            self._stopped = now
+            for sources in self._last_moves.values():
+                sources.update({source: now for source, time in sources.items() if time > -math.inf})
 
     def _note(self, source: str, rank: int, when: float) -> None:
         sources = self._last_moves.setdefault(rank, {})
@@ -227,6 +233,11 @@ class Arbiter:
         driver = self._driver
         return None if driver is None or 0 <= self._patience(driver) < time - driver.sent - self.time.slack else driver
 
+    def is_driver(self, source: str, rank: int, now: float) -> bool:
+        """Whether a source of that rank drives at `now`, with a stop or a motion."""
+        driver = self.driver(now)
+        return driver is not None and (driver.source, driver.rank) == (source, max(rank, PERSON))
+
     def moves(self, source: str, now: float) -> bool:
         """Whether a source moves the robot at `now`."""
         driver = self.driver(now)
@@ -251,9 +262,8 @@ class Arbiter:
 
     def pushes_of(self, source: str, rank: int, now: float) -> AppliedForces:
         """The forces of a source at `now`; none unless it drives."""
-        driver = self.driver(now)
-        is_driver = driver is not None and (driver.source, driver.rank) == (source, max(rank, PERSON))
-        return driver.motion if driver and is_driver and isinstance(driver.motion, AppliedForces) else AppliedForces(())
+        driver = self.driver(now) if self.is_driver(source, rank, now) else None
+        return driver.motion if driver and isinstance(driver.motion, AppliedForces) else AppliedForces(())
 
     def _patience(self, driver: Driver) -> float:
         """The silence in s after which a driver no longer drives; below zero: never."""
@@ -324,11 +334,11 @@ class Arbiter:
         self.resumed += 1
         return ""
 
-    def inherit(self, other: "Arbiter") -> None:
-        """Take over the held sources and the software stop of a robot that was replaced."""
+    def inherit(self, other: "Arbiter", now: float) -> None:
+        """Take over the held sources and the software stop of a robot that is replaced at `now`."""
         self._held = deepcopy(other._held)
         self._highest, self.stopped_at, self.taken_at = other._highest, other.stopped_at, other.taken_at
-        self.software_stop.inherit(other.software_stop)
+        self.software_stop.inherit(other.software_stop, self.time.at(now))
 
     def _is_held(self, source: str, rank: int) -> bool:
         autopilot = rank >= AUTOPILOT and rank > self._highest

@@ -28,6 +28,7 @@ GONE = "gone: its sender has left"
 OUT_OF_ORDER = "out of order: number {number} came after {last}"
 UNANSWERED = "late: it was under way for {age:.2f} s or more, and its sender has not answered since"
 UNKNOWN = "unknown clock: its sender has not answered with its time"
+VOID = "void: it came before the sim was played or reset"
 UNSTAMPED = "unstamped: this sender stamps its commands"
 
 
@@ -103,15 +104,29 @@ class Freshness(Generic[M]):
         self._newest: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # the newest command: sent when, number
         self._doubted: OrderedDict[Sender, float] = OrderedDict()  # since when an answer is awaited
         self._waiting: dict[Sender, tuple[Received[M], float]] = {}  # with the arrival of its sender's first one
+        self._void: list[Received[M]] = []  # of those that waited, to be refused
 
     @property
     def is_waiting(self) -> bool:
         """Whether any command waits for its sender's clock."""
-        return bool(self._waiting)
+        return bool(self._waiting or self._void)
+
+    @property
+    def waiting(self) -> list[Received[M]]:
+        """The commands that wait for their sender's clock, the newest of each."""
+        return [received for received, _ in self._waiting.values()]
+
+    def drop_waiting(self) -> None:
+        """Refuse the commands that wait now, whatever their age will prove to be."""
+        self._void += self.waiting
+        self._waiting.clear()
 
     def sift(self, arrived: Iterable[Received[M]], now: float, since: float) -> Iterator[Judged[M]]:
         """Judge the commands in order: those that waited, then those that `arrived` between `since` and `now` (s)."""
         arrived = list(arrived)
+        void, self._void = self._void, []
+        for received in void:
+            yield Judged(received, -math.inf, 0.0, VOID)
         if self._waiting:
             yield from self._waited(now)
         senders = [*map(_sender, arrived)]

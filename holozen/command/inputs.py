@@ -19,12 +19,13 @@ from holozen.messages.message import not_finite
 from holozen.suggest import listed
 from holozen.transport.pubsub import Received, Subscription
 from holozen.transport.samples import PRIORITIES
-from holozen.wire import MAX_STAMP_AGE, implausible
+from holozen.wire import COMMAND_SILENCE, MAX_STAMP_AGE, implausible
 
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
 LINEAR, ANGULAR = (0.01, 50.0), (0.01, 100.0)  # the ranges in which these two may be set
 MAX_RATES = 16  # sources, whose names come over the wire; beyond, the oldest of the lowest rank is forgotten
+MAX_PARTS = 100  # sources whose moving topics or joints are known
 RECENT = 3.0  # s for which a source is listed
 SPAN = 1.0  # s over which the rate is measured
 MARK = 0.1  # s between two samples of a count
@@ -32,6 +33,7 @@ REPORT_EVERY = 1.0  # s
 MAX_LINES = 10  # a second by all robots: if a fleet's driver fails, each of them has something to report
 M = TypeVar("M", bound=Message)
 
+PART = "part: it stops one topic or joint while its source moves another, so it is no stop"
 UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its sender's name
 
 
@@ -69,6 +71,12 @@ class Input(Generic[M]):
         """Process the samples that `arrived` by that moment, and those that waited for their sender's clock."""
         for judged in self.freshness.sift(arrived, moment.now, moment.since):
             self._take(judged, moment)
+        for received in self.freshness.waiting:  # whatever becomes of it, its source has not let go
+            self._note_refused(source_of(received), PRIORITIES.index(received.priority), moment.now)
+
+    def _note_refused(self, source: str, rank: int, now: float) -> None:
+        for arbiter in self._arbiters:
+            arbiter.note_refused(source, rank, now)
 
     def _take(self, judged: Judged[M], moment: Moment) -> None:
         received = judged.received
@@ -81,8 +89,7 @@ class Input(Generic[M]):
         sent = min(judged.sent, moment.now - age)
         command = Command(message, received.key, source, rank, moment, sent, age)
         if refusal := judged.refusal or self._refusal(command):
-            for arbiter in self._arbiters:
-                arbiter.note_refused(source, rank, moment.now)
+            self._note_refused(source, rank, moment.now)
             self._refuse(command, refusal)
         else:
             self._obey(command)
@@ -102,9 +109,16 @@ class Input(Generic[M]):
         """Pass a command to the arbiters."""
         raise NotImplementedError
 
-    def _offer(self, arbiter: Arbiter, command: Command[M], motion: Motion) -> bool:
-        """Pass a command's motion to an arbiter, and count it. Returns whether it is accepted."""
-        reason = arbiter.offer(command.source, command.rank, motion, command.moment.now, command.sent)
+    def _offer(self, arbiter: Arbiter, command: Command[M], motion: Motion, moves: bool = False) -> bool:
+        """Pass a command's motion to an arbiter, and count it. Returns whether it is accepted. `moves`: its source
+        moves another part, so that a stop of this one stops the robot only if the source drives it.
+        """
+        source, rank, now = command.source, command.rank, command.moment.now
+        if moves and is_stop(motion) and not arbiter.is_driver(source, rank, now):
+            arbiter.note_refused(source, rank, now)
+            reason = PART
+        else:
+            reason = arbiter.offer(source, rank, motion, now, command.sent)
         if reason:
             self._refuse(command, reason)
         else:
@@ -222,27 +236,29 @@ class JointInput(Input[JointState]):
     ) -> None:
         freshness: Freshness[JointState] = Freshness((key,), senders, _joints_stop, self._moves)
         super().__init__((key,), freshness, stats, (arbiter for _, arbiter in groups))
-        self._groups, self._known = groups, known
+        self._groups, self._known = [(names, arbiter, Parts()) for names, arbiter in groups], known
 
     def _obey(self, command: Command[JointState]) -> None:
         try:
             motion = self._checked(motion_of(command.message))
         except ValueError as error:
             return self._refuse(command, str(error), "malformed")
-        for names, arbiter in self._groups:
+        for names, arbiter, parts in self._groups:
             if part := motion.only(names):
-                self._offer(arbiter, command, part)
+                each = [(name, part.kind == "position" or value != 0) for name, value in part.values]
+                moves = parts.record(command.source, command.rank, each, arbiter.time.at(command.moment.now))
+                self._offer(arbiter, command, part, moves)
 
     def _moves(self, source: str, now: float) -> bool:
         return any(arbiter.moves(source, now) for arbiter in self._arbiters)
 
     def _checked(self, motion: JointMotion) -> JointMotion:
-        moved = frozenset[str]().union(*(names for names, _ in self._groups))
+        moved = frozenset[str]().union(*(names for names, *_ in self._groups))
         for name, _ in motion.values:
             if name not in self._known:
                 raise ValueError(f"there is no joint {name!r}; the joints are {listed(self._known)}")
             if name not in moved:
-                raise ValueError(f"joint {name!r} follows the drive; only {listed(list(moved))} take commands")
+                raise ValueError(f"joint {name!r} follows the drive; only {listed(moved)} take commands")
         return motion
 
 
@@ -253,18 +269,48 @@ def _joints_stop(message: JointState) -> bool:
         return True  # it moves nothing, and is refused later
 
 
+class Parts:
+    """The topics or joints that each source has set moving in the last 0.5 s, and not stopped since.
+
+    A source may command them one by one: then a zero for one is no stop while it moves another. Names come over the
+    wire, so of too many sources the one that has been silent for the longest time is forgotten.
+    """
+
+    def __init__(self) -> None:
+        self._moving: dict[tuple[str, int], dict[str, float]] = {}
+
+    def record(self, source: str, rank: int, parts: Iterable[tuple[str, bool]], time: float) -> bool:
+        """Record which `parts` a command moves, and which it stops, at `time` (s). Returns whether its source still
+        moves any.
+        """
+        mine = {name: at for name, at in self._moving.pop((source, rank), {}).items() if time - at <= COMMAND_SILENCE}
+        for name, moves in parts:
+            mine.pop(name, None)
+            if moves:
+                mine[name] = time
+        if mine:
+            self._moving[source, rank] = mine
+            if len(self._moving) > MAX_PARTS:
+                del self._moving[next(iter(self._moving))]
+        return bool(mine)
+
+
 class ForceInput(Input[Wrench]):
     """The wrenches on a robot's `keys`. One source drives at a time: all that act are its own."""
 
     def __init__(self, keys: tuple[str, ...], arbiter: Arbiter, senders: Senders, stats: CommandStats) -> None:
         super().__init__(keys, Freshness(keys, senders, _pushes_nothing, arbiter.moves), stats, (arbiter,))
+        self._parts = Parts()
 
     def _obey(self, command: Command[Wrench]) -> None:
         (arbiter,), now = self._arbiters, command.moment.now
         age = 0.0 if arbiter.time.is_paused else now - command.sent
         push = AppliedForce(command.key, _wrench(command.message), arbiter.time.at(now) - age)
         others = arbiter.pushes_of(command.source, command.rank, now).without(command.key)
-        self._offer(arbiter, command, AppliedForces(tuple(sorted((*others, push)))))
+        pushes = self._parts.record(
+            command.source, command.rank, [(command.key, any(push.wrench))], arbiter.time.at(now)
+        )
+        self._offer(arbiter, command, AppliedForces(tuple(sorted((*others, push)))), pushes)
 
 
 def _wrench(message: Wrench) -> tuple[float, float, float, float, float, float]:

@@ -41,7 +41,7 @@ WIRES = {"json": "application/json", "msgpack": "application/msgpack", "cdr": "a
 
 
 def encoding_of(wire: str, type_name: str) -> str:
-    """The Encoding of a message. CDR does not describe itself, so its type is appended, as Zenoh's schema; "" if unknown."""
+    """The Encoding of a message. CDR does not describe itself, so its type is appended, as Zenoh's schema, if known."""
     return f"{WIRES[wire]};{type_name}" if wire == "cdr" and type_name else WIRES[wire]
 
 

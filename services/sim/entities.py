@@ -276,7 +276,7 @@ class Entities:
     def _remember(self, place: str, robot: Robot) -> None:
         """A respawned robot inherits held sources and the software stop; one that was in another sim, the stop."""
         if old := self.memories.pop(place, None):
-            robot.inherit(old)
+            robot.inherit(old, time.monotonic())
         self.memories[place] = robot.memory
         if self._stops and (by := self._stops.read(place)):
             for arbiter in robot.memory:

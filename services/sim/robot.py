@@ -105,10 +105,10 @@ class Robot:
         """The arbiters, with the held sources and the software stop that a robot in its place inherits."""
         return self.arbiter, self.joint_arbiter, self._spare
 
-    def inherit(self, memory: Memory) -> None:
-        """Take over held sources and the software stop from the robot that was in its place."""
+    def inherit(self, memory: Memory, now: float) -> None:
+        """Take over held sources and the software stop at `now` (s) from the robot that was in its place."""
         for arbiter, other in zip(self.memory, memory, strict=True):
-            arbiter.inherit(other)
+            arbiter.inherit(other, now)
 
     @property
     def command_readers(self) -> list[Reader]:
@@ -157,12 +157,19 @@ class Robot:
 
     def reset(self) -> None:
         """The world was reset: only a new command moves it, and what it publishes is due at once."""
-        for arbiter in self.memory:
-            arbiter.drop_driver()
+        self.drop_commands()
         self._joints_at = -math.inf
         self._agenda.publishes.set(self, -math.inf)
         if self._sensors:
             self._sensors.reset()
+
+    def drop_commands(self, without_watchdog: bool = True) -> None:
+        """Let only a new command move it. If its watchdog is off, only `without_watchdog`."""
+        for arbiter in self.memory:
+            arbiter.drop_driver(without_watchdog)
+        if without_watchdog or self.arbiter.timeout >= 0:
+            for freshness in self._filters:
+                freshness.drop_waiting()
 
     @property
     def joint_names(self) -> list[str]:

@@ -48,8 +48,7 @@ class Simulation:
         self.state = State.STATE_PLAYING
         self._entities.command_time.play(now)
         for robot in self._entities.robots:
-            for arbiter in robot.memory:
-                arbiter.drop_driver(without_watchdog=False)
+            robot.drop_commands(without_watchdog=False)
         self._pace.set_factor(self._pace.rtf, now)
         self._publish()
 

@@ -226,7 +226,7 @@ def test_it_knows_when_a_source_last_made_others_wait(arbiter: Arbiter) -> None:
     arbiter.stop("person", 3.0)
     assert (arbiter.taken_at, arbiter.stopped_at) == (3.0, 3.0), "a stop is set, and set again"
     other = Arbiter(timeout=0.5)
-    other.inherit(arbiter)
+    other.inherit(arbiter, 4.0)
     assert (other.taken_at, other.stopped_at) == (3.0, 3.0)
 
 
@@ -368,7 +368,7 @@ class TestSoftwareStop:
     def test_the_robot_in_the_place_of_a_stopped_one_is_stopped(self, arbiter: Arbiter) -> None:
         arbiter.stop("ann@1", 1.0)
         heir = Arbiter(0.5)
-        heir.inherit(arbiter)
+        heir.inherit(arbiter, 8.0)
         assert heir.offer("teleop", PERSON, FORWARD, 9.0).startswith("stopped: by ann@1; ")
 
 

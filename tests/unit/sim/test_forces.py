@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from holozen.command.arbiter import Arbiter
-from holozen.command.inputs import CommandStats, ForceInput
-from holozen.command.motion import AppliedForce
+from holozen.command.inputs import CommandStats, ForceInput, JointInput
+from holozen.command.motion import AppliedForce, is_stop
 from holozen.command.wait_set import Moment
-from holozen.messages import Vector3, Wrench
+from holozen.messages import JointState, Vector3, Wrench
 from holozen.robot.loading import parse
 from holozen.robot.model import Force, Pushed
 from holozen.robot.rotation import matrix_of
@@ -165,6 +165,45 @@ def test_what_is_no_plausible_force_is_refused(topics: Topics, bad: float) -> No
     topics.take("left", bad, 10.1)
     assert topics.pushes(10.2) == {"left": 1.0}
     assert sum(topics.stats.refused.values()) == 1 and "force.x is" in topics.stats.last
+
+
+def test_a_zero_on_one_topic_is_no_stop_while_its_source_pushes_on_another(topics: Topics) -> None:
+    """An ordinary turn has one thruster at zero. That lets go of no stopped robot, and stops no equal."""
+    topics.arbiter.stop("ann@1", 10.0)
+    for now in (10.1, 10.3, 10.5):
+        topics.take("right", 2.0, now)
+        topics.take("left", 0.0, now)
+    topics.arbiter.software_stop.release()
+    topics.take("right", 2.0, 10.7)
+    assert topics.pushes(10.7) is None and "let go first" in topics.stats.last
+    topics.take("right", 0.0, 10.8)
+    topics.take("right", 2.0, 10.9)
+    assert topics.pushes(10.9) == {"right": 2.0}, "all of its topics were at zero"
+    topics.take("right", 1.0, 11.0, "other@2")
+    topics.take("left", 0.0, 11.1, "other@2")
+    assert topics.pushes(11.1) == {"right": 2.0}
+
+
+def test_a_zero_for_one_joint_is_no_stop_while_its_source_moves_another() -> None:
+    arbiter, stats = Arbiter(0.5), CommandStats(lambda _: None)
+    joints = JointInput("joint_command", FakeSenders(), stats, [(frozenset(("l", "r")), arbiter)], ["l", "r"])
+
+    def take(now: float, **speeds: float) -> None:
+        message = JointState(name=[*speeds], velocity=[*speeds.values()])
+        joints.take([received(message, "me@1", key="joint_command")], Moment(now, now, ()))
+
+    arbiter.stop("ann@1", 10.0)
+    for now in (10.1, 10.3, 10.5):
+        take(now, r=5.0)
+        take(now, l=0.0)
+    arbiter.software_stop.release()
+    take(10.7, r=5.0)
+    assert is_stop(arbiter.motion(10.7)) and "let go first" in stats.last
+    take(10.8, l=0.0, r=0.0)
+    take(10.9, r=5.0)
+    assert not is_stop(arbiter.motion(10.9))
+    take(11.0, l=0.0)
+    assert is_stop(arbiter.motion(11.0)), "of its driver, any zero stops"
 
 
 def test_a_software_stop_ends_all_forces_until_the_source_has_let_go(topics: Topics) -> None:

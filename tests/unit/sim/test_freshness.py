@@ -132,6 +132,15 @@ def test_a_command_waits_for_its_senders_clock_and_the_newest_is_judged_then(rob
     assert not robot.freshness.is_waiting
 
 
+def test_what_waits_when_the_sim_is_played_or_reset_is_refused(robot: Robot) -> None:
+    robot.senders.known.clear()
+    robot.hear(10.0, robot.sent(1, 10.0))
+    robot.freshness.drop_waiting()
+    robot.senders.known.add("aa")
+    assert robot.hear(10.02, robot.sent(2, 10.02)) == ["void", ""]
+    assert robot.hear(10.04) == [] and not robot.freshness.is_waiting
+
+
 def test_a_command_whose_senders_clock_stays_unknown_is_refused(robot: Robot) -> None:
     robot.senders.known.clear()
     assert robot.hear(10.0, robot.sent(1, 10.0)) == []

@@ -217,6 +217,26 @@ def test_a_source_on_a_bad_link_that_commands_has_not_let_go(judge: Judge, kind:
     assert judge.motion(11.8) == (1, 0, 0)
 
 
+def test_a_source_whose_clock_is_not_known_yet_has_commanded_during_the_stop() -> None:
+    senders, arbiter = FakeSenders(known=set()), Arbiter(0.5)
+    slow = TwistInput("Fred/cmd_vel", arbiter, senders, linear=2.0, angular=3.0)
+
+    def take(number: int, now: float) -> None:
+        stamp = f"me@aa;{number};{round((now + senders.offset) * 1e9)}"
+        slow.take([received(Twist.planar(1), stamp)], Moment(now, now, CLOCKS))
+
+    arbiter.stop("ann@1", 9.0)
+    take(1, 10.0)
+    arbiter.software_stop.release()
+    senders.known.add("aa")
+    take(2, 10.1)
+    senders.answers["aa"] = 10.15  # the first was late, so it has to answer
+    take(3, 10.2)
+    assert arbiter.motion(10.2) == STOP
+    take(4, 10.8)
+    assert arbiter.motion(10.8) == (1, 0, 0)
+
+
 def test_refusals_are_reported_once_a_second_with_the_number_of_the_others(judge: Judge) -> None:
     for now in (1.0, 1.2, 1.4, 1.0 + REPORT_EVERY, 2.1):
         judge.take(None, now, error="not a Twist")

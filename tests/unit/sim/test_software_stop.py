@@ -126,10 +126,22 @@ def test_the_robot_that_takes_its_place_is_stopped_as_well(stop: SoftwareStop) -
     set_at(stop, 1.0)
     stop.refusal("me", RANK, False, 2.0)
     heir = SoftwareStop(0.5)
-    heir.inherit(stop)
+    heir.inherit(stop, 2.05)
     assert heir.refusal("me", RANK, False, 2.1) == STOPPED
     heir.release()
     assert heir.refusal("me", RANK, False, 2.2) == LET_GO
+
+
+def test_when_it_takes_that_place_whoever_sent_no_stop_has_not_let_go(stop: SoftwareStop) -> None:
+    """A source that commands every 0.4 s was not heard while the robot was gone."""
+    set_at(stop, 1.0)
+    stop.refusal("me", RANK, False, 1.4)
+    stop.refusal("let go", RANK, True, 1.4)
+    heir = SoftwareStop(0.5)
+    heir.inherit(stop, 3.0)
+    heir.release()
+    assert heir.refusal("me", RANK, False, 3.2) == heir.refusal("new", RANK, False, 3.2) == LET_GO
+    assert heir.refusal("let go", RANK, False, 3.2) == ""
 
 
 def test_a_flood_of_names_lets_no_one_of_its_rank_through_and_delays_no_one_of_another(stop: SoftwareStop) -> None:
