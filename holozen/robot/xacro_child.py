@@ -4,6 +4,7 @@ The library keeps its state in module globals and evaluates Python that may neve
 that the kernel can end. `holozen.robot.xacro` starts it.
 """
 
+import contextlib
 import io
 import json
 import os
@@ -11,14 +12,13 @@ import re
 import signal
 import sys
 from collections.abc import Callable, Mapping
-from contextlib import redirect_stderr, redirect_stdout
 from importlib.util import find_spec
 from itertools import groupby
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 from xml.dom import expatbuilder, minidom
-from xml.parsers.expat import ExpatError
+from xml.parsers.expat import ExpatError, ParserCreate, errors
 
 from holozen.robot.elements import MAX_ELEMENTS, broken_xml, check_file, check_size, read_text
 from holozen.robot.errors import RobotError
@@ -234,6 +234,19 @@ def names(table: Any) -> list[str]:
     return found
 
 
+def _still_open(error: ExpatError, text: str) -> str:
+    """Which element is still open where another one ends; empty for any other error."""
+    if error.code != errors.codes[errors.XML_ERROR_TAG_MISMATCH]:
+        return ""
+    opened = list[tuple[str, int]]()
+    parser = ParserCreate("utf-8")
+    parser.StartElementHandler = lambda name, _: opened.append((name, parser.CurrentLineNumber))
+    parser.EndElementHandler = lambda _: opened.pop()
+    with contextlib.suppress(ExpatError):
+        parser.Parse(text.encode("utf-8", "replace"), True)
+    return f"; <{opened[-1][0][:80]}> of line {opened[-1][1]} is still open" if opened else ""
+
+
 # The library's errors as one line.
 
 
@@ -249,7 +262,8 @@ def describe(error: BaseException, trace: Trace, path: Path, guesses: Mapping[st
         return f"{_placed(str(cause), path, trace)}{chain}"
     if isinstance(cause, ExpatError):
         file = _last_file(trace)
-        return f"{Place(file, cause.lineno)}: {broken_xml(cause, _text(file), chain)}"
+        text = _text(file)
+        return f"{Place(file, cause.lineno)}: {broken_xml(cause, text, _still_open(cause, text) + chain)}"
     args = trace.library.substitution_args_context.get("arg", {})
     hint = getattr(cause, "hint", "") or (_guessed(guesses) if isinstance(cause, OSError) else "")
     if type(cause).__name__ == "ArgException":
@@ -345,7 +359,7 @@ def main(asked: dict[str, Any]) -> None:
     limit(MAX_MEMORY, PROCESSOR_TIME, MAX_REPLY)
     sys.setrecursionlimit(DEEPEST_CALLS)
     words = io.StringIO()
-    with redirect_stdout(words), redirect_stderr(words):
+    with contextlib.redirect_stdout(words), contextlib.redirect_stderr(words):
         packages = {name: Path(folder) for name, folder in asked["packages"].items()}
         reply = Expansion(Path(asked["path"]), packages, asked).run(asked)
     reply["warnings"] = words.getvalue()[:MAX_WORDS].splitlines()

@@ -147,7 +147,7 @@ def test_an_unknown_package_is_reported_with_the_way_out(home: Path, folder: Pat
 
 def test_broken_xml_is_reported_with_its_line(folder: Path) -> None:
     path = write(folder, "<link>\n<joint>\n</link>")
-    assert failure(path) == f"{path}, line 4: broken XML: mismatched tag; {CLOSE}"
+    assert failure(path) == f"{path}, line 4: broken XML: mismatched tag; <joint> of line 3 is still open; {CLOSE}"
 
 
 def test_a_double_dash_in_a_comment_is_named(folder: Path) -> None:
