@@ -19,6 +19,7 @@ MODE, TORQUE, GOAL_SPEED, SPEED = 33, 40, 46, 58  # addresses
 SPEED_MODE = 1
 STEPS = 4096 / math.tau  # a radian
 ANSWER = 0.05  # s; a servo answers within 1 ms, a USB adapter or a busy computer delays that
+TRIES = 3  # requests without an answer, after which a servo is taken to be gone
 
 
 class ServoError(Exception):
@@ -85,6 +86,13 @@ class Servos:
 
     def _ask(self, servo: int, instruction: int, parameters: bytes) -> bytes:
         """The parameters of a servo's answer."""
+        for _ in range(TRIES):
+            if (answer := self._try(servo, instruction, parameters)) is not None:
+                return answer
+        raise ServoError(f"servo {servo} at {self._port} does not answer: is it powered, and is that its id?")
+
+    def _try(self, servo: int, instruction: int, parameters: bytes) -> bytes | None:
+        """As `_ask`, once: None without an answer in time."""
         termios.tcflush(self._file, termios.TCIFLUSH)
         self._send(packet(servo, instruction, parameters))
         received, deadline = b"", time.monotonic() + ANSWER
@@ -99,7 +107,7 @@ class Servos:
                     raise ServoError(f"servo {servo} at {self._port} reports error {answer[4]:#04x}")
                 return answer[5:-1]
             if not select.select([self._file], [], [], max(0.0, deadline - time.monotonic()))[0]:
-                raise ServoError(f"servo {servo} at {self._port} does not answer: is it powered, and is that its id?")
+                return None
             try:
                 received += os.read(self._file, 256)
             except OSError as error:

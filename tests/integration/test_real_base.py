@@ -1,12 +1,15 @@
 """LeKiwi's base of the examples on a simulated port: it keeps what bases promise; its wheels stop, whatever ends it."""
 
 import contextlib
+import math
 import os
 import re
 import shlex
 import signal
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +43,11 @@ class Kiwi:
 
     def start(self) -> None:
         self.base = Process(self.command)
-        self.base.wait_for_line("drives the servos")
+        try:
+            self.base.wait_for_line("drives the servos")
+        except BaseException:  # no fixture will
+            self.close()
+            raise
 
     def kill_and_start(self) -> None:
         self.base.kill()
@@ -292,3 +299,22 @@ def test_a_port_without_servos_is_reported_in_one_line(wire: Wire) -> None:
     finally:
         os.close(here)
         os.close(there)
+
+
+def test_a_servo_whose_answer_is_late_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(FOLDER)
+    feetech = import_module("feetech")
+    here, there = os.openpty()
+
+    def answer_the_second() -> None:
+        for reply in (b"", feetech.packet(9, 0, bytes((0, 4)))):
+            os.read(here, 256)
+            os.write(here, reply)
+
+    with feetech.Servos(os.ttyname(there)) as servos:
+        thread = threading.Thread(target=answer_the_second)
+        thread.start()
+        assert servos.rate(9) == pytest.approx(math.tau / 4)
+        thread.join()
+    os.close(here)
+    os.close(there)
