@@ -1,4 +1,4 @@
-"""Parts of the machine that a test needs: in CI they are installed if missing, elsewhere the test is skipped.
+"""Parts of the machine that a test needs: `scripts/parts` installs them in CI, elsewhere the test is skipped.
 
     @pytest.mark.needs("ip", "unshare")
 
@@ -11,12 +11,9 @@ What is tried often, to be sure, is tried more often by `scripts/test --long`, w
         for _ in range(trials(3, 20)):
 """
 
-import fcntl
 import os
 import shutil
 import signal
-import subprocess
-import tempfile
 from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Any
@@ -25,29 +22,12 @@ import pytest
 
 from holozen.process import Ending
 
-PACKAGES = {
-    "chromium": "chromium",
-    "debootstrap": "debootstrap",
-    "docker": "docker.io",
-    "docker-compose": "docker-compose",
-    "faketime": "faketime",
-    "Xvfb": "xvfb",
-    "ip": "iproute2",
-    "kitty": "kitty",
-    "nft": "nftables",
-    "nsenter": "util-linux",
-    "screen": "screen",
-    "setpriv": "util-linux",
-    "setxkbmap": "x11-xkb-utils",
-    "ss": "iproute2",
-    "tmux": "tmux",
-    "unshare": "util-linux",
-    "xdotool": "xdotool",
-}
-"""Debian's package of each command that a test may need."""
+HERE = Path(__file__).parent
+PACKAGES = dict(line.split(" ", 1) for line in (HERE / "packages.txt").read_text().splitlines())
+"""Debian's packages of each command that a test may need."""
 
 IN_CI = os.environ.get("CI") == "true"
-QUICK = Path(__file__).parent / "unit"
+QUICK = HERE / "unit"
 LONG = os.environ.get("HOLOZEN_LONG") == "1"
 
 
@@ -93,9 +73,7 @@ def trials() -> Callable[[int, int], int]:
 def pytest_runtest_setup(item: pytest.Item) -> None:
     needed = [command for marker in item.iter_markers("needs") for command in marker.args]
     for unknown in set(needed) - set(PACKAGES):
-        raise pytest.UsageError(f"needs({unknown!r}): not in PACKAGES of {__file__}")
-    if IN_CI:
-        _install(_packages(needed))
+        raise pytest.UsageError(f"needs({unknown!r}): not in {HERE}/packages.txt")
     if packages := _packages(needed):
         missing = ", ".join(command for command in needed if not shutil.which(command))
         pytest.skip(f"needs {missing}; on Debian: apt install {' '.join(packages)}")
@@ -123,14 +101,3 @@ def _no_skip(report: Any) -> Any:
 def _packages(commands: list[str]) -> list[str]:
     """The packages of those commands that are not there."""
     return sorted({PACKAGES[command] for command in commands if not shutil.which(command)})
-
-
-def _install(packages: list[str]) -> None:
-    """Try it; the test names what is missing if that fails."""
-    if not packages or not shutil.which("apt-get"):
-        return
-    quiet = {**os.environ, "DEBIAN_FRONTEND": "noninteractive"}
-    with (Path(tempfile.gettempdir()) / "holozen-tests-apt-get").open("w") as door:
-        fcntl.flock(door, fcntl.LOCK_EX)  # two cannot install at once, and what the other one did need not be done
-        for words in (["update"], ["install", "--yes", *packages]):
-            subprocess.run(["apt-get", *words], env=quiet, stdin=subprocess.DEVNULL, capture_output=True, timeout=600)

@@ -243,11 +243,13 @@ class JointInput(Input[JointState]):
             motion = self._checked(motion_of(command.message))
         except ValueError as error:
             return self._refuse(command, str(error), "malformed")
+        accepted = self.stats.accepted
         for names, arbiter, parts in self._groups:
             if part := motion.only(names):
                 each = [(name, part.kind == "position" or value != 0) for name, value in part.values]
                 moves = parts.record(command.source, command.rank, each, arbiter.time.at(command.moment.now))
                 self._offer(arbiter, command, part, moves)
+        self.stats.accepted = min(self.stats.accepted, accepted + 1)  # one command, though for several arbiters
 
     def _moves(self, source: str, now: float) -> bool:
         return any(arbiter.moves(source, now) for arbiter in self._arbiters)

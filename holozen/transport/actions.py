@@ -235,18 +235,17 @@ class ActionServer(Goals):
         self._refuses, self._begin = refuses, begin
         send, result = action.Impl.SendGoalService, action.Impl.GetResultService
         self._result_type = result.Response
-        self._servers = [
-            bus.serve(key_of(key, SEND), send.Request, send.Response, self._accept),
-            bus.serve(key_of(key, CANCEL), CancelGoalRequest, CancelGoalReply,
-                lambda request: self.cancel(request, CancelGoalReply(), lambda _: True)),
-        ]  # fmt: skip
+        self._goals = bus.serve(key_of(key, SEND), send.Request, send.Response, self._accept)
+        cancels = bus.serve(key_of(key, CANCEL), CancelGoalRequest, CancelGoalReply,
+            lambda request: self.cancel(request, CancelGoalReply(), lambda _: True))  # fmt: skip
+        self._servers = [self._goals, cancels]
         self._results = bus.serve(key_of(key, RESULT), result.Request, result.Response, _answered_later)
         self._accepted = send.Response
 
     @property
     def caller(self) -> str:
         """The claimed sender of the goal that `refuses` or `begin` is called with."""
-        return self._servers[0].caller
+        return self._goals.caller
 
     def start(self) -> None:
         """Answer from threads, until the bus is closed."""

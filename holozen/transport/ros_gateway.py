@@ -132,6 +132,10 @@ class Gateway:
             for end in ends:
                 end()
         self._held.clear()
+        self._ours.close()
+        for watched in (self._tokens, self._same):
+            if watched:
+                _quietly(watched.undeclare)()
         if self._there is not self._bus.session:
             close(self._there)
 
@@ -201,13 +205,11 @@ class Gateway:
         On our side the key is a service of the sim. A node that publishes the topic, on either side, takes precedence.
         """
         if self._changes != self._ours.changes:
-            self._changes, scenes = self._ours.changes, []
-            if graphs.on_key(ours, "get_scene", "srv"):
-                try:
-                    scenes = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, CALL)
-                except BusError:  # it may have left
-                    self._changes = -1
-            self._robots = [one for scene in scenes for one in scene.entities if one.odometry]
+            self._changes = self._ours.changes
+            try:
+                self._robots = self._robots_of_sims() if graphs.on_key(ours, "get_scene", "srv") else []
+            except BusError:  # it may have left; until the next update, its robots are those of before
+                self._changes = -1
         taken = {one.key for one in ours if one.kind == "pub"} | {
             one.topic for one in self._theirs.values() if one.kind == "pub"
         }
@@ -216,6 +218,10 @@ class Gateway:
             for robot in self._robots
             if (topic := f"{robot.odometry.rpartition('/')[0]}/{DESCRIPTION}".lstrip("/")) not in taken
         }
+
+    def _robots_of_sims(self) -> list[SceneEntity]:
+        scenes = self._bus.call_all("get_scene", GetSceneRequest(), GetSceneReply, CALL)
+        return [one for scene in scenes for one in scene.entities if one.odometry]
 
     def _describe(self, topic: str, robot: SceneEntity) -> Ends:
         """Publish a robot's URDF on ROS 2's side."""
@@ -479,8 +485,7 @@ class ConcurrentAnswers(Answers):
 
         def one(query: Any) -> None:
             try:
-                with query:
-                    self._answer(query)
+                self._handle(query)
             finally:
                 room.release()
 

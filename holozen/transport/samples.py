@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from typing import Any, NamedTuple
 
+from holozen.console import report
 from holozen.transport.errors import BusError
 
 MAX_ATTACHMENT_BYTES = 1000  # longer ones are not read
@@ -235,8 +236,15 @@ class Answers(Declared):
                 query = self._queries.recv()
             except Exception:  # as in RawSubscriber.recv
                 return
-            with query:
+            self._handle(query)
+
+    def _handle(self, query: Any) -> None:
+        with query:
+            try:
                 self._answer(query)
+            except Exception as error:  # of any kind: else later queries would get no answer
+                if self.ends:  # not closed meanwhile
+                    report(f"{query.key_expr}: {type(error).__name__}: {error}")
 
 
 class Ring:

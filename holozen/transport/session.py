@@ -266,7 +266,11 @@ def _value(config: zenoh.Config, path: str) -> Any:
 def open_point(endpoint: str) -> Callable[[], None] | None:
     """Open a session that only listens at `endpoint`. Returns a function that closes it, or None if it is taken."""
     id = new_id([endpoint], [endpoint])
-    cfg = (("listen/endpoints", f'["{endpoint}"]'), ("listen/exit_on_failure", "true"), ("id", f'"{id}"'))
+    cfg = (
+        ("listen/endpoints", json.dumps([endpoint])),
+        ("listen/exit_on_failure", "true"),
+        ("id", json.dumps(id)),
+    )
     try:
         session = zenoh.open(configuration(Connection(connect=(), listen=(), cfg=cfg)))
     except zenoh.ZError:

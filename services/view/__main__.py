@@ -2,7 +2,6 @@
 
 import argparse
 import contextlib
-import errno
 import io
 import re
 import secrets
@@ -21,6 +20,7 @@ from holozen.console import report
 from holozen.process import stop_event
 from holozen.transport import connection
 from holozen.transport.errors import BusError
+from holozen.transport.rendezvous import IN_USE, listen_error
 
 if TYPE_CHECKING:
     import viser
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 PORT, FOXGLOVE_PORT = 8080, 8765
 NO_TOKEN = "none"
+ALL = ("0.0.0.0", "::")  # addresses that listen on every interface
 
 
 def parser() -> argparse.ArgumentParser:
@@ -60,8 +61,16 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
+    from .guard import is_loopback
+
     where = connection.from_arguments(args)
     token = random_token(args.host, where) if args.token is None else "" if args.token == NO_TOKEN else args.token
+    if not token and args.host not in ALL and not is_loopback(args.host):
+        report(
+            f"view: without a token a page opens only at 127.0.0.1, where --host {args.host} does not listen; "
+            "use --host 0.0.0.0, or leave out --token none"
+        )
+        return 2
     if args.port is None:
         args.port = FOXGLOVE_PORT if args.foxglove else PORT
     if args.foxglove:
@@ -161,21 +170,15 @@ def _addresses(args: argparse.Namespace, port: int, token: str, scheme: str = "h
             yield f"{scheme}://127.0.0.1:{port}/"
             return
         yield f"port {port} of {args.host} is open to the network; anyone with this address may {may} the robots:"
-        host = host if args.host not in ("0.0.0.0", "::") else socket.gethostname()
+        host = host if args.host not in ALL else socket.gethostname()
     yield f"{scheme}://{host}:{port}/{token and f'?token={token}'}"
 
 
 def _check_port(host: str, port: int) -> None:
     """Raise OSError if the port is not free; viser would silently take the next one."""
-    family = socket.AF_INET6 if ":" in host else socket.AF_INET
-    with socket.socket(family) as probe:
-        probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        try:
-            probe.bind((host, port))
-        except (OSError, OverflowError) as error:
-            reason = getattr(error, "strerror", None) or error
-            advice = "; --port 0 takes a free one" if getattr(error, "errno", 0) == errno.EADDRINUSE else ""
-            raise OSError(f"cannot listen on {host} port {port}: {reason}{advice}") from None
+    if reason := listen_error(f"tcp/{f'[{host}]' if ':' in host else host}:{port}"):
+        advice = "; --port 0 takes a free one" if reason == IN_USE else ""
+        raise OSError(f"cannot listen on {host} port {port}: {reason}{advice}")
 
 
 def _serve(host: str, port: int, guard: "Guard") -> "viser.ViserServer":

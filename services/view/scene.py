@@ -26,7 +26,7 @@ from holozen.robot.errors import RobotError
 from holozen.rotation import XYZ, Transform
 from holozen.transport.errors import ServiceError
 from holozen.transport.graph import Endpoint
-from holozen.wire import key_for
+from holozen.wire import key_for, topic
 
 from .drive import Driver
 from .instances import Instances, difference, wxyz
@@ -44,6 +44,7 @@ NAME_AT = (0.0, 0.0, 0.6)  # m
 EYE, LOOK_AT, FIELD = (-2.0, -1.6, 1.6), (0.0, 0.0, 0.0), math.radians(60)  # m; the camera of a page that just opened
 SEEN = 1e-4  # m and of a quaternion; smaller changes are not sent to the pages
 TURNED = 0.01  # rad or m of a joint, likewise
+ODOM = topic("odom")
 LARGEST = 1_000_000  # bytes of a message that is read
 
 
@@ -236,7 +237,9 @@ class Scene:
         sims = {end.session for end in self._ends if end.kind == "srv" and end.key == "get_scene"}
         known = {entity.odometry for entity in entities}
         keys = [
-            end.key for end in self._ends if end.kind == "pub" and end.type == Odometry.ROS and end.session not in sims
+            end.key
+            for end in self._ends
+            if end.kind == "pub" and end.type == Odometry.ROS and end.session not in sims and topic(end.key) == ODOM
         ]
         gone = [one.entity for one in self.shown.values() if not one.entity.number and one.entity.odometry not in known]
         found = {_without_sim(key).name: _without_sim(key) for key in keys if key not in known}

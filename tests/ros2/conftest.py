@@ -83,10 +83,6 @@ class Theirs:
         """The class of a message type that a publisher or subscriber uses."""
         return self._shared().store.types[name]
 
-    def session(self) -> Any:
-        """Zenoh's session of all of them."""
-        return self._shared().session
-
     def _shared(self) -> Any:
         from zenoh_ros2_sdk import ZenohSession
 

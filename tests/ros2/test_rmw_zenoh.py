@@ -158,11 +158,13 @@ def test_a_latched_topic_reaches_a_late_subscriber_also_one_that_asks_as_soon_as
         assert shown.wait(20)
     last = "*/tf_static/**/@adv/pub/**?_anyke"
     assert [reply for reply in session.get(last, timeout=5.0) if reply.ok]
-    late = theirs.session()  # it asks only once, perhaps before its link is up
-    wait_for(lambda: [reply for reply in late.get(last, timeout=5.0) if reply.ok])
     qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
-    theirs.subscriber("/tf_static", "tf2_msgs/msg/TFMessage", found.append, qos=qos)
-    wait_for(lambda: found)
+
+    def asks() -> bool:  # once, as it is made, for 2 s: perhaps before its link is up
+        theirs.subscriber("/tf_static", "tf2_msgs/msg/TFMessage", found.append, qos=qos)
+        return bool(found)
+
+    wait_for(asks)
     assert found[0].transforms[0].child_frame_id == "scanner"
 
 

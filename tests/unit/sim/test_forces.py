@@ -206,6 +206,14 @@ def test_a_zero_for_one_joint_is_no_stop_while_its_source_moves_another() -> Non
     assert is_stop(arbiter.motion(11.0)), "of its driver, any zero stops"
 
 
+def test_a_joint_command_for_several_arbiters_counts_once() -> None:
+    stats, groups = CommandStats(lambda _: None), [(frozenset((name,)), Arbiter(0.5)) for name in ("wheel", "arm")]
+    joints = JointInput("joint_command", FakeSenders(), stats, groups, ["wheel", "arm"])
+    message = JointState(name=["wheel", "arm"], velocity=[1.0, 1.0])
+    joints.take([received(message, "me@1", key="joint_command")], Moment(10.0, 10.0, ()))
+    assert all(not is_stop(arbiter.motion(10.0)) for _, arbiter in groups) and stats.accepted == 1
+
+
 def test_a_software_stop_ends_all_forces_until_the_source_has_let_go(topics: Topics) -> None:
     topics.take("left", 1.0, 10.0)
     topics.arbiter.stop("me", 10.1)

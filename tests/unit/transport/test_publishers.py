@@ -58,6 +58,19 @@ def test_a_get_is_answered_with_the_last_message(wire: Wire, capfd: pytest.Captu
     assert capfd.readouterr().err == ""  # Zenoh's own thread would report errors there
 
 
+def test_a_get_that_cannot_be_answered_is_reported_and_the_next_one_is(
+    wire: Wire, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    writer, reader = wire.bus("writer"), wire.bus("reader")
+    publisher = writer.publisher("cmd_vel", Twist)
+    publisher.put(Twist())
+    with monkeypatch.context() as broken:
+        broken.setattr(Publisher, "reply", lambda *_: 1 // 0)
+        assert last(reader, "cmd_vel") == []
+    assert capsys.readouterr().err == "cmd_vel: ZeroDivisionError: integer division or modulo by zero\n"
+    assert len(last(reader, "cmd_vel")) == 1
+
+
 def test_a_number_that_is_not_finite_is_neither_sent_nor_remembered(wire: Wire) -> None:
     bus = wire.bus()
     subscription = bus.subscribe("cmd_vel", Twist)

@@ -3,14 +3,16 @@
 import math
 from types import SimpleNamespace
 from typing import Any, cast
+from unittest.mock import MagicMock
 
 import pytest
 import viser
 
 from holozen.bus import Bus
-from holozen.messages import Point, Pose, Quaternion, SceneEntity
+from holozen.messages import Odometry, Point, Pose, Quaternion, SceneEntity
+from holozen.testing import Wire
 from services.view.instances import Body, Instances
-from services.view.scene import Shown
+from services.view.scene import Scene, Shown
 
 
 @pytest.fixture
@@ -22,6 +24,19 @@ def shown() -> Shown:
     kind = SimpleNamespace(add=Body, changed=False, is_arrow=False)
     entity = SceneEntity("bot", odometry="odom")
     return Shown(cast("viser.ViserServer", server), cast("Bus", None), entity, cast("Instances", kind))
+
+
+def test_a_robot_that_no_sim_has_is_known_by_its_odom_alone(wire: Wire) -> None:
+    """Filters publish odometry too, beside that of their robot or on keys like `odometry/filtered`."""
+    keys, base = {"Fred/odom", "Fred/odom_filtered", "odometry/filtered"}, wire.bus("base")
+    for key in keys:
+        base.publisher(key, Odometry)
+    scene = Scene(MagicMock(), wire.bus("view"))
+    there = scene.ask().there
+    while not scene.topics.keys() >= keys:
+        there = scene.ask().there
+    scene.close()
+    assert [(one.name, one.odometry) for one in there.values()] == [("Fred", "Fred/odom")]
 
 
 @pytest.mark.parametrize("bad", [(math.nan, 2.0, 0.0), (5.0, math.nan, 0.0), (5.0, math.inf, 0.0)])

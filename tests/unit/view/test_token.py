@@ -20,6 +20,11 @@ def test_a_page_has_a_token_where_more_people_reach_it_than_the_robots() -> None
         assert random_token(host, OPEN)
 
 
+def test_without_a_token_no_page_is_promised_that_would_be_refused(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["--host", "192.0.2.1", "--token", "none"]) == 2
+    assert "without a token a page opens only at 127.0.0.1" in capsys.readouterr().err
+
+
 def test_a_token_needs_no_quoting(capsys: pytest.CaptureFixture[str]) -> None:
     assert parser().parse_args(["--token", "a-B.9_~"]).token == "a-B.9_~"
     for wrong in ("a&b", "a;b", "a b", "ä", "a%41", ""):
