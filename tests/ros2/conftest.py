@@ -9,7 +9,7 @@ import pytest
 
 from holozen.messages.definitions import whole_text
 from holozen.messages.registry import Registry
-from holozen.testing import Wire
+from holozen.testing import Wire, wait_for
 from tests.built import built, needs
 
 BRIDGE = built("bridge")
@@ -57,6 +57,22 @@ class Theirs:
     def subscriber(self, topic: str, kind: str, callback: Callable[[Any], None], **more: Any) -> Any:
         """A subscriber that calls `callback` with each message."""
         return self._made("ROS2Subscriber", topic, kind, callback, msg_definition=definition(kind), **more)
+
+    def latched(self, topic: str, kind: str) -> list[Any]:
+        """The last message of a topic, as a late subscriber has it. That asks once, as it is made: before its link to
+        the publisher is up it would find none, so others are made until one has.
+        """
+        from zenoh_ros2_sdk.qos import QosDurability, QosProfile  # type: ignore[import-untyped]
+
+        found: list[Any] = []
+        qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
+
+        def has_come() -> bool:
+            self.subscriber(topic, kind, found.append, qos=qos)
+            return bool(found)
+
+        wait_for(has_come, what=f"the last message of {topic}")
+        return found
 
     def trigger(self, name: str) -> Any:
         """A client of a service with the type Trigger: `call()`."""

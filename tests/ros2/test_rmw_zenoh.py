@@ -38,8 +38,6 @@ def joined(wire: Wire, *words: str) -> Any:
 
 
 def test_a_ros_node_sees_reads_drives_and_stops_our_robot(wire: Wire, theirs: "Theirs") -> None:
-    from zenoh_ros2_sdk.qos import QosDurability, QosProfile  # type: ignore[import-untyped]
-
     wire.start("sim").wait_for_line("listens on cmd_vel", 60)
     joined(wire)
     odom: list[Any] = []
@@ -54,11 +52,8 @@ def test_a_ros_node_sees_reads_drives_and_stops_our_robot(wire: Wire, theirs: "T
     }
     wait_for(lambda: theirs.topics().items() >= expected.items(), what=lambda: f"our topics in {theirs.topics()}")
 
-    shown: list[Any] = []
-    transient = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
-    theirs.subscriber("/robot_description", "std_msgs/msg/String", shown.append, qos=transient)
-    wait_for(lambda: shown, what="the robot's description")
-    assert '<link name="base' in shown[0].data
+    (description,) = theirs.latched("/robot_description", "std_msgs/msg/String")
+    assert '<link name="base' in description.data
 
     status = wire.bus().latest("cmd_vel_status", CommandStatus)
     commands = theirs.publisher("/cmd_vel", TWIST, "their_teleop")
@@ -147,25 +142,17 @@ def test_a_node_of_humble_is_reported_without_the_flag(wire: Wire, theirs: "Thei
 def test_a_latched_topic_reaches_a_late_subscriber_also_one_that_asks_as_soon_as_it_is_shown(
     wire: Wire, theirs: "Theirs"
 ) -> None:
-    from zenoh_ros2_sdk.qos import QosDurability, QosProfile
-
     static = wire.bus("statics").publisher("tf_static", TFMessage)
     static.put(TFMessage([TransformStamped(child_frame_id="scanner")]))
-    session, shown, found = wire.bus().session, threading.Event(), list[Any]()
+    session, shown = wire.bus().session, threading.Event()
     token = "@ros2_lv/*/*/*/*/MP/*/*/*/%tf_static/**"
     with session.liveliness().declare_subscriber(token, lambda _: shown.set()):
         joined(wire)
         assert shown.wait(20)
     last = "*/tf_static/**/@adv/pub/**?_anyke"
     assert [reply for reply in session.get(last, timeout=5.0) if reply.ok]
-    qos = QosProfile(durability=QosDurability.TRANSIENT_LOCAL, history_depth=1)
-
-    def asks() -> bool:  # once, as it is made, for 2 s: perhaps before its link is up
-        theirs.subscriber("/tf_static", "tf2_msgs/msg/TFMessage", found.append, qos=qos)
-        return bool(found)
-
-    wait_for(asks)
-    assert found[0].transforms[0].child_frame_id == "scanner"
+    (found,) = theirs.latched("/tf_static", "tf2_msgs/msg/TFMessage")
+    assert found.transforms[0].child_frame_id == "scanner"
 
 
 def test_a_ros_node_is_a_client_of_our_actions(wire: Wire, theirs: "Theirs") -> None:
