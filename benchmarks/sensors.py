@@ -1,5 +1,5 @@
 """What sensors cost a sim that keeps real time: a lidar of 360 rays and a camera of 640 x 480, both at 10 Hz, on one
-robot that is driven at 20 Hz. They are read, or not, in turns, in the same sim: what nobody reads is not made.
+robot that is driven at 20 Hz. They are read, or not, in turns, in the same sim: without a reader, they are not made.
 """
 
 import sys

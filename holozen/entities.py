@@ -28,7 +28,7 @@ AGAIN = 0.5  # s between two requests to cancel them
 POLL = 0.01  # s
 NONE_MADE = "no step was made"
 
-DONE = "the others did as they were told"
+DONE = "the others have done it"
 HANGS = "it hangs or is stopped (fg or kill -CONT continues it), or cannot be reached from here"
 
 T = TypeVar("T")

@@ -73,6 +73,8 @@ EXTRAS = (
 """Libraries that only some verbs need."""
 EXTRA_OF = {"cryptography": "secure", "foxglove": "foxglove", "mujoco": "mujoco"}
 """Library that a flag of several verbs needs -> the extra that installs it; others are in the extra of their verb."""
+FOR_SCRIPTS = ("run", "launch")
+"""Verbs that run code of users, whose arrays may be large."""
 SERVICES = ("sim", "teleop", "controller", "camera", "view", "pose-service")
 SERVICE_VERBS = {"sim": dict.fromkeys(("pause", "play", "step", "reset"), "simulation")}
 """Service -> verbs that may follow its name -> their modules."""
@@ -155,6 +157,9 @@ def _main(words: list[str]) -> int:
 def _run(verb: str, words: list[str]) -> int:
     from holozen.console import Failure, report
 
+    if verb not in FOR_SCRIPTS:
+        # numpy's threads spin for 0.05 s of processor time as it is loaded, and save none: the arrays here are small.
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         return int(command(verb).main(words))
     except Failure as error:

@@ -88,6 +88,7 @@ def keep_places(file: Callable[[], str]) -> None:
 MAX_CALLS = 5_000  # of macros, blocks and includes; the library takes 1 s for this many, and superlinear time for more
 # These differ between processes: string hashes, set order, and generated names.
 _IMPURE = re.compile(r"\b(hash|set|frozenset|anon)\b")
+_NAME, _COMMA = re.compile(r"[A-Za-z_]\w*"), re.compile(r"[-+]?\d+,\d+")
 
 
 class Trace:
@@ -221,8 +222,25 @@ class Trace:
                 if error.name and tables and not hasattr(error, "hint"):
                     error.hint = suggest(error.name, names(tables[0]))  # type: ignore[attr-defined]
                 raise
+            except TypeError as error:
+                if tables and not hasattr(error, "hint"):
+                    error.hint = _no_number(text, tables[0])  # type: ignore[attr-defined]
+                raise
 
         return wrapped
+
+
+def _no_number(expression: str, table: Any) -> str:
+    """A hint for an expression that calculates with a text."""
+    for name in _NAME.findall(expression):
+        try:
+            value = table[name]
+        except Exception:  # no property, or one that cannot be evaluated, which has its own error
+            continue
+        if isinstance(value, str):
+            point = f"; write {value.strip().replace(',', '.')}" if _COMMA.fullmatch(value.strip()) else ""
+            return f"; {name} is the text {shorten(repr(value), 80)}, not a number{point}"
+    return ""
 
 
 def names(table: Any) -> list[str]:

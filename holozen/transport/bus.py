@@ -81,9 +81,9 @@ class Bus(Node):
         self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False, wire: str = "",
         dead_man: bool = True,
     ) -> Publisher[M]:  # fmt: skip
-        """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages. `wire` is another one
-        than the node's. `dead_man`: who commands is listed as a node, so that its end stops the robot at once; without,
-        its last command counts as long as that of a foreign program.
+        """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages. `wire` replaces
+        the node's. `dead_man`: a publisher of commands is listed as a node, so that its end stops the robot at once;
+        without, its last command counts as long as that of a foreign program.
         """
         from holozen.messages import codec
 

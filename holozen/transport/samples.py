@@ -122,8 +122,8 @@ class Sample:
     """A received sample. If its `size` in bytes is over the reader's limit, or its attachment is too long, that is its
     `oversize`, else 0, and it has no payload. A limit of 0 means no limit.
 
-    Most readers need only the payload, so the rest is read from Zenoh's sample on demand. Who decodes it puts the
-    result into `message`, or the reason why not into `error`.
+    Most readers need only the payload, so the rest is read from Zenoh's sample on demand. The decoder puts its
+    result into `message`, or the reason why it has none into `error`.
     """
 
     __slots__ = ("_sample", "_stamp", "error", "message", "oversize", "payload")

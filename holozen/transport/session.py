@@ -136,8 +136,8 @@ def _open_listening(connection: Connection, config: zenoh.Config, mode: str) -> 
 def new_id(listen: list[str], points: Sequence[str]) -> str:
     """An id for a peer's session, greater than those of the peers that it is to connect to.
 
-    Who listens nowhere connects to all. Who listens at one of the `points`, or beyond loopback, connects to none that
-    it only hears of: the others reach it, and it may not reach them. Among the rest chance decides.
+    A peer that listens nowhere connects to all. One that listens at one of the `points`, or beyond loopback, connects
+    to none that it only hears of: the others reach it, and it may not reach them. Among the rest chance decides.
     """
     rank = "1" if not are_near(listen) or set(listen) & set(points) else "8" if listen else "f"
     # Zenoh compares the last byte first, and takes no zero in front.

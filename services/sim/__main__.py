@@ -73,8 +73,6 @@ def main(argv: list[str] | None = None) -> int:
     if args.shard and (args.join or any(not name for _, name in args.robot or ())):
         options.error("--shard gives each robot to the shard of its name: use --robot FILE=NAME, and no --join")
     stop = stop_event()
-    # Its threads take longer to start than they save: the arrays here are small.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         from holozen.robot import loading, reader  # they load numpy, which --help does not need
         from holozen.robot.sdf_world import load_world
@@ -130,7 +128,7 @@ def main(argv: list[str] | None = None) -> int:
             rivals = Rivals(entities, bus.id, stop)
             if not joins and not mine:
                 loop.answers.append(rivals.answer)
-            # Last: who reads it may ask for all of the above.
+            # Last: a program that waits for this line may ask for all of the above.
             for robot in added:
                 report(f"sim: {robot}")
             if mine:

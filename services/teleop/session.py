@@ -79,7 +79,7 @@ class Session:
     def steer(self, stick: tuple[float, float, float], now: float) -> None:
         """Take the joystick's deflection (forward, left, counter-clockwise; -1 to 1), and publish any change."""
         if stick != self.mapper.stick:
-            if self._pending == "resume":  # as a key does: who steers has not handed over
+            if self._pending == "resume":  # as a key does: an operator who steers has not handed over
                 self._pending = ""
             self.mapper.steer(stick, now)
             self.publish(now)
