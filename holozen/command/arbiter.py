@@ -7,6 +7,7 @@ import math
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
 from holozen.limits import STOP
@@ -60,20 +61,34 @@ class CommandTime:
         self._ahead, self.is_paused, self.slack = self.at(now) - now, False, 0.0
 
 
+class Sent(NamedTuple):
+    """When a command was sent, in s: not before `earliest`, and not after `latest`, or if others that its source sent
+    before it are missing, they may have been sent since `latest`. For `silence` its source had sent nothing before it,
+    by the source's own clock; infinite if that is unknown.
+    """
+
+    earliest: float
+    latest: float
+    silence: float = math.inf
+
+
 class SoftwareStop:
     """Refuses every command while it is set.
 
     Releasing it moves nothing, as ISO 13850 requires of an emergency stop: a source that commanded during the stop
     drives again only after it has let go, by sending a stop or by being silent for the robot's watchdog timeout, at
-    least 0.5 s. Where the watchdog is off (a `timeout` below zero), only a stop counts. A source without a record is
-    assumed to have commanded at the moment of the stop.
+    least 0.5 s. A link or a receiver that is held up for that long is no silence. Where the watchdog is off (a
+    `timeout` below zero), only a stop counts. A source without a record is assumed to have commanded at the moment of
+    the stop.
     """
 
     def __init__(self, timeout: float) -> None:
         self.setter = ""  # the node that set it; empty while it is not set
         self.set_timeout(timeout)
-        self._last_moves: dict[int, dict[str, float]] = {}  # rank -> source -> time of its last motion
+        # Rank -> source -> time of the last motion that came from it; -inf once it has let go.
+        self._last_moves: dict[int, dict[str, float]] = {}
         self._stopped = -math.inf  # when it was set: any source may have commanded until then
+        self._released = -math.inf  # when it was last released
         self._others: dict[int, float] = {}  # rank -> time of the last motion of any source beyond MAX_PER_RANK
 
     def set_timeout(self, timeout: float) -> None:
@@ -84,7 +99,9 @@ class SoftwareStop:
         """Set the stop at `now`. `driver` is the source that moves the robot, with its rank. The first setter stays."""
         if not self.setter:
             self._last_moves = {
-                rank: {source: time for source, time in sources.items() if self.must_let_go(source, rank, now)}
+                rank: {
+                    source: time for source, time in sources.items() if self.must_let_go(source, rank, Sent(now, now))
+                }
                 for rank, sources in self._last_moves.items()
             }
             self._stopped = now
@@ -92,32 +109,39 @@ class SoftwareStop:
             self._note(*driver, now)
         self.setter = self.setter or by or "an unknown caller"
 
-    def release(self) -> None:
+    def release(self, now: float) -> None:
         """Let sources that have let go drive again."""
+        if self.setter:
+            self._released = now
         self.setter = ""
 
-    def refusal(self, source: str, rank: int, stops: bool, now: float) -> str:
-        """Why a command is refused at `now`, or ""; `stops` tells whether it is a stop."""
-        waits = self.must_let_go(source, rank, now)
+    def refusal(self, source: str, rank: int, stops: bool, now: float, sent: Sent | None = None) -> str:
+        """Why a command is refused at `now`, or ""; `stops`: it is a stop. Without `sent`, it was sent now."""
+        waits = self.must_let_go(source, rank, sent or Sent(now, now))
         if self.setter or waits:
             self._note(source, rank, -math.inf if stops else now)
+        elif source in self._last_moves.get(rank, {}):
+            self._note(source, rank, -math.inf)
         if self.setter:
             return STOPPED.format(by=self.setter)
         or_wait = f" or be silent for {self._silence:g} s" if self._silence < NEVER else ""
         return LET_GO.format(or_wait=or_wait) if waits and not stops else ""
 
-    def must_let_go(self, source: str, rank: int, now: float) -> bool:
-        """Whether a source still has to let go before it may drive."""
+    def must_let_go(self, source: str, rank: int, sent: Sent) -> bool:
+        """Whether a source still has to let go before it may drive, by a command that was `sent` then."""
         sources = self._last_moves.get(rank, {})
         if source in sources:
-            return now - sources[source] <= self._silence + ROUNDING
-        return now - max(self._stopped, self._others.get(rank, -math.inf)) <= COMMAND_SILENCE + ROUNDING
+            last = sources[source]
+            return last > -math.inf and min(sent.earliest - last, sent.silence) <= self._silence + ROUNDING
+        stopped = max(self._stopped, self._others.get(rank, -math.inf))
+        return sent.latest < self._released or sent.latest - stopped <= COMMAND_SILENCE + ROUNDING
 
     def inherit(self, other: "SoftwareStop", now: float) -> None:
         """Take over the state of another one at `now`. If that is set, whoever has not sent a stop may have commanded
         until now: nothing listened.
         """
-        self.setter, self._stopped, self._others = other.setter, other._stopped, dict(other._others)
+        self.setter, self._stopped, self._released = other.setter, other._stopped, other._released
+        self._others = dict(other._others)
         self._last_moves = deepcopy(other._last_moves)
         if self.setter:
             self._stopped = now
@@ -186,19 +210,27 @@ class Arbiter:
         self._held: dict[int, Held] = {}  # by rank
         self._highest = AUTOPILOT + 1  # the highest rank that has driven since the last resume
 
-    def offer(self, source: str, rank: int, motion: Motion, now: float, sent: float | None = None) -> str:
-        """Take a command at `now`, which was sent at `sent` at the earliest. Returns why it is refused, or ""."""
-        real, age, now = now, 0.0 if sent is None else now - sent, self.time.at(now)
-        if reason := self.software_stop.refusal(source, max(rank, PERSON), is_stop(motion), now):
+    def offer(self, source: str, rank: int, motion: Motion, now: float, sent: Sent | None = None) -> str:
+        """Take a command at `now`; without `sent`, it was sent now. Returns why it is refused, or ""."""
+        age, here, rank = now - sent.earliest if sent else 0.0, self._here(now, sent), max(rank, PERSON)
+        time = self.time.at(now)
+        if reason := self.software_stop.refusal(source, rank, is_stop(motion), time, here):
             return reason
         if age > COMMAND_SILENCE and not is_stop(motion):
             return LATE.format(age=age)
-        sent = now if self.time.is_paused else now - age  # a command does not age while the sim is paused
-        return self._choose(Driver(source, max(rank, PERSON), motion, sent), now, real)
+        return self._choose(Driver(source, rank, motion, here.earliest), time, now)
 
-    def note_refused(self, source: str, rank: int, now: float) -> None:
+    def note_refused(self, source: str, rank: int, now: float, sent: Sent | None = None) -> None:
         """Record a command that was refused earlier: its source has not let go of a stopped robot."""
-        self.software_stop.refusal(source, max(rank, PERSON), False, self.time.at(now))
+        rank = max(rank, PERSON)
+        self.software_stop.refusal(source, rank, False, self.time.at(now), self._here(now, sent))
+
+    def _here(self, now: float, sent: Sent | None) -> Sent:
+        """When a command was sent, on our clock; while the sim is paused, it does not age, and nor does a silence."""
+        time = self.time.at(now)
+        if sent is None or self.time.is_paused:
+            return Sent(time, time)
+        return Sent(time - (now - sent.earliest), time - max(0.0, now - sent.latest), sent.silence)
 
     def _choose(self, new: Driver, now: float, real: float) -> str:
         source, rank, motion = new.source, new.rank, new.motion
@@ -295,6 +327,10 @@ class Arbiter:
         self._drive(None)
         self._highest = PERSON
 
+    def release(self, now: float) -> None:
+        """End the software stop."""
+        self.software_stop.release(self.time.at(now))
+
     def forget(self, source: str, of_members: bool = False) -> None:
         """Stop the robot if this source drove: its process is gone.
 
@@ -307,7 +343,7 @@ class Arbiter:
     def holds(self, source: str, rank: int, now: float) -> bool:
         """Whether a source has to wait for `resume`, or has to let go, before it may drive."""
         rank = max(rank, PERSON)
-        return self._is_held(source, rank) or self.software_stop.must_let_go(source, rank, self.time.at(now))
+        return self._is_held(source, rank) or self.software_stop.must_let_go(source, rank, self._here(now, None))
 
     @property
     def held(self) -> bool:

@@ -68,13 +68,15 @@ class Sender(NamedTuple):
 
 class Judged(NamedTuple, Generic[M]):
     """A command, the earliest time (s) at which it may have been sent, its greatest possible age (s; 0: unknown), and
-    why it is refused, or "".
+    why it is refused, or "". `latest` and `silence` are those of `Sent`, as far as they are known.
     """
 
     received: Received[M]
     sent: float
     age: float
     refusal: str
+    latest: float = math.inf
+    silence: float = math.inf
 
 
 class Freshness(Generic[M]):
@@ -102,6 +104,7 @@ class Freshness(Generic[M]):
         self._keys, self._senders, self._stops, self._drives = keys, senders, stops, drives
         self.max_age = COMMAND_SILENCE
         self._newest: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # the newest command: sent when, number
+        self._heard: OrderedDict[Sender, tuple[float, int]] = OrderedDict()  # likewise, for each name of a session
         self._doubted: OrderedDict[Sender, float] = OrderedDict()  # since when an answer is awaited
         self._waiting: dict[Sender, tuple[Received[M], float]] = {}  # with the arrival of its sender's first one
         self._void: list[Received[M]] = []  # of those that waited, to be refused
@@ -138,6 +141,7 @@ class Freshness(Generic[M]):
             elif self._stops(received.message):
                 self._waiting.pop(sender, None)  # earlier commands are void
                 if stamp and self._ages(stamp, now):
+                    self._gap(received, stamp)
                     self._note(stamp, sender)
                 yield Judged(received, now if stamp else since, 0.0, "")
             elif stamp:
@@ -177,21 +181,38 @@ class Freshness(Generic[M]):
         before = self._newest.get(sender, (-math.inf, -1))
         self._note(stamp, sender)
         youngest, oldest = ages
-        sent = now - oldest
+        silence, missing = self._gap(received, stamp)
+        judged = Judged(received, now - oldest, oldest, "", now - youngest - missing, silence)
         # The time is compared first: a forged number would count for as long as the session lives, a forged time only
         # until that time has come.
         if (stamp.sent, stamp.number) <= before:
-            return Judged(received, sent, oldest, OUT_OF_ORDER.format(number=stamp.number, last=before[1]))
+            return judged._replace(refusal=OUT_OF_ORDER.format(number=stamp.number, last=before[1]))
         if sender not in self._doubted and youngest > PROMPT and not self._drives(source_of(received), now):
             _put(self._doubted, sender, now)
             self._senders.ask_now(session, now)
         if sender in self._doubted:
             if self._senders.answered(session) < self._doubted[sender]:
-                return Judged(received, sent, oldest, UNANSWERED.format(age=youngest))
+                return judged._replace(refusal=UNANSWERED.format(age=youngest))
             del self._doubted[sender]
-        if oldest > self.max_age:
-            return Judged(received, sent, oldest, OLD.format(age=oldest, limit=self.max_age))
-        return Judged(received, sent, oldest, "")
+        return judged._replace(refusal=OLD.format(age=oldest, limit=self.max_age)) if oldest > self.max_age else judged
+
+    def _gap(self, received: Received[M], stamp: Stamp) -> tuple[float, float]:
+        """The time (s) since the sample that its source sent before this one, on the source's clock: as a silence if
+        that one arrived (infinite if none did), and as a time in which samples were sent that are missing.
+        """
+        source = Sender(received.source, "", received.key)  # numbers of all priorities are one sequence
+        sent, number = self._heard.get(source, (stamp.sent, stamp.number))
+        if stamp.number <= number and source in self._heard:
+            return math.inf, 0.0
+        _put(self._heard, source, (stamp.sent, stamp.number))
+        passed = max(0.0, stamp.sent - sent)
+        return (
+            (math.inf, 0.0)
+            if number == stamp.number
+            else (passed, 0.0)
+            if number + 1 == stamp.number
+            else (0.0, passed)
+        )
 
     def _wait(self, received: Received[M], stamp: Stamp, sender: Sender, came: float, now: float) -> Judged[M] | None:
         there = self._senders.has(stamp.session)

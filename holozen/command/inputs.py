@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, Generic, NamedTuple, TypeVar
 
-from holozen.command.arbiter import Arbiter
+from holozen.command.arbiter import Arbiter, Sent
 from holozen.command.freshness import Freshness, Judged, Senders, source_of
 from holozen.command.motion import AppliedForce, AppliedForces, JointMotion, Motion, is_stop, motion_of
 from holozen.command.wait_set import Moment, Reader
@@ -38,8 +38,8 @@ UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its s
 
 
 class Command(NamedTuple, Generic[M]):
-    """A valid message on `key` from `source`, with its `rank`, read at a `moment`, and sent at `sent` (s) or later.
-    `age` in s is that by a stamp in the message itself; 0 without one.
+    """A valid message on `key` from `source`, with its `rank`, read at a `moment`, and `sent` then. `age` in s is that
+    by a stamp in the message itself; 0 without one.
     """
 
     message: M
@@ -47,7 +47,7 @@ class Command(NamedTuple, Generic[M]):
     source: str
     rank: int
     moment: Moment
-    sent: float
+    sent: Sent
     age: float
 
 
@@ -72,11 +72,12 @@ class Input(Generic[M]):
         for judged in self.freshness.sift(arrived, moment.now, moment.since):
             self._take(judged, moment)
         for received in self.freshness.waiting:  # whatever becomes of it, its source has not let go
-            self._note_refused(source_of(received), PRIORITIES.index(received.priority), moment.now)
+            sent = Sent(moment.since, moment.now, 0.0)
+            self._note_refused(source_of(received), PRIORITIES.index(received.priority), moment.now, sent)
 
-    def _note_refused(self, source: str, rank: int, now: float) -> None:
+    def _note_refused(self, source: str, rank: int, now: float, sent: Sent) -> None:
         for arbiter in self._arbiters:
-            arbiter.note_refused(source, rank, now)
+            arbiter.note_refused(source, rank, now, sent)
 
     def _take(self, judged: Judged[M], moment: Moment) -> None:
         received = judged.received
@@ -86,10 +87,10 @@ class Input(Generic[M]):
         if message is None:
             return
         age = self._stamp_age(message, moment)
-        sent = min(judged.sent, moment.now - age)
+        sent = Sent(min(judged.sent, moment.now - age), min(judged.latest, moment.now), judged.silence)
         command = Command(message, received.key, source, rank, moment, sent, age)
         if refusal := judged.refusal or self._refusal(command):
-            self._note_refused(source, rank, moment.now)
+            self._note_refused(source, rank, moment.now, sent)
             self._refuse(command, refusal)
         else:
             self._obey(command)
@@ -115,7 +116,7 @@ class Input(Generic[M]):
         """
         source, rank, now = command.source, command.rank, command.moment.now
         if moves and is_stop(motion) and not arbiter.is_driver(source, rank, now):
-            arbiter.note_refused(source, rank, now)
+            arbiter.note_refused(source, rank, now, command.sent)
             reason = PART
         else:
             reason = arbiter.offer(source, rank, motion, now, command.sent)
@@ -306,7 +307,7 @@ class ForceInput(Input[Wrench]):
 
     def _obey(self, command: Command[Wrench]) -> None:
         (arbiter,), now = self._arbiters, command.moment.now
-        age = 0.0 if arbiter.time.is_paused else now - command.sent
+        age = 0.0 if arbiter.time.is_paused else now - command.sent.earliest
         push = AppliedForce(command.key, _wrench(command.message), arbiter.time.at(now) - age)
         others = arbiter.pushes_of(command.source, command.rank, now).without(command.key)
         pushes = self._parts.record(

@@ -86,7 +86,7 @@ class RobotServices:
         stopped = max(arbiter.stopped_at for arbiter in self._arbiters)
         self._require_sent_after(self._release, stopped, f"the last stop of {self._namespace or 'the robot'}")
         for arbiter in self._arbiters:
-            arbiter.software_stop.release()
+            arbiter.release(self._now)
         self._report_change(f"was released by {self._release.caller or 'an unknown caller'}")
         return TriggerReply(True, RELEASED)
 

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from holozen.command.arbiter import AUTOPILOT, HELD, MAX_HELD, Arbiter, Driver
+from holozen.command.arbiter import AUTOPILOT, HELD, MAX_HELD, Arbiter, Driver, Sent
 from holozen.command.motion import JointMotion, Motion
 from holozen.limits import STOP, Planar
 from holozen.transport.samples import PRIORITIES
@@ -136,14 +136,14 @@ def test_a_held_source_may_stop_the_robot_but_not_drive_it(arbiter: Arbiter) -> 
 
 
 def test_a_command_is_as_old_as_it_may_have_waited(arbiter: Arbiter) -> None:
-    assert arbiter.offer("teleop", PERSON, FORWARD, now=1.0, sent=0.7) == ""
+    assert arbiter.offer("teleop", PERSON, FORWARD, now=1.0, sent=Sent(0.7, math.inf)) == ""
     assert arbiter.motion(1.2) == FORWARD
     assert arbiter.motion(1.2 + 1e-6) == STOP
 
 
 def test_a_stop_of_any_age_stops_the_robot(arbiter: Arbiter) -> None:
     arbiter.offer("teleop", PERSON, FORWARD, 1.0)
-    assert arbiter.offer("teleop", PERSON, STOP, now=1.1, sent=-math.inf) == ""
+    assert arbiter.offer("teleop", PERSON, STOP, now=1.1, sent=Sent(-math.inf, math.inf)) == ""
     assert arbiter.motion(1.1) == STOP
 
 
@@ -331,7 +331,7 @@ class TestSoftwareStop:
         arbiter = Arbiter(timeout)
         arbiter.offer("script", SCRIPT, FORWARD, 1.0)
         arbiter.stop("ann@1", 1.1)
-        arbiter.software_stop.release()
+        arbiter.release(1.1)
         assert arbiter.motion(1.2) == STOP
         assert arbiter.offer("script", SCRIPT, FORWARD, 1.3).startswith("let go first: ")
         assert arbiter.offer("script", SCRIPT, STOP, 1.4) == ""
@@ -341,7 +341,7 @@ class TestSoftwareStop:
         arbiter.offer("controller", CONTROLLER, FORWARD, 1.0)
         arbiter.stop("ann@1", 1.1)
         assert arbiter.held
-        arbiter.software_stop.release()
+        arbiter.release(1.1)
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.0) == HELD
         assert arbiter.resume(9.1) == ""
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 9.2) == ""
@@ -349,7 +349,7 @@ class TestSoftwareStop:
     def test_resume_does_not_make_up_for_letting_go(self, arbiter: Arbiter) -> None:
         arbiter.stop("ann@1", 1.0)
         arbiter.offer("controller", CONTROLLER, FORWARD, 2.0)
-        arbiter.software_stop.release()
+        arbiter.release(2.0)
         assert arbiter.resume(2.1) == ""
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 2.2).startswith("let go first: ")
         assert arbiter.offer("controller", CONTROLLER, FORWARD, 2.8) == ""
@@ -446,7 +446,10 @@ class Robot(RuleBasedStateMachine):
     @rule(source=st.sampled_from(sorted(SOURCES)), velocity=st.sampled_from([STOP, FORWARD, LEFT]))
     def speak(self, source: str, velocity: Planar) -> None:
         before = self.arbiter.driver(self.now)
-        waits = self.arbiter.software_stop.must_let_go(source, SOURCES[source], self.now) and velocity != STOP
+        waits = (
+            self.arbiter.software_stop.must_let_go(source, SOURCES[source], Sent(self.now, self.now))
+            and velocity != STOP
+        )
         refused = self.arbiter.offer(source, SOURCES[source], velocity, self.now)
         after = self.arbiter.driver(self.now)
         if self.arbiter.software_stop.setter or waits:
@@ -494,7 +497,7 @@ class Robot(RuleBasedStateMachine):
     @rule()
     def release(self) -> None:
         before = self.arbiter.motion(self.now)
-        self.arbiter.software_stop.release()
+        self.arbiter.release(self.now)
         assert self.arbiter.motion(self.now) == before
 
     @rule(source=st.sampled_from(sorted(SOURCES)))

@@ -173,7 +173,7 @@ def test_a_zero_on_one_topic_is_no_stop_while_its_source_pushes_on_another(topic
     for now in (10.1, 10.3, 10.5):
         topics.take("right", 2.0, now)
         topics.take("left", 0.0, now)
-    topics.arbiter.software_stop.release()
+    topics.arbiter.release(10.5)
     topics.take("right", 2.0, 10.7)
     assert topics.pushes(10.7) is None and "let go first" in topics.stats.last
     topics.take("right", 0.0, 10.8)
@@ -196,7 +196,7 @@ def test_a_zero_for_one_joint_is_no_stop_while_its_source_moves_another() -> Non
     for now in (10.1, 10.3, 10.5):
         take(now, r=5.0)
         take(now, l=0.0)
-    arbiter.software_stop.release()
+    arbiter.release(10.5)
     take(10.7, r=5.0)
     assert is_stop(arbiter.motion(10.7)) and "let go first" in stats.last
     take(10.8, l=0.0, r=0.0)
@@ -219,7 +219,7 @@ def test_a_software_stop_ends_all_forces_until_the_source_has_let_go(topics: Top
     topics.arbiter.stop("me", 10.1)
     topics.take("left", 1.0, 10.2)
     assert topics.pushes(10.2) is None and topics.stats.last.startswith("me@1: stopped")
-    topics.arbiter.software_stop.release()
+    topics.arbiter.release(10.2)
     topics.take("left", 1.0, 10.3)
     assert topics.pushes(10.3) is None and topics.stats.last.startswith("me@1: let go first")
     topics.take("left", 0.0, 10.4)

@@ -1,7 +1,9 @@
 """Commands are checked, limited, counted, and reported at most once a second."""
 
+import itertools
 import math
 from itertools import product
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -13,6 +15,7 @@ from holozen.command.motion import Motion
 from holozen.command.wait_set import Moment
 from holozen.limits import STOP
 from holozen.messages import CommandSource, Header, Time, Twist, TwistStamped, Vector3
+from holozen.transport.pubsub import Received
 from holozen.wire import MAX_STAMP_AGE
 from tests.unit.sim.fakes import FakeSenders, received
 
@@ -208,7 +211,7 @@ def test_a_stop_is_obeyed_whatever_its_stamp(judge: Judge, seconds: float) -> No
 def test_a_source_on_a_bad_link_that_commands_has_not_let_go(judge: Judge, kind: str) -> None:
     """What comes too late to be obeyed still shows that its sender has not let go."""
     judge.twist_input.arbiter.stop("ann@1", 10.0)
-    judge.twist_input.arbiter.software_stop.release()
+    judge.twist_input.arbiter.release(10.0)
     for now in (10.4, 10.8):
         judge.take(Twist.planar(1) if kind == "late" else stamped(990.0), now, waited=0.6)
     judge.take(Twist.planar(1), now=11.2)
@@ -227,7 +230,7 @@ def test_a_source_whose_clock_is_not_known_yet_has_commanded_during_the_stop() -
 
     arbiter.stop("ann@1", 9.0)
     take(1, 10.0)
-    arbiter.software_stop.release()
+    arbiter.release(10.0)
     senders.known.add("aa")
     take(2, 10.1)
     senders.answers["aa"] = 10.15  # the first was late, so it has to answer
@@ -235,6 +238,67 @@ def test_a_source_whose_clock_is_not_known_yet_has_commanded_during_the_stop() -
     assert arbiter.motion(10.2) == STOP
     take(4, 10.8)
     assert arbiter.motion(10.8) == (1, 0, 0)
+
+
+class Held:
+    """A source that commands 20 times a second, and what it sent comes in later, and in part."""
+
+    def __init__(self, stamped: bool) -> None:
+        self._senders, self.arbiter, self._stamped = FakeSenders(), Arbiter(0.5), stamped
+        self._input = TwistInput("Fred/cmd_vel", self.arbiter, self._senders, linear=2.0, angular=3.0)
+        self._numbers = itertools.count()
+
+    def take(self, begin: float, end: float, at: float = 0.0, since: float = 0.0, last: int = 99) -> None:
+        """What it sent from `begin` to `end` (s) comes in: each at once, or its `last` samples together `at` a time,
+        before which nothing was read `since` another.
+        """
+        times = [tick / 20 for tick in range(round(begin * 20), round(end * 20))]
+        stamps = [f"me@aa;{next(self._numbers)};{round((sent + self._senders.offset) * 1e9)}" for sent in times]
+        come: list[Received[Twist | TwistStamped]] = [
+            received(Twist.planar(1), stamp if self._stamped else "me@aa") for stamp in stamps
+        ]
+        if at:
+            self._senders.answers["aa"] = at
+            self._input.take(come[-last:], Moment(at, since or at, CLOCKS))
+        else:
+            for sent, each in zip(times, come, strict=True):
+                self._input.take([each], Moment(sent, sent, CLOCKS))
+
+
+@pytest.mark.parametrize(
+    ("stamped", "held_up"),
+    [
+        (True, {}),
+        (True, {"last": 3}),
+        (True, {"since": 12.0, "last": 3}),
+        (False, {"since": 12.0}),
+    ],
+    ids=["link", "link that loses samples", "receiver", "receiver, without stamps"],
+)
+@pytest.mark.parametrize(("stopped", "released"), [(10.0, 11.5), (12.2, 13.0)], ids=["before", "meanwhile"])
+def test_a_link_or_a_receiver_that_is_held_up_is_no_silence(
+    stamped: bool, held_up: dict[str, Any], stopped: float, released: float
+) -> None:
+    held = Held(stamped)
+    held.take(9.0, min(stopped, 12.0))
+    held.arbiter.stop("ann@1", stopped)
+    held.take(min(stopped, 12.0), min(released, 12.0))
+    held.arbiter.release(released)
+    held.take(min(released, 12.0), 12.0)
+    held.take(12.0, 13.6, at=13.6, **held_up)
+    held.take(13.6, 15.0)
+    assert held.arbiter.motion(15.0) == STOP
+    held.take(15.6, 17.0)
+    assert held.arbiter.motion(17.0) == (1, 0, 0), "it was silent"
+
+
+def test_a_source_that_began_during_the_stop_on_a_link_that_was_held_up_has_not_let_go() -> None:
+    held = Held(stamped=True)
+    held.arbiter.stop("ann@1", 12.0)
+    held.arbiter.release(13.0)
+    held.take(12.8, 13.6, at=13.6)
+    held.take(13.6, 15.0)
+    assert held.arbiter.motion(15.0) == STOP
 
 
 def test_refusals_are_reported_once_a_second_with_the_number_of_the_others(judge: Judge) -> None:

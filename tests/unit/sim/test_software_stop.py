@@ -37,7 +37,7 @@ def test_the_first_setter_remains_and_setting_it_again_changes_nothing(stop: Sof
     set_at(stop, 1.0)
     stop.set("bob@2", None, 2.0)
     assert stop.setter == "ann@1"
-    stop.release()
+    stop.release(2.0)
     assert stop.setter == ""
 
 
@@ -51,14 +51,14 @@ def test_after_the_release_a_source_that_goes_on_commanding_is_not_obeyed(stop: 
     set_at(stop, 1.0)
     for step in range(1000):
         if step == 100:
-            stop.release()
+            stop.release(2.0 + step * 0.05)
         assert stop.refusal("me", RANK, False, 2.0 + step * 0.05) == (STOPPED if step < 100 else LET_GO)
 
 
 def test_it_is_obeyed_once_it_was_silent(stop: SoftwareStop) -> None:
     set_at(stop, 1.0)
     stop.refusal("me", RANK, False, 2.0)
-    stop.release()
+    stop.release(2.0)
     assert stop.refusal("me", RANK, False, 2.5) == LET_GO
     assert stop.refusal("me", RANK, False, 3.01) == ""
     assert stop.refusal("me", RANK, False, 3.02) == ""
@@ -69,38 +69,38 @@ def test_it_is_obeyed_once_it_sent_a_stop_also_while_the_stop_was_set(stop: Soft
     set_at(stop, 1.0)
     stop.refusal("me", RANK, False, 2.0)
     if released:
-        stop.release()
+        stop.release(2.0)
     stop.refusal("me", RANK, True, 2.01)
-    stop.release()
+    stop.release(2.01)
     assert stop.refusal("me", RANK, False, 2.02) == ""
 
 
 def test_the_driver_has_to_let_go_too_though_it_was_silent_during_the_stop(stop: SoftwareStop) -> None:
     set_at(stop, 1.0, driver="me")
-    stop.release()
+    stop.release(1.0)
     assert stop.refusal("me", RANK, False, 1.05) == LET_GO
     assert stop.refusal("me", RANK, False, 1.6) == ""
 
 
 def test_right_after_the_stop_any_source_may_have_been_commanding(stop: SoftwareStop) -> None:
     set_at(stop, 1.0)
-    stop.release()
+    stop.release(1.0)
     assert stop.refusal("me", RANK, False, 1.05) == LET_GO
     assert stop.refusal("late comer", RANK, False, 1.6) == ""
 
 
 def test_a_source_that_begins_after_the_release_is_obeyed_at_once(stop: SoftwareStop) -> None:
     set_at(stop, 1.0)
-    stop.release()
+    stop.release(1.0)
     assert stop.refusal("me", RANK, False, 2.0) == ""
 
 
 def test_a_second_stop_remembers_sources_that_still_have_to_let_go(stop: SoftwareStop) -> None:
     set_at(stop, 1.0)
     stop.refusal("me", RANK, False, 2.0)
-    stop.release()
+    stop.release(2.0)
     set_at(stop, 2.1)
-    stop.release()
+    stop.release(2.1)
     assert stop.refusal("me", RANK, False, 2.3) == LET_GO
 
 
@@ -108,7 +108,7 @@ def test_a_slow_watchdog_means_an_equally_long_silence() -> None:
     stop = SoftwareStop(2.0)
     set_at(stop, 1.0)
     stop.refusal("slow", RANK, False, 2.0)
-    stop.release()
+    stop.release(2.0)
     assert stop.refusal("slow", RANK, False, 3.5).endswith("silent for 2 s")
     assert stop.refusal("slow", RANK, False, 5.6) == ""
 
@@ -116,7 +116,7 @@ def test_a_slow_watchdog_means_an_equally_long_silence() -> None:
 def test_where_the_watchdog_is_off_only_a_stop_counts() -> None:
     stop = SoftwareStop(-1)
     set_at(stop, 1.0, driver="slow")
-    stop.release()
+    stop.release(1.0)
     assert stop.refusal("slow", RANK, False, 1000.0).endswith("send a stop")
     assert stop.refusal("new", RANK, False, 1000.0) == ""
     assert stop.refusal("slow", RANK, True, 1001.0) == stop.refusal("slow", RANK, False, 1001.1) == ""
@@ -128,7 +128,7 @@ def test_the_robot_that_takes_its_place_is_stopped_as_well(stop: SoftwareStop) -
     heir = SoftwareStop(0.5)
     heir.inherit(stop, 2.05)
     assert heir.refusal("me", RANK, False, 2.1) == STOPPED
-    heir.release()
+    heir.release(2.1)
     assert heir.refusal("me", RANK, False, 2.2) == LET_GO
 
 
@@ -139,7 +139,7 @@ def test_when_it_takes_that_place_whoever_sent_no_stop_has_not_let_go(stop: Soft
     stop.refusal("let go", RANK, True, 1.4)
     heir = SoftwareStop(0.5)
     heir.inherit(stop, 3.0)
-    heir.release()
+    heir.release(3.0)
     assert heir.refusal("me", RANK, False, 3.2) == heir.refusal("new", RANK, False, 3.2) == LET_GO
     assert heir.refusal("let go", RANK, False, 3.2) == ""
 
@@ -148,7 +148,7 @@ def test_a_flood_of_names_lets_no_one_of_its_rank_through_and_delays_no_one_of_a
     set_at(stop, 1.0)
     for number in range(MAX_PER_RANK + 10):
         stop.refusal(f"script {number}", RANK, False, 2.0)
-    stop.release()
+    stop.release(2.0)
     for number in (0, MAX_PER_RANK + 5):
         assert stop.refusal(f"script {number}", RANK, False, 2.3) == LET_GO
     assert stop.refusal("a fresh script", RANK, False, 2.3) == LET_GO
@@ -172,7 +172,7 @@ def test_no_source_moves_the_robot_after_a_release_without_having_let_go(
     for index, (source, what, pause) in enumerate(before + after):
         now += pause
         if index == len(before):
-            stop.release()
+            stop.release(now)
         refused = stop.refusal(source, RANK, what == "stop", now)
         let_go = what == "stop" or now - last[source] > 0.5
         assert bool(refused) == (index < len(before) or not let_go)
@@ -185,6 +185,6 @@ def test_with_a_longer_watchdog_a_source_has_to_be_silent_for_longer(stop: Softw
     set_at(stop, 1.0)
     stop.refusal("me", RANK, False, 1.1)
     stop.set_timeout(2.0)
-    stop.release()
+    stop.release(1.1)
     assert "silent for 2 s" in stop.refusal("me", RANK, False, 3.0)
     assert stop.refusal("me", RANK, False, 5.1) == ""
