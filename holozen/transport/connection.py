@@ -458,7 +458,9 @@ def _canonical(endpoint: str) -> str:
         return f"{kind}/{os.path.normpath(place)}"
     host, _, port = place.rpartition(":")
     host = host.strip("[]").lower()
-    return f"{kind}/{HERE[0] if host in HERE else host}:{int(port)}" if int(port) else ""
+    plain = host.removeprefix("::ffff:")
+    is_here = plain in HERE or plain.startswith("127.") or plain == os.uname().nodename.lower()
+    return f"{kind}/{HERE[0] if is_here else host}:{int(port)}" if int(port) else ""
 
 
 def from_here(listening: str) -> str:

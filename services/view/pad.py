@@ -29,10 +29,9 @@ class Pad:
     def __init__(self) -> None:
         self._held: dict[str, float] = {}  # button -> its last report
         self._page = -1  # the one that drives
-        self._expired: set[tuple[int, str]] = set()
+        self._expired: dict[tuple[int, str], str] = {}  # page and button -> why it counts as let go
         self._stopping = -math.inf  # when the last stop began
         self._ended = False
-        self.why = ""  # why the buttons that were held at the last `stop` count as let go
 
     def hold(self, page: int, button: str, now: float) -> str:
         """A page reports a held button. Returns why it does not count, or ""."""
@@ -40,8 +39,9 @@ class Pad:
         if self._ended:
             return ENDS
         if (page, button) in self._expired:
-            return ""
+            return self._expired[page, button]
         if self._held and page != self._page:
+            self._expired[page, button] = OTHER  # else it would drive by itself once the other page lets go
             return OTHER
         self._page = page
         self._held[button] = now
@@ -52,26 +52,25 @@ class Pad:
         if page == self._page and self._held.pop(button, None) is not None and not self._held:
             self._stopping = now
 
-    def expired(self, page: int, now: float) -> list[str]:
-        """The buttons that a page has to replace."""
+    def expired(self, page: int, now: float) -> dict[str, str]:
+        """The buttons that a page has to replace, and why they count as let go."""
         self._expire(now)
-        return [button for other, button in self._expired if other == page]
+        return {button: why for (other, button), why in self._expired.items() if other == page}
 
     def renew(self, page: int, button: str) -> None:
         """A page has replaced a button."""
-        self._expired.discard((page, button))
+        self._expired.pop((page, button), None)
 
     def close(self, page: int, now: float) -> None:
         """A page is gone: stop if it drives."""
         if page == self._page:
             self.stop(now)
-        self._expired = {button for button in self._expired if button[0] != page}
+        self._expired = {button: why for button, why in self._expired.items() if button[0] != page}
 
     def stop(self, now: float, why: str = "") -> None:
         """Let go of all buttons, and note `why`. Those that are held have to be pressed again."""
         if self._held:
-            self.why = why
-            self._expired |= {(self._page, button) for button in self._held}
+            self._expired |= {(self._page, button): why for button in self._held}
             self._held.clear()
             self._stopping = now
 

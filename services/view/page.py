@@ -189,10 +189,9 @@ class Page:
         page, chosen = self._client.client_id, _entity(self._shown_robot())
         wrong = {button for button, entity in self._pressed.items() if entity != chosen}
         for driver in self._driven:
-            expired, why = driver.use(lambda pad, now: (pad.expired(page, now), pad.why))
+            expired = driver.use(lambda pad, now: pad.expired(page, now))
             wrong.update(expired)
-            if expired and why:
-                self._said = why
+            self._said = next(filter(None, expired.values()), self._said)
         for button in wrong:
             old = self._buttons[button]
             self._add_button(button, old.order)

@@ -38,7 +38,7 @@ def test_silence_is_a_stop_and_what_is_reported_afterwards_counts_only_for_a_new
     pad.hold(1, "forward", 0.0)
     late = HELD + 0.01
     assert pad.command(late, False) == STOP
-    assert pad.expired(1, late) == ["forward"] and pad.why == SILENT
+    assert pad.expired(1, late) == {"forward": SILENT}
     pad.hold(1, "forward", late)
     assert pad.command(late, True) is None
     pad.renew(1, "forward")
@@ -65,6 +65,18 @@ def test_one_page_drives_until_it_lets_go_or_is_gone() -> None:
     assert pad.command(0.05, False) == (0.0, 1.0, 0.0)
 
 
+def test_a_button_that_was_refused_does_not_drive_once_the_other_page_lets_go() -> None:
+    pad = Pad()
+    pad.hold(1, "forward", 0.0)
+    pad.hold(2, "left", 0.01)
+    pad.release(1, "forward", 0.02)
+    pad.hold(2, "left", 0.03)
+    assert pad.command(0.04, False) == STOP and pad.expired(2, 0.04) == {"left": OTHER}
+    pad.renew(2, "left")
+    pad.hold(2, "left", 0.05)
+    assert pad.command(0.06, False) == (0.0, 1.0, 0.0)
+
+
 def test_a_release_by_another_page_changes_nothing() -> None:
     pad = Pad()
     pad.hold(1, "forward", 0.0)
@@ -79,4 +91,4 @@ def test_a_stop_needs_no_reason_when_a_person_asks_for_it() -> None:
     pad.renew(1, "forward")
     pad.hold(1, "forward", 1.0)
     pad.stop(1.1)
-    assert pad.expired(1, 1.1) == ["forward"] and not pad.why
+    assert pad.expired(1, 1.1) == {"forward": ""}
