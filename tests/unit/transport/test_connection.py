@@ -229,7 +229,8 @@ NETWORKS: list[tuple[dict[str, Any], set[str]]] = [
     ({"mode": "client", "connect": ("tcp/[::1]:7447",)}, {HOME}),
     ({"mode": "router"}, {HOME}),
     *(({"connect": (one,), "listen": (POINT,)}, {POINT}) for one in (
-        POINT, "tcp/localhost:9000", f"tcp/{os.uname().nodename}:9000", "tcp/[::ffff:127.0.0.1]:9000", "tcp/[::1]:9000", "tcp/127.0.0.1:09000", "tcp/127.0.0.1:9000#so_sndbuf=65000",
+        POINT, "tcp/localhost:9000", f"tcp/{os.uname().nodename}:9000", "tcp/[::ffff:127.0.0.1]:9000",
+        "tcp/[::1]:9000", "tcp/127.0.0.1:09000", "tcp/127.0.0.1:9000#so_sndbuf=65000",
     )),
     ({"connect": (POINT,), "listen": ("tcp/127.0.0.1:0",)}, {POINT}),
     ({"connect": ("tcp/127.0.0.1:1", POINT), "listen": (POINT,)}, {POINT, "tcp/127.0.0.1:1"}),
