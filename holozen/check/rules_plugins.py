@@ -107,4 +107,5 @@ def _is_driven(subject: Subject) -> bool:
     """Whether the robot has a drive, or a plugin that may be meant as one."""
     if subject.drives or (subject.model is not None and subject.model.drive is not None):
         return True
-    return any(nearest(kind_of(plugin), DRIVES, 6) for plugin in subject.plugins)
+    misplaced = subject.root.all("plugin")  # in URDF
+    return any(nearest(kind_of(plugin), DRIVES, 6) for plugin in (*subject.plugins, *misplaced))

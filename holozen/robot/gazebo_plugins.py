@@ -680,6 +680,8 @@ def read_plugins(
     plugin that cannot work as written.
     """
     drive, publishers, wheels = None, [], None
+    for plugin in robot.all("plugin") if robot.name == "robot" else ():
+        source.warn(plugin, "is not inside <gazebo>, so it is ignored; put <gazebo> ... </gazebo> around it")
     for plugin in plugins_outside_sensors(robot):
         kind = kind_of(plugin)
         if kind == PUBLISHER:
@@ -710,8 +712,8 @@ def read_plugins(
 
 
 def plugins_outside_sensors(robot: Tag) -> Iterator[Tag]:
-    """The plugins outside sensors, at any depth in a `<gazebo>`, or directly in a `<model>`."""
-    waiting = [tag for tag in reversed(robot.children) if tag.name in ("gazebo", "plugin")]
+    """The plugins outside sensors: of a `<robot>` those at any depth in a `<gazebo>`, of a `<model>` its own."""
+    waiting = robot.all("gazebo" if robot.name == "robot" else "plugin")[::-1]
     while waiting:
         tag = waiting.pop()
         if tag.name == "plugin":

@@ -55,7 +55,6 @@ BROKEN = [
     ("ignored", "</robot>", "<unheard_of/></robot>", "<unheard_of> in <robot name='good'> is not read"),
     ("ignored", '<link name="arm">', '<link name="arm"><foo>1</foo>', "collision, gravity, inertial, visual"),
     ("floating", '<link name="base">', '<link name="base"><gravity>false</gravity>', "link 'base'"),
-    ("ignored", "</robot>", '<plugin name="x" filename="libx.so"/></robot>', "into a <gazebo>"),
     ("wheel-load", BODY, BODY.replace("0.02", "0"), "'base' is as low as the wheels"),
     ("wheel-side", "<leftJoint>left_joint</leftJoint><rightJoint>right_joint<", SWAPPED, "'left_joint' (a right joint"),
     ("wheel-measure", "<wheelSeparation>0.24", "<wheelSeparation>0.3", "is 0.3 m, and the wheels are 0.24 m apart"),
@@ -214,6 +213,15 @@ def test_wheels_and_plugins_but_no_drive(good: str, findings: Findings) -> None:
     found = {finding.rule: finding.problem for finding in findings(good.replace("ros_diff_drive", "ros_camera"))}
     assert sorted(found) == ["load-note", "no-drive"]
     assert "no drive plugin" in found["no-drive"] and "(camera) is not simulated" in found["load-note"]
+
+
+def test_a_drive_outside_gazebo_is_misplaced_and_nothing_else_is_wrong(good: str, findings: Findings) -> None:
+    (finding,) = findings(good.replace("<gazebo>", "").replace("</gazebo>\n</robot>", "</robot>"))
+    assert (finding.rule, finding.severity, finding.place.line) == ("place", "error", 60)
+    assert (finding.problem, finding.fix) == (
+        "<plugin> does not belong in <robot name='good'>",
+        "move it into <gazebo>",
+    )
 
 
 def test_gazebo_fixes_a_root_called_world_in_place(good: str, findings: Findings) -> None:

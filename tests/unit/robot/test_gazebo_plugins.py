@@ -136,6 +136,12 @@ def test_a_plugin_without_file_name_is_reported() -> None:
     assert warning.endswith("<plugin> of <robot name='r'> (no filename) is unknown and is ignored")
 
 
+def test_a_plugin_outside_gazebo_is_reported_and_ignored_as_in_gazebo() -> None:
+    model = parse(f'<robot name="r">\n<link name="base"/>\n{plugin("")}</robot>', ORIGIN)
+    problem = "<plugin name='drive'> is not inside <gazebo>, so it is ignored; put <gazebo> ... </gazebo> around it"
+    assert (model.drive, model.warnings) == (None, (f"{ORIGIN}, line 3: {problem}",))
+
+
 def test_a_plugin_directly_in_an_sdf_model_drives_it() -> None:
     link = "<link name='base'><inertial><mass>1</mass></inertial></link>"
     text = f"<sdf version='1.6'><model name='m'>{link}{plugin('<commandTopic>go</commandTopic>')}</model></sdf>"
