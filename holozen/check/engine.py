@@ -12,6 +12,7 @@ from holozen.robot import reader
 from holozen.robot.elements import Tag, read_text, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, KNOWN, kind_of
+from holozen.robot.keys import shared
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import check_simulated
@@ -319,6 +320,12 @@ def _refusals(subject: Subject) -> Iterator[tuple[Severity, Mistake]]:
         check_simulated(subject.loaded)
     except RobotError as error:
         yield _message("error", subject.root, str(error))
+    key, problem = shared(subject.loaded, subject.loaded.name)
+    if key:
+        named = (
+            tag for tag in subject.settings if (topic := tag.value().strip("/")) and f"/{key}".endswith(f"/{topic}")
+        )
+        yield _message("error", next(named, subject.root), problem)
 
 
 def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:

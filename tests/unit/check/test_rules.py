@@ -39,6 +39,7 @@ BROKEN = [
     ("tag", "<mu1>1.0</mu1>", "<slefCollide>true</slefCollide>", "write <selfCollide>"),
     ("tag", "<commandTopic>cmd_vel</commandTopic>", "<comandTopic>cmd_vel</comandTopic>", "write <commandTopic>"),
     ("tag", '<link name="arm">', '<Link name="x"/><link name="arm">', "write <link>"),
+    ("load", "<commandTopic>cmd_vel<", "<commandTopic>odom<", ":63: error: the robot's file puts its commands and its"),
     ("attribute", 'iyy="0.017" iyz="0"', 'iyy="0.017" ivz="0"', "write iyz="),
     ("attribute", '<sphere radius="0.015"/>', '<sphere radius="0.015" raduis="1"/>', "write radius="),
     ("attribute", 'radius="0.05" length="0.03"', 'radius="0.05" length="0.03" lenght="0.03"', "write length="),
