@@ -377,6 +377,17 @@ def test_a_skid_steer_may_be_given_a_wider_base(good: str, rules: Rules) -> None
     rear = wide[start:end].replace("_wheel", "_rear").replace("_joint", "_rear_joint").replace("0.05 ", "-0.1 ", 4)
     tags = "<leftJoint>left_rear_joint</leftJoint><rightJoint>right_rear_joint</rightJoint><wheelSeparation>"
     assert rules(wide[:end] + rear + wide[end:].replace("<wheelSeparation>", tags)) == []
+    crossed = tags.replace("left_rear", "x").replace("right_rear", "left_rear").replace("x_", "right_rear_")
+    assert rules(wide[:end] + rear + wide[end:].replace("<wheelSeparation>", crossed)) == ["wheel-side"]
+
+
+def test_no_measure_is_taken_from_a_robot_in_millimetres(good: str, findings: Findings) -> None:
+    large = '<link name="x"><visual><geometry><box size="300 20 10"/></geometry></visual></link>'
+    joint = '<joint name="x" type="fixed"><parent link="base"/><child link="x"/></joint></robot>'
+    (finding,) = findings(
+        good.replace("<wheelSeparation>0.24", "<wheelSeparation>0.3").replace("</robot>", large + joint)
+    )
+    assert finding.problem == "the robot measures 300 m; its file may be in millimetres"
 
 
 def test_the_files_of_the_lessons_are_silent() -> None:
