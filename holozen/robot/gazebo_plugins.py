@@ -726,7 +726,9 @@ def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
     if kind in INSTEAD:
         source.warn(plugin, f"({shorten(file_of(plugin))}) is not supported; {INSTEAD[kind]}")
     elif kind not in (*SENSING, *OF_SENSORS):
-        near = source.suggest(kind, KNOWN, lambda name: name.removeprefix("gazebo_ros_"), alike=0.8) if kind else ""
+        known = {file_name(name): name for name in (kind, *KNOWN)}
+        others = [file for file in known if known[file] != kind]
+        near = source.suggest(file_name(kind), others, lambda file: known[file].removeprefix("gazebo_ros_"), alike=0.8)
         source.warn(plugin, f"({shorten(file_of(plugin)) or 'no filename'}) is unknown and is ignored{near}")
 
 

@@ -101,6 +101,7 @@ BROKEN = [
     ("wheel-height", LEFT, LEFT.replace("0.12 0", "0.12 0.02"), "20 mm above the other wheels"),
     ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.26 0.02 0.05"/>', "the robot stands on"),
     ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_dif_drive", "libgazebo_ros_diff_drive.so"),
+    ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_diff", "write libgazebo_ros_diff_drive.so"),
     ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "remove it, or correct its name"),
     ("plugin-link", FRAME, "<robotBaseFrame>chasis</robotBaseFrame>", "names no link"),
     ("plugin-joint", "<leftJoint>left_joint", "<leftJoint>left_jiont", "'left_joint'"),

@@ -121,7 +121,7 @@ def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it() ->
             "libgz_ros2_control-system.so",
             "is not supported; joint_states is published anyway, and joints follow joint_command",
         ),
-        ("libgazebo_ros_planarmove.so", "is unknown and is ignored (did you mean 'gazebo_ros_planar_move'?)"),
+        ("libgazebo_ros_planarmove.so", "is unknown and is ignored (did you mean 'libgazebo_ros_planar_move.so'?)"),
         ("libsomething_else.so", "is unknown and is ignored"),
         ("libgazebo_ros_magic_wand.so", "is unknown and is ignored"),
         ("libmecanum.so", "is unknown and is ignored"),
