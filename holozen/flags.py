@@ -7,7 +7,7 @@ import math
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from holozen.console import report
@@ -170,8 +170,14 @@ def pair(text: str) -> tuple[str, str]:
     """Parses name:=value."""
     name, assign, value = (part.strip() for part in text.partition(":="))
     if not assign or not name:
-        raise refused(f"{text!r}: write name:=value")
+        raise refused(f"{text!r}: write {assigned([text]) or 'name:=value'}")
     return name, value
+
+
+def assigned(words: Iterable[str]) -> str:
+    """The first of the words that is name=value, as it is meant: name:=value. Empty without one."""
+    parts = [word.partition("=") for word in words]
+    return next((f"{name}:={value}" for name, equals, value in parts if equals and name.isidentifier()), "")
 
 
 def path(text: str) -> Path:

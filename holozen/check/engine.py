@@ -12,10 +12,11 @@ from holozen.robot import reader
 from holozen.robot.elements import Tag, read_text, read_xml, repair_xml
 from holozen.robot.errors import RobotError
 from holozen.robot.gazebo_plugins import DRIVES, KNOWN, kind_of
+from holozen.robot.keys import shared
 from holozen.robot.loading import parse
 from holozen.robot.model import RobotModel
 from holozen.robot.rigid import check_simulated
-from holozen.robot.sources import SourceFile, read_sources, trace
+from holozen.robot.sources import SourceFile, macro_calls, read_sources, trace
 from holozen.robot.xacro import Outcome, is_xacro, unasked
 
 Severity = Literal["error", "warning"]
@@ -126,7 +127,8 @@ class Requirements:
 @dataclass(eq=False)
 class Subject:
     """The file under check. `root` is its <robot>, with xacro expanded, or its <model> for an SDF file (`sdf`). `model`
-    is None if the file cannot be loaded; `messages` are the loader's. `origins` maps elements to their source lines.
+    is None if the file cannot be loaded; `messages` are the loader's. `origins` maps elements to their source lines,
+    `calls` to the name and the call of the macro that made them.
     `forgiven` are XML mistakes that Gazebo tolerates.
     """
 
@@ -139,6 +141,7 @@ class Subject:
     model: RobotModel | None = None
     messages: list[tuple[Severity, Mistake]] = field(default_factory=list)
     origins: Mapping[Tag, Place] = field(default_factory=dict)
+    calls: Mapping[Tag, tuple[str, Place]] = field(default_factory=dict)
     forgiven: list[Mistake] = field(default_factory=list)
 
     @cached_property
@@ -255,7 +258,8 @@ def read(path: Path, given: Collection[str], packages: Mapping[str, Path], requi
     robot = _robot(root)
     subject = Subject(path, robot, sources, packages, requirements, robot.name == "model")
     subject.forgiven = [Mistake(Place(place, line), problem, FORGIVEN) for line, problem in mistakes]
-    subject.origins = _origins(subject, root) if expanded else {}
+    if expanded:
+        subject.origins, subject.calls = _origins(subject, root)
     subject.messages += [_message("warning", *split(line, path)) for line in outcome.warnings]
     if not (expanded and is_library(subject)):
         _load(subject, root, plain, place)
@@ -319,13 +323,23 @@ def _refusals(subject: Subject) -> Iterator[tuple[Severity, Mistake]]:
         check_simulated(subject.loaded)
     except RobotError as error:
         yield _message("error", subject.root, str(error))
+    key, problem = shared(subject.loaded, subject.loaded.name)
+    if key:
+        named = (
+            tag for tag in subject.settings if (topic := tag.value().strip("/")) and f"/{key}".endswith(f"/{topic}")
+        )
+        yield _message("error", next(named, subject.root), problem)
 
 
-def _origins(subject: Subject, root: Tag) -> dict[Tag, Place]:
-    """Element of the expanded text -> its place in a source file or, if that is unknown, in the text."""
+def _origins(subject: Subject, root: Tag) -> tuple[dict[Tag, Place], dict[Tag, tuple[str, Place]]]:
+    """Element of the expanded text -> its place in a source file or, if that is unknown, in the text; and the calls."""
     try:
         known = trace(subject.sources, root, subject.packages)
     except (RobotError, OSError):
         known = []
     places = {tag: Place(str(subject.path), tag.line, True) for tag in root.walk()}
-    return places | {tag: Place(str(file), line) for tag, file, line in known}
+    calls = macro_calls(subject.sources, known)
+    return (
+        places | {tag: Place(str(file), line) for tag, file, line in known},
+        {tag: (name, Place(str(file), line)) for tag, (name, file, line) in calls.items()},
+    )

@@ -27,6 +27,7 @@ _BOX = (
     '<link name="box"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1"/></inertial>\n  <{0}><geometry>'
     '<box size="1 1 1"/></geometry></{0}></link>'
 )
+_TIP_BOX = '<link name="tip"><visual><geometry><box size="{}"/></geometry></visual></link>'
 _MESH = '<mesh filename="{}" scale="{}"/>'
 _ONE = "1 1 1"
 
@@ -105,6 +106,9 @@ EXAMPLES = {
     "mesh-unit": Example(
         f"{_MESH.format('meshes/in_mm.stl', _ONE)}  <!-- drawn in millimetres -->",
         _MESH.format("meshes/in_mm.stl", "0.001 0.001 0.001"),
+    ),
+    "robot-unit": Example(
+        f"{_TIP_BOX.format('30 20 10')}  <!-- in millimetres -->", _TIP_BOX.format("0.03 0.02 0.01")
     ),
     "fits": Example(
         '<visual><geometry><box size="0.5 0.2 0.1"/></geometry>  <!-- where 0.4 x 0.3 m are asked for -->',

@@ -1,4 +1,4 @@
-"""Mesh files: whether they exist, can be read, and are in metres."""
+"""Mesh files: whether they exist, can be read, and are in metres; and whether the robot is."""
 
 import math
 from collections.abc import Iterator
@@ -18,6 +18,7 @@ FACTOR = 20.0  # times larger than the rest of the robot, or smaller than the re
 TINY = 500.0  # times smaller than the rest of the robot
 ALONE = 200.0  # times larger than all shapes other than meshes
 LARGEST, SMALLEST = 100.0, 0.001  # m; for a mesh without other shapes
+OVERSIZED = 20.0  # m; for a robot
 UNITS = {0.001: "millimetres", 0.01: "centimetres", 0.0254: "inches", 1000.0: "", 100.0: "", 1 / 0.0254: ""}
 """Factor to metres -> the unit that the file may be in; empty if it may have been scaled twice."""
 
@@ -77,6 +78,20 @@ def _units(subject: Subject) -> Iterator[Mistake]:
                 scaled = " ".join(f"{value * factor:.4g}" for value in scale)
                 problem = f"mesh {path.name} is {size:.3g} m large, where {other:.3g} m would match the rest{unit}"
                 yield Mistake(tag, problem, f'scale="{scaled}" makes it {size * factor:.3g} m')
+
+
+@rule("robot-unit", "warning", "a robot of more than 20 m", "lengths are in metres")
+def _robot_units(subject: Subject) -> Iterator[Mistake]:
+    """Measured without its meshes, which have a rule of their own."""
+    if size := too_large(subject):
+        problem = f"the robot measures {size:.3g} m; its file may be in millimetres"
+        yield Mistake(subject.root, problem, "write all lengths in metres: 0.3 for 300 mm")
+
+
+def too_large(subject: Subject) -> float:
+    """The size of a robot that is too large to be meant in metres; 0 for any other, or if it cannot move."""
+    size = _largest([shape for shape in subject.placed if shape.shape.path is None])
+    return size if size > OVERSIZED and not subject.loaded.static else 0.0
 
 
 def _other(subject: Subject, tag: Tag, path: Path, size: float) -> float:

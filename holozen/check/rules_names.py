@@ -19,9 +19,11 @@ def _duplicates(subject: Subject) -> Iterator[Mistake]:
             name = tag.attributes.get("name", "")
             first = seen.setdefault(name, tag)
             if name and first is not tag:
-                yield Mistake(
-                    tag, f"{tag} is defined twice, first at {subject.place(first)}", "give each a unique name"
-                )
+                problem = f"{tag} is defined twice, first at {subject.place(first)}"
+                if first in subject.calls and tag in subject.calls:
+                    (macro, before), (_, again) = subject.calls[first], subject.calls[tag]
+                    problem = f"{tag} is defined twice, in macro {macro!r} called at {before} and at {again}"
+                yield Mistake(tag, problem, "give each a unique name")
 
 
 @rule("no-link", "error", "a joint that names a missing link", "the joint connects nothing")

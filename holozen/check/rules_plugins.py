@@ -21,9 +21,7 @@ FRAME_TAGS = ("framename", "frameid", "childframeid")
 @rule("plugin-name", "error", "a misspelt plugin", "Gazebo does not find it")
 def _misspelt_plugins(subject: Subject) -> Iterator[Mistake]:
     for plugin in subject.plugins:
-        kind = kind_of(plugin)
-        suggestion = None if kind in KNOWN else nearest(kind, KNOWN, 6)
-        if suggestion:
+        if suggestion := _meant(kind_of(plugin)):
             yield Mistake(
                 plugin, f"there is no plugin {plugin.attributes['filename']!r}", f"write {file_name(suggestion)}"
             )
@@ -36,7 +34,7 @@ def _unknown_plugins(subject: Subject) -> Iterator[Mistake]:
         kind = kind_of(plugin)
         if not file_of(plugin):
             yield Mistake(plugin, f"{plugin} has no filename", f"write one, such as {file_name(SUGGESTED[0])}")
-        elif kind not in KNOWN and not FAMILIES.match(kind) and not nearest(kind, KNOWN, 6):
+        elif kind not in KNOWN and not FAMILIES.match(kind) and not _meant(kind):
             names = ", ".join(map(file_name, SUGGESTED))
             fix = "remove it, or correct its name" if _is_driven(subject) else f"to drive use one of {names}"
             yield Mistake(plugin, f"plugin {plugin.attributes['filename']!r} is unknown", fix)
@@ -107,4 +105,14 @@ def _is_driven(subject: Subject) -> bool:
     """Whether the robot has a drive, or a plugin that may be meant as one."""
     if subject.drives or (subject.model is not None and subject.model.drive is not None):
         return True
-    return any(nearest(kind_of(plugin), DRIVES, 6) for plugin in subject.plugins)
+    misplaced = subject.root.all("plugin")  # in URDF
+    kinds = [kind_of(plugin) for plugin in (*subject.plugins, *misplaced)]
+    return any(kind in DRIVES or _meant(kind) in DRIVES for kind in kinds)
+
+
+def _meant(kind: str) -> str | None:
+    """The plugin that a kind is a misspelling of: letters differ, or its last word, such as `_drive`, is missing."""
+    if kind in KNOWN:
+        return None
+    longer = [name for name in DRIVES if kind.startswith("gazebo_ros_") and name.startswith(f"{kind}_")]
+    return nearest(kind, KNOWN, 6) or min(longer, key=len, default=None)

@@ -21,6 +21,7 @@ from holozen.check.geometry import (
     is_called_caster,
     is_called_wheel,
 )
+from holozen.check.rules_meshes import too_large
 from holozen.robot.elements import Tag, Vector
 from holozen.robot.errors import RobotError
 from holozen.robot.model import Differential, Link, Mecanum, Planar
@@ -350,12 +351,13 @@ def _sides(subject: Subject) -> Iterator[Mistake]:
 @rule("wheel-measure", "warning", "a plugin's wheel separation or diameter that differs by 20 % from the robot's",
       "it turns or drives faster or slower than commanded")  # fmt: skip
 def _measures(subject: Subject) -> Iterator[Mistake]:
+    """Without advice to copy a measure that is wrong itself: of wheels on the wrong sides, or in millimetres."""
     drive = _driven(subject)
-    if drive is None:
+    if drive is None or too_large(subject):
         return
     tag = _tag(subject, "wheelseparation")
-    if drive.separation and tag and _level(drive, subject):
-        found = _separations(drive, subject)
+    found = _separations(drive, subject)
+    if drive.separation and tag and _level(drive, subject) and found[0] > ACROSS and not any(_sides.find(subject)):
         most = SKID if len(drive.left) > 1 else 1 + OFF
         if not any(1 - OFF <= drive.separation / one <= most for one in found if one > 0):
             problem = f"<{tag.name}> is {drive.separation:.3g} m, and the wheels are {found[0]:.3g} m apart"

@@ -70,14 +70,13 @@ MISPLACED = {
         """origin mass inertia geometry inertial visual collision axis limit parent child mimic dynamics link joint
         box cylinder sphere mesh color"""
     )
-}
+} | {"plugin": ["gazebo"]}
 """Element -> the elements that it belongs in; parsers silently ignore it anywhere else."""
 
 IGNORED = {
     "surface": 'write <gazebo reference="LINK"> with <mu1> and <mu2> in it, next to the links',
     "pose": 'write <origin xyz="..." rpy="..."/> in the joint, inertial, visual or collision',
     "joint_properties": 'write <dynamics damping="..." friction="..."/>',
-    "plugin": "write it into a <gazebo>",
     "self_collide": 'write <gazebo reference="LINK"><selfCollide>true</selfCollide></gazebo>',
 }
 """Elements of SDF and of older URDF often found in URDF, and what to write instead."""

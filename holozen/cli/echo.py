@@ -10,11 +10,11 @@ from collections import deque
 from functools import partial
 from typing import Any
 
-from holozen.cli.hints import suggest_key
+from holozen.cli.hints import is_any, suggest_key
 from holozen.cli.output import Hex, Reader, csv_row, cut, lines, strict
 from holozen.console import Failure, printable, report
 from holozen.transport.errors import BusError
-from holozen.transport.graph import is_latched, latched
+from holozen.transport.graph import is_latched, latched, on_key
 from holozen.transport.node import Node
 from holozen.transport.samples import RawSubscriber, Sample
 
@@ -46,7 +46,7 @@ def _latched(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber) -> 
 
 
 def _echo(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber, printer: Printer, reader: Reader) -> int:
-    first = _latched(args, bus, subscriber)
+    first, seen = _latched(args, bus, subscriber), set[str]()
     nothing = "no message that passes the filter" if args.filter else "no messages"
     then = subscriber.close if args.timeout else partial(_report_waiting, args, bus, nothing, printer)
     late = threading.Timer(args.timeout or WAITING, then)
@@ -61,6 +61,9 @@ def _echo(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber, printe
                 raise Failure(f"{why}{_hint(args, bus, printer)}") from None
             if not args.filter:
                 late.cancel()
+            if reader.given and sample.key not in seen:
+                seen.add(sample.key)
+                _check_type(reader.given, sample.key, bus)
             if printer.show(sample, reader.read(sample, bus)):
                 late.cancel()
                 if args.once:
@@ -69,6 +72,13 @@ def _echo(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber, printe
         raise Failure(f"{args.key}: {error.args[0]}") from None
     finally:
         printer.report_skipped(reader.why)
+
+
+def _check_type(given: str, key: str, bus: Node) -> None:
+    """Raise Failure if all publishers of a key announce another type than the given one."""
+    found = {end.type for end in on_key(bus.endpoints(), key, "pub") if end.type and not is_any(end)}
+    if found and given not in found:
+        raise Failure(f"{key}: its type is {' or '.join(sorted(found))}, not {given}; leave the type out")
 
 
 def _report_waiting(args: argparse.Namespace, bus: Node, nothing: str, printer: Printer) -> None:

@@ -74,6 +74,8 @@ def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
     from holozen.ros import packages
     from holozen.ros.executables import NotFound
 
+    if meant := flags.assigned(words[1:]):
+        refuse(f"{meant.replace(':=', '=', 1)!r}: write {meant}")
     if len(words) == 1:
         return Path(words[0]).expanduser()
     if len(words) != 2:

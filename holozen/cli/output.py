@@ -40,8 +40,7 @@ class Reader:
         self._interfaces: dict[str, Any] = {}
         self._registry: Any = None
         self._announced: dict[str, str] = {}  # key -> the type that its publishers announce
-        if type_name:
-            self._interface(type_name)
+        self.given = self._interface(type_name).name if type_name else ""  # in full
 
     def read(self, sample: Sample, bus: Node, usual: str = "") -> Any:
         """The value of a sample; a Hex if its bytes cannot be decoded. `usual`: its type if it does not name one."""

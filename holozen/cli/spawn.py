@@ -239,6 +239,8 @@ def _words(args: argparse.Namespace) -> tuple[Path, dict[str, str]]:
     except argparse.ArgumentTypeError as error:
         args.error(str(error))
     files = [word for word in (*args.words, *([args.file] if args.file else ())) if ":=" not in word]
+    if len(files) > 1 and (meant := flags.assigned(files)):
+        args.error(f"{meant.replace(':=', '=', 1)!r}: write {meant}")
     if len(files) != 1:
         args.error(f"give one FILE, not {len(files)}" + (f": {' '.join(files)}" if files else ""))
     return Path(files[0]), values

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import math
+import re
 import time
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from holozen.flags import number, robot
 from holozen.frames import Frames
 from holozen.process import stop_event
 from holozen.rotation import Transform, to_rpy
+from holozen.suggest import listed
 from holozen.transport.samples import Sample
 
 if TYPE_CHECKING:
@@ -25,6 +27,7 @@ if TYPE_CHECKING:
 TICK = 0.01  # s between two polls
 ASK = 0.3  # s to wait for replies with static transforms
 WAITING = 1.0  # s without a transform until that is reported
+_TF = re.compile(r".+/tf(_static)?$")
 
 
 def echo(args: argparse.Namespace) -> int:
@@ -80,7 +83,10 @@ def _held(bus: Bus, key: str) -> Iterable[TFMessage]:
 def _why(bus: Bus, key: str, frames: Frames, error: LookupError) -> str:
     if frames.names():
         return str(error)
-    return f"no transforms on {key}{'' if bus.connected() else f'; {no_nodes(bus.where)}'}"
+    if not bus.connected():
+        return f"no transforms on {key}; {no_nodes(bus.where)}"
+    others = sorted({end.key.rpartition("/")[0] for end in bus.endpoints() if end.kind == "pub" and _TF.match(end.key)})
+    return f"no transforms on {key}{f'; there are some with --robot {listed(others)}' if others else ''}"
 
 
 def _print(args: argparse.Namespace, pose: Transform, stamp: float) -> None:

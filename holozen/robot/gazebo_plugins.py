@@ -680,6 +680,8 @@ def read_plugins(
     plugin that cannot work as written.
     """
     drive, publishers, wheels = None, [], None
+    for plugin in robot.all("plugin") if robot.name == "robot" else ():
+        source.warn(plugin, "is not inside <gazebo>, so it is ignored; put <gazebo> ... </gazebo> around it")
     for plugin in plugins_outside_sensors(robot):
         kind = kind_of(plugin)
         if kind == PUBLISHER:
@@ -710,8 +712,8 @@ def read_plugins(
 
 
 def plugins_outside_sensors(robot: Tag) -> Iterator[Tag]:
-    """The plugins outside sensors, at any depth in a `<gazebo>`, or directly in a `<model>`."""
-    waiting = [tag for tag in reversed(robot.children) if tag.name in ("gazebo", "plugin")]
+    """The plugins outside sensors: of a `<robot>` those at any depth in a `<gazebo>`, of a `<model>` its own."""
+    waiting = robot.all("gazebo" if robot.name == "robot" else "plugin")[::-1]
     while waiting:
         tag = waiting.pop()
         if tag.name == "plugin":
@@ -724,7 +726,9 @@ def _warn_not_run(plugin: Tag, kind: str, source: Source) -> None:
     if kind in INSTEAD:
         source.warn(plugin, f"({shorten(file_of(plugin))}) is not supported; {INSTEAD[kind]}")
     elif kind not in (*SENSING, *OF_SENSORS):
-        near = source.suggest(kind, KNOWN, lambda name: name.removeprefix("gazebo_ros_"), alike=0.8) if kind else ""
+        known = {file_name(name): name for name in (kind, *KNOWN)}
+        others = [file for file in known if known[file] != kind]
+        near = source.suggest(file_name(kind), others, lambda file: known[file].removeprefix("gazebo_ros_"), alike=0.8)
         source.warn(plugin, f"({shorten(file_of(plugin)) or 'no filename'}) is unknown and is ignored{near}")
 
 

@@ -46,7 +46,7 @@ def _loaded(file: XacroFile, strict: bool, portable: bool) -> tuple[RobotModel, 
             readable=partial(readable, path, packages),
         )  # fmt: skip
     except RobotError as error:
-        raise RobotError(*_in_source(place, file, [str(error)])) from None
+        raise RobotError(*_in_source(place, file, [str(error)], calls=True)) from None
     return replace(model, warnings=warnings + _in_source(place, file, model.warnings)), portable_text
 
 
@@ -106,17 +106,21 @@ MAX_SHOWN = 2_000_000  # characters of visual meshes in a text; a reader accepts
 _FILENAME = re.compile(rb"""\sfilename\s*=\s*("[^"]*"|'[^']*')""")
 
 
-def _in_source(place: str, file: XacroFile, messages: Sequence[str]) -> tuple[str, ...]:
-    """The messages, with each line of the expanded text (`place`) replaced by the source line that it comes from."""
+def _in_source(place: str, file: XacroFile, messages: Sequence[str], calls: bool = False) -> tuple[str, ...]:
+    """The messages, with each line of the expanded text (`place`) replaced by the source line that it comes from, and
+    with the `calls` of macros there.
+    """
     start = f"{place}, line "
     if not place or not any(start in message for message in messages):
         return tuple(messages)
     lines = source_lines(file)
 
     def named(found: re.Match[str]) -> str:
-        return lines.get(int(found[1]), found[0])
+        return lines[int(found[1])][0] if int(found[1]) in lines else found[0]
 
-    return tuple(re.sub(rf"{re.escape(start)}(\d+)", named, message) for message in messages)
+    pattern = re.compile(rf"{re.escape(start)}(\d+)")
+    made = [[lines.get(int(line), ("", ""))[1] for line in pattern.findall(text)] if calls else [] for text in messages]
+    return tuple(pattern.sub(named, text) + "".join(parts) for text, parts in zip(messages, made, strict=True))
 
 
 def with_meshes(text: str, path: Path, packages: Mapping[str, Path]) -> tuple[str, tuple[str, ...]]:

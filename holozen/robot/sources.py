@@ -3,6 +3,7 @@
 import os
 import re
 import tempfile
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
@@ -66,12 +67,37 @@ def trace(sources: list[SourceFile], plain: Tag, packages: Mapping[str, Path]) -
     return [(tag, sources[int(number)].path, int(line)) for tag, (number, _, line) in places if line]
 
 
-def source_lines(file: XacroFile) -> dict[int, str]:
-    """Line of the expanded text -> "FILE, line N" of the element that begins there, as far as that is known."""
+def macro_calls(sources: list[SourceFile], traced: list[tuple[Tag, Path, int]]) -> dict[Tag, tuple[str, Path, int]]:
+    """Element of the expanded text -> the macro that made it, with file and line of the call, where that is certain:
+    a line of the macro made as many elements of a name as there are calls, all in one file and none in a macro.
+    """
+    macros = [(source, macro) for source in sources for macro in source.root.below("xacro:macro")]
+    names = Counter(macro.attributes.get("name", "") for _, macro in macros)
+    inside = {tag for _, macro in macros for tag in macro.walk()}
+    found: dict[Tag, tuple[str, Path, int]] = {}
+    made: dict[tuple[Path, int, str], list[Tag]] = {}
+    for tag, file, line in traced:
+        made.setdefault((file, line, tag.name), []).append(tag)
+    for source, macro in macros:
+        name = macro.attributes.get("name", "")
+        calls = [(each.path, tag) for each in sources for tag in each.root.below(f"xacro:{name}")]
+        if names[name] > 1 or len({path for path, _ in calls}) != 1 or any(tag in inside for _, tag in calls):
+            continue
+        for line, kind in {(tag.line, tag.name) for tag in macro.walk()}:
+            tags = made.get((source.path, line, kind), [])
+            if len(tags) == len(calls):
+                found |= {tag: (name, path, call.line) for tag, (path, call) in zip(tags, calls, strict=True)}
+    return found
+
+
+def source_lines(file: XacroFile) -> dict[int, tuple[str, str]]:
+    """Line of the expanded text -> "FILE, line N" of the element that begins there, as far as that is known, and in
+    which macro that is; empty if in none.
+    """
     path, packages = file.path, file.packages
     try:
         found = reader.run(
-            list[tuple[int, str]], path, _source_lines, path, packages,
+            list[tuple[int, tuple[str, str]]], path, _source_lines, path, packages,
             readable=partial(readable, path, packages), handlers=handlers(file),
         )  # fmt: skip
     except (RobotError, OSError):
@@ -84,10 +110,14 @@ def handlers(file: XacroFile) -> dict[str, reader.Handler]:
     return {"expand": partial(process, file), "marked": partial(_expand_marked, file)}
 
 
-def _source_lines(path: Path, packages: Mapping[str, Path]) -> list[tuple[int, str]]:
+def _source_lines(path: Path, packages: Mapping[str, Path]) -> list[tuple[int, tuple[str, str]]]:
     root = read_xml(reader.ask("expand").text, "expanded")
-    places = trace(read_sources(path, packages), root, packages)
-    return [(tag.line, f"{file}, line {line}") for tag, file, line in places]
+    places = trace(sources := read_sources(path, packages), root, packages)
+    calls = {
+        tag: f" (in macro {name!r} called at {file}, line {line})"
+        for tag, (name, file, line) in macro_calls(sources, places).items()
+    }
+    return [(tag.line, (f"{file}, line {line}", calls.get(tag, ""))) for tag, file, line in places]
 
 
 def _expand_marked(file: XacroFile, texts: list[bytes], found: Mapping[str, str]) -> str:

@@ -196,6 +196,9 @@ class Trace:
         params = [param.lstrip("*") for param in error.macros[0].params]
         wrong = words.split('"')[1] if words.startswith("Invalid parameter ") else ""
         error.hint = suggest(wrong, params) or f"; {node.tagName} takes {', '.join(params) or 'no parameter'}"
+        if "," in (given := " ".join(error.macros[0].params)):
+            plain = " ".join(given.replace(",", " ").split())
+            error.hint = f"; in xacro:macro write params={shorten(plain, 80)!r}: spaces stand between them, not commas"
 
     def _including(self, function: Any) -> Any:
         def wrapped(node: Any, *rest: Any) -> None:

@@ -16,6 +16,7 @@ from holozen.console import report
 from holozen.messages import Pose, SeenEntity
 from holozen.messages import simulation_interfaces as si
 from holozen.robot.errors import RobotError
+from holozen.robot.keys import command_key, keys_of, shared
 from holozen.robot.model import MOVING, Camera, RobotModel
 from holozen.robot.rigid import check_shapes
 from holozen.rotation import XYZ, XYZW
@@ -31,7 +32,7 @@ from .physics.body import Body
 from .physics.movers import Mover, mover_for
 from .physics.ray_caster import RayCaster
 from .physics.world import World
-from .robot import Memory, Robot, command_key, keys_of
+from .robot import Memory, Robot
 from .schedule import Agenda
 
 MAX_REASON = 300  # characters
@@ -153,7 +154,7 @@ class Entities:
             raise
         self._all[name] = entity
         if entity.robot:
-            self._keys |= dict.fromkeys(keys_of(model, prefix), name)
+            self._keys |= dict.fromkeys((key for key, _ in keys_of(model, prefix)), name)
             self._remember(_place_of(model, prefix), entity.robot)
             self.robots.append(entity.robot)
             entity.robot.schedule_on(self.agenda)
@@ -379,19 +380,21 @@ class Entities:
                 f"there are {MAX_ENTITIES} entities, the most that are simulated; delete some",
             )
         if has_keys(model):
-            self._check_keys(keys_of(model, prefix))
+            self._check_keys(model, prefix)
         if model.drive:
             self._check_alone(key_for(model.drive.odometry_topic, prefix))
 
-    def _check_keys(self, keys: list[str]) -> None:
+    def _check_keys(self, model: RobotModel, prefix: str) -> None:
         """Raise EntityError if another robot, or the sim, has one of the keys: each would get the other's commands."""
         taken = {row.key for row in SERVICES if row.server == "sim"} - {*RobotServices.VERBS} | KEYS
-        for key in keys:
-            if keys.count(key) > 1 or key in taken:
-                raise EntityError(
-                    si.SpawnEntityReply.NAMESPACE_INVALID, f"the robot's file puts two things on the key {key[:80]!r}"
-                )
-        if both := self._keys.keys() & keys:
+        keys = dict(keys_of(model, prefix))
+        problem = shared(model, prefix)[1]
+        if of_sim := taken & keys.keys():
+            key = min(of_sim)
+            problem = f"the robot's file puts {keys[key]} on the sim's own key {key!r}; give it another topic there"
+        if problem:
+            raise EntityError(si.SpawnEntityReply.NAMESPACE_INVALID, problem)
+        if both := self._keys.keys() & keys.keys():
             problem = f"{min(both)} is the key of {self._keys[min(both)]!r}; use another name"
             raise EntityError(si.SpawnEntityReply.NAME_NOT_UNIQUE, problem)
 

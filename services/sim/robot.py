@@ -12,7 +12,8 @@ from holozen.command.motion import JointMotion
 from holozen.command.stop_services import RobotServices
 from holozen.command.wait_set import Reader
 from holozen.messages import TFMessage, Time, Wrench
-from holozen.robot.model import STEP, Balancing, Differential, Force, Pushed, RobotModel
+from holozen.robot.keys import aliases, command_key
+from holozen.robot.model import STEP, Differential, Force, Pushed, RobotModel
 from holozen.suggest import listed
 from holozen.transport.pubsub import Publisher
 from holozen.wire import COMMAND_SILENCE, MAX_COMMAND_BYTES, key_for
@@ -60,7 +61,7 @@ class Robot:
         keys = _forces(model, prefix)
         refusal = "" if self.drives else NO_DRIVE.format(keys=listed(keys))
         self._input = twist_input = TwistInput(
-            command, self.arbiter, senders, *limits, others=_aliases(model, prefix), refusal=refusal, lines=LINES
+            command, self.arbiter, senders, *limits, others=aliases(model, prefix), refusal=refusal, lines=LINES
         )
         self._drive = DriveTopics(bus, prefix, name, drive, twist_input, self._tf) if drive else None
         if self._drive:
@@ -284,35 +285,12 @@ class Robot:
             self._sensors.close()
 
 
-def command_key(model: RobotModel, prefix: str) -> str:
-    """The command key of a robot with this `prefix`. All its other keys but odometry are in the same namespace."""
-    return key_for(model.drive.command_topic if model.drive else "cmd_vel", prefix)
-
-
-def keys_of(model: RobotModel, prefix: str) -> list[str]:
-    """All keys of a robot with this `prefix`. No other robot may have any of them."""
-    command = command_key(model, prefix)
-    namespace = command.rpartition("/")[0]
-    keys = [key_for(key, namespace) for key in ("tf", "joint_states", "joint_command", *RobotServices.VERBS)]
-    if model.drive:
-        odometry = key_for(model.drive.odometry_topic, prefix)
-        keys += [command, f"{command}_status", odometry, *_aliases(model, prefix)]
-    keys += [key_for(topic, prefix) for sensor in model.sensors for topic in sensor.topics]
-    return keys + list(_forces(model, prefix))
-
-
 def _forces(model: RobotModel, prefix: str) -> dict[str, list[Force]]:
     """The forces of a robot with this `prefix`, by their keys."""
     found: dict[str, list[Force]] = {}
     for force in model.forces:
         found.setdefault(key_for(force.topic, prefix), []).append(force)
     return found
-
-
-def _aliases(model: RobotModel, prefix: str) -> tuple[str, ...]:
-    """Additional command keys: wheely_boi's plugin listens on `NAME/NAME/cmd`."""
-    name = prefix or model.name
-    return (f"{name}/{name}/cmd",) if model.drive and isinstance(model.drive.mechanism, Balancing) else ()
 
 
 def _motors(mover: Mover, model: RobotModel) -> tuple[Motors | None, Motors | None]:

@@ -8,6 +8,7 @@ from holozen import data
 from holozen.console import report
 from holozen.entities import has_no_room
 from holozen.robot.errors import RobotError
+from holozen.robot.keys import command_key
 from holozen.robot.loading import load
 from holozen.robot.model import Pushed, RobotModel, driven, takes
 from holozen.robot.rigid import PlacedShape, lowest, lump
@@ -17,7 +18,6 @@ from holozen.wire import key_for
 
 from .entities import Entities, EntityError
 from .physics.engine import UPRIGHT
-from .robot import command_key
 from .shard import Shard
 
 GAP = 0.5  # m between two robots at the start

@@ -82,7 +82,7 @@ def test_a_task_sets_size_and_names(tmp_path: Path) -> None:
     ("words", "expected"),
     [
         (["--fits", "big"], "write metres as 0.4x0.2"),
-        (["n=1"], "write name:=value"),
+        (["n=1"], "write n:=1"),
         (["--fits", "1x-1"], "write metres"),
     ],
 )

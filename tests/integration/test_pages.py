@@ -15,7 +15,7 @@ PAGES = [page for page in DOCS.glob("**/*.md") if {step["language"] for step in 
 @pytest.mark.timeout(300)
 @pytest.mark.parametrize("page", sorted(str(page.relative_to(DOCS).with_suffix("")) for page in PAGES))
 def test_a_page_does_what_it_says(page: str, tmp_path: Path) -> None:
-    for name in (".venv", "deploy", "examples", "meshes", "urdf", "worlds"):
+    for name in (".venv", "deploy", "examples", "meshes", "pyproject.toml", "urdf", "worlds"):
         (tmp_path / name).symlink_to(REPO / name)
     with Lab() as lab:
         done = lab.host("machine").run(sys.executable, "-m", "tests.pages", page, str(tmp_path), within=240)

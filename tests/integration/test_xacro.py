@@ -53,7 +53,7 @@ def test_it_takes_arguments_and_packages(tmp_path: Path) -> None:
     [
         (None, [], 1, "robot.xacro"),
         ('<robot name="r">${1/0}</robot>', [], 1, "division by zero"),
-        ("<robot/>", ["n=7"], 2, "'n=7': write name:=value"),
+        ("<robot/>", ["n=7"], 2, "'n=7': write n:=7"),
         ("<robot/>", ["-o", "/nowhere/robot.urdf"], 1, "/nowhere/robot.urdf"),
     ],
 )

@@ -3,9 +3,13 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from holozen.check.report import check
 from holozen.check.rules_xml import PLUGIN, URDF
 from holozen.check.spelling import distance, nearest
+from holozen.robot.errors import RobotError
+from holozen.robot.loading import load
 from tests.unit.check.conftest import Findings
 
 BALL = '<collision><geometry><sphere radius="1"/></geometry></collision>'
@@ -35,6 +39,20 @@ def places(path: Path) -> list[tuple[str, str, int]]:
 def test_a_line_in_a_macro_and_one_in_its_call(findings: Findings, tmp_path: Path) -> None:
     findings(HEAD + WHEELS + USE, "r.xacro")
     assert [(rule, line) for rule, _, line in places(tmp_path / "r.xacro")] == [("attribute", 6), ("attribute", 11)]
+
+
+def test_a_name_that_a_macro_uses_twice_has_the_lines_of_both_calls(findings: Findings, tmp_path: Path) -> None:
+    text = HEAD + WHEELS.replace(' ivz="0"', "") + USE.replace(' ryp="0 0 0"', "").replace('name="b"', 'name="a"')
+    twice = [finding.problem for finding in findings(text, "r.xacro") if finding.rule == "twice"]
+    path = tmp_path / "r.xacro"
+    end = f"is defined twice, in macro 'part' called at {path}:11 and at {path}:12"
+    assert twice == [f"<link name='a'> {end}", f"<joint name='a_joint'> {end}"]
+    with pytest.raises(RobotError) as error:
+        load(path)
+    assert str(error.value).endswith(f"a unique name (in macro 'part' called at {path}, line 12)")
+    nested = text.replace("<xacro:part name", '<xacro:macro name="pair" params=""><xacro:part name', 1)
+    nested = nested.replace("</robot>", "</xacro:macro><xacro:pair/></robot>")
+    assert any(f"first at {path}:4" in finding.problem for finding in findings(nested, "r.xacro"))
 
 
 def test_a_line_in_an_included_file(findings: Findings, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ PLACES = {
     "xml": '<link name="arm">', "ignored": LIMIT, "degrees": LIMIT, "unused-colour": '<link name="footprint"/>',
     "unused": '<sphere radius="0.015"/>', "mesh": MESH, "mesh-path": MESH, "mesh-empty": MESH, "mesh-unit": MESH,
 }  # fmt: skip
-ADDED = ("twice", "macro-twice", "floating", "static")  # to the good robot
+ADDED = ("twice", "macro-twice", "floating", "static", "robot-unit")  # to the good robot
 JOINT = '<joint name="{0}_joint" type="fixed"><parent link="base"/><child link="{0}"/></joint>'
 
 

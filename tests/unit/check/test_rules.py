@@ -39,6 +39,7 @@ BROKEN = [
     ("tag", "<mu1>1.0</mu1>", "<slefCollide>true</slefCollide>", "write <selfCollide>"),
     ("tag", "<commandTopic>cmd_vel</commandTopic>", "<comandTopic>cmd_vel</comandTopic>", "write <commandTopic>"),
     ("tag", '<link name="arm">', '<Link name="x"/><link name="arm">', "write <link>"),
+    ("load", "<commandTopic>cmd_vel<", "<commandTopic>odom<", ":63: error: the robot's file puts its commands and its"),
     ("attribute", 'iyy="0.017" iyz="0"', 'iyy="0.017" ivz="0"', "write iyz="),
     ("attribute", '<sphere radius="0.015"/>', '<sphere radius="0.015" raduis="1"/>', "write radius="),
     ("attribute", 'radius="0.05" length="0.03"', 'radius="0.05" length="0.03" lenght="0.03"', "write length="),
@@ -55,7 +56,6 @@ BROKEN = [
     ("ignored", "</robot>", "<unheard_of/></robot>", "<unheard_of> in <robot name='good'> is not read"),
     ("ignored", '<link name="arm">', '<link name="arm"><foo>1</foo>', "collision, gravity, inertial, visual"),
     ("floating", '<link name="base">', '<link name="base"><gravity>false</gravity>', "link 'base'"),
-    ("ignored", "</robot>", '<plugin name="x" filename="libx.so"/></robot>', "into a <gazebo>"),
     ("wheel-load", BODY, BODY.replace("0.02", "0"), "'base' is as low as the wheels"),
     ("wheel-side", "<leftJoint>left_joint</leftJoint><rightJoint>right_joint<", SWAPPED, "'left_joint' (a right joint"),
     ("wheel-measure", "<wheelSeparation>0.24", "<wheelSeparation>0.3", "is 0.3 m, and the wheels are 0.24 m apart"),
@@ -101,6 +101,7 @@ BROKEN = [
     ("wheel-height", LEFT, LEFT.replace("0.12 0", "0.12 0.02"), "20 mm above the other wheels"),
     ("wheel-height", '<sphere radius="0.015"/>', '<box size="0.26 0.02 0.05"/>', "the robot stands on"),
     ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_dif_drive", "libgazebo_ros_diff_drive.so"),
+    ("plugin-name", "gazebo_ros_diff_drive", "gazebo_ros_diff", "write libgazebo_ros_diff_drive.so"),
     ("plugin", PLUGIN, '<plugin name="x" filename="libmy_magic.so"/>' + PLUGIN, "remove it, or correct its name"),
     ("plugin-link", FRAME, "<robotBaseFrame>chasis</robotBaseFrame>", "names no link"),
     ("plugin-joint", "<leftJoint>left_joint", "<leftJoint>left_jiont", "'left_joint'"),
@@ -214,6 +215,15 @@ def test_wheels_and_plugins_but_no_drive(good: str, findings: Findings) -> None:
     found = {finding.rule: finding.problem for finding in findings(good.replace("ros_diff_drive", "ros_camera"))}
     assert sorted(found) == ["load-note", "no-drive"]
     assert "no drive plugin" in found["no-drive"] and "(camera) is not simulated" in found["load-note"]
+
+
+def test_a_drive_outside_gazebo_is_misplaced_and_nothing_else_is_wrong(good: str, findings: Findings) -> None:
+    (finding,) = findings(good.replace("<gazebo>", "").replace("</gazebo>\n</robot>", "</robot>"))
+    assert (finding.rule, finding.severity, finding.place.line) == ("place", "error", 60)
+    assert (finding.problem, finding.fix) == (
+        "<plugin> does not belong in <robot name='good'>",
+        "move it into <gazebo>",
+    )
 
 
 def test_gazebo_fixes_a_root_called_world_in_place(good: str, findings: Findings) -> None:
@@ -368,6 +378,17 @@ def test_a_skid_steer_may_be_given_a_wider_base(good: str, rules: Rules) -> None
     rear = wide[start:end].replace("_wheel", "_rear").replace("_joint", "_rear_joint").replace("0.05 ", "-0.1 ", 4)
     tags = "<leftJoint>left_rear_joint</leftJoint><rightJoint>right_rear_joint</rightJoint><wheelSeparation>"
     assert rules(wide[:end] + rear + wide[end:].replace("<wheelSeparation>", tags)) == []
+    crossed = tags.replace("left_rear", "x").replace("right_rear", "left_rear").replace("x_", "right_rear_")
+    assert rules(wide[:end] + rear + wide[end:].replace("<wheelSeparation>", crossed)) == ["wheel-side"]
+
+
+def test_no_measure_is_taken_from_a_robot_in_millimetres(good: str, findings: Findings) -> None:
+    large = '<link name="x"><visual><geometry><box size="300 20 10"/></geometry></visual></link>'
+    joint = '<joint name="x" type="fixed"><parent link="base"/><child link="x"/></joint></robot>'
+    (finding,) = findings(
+        good.replace("<wheelSeparation>0.24", "<wheelSeparation>0.3").replace("</robot>", large + joint)
+    )
+    assert finding.problem == "the robot measures 300 m; its file may be in millimetres"
 
 
 def test_the_files_of_the_lessons_are_silent() -> None:

@@ -55,6 +55,14 @@ def run(wire: Wire, capsys: pytest.CaptureFixture[str]) -> Run:
     return run
 
 
+def test_echo_refuses_another_type_than_the_publishers_announce(sim: Bus, run: Run) -> None:
+    error = "holozen topic echo: Fred/odom: its type is nav_msgs/msg/Odometry, not geometry_msgs/msg/Twist; "
+    for words in (["geometry_msgs/msg/Twist"], ["--type", "geometry_msgs/Twist"]):
+        code, out, err = run("topic", "echo", "Fred/odom", "--once", *words)
+        assert (code, out, err.count("\n")) == (1, "", 1) and err.startswith(error)
+    assert run("topic", "echo", "Fred/odom", "nav_msgs/Odometry", "--once", "--field", "child_frame_id")[0] == 0
+
+
 def test_topics_are_listed_once_with_their_types(sim: Bus, run: Run) -> None:
     sim.subscribe("Fred/odom", Odometry)
     sim.subscribe("**/odom", Odometry)

@@ -73,5 +73,7 @@ def test_echo_prints_what_tf2_echo_prints(wire: Wire, run: Run) -> None:
         "- Rotation: in RPY (radian) [0.000, 0.000, 1.571]",
         "- Rotation: in RPY (degree) [0.000, 0.000, 90.000]",
     ]
+    code, out, err = run("tf", "echo", "odom", "lidar", "--timeout", "0.2")
+    assert (code, out, err) == (1, "", "holozen tf echo: no transforms on tf; there are some with --robot Fred\n")
     row = json.loads(run(*words, "--json")[1])
     assert (row["source"], row["target"], row["rpy"][2]) == ("odom", "lidar", pytest.approx(QUARTER))

@@ -37,6 +37,9 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
             "stop --tiemout 3",
             "holozen stop: no flag '--tiemout' (did you mean '--timeout'?); see `holozen stop --help`",
         ),
+        ("spawn a.urdf radius=0.1", "holozen spawn: 'radius=0.1': write radius:=0.1; "),
+        ("xacro a.xacro radius=0.1", "holozen xacro: argument name:=value: 'radius=0.1': write radius:=0.1; "),
+        ("launch a.launch.py robot=Rosie", "holozen launch: 'robot=Rosie': write robot:=Rosie; "),
         ("spawn a.urdf --nmae Fred", "holozen spawn: no flag '--nmae' (did you mean '--name'?); "),
         (
             "check --package hb=/nope a.urdf",

@@ -121,7 +121,7 @@ def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it() ->
             "libgz_ros2_control-system.so",
             "is not supported; joint_states is published anyway, and joints follow joint_command",
         ),
-        ("libgazebo_ros_planarmove.so", "is unknown and is ignored (did you mean 'gazebo_ros_planar_move'?)"),
+        ("libgazebo_ros_planarmove.so", "is unknown and is ignored (did you mean 'libgazebo_ros_planar_move.so'?)"),
         ("libsomething_else.so", "is unknown and is ignored"),
         ("libgazebo_ros_magic_wand.so", "is unknown and is ignored"),
         ("libmecanum.so", "is unknown and is ignored"),
@@ -134,6 +134,12 @@ def test_a_plugin_that_does_not_drive_is_named_with_what_happens_without_it() ->
 def test_a_plugin_without_file_name_is_reported() -> None:
     (warning,) = robot("<plugin/>").warnings
     assert warning.endswith("<plugin> of <robot name='r'> (no filename) is unknown and is ignored")
+
+
+def test_a_plugin_outside_gazebo_is_reported_and_ignored_as_in_gazebo() -> None:
+    model = parse(f'<robot name="r">\n<link name="base"/>\n{plugin("")}</robot>', ORIGIN)
+    problem = "<plugin name='drive'> is not inside <gazebo>, so it is ignored; put <gazebo> ... </gazebo> around it"
+    assert (model.drive, model.warnings) == (None, (f"{ORIGIN}, line 3: {problem}",))
 
 
 def test_a_plugin_directly_in_an_sdf_model_drives_it() -> None:

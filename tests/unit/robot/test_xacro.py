@@ -218,6 +218,10 @@ def test_a_misspelt_name_is_reported_with_one_that_looks_alike(folder: Path) -> 
             "Invalid parameter \"raduis\" (did you mean 'radius'?)",
         ),
         (
+            '<xacro:macro name="m" params="name, x,*b"><a/></xacro:macro><xacro:m name="1"/>',
+            "; in xacro:macro write params='name x *b': spaces stand between them, not commas",
+        ),
+        (
             '<xacro:macro name="m" params="radius *b"><a/></xacro:macro><xacro:m/>',
             "Not enough blocks; xacro:m takes radius, b",
         ),

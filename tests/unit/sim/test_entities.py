@@ -554,6 +554,10 @@ def test_a_robots_file_puts_nothing_on_a_key_that_is_taken(town: Town, tag: str)
     model = parse(text, Path("r"))
     code, reported = town.refusal(lambda: town.entities.add("Fred", model, ((0, 0, 0), UPRIGHT), ""))
     assert (code, repr(tag) in reported) == (si.SpawnEntityReply.NAMESPACE_INVALID, True)
+    assert reported.startswith("the robot's file puts its commands on the sim's own key '") == (
+        tag not in ("tf", "odom")
+    )
+    assert reported.endswith("topic there")
 
 
 @pytest.mark.parametrize("robots", [(), ("Fred", "Ann")])
