@@ -344,14 +344,19 @@ def wait_for_threads(threads: Iterable[threading.Thread | None], seconds: float)
 
     The interpreter aborts if a thread returns from Zenoh during its finalization.
     """
-    others = [thread for thread in threads if thread and thread is not threading.current_thread()]
-    if late := _join(others, seconds):
+    if late := _join(threads, seconds):
         atexit.register(_join, late, LAST)
 
 
-def _join(threads: list[threading.Thread], seconds: float) -> list[threading.Thread]:
+def join_at_end(threads: Iterable[threading.Thread | None]) -> None:
+    """As `wait_for_threads`, in a callback of atexit, which can register no other."""
+    _join(threads, CLOSE_LIMIT + LAST)
+
+
+def _join(threads: Iterable[threading.Thread | None], seconds: float) -> list[threading.Thread]:
     """Join threads; returns those that still run."""
+    others = [thread for thread in threads if thread and thread is not threading.current_thread()]
     deadline = time.monotonic() + seconds
-    for thread in threads:
+    for thread in others:
         thread.join(max(0.0, deadline - time.monotonic()))
-    return [thread for thread in threads if thread.is_alive()]
+    return [thread for thread in others if thread.is_alive()]
