@@ -89,7 +89,7 @@ class Bus(Node):
 
         self.define(kind)
         wire = wire or self.wire
-        make: Callable[..., Publisher[M]] = partial(Publisher, wire, self._queued)
+        make: Callable[..., Publisher[M]] = partial(Publisher, kind, wire, self._queued)
         return self._publish(make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man)
 
     def publisher_raw(
@@ -232,7 +232,7 @@ class Bus(Node):
         queryable: Any = self._ring(key, RING, is_queryable=True) if dealt else None
         if not queryable:
             queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=not shared)
-        server = self._keep(Server(queryable, key, request, answer, self.wire, room, stops))
+        server = self._keep(Server(queryable, key, request, reply, answer, self.wire, room, stops))
         server.ends.append(token)
         return server
 
