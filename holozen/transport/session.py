@@ -25,6 +25,13 @@ LAST = 1.0  # s to wait for threads at the end of the process
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
 
 
+FORKED = (
+    "cannot open Zenoh in a process that was forked from one which has used it: start it by multiprocessing's "
+    '"spawn" method, or fork before the first Bus'
+)
+_process = 0  # the one that has used Zenoh: its threads are not in those that are forked from it
+
+
 class Opened:
     """An open session. `took`: s until its first link, a measure of the network's delay."""
 
@@ -59,6 +66,10 @@ class Opening:
         stop: threading.Event | None = None,
         early: bool = False,
     ) -> None:
+        global _process
+        if _process not in (0, os.getpid()):
+            raise BusError(FORKED)
+        _process = os.getpid()
         self.where, self.wire, self.closing = connection.where, connection.wire, threading.Event()
         self.networks = connection.networks
         self.secure = connection.secure

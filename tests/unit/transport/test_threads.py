@@ -80,3 +80,21 @@ def test_a_bus_that_was_closed_is_not_kept(wire: Wire) -> None:
         return kept() is None
 
     wait_for(is_gone)
+
+
+def test_a_forked_process_names_what_it_cannot_do(wire: Wire) -> None:
+    words = "kept = bus.publisher('odom', Odometry)\nif os.fork() == 0: Bus('child')\n"
+    words += "sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))"
+    done = subprocess.run(
+        [sys.executable, "-c", UNCLOSED + words, wire.endpoint], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 1
+    reason = "BusError: cannot open Zenoh in a process that was forked from one which has used it: "
+    assert reason in done.stderr and "multiprocessing" in done.stderr
+
+
+def test_a_process_forked_before_the_first_bus_opens_its_own(wire: Wire) -> None:
+    program = UNCLOSED.replace("bus = ", "child = os.fork()\nbus = ")
+    words = "if child: sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))"
+    run = [sys.executable, "-c", program + words, wire.endpoint]
+    assert subprocess.run(run, timeout=60).returncode == 0
