@@ -69,8 +69,11 @@ def diagnose(connection: Connection, given: Mapping[str, object]) -> Iterator[Fi
     try:
         yield from nodes(connection)
     except BusError as error:
-        yield from meeting_points(connection, connected=False)
-        yield Finding("zenoh", ERROR, str(error), "check --mode, --connect, --config and --cfg")
+        points = [*meeting_points(connection, connected=False)]
+        yield from points
+        # What is wrong at an endpoint is not told again, without what to do there.
+        if not any(one.level == ERROR and one.text.partition(" ")[0] in str(error) for one in points):
+            yield Finding("zenoh", ERROR, str(error), "check --mode, --connect, --config and --cfg")
     except ModuleNotFoundError as error:
         yield from meeting_points(connection, connected=False)
         yield Finding("zenoh", ERROR, f"nodes cannot be checked without {error.name}", "run scripts/venv")

@@ -1,6 +1,7 @@
 """`holozen new`: writes a small robot, controller or package of interfaces to start from."""
 
 import argparse
+import contextlib
 import json
 import os
 import re
@@ -57,13 +58,17 @@ def _run(make: Make, args: argparse.Namespace) -> int:
     files, following = make(args)
     if taken := next((place for name in files if (place := _taken(name))), None):
         raise Failure(f"{taken} exists already and is left unchanged; choose another name, or another folder")
-    for name, text in files.items():
-        try:
-            Path(name).parent.mkdir(parents=True, exist_ok=True)
-            with Path(name).open("x") as file:
-                file.write(text)
-        except OSError as error:
-            raise Failure(f"{name}: {error.strerror}") from None
+    with contextlib.ExitStack() as undo:  # what was written would be in the way of the next try
+        for name, text in files.items():
+            try:
+                Path(name).parent.mkdir(parents=True, exist_ok=True)
+                with Path(name).open("x") as file:
+                    undo.callback(Path(name).unlink)
+                    file.write(text)
+            except OSError as error:
+                raise Failure(f"{name}: {error.strerror}") from None
+        undo.pop_all()
+    for name in files:
         print(json.dumps({"file": name}) if args.json else name)
     if not args.json:
         print(f"next: {following}")

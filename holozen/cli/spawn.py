@@ -15,6 +15,7 @@ from holozen.bus import Bus
 from holozen.cli.verb import Verb, by_name
 from holozen.console import report
 from holozen.robot.errors import RobotError
+from holozen.suggest import listed
 from holozen.transport import connection
 from holozen.transport.errors import ServiceError
 
@@ -105,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Namespace) -> int:
     """Spawn many copies on a square grid, called bot0, bot1 and so on, or by the name given. Several requests are under
-    way at a time. Raises ServiceError; those spawned before that, or before Ctrl-C, stay.
+    way at a time. Raises ServiceError; those that were spawned, or were before Ctrl-C, stay.
     """
     from holozen import entities
     from holozen.messages import Point, Pose
@@ -124,7 +125,9 @@ def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Name
         raise ServiceError(f"{len(taken)} of these exist already, such as {min(taken)}; --name gives another name")
     first = _requested_pose(candidate.model, place)
 
-    def spawn(number: int) -> Spawned:
+    crowded: dict[str, ServiceError] = {}
+
+    def spawn(number: int) -> Spawned | None:
         at = first.position
         pose = Pose(
             Point(at.x + args.grid * (number % side), at.y + args.grid * (number // side), at.z), first.orientation
@@ -134,20 +137,26 @@ def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Name
         except ServiceError as error:
             if not entities.has_no_room(error):
                 raise
-            advice = f"-x and -y choose the first place, and --grid more than {args.grid:g} m between two"
-            raise ServiceError(f"{error}; {advice}") from None
+            crowded[f"{base}{number}"] = error
+            return None
         return _spawned(name, candidate, pose)
 
     fleet = list[Spawned]()
     try:
         for spawned in entities.for_each(spawn, range(args.count)):
-            fleet.append(spawned)
+            if spawned:
+                fleet.append(spawned)
     except KeyboardInterrupt:
         names = f" ({fleet[0].name} .. {fleet[-1].name})" if fleet else ""
         report(
             f"holozen spawn: spawned {len(fleet)} of {args.count}{names}; `holozen delete '{base}[0-9]*'` removes them"
         )
         raise
+    if crowded:
+        raise ServiceError(
+            f"{len(fleet)} of {args.count} were spawned, without {listed(crowded)}: {crowded[min(crowded)]}; "
+            f"-x and -y choose the first place, and --grid more than {args.grid:g} m between two"
+        )
     if args.json:
         print(*(one.as_json() for one in fleet), sep="\n")
     else:

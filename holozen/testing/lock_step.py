@@ -2,14 +2,16 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from holozen.testing.process import wait_for
 from holozen.testing.wire import Wire
 
 if TYPE_CHECKING:
-    from holozen.messages import CommandStatus, Odometry, SimulationStatus
+    from holozen.messages import CommandStatus, Message, Odometry, SimulationStatus
     from holozen.transport.pubsub import Subscription
+
+T = TypeVar("T")
 
 HELD_UP = ("late", "old", "unknown clock", "gone")  # the refusals of commands that were held up on their way
 PATIENCE = 60.0  # s for steps, or for a sim to start
@@ -28,6 +30,8 @@ class LockStep:
         from holozen.wire import key_for
 
         self.process = wire.start("sim", "--paused", *flags)
+        # Another sim that is here already would answer in its place, and this one ends.
+        self.process.wait_for_line("listens on", PATIENCE)
         self.bus = wire.bus("lock_step")
         self._times = self.bus.subscribe("simulation_status", SimulationStatus)
         self._odoms = self.bus.subscribe(key_for("odom", robot), Odometry)
@@ -35,7 +39,7 @@ class LockStep:
         self._commands = self.bus.publisher(key_for("cmd_vel", robot), Twist)
         self.status: SimulationStatus
         self.odom: Odometry
-        self._obeyed: CommandStatus = wait_for(lambda: _newest(self._statuses), PATIENCE, "a robot")
+        self._obeyed: CommandStatus = self._wait(lambda: _newest(self._statuses), "a robot")
         self._read(lambda _: True)
 
     def step(self, steps: int = 1) -> "Odometry":
@@ -43,7 +47,7 @@ class LockStep:
         from holozen.messages import simulation_interfaces as si
 
         before = self.status
-        self.bus.call("step_simulation", si.StepSimulationRequest(steps), si.StepSimulationReply, PATIENCE)
+        self._call("step_simulation", si.StepSimulationRequest(steps), si.StepSimulationReply)
         return self._read(lambda now: (now.epoch, now.steps) == (before.epoch, before.steps + steps))
 
     def reset(self, scope: int = 0) -> "Odometry":
@@ -51,7 +55,7 @@ class LockStep:
         from holozen.messages import simulation_interfaces as si
 
         before = self.status
-        self.bus.call("reset_simulation", si.ResetSimulationRequest(scope), si.ResetSimulationReply, PATIENCE)
+        self._call("reset_simulation", si.ResetSimulationRequest(scope), si.ResetSimulationReply)
         return self._read(lambda now: now.epoch == before.epoch + 1)
 
     def drive(self, x: float = 0.0, y: float = 0.0, turn: float = 0.0) -> None:
@@ -60,17 +64,32 @@ class LockStep:
         """
         from holozen.messages import Twist
 
-        wait_for(lambda: self._commands.matched, PATIENCE, "a robot that listens")
+        self._wait(lambda: self._commands.matched, "a robot that listens")
         refusal = HELD_UP[0]
         while refusal.startswith(HELD_UP):
             accepted, count = self._obeyed.accepted, _count(self._obeyed)
             self._commands.put(Twist.planar(x, y, turn))
-            wait_for(partial(self._is_read, count), PATIENCE, "the robot to read its command")
+            self._wait(partial(self._is_read, count), "the robot to read its command")
             if self._obeyed.accepted > accepted:
                 return
             if _count(self._obeyed) > count:
                 refusal = self._obeyed.last_refusal.removeprefix(f"{self.bus.source}: ")
         raise AssertionError(f"the command was refused: {refusal}")
+
+    def _wait(self, condition: Callable[[], T], what: str) -> T:
+        """As `wait_for`; AssertionError with what the sim wrote once it has ended."""
+
+        def look() -> T:
+            if self.process.returncode is not None:
+                raise AssertionError(f"{self.process}; it wrote:\n{self.process.out}{self.process.err}")
+            return condition()
+
+        return wait_for(look, PATIENCE, what)
+
+    def _call(self, key: str, request: "Message", reply: "type[Message]") -> None:
+        """Call the sim. AssertionError as `_wait` if it has ended before."""
+        self._wait(lambda: True, "the sim")
+        self.bus.call(key, request, reply, PATIENCE)
 
     def _is_read(self, before: int) -> bool:
         """Whether the newest command status counts other than `before` commands: more, or those of a new robot."""
@@ -91,8 +110,8 @@ class LockStep:
                 self.odom = new
             return bool(new) and new.header.stamp == Time.of(self.status.time)
 
-        wait_for(is_wanted, PATIENCE, "the sim's status")
-        wait_for(is_published, PATIENCE, "odom")
+        self._wait(is_wanted, "the sim's status")
+        self._wait(is_published, "odom")
         return self.odom
 
 

@@ -17,7 +17,7 @@ from holozen.transport.graph import Definition
 from holozen.transport.node import Node
 from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
-from holozen.transport.samples import Dealer, Declared, RawSubscriber, Replies, Ring, stamps
+from holozen.transport.samples import Answers, Dealer, RawSubscriber, Replies, Ring, stamps
 from holozen.transport.services import RING, ROOM, Server
 from holozen.transport.session import one_line
 
@@ -31,7 +31,7 @@ R = TypeVar("R", bound="Message")
 
 LARGEST_STATE = 1_000_000  # bytes; an odom takes about 1,500
 DEALT = 1 << 14  # samples, or requests, of all keys of a Dealer that wait for it
-GETS = 256  # waiting queries for a publisher's last value; beyond, the oldest get no reply
+GETS = 256  # waiting queries for a publisher's last value, or for our clock; beyond, the oldest get no reply
 
 
 class Bus(Node):
@@ -63,19 +63,19 @@ class Bus(Node):
         return {}
 
     @cached_property
-    def clock_server(self) -> Declared:
+    def clock_server(self) -> Answers:
         """Answers readers of a stamp that ask for our clock."""
         key, member = clock_key(self.id), self.member
 
-        def answer(query: zenoh.Query) -> None:  # runs in Zenoh's thread, the only work done there
-            with query:
-                clock: str | bytes = str(time.monotonic_ns())
-                if member:
-                    clock = member.answer(self.id, bytes(query.payload or b"")[:64], str(clock))
-                query.reply(key, clock, express=True)
+        def answer(query: zenoh.Query) -> None:
+            clock: str | bytes = str(time.monotonic_ns())
+            if member:
+                clock = member.answer(self.id, bytes(query.payload or b"")[:64], str(clock))
+            query.reply(key, clock, express=True)
             self.clock_asked.set()
 
-        return self._keep(Declared(self.session.declare_queryable(key, answer)))
+        # Not a callback: Zenoh would run it in a thread that keeps a program from ending which has not closed its bus.
+        return self._keep(Answers(self.session.declare_queryable(key, zenoh.handlers.RingChannel(GETS)), answer))
 
     def publisher(
         self, key: str, kind: type[M], priority: str = "DATA", *, block: bool = False, wire: str = "",
@@ -89,7 +89,7 @@ class Bus(Node):
 
         self.define(kind)
         wire = wire or self.wire
-        make: Callable[..., Publisher[M]] = partial(Publisher, wire, self._queued)
+        make: Callable[..., Publisher[M]] = partial(Publisher, kind, wire, self._queued)
         return self._publish(make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man)
 
     def publisher_raw(
@@ -232,7 +232,7 @@ class Bus(Node):
         queryable: Any = self._ring(key, RING, is_queryable=True) if dealt else None
         if not queryable:
             queryable = self.session.declare_queryable(key, zenoh.handlers.RingChannel(RING), complete=not shared)
-        server = self._keep(Server(queryable, key, request, answer, self.wire, room, stops))
+        server = self._keep(Server(queryable, key, request, reply, answer, self.wire, room, stops))
         server.ends.append(token)
         return server
 

@@ -5,10 +5,13 @@ No work is done in Zenoh's threads: samples wait in ring channels, so a slow rea
 
 from __future__ import annotations
 
+import atexit
 import contextlib
+import os
 import re
 import threading
 import time
+import weakref
 from collections.abc import Callable, Iterable, Iterator
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, Self, TypeVar
@@ -21,7 +24,7 @@ from holozen.transport.connection import UNIX, Connection, from_environment
 from holozen.transport.errors import BusError
 from holozen.transport.graph import Graph, NodeInfo, Peers, Witness
 from holozen.transport.samples import Declared, RawSubscriber, Replies, Sample, source
-from holozen.transport.session import CLOSE_LIMIT, Opening, linked, one_line, wait_for_threads
+from holozen.transport.session import CLOSE_LIMIT, Opening, join_at_end, linked, one_line, wait_for_threads
 
 if TYPE_CHECKING:
     from holozen.transport.members import Member
@@ -36,8 +39,20 @@ LAST_WAIT = 0.5  # s for publishers to answer with their last messages
 DEFINITION_TIMEOUT = 2.0  # s for its answer
 
 
+_open: weakref.WeakSet[Node] = weakref.WeakSet()
+os.register_at_fork(after_in_child=_open.clear)  # they are the parent's
+
+
+@atexit.register
+def _close_all() -> None:
+    """Close what a program has left open, before the interpreter is finalized: Zenoh's threads that enter or return to
+    Python in that hang or abort the process. All at once, so that those that hang do not add up.
+    """
+    join_at_end([thread for node in list(_open) for thread in node.begin_close()])
+
+
 class Node:
-    """A node on the wire. Use it in `with`: an open session keeps a Python process from ending.
+    """A node on the wire, open until `close`, the end of its `with`, or that of the process.
 
     `wire` is "json", "msgpack" or "cdr", by default that of the connection. `lasting` is for long-running nodes, which
     are listed in the graph at once; see Opening for it, `patience` and `stop`. With an early Opening, the first use
@@ -61,6 +76,7 @@ class Node:
         self._closing, self._opened, self._secure = connection.closing, connection.opened, connection.secure
         self._declared: set[Declared] = set()
         self._keeper = self._opened().keeper if lasting else None
+        _open.add(self)
         if lasting:
             if taken := self._opened().taken:
                 from holozen.transport.listeners import shared
@@ -151,11 +167,16 @@ class Node:
 
     def close(self) -> None:
         """Close the session. Returns within 0.2 s, whatever the other side does."""
+        wait_for_threads(self.begin_close(), CLOSE_LIMIT)
+
+    def begin_close(self) -> list[threading.Thread | None]:
+        """As `close`, without waiting; returns the threads that end when it is closed."""
+        _open.discard(self)
         self._closing.set()
         declared = list(self._declared)
         closer = threading.Thread(target=self._leave, args=(declared,), daemon=True)
         closer.start()
-        wait_for_threads((closer, self._keeper, *(one.thread for one in declared)), CLOSE_LIMIT)
+        return [closer, self._keeper, *(one.thread for one in declared)]
 
     def _leave(self, declared: list[Declared]) -> None:
         # A link that another session opens at this moment may outlive this session, and Zenoh would keep showing there

@@ -49,8 +49,9 @@ class RawPublisher(Declared):
 
     @property
     def matched(self) -> bool:
-        """Whether anyone subscribes to this key."""
-        return bool(self._publisher.matching_status.matching)
+        """Whether anyone subscribes to this key. Raises BusError once it, or the bus, is closed."""
+        with self.unless_closed():
+            return bool(self._publisher.matching_status.matching)
 
     @property
     def wanted(self) -> bool:
@@ -58,8 +59,9 @@ class RawPublisher(Declared):
         first look on, a get is answered with the next message.
         """
         if self._next is None:
+            with self.unless_closed():
+                listener = self._watch()
             self._next = threading.Event()
-            listener = self._watch()
             self.ends.append(listener)
             self._statuses = listener.handler
         # A reader that has left costs some messages that go nowhere; one that came is looked for each time.
@@ -69,15 +71,21 @@ class RawPublisher(Declared):
         return self._is_matched or not self._next.is_set()
 
     def put_bytes(self, payload: bytes, encoding: str | None = None) -> None:
-        """Send an encoded payload, by default in the encoding of this publisher."""
+        """Send an encoded payload, by default in the encoding of this publisher. Raises BusError once it, or the bus,
+        is closed.
+        """
         self._last = payload, encoding
         attachment = self._stamp()
         if self._sign:
             attachment = self._sign(attachment, str(encoding or self._encoding), payload)
-        if encoding:
-            self._put(payload, encoding=encoding, attachment=attachment)
-        else:  # to pass a None takes Zenoh a fifth longer
-            self._put(payload, attachment=attachment)
+        try:  # `unless_closed` would take longer
+            if encoding:
+                self._put(payload, encoding=encoding, attachment=attachment)
+            else:  # to pass a None takes Zenoh a fifth longer
+                self._put(payload, attachment=attachment)
+        except Exception:
+            with self.unless_closed():
+                raise
         if self._next is not None and not self._next.is_set():
             self._next.set()
 
@@ -106,23 +114,33 @@ class Publisher(RawPublisher, Generic[M]):
     `Bus.publisher`.
     """
 
-    def __init__(self, wire: str, queued: list[tuple[RawPublisher, bytes, str | None]], *declared: Any) -> None:
+    def __init__(
+        self, kind: type[M], wire: str, queued: list[tuple[RawPublisher, bytes, str | None]], *declared: Any
+    ) -> None:
         from holozen.messages import codec
 
         super().__init__(*declared)
+        self._kind = kind
         self._wire, self._queued, self._written, self._named = wire, queued, codec.written, codec.encoding
 
     def put(self, message: M) -> None:
         """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
-        on its type.
+        on its type. Raises TypeError for a message of another type, and BusError once it, or the bus, is closed.
         """
+        if not isinstance(message, self._kind):
+            raise self._mistaken(message)
         payload, wire = self._written(message, self._wire)
         self.put_bytes(payload, None if wire == self._wire else self._named(wire, type(message)))
 
     def queue(self, message: M) -> None:
         """As `put`, but `Bus.send_queued` sends it: many messages that are sent at once take Zenoh less time."""
+        if not isinstance(message, self._kind):
+            raise self._mistaken(message)
         payload, wire = self._written(message, self._wire)
         self._queued.append((self, payload, None if wire == self._wire else self._named(wire, type(message))))
+
+    def _mistaken(self, message: object) -> TypeError:
+        return TypeError(f"{self.key}: a {type(message).__name__}, but this publisher sends {self._kind.__name__}")
 
 
 class Gets(Answers):
@@ -180,8 +198,9 @@ class Subscription(Generic[M]):
         self.raw, self._decode, self._refusal = samples, decode, refusal
 
     def try_recv(self) -> Received[M] | None:
-        """The next waiting message, or None."""
-        sample = self.raw.channel.try_recv()
+        """The next waiting message, or None. Raises BusError once the bus is closed."""
+        with self.raw.unless_closed():
+            sample = self.raw.channel.try_recv()
         return None if sample is None else self._received(sample)
 
     def waiting(self, first: Any) -> list[Received[M]]:

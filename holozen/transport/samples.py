@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import threading
 import time
 from collections import deque
@@ -219,6 +220,16 @@ class Declared:
         ends, self.ends = self.ends, []
         for end in reversed(ends):
             end.undeclare()
+
+    @contextlib.contextmanager
+    def unless_closed(self) -> Iterator[None]:
+        """Convert any error to a BusError once this is closed."""
+        try:
+            yield
+        except Exception:  # a ZError. Zenoh is imported later than this module
+            if self.ends:
+                raise
+            raise BusError("closed") from None
 
 
 class Answers(Declared):

@@ -98,8 +98,8 @@ class Server(Declared):
     """
 
     def __init__(
-        self, queryable: Any, key: str, request: type[Message], answer: Callable[[Any], Any], wire: str, room: int,
-        stops: bool = False,
+        self, queryable: Any, key: str, request: type[Message], reply: type[Message], answer: Callable[[Any], Any],
+        wire: str, room: int, stops: bool = False,
     ) -> None:  # fmt: skip
         from holozen.messages import codec
 
@@ -114,6 +114,7 @@ class Server(Declared):
         self._doubts: dict[bytes, Doubt] = {}  # by the number of the request, in order
         self._kept: dict[bytes, tuple[bytes, str, str]] = {}  # number of a request -> its reply, in order
         self._key, self._request, self._answer, self._wire, self._codec = key, request, answer, wire, codec
+        self._replies = reply
 
     def take_in(self, most: int = BATCH) -> int:
         """Read at most `most` requests from Zenoh's ring; returns how many wait."""
@@ -241,7 +242,11 @@ class Server(Declared):
         return str(query.key_expr) == self._key
 
     def reply(self, query: Any, answer: Message, note: str = "") -> None:
-        """Answer a request. The reply's type has no place for `note`, so it is the attachment."""
+        """Answer a request. The reply's type has no place for `note`, so it is the attachment. Raises TypeError
+        for one of another type.
+        """
+        if not isinstance(answer, self._replies):
+            raise TypeError(f"its answer is a {type(answer).__name__}, not a {self._replies.__name__}")
         reply, wire = self._codec.written(answer, self._wire)
         encoding = self._codec.encoding(wire, type(answer))
         if len(reply) <= KEPT_BYTES and (number := _asked(query)[0]):

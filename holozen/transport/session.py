@@ -25,6 +25,13 @@ LAST = 1.0  # s to wait for threads at the end of the process
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
 
 
+FORKED = (
+    "cannot open Zenoh in a process that was forked from one which has used it: start it by multiprocessing's "
+    '"spawn" method, or fork before the first Bus'
+)
+_process = 0  # the one that has used Zenoh: its threads are not in those that are forked from it
+
+
 class Opened:
     """An open session. `took`: s until its first link, a measure of the network's delay."""
 
@@ -59,6 +66,10 @@ class Opening:
         stop: threading.Event | None = None,
         early: bool = False,
     ) -> None:
+        global _process
+        if _process not in (0, os.getpid()):
+            raise BusError(FORKED)
+        _process = os.getpid()
         self.where, self.wire, self.closing = connection.where, connection.wire, threading.Event()
         self.networks = connection.networks
         self.secure = connection.secure
@@ -344,14 +355,19 @@ def wait_for_threads(threads: Iterable[threading.Thread | None], seconds: float)
 
     The interpreter aborts if a thread returns from Zenoh during its finalization.
     """
-    others = [thread for thread in threads if thread and thread is not threading.current_thread()]
-    if late := _join(others, seconds):
+    if late := _join(threads, seconds):
         atexit.register(_join, late, LAST)
 
 
-def _join(threads: list[threading.Thread], seconds: float) -> list[threading.Thread]:
+def join_at_end(threads: Iterable[threading.Thread | None]) -> None:
+    """As `wait_for_threads`, in a callback of atexit, which can register no other."""
+    _join(threads, CLOSE_LIMIT + LAST)
+
+
+def _join(threads: Iterable[threading.Thread | None], seconds: float) -> list[threading.Thread]:
     """Join threads; returns those that still run."""
+    others = [thread for thread in threads if thread and thread is not threading.current_thread()]
     deadline = time.monotonic() + seconds
-    for thread in threads:
+    for thread in others:
         thread.join(max(0.0, deadline - time.monotonic()))
-    return [thread for thread in threads if thread.is_alive()]
+    return [thread for thread in others if thread.is_alive()]

@@ -66,6 +66,15 @@ def test_a_name_that_python_could_not_use_is_refused(run: Run, tmp_path: Path, t
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.needs("prlimit")
+def test_a_write_that_fails_leaves_nothing_in_the_way(run: Run, tmp_path: Path) -> None:
+    words = command("new", "controller", "go_there")
+    done = run("prlimit", "--fsize=100", *words)
+    assert (done.returncode, done.stderr) == (1, "holozen new controller: go_there.py: File too large\n")
+    assert list(tmp_path.iterdir()) == []
+    assert run(*words).returncode == 0
+
+
 def test_nothing_is_written_where_a_part_is_in_the_way(run: Run, tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "srv").write_text("mine")

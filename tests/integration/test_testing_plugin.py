@@ -90,15 +90,20 @@ IN_VAIN = {
     "wire.start('sim', '--rtf', 'x').wait_for_line('tea')": "exit code 2> ended without 'tea'; it wrote:",
     "wire.start('sim').wait(within=0.1)": "still runs after 0.1 s; it wrote:",
     "terminal('topic', 'list').wait_for_text('tea')": "ended without 'tea' on its screen:",
+    "lock_step('--nonsense')": "no flag '--nonsense'",
+    "lock_step(); lock_step()": "simulates here already",
+    "sim = lock_step(); sim.process.kill(); sim.step()": "exit code -9>; it wrote:",
+    "sim = lock_step(); sim.process.kill(); sim.drive(x=0.3)": "exit code -9>; it wrote:",
 }
 
 
 def test_a_condition_that_never_comes_true_names_what_was_awaited(tmp_path: Path) -> None:
-    tests = [f"def test_{n}(wire, terminal, wait_for):\n    {test}\n" for n, test in enumerate(IN_VAIN)]
+    tests = [f"def test_{n}(wire, terminal, wait_for, lock_step):\n    {test}\n" for n, test in enumerate(IN_VAIN)]
     done = run_pytest(tmp_path, "\n".join(tests))
     assert f"{len(IN_VAIN)} failed" in done.stdout
     for test, reason in IN_VAIN.items():
         assert reason in done.stdout, test
+    assert "waited 60 s" not in done.stdout
 
 
 def test_two_wires_hear_nothing_of_each_other(tmp_path: Path) -> None:

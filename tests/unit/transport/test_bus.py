@@ -147,10 +147,16 @@ def test_a_latest_can_be_closed_and_its_thread_ends(wire: Wire) -> None:
 def test_a_closed_bus_ends_its_readers_and_may_be_closed_again(wire: Wire) -> None:
     bus = wire.bus()
     tap = bus.subscribe_raw("odom")
+    odom, publisher = bus.subscribe("odom", Odometry), bus.publisher("odom", Odometry)
     bus.close()
     bus.close()
     with pytest.raises(BusError):
         tap.recv()
+    uses: list[Callable[[], object]] = [
+        odom.recv, odom.try_recv, lambda: publisher.put(Odometry()),
+        lambda: publisher.matched, lambda: publisher.wanted,
+    ]  # fmt: skip
+    assert {refusal(use) for use in uses} == {"closed"}
     assert "session closed" in refusal(lambda: bus.subscribe_raw("odom"))
 
 

@@ -1,11 +1,13 @@
 """A publisher writes messages, and answers a get with the last one."""
 
+import itertools
 import json
 import math
 import os
 import signal
 import sys
 import threading
+from typing import Any
 
 import pytest
 import zenoh
@@ -35,6 +37,13 @@ def test_what_is_put_arrives_with_encoding_priority_and_source(wire: Wire, name:
     assert (received.key, received.encoding) == ("cmd_vel", encoding(name, Twist))
     assert (received.priority, received.source) == ("DATA_LOW", writer.source)
     assert writer.source.startswith("writer@")
+
+
+def test_a_message_of_another_type_is_refused_and_both_are_named(wire: Wire) -> None:
+    publisher: Publisher[Any] = wire.bus("writer").publisher("cmd_vel", Twist)
+    for put, given in itertools.product((publisher.put, publisher.queue), (Odometry(), {"linear": {"x": 0.1}})):
+        with pytest.raises(TypeError, match=rf"^cmd_vel: a {type(given).__name__}, but this publisher sends Twist$"):
+            put(given)
 
 
 def test_nothing_matches_until_there_is_a_subscriber(wire: Wire) -> None:

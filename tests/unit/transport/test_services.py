@@ -5,7 +5,7 @@ import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import pytest
 
@@ -67,6 +67,15 @@ def test_a_server_speaks_its_wire_and_understands_the_others(wire: Wire, name: s
 def test_a_refusal_arrives_in_the_words_of_the_service(caller: Bus) -> None:
     with pytest.raises(ServiceError, match=r"^goal -1: there is none\nat all$"):
         caller.call("next_goal", NextGoalRequest(-1), NextGoalReply)
+
+
+def test_an_answer_of_a_wrong_type_is_logged_with_both(wire: Wire, capsys: pytest.CaptureFixture[str]) -> None:
+    answer: Any = lambda _: NextGoalRequest(1)  # noqa: E731
+    wire.bus("server").serve("next_goal", NextGoalRequest, NextGoalReply, answer).start()
+    with pytest.raises(ServiceError, match=r"^next_goal: internal error, see the server's log$"):
+        wire.bus("caller").call("next_goal", NextGoalRequest(4), NextGoalReply)
+    logged = "next_goal: TypeError: its answer is a NextGoalRequest, not a NextGoalReply\n"
+    assert capsys.readouterr().err == logged
 
 
 def test_an_exception_in_a_handler_is_logged_and_does_not_reach_the_caller(

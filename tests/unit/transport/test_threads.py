@@ -1,7 +1,15 @@
-"""A process waits for threads that are about to come out of Zenoh, and not for ever."""
+"""At its end a process closes what it left open. It waits for threads that come out of Zenoh, and not for ever."""
 
+import gc
 import subprocess
 import sys
+import weakref
+
+import pytest
+
+from holozen.bus import Bus
+from holozen.messages import Odometry
+from holozen.testing import Wire, wait_for
 
 ENDS = """
 import threading, time
@@ -29,3 +37,64 @@ def test_a_late_thread_may_leave_before_the_process_ends() -> None:
 
 def test_a_hanging_thread_does_not_keep_the_process() -> None:
     assert reported(3600) == ["waited"]
+
+
+UNCLOSED = """
+import os, sys, threading
+from types import SimpleNamespace
+from holozen.bus import Bus, Connection
+from holozen.messages import Odometry, TriggerReply, TriggerRequest
+
+bus = Bus("unclosed", Connection(connect=(sys.argv[1],), listen=(sys.argv[1],)))
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [
+        ("kept = bus.publisher('odom', Odometry)", 0),
+        ("kept = bus.latest('odom', Odometry)", 0),
+        ("bus.serve('ask', TriggerRequest, TriggerReply, lambda _: TriggerReply()).start()", 0),
+        ("bus.publisher('odom', Odometry); sys.exit(3)", 3),
+        ("bus.publisher('odom', Odometry); bus.latest('odom', Odometry); 1 / 0", 1),
+        ("bus.listing.ends.append(SimpleNamespace(undeclare=threading.Event().wait))  # a close that hangs", 0),
+        ("bus.publisher('odom', Odometry)\nif os.fork() == 0: sys.exit()\nsys.exit(os.wait()[1])", 0),
+    ],
+)
+def test_a_program_that_leaves_its_bus_open_ends_as_any_other(wire: Wire, words: str, code: int) -> None:
+    run = [sys.executable, "-c", UNCLOSED + words, wire.endpoint]
+    done = subprocess.run(run, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (code, "")
+    assert done.stderr.splitlines()[-1:] == (["ZeroDivisionError: division by zero"] if "1 / 0" in words else [])
+
+
+def test_a_bus_that_was_closed_is_not_kept(wire: Wire) -> None:
+    bus = Bus("closed", wire.connection)
+    bus.publisher("odom", Odometry)
+    bus.close()
+    kept = weakref.ref(bus)
+    del bus
+
+    def is_gone() -> bool:
+        gc.collect()
+        return kept() is None
+
+    wait_for(is_gone)
+
+
+def test_a_forked_process_names_what_it_cannot_do(wire: Wire) -> None:
+    words = "kept = bus.publisher('odom', Odometry)\nif os.fork() == 0: Bus('child')\n"
+    words += "sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))"
+    done = subprocess.run(
+        [sys.executable, "-c", UNCLOSED + words, wire.endpoint], capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 1
+    reason = "BusError: cannot open Zenoh in a process that was forked from one which has used it: "
+    assert reason in done.stderr and "multiprocessing" in done.stderr
+
+
+def test_a_process_forked_before_the_first_bus_opens_its_own(wire: Wire) -> None:
+    program = UNCLOSED.replace("bus = ", "child = os.fork()\nbus = ")
+    words = "if child: sys.exit(os.waitstatus_to_exitcode(os.wait()[1]))"
+    run = [sys.executable, "-c", program + words, wire.endpoint]
+    assert subprocess.run(run, timeout=60).returncode == 0
