@@ -140,7 +140,10 @@ class Publisher(RawPublisher, Generic[M]):
         self._queued.append((self, payload, None if wire == self._wire else self._named(wire, type(message))))
 
     def _mistaken(self, message: object) -> TypeError:
-        return TypeError(f"{self.key}: a {type(message).__name__}, but this publisher sends {self._kind.__name__}")
+        from holozen.suggest import article
+
+        given = article(type(message).__name__)
+        return TypeError(f"{self.key}: {given}, but this publisher sends {self._kind.__name__}")
 
 
 class Gets(Answers):

@@ -246,7 +246,9 @@ class Server(Declared):
         for one of another type.
         """
         if not isinstance(answer, self._replies):
-            raise TypeError(f"its answer is a {type(answer).__name__}, not a {self._replies.__name__}")
+            from holozen.suggest import article
+
+            raise TypeError(f"its answer is {article(type(answer).__name__)}, not {article(self._replies.__name__)}")
         reply, wire = self._codec.written(answer, self._wire)
         encoding = self._codec.encoding(wire, type(answer))
         if len(reply) <= KEPT_BYTES and (number := _asked(query)[0]):
