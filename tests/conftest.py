@@ -56,8 +56,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 @pytest.fixture(autouse=True, scope="session")
 def cache(tmp_path_factory: pytest.TempPathFactory) -> Generator[None, None, None]:
-    """Nothing is read from, or left in, the user's cache folder."""
+    """Nothing is read from, or left in, the user's cache folder, and none of the user's own variables counts."""
     with pytest.MonkeyPatch.context() as patch:
+        for name in os.environ.keys() - {"HOLOZEN_LONG"}:
+            if name.startswith("HOLOZEN_") or name == "ROS_DOMAIN_ID":
+                patch.delenv(name)
         patch.setenv("XDG_CACHE_HOME", str(tmp_path_factory.mktemp("cache")))
         patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
         yield

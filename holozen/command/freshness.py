@@ -201,18 +201,14 @@ class Freshness(Generic[M]):
         that one arrived (infinite if none did), and as a time in which samples were sent that are missing.
         """
         source = Sender(received.source, "", received.key)  # numbers of all priorities are one sequence
-        sent, number = self._heard.get(source, (stamp.sent, stamp.number))
-        if stamp.number <= number and source in self._heard:
+        before = self._heard.get(source)
+        if before and stamp.number <= before[1]:  # it was overtaken
             return math.inf, 0.0
         _put(self._heard, source, (stamp.sent, stamp.number))
-        passed = max(0.0, stamp.sent - sent)
-        return (
-            (math.inf, 0.0)
-            if number == stamp.number
-            else (passed, 0.0)
-            if number + 1 == stamp.number
-            else (0.0, passed)
-        )
+        if not before:
+            return math.inf, 0.0
+        passed = max(0.0, stamp.sent - before[0])
+        return (passed, 0.0) if stamp.number == before[1] + 1 else (0.0, passed)
 
     def _wait(self, received: Received[M], stamp: Stamp, sender: Sender, came: float, now: float) -> Judged[M] | None:
         there = self._senders.has(stamp.session)
