@@ -158,6 +158,7 @@ def nodes(connection: Connection) -> Iterator[Finding]:
         yield from clocks(peers.values())
         yield from open_ports(peers.values())
         yield from duplicates(endpoints, peers)
+        yield from paused(bus, endpoints)
         if robots.count:
             time.sleep(max(0.0, began + LISTEN - time.monotonic()))
         yield from robots.findings(time.monotonic() - began)
@@ -336,6 +337,14 @@ def duplicates(endpoints: Iterable[Endpoint], peers: Mapping[str, Peer]) -> Iter
         yield Finding("duplicates", ERROR, text, "end one, or give its robot another name: --robot FILE=NAME")
 
 
+def paused(bus: "Bus", endpoints: Iterable[Endpoint]) -> Iterator[Finding]:
+    """Whether a sim is paused."""
+    from holozen import entities
+
+    if entities.is_paused(bus, endpoints):
+        yield Finding("sim", WARNING, "the sim is paused: its robots stand still", "holozen sim play")
+
+
 # The robots.
 
 
@@ -367,7 +376,8 @@ class Robots:
             text = f"{key} is stale: nothing from {self._nodes[key]} for {seconds:.1f} s"
             yield Finding("odom", ERROR, text, "continue or restart that node (fg, kill -CONT), or raise its --rtf")
         if not stale:
-            yield Finding("odom", OK, f"fresh on {', '.join(list(self._odoms)[:MAX_KEYS])} ({self.count} robots)")
+            robots = f"{self.count} robot{'s' * (self.count != 1)}"
+            yield Finding("odom", OK, f"fresh on {', '.join(list(self._odoms)[:MAX_KEYS])} ({robots})")
         alike: dict[tuple[str, str], list[Finding]] = {}  # the robots of a fleet have much the same findings
         for key, latest in self._statuses.items():
             if status := latest.read()[0]:

@@ -3,6 +3,7 @@
 Several sims may run on one wire, of which one spawns. Requests about entities go to all of them.
 """
 
+import contextlib
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -10,14 +11,22 @@ from typing import Any, TypeVar
 
 from holozen.background import background
 from holozen.bus import Bus
-from holozen.messages import Message, Pose, PoseStamped, RobotDescriptionReply, RobotDescriptionRequest
+from holozen.messages import (
+    Message,
+    Pose,
+    PoseStamped,
+    RobotDescriptionReply,
+    RobotDescriptionRequest,
+    SimulationStatus,
+)
 from holozen.messages import simulation_interfaces as si
 from holozen.messages.action_msgs import CancelGoalReply, CancelGoalRequest, GoalInfo
+from holozen.messages.codec import CodecError, decode
 from holozen.messages.unique_identifier_msgs import UUID
 from holozen.suggest import listed
 from holozen.transport.actions import CANCEL, RESULT, SEND, State, key_of, new_id
 from holozen.transport.errors import NoReply, ServiceError
-from holozen.transport.graph import SIMS, Endpoint
+from holozen.transport.graph import SIMS, Endpoint, on_key
 
 NOTICE = 3.0  # s for a sim to answer
 PATIENCE = 30.0  # s for a request to complete
@@ -88,6 +97,16 @@ def set_playing(bus: Bus, playing: bool) -> list[str]:
     state = si.SimulationState.STATE_PLAYING if playing else si.SimulationState.STATE_PAUSED
     request = si.SetSimulationStateRequest(si.SimulationState(state))
     return _control(bus, "set_simulation_state", request, si.SetSimulationStateReply)
+
+
+def is_paused(bus: Bus, endpoints: Iterable[Endpoint]) -> bool:
+    """Whether any of the sims with these endpoints is paused. What does not answer is not."""
+    for sample in bus.last_messages(on_key(endpoints, "simulation_status", "pub")):
+        with contextlib.suppress(CodecError):
+            status = decode(sample.payload, sample.encoding, (SimulationStatus,), tolerant=True)
+            if status.state == si.SimulationState.STATE_PAUSED:
+                return True
+    return False
 
 
 def step(bus: Bus, steps: int) -> list[str]:

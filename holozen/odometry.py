@@ -1,23 +1,29 @@
-"""A robot's odometry as feedback for driving it: whether it is stale or lost, and whether the robot is at rest."""
+"""A robot's odometry as feedback for driving it: whether it is stale or lost, the robot rests, or is another one."""
 
+import math
 import time
 
 from holozen.bus import Bus, Latest
-from holozen.messages import Odometry
+from holozen.messages import Odometry, SimulationStatus
 from holozen.wire import topic
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
 LOST = 0.4  # s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
+JUMP = 0.5  # m between two looks, more than its motion explains, that mean a reset
 
 
-class OdometryFeedback(Latest[Odometry]):
-    """The newest odometry on `key`."""
+class RobotFeedback(Latest[Odometry]):
+    """The newest odometry on `key`, for a driver, which has to know when its robot is another one, or starts again."""
 
     def __init__(self, bus: Bus, key: str) -> None:
         row = topic("odom")
         assert row is not None
         self._silence = row.silence
         super().__init__(bus.state(key, Odometry))
+        self._writers = bus.writers(key)
+        self._sim = bus.latest("simulation_status", SimulationStatus)
+        self._before: Odometry | None = None
+        self._epoch: int | None = None
 
     @property
     def stale_after(self) -> float:
@@ -38,3 +44,35 @@ class OdometryFeedback(Latest[Odometry]):
         """Whether what was received after `since` (s, monotonic) shows a robot at rest."""
         odom, age = self.read()
         return odom is not None and time.monotonic() - age > since and odom.twist.twist.is_slow(RESTS)
+
+    def was_removed(self) -> bool:
+        """Whether a publisher of its odom has left since the last call: it was removed, though another one may have
+        taken its place.
+        """
+        tokens = list(iter(self._writers.try_recv, None))
+        return any(token.is_deletion for token in tokens)
+
+    def was_reset(self) -> bool:
+        """Whether the robot has been reset since the last call: a new epoch of the sim began, the robot's clock went
+        back, or its position jumped.
+        """
+        sim, _ = self._sim.read()
+        epoch, self._epoch = self._epoch, sim.epoch if sim else None
+        before, self._before = self._before, self.read()[0]
+        if epoch is not None and epoch != self._epoch:
+            return True
+        return before is not None and self._before is not None and _starts_again(before, self._before)
+
+    def close(self) -> None:
+        """Stop listening."""
+        super().close()
+        self._writers.close()
+        self._sim.close()
+
+
+def _starts_again(before: Odometry, now: Odometry) -> bool:
+    """Whether the clock went back, or the robot is farther away than it can have driven."""
+    seconds = now.header.stamp.seconds() - before.header.stamp.seconds()
+    (x0, y0, _), (x, y, _) = before.pose.pose.planar(), now.pose.pose.planar()
+    speed = max(math.hypot(odom.twist.twist.linear.x, odom.twist.twist.linear.y) for odom in (before, now))
+    return seconds < 0 or math.hypot(x - x0, y - y0) > JUMP + 2 * speed * seconds

@@ -90,7 +90,7 @@ TOPICS = (
     Topic("joint_states", ("sensor_msgs/msg/JointState",), ("sim",), (), 50.0, 0.2, ""),
     Topic("tf", ("tf2_msgs/msg/TFMessage",), ("sim",), (), 50.0, 0.2, ""),
     Topic("clock", ("rosgraph_msgs/msg/Clock",), ("sim",), (), 50.0, 0.2, ""),
-    Topic("simulation_status", ("holozen/msg/SimulationStatus",), ("sim",), (), 10.0, 1.0, ""),
+    Topic("simulation_status", ("holozen/msg/SimulationStatus",), ("sim",), ("teleop", "controller"), 10.0, 1.0, ""),
     Topic("scan", ("sensor_msgs/msg/LaserScan",), ("sim",), (), 10.0, 1.0, ""),
     Topic("imu", ("sensor_msgs/msg/Imu",), ("sim",), (), 100.0, 0.2, ""),
     Topic("exposures", ("holozen/msg/Exposure",), ("sim",), ("camera",), 10.0, 1.0, ""),
@@ -242,6 +242,16 @@ def implausible(command: Any, type_name: str) -> str:
                 if abs(value := getattr(getattr(twist, part), axis)) > most:
                     return f"{part}.{axis} is {value:g} {unit}; at most {most:g}"
     return ""
+
+
+def stop(command: Any, type_name: str) -> dict[str, Any] | None:
+    """The fields of the message that stops what a command moves; None for one that ends by itself, as a goal does.
+
+    `command` is as in `implausible`. Joints hold still after a rate or an effort; what goes to a position stops there.
+    """
+    if type_name.endswith("/JointState") and (command.velocity or command.effort):
+        return {"name": command.name, "velocity": [0.0] * len(command.name)}  # an effort of zero would let them coast
+    return {} if type_name in COMMAND_TYPES else None
 
 
 def service(key: str) -> Service | None:

@@ -28,6 +28,9 @@ PACKAGES = dict(line.split(" ", 1) for line in (HERE / "packages.txt").read_text
 
 IN_CI = os.environ.get("CI") == "true"
 QUICK = HERE / "unit"
+SHARED = {"town", "fleet", "kiwi", "eye"}
+"""Fixtures of a file whose processes run, and cost time, from the first test that uses them until the file's last."""
+REORDERED = {HERE / "faults", HERE / "integration", HERE / "terminals"}
 LONG = os.environ.get("HOLOZEN_LONG") == "1"
 
 
@@ -37,7 +40,8 @@ def pytest_configure(config: pytest.Config) -> None:
         if signal.getsignal(number) is signal.SIG_IGN:
             signal.signal(number, handler)
     config.addinivalue_line(
-        "markers", "alone: measures time, or needs what keeps it; scripts/test runs it beside no other test"
+        "markers",
+        "alone: measures time, or needs what keeps it; scripts/test runs it when little else does",
     )
     config.addinivalue_line("markers", "engines: tried in each physics engine, by the fixture `engine` or a world")
     config.addinivalue_line("markers", f"needs(*commands): of {', '.join(PACKAGES)}")
@@ -51,7 +55,14 @@ def pytest_sessionfinish(exitstatus: int) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    items.sort(key=lambda item: QUICK in item.path.parents)  # the long files first: none is left over at the end
+    order = {path: number for number, path in enumerate(dict.fromkeys(item.path for item in items))}
+
+    def place(item: pytest.Item) -> tuple[bool, int, bool]:
+        """The long files first: none is left over at the end. In a file, the tests that share processes last."""
+        shares = item.path.parent in REORDERED and not SHARED.isdisjoint(getattr(item, "fixturenames", ()))
+        return QUICK in item.path.parents, order[item.path], shares
+
+    items.sort(key=place)
 
 
 @pytest.fixture(autouse=True, scope="session")

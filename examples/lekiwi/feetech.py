@@ -109,9 +109,12 @@ class Servos:
             if not select.select([self._file], [], [], max(0.0, deadline - time.monotonic()))[0]:
                 return None
             try:
-                received += os.read(self._file, 256)
+                more = os.read(self._file, 256)
             except OSError as error:
                 raise ServoError(f"{self._port}: {error.strerror}") from None
+            if not more:
+                raise ServoError(f"{self._port}: the port has hung up")
+            received += more
 
     def _send(self, data: bytes) -> None:
         try:

@@ -6,6 +6,8 @@ Without the robot: `python examples/lekiwi/simulated_servos.py` prints a port to
 """
 
 import argparse
+import contextlib
+import fcntl
 import math
 import os
 import select
@@ -32,6 +34,8 @@ ROLLS = {7: 150, 8: -90, 9: 30}  # servo -> its wheel's rolling direction, in de
 MAX_LINEAR, MAX_ANGULAR = 0.2, 1.0  # m/s, rad/s
 MAX_RATE = 4.6  # rad/s of a wheel, 3000 steps/s; beyond, all turn slower, so that the robot keeps its direction
 SILENCE = 0.3  # s without a pass of the loop after which the guard stops the wheels
+LAST_STOPS = 10  # of the guard: one may get lost, while a servo still answers the process that has ended
+UNREAD = 64  # beats that the guard may leave unread, 1.3 s, a power of two; beyond, the process ends
 MAX_LOST = 5  # missing answers in a row; beyond, the process ends
 
 
@@ -64,7 +68,10 @@ class Guard:
     """
 
     def __init__(self, servos: Servos) -> None:
-        (heard, self._beat), (ready, begun) = os.pipe(), os.pipe()
+        # In packet mode each beat takes a page of the pipe, so that a guard that does not read is soon noticed.
+        (heard, self._beat), (ready, begun) = os.pipe2(os.O_DIRECT), os.pipe()
+        with contextlib.suppress(OSError):  # where pages are large it has room for 16 beats
+            fcntl.fcntl(self._beat, fcntl.F_SETPIPE_SZ, UNREAD * os.sysconf("SC_PAGE_SIZE"))
         self.pid = os.fork()
         if not self.pid:
             try:
@@ -83,7 +90,7 @@ class Guard:
         """Tell it that this process is alive; at each pass of the loop. Raises GuardError."""
         try:
             os.write(self._beat, b".")
-        except OSError:  # it is gone, or has not read for so long that the pipe is full
+        except OSError:  # it is gone, or the pipe is full
             raise self._lost() from None
 
     def _lost(self) -> GuardError:
@@ -93,22 +100,21 @@ class Guard:
 
 
 def _keep_guard(servos: Servos, heard: int, begun: int) -> None:
-    """Stop the wheels whenever nothing has been `heard` for SILENCE, and once it is closed. Writes to `begun` when
-    nothing that is sent to the guarded process's job or terminal ends this one.
+    """Stop the wheels whenever nothing has been `heard` for SILENCE, and for good once it is closed. Writes to `begun`
+    when nothing that is sent to the guarded process's job or terminal ends this one.
     """
     os.setsid()
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
         signal.signal(number, signal.SIG_IGN)  # systemd sends SIGTERM to all processes of a unit
     os.write(begun, b".")
-    is_alive = True
-    while is_alive:
-        is_heard = bool(select.select([heard], [], [], SILENCE)[0])
-        is_alive = not is_heard or bool(os.read(heard, 4096))
-        if not is_heard or not is_alive:
-            try:
+    while not (is_heard := bool(select.select([heard], [], [], SILENCE)[0])) or os.read(heard, 4096):
+        if not is_heard:
+            with contextlib.suppress(ServoError):
                 servos.turn(rates_for(STOP))
-            except ServoError:  # the port is gone
-                break
+    for _ in range(LAST_STOPS):
+        with contextlib.suppress(ServoError):
+            servos.turn(rates_for(STOP))
+        time.sleep(1 / RATE)
 
 
 def run(base: Base, servos: Servos, guard: Guard, stop: threading.Event) -> None:

@@ -13,7 +13,9 @@ from typing import Any, NamedTuple
 from holozen import wire
 from holozen.bag import BagError, Channel, Message
 from holozen.bus import Bus
-from holozen.messages import Header, Time, Twist, TwistStamped, codec, named
+from holozen.console import report
+from holozen.messages import Header, Time, TwistStamped, codec, named
+from holozen.messages import Message as Struct
 from holozen.terminal import single_keys
 from holozen.transport.graph import Endpoint, includes, on_key
 
@@ -24,15 +26,20 @@ GAP = 0.5  # s between two looks; after more the process was suspended
 GOALS = "goal_pose"  # the last name of keys with goals
 PAUSE, STEP = "pause", "step"
 STEPS = (b"s", b"\x1b[C", b"\x1bOC")  # s, and the right arrow's two sequences
+MOVES = "it moves robots; --commands plays it too"
+COMMANDS = tuple(map(named, sorted(wire.COMMAND_TYPES)))
 
 
 class Plan(NamedTuple):
-    """Channels and the keys they are played on; `commands` are those of the keys that move robots."""
+    """Channels and the keys they are played on; `commands` are those of the keys that move robots. `moves`: commands
+    are played.
+    """
 
     targets: dict[Channel, str]
     commands: set[str]
     left_out: dict[str, str]  # key in the bag -> reason
     published: dict[str, str]  # keys left out because they have a publisher -> its node
+    moves: bool
 
 
 def plan(
@@ -50,7 +57,7 @@ def plan(
     """
     channels = sorted(channels)
     _check_known(topics or [], remap, channels)
-    made = Plan({}, set(), {}, {})
+    made = Plan({}, set(), {}, {}, commands)
     for channel in channels:
         asked = channel.key in (topics or ()) or channel.key in remap
         if topics and not any(includes(one, channel.key) for one in topics):
@@ -89,7 +96,7 @@ def _why_not(target: str, moves: bool, nodes: str) -> str:
     if set(target) & set("*$?#") or target.startswith("@") or "" in target.split("/"):
         return "this is not a key to publish on"
     if moves:
-        return "it moves robots; --commands plays it too"
+        return MOVES
     return f"{nodes} publishes it now; --remap {target}:=NEW plays it elsewhere" if nodes else ""
 
 
@@ -98,39 +105,55 @@ def _publishers(key: str, endpoints: list[Endpoint]) -> str:
 
 
 class Way(NamedTuple):
-    """The key that a channel is played on, with its publisher and what stamps each message."""
+    """The key that a channel is played on, with its publisher and what stamps each message. `kinds` are the types of
+    the commands that may come on it; `is_command`: all its messages are commands.
+    """
 
     key: str
     publisher: Any
     stamp: Callable[[], bytes]
+    kinds: tuple[type[Struct], ...]
+    is_command: bool
 
     def put(self, payload: bytes, encoding: str | None = None) -> None:
         """Send a payload, by default in the channel's encoding."""
         self.publisher.put(payload, encoding=encoding, attachment=self.stamp())
+
+    def command(self, message: Message) -> Struct | None:
+        """The command that a robot would read in a message. Beyond keys of commands only what moves one counts,
+        whatever its type: a robot that reads that key may come at any moment.
+        """
+        if len(message.payload) <= wire.MAX_COMMAND_BYTES:
+            with contextlib.suppress(codec.CodecError):
+                found = codec.decode(message.payload, message.channel.encoding, self.kinds)
+                return found if self.is_command or found != type(found)() else None
+        return self.kinds[0]() if self.is_command else None  # a foreign robot may read it
 
 
 class Outlet:
     """Publishers for the channels of a plan, with the priority of plain data: a person at a teleop takes precedence.
 
     Payloads and Encodings are those of the recording, but for the stamps of commands: see `_restamped`. `goals` are the
-    keys on which goals were played.
+    keys on which goals were played, `left_out` those that turned out to hold commands.
     """
 
     def __init__(self, bus: Bus, plan: Plan) -> None:
-        self._commands = plan.commands
-        if plan.commands:
+        self._plan = plan
+        if plan.moves:
             _ = bus.listing
         self._tokens = [
             bus.announce("pub", channel.type or "any/msg/Any", key) for channel, key in plan.targets.items()
         ]
         self._ways = {channel: self._way(bus, channel, key) for channel, key in plan.targets.items()}
-        self._driven: set[Channel] = set()  # command channels played since the last stop
+        self._stops: set[tuple[Channel, bytes, str]] = set()  # payloads, and their Encodings, for what now moves
         self.goals: set[str] = set()
+        self.left_out: set[str] = set()
 
     def _way(self, bus: Bus, channel: Channel, key: str) -> Way:
+        is_command = key in self._plan.commands
         # Telemetry is batched: sent one by one, more of it is lost on a busy machine.
-        express = key in self._commands
-        return Way(key, bus.session.declare_publisher(key, encoding=channel.encoding, express=express), bus.stamps(key))
+        publisher = bus.session.declare_publisher(key, encoding=channel.encoding, express=is_command)
+        return Way(key, publisher, bus.stamps(key), _kinds(channel, key), is_command)
 
     def settle(self) -> None:
         """Wait briefly for subscribers."""
@@ -140,53 +163,61 @@ class Outlet:
                 return
             time.sleep(0.005)
 
-    def publish(self, message: Message) -> None:
-        """Send a message, if its channel is in the plan."""
-        if way := self._ways.get(message.channel):
-            key = way.key
-            way.put(_restamped(message) if key in self._commands else message.payload)
-            if key in self._commands:
-                self._driven.add(message.channel)
-            if key.rpartition("/")[2] == GOALS:
-                self.goals.add(key)
+    def publish(self, message: Message) -> bool:
+        """Send a message, if its channel is in the plan. Returns whether it was sent: a channel is left out from its
+        first command on, unless commands are played.
+        """
+        if not (way := self._ways.get(message.channel)):
+            return False
+        command = way.command(message)
+        if command is None:
+            way.put(message.payload)
+        elif self._plan.moves:
+            way.put(_restamped(message, command))
+            if (fields := wire.stop(command, command.ROS)) is not None:
+                self._stops.add((message.channel, *_encoded(type(command)(**fields), message.channel)))
+            if way.key.rpartition("/")[2] == GOALS:
+                self.goals.add(way.key)
+        else:
+            report(f"{message.channel.key} is left out from here on: {MOVES}")
+            self.left_out.add(message.channel.key)
+            del self._ways[message.channel]
+            return False
+        return True
 
     def stop(self) -> None:
-        """Stop every robot that was moved."""
-        driven = [(channel, self._ways[channel]) for channel in self._driven]
-        stops = [(way, *_stop(channel)) for channel, way in driven if not _ends_by_itself(channel.key, way.key)]
-        for _ in range(STOPS if stops else 0):
-            for way, payload, encoding in stops:
-                way.put(payload, encoding)
+        """Stop everything that was moved."""
+        for _ in range(STOPS if self._stops else 0):
+            for channel, payload, encoding in self._stops:
+                self._ways[channel].put(payload, encoding)
             time.sleep(STOP_EVERY)
-        self._driven.clear()
+        self._stops.clear()
 
 
-def _restamped(message: Message) -> bytes:
+def _kinds(channel: Channel, target: str) -> tuple[type[Struct], ...]:
+    """The types of the commands that may come on a channel which is played on `target`."""
+    if channel.type in wire.COMMAND_TYPES:
+        return (named(channel.type),)
+    rows = (wire.topic(key) for key in (target, channel.key))
+    return next((row.types for row in rows if row and row.is_command), COMMANDS)
+
+
+def _restamped(message: Message, command: Struct) -> bytes:
     """The payload of a command, with a stamp of this moment if it has one: robots refuse old stamps."""
-    channel, payload = message.channel, message.payload
-    if channel.type not in ("", TwistStamped.ROS):
-        return payload
-    try:
-        command = codec.decode(payload, channel.encoding, (TwistStamped,))
-        if not command.header.stamp.seconds():
-            return payload
+    if isinstance(command, TwistStamped) and command.header.stamp.seconds():
         header = Header(Time.of(time.time()), command.header.frame_id)
-        return codec.encode(TwistStamped(header, command.twist), codec.form(payload, channel.encoding))
-    except codec.CodecError:  # another type, or one that the robot refuses, with its reason
-        return payload
+        with contextlib.suppress(codec.CodecError):  # the robot refuses it, with its reason
+            return codec.encode(
+                TwistStamped(header, command.twist), codec.form(message.payload, message.channel.encoding)
+            )
+    return message.payload
 
 
-def _ends_by_itself(*keys: str) -> bool:
-    """Whether a stop would do nothing: joints stop after a short timeout, and a controller obeys no velocity."""
-    return any(key.rpartition("/")[2] in ("joint_command", GOALS) for key in keys)
-
-
-def _stop(channel: Channel) -> tuple[bytes, str]:
-    """A stop in the encoding and type of a channel, and its Encoding."""
+def _encoded(stop: Struct, channel: Channel) -> tuple[bytes, str]:
+    """A stop in the encoding of a channel, and its Encoding."""
     name = channel.encoding.partition(";")[0]
     form = next((form for form, encoding in codec.WIRES.items() if encoding == name), "json")
-    kind = named(channel.type) if channel.type in wire.COMMAND_TYPES else Twist
-    return codec.encode(kind(), form), codec.encoding(form, kind)
+    return codec.encode(stop, form), codec.encoding(form, type(stop))
 
 
 class Pace:
@@ -255,7 +286,8 @@ def meaning(pressed: bytes) -> str:
 
 
 class Player:
-    """Calls `publish` with each message when it is due, and `hold` when a pause begins.
+    """Calls `publish` with each message when it is due, and `hold` when a pause begins. `publish` returns whether it
+    sent the message: only then it counts.
 
     After a gap, as when the process was suspended, it goes on from where it was; `on_gap` gets the length in s.
     `paused` and `position` (ns, of the last message) are for the display.
@@ -263,7 +295,7 @@ class Player:
 
     def __init__(
         self,
-        publish: Callable[[Message], None],
+        publish: Callable[[Message], bool],
         hold: Callable[[], None],
         read_key: ReadKey,
         stop: threading.Event,
@@ -288,8 +320,8 @@ class Player:
                 begun = True
             if not self._wait_for(message.at, on_look):
                 return False
-            self._publish(message)
-            self.position, self.count = message.at, self.count + 1
+            self.count += self._publish(message)
+            self.position = message.at
         return not self._stop.is_set()
 
     def _wait_for(self, at: int, on_look: Callable[[float], None]) -> bool:

@@ -66,6 +66,7 @@ class Intake:
 
     def __init__(self, room: int = QUEUE) -> None:
         self.received = self.dropped = 0
+        self.deletions = 0  # samples that delete their key, and hold no message
         self.lost = 0  # samples that never arrived, by their sequence numbers
         self.keys: set[str] = set()  # on which anything arrived, up to PUBLISHERS
         self._latched: set[int] = set()  # hashes of the messages on latched keys, up to PUBLISHERS
@@ -173,7 +174,10 @@ class _Listener:
                 if in_a_row == DEPTH:
                     self.overran, in_a_row = self.overran + 1, 0
                 sample = waiting or self._wait()
-                self._intake.add(sample.key, sample.payload, sample.encoding, sample.number)
+                if sample.is_deletion:  # replayed, it would be an empty message
+                    self._intake.deletions += 1
+                else:
+                    self._intake.add(sample.key, sample.payload, sample.encoding, sample.number)
         except Exception:  # raised by a closed subscriber; anything else is an error
             if not self._closing:
                 raise

@@ -200,11 +200,13 @@ def _counted(count: int, thing: str) -> str:
 
 
 def _once(findings: Iterable[Finding], expanded: bool) -> Iterable[Finding]:
-    """The findings without duplicates; of a line that a macro repeats, only the first."""
+    """The findings without duplicates; of a line that a macro repeats, only the first of each rule and fix. All
+    notes of the loader have the same fix.
+    """
     first: dict[tuple[str, Place, str], Finding] = {}
     for finding in findings:
-        traced = expanded and finding.place.line and not finding.place.expanded
-        first.setdefault((finding.rule, finding.place, finding.fix if traced else finding.problem), finding)
+        is_repeated = expanded and finding.place.line and not finding.place.expanded and finding.rule != NOTE.name
+        first.setdefault((finding.rule, finding.place, finding.fix if is_repeated else finding.problem), finding)
     return first.values()
 
 

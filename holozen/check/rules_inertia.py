@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from holozen.check.engine import Edit, Mistake, Subject, rule
 from holozen.check.geometry import MOVING, box_of, extent, fixed_bodies, size_of
 from holozen.robot.elements import Tag, number
-from holozen.robot.inertia import of_shapes, positive_definite
+from holozen.robot.inertia import impossible, of_shapes
 from holozen.robot.model import HERE, Link, Moments
 from holozen.robot.rigid import FALLS, falls_through
 from holozen.robot.rotation import Array
@@ -18,7 +18,6 @@ MINOR = 0.1  # of the mass of the rigid body; the inertia of a lighter link in i
 DENSEST = 25_000.0  # kg/m^3; osmium has 22 600
 STEEL = 8_000.0  # kg/m^3
 LIGHT = 2.0  # kg; lighter parts are often drawn smaller than they are
-ROUNDING = 0.01  # of the trace: numbers are written with few digits
 
 COMPUTE = "compute it from the shape"
 
@@ -180,20 +179,6 @@ def _gravity(link: str, subject: Subject) -> Tag:
     owners = [gazebo for gazebo in subject.root.all("gazebo") if gazebo.attributes.get("reference", "").strip() == link]
     settings = [tag for owner in (*owners, subject.links[link]) for tag in owner.children]
     return next((tag for tag in settings if "gravity" in tag.name.lower()), subject.links[link])
-
-
-def impossible(inertia: Moments) -> str:
-    """Why no body can have these moments; empty if one can."""
-    xx, xy, xz, yy, yz, zz = inertia
-    if not positive_definite(xx, xy, xz, yy, yz, zz):
-        return "is negative or not positive definite"
-    # The triangle inequality, for any axes: the second moments of mass, half the trace minus the tensor, are
-    # not negative (P. Wensing et al., "Linear matrix inequalities for physically consistent inertial parameter
-    # identification", IEEE Robotics and Automation Letters 3, 2018).
-    half = (xx + yy + zz) * (0.5 + ROUNDING)
-    if not positive_definite(half - xx, -xy, -xz, half - yy, -yz, half - zz):
-        return f"has one moment above the sum of the other two (ixx={xx:g}, iyy={yy:g}, izz={zz:g})"
-    return ""
 
 
 def solid_moment(link: Link, mass: float) -> float:

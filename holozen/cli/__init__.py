@@ -82,10 +82,13 @@ SERVICE_VERBS = {"sim": dict.fromkeys(("pause", "play", "step", "reset"), "simul
 
 def main(argv: list[str] | None = None) -> int:
     """Run one verb; returns the exit code (0 good, 1 failed, 2 wrong usage). Without `argv` it ends the process."""
-    if sys.stdin is None:  # closed by the parent process
-        sys.stdin = open(os.devnull)  # noqa: SIM115 - kept as long as the process
+    for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
+        if getattr(sys, name) is None:  # closed by the parent process
+            setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115 - kept as long as the process
     if argv is not None:
         return _guarded(argv)
+    if sys.stdout.errors == "strict":  # names may have letters that the terminal's encoding lacks
+        sys.stdout.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
     ending = Ending()
     code: int | str | None
     try:

@@ -19,11 +19,18 @@ from holozen.transport.node import Node
 from holozen.transport.samples import RawSubscriber, Sample
 
 DEPTH = 1024  # messages that wait to be printed
+EXCLUSIVE = (
+    ("json", "csv"), ("json", "raw"), ("csv", "raw"), ("field", "raw"), ("full_length", "truncate_length"),
+)  # fmt: skip
+"""Flags of which one has no effect beside the other."""
 WAITING = 1.0  # s without a message until that is reported
 
 
 def echo(args: argparse.Namespace, bus: Node) -> int:
     """Print every message of a key, until interrupted."""
+    for one, other in EXCLUSIVE:
+        if getattr(args, one) and getattr(args, other):
+            args.error(f"give --{one} or --{other}, not both".replace("_", "-"))
     try:
         printer, reader = Printer(args), Reader(args.type_flag or args.type or "", args.package)
     except ValueError as error:
@@ -59,7 +66,7 @@ def _echo(args: argparse.Namespace, bus: Node, subscriber: RawSubscriber, printe
             except BusError:
                 why = f"{nothing} on {args.key} within {args.timeout:g} s"
                 raise Failure(f"{why}{_hint(args, bus, printer)}") from None
-            if not args.filter:
+            if not (args.filter or sample.is_deletion):
                 late.cancel()
             if reader.given and sample.key not in seen:
                 seen.add(sample.key)
@@ -116,6 +123,10 @@ class Printer:
 
     def show(self, sample: Sample, value: Any) -> bool:
         """Print a value; returns whether it was shown. Raises LookupError if the field is missing."""
+        if sample.is_deletion:  # it holds no message, so no filter passes it and it has no field
+            if not (self._passes or self._path):
+                self._write(sample, {"deleted": True} if self._args.json else "(deleted)")
+            return not (self._passes or self._path)
         self._count += 1
         self._undecoded += isinstance(value, Hex)
         if self._passes and not self._passes(value):

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
-from holozen.suggest import listed, suggest
+from holozen.suggest import closest, listed, suggest
 from holozen.transport.graph import Endpoint
 from holozen.transport.node import Node
 
@@ -35,7 +35,14 @@ def suggest_key(bus: Node, keys: Iterable[str], kinds: tuple[str, ...] = ("pub",
         return f"; {no_nodes(bus.where)}"
     live = {end.key for end in ends if end.kind in kinds and not is_any(end) and "*" not in end.key}
     lost = [key for key in keys if key not in live and "*" not in key]
-    return suggest(lost[0], sorted(live)) if lost else ""
+    return suggest(lost[0], sorted(_near(lost[0], live))) if lost else ""
+
+
+def _near(lost: str, live: Collection[str]) -> list[str]:
+    """The keys that may be meant by one that no node has: none of another robot than the one that it names."""
+    robot = lost.rpartition("/")[0]
+    own = [key for key in live if robot and key.startswith(f"{robot}/")]
+    return own or [key for key in live if not robot or "/" not in key or closest(robot, [key.rpartition("/")[0]])]
 
 
 def is_any(end: Endpoint) -> bool:

@@ -189,6 +189,7 @@ def _print_verbose(found: list[Topic]) -> None:
 
 def topic_type(args: argparse.Namespace, bus: Node) -> int:
     """Print a key's type. Raises Failure if no node states it."""
+    _check_one(args.key)
     found = topics(bus.endpoints())
     types = next((topic.types for topic in found if topic.key == args.key), [])
     met = None if types else foreign_sample(bus, args.key)
@@ -197,6 +198,11 @@ def topic_type(args: argparse.Namespace, bus: Node) -> int:
     if met and not types:
         raise Failure(f"{args.key!r} has no known type; its samples are {met[0].encoding}")
     return print_types(args, types, [topic.key for topic in found], bus.where)
+
+
+def _check_one(key: str) -> None:
+    if "*" in key:
+        raise Failure(f"{key!r}: name one key; `holozen topic list` lists them")
 
 
 def find_topics(args: argparse.Namespace, bus: Node) -> int:
@@ -214,6 +220,7 @@ ENOUGH = 200  # samples, after which `info -v` stops listening
 
 def topic_info(args: argparse.Namespace, bus: Node) -> int:
     """Print a key's type, publishers and subscribers."""
+    _check_one(args.key)
     endpoints = bus.endpoints()
     publishers = [_row(end) for end in on_key(endpoints, args.key, "pub")]
     subscriptions = [_row(end) for end in on_key(endpoints, args.key, "sub")]

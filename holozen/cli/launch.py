@@ -19,7 +19,7 @@ def run(args: argparse.Namespace) -> int:
     """Run a launch file, or list its arguments."""
     from holozen.ros import importer, packages, tracebacks
     from holozen.ros.launch.launch_description_sources import read
-    from holozen.ros.launch.stand_ins import replace_gazebo_packages
+    from holozen.ros.launch.stand_ins import gazebo_launch_file, replace_gazebo_packages
 
     given = dict(args.package)
     packages.use(given)
@@ -27,9 +27,11 @@ def run(args: argparse.Namespace) -> int:
     values = dict(word.split(":=", 1) for word in args.words if ":=" in word)
     try:
         path = _file([word for word in args.words if ":=" not in word], args.error)
-        packages.use(given, path.resolve().parent)
-        importer.install(packages.given, [path.resolve().parent])
-        description = read(path)
+        description = gazebo_launch_file(path)
+        places = [] if description else [path.resolve().parent]
+        packages.use(given, *places)
+        importer.install(packages.given, places)
+        description = description or read(path)
         return _show(description) if args.show_args else _follow(args, path.absolute(), description, values)
     except Failure:
         raise
@@ -82,6 +84,8 @@ def _file(words: list[str], refuse: Callable[[str], NoReturn]) -> Path:
         refuse(f"give FILE, or PACKAGE FILE, not {' '.join(words) or 'nothing'!r}")
     package, name = words
     folder = packages.find(package)
+    if folder == packages.stand_ins.get(package):
+        return folder / "launch" / name
     files = sorted(file for file in (folder / "launch").rglob("*") if file.is_file()) if folder.is_dir() else []
     found = next((file for file in files if file.name == name), None)
     if found is None:

@@ -26,6 +26,7 @@ from holozen.ros import parameter_yaml
 from holozen.ros.parameter_yaml import Value, written
 from holozen.suggest import suggest
 from holozen.transport.errors import BusError
+from holozen.transport.graph import UNREACHED
 
 if TYPE_CHECKING:
     from holozen.messages import rcl_interfaces as r
@@ -57,6 +58,8 @@ class Nodes:
         if len(found) > 1:
             raise BusError(f"{self.twins(name)}; a request would reach any of them: end all but one")
         if not found:
+            if hung := [end.source for end in self._bus.hidden() if end.key == f"{name}{LIST}"]:
+                raise BusError(UNREACHED.format(source=hung[0]))
             raise BusError(f"there is no node {name!r} with parameters{self._known(name)}")
         return name
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import json
+import math
 import queue
 import sys
 import threading
@@ -22,7 +23,7 @@ from holozen.cli.output import decode
 from holozen.console import Failure, report
 from holozen.limits import not_finite
 from holozen.messages import WIRES, CodecError, encoding_of
-from holozen.messages.definitions import Interface, InterfaceError, completed, prototype, with_mappings
+from holozen.messages.definitions import Interface, InterfaceError, completed, with_mappings
 from holozen.messages.registry import Registry
 from holozen.process import stop_event
 from holozen.suggest import suggest
@@ -35,6 +36,7 @@ CLOCK_PATIENCE = 0.2  # s to wait for the robot to ask for our clock
 LOOK = 0.1  # s between two checks for a line of standard input
 VERDICT = 0.3, 2.0  # s to wait for the sim's status, which comes at 10 Hz: where none was found, and where one was
 FRESH = 1.0  # s; an older status is ignored
+COVERED = 3  # statuses after a command, of which the last was sent after the command has been read
 FORCE = "; --force sends it all the same"
 
 
@@ -67,9 +69,9 @@ def _run(
             return 1
         if args.wait and matched < args.wait and not stop.is_set():
             raise Failure(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
-    stopping = form.stop()
-    feedback = CommandFeedback(bus, args.key) if stopping else None
-    if feedback and matched and payload != stopping:
+    status_key = form.status_key
+    feedback = CommandFeedback(bus, status_key, form.is_velocity) if status_key else None
+    if feedback and matched and payload not in form.stops:
         bus.clock_asked.wait(CLOCK_PATIENCE)  # only a stop is obeyed before the robot knows our clock
     turns = _lines(form, args, stop) if args.stdin else _turns(form, payload, args, stop)
     sent = 0
@@ -80,13 +82,13 @@ def _run(
             if feedback:
                 feedback.look()
         if feedback and (args.once or args.times) and matched:
-            feedback.wait(stop, VERDICT[bool(on_key(looking(), f"{args.key}_status", "pub"))])
+            feedback.wait(stop, VERDICT[bool(on_key(looking(), status_key, "pub"))])
     finally:
-        if stopping and not args.once:
-            _stop_robot(publisher, stopping)
+        if form.stops and not args.once:
+            _stop_robot(publisher, form.stops)
     if args.json:
         print(json.dumps({"key": args.key, "type": form.kind.name, "subscribers": matched, "published": sent}))
-    return int(bool(feedback and feedback.refusal and (args.once or args.times) and payload != stopping))
+    return int(bool(feedback and feedback.refusal and (args.once or args.times) and payload not in form.stops))
 
 
 def _form(args: argparse.Namespace) -> Form | None:
@@ -202,16 +204,18 @@ def _lines(form: Form, args: argparse.Namespace, stop: threading.Event) -> Itera
             stop.wait(1 / args.rate)
 
 
-def _stop_robot(publisher: RawPublisher, payload: bytes) -> None:
-    """Send several stops, because a congested link may drop some."""
+def _stop_robot(publisher: RawPublisher, stops: set[bytes]) -> None:
+    """Send each of the `stops` several times, because a congested link may drop some."""
     for _ in range(STOPS):
-        publisher.put_bytes(payload)
+        for payload in stops:
+            publisher.put_bytes(payload)
         time.sleep(STOP_EVERY)
 
 
 LIMITED = "over the limits"  # prefix of the sim's reason when it drives slower than commanded
 OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 DRIVES = " drives"
+PAUSED = "; the sim is paused; `holozen sim play` continues it"
 LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
 HELD = "held, since a higher source took over; `holozen service call resume` lets it drive again"
 
@@ -235,6 +239,16 @@ def verdict(status: Any, source: str) -> str | None:
     return own_refusal or None
 
 
+def verdict_on_part(status: Any, before: Any, source: str) -> str | None:
+    """As `verdict`, of commands to joints or forces, whose sources a status names only where they drive or are refused.
+    `before` is the status before it: a command that is accepted after a refusal is known by the counts.
+    """
+    why = verdict(status, source)
+    if not why or status.stopped or status.refused != before.refused:
+        return why
+    return "" if status.accepted > before.accepted and not status.obeyed and not status.sources else None
+
+
 def _status(kind: Interface, sample: Sample) -> Any:
     """A CommandStatus, defined by `kind`, as an object; a newer sim may send more fields. Raises CodecError."""
     if sample.encoding.startswith(WIRES["cdr"]):
@@ -248,38 +262,61 @@ def _status(kind: Interface, sample: Sample) -> Any:
 
 
 class CommandFeedback:
-    """Reports when the robot on a command key starts or stops obeying."""
+    """Reports when the robot with the command status on `key` starts or stops obeying. If the commands are no
+    velocities (`is_velocity`) but move joints or are forces, they are judged by `verdict_on_part`.
+    """
 
-    def __init__(self, bus: Bus, key: str) -> None:
-        self._bus, self._reported = bus, ""
+    def __init__(self, bus: Bus, key: str, is_velocity: bool = True) -> None:
+        self._bus, self._key, self._is_velocity, self._reported = bus, key, is_velocity, ""
+        self._judged: Any = None  # the last status, and the one before
+        self._before: Any = None
         self.refusal = ""
         """Why the robot does not obey, by the latest look; empty if it does, or is not known to."""
         read = partial(_status, Registry().find("holozen/msg/CommandStatus"))
-        self._latest: Latest[Any] = Latest(Subscription(bus.subscribe_raw(f"{key}_status", depth=1), read))
+        self._latest: Latest[Any] = Latest(Subscription(bus.subscribe_raw(key, depth=1), read))
 
     def look(self) -> bool:
         """Report any change; returns whether the sim has judged our commands yet."""
         status, age = self._latest.read()
-        why = verdict(status, self._bus.source) if status and age < FRESH else None
+        why = self._verdict(status) if status and age < FRESH else None
         if why is None:
             return False
         if why != self._reported:
             driver = status.obeyed if status and why.endswith(DRIVES) else ""
-            refused = f"not obeyed: {why}{LEFT if self._has_left(driver) else ''}"
-            report(why if why.startswith(LIMITED) else refused if why else "obeyed again")
+            if why and not why.startswith(LIMITED):
+                report(f"not obeyed: {why}{PAUSED if self._is_paused() else LEFT if self._has_left(driver) else ''}")
+            else:
+                report(why or "obeyed again")
         self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
         return True
+
+    def _verdict(self, status: Any) -> str | None:
+        if self._is_velocity:
+            return verdict(status, self._bus.source)
+        if status is not self._judged:
+            self._before, self._judged = self._judged or SimpleNamespace(refused=None, accepted=math.inf), status
+        return verdict_on_part(status, self._before, self._bus.source)
 
     def _has_left(self, driver: str) -> bool:
         """Whether a source is none of the nodes that are there; one without a node may be anyone's."""
         return "@" in driver and driver not in {end.source for end in self._bus.endpoints()}
 
+    def _is_paused(self) -> bool:
+        """Whether the robot's sim is paused."""
+        from holozen import entities
+
+        ends = self._bus.endpoints()
+        sims = {end.session for end in on_key(ends, self._key, "pub")}
+        return entities.is_paused(self._bus, [end for end in ends if end.session in sims])
+
     def wait(self, stop: threading.Event, seconds: float) -> None:
         """Wait until the sim has judged our commands; report if it has not after so many `seconds`."""
-        deadline = time.monotonic() + seconds
+        deadline, received = time.monotonic() + seconds, self._latest.count
         while not self.look() and not stop.wait(0.002):
+            if not self._is_velocity and self._latest.count >= received + COVERED:
+                return  # it says nothing of what it accepts
             if time.monotonic() > deadline:
-                if self._latest.read()[1] < FRESH:
+                if self._latest.read()[1] < FRESH and self._is_velocity:
                     self.refusal = "the sim has not received it; does anything flood it?"
                     report(f"not obeyed: {self.refusal}")
                 return
@@ -298,12 +335,27 @@ class Form:
         self.kind, self._wire, self._force = self._kinds[0], args.wire, args.force
         # A package that is given has its own types, whatever their names are here.
         ours = not any(name.startswith(f"{package}/") for package, _ in args.package for name in type_names)
-        self._is_command = ours and wire.is_command(args.key, type_names)
+        self._key, self._is_command = args.key, ours and wire.is_command(args.key, type_names)
+        self.stops: set[bytes] = set()
+        """The bytes that stop what its payloads move."""
 
     @property
     def encoding(self) -> str:
         """The Encoding of its bytes."""
         return encoding_of(self._wire, self.kind.name)
+
+    @property
+    def is_velocity(self) -> bool:
+        """Whether it commands a velocity."""
+        return self._is_command and self.kind.name in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
+
+    @property
+    def status_key(self) -> str:
+        """The key of the status of its commands: for joints and forces that of the robot's cmd_vel; empty for goals."""
+        if self.is_velocity:
+            return f"{self._key}_status"
+        moves = self._is_command and self.kind.name in ("sensor_msgs/msg/JointState", "geometry_msgs/msg/Wrench")
+        return wire.key_for("cmd_vel_status", self._key.rpartition("/")[0]) if moves else ""
 
     def payload(self, text: str) -> bytes:
         """The bytes of a written value. Raises ValueError with the reason."""
@@ -311,14 +363,13 @@ class Form:
         bad = not_finite(value)
         if bad and not self._force:
             raise ValueError(f"{bad} is not a finite number{FORCE}")
-        if self._is_command and not self._force and (bad := wire.implausible(_object(value), self.kind.name)):
-            raise ValueError(f"{bad}{FORCE}")
+        if self._is_command:
+            command = _object(value)
+            if not self._force and (bad := wire.implausible(command, self.kind.name)):
+                raise ValueError(f"{bad}{FORCE}")
+            if (fields := wire.stop(command, self.kind.name)) is not None:
+                self.stops.add(written(self.kind, completed(self.kind, fields), self._wire))
         return written(self.kind, value, self._wire)
-
-    def stop(self) -> bytes | None:
-        """The bytes that stop a robot; None if this is no command."""
-        moves = self._is_command and self.kind.name in ("geometry_msgs/msg/Twist", "geometry_msgs/msg/TwistStamped")
-        return written(self.kind, prototype(self.kind), self._wire) if moves else None
 
     def _message(self, value: Any) -> dict[str, Any]:
         """All fields of the first type that fits; the error is that of the type with most of the names."""

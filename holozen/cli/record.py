@@ -28,7 +28,7 @@ REPORT_EVERY = {True: 0.5, False: 5.0}  # s between two lines, in a terminal and
 def run(args: argparse.Namespace) -> int:
     """Record until Ctrl-C, or until --max-duration has passed."""
     if bool(args.keys) == args.all:
-        args.error("name the keys to record, or use -a for all")
+        args.error("give keys or -a, not both" if args.all else "name the keys to record, or use -a for all")
     from holozen.bag.writer import BagWriter, RosBagWriter
 
     name = args.output or time.strftime("holozen_%Y_%m_%d-%H_%M_%S")
@@ -190,6 +190,7 @@ class Progress:
             "left_out": sum(left.messages for left in self._recorder.left_out.values()),
             "lost": self._intake.lost,
             "overran": self._intake.overran,
+            "deletions": self._intake.deletions,
         }
 
     def _line(self) -> str:
@@ -197,6 +198,7 @@ class Progress:
         text = f"{figures['seconds']} s, {figures['messages']} messages, {self._writer.size / 1e6:.2f} MB"
         text += f", {figures['dropped']} dropped" if figures["dropped"] else ", none dropped"
         text += f", {figures['lost']} lost on the way" if figures["lost"] else ""
+        text += f", {figures['deletions']} deletions left out" if figures["deletions"] else ""
         return text + (f", queue overrun {figures['overran']} times" if figures["overran"] else "")
 
 

@@ -30,6 +30,9 @@ def run(args: argparse.Namespace) -> int:
     from holozen.bag.player import Outlet, Player, keys, plan
     from holozen.bag.reader import Bag, summarize
 
+    olds = [old for old, _ in args.remap]
+    if twice := next((old for old in olds if olds.count(old) > 1), ""):
+        args.error(f"--remap: {twice!r} is given twice; it is played on one key")
     stop, summaries = stop_event(), []
     for file in args.files:
         with Bag(file) as bag:
@@ -91,7 +94,7 @@ def _play(
     else:
         print(printable(f"played {player.count} messages in {seconds:.1f} s"))
     if ended and not player.count:
-        raise Failure("no message is between --start-offset and --until")
+        raise Failure("nothing was played" if outlet.left_out else "no message is between --start-offset and --until")
     return 0
 
 

@@ -82,7 +82,14 @@ def _script(target: str, words: list[str], given: dict[str, Path]) -> "tuple[Scr
         return script, words
     packages.use(given)
     name = "" if words[:1] and words[0].startswith("-") else "".join(words[:1])
-    script = executables.find(target, name)
+    try:
+        script = executables.find(target, name)
+    except executables.PackageNotFound:
+        from holozen.ros.launch import stand_ins
+
+        if advice := stand_ins.advice(target, name, words[1:]):
+            raise Failure(f"{' '.join(filter(None, (target, name)))} is not run here: {advice}") from None
+        raise
     packages.use(given, script.root)
     return script, words[1:]
 

@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     if args.count and (args.replace or args.namespace):
         args.error("--count gives names of its own: leave out --replace and --namespace")
     place = Place(args.x, args.y, args.z, args.R, args.P, args.Y)
-    candidate = read(file, args.name, values, dict(args.package), args.drive or "", args.strict, args.allow_env)
+    candidate = read(file, args.name or "", values, dict(args.package), args.drive or "", args.strict, args.allow_env)
     candidate = replace(candidate, namespace=args.namespace)
     with Bus("spawn", connection.from_arguments(args), patience=args.timeout or None) as bus:
         if args.count:
@@ -155,7 +155,7 @@ def _put_fleet(bus: Bus, candidate: Candidate, place: Place, args: argparse.Name
     if crowded:
         raise ServiceError(
             f"{len(fleet)} of {args.count} were spawned, without {listed(crowded)}: {crowded[min(crowded)]}; "
-            f"-x and -y choose the first place, and --grid more than {args.grid:g} m between two"
+            f"-x, -y and -z choose the first place, and --grid more than {args.grid:g} m between two"
         )
     if args.json:
         print(*(one.as_json() for one in fleet), sep="\n")
@@ -221,10 +221,13 @@ def put(
         name, warnings = entities.spawn(bus, candidate.name, candidate.text, pose, candidate.namespace)
     except ServiceError as error:
         # The sim checks a robot before its name, so the old one is deleted only for a valid one.
+        if entities.is_taken(error) and not exists and candidate.namespace:
+            raise ServiceError(f"{error}; --namespace NAME (-robot_namespace NAME) gives one") from None
         if entities.is_taken(error) and not replace:
-            raise ServiceError(f"{error}; --replace takes its place, --name gives another") from None
+            own = "--replace takes its place, " if exists else ""
+            raise ServiceError(f"{error}; {own}--name gives another") from None
         if entities.has_no_room(error):
-            raise ServiceError(f"{error}; -x and -y choose the place") from None
+            raise ServiceError(f"{error}; -x, -y and -z choose the place") from None
         if not old or not entities.is_taken(error):
             raise
         entities.delete(bus, candidate.name)
@@ -251,7 +254,9 @@ def _words(args: argparse.Namespace) -> tuple[Path, dict[str, str]]:
     if len(files) > 1 and (meant := flags.assigned(files)):
         args.error(f"{meant.replace(':=', '=', 1)!r}: write {meant}")
     if len(files) != 1:
-        args.error(f"give one FILE, not {len(files)}" + (f": {' '.join(files)}" if files else ""))
+        args.error(
+            f"give one FILE, not {len(files)}: {' '.join(files)}" if files else "give the FILE of a robot or object"
+        )
     return Path(files[0]), values
 
 
@@ -301,11 +306,18 @@ def _spawned(name: str, candidate: Candidate, pose: "Pose") -> Spawned:
     return Spawned(name, "", pose, hint)
 
 
+def _name(text: str) -> str:
+    """Parses the name of a new robot."""
+    if not text:
+        raise flags.refused("'': a name has one character or more; leave the flag out to take the file's")
+    return flags.robot(text)
+
+
 def _arguments(parser: argparse.ArgumentParser) -> None:
     add = parser.add_argument
     add("words", nargs="*", metavar="FILE [name:=value]", help="the file, and values of its xacro:arg")
     add("-file", "--file", metavar="FILE", help="the file, as for spawn_model")
-    add("--name", "-model", "-entity", type=flags.robot, default="", help="default: as in the file")
+    add("--name", "-model", "-entity", type=_name, help="default: as in the file")
     for flag in "xyz":
         add(f"-{flag}", type=flags.number(-FAR, FAR, "m"), metavar="m", help=PLACES[flag])
     for flag in "RPY":

@@ -11,6 +11,7 @@ from holozen.console import Failure, printable, report
 from holozen.flags import number
 from holozen.transport import connection
 from holozen.transport.errors import TIMEOUT, BusError
+from holozen.transport.graph import UNREACHED
 from holozen.transport.samples import Sample
 from holozen.transport.services import Attempts, refusal
 
@@ -91,6 +92,11 @@ class Order:
                 self._attempts.were_asked(refused)
 
 
+def _can_be_asked(name: str) -> bool:
+    """Whether a name makes a key of one robot."""
+    return not name or all(part and not set(part) & set("*$?#") for part in name.split("/"))
+
+
 def _read(payload: bytes, encoding: str) -> tuple[bool, str]:
     """Success and message of a reply. JSON is read without the codec, which takes time to load."""
     if encoding.startswith("application/json"):
@@ -114,10 +120,9 @@ class Orders:
     def __init__(self, bus: Bus, verb: str, args: argparse.Namespace, began: float) -> None:
         self._bus, self._verb, self._args, self._began = bus, verb, args, began
         self._graph = bus.graph(TOKENS.format(verb=verb))
-        self._wanted = {name.removeprefix("/") for name in args.robots}
+        self._wanted = {name.strip("/") for name in args.robots}
         # Those that are named, or else the robot at the root, are asked before they are discovered.
-        names = {name for name in self._wanted or {""} if not set(name) & set("*$?#")}
-        self._orders = {name: Order(name, verb, began) for name in names}
+        self._orders = {name: Order(name, verb, began) for name in filter(_can_be_asked, self._wanted or {""})}
         self.found: set[str] = set()  # names of robots
         self._status: Latest[CommandStatus] | None = None  # of the robot at the root
         self._root = ""  # the name of the robot at the root, once it is known
@@ -145,7 +150,7 @@ class Orders:
         late = [order for order in self._orders.values() if order.discovered and not order.confirmed]
         for order in late + [order for order in self._orders.values() if order.confirmed and not order.printed]:
             self._print(order)
-        missing = sorted(self._wanted - self.found)
+        missing = sorted(self._missing)
         if missing and self.found:
             found = ", ".join(map(self._named, sorted(self.found)))
             report(f"holozen {self._verb}: there is no robot {', '.join(map(repr, missing))}; there are: {found}")
@@ -164,14 +169,17 @@ class Orders:
             return False
         for end in (silent := [end for end in self._bus.hidden() if self._is_wanted(end.key)]):
             order = Order(end.key.removesuffix("stop").removesuffix("/"), self._verb, self._began)
-            order.message = f"{end.source} does not answer: it hangs or is stopped, or cannot be reached from here"
+            order.message = UNREACHED.format(source=end.source)
             self._print(order)
         return bool(silent)
 
     def _is_wanted(self, stop: str) -> bool:
         """Whether a service, if it is one that stops a robot, is that of a robot to reach."""
         robot, _, verb = stop.rpartition("/")
-        return verb == "stop" and (not self._wanted or robot in self._wanted)
+        return verb == "stop" and self._is_meant(robot)
+
+    def _is_meant(self, robot: str) -> bool:
+        return not self._wanted or robot in self._wanted or robot in self._orders
 
     def _find(self) -> None:
         for order in self._orders.values():
@@ -179,7 +187,7 @@ class Orders:
         for endpoint in self._graph.endpoints():
             robot = endpoint.key.removesuffix(self._verb).removesuffix("/")
             self.found.add(robot)
-            if not self._wanted or robot in self._wanted:
+            if self._is_meant(robot):
                 order = self._orders.setdefault(robot, Order(robot, self._verb, self._began))
                 order.discovered = True
                 order.servers.add(endpoint.session)
@@ -192,9 +200,14 @@ class Orders:
             self._status = self._bus.latest("cmd_vel_status", CommandStatus)
         if not self._root and (status := self._status.read()[0]):
             self._root = status.name
-            if self._root in self._wanted - self.found:
-                self._wanted = self._wanted - {self._root} | {""}
-                self._orders[""] = Order("", self._verb, self._began)
+            if self._root in self._wanted:  # of another robot it may be the name too: then both are meant
+                self._orders.setdefault("", Order("", self._verb, self._began))
+                self._find()
+
+    @property
+    def _missing(self) -> set[str]:
+        """The names that no robot has."""
+        return self._wanted - self.found - ({self._root} if "" in self.found else set())
 
     def _known(self) -> tuple[int, int]:
         """The number of robots discovered, and of servers that the orders go to."""
@@ -205,7 +218,8 @@ class Orders:
             return False
         if not self.found:  # among thousands of tokens, those of robots may come late
             return False
-        if self._wanted - self.found:
+        unnamed = self._wanted and "" in self.found and not self._root
+        if self._missing or unnamed:
             return since > max(NOTICE, self._bus.took) and quiet > QUIET
         return quiet > max(QUIET, self._bus.took)
 
@@ -217,7 +231,9 @@ class Orders:
         if confirmed:
             if message == NOT_STOPPED:
                 return print(printable(f"{name} was not stopped"), flush=True)
-            more = f": {message}" if self._verb == "release" and message else ""
+            if self._verb == "stop":
+                message = message.partition("; ")[2]  # what follows who stopped it
+            more = f": {message}" if message else ""
             return print(printable(f"{name} {DONE[self._verb]}{more}"), flush=True)
         if order.outdated:
             return report(f"{name} is not released: {message}")

@@ -6,6 +6,7 @@ import argparse
 
 from holozen.background import background
 from holozen.cli.verb import (
+    DURABILITIES,
     Noun,
     Verb,
     add_count,
@@ -78,9 +79,9 @@ def _echo_arguments(parser: argparse.ArgumentParser) -> None:
     text = "show at most N values of a list and characters of a text (default: 128 values of a list)"
     add("-l", "--truncate-length", type=count(1), default=0, metavar="N", help=text)
     add("-f", "--full-length", action="store_true", help="lists in full")
-    add("--qos-durability", choices=("system_default", "transient_local", "volatile", "unknown", "best_available"),
-        default="system_default", metavar="NAME", help="transient_local: begin with the last message of each publisher,"
-        " on any key; volatile: on none (default: on tf_static, robot_description and map)")  # fmt: skip
+    add("--qos-durability", choices=DURABILITIES, default="system_default", metavar="NAME",
+        help="transient_local: begin with the last message of each publisher, on any key; volatile: on none"
+        " (default: on tf_static, robot_description and map)")  # fmt: skip
 
 
 def _pub_arguments(parser: argparse.ArgumentParser) -> None:

@@ -6,6 +6,7 @@ import json
 import re
 import sys
 import time
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from holozen.limits import not_finite
@@ -15,6 +16,8 @@ if TYPE_CHECKING:
     from holozen.messages.definitions import Interface
 
 LARGEST = 1_000_000  # bytes of a value
+ODD_NUMBER = re.compile(r".*[:_]|[-+]?0\d")
+"""1:30, 1_0 and 010: YAML 1.1 reads them as 90, 10 and 8, and who wrote them may not know that."""
 EXPONENT = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)[eE][-+]?\d+$")
 
 
@@ -51,9 +54,21 @@ def is_time_dependent(text: str) -> bool:
 
 def _read(text: str) -> Any:
     try:
-        return json.loads(text)
+        return json.loads(text, object_pairs_hook=_unique)
     except ValueError as error:
         return _yaml(text, error)
+
+
+def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """A JSON object. Raises ValueError if it has a name twice: which value was meant is unknown."""
+    if (double := _double([name for name, _ in pairs])) is not None:
+        raise ValueError(f"{cut(double)} is given twice")
+    return dict(pairs)
+
+
+def _double(names: list[str]) -> str | None:
+    """The first name that is there twice."""
+    return next((name for name, times in Counter(names).items() if times > 1), None)
 
 
 def _timed(value: Any) -> Any:
@@ -78,8 +93,24 @@ def _yaml(text: str, why_no_json: ValueError) -> Any:
         raise ValueError(f"{cut(text)} is not valid JSON: {why_no_json}; to write YAML: pip install pyyaml") from None
 
     class Loader(yaml.SafeLoader):
-        """Reads 1e-3 as a number, as YAML 1.2 and JSON do; YAML 1.1 requires a decimal point."""
+        """Reads numbers as YAML 1.2 and JSON do: 1e-3 is one, without a decimal point. Refuses a name that is given
+        twice.
+        """
 
+        def construct_mapping(self, node: Any, deep: bool = False) -> Any:
+            double = _double([name.value for name, _ in node.value if isinstance(name.value, str)])
+            if double is not None:
+                raise yaml.constructor.ConstructorError(None, None, f"{cut(double)} is given twice", node.start_mark)
+            return super().construct_mapping(node, deep)
+
+    def number(loader: Loader, node: Any) -> Any:
+        if ODD_NUMBER.match(node.value):
+            return node.value
+        read = loader.construct_yaml_int if node.tag.endswith(":int") else loader.construct_yaml_float
+        return read(node)
+
+    for kind in ("int", "float"):
+        Loader.add_constructor(f"tag:yaml.org,2002:{kind}", number)
     Loader.add_implicit_resolver("tag:yaml.org,2002:float", EXPONENT, list("-+.0123456789"))
     try:
         return yaml.load(text, Loader)

@@ -9,7 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from holozen.flags import Parser, key
+from holozen.flags import Parser, count, key, number
 from holozen.process import deferred_interrupt
 from holozen.suggest import suggest
 from holozen.transport import connection
@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 JSON = "print the output as JSON, one object per line"
 ROS2_TITLE = "accepted for compatibility with ros2"
 
-# Flags of ros2 without effect here, accepted so that its command lines work unchanged.
+# Flags of ros2 without effect here, accepted so that its command lines work unchanged. Their values are checked: a
+# misspelt one would seem to have been understood.
 _EVERY = ("--spin-time S", "--no-daemon")
 _QOS = (
     "--qos-profile NAME", "--qos-depth N", "--qos-history NAME", "--qos-reliability NAME", "--qos-durability NAME",
@@ -39,6 +40,17 @@ _ROS2 = {
     "node list": ("-a", "--all"), "node info": ("--include-hidden",), "param list": (_NODES,), "param get": (_NODES,),
     "param set": (_NODES,), "param describe": (_NODES,), "param dump": (_NODES,), "param load": (_NODES,),
 }  # fmt: skip
+
+DURABILITIES = ("system_default", "transient_local", "volatile", "unknown", "best_available")
+_POLICIES = {
+    "profile": ("unknown", "default", "system_default", "sensor_data", "services_default", "parameters",
+                "parameter_events", "action_status_default", "best_available"),
+    "history": ("system_default", "keep_last", "keep_all", "unknown"),
+    "reliability": ("system_default", "reliable", "best_effort", "unknown", "best_available"),
+    "durability": DURABILITIES,
+    "liveliness": ("system_default", "automatic", "manual_by_topic", "unknown", "best_available"),
+}  # fmt: skip
+_VALUES: dict[str, Callable[[str], object]] = {"S": number(0, 1e9, "s"), "N": count()}
 
 _TYPE = re.compile(r"\w+/((msg|srv|action)/)?\w+")
 
@@ -169,6 +181,8 @@ def type_and_value(args: argparse.Namespace, kind: str, what: str) -> tuple[str,
     """
     words = list(args.words)
     given = words.pop(0) if words and _TYPE.fullmatch(words[0]) else ""
+    if len(words) == 2 and words[0].isidentifier():
+        args.error(f"{args.key}: {words[0]!r} has no package; write a type as geometry_msgs/msg/Twist")
     if len(words) > 1:
         args.error(f"{args.key}: {words[-1]!r} is too much; write KEY [TYPE] {what}")
     full = given.replace("/", f"/{kind}/") if given.count("/") == 1 else given
@@ -207,7 +221,8 @@ def _add_ros2_flags(parser: argparse.ArgumentParser, name: str) -> None:
     for flag in (*_EVERY, *_ROS2.get(name, ())):
         option, _, value = flag.partition(" ")
         if value:
-            group.add_argument(option, metavar=value)
+            choices = _POLICIES.get(option.removeprefix("--qos-"))
+            group.add_argument(option, metavar=value, type=_VALUES.get(value, str), choices=choices)
         else:
             group.add_argument(option, action="store_true")
 

@@ -58,7 +58,7 @@ def write(out: Path, text: str) -> None:
 
 
 def _print(text: str) -> None:
-    if sys.stdout is None:
+    if sys.__stdout__ is None:
         raise RobotError("there is no standard output; write to a file with -o OUT")
     try:
         sys.stdout.buffer.write(_encoded(text))

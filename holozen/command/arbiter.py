@@ -4,7 +4,7 @@ No clock, no socket.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -17,11 +17,12 @@ from holozen.wire import COMMAND_SILENCE
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # no source ranks above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here down, a source waits for `resume` once a higher one has driven
 MAX_HELD = 100  # held names of each rank, which come over the wire; beyond, all of the rank but its driver is held
+MAX_PARTS = 100  # sources whose moving topics or joints are known
 MAX_PER_RANK = 100  # recorded names of each rank, which come over the wire; those beyond share one record
 NEVER = 1e9  # s
 ROUNDING = 1e-6  # s of tolerance: which step ends a silence must not depend on rounding errors of the clock
 STOPPED = "stopped: by {by}; `holozen release` lets it drive again"
-LET_GO = "let go first: it commanded while the robot was stopped; send a stop{or_wait}"
+LET_GO = "let go first: it commanded while another drove or the robot was stopped; send a stop{or_wait}"
 LATE = "late: it waited up to {age:.1f} s for the sim"
 OVERRULED = "overruled: {driver} drives"
 HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
@@ -115,17 +116,30 @@ class SoftwareStop:
             self._released = now
         self.setter = ""
 
-    def refusal(self, source: str, rank: int, stops: bool, now: float, sent: Sent | None = None) -> str:
-        """Why a command is refused at `now`, or ""; `stops`: it is a stop. Without `sent`, it was sent now."""
+    def refusal(
+        self, source: str, rank: int, stops: bool, now: float, sent: Sent | None = None, lets_go: bool = True
+    ) -> str:
+        """Why a command is refused at `now`, or ""; `stops`: it is a stop, by which its source `lets_go`. Without
+        `sent`, it was sent now.
+        """
         waits = self.must_let_go(source, rank, sent or Sent(now, now))
         if self.setter or waits:
-            self._note(source, rank, -math.inf if stops else now)
+            self._note(source, rank, -math.inf if stops and lets_go else now)
         elif source in self._last_moves.get(rank, {}):
             self._note(source, rank, -math.inf)
         if self.setter:
             return STOPPED.format(by=self.setter)
         or_wait = f" or be silent for {self._silence:g} s" if self._silence < NEVER else ""
         return LET_GO.format(or_wait=or_wait) if waits and not stops else ""
+
+    def overrule(self, source: str, rank: int, now: float) -> None:
+        """Let a source let go before it drives, as if it had commanded during a stop. Of too many, the one that has let
+        go, or was silent for the longest time, is forgotten: those without a record are free.
+        """
+        sources = self._last_moves.setdefault(rank, {})
+        if source not in sources and len(sources) >= MAX_PER_RANK:
+            del sources[min(sources, key=lambda each: sources[each])]
+        sources[source] = now
 
     def must_let_go(self, source: str, rank: int, sent: Sent) -> bool:
         """Whether a source still has to let go before it may drive, by a command that was `sent` then."""
@@ -136,17 +150,25 @@ class SoftwareStop:
         stopped = max(self._stopped, self._others.get(rank, -math.inf))
         return sent.latest < self._released or sent.latest - stopped <= COMMAND_SILENCE + ROUNDING
 
+    def settle(self, now: float) -> None:
+        """Nothing listens from `now` on: sources that have let go until then have, whatever they send after it."""
+        if not self.setter:
+            for rank, sources in self._last_moves.items():
+                for source in sources:
+                    if not self.must_let_go(source, rank, Sent(now, now)):
+                        sources[source] = -math.inf
+
     def inherit(self, other: "SoftwareStop", now: float) -> None:
-        """Take over the state of another one at `now`. If that is set, whoever has not sent a stop may have commanded
-        until now: nothing listened.
+        """Take over the state of another one at `now`. Whoever has not let go may have commanded until now, since
+        nothing listened; if that one is set, so may any source that has not sent a stop.
         """
         self.setter, self._stopped, self._released = other.setter, other._stopped, other._released
         self._others = dict(other._others)
         self._last_moves = deepcopy(other._last_moves)
+        for sources in self._last_moves.values():
+            sources.update({source: now for source, time in sources.items() if time > -math.inf})
         if self.setter:
             self._stopped = now
-            for sources in self._last_moves.values():
-                sources.update({source: now for source, time in sources.items() if time > -math.inf})
 
     def _note(self, source: str, rank: int, when: float) -> None:
         sources = self._last_moves.setdefault(rank, {})
@@ -154,6 +176,41 @@ class SoftwareStop:
             sources[source] = when
         else:
             self._others[rank] = max(self._others.get(rank, -math.inf), when)
+
+
+class Parts:
+    """The topics or joints that each source has set moving in the last 0.5 s, and not stopped since.
+
+    A source may command them one by one: then a zero for one is no stop while it moves another. Names come over the
+    wire, so of too many sources the one that has been silent for the longest time is forgotten.
+    """
+
+    def __init__(self) -> None:
+        self._moving: dict[tuple[str, int], dict[str, float]] = {}
+
+    def record(self, source: str, rank: int, parts: Iterable[tuple[str, bool]], time: float) -> bool:
+        """Record which `parts` a command moves, and which it stops, at `time` (s). Returns whether its source still
+        moves any.
+        """
+        mine = {name: at for name, at in self._moving.pop((source, rank), {}).items() if time - at <= COMMAND_SILENCE}
+        for name, moves in parts:
+            mine.pop(name, None)
+            if moves:
+                mine[name] = time
+        if mine:
+            self._moving[source, rank] = mine
+            if len(self._moving) > MAX_PARTS:
+                del self._moving[next(iter(self._moving))]
+        return bool(mine)
+
+    def settle(self, time: float) -> None:
+        """Forget what no source has moved for 0.5 s by `time` (s)."""
+        for source, parts in self._moving.items():
+            self._moving[source] = {name: at for name, at in parts.items() if time - at <= COMMAND_SILENCE}
+
+    def inherit(self, other: "Parts", time: float) -> None:
+        """Take over those of a robot that is replaced at `time` (s): nothing listened until then."""
+        self._moving = {source: dict.fromkeys(parts, time) for source, parts in other._moving.items()}
 
 
 @dataclass(slots=True)
@@ -193,14 +250,16 @@ class Arbiter:
 
     Among equals the current driver keeps driving, but each of them may stop the robot. A source that a higher one
     overruled, or that another one stopped, is held: it moves the robot again only after `resume`. So is every autopilot
-    once a source above it has driven. A source is a name with a rank, since senders choose their names freely. A source
-    stops driving after `timeout` seconds of silence; below zero, it drives until another one commands. The
-    `software_stop` overrides them all. Silence is measured on the clock `time`; all methods take real times in s.
+    once a source above it has driven. A person whom another one overruled has to let go before driving: a key that is
+    held, or was latched, moves nothing once the robot is free. A source is a name with a rank, since senders choose
+    their names freely. A source stops driving after `timeout` seconds of silence; below zero, it drives until another
+    one commands. The `software_stop` overrides them all. Silence is measured on the clock `time`; all methods take real
+    times in s.
     """
 
     def __init__(self, timeout: float, time: CommandTime | None = None) -> None:
         self.time = time or CommandTime()
-        self.timeout, self.software_stop = timeout, SoftwareStop(timeout)
+        self.timeout, self.software_stop, self.parts = timeout, SoftwareStop(timeout), Parts()
         self.resumed = 0  # how often `resume` succeeded
         self.stopped_at = -math.inf  # s; the last time that the software stop was set, or set again
         self.taken_at = -math.inf  # s; the last time that a source did what makes others wait for `resume`
@@ -210,11 +269,15 @@ class Arbiter:
         self._held: dict[int, Held] = {}  # by rank
         self._highest = AUTOPILOT + 1  # the highest rank that has driven since the last resume
 
-    def offer(self, source: str, rank: int, motion: Motion, now: float, sent: Sent | None = None) -> str:
-        """Take a command at `now`; without `sent`, it was sent now. Returns why it is refused, or ""."""
+    def offer(
+        self, source: str, rank: int, motion: Motion, now: float, sent: Sent | None = None, lets_go: bool = True
+    ) -> str:
+        """Take a command at `now`; without `sent`, it was sent now. Returns why it is refused, or "". `lets_go`: by a
+        stop its source lets go of the robot.
+        """
         age, here, rank = now - sent.earliest if sent else 0.0, self._here(now, sent), max(rank, PERSON)
         time = self.time.at(now)
-        if reason := self.software_stop.refusal(source, rank, is_stop(motion), time, here):
+        if reason := self.software_stop.refusal(source, rank, is_stop(motion), time, here, lets_go):
             return reason
         if age > COMMAND_SILENCE and not is_stop(motion):
             return LATE.format(age=age)
@@ -222,8 +285,11 @@ class Arbiter:
 
     def note_refused(self, source: str, rank: int, now: float, sent: Sent | None = None) -> None:
         """Record a command that was refused earlier: its source has not let go of a stopped robot."""
-        rank = max(rank, PERSON)
-        self.software_stop.refusal(source, rank, False, self.time.at(now), self._here(now, sent))
+        rank, time = max(rank, PERSON), self.time.at(now)
+        self.software_stop.refusal(source, rank, False, time, self._here(now, sent))
+        driver = self._driver_at(time)
+        if driver and rank == driver.rank == PERSON and driver.source != source and not is_stop(driver.motion):
+            self.software_stop.overrule(source, rank, time)
 
     def _here(self, now: float, sent: Sent | None) -> Sent:
         """When a command was sent, on our clock; while the sim is paused, it does not age, and nor does a silence."""
@@ -240,11 +306,17 @@ class Arbiter:
         if other and rank >= other.rank and not stops and now - other.sent <= COMMAND_SILENCE:
             if rank > other.rank:
                 self._hold(source, rank, new)
+            elif rank == PERSON and not is_stop(other.motion):
+                self.software_stop.overrule(source, rank, now)
             return OVERRULED.format(driver=other.source)
         if not stops and self._is_held(source, rank):
+            if rank == PERSON:
+                self.software_stop.overrule(source, rank, now)
             return HELD
         if other and (stops or rank < other.rank):
             self._hold(other.source, other.rank, new)
+            if other.rank == PERSON and not is_stop(other.motion):
+                self.software_stop.overrule(other.source, other.rank, now)
         if (rank < AUTOPILOT and not is_stop(motion)) or (other and stops and not is_stop(other.motion)):
             self.taken_at = real
         self._drive(new)
@@ -370,11 +442,17 @@ class Arbiter:
         self.resumed += 1
         return ""
 
+    def settle(self, now: float) -> None:
+        """The robot is removed at `now`; another one may `inherit` from this one."""
+        self.software_stop.settle(self.time.at(now))
+        self.parts.settle(self.time.at(now))
+
     def inherit(self, other: "Arbiter", now: float) -> None:
         """Take over the held sources and the software stop of a robot that is replaced at `now`."""
         self._held = deepcopy(other._held)
         self._highest, self.stopped_at, self.taken_at = other._highest, other.stopped_at, other.taken_at
         self.software_stop.inherit(other.software_stop, self.time.at(now))
+        self.parts.inherit(other.parts, self.time.at(now))
 
     def _is_held(self, source: str, rank: int) -> bool:
         autopilot = rank >= AUTOPILOT and rank > self._highest

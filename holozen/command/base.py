@@ -118,7 +118,7 @@ class Base:
         self._clocks.poll(now)
         if now >= self._status_at:
             self._publish_status(now)
-        motion = self._arbiter.motion(now)
+        motion = self._arbiter.motion(time.monotonic())  # not `now`: this process may have been suspended since
         assert isinstance(motion, tuple), "only a velocity is offered"
         return motion
 
@@ -148,10 +148,9 @@ class Base:
     def _taken(self, other: Endpoint) -> BusError:
         return BusError(TAKEN.format(robot=self._robot or "the robot", by=other.source))
 
-    def _on_stop(self, now: float) -> None:
-        if self._stops:
-            self._stops.write(self._robot, self._arbiter.software_stop.setter)
+    def _on_stop(self, now: float) -> str:
         self._publish_status(now)
+        return self._stops.write(self._robot, self._arbiter.software_stop.setter) if self._stops else ""
 
     def _publish_status(self, now: float) -> None:
         status = self._input.status(now)

@@ -19,13 +19,12 @@ from holozen.messages.message import not_finite
 from holozen.suggest import listed
 from holozen.transport.pubsub import Received, Subscription
 from holozen.transport.samples import PRIORITIES
-from holozen.wire import COMMAND_SILENCE, MAX_STAMP_AGE, implausible
+from holozen.wire import MAX_STAMP_AGE, implausible
 
 MAX_LINEAR = 5.0  # m/s
 MAX_ANGULAR = 10.0  # rad/s
 LINEAR, ANGULAR = (0.01, 50.0), (0.01, 100.0)  # the ranges in which these two may be set
 MAX_RATES = 16  # sources, whose names come over the wire; beyond, the oldest of the lowest rank is forgotten
-MAX_PARTS = 100  # sources whose moving topics or joints are known
 RECENT = 3.0  # s for which a source is listed
 SPAN = 1.0  # s over which the rate is measured
 MARK = 0.1  # s between two samples of a count
@@ -34,6 +33,7 @@ MAX_LINES = 10  # a second by all robots: if a fleet's driver fails, each of the
 M = TypeVar("M", bound=Message)
 
 PART = "part: it stops one topic or joint while its source moves another, so it is no stop"
+TWIST = "cmd_vel"  # one part, whichever of the robot's keys a velocity comes on: a zero on any of them ends it
 UNPROVEN = "unproven"  # the kind of refusal of a command without proof of its sender's name
 
 
@@ -110,16 +110,21 @@ class Input(Generic[M]):
         """Pass a command to the arbiters."""
         raise NotImplementedError
 
-    def _offer(self, arbiter: Arbiter, command: Command[M], motion: Motion, moves: bool = False) -> bool:
-        """Pass a command's motion to an arbiter, and count it. Returns whether it is accepted. `moves`: its source
-        moves another part, so that a stop of this one stops the robot only if the source drives it.
+    def _offer(
+        self, arbiter: Arbiter, command: Command[M], motion: Motion, parts: Iterable[tuple[str, bool]],
+        is_whole: bool = False,
+    ) -> bool:  # fmt: skip
+        """Pass a command's motion to an arbiter, and count it. Returns whether it is accepted. `parts` are those that
+        it commands, and whether it moves them. While its source moves another part, a stop lets go of nothing, and it
+        stops the robot only if the source drives that, or if it `is_whole`: one of the robot, not of its parts.
         """
         source, rank, now = command.source, command.rank, command.moment.now
-        if moves and is_stop(motion) and not arbiter.is_driver(source, rank, now):
+        moves = arbiter.parts.record(source, rank, parts, arbiter.time.at(now))
+        if moves and is_stop(motion) and not (is_whole or arbiter.is_driver(source, rank, now)):
             arbiter.note_refused(source, rank, now, command.sent)
             reason = PART
         else:
-            reason = arbiter.offer(source, rank, motion, now, command.sent)
+            reason = arbiter.offer(source, rank, motion, now, command.sent, lets_go=not moves)
         if reason:
             self._refuse(command, reason)
         else:
@@ -205,7 +210,8 @@ class TwistInput(Input[Twist | TwistStamped]):
     def _obey(self, command: Command[Twist | TwistStamped]) -> None:
         velocity = _velocity(command.message)
         limited = clamp_speed(velocity, self.linear, self.angular)
-        if self._offer(self.arbiter, command, limited) and limited != velocity:
+        parts = [(TWIST, not is_stop(limited))]
+        if self._offer(self.arbiter, command, limited, parts, is_whole=True) and limited != velocity:
             text = f"over the limits of {self.linear:g} m/s and {self.angular:g} rad/s, clamped: {velocity}"
             self._refuse(command, text, "clamped")
 
@@ -237,7 +243,7 @@ class JointInput(Input[JointState]):
     ) -> None:
         freshness: Freshness[JointState] = Freshness((key,), senders, _joints_stop, self._moves)
         super().__init__((key,), freshness, stats, (arbiter for _, arbiter in groups))
-        self._groups, self._known = [(names, arbiter, Parts()) for names, arbiter in groups], known
+        self._groups, self._known = groups, known
 
     def _obey(self, command: Command[JointState]) -> None:
         try:
@@ -245,18 +251,17 @@ class JointInput(Input[JointState]):
         except ValueError as error:
             return self._refuse(command, str(error), "malformed")
         accepted = self.stats.accepted
-        for names, arbiter, parts in self._groups:
+        for names, arbiter in self._groups:
             if part := motion.only(names):
                 each = [(name, part.kind == "position" or value != 0) for name, value in part.values]
-                moves = parts.record(command.source, command.rank, each, arbiter.time.at(command.moment.now))
-                self._offer(arbiter, command, part, moves)
+                self._offer(arbiter, command, part, each)
         self.stats.accepted = min(self.stats.accepted, accepted + 1)  # one command, though for several arbiters
 
     def _moves(self, source: str, now: float) -> bool:
         return any(arbiter.moves(source, now) for arbiter in self._arbiters)
 
     def _checked(self, motion: JointMotion) -> JointMotion:
-        moved = frozenset[str]().union(*(names for names, *_ in self._groups))
+        moved = frozenset[str]().union(*(names for names, _ in self._groups))
         for name, _ in motion.values:
             if name not in self._known:
                 raise ValueError(f"there is no joint {name!r}; the joints are {listed(self._known)}")
@@ -272,48 +277,19 @@ def _joints_stop(message: JointState) -> bool:
         return True  # it moves nothing, and is refused later
 
 
-class Parts:
-    """The topics or joints that each source has set moving in the last 0.5 s, and not stopped since.
-
-    A source may command them one by one: then a zero for one is no stop while it moves another. Names come over the
-    wire, so of too many sources the one that has been silent for the longest time is forgotten.
-    """
-
-    def __init__(self) -> None:
-        self._moving: dict[tuple[str, int], dict[str, float]] = {}
-
-    def record(self, source: str, rank: int, parts: Iterable[tuple[str, bool]], time: float) -> bool:
-        """Record which `parts` a command moves, and which it stops, at `time` (s). Returns whether its source still
-        moves any.
-        """
-        mine = {name: at for name, at in self._moving.pop((source, rank), {}).items() if time - at <= COMMAND_SILENCE}
-        for name, moves in parts:
-            mine.pop(name, None)
-            if moves:
-                mine[name] = time
-        if mine:
-            self._moving[source, rank] = mine
-            if len(self._moving) > MAX_PARTS:
-                del self._moving[next(iter(self._moving))]
-        return bool(mine)
-
-
 class ForceInput(Input[Wrench]):
     """The wrenches on a robot's `keys`. One source drives at a time: all that act are its own."""
 
     def __init__(self, keys: tuple[str, ...], arbiter: Arbiter, senders: Senders, stats: CommandStats) -> None:
         super().__init__(keys, Freshness(keys, senders, _pushes_nothing, arbiter.moves), stats, (arbiter,))
-        self._parts = Parts()
 
     def _obey(self, command: Command[Wrench]) -> None:
         (arbiter,), now = self._arbiters, command.moment.now
         age = 0.0 if arbiter.time.is_paused else now - command.sent.earliest
         push = AppliedForce(command.key, _wrench(command.message), arbiter.time.at(now) - age)
         others = arbiter.pushes_of(command.source, command.rank, now).without(command.key)
-        pushes = self._parts.record(
-            command.source, command.rank, [(command.key, any(push.wrench))], arbiter.time.at(now)
-        )
-        self._offer(arbiter, command, AppliedForces(tuple(sorted((*others, push)))), pushes)
+        parts = [(command.key, any(push.wrench))]
+        self._offer(arbiter, command, AppliedForces(tuple(sorted((*others, push)))), parts)
 
 
 def _wrench(message: Wrench) -> tuple[float, float, float, float, float, float]:

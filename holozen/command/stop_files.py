@@ -5,6 +5,7 @@ the same robots stopped.
 import os
 import re
 import stat
+import threading
 import zlib
 from collections.abc import Iterable
 from pathlib import Path
@@ -15,6 +16,9 @@ from holozen.suggest import cut
 
 UNREADABLE = "the robot's own process, which could not read who did"
 MAX_BYTES = 1000
+HANGS = 0.25  # s after which a disk counts as hung; meanwhile a base goes on at its last velocity
+HUNG = "the disk does not answer: the stop holds, and its file is written once it does"
+HUNG_AT_RELEASE = "the disk does not answer: until its file is removed, a new process has the robot stopped"
 
 
 def default_folder() -> Path | None:
@@ -32,14 +36,20 @@ class StopFiles:
     stopped if any of them has its file. Reports begin with `reporter`.
 
     A file is written before the stop is confirmed, but not synced: it outlasts the process, however that ends, but a
-    loss of power may undo the last seconds.
+    loss of power may undo the last seconds. A disk that hangs holds up no robot: another thread writes, and is waited
+    for no longer than HANGS.
     """
 
     def __init__(self, folder: Path, networks: Iterable[str], reporter: str = "sim") -> None:
         self._all = folder
         self._folders = [folder / _name(network) for network in networks]
         self._last: dict[str, str] = {}  # robot -> contents of all its files, if known
-        self._is_reported, self._reporter = False, reporter
+        self._reporter = reporter
+        self._reported = set[tuple[str, bool]]()  # robots whose stop, or release, could not be written
+        self._lock = threading.Lock()  # of these three
+        self._wanted: dict[str, str] = {}  # robot -> what is to be written
+        self._failed: dict[str, str] = {}  # robot -> why that failed, or ""
+        self._writer: threading.Thread | None = None
 
     def paths(self, robot: str) -> list[Path]:
         """The files of a robot, one for each network; `robot` is empty for the one at the root."""
@@ -70,33 +80,63 @@ class StopFiles:
             report(f"{self._reporter}: {path}: {why}, so {robot or 'the robot'} is stopped until `holozen release`")
             return UNREADABLE
 
-    def write(self, robot: str, by: str) -> None:
-        """Record who stopped a robot; empty: no one. An error is only reported, once: the stop holds all the same."""
-        if self._last.get(robot) == by:
-            return
-        self._last.pop(robot, None)
-        written = [self._write(path, by) for path in self.paths(robot)]  # also after one that failed
-        if all(written):
-            self._last[robot], self._is_reported = by, False
+    def write(self, robot: str, by: str) -> str:
+        """Record who stopped a robot; empty: no one. Returns why that failed and what follows, or "". It is reported
+        too, once: the stop holds all the same.
+        """
+        if not by and self._writer is None and self._is_kept(robot, by):
+            return ""  # at each spawn of a robot that is not stopped, without the cost of a thread
+        with self._lock:
+            self._wanted[robot] = by
+            writer, hangs = self._writer, self._writer is not None
+            if writer is None:
+                writer = self._writer = threading.Thread(target=self._write_wanted, daemon=True)
+                writer.start()
+        writer.join(0 if hangs else HANGS)
+        if not writer.is_alive():
+            return self._failed.pop(robot, "")
+        reason = f"{self.paths(robot)[0]}: {HUNG if by else HUNG_AT_RELEASE}"
+        self._report(robot, by, reason)
+        return reason
 
-    def _write(self, path: Path, by: str) -> bool:
-        try:
-            if by:
-                _replace(path, by)
-            else:
-                path.unlink(missing_ok=True)
-        except OSError as error:
-            if not self._is_reported:
-                lost, left = "stops hold, but not beyond the end of this process", "the next one has the robot stopped"
-                kept = lost if by else left
-                report(f"{self._reporter}: {path}: {error.strerror}: {kept}")
-            self._is_reported = True
-            return False
-        return True
+    def _write_wanted(self) -> None:
+        while True:
+            with self._lock:
+                if not self._wanted:
+                    self._writer = None
+                    return
+                robot, by = self._wanted.popitem()
+            failed = self._write_files(robot, by)
+            with self._lock:
+                self._failed[robot] = failed
+
+    def _write_files(self, robot: str, by: str) -> str:
+        """Write all files of a robot. Returns why that failed, or ""."""
+        if self._is_kept(robot, by):
+            return ""
+        self._last.pop(robot, None)
+        failures = [*filter(None, [_written(path, by) for path in self.paths(robot)])]  # all are tried
+        if not failures:
+            self._last[robot] = by
+            self._reported -= {(robot, True), (robot, False)}
+            return ""
+        lost, left = "stops hold, but not beyond the end of this process", "the next one has the robot stopped"
+        reason = f"{failures[0]}: {lost if by else left}"
+        self._report(robot, by, reason)
+        return reason
+
+    def _is_kept(self, robot: str, by: str) -> bool:
+        return self._last.get(robot) == by and all(os.path.exists(path) == bool(by) for path in self.paths(robot))
+
+    def _report(self, robot: str, by: str, reason: str) -> None:
+        if (robot, bool(by)) not in self._reported:
+            self._reported.add((robot, bool(by)))
+            report(f"{self._reporter}: {reason}")
 
     def forget(self, robot: str) -> None:
         """Forget a robot that is gone; its file stays."""
         self._last.pop(robot, None)
+        self._reported -= {(robot, True), (robot, False)}
 
 
 def _name(network: str) -> str:
@@ -106,6 +146,18 @@ def _name(network: str) -> str:
 
 def _file(robot: str) -> str:
     return f"{quote(robot, safe='') or '@'}.stop"
+
+
+def _written(path: Path, by: str) -> str:
+    """Write a file, or without `by` remove it. Returns why that failed, or ""."""
+    try:
+        if by:
+            _replace(path, by)
+        else:
+            path.unlink(missing_ok=True)
+    except OSError as error:
+        return f"{path}: {error.strerror}"
+    return ""
 
 
 def _replace(path: Path, text: str) -> None:

@@ -23,13 +23,14 @@ RELEASED = (
 
 class RobotServices:
     """Serves stop, release and resume in the namespace of the key `command`, for all `arbiters` together. `changed` is
-    called with the time (s) before a stop or a release is confirmed. Reports begin with `reporter`.
+    called with the time (s) before a stop or a release is confirmed, also for a stop of a robot that is stopped; it
+    returns what the caller should know, or "". Reports begin with `reporter`.
     """
 
     VERBS = ("release", "resume", "stop")
 
     def __init__(
-        self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[float], None],
+        self, bus: Bus, command: str, arbiters: tuple[Arbiter, ...], changed: Callable[[float], str],
         reporter: str = "sim",
     ) -> None:  # fmt: skip
         self._arbiters, self._changed, self._reporter = arbiters, changed, reporter
@@ -76,9 +77,9 @@ class RobotServices:
         for arbiter in self._arbiters:
             arbiter.stop(self._stop.caller, self._now)
         if not before:
-            self._report_change(f"is stopped by {self._setter}")
+            self._report(f"is stopped by {self._setter}")
         problem = f"; the request cannot be read: {self._stop.problem}" if self._stop.problem else ""
-        return TriggerReply(True, f"stopped by {self._setter}{problem}")
+        return TriggerReply(True, f"stopped by {self._setter}{problem}{self._change()}")
 
     def _on_release(self, _request: TriggerRequest) -> TriggerReply:
         if not self._setter:
@@ -87,8 +88,8 @@ class RobotServices:
         self._require_sent_after(self._release, stopped, f"the last stop of {self._namespace or 'the robot'}")
         for arbiter in self._arbiters:
             arbiter.release(self._now)
-        self._report_change(f"was released by {self._release.caller or 'an unknown caller'}")
-        return TriggerReply(True, RELEASED)
+        self._report(f"was released by {self._release.caller or 'an unknown caller'}")
+        return TriggerReply(True, f"{RELEASED}{self._change()}")
 
     def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
         refusals = [arbiter.resume_refusal(self._now) for arbiter in self._arbiters]
@@ -104,6 +105,9 @@ class RobotServices:
         verb = "release" if server is self._release else "resume"
         server.require_sent_after(event, self._now, OUTDATED.format(verb=verb, event=what))
 
-    def _report_change(self, what: str) -> None:
+    def _report(self, what: str) -> None:
         report(f"{self._reporter}: {self._namespace or 'the robot'} {what}")
-        self._changed(self._now)
+
+    def _change(self) -> str:
+        warning = self._changed(self._now)
+        return f"; {warning}" if warning else ""

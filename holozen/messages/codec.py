@@ -16,7 +16,19 @@ from holozen.suggest import article, shorten
 if TYPE_CHECKING:
     from holozen.messages.definitions import Interface
 
-__all__ = ["WIRES", "CodecError", "convert", "decode", "decoder", "encode", "encoding", "form", "transcoded", "written"]
+__all__ = [
+    "WIRES",
+    "CodecError",
+    "convert",
+    "decode",
+    "decoder",
+    "encode",
+    "encoding",
+    "form",
+    "transcoded",
+    "writer",
+    "written",
+]
 
 M = TypeVar("M", bound=Message)
 Makers = tuple[tuple[type[M], Callable[[Any], M]], ...]
@@ -47,16 +59,6 @@ def encode(message: Message, wire: str = "json") -> bytes:
 
 def written(message: Message, wire: str) -> tuple[bytes, str]:
     """The bytes of `message`, and their wire: CDR for one with ANY_NUMBER that holds a NaN or an infinity."""
-    if wire == "json" and not message.SETTLE:
-        try:
-            payload = _encode_json(message)
-        except UnicodeEncodeError:
-            pass  # the long way has the reason
-        else:
-            # One byte is found ten times faster than four, and most messages have at most one of these, in "angular".
-            u = payload.find(b"u")
-            if u < 0 or (payload[u - 1] != N and payload.find(b"u", u + 1) < 0) or not _has_null(payload):
-                return payload, wire
     if not message.ANY_NUMBER or wire == "cdr":
         return encode(message, wire), wire
     payload, finite = _write(message, wire)
@@ -70,6 +72,36 @@ def written(message: Message, wire: str) -> tuple[bytes, str]:
             raise CodecError(f"{reason}, and that cannot hold the rest: {error}") from None
         return payload, wire
     return (payload, wire) if finite else (cdr, "cdr")
+
+
+def writer(kind: type[M], wire: str, checks: bool) -> Callable[[M], tuple[bytes, str | None]]:
+    """A function that returns the bytes of a message of `kind`, and their Encoding if it is not that of `wire`. If it
+    `checks`, it raises CodecError for a field with a value of another type: JSON and msgpack write what they are given,
+    and only a reader would find it.
+    """
+    parsers = {each: _decoders((kind,), WIRES[each], each)[0][1] for each in ("json", "msgpack") if checks}
+
+    def write(message: M) -> tuple[bytes, str | None]:
+        payload, used = written(message, wire)
+        if parse := parsers.get(used):  # CDR's writer checks
+            try:
+                parse(payload)
+            except (msgspec.DecodeError, CodecError):  # the long way has the reason
+                decode(payload, WIRES[used], (kind,))
+        return payload, None if used == wire else encoding(used, type(message))
+
+    def write_json(message: M) -> tuple[bytes, str | None]:
+        try:
+            payload = _encode_json(message)
+        except UnicodeEncodeError:
+            return write(message)  # the long way has the reason
+        # One byte is found ten times faster than four, and most messages have at most one of these, in "angular".
+        u = payload.find(b"u")
+        if u < 0 or (payload[u - 1] != N and payload.find(b"u", u + 1) < 0) or not _has_null(payload):
+            return payload, None
+        return write(message)
+
+    return write_json if wire == "json" and not kind.SETTLE and not checks else write
 
 
 def _write(message: Message, wire: str) -> tuple[bytes, bool]:

@@ -73,22 +73,46 @@ def positive_definite(xx: float, xy: float, xz: float, yy: float, yz: float, zz:
     return xx > 0 and minor > 0 and determinant > 0
 
 
+ROUNDING = 0.01  # of the trace: numbers are written with few digits
+
+
+def impossible(inertia: Moments) -> str:
+    """Why no body can have these moments, in kg m^2; empty if one can."""
+    xx, xy, xz, yy, yz, zz = inertia
+    if not positive_definite(xx, xy, xz, yy, yz, zz):
+        return "is zero or not positive definite"
+    # The triangle inequality, for any axes: the second moments of mass, half the trace minus the tensor, are
+    # not negative (P. Wensing et al., "Linear matrix inequalities for physically consistent inertial parameter
+    # identification", IEEE Robotics and Automation Letters 3, 2018).
+    half = (xx + yy + zz) * (0.5 + ROUNDING)
+    if not positive_definite(half - xx, -xy, -xz, half - yy, -yz, half - zz):
+        return f"has one moment above the sum of the other two (ixx={xx:g}, iyy={yy:g}, izz={zz:g})"
+    return ""
+
+
 # Moments that a file omits, or that no body of the link's shapes can have.
 
 
 NO_INERTIA = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
-def read_inertia(inertial: Tag, moment: float) -> Moments:
-    """The tensor of an `<inertial>`, whose moments are `moment` where it gives none; NO_INERTIA for one that is not
-    positive definite: rejecting those would stop many students' robots. Raises RobotError.
+def read_inertia(inertial: Tag) -> Moments:
+    """The tensor of an `<inertial>` in kg m^2; NO_INERTIA for an impossible one: rejecting those would stop many
+    students' robots. Raises RobotError.
     """
     given = inertial.child("inertia")
-    xx, yy, zz = (given.number(name, moment) for name in ("ixx", "iyy", "izz"))
-    xy, xz, yz = (given.number(name, 0.0) for name in ("ixy", "ixz", "iyz"))
+    tensor = _tensor(given)
+    xx, _, _, yy, _, zz = tensor
     if min(xx, yy, zz) < 0:
         raise given.wrong(f"has ixx={xx}, iyy={yy}, izz={zz}; a moment of inertia is never negative")
-    return (xx, xy, xz, yy, yz, zz) if positive_definite(xx, xy, xz, yy, yz, zz) else NO_INERTIA
+    return NO_INERTIA if impossible(tensor) else tensor
+
+
+def _tensor(given: Tag) -> Moments:
+    """The tensor of an `<inertia>`. Omitted values are 0, in SDF 1 on the diagonal."""
+    xx, yy, zz = (given.number(name, 1.0 if given.sdf else 0.0) for name in ("ixx", "iyy", "izz"))
+    xy, xz, yz = (given.number(name, 0.0) for name in ("ixy", "ixz", "iyz"))
+    return xx, xy, xz, yy, yz, zz
 
 
 def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool = False) -> Link:
@@ -113,11 +137,12 @@ def with_moments(link: Link, inertial: Tag | None, source: Source, silent: bool 
 
 def _warn(link: Link, inertial: Tag, shaped: bool, source: Source) -> None:
     given, part = inertial.first("inertia"), link.inertial
-    wrong = "is zero or not positive definite, which is impossible"
     if part and part.inertia != NO_INERTIA:
         wrong = "is absurdly small for the size of the link's collision shapes"
     elif given is None:
         wrong = "has no <inertia>"
+    else:
+        wrong = f"{impossible(_tensor(given))}, which is impossible"
     taken = "the inertia of its solid collision shapes is used" if shaped else "the link is treated as a point mass"
     source.warn(given or inertial, f"{wrong}; {taken}")
 

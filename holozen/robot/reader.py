@@ -287,10 +287,14 @@ def _work(request: bytes, end: int) -> NoReturn:
         reply = _Reply(lacks=lacks, asked=[*asked.question])
     except RobotError as error:
         reply = _Reply(lacks=lacks, error=str(error))
+    except UnicodeEncodeError:
+        known = sys.getfilesystemencoding()
+        reply = _Reply(lacks=lacks, error=f"{what}: the name of this file, or of one in it, is not {known}; rename it")
     except MemoryError:
         reply = _Reply(lacks=lacks, error=f"{what}: it takes more than {MAX_MEMORY >> 20} MB of memory to read")
     except Exception as error:  # a bug that untrusted input triggers must not end the sim
         reply = _Reply(lacks=lacks, error=f"{what}: it cannot be read: {type(error).__name__}: {error}")
+    reply = reply._replace(error=reply.error.encode(errors="replace").decode())  # `what` may be such a name
     with os.fdopen(end, "wb") as file:
         file.write(msgspec.msgpack.encode(reply))
     os._exit(0)

@@ -278,7 +278,7 @@ def _inertial(tag: Tag, frame: Pose, static: bool, source: Source) -> Inertial |
     if mass == 0 and not static:
         source.warn(inertial, "has no mass; the link is treated as massless, with no inertia")
     pose = compose(frame, read_pose(inertial).pose)
-    return Inertial(pose, mass, read_inertia(inertial, 1.0) if mass else NO_INERTIA)
+    return Inertial(pose, mass, read_inertia(inertial) if mass else NO_INERTIA)
 
 
 def _surface(tag: Tag, self_collide: bool, source: Source) -> Surface:

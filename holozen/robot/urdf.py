@@ -274,7 +274,7 @@ def _inertial(tag: Tag) -> Inertial:
     mass = tag.needed("mass").number("value")
     if mass < 0:
         raise tag.needed("mass").wrong(f"value: {mass} kg is negative")
-    return Inertial(read_pose(tag), mass, read_inertia(tag, 0.0) if mass else NO_INERTIA)
+    return Inertial(read_pose(tag), mass, read_inertia(tag) if mass else NO_INERTIA)
 
 
 def _axis(tag: Tag, kind: str) -> Vector:

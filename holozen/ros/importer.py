@@ -116,7 +116,8 @@ class _Finder:
     def unknown(self, name: str) -> str:
         """The error line for a package that is not found."""
         starts = [*map(Path, self._near), Path(os.path.abspath(os.curdir))]
-        known = {*self.places.packages(), *(found for start in starts for found in local_packages(start))} - {"holozen"}
+        known = {*self.places.packages(), *(found for start in starts for found in local_packages(start))}
+        known -= {"holozen", name}  # one of that name may be without such files
         folders = list(dict.fromkeys(str(above[0]) for start in starts if (above := folders_above(start))))
         return (
             f"no package {name!r} with .msg, .srv or .action files{suggest(name, known)}; searched AMENT_PREFIX_PATH,"

@@ -7,7 +7,7 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 from holozen.testing.process import PATIENCE, Process, wait_for
@@ -34,6 +34,7 @@ class Terminal:
         self._bytes = b""
         self._shown = 0  # bytes passed to the emulator
         self._emulator: Any = None
+        self._screen: str | None = None  # what the emulator shows now, once it was asked
         self._closing, self._frozen, self._reading = threading.Event(), threading.Event(), threading.Lock()
         self._read_all = threading.Event()  # set once nothing more can come
         try:
@@ -75,11 +76,31 @@ class Terminal:
             due += interval
         return sent
 
+    def hold_until(self, key: str | bytes, condition: Callable[[], object]) -> None:
+        """Hold a key until `condition()` is true; AssertionError after 30 s.
+
+        After each 3 s it is let go for a second: a program that was held up, as on a busy machine, may disregard a key
+        that was held meanwhile.
+        """
+
+        def is_met() -> bool:
+            end = time.monotonic() + 3
+            while time.monotonic() < end:
+                self.type(key)
+                if condition():
+                    return True
+                time.sleep(0.04)
+            time.sleep(1)
+            return False
+
+        wait_for(is_met, what=lambda: f"what {key!r} does; the screen:\n{self.screen()}")
+
     def resize(self, columns: int, rows: int) -> None:
         """Resize the window, and notify the process."""
         if self._emulator is not None:
             self.screen()  # the output so far was written for the old size
             self._emulator.listener.resize(rows, columns)
+            self._screen = None
         self._size = columns, rows
         termios.tcsetwinsize(self._master, (rows, columns))
 
@@ -116,10 +137,13 @@ class Terminal:
         if self._emulator is None:
             self._emulator = pyte.ByteStream(pyte.Screen(*self._size))
         self._catch_up()
-        new = self._bytes[self._shown :]
-        self._shown += len(new)
-        self._emulator.feed(new)
-        return "\n".join(line.rstrip() for line in self._emulator.listener.display)
+        if new := self._bytes[self._shown :]:
+            self._shown += len(new)
+            self._emulator.feed(new)
+            self._screen = None
+        if self._screen is None:  # it takes some ms
+            self._screen = "\n".join(line.rstrip() for line in self._emulator.listener.display)
+        return self._screen
 
     def wait_for_text(self, text: str, within: float = PATIENCE) -> str:
         """Wait until the screen shows `text`, and return the screen. AssertionError if the process ends without it."""

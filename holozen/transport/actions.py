@@ -119,6 +119,8 @@ class Goals:
 
     def refusal(self, identity: bytes) -> str:
         """Why no goal with this id can be accepted; empty if one can."""
+        if not any(identity):  # a request to cancel that one would cancel all
+            return "its goal_id is missing, or zero"
         if self.get(identity):
             return "there is a goal with this id already"
         return f"there are {MAX_GOALS} goals already" if len(self._all) >= MAX_GOALS else ""

@@ -12,12 +12,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import zenoh
 
 from holozen import wire
+from holozen.suggest import cut, shorten
 from holozen.transport import services
+from holozen.transport.errors import BusError
 from holozen.transport.graph import Definition
-from holozen.transport.node import Node
+from holozen.transport.node import Node, checked_wire
 from holozen.transport.peer_clocks import PeerClocks, clock_key
 from holozen.transport.pubsub import Gets, Latest, Publisher, RawPublisher, Subscription
-from holozen.transport.samples import Answers, Dealer, RawSubscriber, Replies, Ring, stamps
+from holozen.transport.samples import PRIORITIES, Answers, Dealer, RawSubscriber, Replies, Ring, stamps
 from holozen.transport.services import RING, ROOM, Server
 from holozen.transport.session import one_line
 
@@ -83,12 +85,14 @@ class Bus(Node):
     ) -> Publisher[M]:  # fmt: skip
         """A writer of `kind` on `key`. On a full link it waits (`block`), or else drops messages. `wire` replaces
         the node's. `dead_man`: a publisher of commands is listed as a node, so that its end stops the robot at once;
-        without, its last command counts as long as that of a foreign program.
+        without, its last command counts as long as that of a foreign program. Raises BusError for a wildcard, or a
+        key, priority or wire that does not exist, and TypeError for a `kind` that is not the class of a message.
         """
         from holozen.messages import codec
 
+        _check_types(key, kind)
         self.define(kind)
-        wire = wire or self.wire
+        wire = checked_wire(wire or self.wire)
         make: Callable[..., Publisher[M]] = partial(Publisher, kind, wire, self._queued)
         return self._publish(make, key, kind.ROS, codec.encoding(wire, kind), priority, block, dead_man)
 
@@ -103,8 +107,12 @@ class Bus(Node):
         self, make: Callable[..., P], key: str, type_name: str, encoding: str, priority: str, block: bool,
         dead_man: bool,
     ) -> P:  # fmt: skip
+        if priority not in PRIORITIES:
+            raise BusError(f"key {key!r}: no priority {priority!r}; there are {', '.join(PRIORITIES)}")
         commands = wire.is_command(key, (type_name,))
         with one_line(f"key {key!r}"):
+            if "*" in str(zenoh.KeyExpr(key)):
+                raise BusError(f"key {key!r}: write to one key; a wildcard would reach every robot")
             publisher = self.session.declare_publisher(
                 key, encoding=encoding, priority=getattr(zenoh.Priority, priority), express=commands,
                 congestion_control=zenoh.CongestionControl.BLOCK if block else zenoh.CongestionControl.DROP,
@@ -190,10 +198,12 @@ class Bus(Node):
     ) -> Subscription[M]:
         """A reader of any of `kinds` that keeps the newest `depth`. Payloads over `limit` bytes are refused, and in the
         secure set-up commands without proof. `dealt`: for a WaitSet, which reads higher priorities first; the newest
-        `depth` of each are kept, and all robots' keys of that name share a subscriber.
+        `depth` of each are kept, and all robots' keys of that name share a subscriber. Raises BusError for a wrong key,
+        and TypeError without `kinds`, or for one that is not the class of a message.
         """
         from holozen.messages import codec
 
+        _check_types(key, *kinds or (None,))
         ring = self._ring(key, depth) if dealt else None
         raw = self._keep(RawSubscriber(ring, limit)) if ring else self.subscribe_raw(key, depth, limit)
         raw.ends.append(self.announce("sub", kinds[0].ROS, key))
@@ -226,8 +236,10 @@ class Bus(Node):
 
         At most `room` requests wait; more are refused as busy. A request on a `shared` key goes to all of its servers;
         those that have no part in it raise Elsewhere. `dealt`: all robots' keys of that name share a queryable, which a
-        WaitSet reads. `stops` as in Server.
+        WaitSet reads. `stops` as in Server. Raises BusError for a wrong key, and TypeError for a `request` or a `reply`
+        that is not the class of a message.
         """
+        _check_types(key, request, reply)
         token = self.announce("srv", reply.ROS, key)
         queryable: Any = self._ring(key, RING, is_queryable=True) if dealt else None
         if not queryable:
@@ -239,12 +251,15 @@ class Bus(Node):
     def call(self, key: str, request: Message, reply: type[R], timeout: float = 5.0) -> R:
         """Call a service; waits for it to appear and to reply, for at most `timeout` seconds.
 
-        Raises ServiceError with the service's own reason, without a reply, or for a malformed one.
+        Raises ServiceError with the service's own reason, without a reply, or for a malformed one; BusError for a wrong
+        key or `timeout`, and TypeError for a wrong type.
         """
+        _check_call(key, request, reply, timeout)
         return services.call(self, key, request, reply, timeout)[0]
 
     def call_all(self, key: str, request: Message, reply: type[R], timeout: float = 5.0) -> list[R]:
         """As `call`, with the replies of all servers of the key that did not refuse. Raises ServiceError if all did."""
+        _check_call(key, request, reply, timeout)
         return services.call(self, key, request, reply, timeout, everyone=True)
 
     def peer_clocks(self, has: Callable[[str], bool]) -> PeerClocks:
@@ -261,3 +276,26 @@ def _of_all(key: str) -> str:
     """The key expression of all robots' keys of that name: `*/odom` for `Fred/odom`, and `odom` for `odom`."""
     first, _, rest = key.partition("/")
     return f"*/{rest}" if rest and not first.startswith("@") else key
+
+
+def _check_types(key: object, *kinds: object) -> None:
+    """Raise TypeError unless `key` is a text and each of `kinds` the class of a message."""
+    from holozen.messages import Message
+
+    if not isinstance(key, str):
+        raise TypeError(f"key {cut(repr(key))}: give a text, such as 'odom'")
+    for kind in kinds:
+        if not (isinstance(kind, type) and issubclass(kind, Message)):
+            given = getattr(kind, "__name__", None) or shorten(repr(kind))
+            raise TypeError(f"key {key!r}: {given} is not the class of a message, such as Twist")
+
+
+def _check_call(key: object, request: object, reply: object, timeout: float) -> None:
+    """Raise TypeError or BusError unless these can be the arguments of a call."""
+    from holozen.messages import Message
+
+    _check_types(key, reply)
+    if not isinstance(request, Message):
+        raise TypeError(f"key {key!r}: the request {shorten(repr(request))} is not a message, such as TriggerRequest()")
+    if not timeout >= 0:
+        raise BusError(f"key {key!r}: timeout {timeout:g}: use 0 s or more")

@@ -129,8 +129,9 @@ class Connection:
             values["connect/endpoints"] = self.connect_endpoints
         if not self.config or self.listen is not None:
             values["listen/endpoints"] = self._listen_endpoints()
-        if self.mode == "peer" and are_near([*self.connect_endpoints, *self._listen_endpoints()]):
-            # Zenoh does not restore a link that it learned of by gossip, unless the gossip is repeated.
+        if are_near([*self.connect_endpoints, *self._listen_endpoints()]):
+            # Zenoh does not restore a link that it learned of by gossip, unless the gossip is repeated. And a process
+            # that hangs is known for as long as its link lasts.
             values["transport/link/tx/lease"] = NEAR_LEASE
         if self.config:
             # The file decides; a mode of "peer" cannot be distinguished from the default.

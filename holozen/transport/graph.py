@@ -24,6 +24,9 @@ ALL_PEERS = "@holozen/*/peers"
 ALL_WITNESSES = "@holozen/*/witness"
 ROBOTS = "@holozen/*/*/srv/std_srvs/srv/Trigger/**/stop"  # the tokens of what stops a robot
 SIMS = "@holozen/*/*/srv/*/*/*/get_entities"
+PARAMETERS = "@holozen/*/*/srv/*/*/*/**/list_parameters"  # of all nodes with parameters
+WITNESSED = (ROBOTS, SIMS, PARAMETERS)
+UNREACHED = "{source} does not answer: it hangs or is stopped, or cannot be reached from here"  # of `Node.hidden`
 LONGEST = 5.0  # s that a snapshot waits for nodes, while some come or go
 SILENT_FACTOR = 5  # how many times longer it waits for nodes without tokens
 MAX_GONE = 1000  # tokens kept until `left` is called; the oldest are dropped
@@ -305,9 +308,9 @@ class Peers(Answers):
 
 
 class Witness(Answers):
-    """Answers queries for the tokens of robots and sims in sessions other than those that the query names: those to
-    which the asker has a link. A process that hangs makes no new link, so one that comes later cannot see it; this
-    session does, until its own link lapses. `graphs` hold the tokens, and `ends` are their subscriptions.
+    """Answers queries for the tokens of robots, sims and parameters in sessions other than those that the query names:
+    those to which the asker has a link. A process that hangs makes no new link, so one that comes later cannot see it;
+    this session does, until its own link lapses. `graphs` hold the tokens, and `ends` are their subscriptions.
     """
 
     def __init__(self, session: Any, channel: Any, graphs: list[Graph], ends: list[Any]) -> None:

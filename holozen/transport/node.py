@@ -19,12 +19,24 @@ from typing import TYPE_CHECKING, Any, Self, TypeVar
 import zenoh
 
 from holozen.console import report
+from holozen.suggest import cut
 from holozen.transport import graph as graphs
 from holozen.transport.connection import UNIX, Connection, from_environment
 from holozen.transport.errors import BusError
-from holozen.transport.graph import Graph, NodeInfo, Peers, Witness
+from holozen.transport.graph import Graph, NodeInfo, Peers
 from holozen.transport.samples import Declared, RawSubscriber, Replies, Sample, source
-from holozen.transport.session import CLOSE_LIMIT, Opening, join_at_end, linked, one_line, wait_for_threads
+from holozen.transport.session import (
+    CLOSE_LIMIT,
+    MAX_TOKENS,
+    Opening,
+    join_at_end,
+    linked,
+    one_line,
+    token_change,
+    tokens,
+    wait_for_threads,
+    witness,
+)
 
 if TYPE_CHECKING:
     from holozen.transport.members import Member
@@ -32,12 +44,12 @@ if TYPE_CHECKING:
 D = TypeVar("D", bound=Declared)
 
 ROLL_CALL = 2.0  # s for all nodes to send their tokens; a sim with hundreds of robots has thousands
-MAX_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
 WITNESSES = 1.0  # s for the holders of meeting points to tell of robots and sims
 DEFINITION_WAIT = 0.5  # s for a node to be found that answers
 LAST_WAIT = 0.5  # s for publishers to answer with their last messages
 DEFINITION_TIMEOUT = 2.0  # s for its answer
-
+LONGEST_NAME = 255  # characters of a node's name, as in ROS
+_NAME = re.compile(r"[\w.-]+(?:[ /][\w.-]+)*")
 
 _open: weakref.WeakSet[Node] = weakref.WeakSet()
 os.register_at_fork(after_in_child=_open.clear)  # they are the parent's
@@ -48,7 +60,12 @@ def _close_all() -> None:
     """Close what a program has left open, before the interpreter is finalized: Zenoh's threads that enter or return to
     Python in that hang or abort the process. All at once, so that those that hang do not add up.
     """
-    join_at_end([thread for node in list(_open) for thread in node.begin_close()])
+    closing = [(node, node.begin_close()) for node in list(_open)]
+    join_at_end(thread for _, threads in closing for thread in threads)
+    hung = [(node, others) for node, (closer, *others) in closing if closer and closer.is_alive()]
+    for node, _ in hung:
+        node.close_session()
+    join_at_end(thread for _, others in hung for thread in others)
 
 
 class Node:
@@ -56,7 +73,7 @@ class Node:
 
     `wire` is "json", "msgpack" or "cdr", by default that of the connection. `lasting` is for long-running nodes, which
     are listed in the graph at once; see Opening for it, `patience` and `stop`. With an early Opening, the first use
-    waits for it, and raises its error.
+    waits for it, and raises its error. Raises BusError for a name or a wire that cannot be.
     """
 
     def __init__(
@@ -69,6 +86,8 @@ class Node:
         lasting: bool = False,
         stop: threading.Event | None = None,
     ) -> None:
+        _check_name(node)
+        _ = wire and checked_wire(wire)
         if not isinstance(connection, Opening):
             connection = Opening(connection or from_environment(), lasting=lasting, patience=patience, stop=stop)
         self.node, self.wire, self.where = node, wire or connection.wire, connection.where
@@ -89,18 +108,8 @@ class Node:
                 report(f"{node}: {exposure(self.exposed)}")
             if self._opened().point:
                 self._keep(Peers(self.session, zenoh.handlers.RingChannel(16), is_node=True))
-                self._keep(self._witness())
+                self._keep(witness(self.session))
             _ = self.listing
-
-    def _witness(self) -> Witness:
-        keys = (graphs.ROBOTS, graphs.SIMS)
-        tokens = [self._tokens(each) for each in keys]
-        known = [Graph(partial(_token_change, each)) for each in tokens]
-        return Witness(self.session, zenoh.handlers.RingChannel(16), known, tokens)
-
-    def _tokens(self, keys: str) -> Any:
-        """A subscription to the tokens that match `keys`, those that exist included."""
-        return self.session.liveliness().declare_subscriber(keys, zenoh.handlers.RingChannel(MAX_TOKENS), history=True)
 
     @cached_property
     def listing(self) -> NodeInfo:
@@ -146,6 +155,8 @@ class Node:
         return load(self._secure)
 
     def __enter__(self) -> Self:
+        if self._closing.is_set():
+            raise BusError("closed; make another")
         return self
 
     def __exit__(self, *_error: object) -> None:
@@ -184,6 +195,10 @@ class Node:
         for one in declared:
             with contextlib.suppress(Exception):  # closed, or in use, by another thread
                 one.close()
+        self.close_session()
+
+    def close_session(self) -> None:
+        """Close the session alone; what is declared is not withdrawn first."""
         with contextlib.suppress(BusError, SystemExit):  # an error of opening was reported already
             self._opened().close()
 
@@ -267,7 +282,7 @@ class Node:
 
     def graph(self, keys: str = graphs.ALL) -> Graph:
         """The endpoints of all nodes, or those with tokens that match `keys`, kept up to date."""
-        live, tokens = self.session.liveliness(), self._tokens(keys)
+        live, known = self.session.liveliness(), tokens(self.session, keys)
 
         def roll_call() -> bool:
             # A full channel would block Zenoh's thread, and the rest, for ever: the default one is for 256 replies.
@@ -278,11 +293,11 @@ class Node:
             return time.monotonic() - began < timeout
 
         return Graph(
-            partial(_token_change, tokens),
+            partial(token_change, known),
             roll_call,
             lambda: map(str, self.session.info.peers_zid() if keys == graphs.ALL else ()),
             self._ask_peers if keys == graphs.ALL else lambda: set,
-            partial(_undeclare, tokens),
+            partial(_undeclare, known),
             self.took,
         )
 
@@ -314,8 +329,8 @@ class Node:
             return graph.settled(self.connected, max(patience, self.took))
 
     def hidden(self) -> list[graphs.Endpoint]:
-        """The services of robots and sims that others know of, but to which this session has no link: they hang, or
-        cannot be reached from here. Ask once the graph has settled, when there is a link to all that answer.
+        """The services of robots, sims and parameters that others know of, but to which this session has no link: they
+        hang, or cannot be reached from here. Ask once the graph has settled, when there is a link to all that answer.
         """
         if self.session.info.routers_zid():  # it sees everything through the router
             return []
@@ -328,7 +343,7 @@ class Node:
         if not found:
             return []
         # A client of a peer sees others through it, without a link.
-        seen = {end.session for keys in (graphs.ROBOTS, graphs.SIMS) for end in self.endpoints(keys)}
+        seen = {end.session for keys in graphs.WITNESSED for end in self.endpoints(keys)}
         return sorted(end for end in found if end.session not in seen)
 
     def connected(self) -> bool:
@@ -338,14 +353,24 @@ class Node:
         return linked(self.session)
 
 
+def _check_name(node: object) -> None:
+    # It goes into keys, and into attachments before `@` and `;`.
+    if not isinstance(node, str) or len(node) > LONGEST_NAME or not _NAME.fullmatch(node):
+        raise BusError(
+            f"name of a node {cut(str(node))}: use up to {LONGEST_NAME} letters, digits, '_', '-' and '.', with single"
+            " spaces or '/' in between (such as my_node)"
+        )
+
+
+def checked_wire(wire: str) -> str:
+    """`wire`; raises BusError if there is none of that name."""
+    from holozen.messages import WIRES  # not loaded by an echo
+
+    if wire not in WIRES:
+        raise BusError(f"no wire {wire!r}; there are {', '.join(WIRES)}")
+    return wire
+
+
 def _undeclare(tokens: Any) -> None:
     with contextlib.suppress(zenoh.ZError):  # the session is closed
         tokens.undeclare()
-
-
-def _token_change(tokens: Any) -> tuple[str, bool] | None:
-    try:
-        sample = tokens.try_recv()
-    except zenoh.ZError:
-        raise BusError("closed") from None
-    return sample and (str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)

@@ -5,14 +5,17 @@ They are served as in ROS 2's rcl_interfaces, on `<node>/list_parameters`, `get_
 """
 
 import threading
+import time
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from holozen.console import report
 from holozen.messages import rcl_interfaces as r
 from holozen.suggest import shorten, suggest
-from holozen.transport.errors import ServiceError
+from holozen.transport.errors import BusError, ServiceError
+from holozen.transport.graph import PARAMETERS
 from holozen.transport.services import Server, answer_in_turn
 
 if TYPE_CHECKING:
@@ -20,6 +23,7 @@ if TYPE_CHECKING:
 
 MAX_NAMES = 1000  # names in one request
 LONGEST = 80  # characters of a value or a name in a message
+TWIN_WAIT, TWIN_LOOK = 1.0, 0.05  # s for another node of the same name to be discovered, and between two looks for it
 ELSE = "not set, since another parameter of the request was refused"
 
 
@@ -168,6 +172,21 @@ class Parameters:
 
     def _known(self) -> dict[str, Parameter]:
         return {parameter.name: parameter for parameter in self._declared()}
+
+
+def warn_of_twin(bus: "Bus", node: str) -> None:
+    """Report, soon after this returns, another process whose parameters have the name of this `node` too."""
+
+    def look() -> None:
+        with suppress(BusError), bus.graph(PARAMETERS.replace("**", node)) as graph:
+            until = time.monotonic() + TWIN_WAIT
+            while time.monotonic() < until:
+                if twin := next((end for end in graph.endpoints() if end.session != bus.id), None):
+                    report(f"{node}: {twin.source} does the same already; end one of the two")
+                    return
+                time.sleep(TWIN_LOOK)
+
+    threading.Thread(target=look, daemon=True).start()
 
 
 def unknown(node: str, name: str, known: Iterable[str]) -> str:

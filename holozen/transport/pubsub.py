@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from holozen.messages import CodecError
 from holozen.transport.errors import BusError
 from holozen.transport.samples import Answers, Declared, RawSubscriber, Sample
+from holozen.wire import is_command
 
 if TYPE_CHECKING:
     from holozen.messages import Message
@@ -121,23 +122,24 @@ class Publisher(RawPublisher, Generic[M]):
 
         super().__init__(*declared)
         self._kind = kind
-        self._wire, self._queued, self._written, self._named = wire, queued, codec.written, codec.encoding
+        # A command that nobody can read would leave the robot to its watchdog.
+        self._write = codec.writer(kind, wire, checks=is_command(str(self.key), (kind.ROS,)))
+        self._queued = queued
 
     def put(self, message: M) -> None:
         """Send one message. With a number that is not finite it raises codec.CodecError, or is sent as CDR, depending
-        on its type. Raises TypeError for a message of another type, and BusError once it, or the bus, is closed.
+        on its type; a command with a value of a wrong type raises it too. Raises TypeError for a message of another
+        type, and BusError once it, or the bus, is closed.
         """
         if not isinstance(message, self._kind):
             raise self._mistaken(message)
-        payload, wire = self._written(message, self._wire)
-        self.put_bytes(payload, None if wire == self._wire else self._named(wire, type(message)))
+        self.put_bytes(*self._write(message))
 
     def queue(self, message: M) -> None:
         """As `put`, but `Bus.send_queued` sends it: many messages that are sent at once take Zenoh less time."""
         if not isinstance(message, self._kind):
             raise self._mistaken(message)
-        payload, wire = self._written(message, self._wire)
-        self._queued.append((self, payload, None if wire == self._wire else self._named(wire, type(message))))
+        self._queued.append((self, *self._write(message)))
 
     def _mistaken(self, message: object) -> TypeError:
         from holozen.suggest import article

@@ -261,9 +261,15 @@ class Server(Declared):
         query.reply(self._key, reply, encoding=encoding, attachment=note or None)
 
     def read(self, query: Any) -> Any:
-        """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`)."""
+        """The request: from the payload, else from the selector's parameters (`next_goal?request_goal=2`). A bare query
+        is how people look at a key: it does nothing, unless the type has no fields.
+        """
         if query.payload is None:
             values = dict(query.parameters)
+            if not values and (fields := self._request.__struct_fields__):
+                from holozen.suggest import listed
+
+                raise ServiceError(f"the request is empty; send {listed(fields)}, or {{}} for the defaults")
             return self._codec.convert(values, (self._request,))
         if len(query.payload) > MAX_REQUEST_BYTES:
             release_memory()

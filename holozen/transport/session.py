@@ -19,9 +19,10 @@ from holozen.console import report
 from holozen.transport import rendezvous
 from holozen.transport.connection import CLIENT_TRY, Connection, are_near, covers, socket_path
 from holozen.transport.errors import BusError
-from holozen.transport.graph import Peers
+from holozen.transport.graph import WITNESSED, Graph, Peers, Witness
 
 LAST = 1.0  # s to wait for threads at the end of the process
+MAX_TOKENS = 1 << 15  # that wait, of 240 bytes each, which Zenoh takes bit by bit in a process's first hours
 CLOSE_LIMIT = 0.15  # s; a session whose peer hangs would take 10 s to close
 
 
@@ -288,20 +289,42 @@ def open_point(endpoint: str) -> Callable[[], None] | None:
         return None
     # It marks a session of ours that is not a node.
     token = session.liveliness().declare_token(f"@holozen/{session.zid()}/rendezvous/rendezvous")
-    peers = Peers(session, zenoh.handlers.RingChannel(16))
+    answers = Peers(session, zenoh.handlers.RingChannel(16)), witness(session)
 
     def close_point() -> None:
-        close(session, token, *peers.ends)
-        wait_for_threads([peers.thread], CLOSE_LIMIT)
+        close(session, token, *(end for one in answers for end in one.ends))
+        wait_for_threads([one.thread for one in answers], CLOSE_LIMIT)
 
     return close_point
 
 
+def witness(session: Any) -> Witness:
+    """What a holder of a meeting point answers about those that hang."""
+    known = [tokens(session, each) for each in WITNESSED]
+    graphs = [Graph(partial(token_change, each)) for each in known]
+    return Witness(session, zenoh.handlers.RingChannel(16), graphs, known)
+
+
+def tokens(session: Any, keys: str) -> Any:
+    """A subscription to the tokens that match `keys`, those that exist included."""
+    return session.liveliness().declare_subscriber(keys, zenoh.handlers.RingChannel(MAX_TOKENS), history=True)
+
+
+def token_change(tokens: Any) -> tuple[str, bool] | None:
+    """The key of the next token of a subscription that changed, and whether it exists, or None. Raises BusError."""
+    try:
+        sample = tokens.try_recv()
+    except zenoh.ZError:
+        raise BusError("closed") from None
+    return sample and (str(sample.key_expr), sample.kind == zenoh.SampleKind.PUT)
+
+
 def close(session: Any, *tokens: Any) -> None:
     """Close a session, even if it is closed already, and withdraw its tokens before that; see Bus.close."""
-    with contextlib.suppress(zenoh.ZError):
-        for token in tokens:
+    for token in tokens:
+        with contextlib.suppress(Exception):  # closed, or in use, by another thread
             token.undeclare()
+    with contextlib.suppress(zenoh.ZError):
         session.close()
 
 

@@ -15,7 +15,7 @@ from holozen.messages import TriggerReply, TriggerRequest
 from holozen.process import stop_event
 from holozen.transport import connection
 from holozen.transport.errors import BusError
-from holozen.transport.parameters import Number, Parameters
+from holozen.transport.parameters import Number, Parameters, warn_of_twin
 from holozen.wire import key_for
 
 from .follow import Follower
@@ -93,6 +93,7 @@ def follow(args: argparse.Namespace, where: connection.Connection) -> int:
     with Bus("controller", where, lasting=True, stop=stop) as bus:
         follower = Follower(bus, args.robot, _gains(args), stop, lambda text: report(f"controller: {text}"), args.held)
         Parameters(bus, key_for("controller", args.robot), lambda: declared(follower)).start()
+        warn_of_twin(bus, key_for("controller", args.robot))
         try:
             while not stop.is_set() and (laps < args.laps or not args.laps):
                 print_legs(follower.lap(), laps := laps + 1)

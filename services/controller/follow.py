@@ -9,7 +9,7 @@ from holozen.bus import Bus
 from holozen.limits import STOP, Planar
 from holozen.messages import CommandStatus, NextGoalReply, NextGoalRequest, Odometry, PoseStamped, Twist
 from holozen.messages.message import not_finite
-from holozen.odometry import OdometryFeedback
+from holozen.odometry import RobotFeedback
 from holozen.suggest import listed, suggest
 from holozen.transport.errors import NoReply, ServiceError
 from holozen.transport.graph import Endpoint
@@ -26,9 +26,14 @@ NOTICE = 3.0  # s without any odom after which it reports the robots that there 
 LARGEST_GOAL = 65_536  # bytes
 MAX_DISTANCE = 1e6  # m; farther goals and poses are errors
 LOST = 2.0  # s without fresh odom, after which the goal of an action is aborted; the robot has stopped long before
+SUSPENDED = 2.0  # s between two looks at the goals that mean that this process was suspended
+CATCHING_UP = 0.5  # s after that in which goals still arrive that were sent before
 FRAMES = ("", "odom", "map", "world")  # frames of a goal that all mean the frame of odom
 GOAL = "a goal of "
 ENDS = "the controller ends"
+LATE = "the controller was suspended when it was sent; send it again"
+REMOVED = "the robot was removed or replaced, or the link to it was lost"
+RESET = "the robot was reset or moved"
 EARLIER = "an earlier source"  # one that drove before this controller's first status
 RESUME = "resume with `holozen controller --resume` or press r in the teleop"
 
@@ -82,7 +87,8 @@ class Follower:
 
     A goal on `goal_pose`, or of an action, has precedence: the robot drives there at once, and stays until the next one
     or a resume. While the controller yields, the newest goal of goal_pose waits for the resume; one of an action is
-    aborted.
+    aborted. Both are for the robot that is there: one that was replaced or reset does not drive there. The list is for
+    whichever robot is there.
     """
 
     def __init__(
@@ -91,11 +97,12 @@ class Follower:
     ) -> None:  # fmt: skip
         self._bus, self._stop, self._report = bus, stop, report
         self.gains = gains  # may be replaced while it drives
-        self._odom = OdometryFeedback(bus, key_for("odom", robot))
+        self._odom = RobotFeedback(bus, key_for("odom", robot))
         self.status = bus.latest(key_for("cmd_vel_status", robot), CommandStatus)
         self._commands: Publisher[Twist] = bus.publisher(key_for("cmd_vel", robot), Twist, PRIORITY_OF["controller"])
         self._goals = bus.subscribe(key_for("goal_pose", robot), PoseStamped, depth=1, limit=LARGEST_GOAL)
         self._wanted: Journey | None = None  # the present one, of goal_pose or an action
+        self._looked, self._caught_up = math.inf, -math.inf  # s; for goals, and until when old ones may arrive
         self._actions = GoalServers(bus, robot, self._refusal, report)
         self._seen = time.monotonic()  # s; the time of the last fresh odom, or of the start of the journey
         self._policy = YieldPolicy(bus.source, "--held" if held else "")
@@ -141,10 +148,16 @@ class Follower:
             self._wanted.give_up(ENDS)
 
     def _newest_journey(self) -> Journey | None:
-        """The newest journey of goal_pose or an action. A new one ends the one before."""
+        """The newest journey of goal_pose or an action. A new one ends the one before. A goal that may have waited for
+        this process is refused: what happened to the robot meanwhile is unknown.
+        """
+        before, self._looked = self._looked, time.monotonic()
+        if self._looked - before > SUSPENDED:
+            self._caught_up = self._looked + CATCHING_UP
         received = self._goals.try_recv()
         if received is not None:
-            if reason := received.error or (received.message and self._refusal(received.message)):
+            late = LATE if self._looked < self._caught_up else ""
+            if reason := received.error or late or (received.message and self._refusal(received.message)):
                 self._report(f"goal_pose: refused: {reason}")
             elif goal := received.message:
                 x, y, theta = goal.pose.planar()
@@ -159,6 +172,7 @@ class Follower:
         if self._wanted:
             self._wanted.give_up(why)
         self._wanted, self._seen = journey, time.monotonic()
+        self._change()  # what happened before does not end this one
         self._policy.invited()
 
     def _refusal(self, goal: PoseStamped) -> str:
@@ -231,15 +245,26 @@ class Follower:
         return None
 
     def _is_given_up(self, journey: Journey, odom: Odometry | None) -> bool:
-        """Whether the journey ends here, because the controller may not drive or there is no odom."""
+        """Whether the journey ends here: it was for the robot of before, the controller may not drive, or there was no
+        odom.
+        """
+        if change := self._change():
+            self._report(f"{journey.origin}: given up: {change}")
+            journey.give_up(change)
+            return True
         now = time.monotonic()
+        if odom is None and (reason := self._policy.reason):
+            return journey.give_up(f"the controller {reason}")
+        if now - self._seen > LOST:  # also if there is one now: this process may have been suspended
+            return journey.give_up(f"there was no odom to act on for {LOST:g} s")
         if odom is not None:
             self._seen = now
-        elif reason := self._policy.reason:
-            return journey.give_up(f"the controller {reason}")
-        elif now - self._seen > LOST:
-            return journey.give_up(f"there was no odom to act on for {LOST:g} s")
         return False
+
+    def _change(self) -> str:
+        """What has made it another robot since the last call, or put it back to its start; else empty."""
+        removed, reset = self._odom.was_removed(), self._odom.was_reset()
+        return REMOVED if removed else RESET if reset else ""
 
     def _next_odom(self) -> Odometry | None:
         """The next odom. None if this controller may not act on it, and then it sends no motion."""

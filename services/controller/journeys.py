@@ -70,8 +70,8 @@ class GoalJourney(Journey):
 
     def follow(self, leg: Leg, odom: Odometry, speed: float) -> None:
         """Publish the progress, every FEEDBACK_EVERY seconds."""
-        if self._began is None or leg.began < self._began:
-            self._began, self._reported = leg.began, -math.inf
+        if self._began is None:
+            self._began = leg.began
         if leg.ended - self._reported < FEEDBACK_EVERY:
             return
         self._reported = leg.ended

@@ -12,7 +12,7 @@ from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGo
 from holozen.process import stop_event, wait_for_end
 from holozen.transport import connection
 from holozen.transport.errors import BusError, ServiceError
-from holozen.transport.parameters import Choice, Number, Parameter, Parameters
+from holozen.transport.parameters import Choice, Number, Parameter, Parameters, warn_of_twin
 
 from .shapes import SHAPES, Goal, GoalsError, read_goals
 from .tracker import MAX_ODOM_BYTES, Tracker
@@ -85,6 +85,7 @@ def main(argv: list[str] | None = None) -> int:
             bus.serve("get_pose", GetPoseRequest, GetPoseReply, tracker.get_pose).start()
             bus.serve("next_goal", NextGoalRequest, NextGoalReply, lambda asked: next_goal(route.goals, asked)).start()
             Parameters(bus, "pose_service", route.declared).start()
+            warn_of_twin(bus, "pose_service")
             report(f"pose_service: {len(route.goals)} goals from {args.goals or args.shape}")
             wait_for_end(stop)
     except (BusError, GoalsError) as error:

@@ -31,7 +31,7 @@ from .link_states import LinkState, link_tree
 from .physics.body import Body
 from .physics.movers import Mover, mover_for
 from .physics.ray_caster import RayCaster
-from .physics.world import World
+from .physics.world import SUNK, World
 from .robot import Memory, Robot
 from .schedule import Agenda
 
@@ -193,10 +193,9 @@ class Entities:
         """From now on, stop each robot that is added if its file says so, and keep the files up to date."""
         self._stops = stops
 
-    def _keep_stop(self, place: str) -> None:
-        """Write to its file who stopped a robot."""
-        if self._stops:
-            self._stops.write(place, self.memories[place][0].software_stop.setter)
+    def _keep_stop(self, place: str) -> str:
+        """Write to its file who stopped a robot. Returns why it is not kept, or ""."""
+        return self._stops.write(place, self.memories[place][0].software_stop.setter) if self._stops else ""
 
     def require_age(self, limit: float) -> None:
         """From now on, refuse commands that may be older than `limit` seconds, except stops."""
@@ -256,12 +255,18 @@ class Entities:
     def _check_place(
         self, name: str, model: RobotModel, body: Body, code: int = si.SpawnEntityReply.INVALID_POSE
     ) -> None:
-        """Raise EntityError if a body overlaps another one deeply: the engine would throw both apart. An entity of the
-        same name does not count: either the name is refused, or that entity is replaced.
+        """Raise EntityError if a body is deep in the ground or in another one: the engine would throw it out. An entity
+        of the same name does not count: either the name is refused, or that entity is replaced. With its root frame on
+        the ground a body may be in it: programs that give no height send 0, wherever the root frame is.
         """
+        at = body.pose()[0]
+        if not model.static and at[2] < -SUNK and (depth := self._world.sunk(body)):
+            problem = f"there is no room for {name!r} at {_at(at)} z {_metres(at[2])}"
+            advice = f"the lowest free z is {_metres(at[2] + depth)}"
+            raise EntityError(code, f"{problem}: it would be {_metres(depth)} m below the ground; {advice}")
         if not (other := self._overlapped(name, model, body)):
             return
-        problem = f"there is no room for {name!r} at {_at(body.pose()[0])}: it would be inside {other.name!r}"
+        problem = f"there is no room for {name!r} at {_at(at)}: it would be inside {other.name!r}"
         free = self._world.free_place(body)
         advice = f"the nearest free place is {_at(free)}" if free else "use another place"
         raise EntityError(code, f"{problem}; {advice}")
@@ -380,11 +385,11 @@ class Entities:
                 f"there are {MAX_ENTITIES} entities, the most that are simulated; delete some",
             )
         if has_keys(model):
-            self._check_keys(model, prefix)
+            self._check_keys(name, model, prefix)
         if model.drive:
             self._check_alone(key_for(model.drive.odometry_topic, prefix))
 
-    def _check_keys(self, model: RobotModel, prefix: str) -> None:
+    def _check_keys(self, name: str, model: RobotModel, prefix: str) -> None:
         """Raise EntityError if another robot, or the sim, has one of the keys: each would get the other's commands."""
         taken = {row.key for row in SERVICES if row.server == "sim"} - {*RobotServices.VERBS} | KEYS
         keys = dict(keys_of(model, prefix))
@@ -395,7 +400,9 @@ class Entities:
         if problem:
             raise EntityError(si.SpawnEntityReply.NAMESPACE_INVALID, problem)
         if both := self._keys.keys() & keys.keys():
-            problem = f"{min(both)} is the key of {self._keys[min(both)]!r}; use another name"
+            advice = f"delete that one, or use {'another' if prefix else 'a'} namespace"
+            advice = "use another name" if prefix == name else advice
+            problem = f"{min(both)} is the key of {self._keys[min(both)]!r}; {advice}"
             raise EntityError(si.SpawnEntityReply.NAME_NOT_UNIQUE, problem)
 
     def _check_alone(self, key: str) -> None:
@@ -410,8 +417,11 @@ class Entities:
 
 
 def _at(position: XYZ) -> str:
-    x, y = (round(part, 2) + 0.0 for part in position[:2])  # no -0
-    return f"x {x:g} y {y:g}"
+    return f"x {_metres(position[0])} y {_metres(position[1])}"
+
+
+def _metres(length: float) -> str:
+    return f"{round(length, 2) + 0.0:.10g}"  # no -0
 
 
 def _place_of(model: RobotModel, prefix: str) -> str:

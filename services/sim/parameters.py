@@ -45,7 +45,7 @@ def _of_robot(robot: Robot) -> Iterator[Number]:
     place = f"{robot.prefix}." if robot.prefix else ""
     arbiter = robot.arbiter
     yield Number(
-        f"{place}command_timeout", "the robot stops after this long without a command; below zero: never", "s",
+        f"{place}command_timeout", "the robot stops after this long without a command", "s",
         *TIMEOUTS,
         lambda: arbiter.timeout, lambda value: robot.set_timeout(value, time.monotonic()),
     )  # fmt: skip

@@ -1,6 +1,7 @@
 """A robot in the world: it reads commands from its keys, moves at each step, and publishes its state."""
 
 import math
+import time
 from collections.abc import Callable
 from functools import partial
 
@@ -36,13 +37,14 @@ class Robot:
     """A robot with a drive, with joints, or with both.
 
     `name` is its name in the world, `prefix` the one on the wire, which is empty at the root. `phase`, from 0 to 1,
-    shifts its telemetry in time from that of others. `keep_stop` is called on each change of its software stop.
+    shifts its telemetry in time from that of others. `keep_stop` is called at each stop and release, and returns why
+    that is not kept, or "".
     """
 
     def __init__(
         self, bus: Bus, name: str, prefix: str, model: RobotModel, mover: Mover, limits: tuple[float, float],
         senders: Senders, phase: float = 0.0, time: CommandTime | None = None,
-        keep_stop: Callable[[], None] = lambda: None,
+        keep_stop: Callable[[], str] = lambda: "",
     ) -> None:  # fmt: skip
         self._model, self.prefix = model, prefix
         self._agenda: Agenda[Robot] = Agenda()  # unused, until `schedule_on`
@@ -128,9 +130,9 @@ class Robot:
         if self._drive:
             self._drive.publish_status(now, at_once)
 
-    def _on_stop(self, keep_stop: Callable[[], None], now: float) -> None:
-        keep_stop()
+    def _on_stop(self, keep_stop: Callable[[], str], now: float) -> str:
         self.publish_status(now, at_once=True)
+        return keep_stop()
 
     @property
     def is_waiting(self) -> bool:
@@ -272,7 +274,9 @@ class Robot:
             joints.publish(stamp, self.mover.states())
 
     def close(self) -> None:
-        """Close its keys."""
+        """Close its keys. Its `memory` is then for the next robot of that name to inherit."""
+        for arbiter in self.memory:
+            arbiter.settle(time.monotonic())
         self.schedule_on(Agenda())
         if self._drive:
             self._drive.close()

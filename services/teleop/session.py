@@ -91,10 +91,10 @@ class Session:
         if self._pending and not self.mapper.engaged:
             self._do_pending()
         lost = self.client.odom.is_lost
-        if (self.client.was_removed() or (lost and self._had_odom)) and self._drives:
+        if (self.client.odom.was_removed() or (lost and self._had_odom)) and self._drives:
             self.let_go(BLIND)
         self._had_odom = not lost
-        if self.client.was_reset() and self._drives:
+        if self.client.odom.was_reset() and self._drives:
             self.let_go(RESET)
         repeats = self.mapper.settings.repeat_rate > 0 or self.mapper.stopping_since() is not None
         if self.mapper.expire(now) or (repeats and now >= self.due):

@@ -10,12 +10,12 @@ from typing import TypeVar
 from holozen.bus import Bus, Publisher
 from holozen.limits import Planar
 from holozen.messages import CommandStatus, Header, Odometry, Point, Pose, PoseStamped, SceneEntity, Twist
-from holozen.odometry import OdometryFeedback
+from holozen.odometry import RobotFeedback
 from holozen.rotation import Transform
 from holozen.wire import PRIORITY_OF, key_for
 
 from .instances import difference
-from .pad import LOST, Pad
+from .pad import LOST, RESET, Pad
 
 T = TypeVar("T")
 
@@ -31,7 +31,7 @@ class Driver:
     def __init__(self, bus: Bus, command: str, odometry: str) -> None:
         self.namespace = command.rpartition("/")[0]
         self._bus, self._command = bus, command
-        self._odom = OdometryFeedback(bus, odometry)
+        self._odom = RobotFeedback(bus, odometry)
         self._status = bus.latest(f"{command}_status", CommandStatus)
         self._pad, self._lock = Pad(), threading.Lock()
         self._speeds = (SPEED, TURN)
@@ -53,8 +53,10 @@ class Driver:
         """Publish what is due. Returns whether the pad is in use."""
         with self._lock:
             now = time.monotonic()
-            if self._odom.is_lost:
+            if self._odom.was_removed() or self._odom.is_lost:
                 self._pad.stop(now, LOST)
+            if self._odom.was_reset():
+                self._pad.stop(now, RESET)
             since = self._pad.stopping_since(now)
             motion = self._pad.command(now, since is not None and self._odom.rests(since))
             if motion is not None and (motion != self._sent or now - self._sent_at >= REPEAT):

@@ -26,13 +26,13 @@ from holozen.bag import formats
 from holozen.bus import Bus, BusError, Publisher, ServiceError
 from holozen.cli.param import Nodes
 from holozen.console import report
-from holozen.messages import Message, Twist, codec
+from holozen.messages import JointState, Message, codec
 from holozen.messages.definitions import Interface, InterfaceError, whole_text
 from holozen.messages.registry import Registry
 from holozen.transport.graph import Endpoint
 from holozen.transport.samples import RawSubscriber
 from holozen.transport.services import call_bytes
-from holozen.wire import PRIORITY_OF, is_command
+from holozen.wire import PRIORITY_OF, is_command, stop
 
 from .guard import Guard, TimedConnection
 
@@ -43,6 +43,7 @@ LOOK_EVERY, DRAIN_EVERY = 0.5, 0.01  # s; how often the graph is read, and the t
 DEPTH = 64  # messages of a topic that wait
 CALL = 5.0  # s for a service
 LARGEST = 16_000_000  # bytes that a client may send at once
+MAX_STOPS = 64  # of a channel: one for each set of joints that a client names
 TURN = 0.5  # s without a motion command by the client that drives a robot, after which another one may drive
 VOUCHED = 0xFFFF_FFFF  # the number of the channel by which the relay vouches for a client
 LOOK_ONLY = "this view is read-only: it was started with --look-only"
@@ -148,13 +149,20 @@ class Topic:
             self._raw = None
 
 
+def _moves(command: Message, stop: Message) -> bool:
+    """Whether a command moves anything."""
+    if isinstance(command, JointState):
+        return any(command.velocity) or any(command.effort)
+    return bool(getattr(command, "twist", command) != getattr(stop, "twist", stop))
+
+
 class Commands:
     """Publishes what clients send, by the rules of the page: with a person's priority, and with a stop at the end."""
 
     def __init__(self, bus: Bus, endpoints: Callable[[], list[Endpoint]]) -> None:
         self._bus, self._endpoints = bus, endpoints
         self._lock = threading.Lock()
-        self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str]]()
+        self._open = dict[tuple[int, int], tuple[Publisher[Any], type[Message], str, list[Message]]]()  # with its stops
         self._ends = False
         self._drivers = dict[str, tuple[int, float]]()  # by key: the client that last moved the robot, and when
 
@@ -173,21 +181,27 @@ class Commands:
         with self._lock:
             if self._ends:
                 raise ValueError("the view ends, and publishes no more")
-            self._open[client, channel.id] = self._bus.publisher(key, kind, priority), kind, encoding
+            self._open[client, channel.id] = self._bus.publisher(key, kind, priority), kind, encoding, []
 
     def put(self, client: int, channel: int, data: bytes) -> None:
         """Publish a client's message. Raises ValueError if it is malformed, or while another client drives."""
         with self._lock:
             if not (found := self._open.get((client, channel))):
                 return
-            publisher, kind, encoding = found
+            publisher, kind, encoding, stops = found
+            key = str(publisher.key)
             try:
                 message = codec.decode(data, encoding, (kind,))
-                if kind is Twist and message != Twist():
-                    self._take_turn(str(publisher.key), client)
+                if is_command(key, (kind.ROS,)) and (fields := stop(message, kind.ROS)) is not None:
+                    stopped = kind(**fields)
+                    if _moves(message, stopped):
+                        self._take_turn(key, client)
+                    if stopped not in stops:
+                        stops.append(stopped)
+                        del stops[:-MAX_STOPS]
                 publisher.put(message)
             except codec.CodecError as error:
-                raise ValueError(f"/{publisher.key}: {error}") from None
+                raise ValueError(f"/{key}: {error}") from None
 
     def _take_turn(self, key: str, client: int) -> None:
         """To the robot all clients are one source, so they take turns here. Raises ValueError while another one drives.
@@ -200,12 +214,12 @@ class Commands:
         self._drivers[key] = client, now
 
     def close(self, client: int, channel: int) -> None:
-        """A client stops publishing on a channel: stop the robot that it drives by it."""
+        """A client stops publishing on a channel: stop what it moved by it."""
         with self._lock:
             if found := self._open.pop((client, channel), None):
-                publisher, kind, _ = found
-                if kind is Twist:
-                    publisher.put(Twist())
+                publisher, _, _, stops = found
+                for stopped in stops:
+                    publisher.put(stopped)
                 publisher.close()
 
     def halt(self) -> None:

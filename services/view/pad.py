@@ -17,6 +17,7 @@ OTHER = "another page drives this robot"
 SILENT = f"the button was silent for {HELD:g} s, and counts as let go"
 ENDS = "the view ends, and drives no more"
 LOST = "odometry was lost, and the button counts as let go"
+RESET = "the robot was reset, and the button counts as let go"
 
 
 class Pad:

@@ -3,6 +3,7 @@
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 REPO = Path(__file__).parents[2]
@@ -12,8 +13,11 @@ NOT_OURS = {"_set_ros_time_is_active", "_linear", "_replace", "_exit"}
 HIDDEN = {"_holozen"}  # the one attribute of a node that is ours and not rclpy's; no script's own has this name
 
 
-def nodes(path: Path) -> Iterator[ast.AST]:
-    return ast.walk(ast.parse(path.read_text()))
+@cache  # each rule looks at all of them
+def nodes(path: Path) -> list[ast.AST]:
+    """What the rules look at."""
+    looked_at = ast.Import | ast.ImportFrom | ast.Attribute
+    return [node for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, looked_at)]
 
 
 def is_private(name: str) -> bool:

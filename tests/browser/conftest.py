@@ -1,7 +1,8 @@
 """One sim, one view and one Chromium for the tests of a file."""
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, sync_playwright
@@ -11,6 +12,15 @@ from holozen.testing import Process, Wire
 SOFTWARE_WEBGL = ("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 TOKEN = "sesame"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Function) -> Generator[None, Any, Any]:
+    """A failure shows the text of the test's page."""
+    report = yield
+    if report.failed and (page := getattr(item, "funcargs", {}).get("page")):
+        report.sections.append(("Text of the page", page.inner_text("body")))
+    return report
 
 
 @pytest.fixture(scope="module")

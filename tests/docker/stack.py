@@ -4,17 +4,19 @@ import json
 import os
 import re
 import subprocess
+import time
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 from holozen.bus import Bus
 from holozen.messages import CommandStatus, Odometry
-from holozen.testing import wait_for
+from holozen.testing import Process, wait_for
 from holozen.testing.wire import free_port
 from holozen.transport.connection import Connection
 
 ROOT = Path(__file__).resolve().parents[2]
+NAMED = '{{.Label "com.docker.compose.service"}} {{.ID}}'
 SERVICES = ("router", "sim", "pose_service", "controller", "view")
 
 
@@ -28,6 +30,7 @@ class Stack:
         self.name, self.port, self.page = f"holozen-test-{uuid4().hex[:8]}", free_port(), free_port()
         self.env = {"HOLOZEN_IMAGE": image, "HOLOZEN_PORT": str(self.port), "HOLOZEN_VIEW_PORT": str(self.page), **env}
         self.services = services
+        self._known: dict[str, str] = {}  # the id of each service's container
         self.connection = Connection(mode="client", connect=(f"tcp/127.0.0.1:{self.port}",))
 
     def words(self, *words: str) -> list[str]:
@@ -41,7 +44,22 @@ class Stack:
     def up(self) -> None:
         """Start everything and wait until every healthcheck succeeds."""
         self.compose("up", "-d")
-        wait_for(lambda: set(self.healths().values()) == {"healthy"}, within=60, what="healthy containers")
+        self.wait_until_healthy()
+
+    def wait_until_healthy(self) -> None:
+        """Look again when the engine reports a change."""
+        words = ["docker", "events", "--since", f"{time.time():.3f}", "--filter", "event=health_status"]
+        ids, seen = [self.container(service) for service in self.services], -1
+        with Process([*words, "--filter", f"label=com.docker.compose.project={self.name}"]) as events:
+
+            def healthy() -> bool:
+                nonlocal seen
+                if (count := len(events.out)) == seen:
+                    return False
+                seen = count
+                return set(docker("inspect", "--format", "{{.State.Health.Status}}", *ids).split()) == {"healthy"}
+
+            wait_for(healthy, within=60, what="healthy containers")
 
     def down(self) -> None:
         """End and remove everything that `up` made, one-off containers too."""
@@ -62,27 +80,30 @@ class Stack:
             self.down()
 
     def container(self, service: str) -> str:
-        """The id of a service's container, running or not."""
-        return self._ids(f"label=com.docker.compose.service={service}", "label=com.docker.compose.oneoff=False")[0]
+        """The id of a service's container, running or not; a restart leaves it as it is."""
+        if service not in self._known:
+            self._known |= dict(row.split() for row in self._list(NAMED, "label=com.docker.compose.oneoff=False"))
+        return self._known[service]
 
     def containers(self) -> list[str]:
         """The ids of all containers, one-off ones too."""
-        return self._ids()
+        return self._list("{{.ID}}")
 
-    def inspect(self, service: str) -> dict[str, Any]:
-        """What the engine reports about a service's container."""
-        found: dict[str, Any] = json.loads(docker("inspect", self.container(service)))[0]
-        return found
-
-    def healths(self) -> dict[str, str]:
-        return {service: self.inspect(service)["State"]["Health"]["Status"] for service in self.services}
+    def inspect(self, *services: str) -> dict[str, Any]:
+        """What the engine reports about the containers of these services, or of all."""
+        names = services or self.services
+        return dict(zip(names, json.loads(docker("inspect", *map(self.container, names))), strict=True))
 
     def starts(self, *services: str) -> dict[str, str]:
         """When each of these was started, so that a restart is noticed."""
-        return {service: self.inspect(service)["State"]["StartedAt"] for service in services}
+        return {service: found["State"]["StartedAt"] for service, found in self.inspect(*services).items()}
 
     def logs(self, *services: str) -> str:
         return "\n".join(docker("logs", self.container(service)) for service in services or self.services)
+
+    def follow(self, service: str, *flags: str) -> Process:
+        """Its log, with what is added to it."""
+        return Process(["docker", "logs", "--follow", *flags, self.container(service)])
 
     def complaints(self) -> list[str]:
         """The lines of the logs that should not be there."""
@@ -92,9 +113,9 @@ class Stack:
         """Run a command in a service's container. Returns its output."""
         return docker("exec", self.container(service), *words)
 
-    def _ids(self, *filters: str) -> list[str]:
+    def _list(self, form: str, *filters: str) -> list[str]:
         words = [word for f in (f"label=com.docker.compose.project={self.name}", *filters) for word in ("--filter", f)]
-        return docker("ps", "--all", "--quiet", "--no-trunc", *words).split()
+        return docker("ps", "--all", "--no-trunc", "--format", form, *words).splitlines()
 
 
 class Watcher:

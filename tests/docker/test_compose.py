@@ -2,7 +2,7 @@
 
 import json
 import sys
-from functools import partial
+import time
 from typing import Any
 from urllib.error import HTTPError
 from urllib.request import Request, urlopen
@@ -33,17 +33,22 @@ def odom(stack: Stack) -> Any:
 def listeners(stack: Stack, service: str) -> set[tuple[str, int]]:
     """The (protocol, port) pairs that a service's container listens on."""
     found: set[tuple[str, int]] = set()
-    for protocol in ("tcp", "tcp6", "udp", "udp6"):
-        for row in stack.execute(service, "cat", f"/proc/net/{protocol}").splitlines()[1:]:
-            _, local, _, state, *_ = row.split()
-            address, port = local.split(":")
-            if address != DOCKERS_DNS and (state == LISTENS or protocol.startswith("udp")):
-                found.add((protocol, int(port, 16)))
+    for row in stack.execute(service, "sh", "-c", "cd /proc/net && grep . tcp tcp6 udp udp6").splitlines():
+        protocol, _, rest = row.partition(":")
+        _, local, _, state, *_ = rest.split()
+        address, _, port = local.partition(":")
+        if port and address != DOCKERS_DNS and (state == LISTENS or protocol.startswith("udp")):
+            found.add((protocol, int(port, 16)))
     return found
 
 
+def hold_forward(terminal: Terminal, watcher: Watcher) -> None:
+    """Hold i until the teleop drives."""
+    terminal.hold_until("i", lambda: watcher.driven_by("teleop") and watcher.odom().twist.twist.linear.x > 0.4)
+
+
 def test_only_the_router_and_the_page_of_the_view_are_published_and_only_on_loopback(stack: Stack) -> None:
-    bound = {service: stack.inspect(service)["NetworkSettings"]["Ports"] for service in SERVICES}
+    bound = {service: found["NetworkSettings"]["Ports"] for service, found in stack.inspect().items()}
     ports = {"router": ("7447/tcp", stack.port), "view": ("8080/tcp", stack.page)}
     here = {
         service: {inside: [{"HostIp": "127.0.0.1", "HostPort": str(port)}]} for service, (inside, port) in ports.items()
@@ -89,19 +94,16 @@ def test_from_this_machine_one_sees_the_robot_move(stack: Stack, watcher: Watche
 
 def test_the_controller_drives_its_shape(stack: Stack) -> None:
     corners = ("(1.00, 0.00, 90 deg)", "(1.00, 1.00, 180 deg)", "(0.00, 1.00, -90 deg)", "(0.00, 0.00, 0 deg)")
-    wait_for(lambda: all(f": {c} in" in stack.logs("controller") for c in corners), within=60, what="four corners")
+    with stack.follow("controller") as log:
+        for corner in corners:
+            log.wait_for_line(f": {corner} in", within=60)
 
 
 def test_a_person_takes_over_from_a_terminal_and_hands_back(stack: Stack, watcher: Watcher) -> None:
     everybody = stack.containers()
     with Terminal(stack.words("run", "--rm", "teleop"), env=stack.env) as terminal:
         terminal.wait_for_text("controller@", within=60)
-
-        def driven() -> bool:
-            terminal.type("i")  # with each status, as a held key
-            return watcher.driven_by("teleop") and watcher.odom().twist.twist.linear.x > 0.4
-
-        wait_for(driven, what="the teleop to drive")
+        hold_forward(terminal, watcher)
         terminal.wait_for_text("you drive")
         terminal.type("\x03")
         assert terminal.process.wait() == 0
@@ -119,12 +121,7 @@ def test_a_person_attaches_and_detaches_and_the_robot_stands(stack: Stack, watch
     container = stack.container("teleop")
     with Terminal(["docker", "attach", container], env=stack.env) as terminal:
         terminal.wait_for_text("listening sim", within=60)
-
-        def driven() -> bool:
-            terminal.type("i")
-            return watcher.driven_by("teleop") and watcher.odom().twist.twist.linear.x > 0.4
-
-        wait_for(driven, what="the teleop to drive")
+        hold_forward(terminal, watcher)
         terminal.type("\x10\x11")  # Docker's own keys
         terminal.process.wait()
         assert "read escape sequence" in terminal.raw, "it was detached"
@@ -155,10 +152,10 @@ def test_a_sim_that_is_killed_is_started_again_and_the_others_carry_on(stack: St
 
 def test_a_sim_that_was_killed_by_docker_stays_down_until_it_is_started(stack: Stack, watcher: Watcher) -> None:
     others = stack.starts("router", "pose_service", "controller")
-    docker("kill", stack.container("sim"))
-    logs = partial(stack.logs, "controller")
-    wait_for(lambda: "waiting for odom" in logs().splitlines()[-1], what=logs)
-    assert not stack.inspect("sim")["State"]["Running"]
+    with stack.follow("controller", "--since", f"{time.time()}") as log:
+        docker("kill", stack.container("sim"))
+        log.wait_for_line("waiting for odom")
+    assert not stack.inspect("sim")["sim"]["State"]["Running"]
     stack.compose("start", "sim")
     wait_for(lambda: watcher.driven_by("controller"), within=30, what="the controller to drive")
     assert stack.starts(*others) == others
@@ -166,7 +163,7 @@ def test_a_sim_that_was_killed_by_docker_stays_down_until_it_is_started(stack: S
 
 def test_a_healthcheck_fails_where_its_process_is_gone(stack: Stack, watcher: Watcher) -> None:
     gone = ("sim", "pose_service", "controller")
-    checks = {service: stack.inspect(service)["Config"]["Healthcheck"]["Test"][1] for service in SERVICES}
+    checks = {service: found["Config"]["Healthcheck"]["Test"][1] for service, found in stack.inspect().items()}
     with pytest.raises(AssertionError, match="exit code 1"):
         stack.execute("sim", "sh", "-c", checks["router"])
     stack.compose("stop", *gone)
@@ -184,12 +181,12 @@ def test_when_the_router_is_started_again_everybody_comes_back(stack: Stack, wat
     wait_for(lambda: holozen(stack, "node", "list").split() == sorted(SERVICES), what="all nodes in the graph")
     assert json.loads(holozen(stack, "service", "call", "next_goal", '{"request_goal": 1}', "--json"))["x_goal"] == 1
     assert stack.starts(*others) == others
-    wait_for(lambda: set(stack.healths().values()) == {"healthy"}, within=60, what="healthy containers")
+    stack.wait_until_healthy()
 
 
 def test_after_all_this_each_process_ends_by_itself_with_code_0_and_clean_logs(stack: Stack) -> None:
     stack.compose("stop")
-    ends = {service: stack.inspect(service)["State"]["ExitCode"] for service in SERVICES}
+    ends = {service: found["State"]["ExitCode"] for service, found in stack.inspect().items()}
     assert ends == dict.fromkeys(SERVICES, 0)  # 137 would be one that had to be killed
     assert stack.complaints() == []
 

@@ -58,13 +58,13 @@ def test_without_a_certificate_nothing_is_reached(stack: Stack) -> None:
 
 
 def test_each_container_holds_its_own_key_and_no_rights(stack: Stack) -> None:
-    for service in stack.services:
+    for service, found in stack.inspect().items():
         lines = stack.execute(service, "cat", "/proc/1/status").splitlines()
         status = dict(line.split(":\t", 1) for line in lines)
         assert int(status["CapEff"], 16) == int(status["CapBnd"], 16) == 0 and "0" not in status["Uid"].split(), service
         seen = stack.execute(service, "sh", "-c", "ls /secure; touch /secure/x 2>&1 || true")
         assert "key.pem" in seen and "ca.key" not in seen and "Read-only" in seen, service
-        sources = {mount["Destination"]: mount["Source"] for mount in stack.inspect(service)["Mounts"]}
+        sources = {mount["Destination"]: mount["Source"] for mount in found["Mounts"]}
         assert sources.pop("/secure").endswith(f"/{MEMBER[service]}"), service
         assert set(sources) == ({"/state"} if service == "sim" else set()), service
     assert stack.complaints() == []

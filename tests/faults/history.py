@@ -12,7 +12,7 @@ from itertools import accumulate, pairwise
 from pathlib import Path
 from typing import NamedTuple
 
-from holozen.testing import Process
+from holozen.testing import Process, wait_for
 from holozen.wire import COMMAND_SILENCE
 
 PROMPT = 0.05  # s; a robot at rest may obey a command that took no longer, see docs/safety.md
@@ -32,11 +32,6 @@ def script(name: str, endpoint: str) -> list[str]:
     return [sys.executable, str(Path(__file__).with_name(f"{name}.py")), endpoint]
 
 
-def newest(observer: Process) -> float:
-    """The time at which the newest odom was sent."""
-    return next((float(line.split()[0]) for line in reversed(whole_lines(observer))), 0.0)
-
-
 @dataclass(frozen=True)
 class Row:
     """An odom that was sent at `end`. The robot's last step was decided after `begin`, when the one before was sent."""
@@ -44,6 +39,26 @@ class Row:
     begin: float
     end: float
     moves: bool
+
+
+def newest(observer: Process) -> Row:
+    """The newest odom."""
+    seen = [line.split() for line in observer.out.rpartition("\n")[0].rsplit("\n", 2)[-2:]]
+    return (
+        Row(float(seen[0][0]), float(seen[1][0]), float(seen[1][1]) > MOVES) if len(seen) > 1 else Row(0.0, 0.0, False)
+    )
+
+
+def wait_for_odom(observer: Process, at: float) -> None:
+    """Wait for an odom that was sent after this."""
+    wait_for(lambda: newest(observer).end > at, what="odom")
+
+
+def wait_for_motion(observer: Process, since: float, moves: bool = True) -> None:
+    """Wait until the robot certainly moves, or stands, at a time after this."""
+    wait_for(
+        lambda: (row := newest(observer)).begin > since and row.moves is moves, what=f"a robot that moves: {moves}"
+    )
 
 
 class Command(NamedTuple):

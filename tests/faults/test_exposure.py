@@ -21,26 +21,31 @@ def host(lab: Lab) -> Host:
     return lab.host("robot")
 
 
-@pytest.mark.parametrize("listen", ["tcp/[::]:7447", "udp/10.99.1.1:7447"])
-def test_a_sim_that_listens_beyond_loopback_warns(lab: Lab, host: Host, listen: str) -> None:
+def found_by_the_doctor(host: Host) -> list[dict[str, str]]:
+    rows = map(json.loads, host.run(*command("doctor", "--json")).stdout.splitlines())
+    return [row for row in rows if row["check"] == "network"]
+
+
+def test_a_sim_that_listens_beyond_loopback_warns_and_the_doctor_finds_it(lab: Lab, host: Host) -> None:
     lab.cable(host, lab.host("desk"))
-    sim = host.start(*command("sim", "--listen", listen))
-    assert sim.wait_for_line("open to the network") == f"sim: listens at {listen}, {RISK}"
-    sim.wait_for_line("listens on cmd_vel")
-
-
-def test_a_hostname_is_looked_up(host: Host) -> None:
-    host.start(*command("sim", "--listen", "tcp/localhost:7447")).wait_for_line("listens on cmd_vel")
-    done = host.run(*command("doctor", "--json"))
-    assert not [row for row in map(json.loads, done.stdout.splitlines()) if row["check"] == "network"]
-
-
-def test_a_sim_on_loopback_prints_no_network_warning(host: Host) -> None:
-    for flags in ((), LOOPBACK):
-        sim = host.start(*command("sim", *flags))
+    for listen in ("udp/10.99.1.1:7447", "tcp/[::]:7447"):
+        sim = host.start(*command("sim", "--listen", listen))
+        assert sim.wait_for_line("open to the network") == f"sim: listens at {listen}, {RISK}"
         sim.wait_for_line("listens on cmd_vel")
-        assert "network" not in sim.err
+        if listen.startswith("tcp"):
+            (row,) = found_by_the_doctor(host)
+            assert row["level"] == "warning"
+            assert f"listens at {listen}, {RISK}" in row["text"]
         assert sim.terminate() == 0
+
+
+@pytest.mark.parametrize("flags", [(), LOOPBACK, ("--listen", "tcp/localhost:7447")], ids=" ".join)
+def test_a_sim_on_loopback_prints_no_network_warning(host: Host, flags: tuple[str, ...]) -> None:
+    sim = host.start(*command("sim", *flags))
+    sim.wait_for_line("listens on cmd_vel")
+    assert "network" not in sim.err
+    if "tcp/localhost:7447" in flags:  # which is looked up
+        assert found_by_the_doctor(host) == []
 
 
 @pytest.mark.parametrize("way", ["config", "cfg"])
@@ -67,11 +72,3 @@ def test_a_router_with_passwords_does_not_warn(host: Host, tmp_path: Path) -> No
     router = host.start(*command("router", "--listen", "tcp/0.0.0.0:7447", "--cfg", dictionary))
     router.wait_for_line("router: listens at tcp/0.0.0.0:7447")
     assert "open to the network" not in router.err
-
-
-def test_the_doctor_finds_it(host: Host) -> None:
-    host.start(*command("sim", "--listen", "tcp/0.0.0.0:7447")).wait_for_line("listens on cmd_vel")
-    done = host.run(*command("doctor", "--json"))
-    (row,) = [row for row in map(json.loads, done.stdout.splitlines()) if row["check"] == "network"]
-    assert row["level"] == "warning"
-    assert f"listens at tcp/0.0.0.0:7447, {RISK}" in row["text"]

@@ -65,7 +65,7 @@ class Watch:
         were refused so far, or nothing if it need not wait for what `counts`.
         """
         # The sim answers this question after all that was sent before it; a message that comes then is later still.
-        names = list(self.bus.session.get("get_entities", priority=LAST, timeout=10))
+        names = list(self.bus.session.get("get_entities", payload="{}", priority=LAST, timeout=10))
         assert [STANDS.encode() in bytes(reply.ok.payload) for reply in names if reply.ok] == [True], what
         going, resting = (_new(odom, 1) for odom in self.odoms)
         driven, standing = (_new(status, 2 * counts) for status in self.statuses)
@@ -153,7 +153,9 @@ def serve(key: str) -> Act:
         bus, fetched = raid.watch.bus, []
         for asked in ("get_entities", "robot_description", "stop" if "stop" in key else "get_scene"):
             if asked != "stop":
-                fetched += [bytes(reply.ok.payload) for reply in bus.session.get(asked, timeout=5) if reply.ok]
+                fetched += [
+                    bytes(reply.ok.payload) for reply in bus.session.get(asked, payload="{}", timeout=5) if reply.ok
+                ]
         got = bus.call("sim/get_parameters", GetParametersRequest(["max_linear"]), GetParametersReply)
         assert fetched and not [one for one in fetched if b"evil" in one], key
         assert got.values[0].double_value == 5.0, key
@@ -224,7 +226,7 @@ def flood(raid: Raid) -> None:
 
 def ask_much(raid: Raid) -> None:
     for _ in range(500):
-        raid.session.get("get_scene", timeout=1, handler=zenoh.handlers.RingChannel(1))
+        raid.session.get("get_scene", payload="{}", timeout=1, handler=zenoh.handlers.RingChannel(1))
 
 
 def fill(raid: Raid) -> None:
@@ -253,9 +255,10 @@ def pose_as(which: str) -> Act:
 
     def act(raid: Raid) -> None:
         ids = {"driver": raid.victim, "sim": sim_session(raid), "router": str(raid.session.info.routers_zid()[0])}
-        with contextlib.suppress(zenoh.ZError), raid.fleet.tool(raid.name, id=ids[which]) as twin:
+        twin = {"id": ids[which], "connect__timeout_ms": 1000}
+        with contextlib.suppress(zenoh.ZError), raid.fleet.tool(raid.name, **twin) as session:
             for key, payload in ((f"{STANDS}/cmd_vel", FORWARD), ("odom", EVIL), ("clock", EVIL)):
-                twin.put(key, payload)
+                session.put(key, payload)
 
     return act
 

@@ -34,6 +34,7 @@ def test_a_caller_learns_that_its_service_died_and_the_next_one_answers(wire: Wi
     caller = wire.bus("caller")
     with Process([sys.executable, "-c", DIES, wire.endpoint]) as dying:
         dying.wait_for_line("serves")
+        wait_for(caller.served("stop"))
         with pytest.raises(NoReply, match="no reply from 'stop' within 2 s"):
             caller.call("stop", TriggerRequest(), TriggerReply, 2.0)
         assert dying.wait() == 3
@@ -86,7 +87,7 @@ def test_a_robot_stands_while_its_next_goal_is_slow_to_come_and_then_drives_ther
     server.start()
     wait_for(lambda: asked)
     go.wait(SLOW)
-    before = odom.read()[0]
+    before = wait_for(lambda: odom.read()[0])
     assert before and before.twist.twist.is_slow(0.001)
     go.set()
     controller.wait_for_line("goal 0: (0.30, 0.00")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from holozen.testing import Process, wait_for
+from holozen.testing import Process
 from holozen.testing.wire import command, free_port
 from tests.built import built, needs
 
-from .history import CLOCK, EACH_STEP, History, newest, script
+from .history import CLOCK, EACH_STEP, History, script, wait_for_motion, wait_for_odom
 from .namespaces import NEEDS, Lab
 
 pytestmark = [NEEDS]
@@ -54,13 +54,7 @@ def test_robots_stand_when_the_link_is_cut_and_only_fresh_commands_move_them_aft
     router(desk, "--listen", here, "--connect", there)
     driver = desk.start(*script("driver", here))
 
-    def history() -> History:
-        return History.of([driver], observer, CLOCK)
-
-    def wait_for_motion(since: float) -> None:
-        wait_for(lambda: history().moves(since), 30.0, "a robot that moves")
-
-    wait_for_motion(0.0)
+    wait_for_motion(observer, 0.0)
     rate = desk.start(*command("topic", "hz", "odom", "--window", "5", *CLIENT, here)).wait_for_line("average rate")
     assert float(rate.split()[-1]) < 6.0, "each step of the sim crossed"
     assert desk.run(*command("topic", "echo", "clock", "--once", "--timeout", "2", *CLIENT, here)).returncode
@@ -70,10 +64,10 @@ def test_robots_stand_when_the_link_is_cut_and_only_fresh_commands_move_them_aft
     time.sleep(1.5)
     restored = time.monotonic()
     cable.join()
-    wait_for_motion(restored)
-    wait_for(lambda: newest(observer) > restored + 1.0, 20.0, "odom")
+    wait_for_motion(observer, restored)
+    wait_for_odom(observer, restored + 1.0)
     driver.close()
-    found = history()
+    found = History.of([driver], observer, CLOCK)
     assert not found.moves(began + 0.55 + DELAY, restored), "the cut did not hit"
     found.check_silence(began)
     found.check_restored(restored)

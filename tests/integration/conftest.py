@@ -2,12 +2,14 @@
 
 import contextlib
 import json
+import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import pytest
 import zenoh
 
+from holozen import cli
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
@@ -44,6 +46,21 @@ def robot(only_robot: Robot) -> Robot:
     only_robot.stands()
     wait_for(handed_over, what="the robot to be handed over")
     return only_robot
+
+
+@pytest.fixture
+def verb(capsys: pytest.CaptureFixture[str]) -> Callable[..., subprocess.CompletedProcess[str]]:
+    """Run `holozen VERB WORDS...` on a wire, in this process: for tests of what verbs write."""
+
+    def run(wire: Wire, *words: str) -> subprocess.CompletedProcess[str]:
+        capsys.readouterr()
+        try:
+            code = cli.main([*words, *wire.flags])
+        except SystemExit as end:
+            code = int(end.code or 0)
+        return subprocess.CompletedProcess(words, code, *capsys.readouterr())
+
+    return run
 
 
 def start_sim(wire: Wire, *flags: str) -> Process:

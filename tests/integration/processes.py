@@ -6,7 +6,7 @@ from pathlib import Path
 
 from holozen.bag import Message
 from holozen.bag.reader import Bag
-from holozen.testing import Wire
+from holozen.testing import Wire, wait_for
 
 
 def assert_one_line(done: subprocess.CompletedProcess[str], code: int, *parts: str) -> None:
@@ -55,6 +55,14 @@ def parts_at(wire: Wire) -> dict[str, int]:
         words = words_of(pid)
         if words == words_of(parent_of(pid)):  # it is about to become another program
             continue
-        if wire.endpoint in words and "holozen" in words and "-c" not in words:
-            found[words[words.index("holozen") + 1]] = pid
+        names = [Path(word).name for word in words]  # `python -m holozen` as well as `.venv/bin/holozen`
+        if wire.endpoint in words and "holozen" in names and "-c" not in words:
+            found[words[names.index("holozen") + 1]] = pid
     return found
+
+
+def wait_for_none(wire: Wire) -> None:
+    """Wait until nothing runs on this wire. What does now is looked at first, as that is cheap."""
+    parts = list(parts_at(wire).values())
+    wait_for(lambda: not any(map(words_of, parts)), what="the end of all that runs")
+    wait_for(lambda: parts_at(wire) == {}, what="the end of what was started meanwhile")

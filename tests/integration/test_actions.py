@@ -2,21 +2,29 @@
 
 import json
 import signal
-from collections.abc import Iterator
+import subprocess
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
 
+from holozen import data
 from holozen.messages import PoseStamped, TriggerReply, TriggerRequest
 from holozen.messages.geometry_msgs import Point, Pose
 from holozen.messages.std_msgs import Header
 from holozen.testing import LockStep, Process, Wire, wait_for
 
 from .conftest import start_sim
-from .robots import Robot, place
+from .processes import assert_one_line
+from .robots import Robot, moves, place, rests
 
+Verb = Callable[..., subprocess.CompletedProcess[str]]
+BOT = str(data.find("urdf", "hb_bot.urdf.xacro"))
 FAR = 1e5  # m; a goal that is not reached
 END = "the controller "
+REMOVED = "the robot was removed or replaced, or the link to it was lost"
+RESET = "the robot was reset or moved"
+SPAWN = ("spawn", BOT, "--name", "Fred", "-x", "20")
 
 
 def pose(x: float, y: float = 0.0, **more: Any) -> dict[str, Any]:
@@ -53,8 +61,17 @@ def aborted(process: Process) -> str:
 def town() -> Iterator[Wire]:
     """A wire with a sim and a controller that has no list of goals."""
     with Wire() as wire:
-        start_sim(wire, "--rtf", "4")
+        start_sim(wire)
         wire.start("controller", "--laps", "0").wait_for_line("waiting for goal 0")
+        yield wire
+
+
+@pytest.fixture(scope="module")
+def freds() -> Iterator[Wire]:
+    """A wire with a sim and a controller of a robot with a name."""
+    with Wire() as wire:
+        start_sim(wire, "--robot", f"{BOT}=Fred")
+        wire.start("controller", "Fred", "--laps", "0").wait_for_line("waiting for goal 0")
         yield wire
 
 
@@ -84,9 +101,8 @@ def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(town: Wire, r
     assert place(robot.stands())[:2] == pytest.approx((0.2, 0.1), abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("action", "goal", "reason"),
-    [
+def test_a_wrong_goal_is_rejected_with_the_reason(town: Wire, verb: Verb) -> None:
+    for action, goal, reason in (
         ("navigate_to_pose", {"pose": pose(1.0, header={"frame_id": "moon"})}, "its frame is 'moon'; give it in"),
         ("navigate_to_pose", {"pose": pose(1e9)}, "it is more than 1e+06 m away"),
         ("navigate_to_pose", {"behavior_tree": "a.xml"}, "there are no behavior trees here"),
@@ -94,14 +110,9 @@ def test_the_robot_follows_waypoints_from_an_index_on_and_in_loops(town: Wire, r
         ("follow_waypoints", {"poses": [pose(0), pose(1e9)]}, "pose 1: it is more than 1e+06 m away"),
         ("follow_waypoints", {"poses": [pose(0)], "goal_index": 1}, "goal_index is 1; use 0 to 0"),
         ("follow_waypoints", {"poses": [pose(0)], "number_of_loops": 20000}, "at most 10000 in all"),
-    ],
-)  # fmt: skip
-def test_a_wrong_goal_is_rejected_with_the_reason(action: str, goal: Any, reason: str, town: Wire) -> None:
-    process = send(town, action, goal)
-    assert process.wait() == 1
-    assert reason in process.err
-    assert len(process.err.splitlines()) == 1
-    assert not process.out
+    ):
+        done = verb(town, "action", "send_goal", action, json.dumps(goal), "--feedback", "--json")
+        assert_one_line(done, 1, reason)
 
 
 def test_ctrl_c_cancels_the_goal_and_the_robot_stands(town: Wire, robot: Robot) -> None:
@@ -146,13 +157,43 @@ def test_a_controller_that_ends_and_a_sim_that_dies_end_the_goal(wire: Wire) -> 
     controller = wire.start("controller", "--laps", "0")
     controller.wait_for_line("waiting for goal 0")
     process = sent(wire, FAR)
-    sim.kill()
+    sim.signal(signal.SIGSTOP)
     assert aborted(process) == "there was no odom to act on for 2 s"
+    sim.signal(signal.SIGCONT)
+    process = sent(wire, FAR)
+    sim.kill()
+    assert aborted(process) == REMOVED
     start_sim(wire)
     process = sent(wire, FAR)
     controller.signal(signal.SIGINT)
     assert aborted(process) == "the controller ends"
     Robot(wire.bus()).stands()
+
+
+@pytest.mark.parametrize(
+    ("verbs", "reason"),
+    [
+        ([("sim", "reset", "--scope", "time")], RESET),
+        ([("sim", "reset", "--scope", "state")], RESET),
+        ([("sim", "reset", "--scope", "spawned")], RESET),
+        ([(*SPAWN, "--replace")], REMOVED),
+        ([("delete", "Fred"), SPAWN], REMOVED),
+    ],
+    ids=["time", "state", "spawned", "replaced", "deleted and spawned"],
+)
+def test_a_goal_is_not_driven_to_by_the_next_robot_or_after_a_reset(
+    freds: Wire, verb: Verb, verbs: list[tuple[str, ...]], reason: str
+) -> None:
+    fred = Robot(freds.bus(), "Fred")
+    goal = send(freds, "Fred/navigate_to_pose", {"pose": pose(FAR)})
+    fred.odom.next(lambda odom: not rests(odom))
+    for words in verbs:
+        assert verb(freds, *words).returncode == 0
+    fred.stands()
+    odoms = fred.odom.from_now()
+    fred.pass_time(1.0)
+    assert all(moves(odom, 0, 0, 0) for odom in odoms.messages())  # a spawned one comes to rest on the floor
+    assert aborted(goal) == reason
 
 
 def test_the_sim_makes_steps_and_tells_how_many(wire: Wire) -> None:
@@ -175,11 +216,11 @@ def test_the_sim_makes_steps_and_tells_how_many(wire: Wire) -> None:
     assert playing.startswith("the sim is playing; pause it to step")
 
 
-def test_the_lists_leave_out_what_an_action_consists_of(town: Wire) -> None:
+def test_the_lists_leave_out_what_an_action_consists_of(town: Wire, verb: Verb) -> None:
     for words, hidden in (
         (("topic", "list"), "simulate_steps/_action/feedback"),
         (("service", "list"), "simulate_steps/_action/send_goal"),
     ):
-        assert "_action" not in town.run(*words).stdout
-        assert hidden in town.run(*words, f"--include-hidden-{words[0]}s").stdout.splitlines()
-    assert town.run("action", "list").stdout == "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"
+        assert "_action" not in verb(town, *words).stdout
+        assert hidden in verb(town, *words, f"--include-hidden-{words[0]}s").stdout.splitlines()
+    assert verb(town, "action", "list").stdout == "follow_waypoints\nnavigate_to_pose\nsimulate_steps\n"

@@ -13,7 +13,7 @@ import zenoh
 from rosbags.typesys import Stores, get_typestore
 
 from holozen.bus import Bus
-from holozen.messages import CommandStatus, GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest
+from holozen.messages import GetPoseReply, GetPoseRequest, NextGoalReply, NextGoalRequest
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.errors import ServiceError
 from holozen.wire import TOPICS
@@ -95,13 +95,13 @@ def test_a_bad_command_is_refused_with_its_reason(robot: Robot, foreign: zenoh.S
         (b"\x00\x01\x00\x00" + b"\xff" * 600, "application/cdr", "malformed", "552 bytes too many"),
     ]:
         before = robot.status().refused.get(kind, 0)
-        foreign.put("cmd_vel", payload, encoding=encoding)
-        status = robot.status_when(partial(has_more, kind, before))
-        assert reason in status.last_refusal
 
+        def refused(payload: bytes = payload, encoding: str = encoding, kind: str = kind, before: int = before) -> str:
+            foreign.put("cmd_vel", payload, encoding=encoding)
+            status = robot.status()
+            return status.last_refusal if status.refused.get(kind, 0) > before else ""
 
-def has_more(kind: str, before: int, status: CommandStatus) -> bool:
-    return status.refused.get(kind, 0) > before
+        assert reason in wait_for(refused)
 
 
 def test_services_answer_in_cdr(only_robot: tuple[Wire, Robot], robot: Robot) -> None:

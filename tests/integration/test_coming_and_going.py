@@ -26,28 +26,19 @@ def test_a_sim_killed_while_driving_and_started_again_stands_until_a_key_is_pres
     robot = Robot(wire.bus())
     terminal = wire.terminal("teleop", "--mode", "latch")
     terminal.wait_for_text("listening")
-    terminal.type("i")
-    robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0))
+    terminal.hold_until("i", lambda: moves(robot.newest(), 0.5, 0, 0))
+    robot.odom.next(lambda odom: moves(odom, 0.5, 0, 0) and place(odom)[0] > 0.1)
     sim.kill()
     terminal.wait_for_text("ODOM IS STALE")
     assert terminal.process.returncode is None
     terminal.wait_for_text("odom was lost: stopped")
     start_sim(wire)
     wait_for(lambda: "ODOM IS STALE" not in terminal.screen())
-    assert rests(robot.newest())
-    terminal.type("J")
-    robot.odom.next(lambda odom: moves(odom, 0, 0.5, 0))
+    newest = robot.newest()
+    assert rests(newest) and place(newest) == pytest.approx((0, 0, 0), abs=1e-3)
+    terminal.hold_until("J", lambda: moves(robot.newest(), 0, 0.5, 0))
     terminal.type("k")
     robot.stands()
-
-
-def test_a_robot_starts_over_with_its_sim(wire: Wire) -> None:
-    sim = start_sim(wire)
-    robot = Robot(wire.bus())
-    robot.drive(1.0, until=lambda odom: place(odom)[0] > 0.3)
-    sim.kill()
-    start_sim(wire)
-    assert place(robot.newest()) == pytest.approx((0, 0, 0), abs=1e-3)
 
 
 def holder(wire: Wire) -> int:
@@ -93,15 +84,7 @@ def meet(wire: Wire, count: int) -> bool:
     return len(wire.run("node", "list").stdout.split()) == count
 
 
-def test_a_late_process_of_ours_gets_in_after_the_holder_is_gone(wire: Wire) -> None:
-    door = wire.start("pose-service")
-    door.wait_for_line("goals")
-    start_sim(wire)
-    door.kill()
-    assert wire.run("topic", "echo", "odom", "--once", "--timeout", "10").returncode == 0
-
-
-def test_nodes_that_met_through_a_holder_talk_on_when_it_is_gone(wire: Wire) -> None:
+def test_when_the_holder_is_gone_nodes_that_met_through_it_talk_on_and_late_ones_get_in(wire: Wire) -> None:
     """Gossip made a link of their own."""
     door = wire.start("pose-service")
     door.wait_for_line("goals")
@@ -109,7 +92,9 @@ def test_nodes_that_met_through_a_holder_talk_on_when_it_is_gone(wire: Wire) -> 
     robot = Robot(wire.bus())
     robot.drive(0.3)
     door.kill()
+    late = wire.start("topic", "echo", "odom", "--once", "--timeout", "10")
     robot.drive(-0.3)
+    assert late.wait() == 0
 
 
 # A bus with what a robot has. It ends by an exception, or after a flood on a peer, given by its pid, that hangs.
@@ -145,40 +130,40 @@ def test_a_process_with_an_open_bus_ends_after_an_exception(wire: Wire) -> None:
         assert process.out == "ready\n"
 
 
-def test_a_process_whose_peer_hangs_under_a_flood_leaves_all_the_same(wire: Wire) -> None:
+def test_a_peer_that_hangs_under_a_flood_holds_nobody_up_who_leaves(wire: Wire) -> None:
     """Zenoh itself waits 10 s for such a peer."""
-    sim = start_sim(wire)
-    with user(wire, str(sim.pid)) as process:
-        process.wait_for_line("left", within=30)
-        assert process.wait() == 0
-
-
-def test_a_bus_whose_peer_hangs_closes_at_once(wire: Wire) -> None:
     sim = start_sim(wire)
     bus = wire.bus()
     odom, commands = bus.latest("odom", Odometry), bus.publisher("cmd_vel", Twist)
     odom.wait(0, 10)
-    sim.signal(signal.SIGSTOP)
+    with user(wire, str(sim.pid)) as process:
+        process.wait_for_line("left", within=30)
+        assert process.wait() == 0
     for _ in range(20_000):
         commands.put(Twist())
     begin = time.monotonic()
     bus.close()
-    assert time.monotonic() - begin < 5.0  # Zenoh itself would wait 10 s
+    assert time.monotonic() - begin < 5.0
     with pytest.raises(BusError):
         bus.subscribe_raw("odom").recv()
 
 
-def test_every_service_ends_on_each_signal_even_alone(wire: Wire) -> None:
-    begun = {"sim": "listens", "pose-service": "goals", "controller": "goal 0", "router": "router"}
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        with ExitStack() as ends:
-            started = {verb: ends.enter_context(Wire()).start(verb) for verb in begun}
-            for verb, process in started.items():
-                process.wait_for_line(begun[verb])
-            for verb, process in started.items():
-                process.signal(number)
-                assert process.wait() == 0, (verb, number)
-                assert "Traceback" not in process.err
+ALONE = [
+    ("sim", "listens", signal.SIGHUP), ("sim", "listens", signal.SIGTERM), ("pose-service", "goals", signal.SIGINT),
+    ("controller", "goal 0", signal.SIGHUP), ("router", "router", signal.SIGINT),
+]  # fmt: skip
+
+
+def test_every_service_ends_on_a_signal_even_alone(wire: Wire) -> None:
+    """tests/unit/test_process.py has each signal."""
+    with ExitStack() as ends:
+        started = [ends.enter_context(Wire()).start(verb) for verb, _, _ in ALONE]
+        for process, (_, line, number) in zip(started, ALONE, strict=True):
+            process.wait_for_line(line)
+            process.signal(number)
+        for process, (verb, _, number) in zip(started, ALONE, strict=True):
+            assert process.wait() == 0, (verb, number)
+            assert "Traceback" not in process.err
 
 
 def test_a_service_with_its_words_cut_off_ends_quietly(wire: Wire) -> None:
@@ -197,13 +182,12 @@ def test_a_node_that_is_gone_answers_no_get_with_its_last_command(wire: Wire) ->
     start_sim(wire)
     terminal = wire.terminal("teleop", "--mode", "latch")
     terminal.wait_for_text("listening")
-    terminal.type("i")
-
     with zenoh.open(foreign_config(wire)) as session:
 
         def last_commands() -> list[Any]:
             return [json.loads(bytes(reply.ok.payload)) for reply in session.get("cmd_vel", timeout=2) if reply.ok]
 
-        assert wait_for(last_commands)[0]["linear"]["x"] == 0.5
+        terminal.hold_until("i", last_commands)
+        assert last_commands()[0]["linear"]["x"] == 0.5
         terminal.process.terminate()
         wait_for(lambda: last_commands() == [])

@@ -30,11 +30,6 @@ def probe(town: Wire) -> Probe:
     return Probe(town.bus)
 
 
-@pytest.mark.parametrize("promise", PROMISES, ids=name)
-def test_the_sim_keeps_every_promise(promise: Any, probe: Probe) -> None:
-    promise(probe)
-
-
 def test_the_command_line_reports_what_is_wrong_in_one_line(wire: Wire) -> None:
     words = (sys.executable, "-m", "holozen.testing.conformance", "--speed", "2", *wire.flags)
     done = subprocess.run(words, capture_output=True, text=True)
@@ -116,3 +111,8 @@ def test_a_naive_base_with_all_rules_keeps_every_promise(promise: Any, wire: Wir
     finally:
         end.set()
         naive.join()
+
+
+@pytest.mark.parametrize("promise", PROMISES, ids=name)
+def test_the_sim_keeps_every_promise(promise: Any, probe: Probe) -> None:
+    promise(probe)

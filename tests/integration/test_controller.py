@@ -2,8 +2,8 @@
 
 import contextlib
 import re
-import signal
-from typing import Any
+import subprocess
+from collections.abc import Callable
 
 import pytest
 
@@ -11,16 +11,11 @@ from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.transport.errors import ServiceError
 
 from .conftest import start_sim
+from .processes import assert_one_line
 from .robots import Robot, distance, moves, place, rests
 
 LEG = re.compile(r"lap (\d+) goal (\d+): \((.*), (.*), (.*) deg\) in (.*) s, path error (.*) mm")
 SQUARE = [(0.5, 0.0, 90), (0.5, 0.5, 180), (0.0, 0.5, -90), (0.0, 0.0, 0)]  # with --size 0.5
-# Each is once the first, once between the others, once the last.
-ORDERS = [
-    ("sim", "pose-service", "controller"),
-    ("pose-service", "controller", "sim"),
-    ("controller", "sim", "pose-service"),
-]
 FAST = ("--rtf", "2")  # faster, a stop that a busy machine delays by some ms turns the robot too far
 GOALS = ("--size", "0.5")
 
@@ -34,15 +29,11 @@ def legs(controller: Process) -> list[tuple[str, ...]]:
     return LEG.findall(controller.out)
 
 
-@pytest.mark.parametrize("order", ORDERS, ids="-".join)
-def test_it_drives_the_square_and_reports_how_well_in_any_start_order(wire: Wire, order: Any) -> None:
-    at_work = {"sim": "listens", "pose-service": "goals", "controller": "waiting for "}
-    processes: dict[str, Process] = {}
-    for verb in order:
-        processes |= start(wire, verb)
-        if verb != order[-1]:
-            processes[verb].wait_for_line(at_work[verb])
-    controller = processes["controller"]
+def test_it_drives_the_square_and_reports_how_well_also_if_the_sim_starts_last(wire: Wire) -> None:
+    start(wire, "pose-service")["pose-service"].wait_for_line("goals")
+    controller = start(wire, "controller")["controller"]
+    controller.wait_for_line("waiting for ")
+    start(wire, "sim")
     assert controller.wait(within=40) == 0
     lines = legs(controller)
     assert len(controller.out.splitlines()) == len(lines) == 4
@@ -144,8 +135,7 @@ def test_a_person_publishing_by_hand_with_a_foreign_tool_is_yielded_to(shared: S
 def test_the_teleops_r_hands_over(town: Wire, shared: Scene) -> None:
     with town.terminal("teleop", "--key-timeout", "0") as terminal:
         terminal.wait_for_text("controller@")
-        terminal.type(",")
-        shared.robot.odom.next(lambda odom: moves(odom, -0.5, 0, 0))
+        terminal.hold_until(",", lambda: moves(shared.robot.newest(), -0.5, 0, 0))
         terminal.wait_for_text("you drive")
         terminal.type("k")
         shared.controller.wait_for_line("yields to teleop@")
@@ -170,18 +160,22 @@ def hands_over(terminal: Terminal, shared: Scene) -> None:
 def test_the_teleops_r_hands_over_in_the_middle_of_a_drive(town: Wire, shared: Scene) -> None:
     with town.terminal("teleop", "--key-timeout", "0") as terminal:
         terminal.wait_for_text("controller@")
-        terminal.type(",")
-        terminal.wait_for_text("you drive")
+        terminal.hold_until(",", lambda: "you drive" in terminal.screen())
         hands_over(terminal, shared)
 
 
-def test_it_stops_when_odom_stops_and_goes_on_when_the_sim_is_back(wire: Wire, scene: Scene) -> None:
+def test_it_stops_when_odom_stops_goes_on_when_it_is_back_and_stops_the_robot_before_it_ends(
+    wire: Wire, scene: Scene
+) -> None:
     scene.sim.kill()
     scene.controller.wait_for_line("waiting for odom: it is stale, or none was received")
     scene.robot.wait_for_stop_command()
     start_sim(wire)
     scene.controller_drives()
-    assert scene.controller.returncode is None
+    assert scene.controller.terminate() == 0
+    scene.robot.wait_for_stop_command()
+    scene.robot.stands()
+    assert "Traceback" not in scene.controller.err
 
 
 def test_a_robot_that_is_not_there_is_reported_with_those_that_are(town: Wire, shared: Scene) -> None:
@@ -190,40 +184,25 @@ def test_a_robot_that_is_not_there_is_reported_with_those_that_are(town: Wire, s
     assert controller.terminate() == 0
 
 
-def test_asked_to_end_it_stops_the_robot_first(scene: Scene) -> None:
-    scene.controller.signal(signal.SIGTERM)
-    assert scene.controller.wait() == 0
-    scene.robot.wait_for_stop_command()
-    scene.robot.stands()
-    assert "Traceback" not in scene.controller.err
-
-
 def test_killed_it_leaves_a_robot_that_stands(scene: Scene) -> None:
     scene.controller.kill()
     last = scene.robot.newest()
     assert distance(last, scene.robot.stands()) < 0.5 * 0.65
 
 
-def test_it_has_patience_with_a_pose_service_that_comes_and_goes(wire: Wire) -> None:
+def test_it_has_patience_with_a_pose_service_that_comes_last_and_goes(wire: Wire) -> None:
+    controller = start(wire, "controller")["controller"]
+    controller.wait_for_line("waiting for ")
     start(wire, "sim")
-    controller = wire.start("controller", "--laps", "2")
     controller.wait_for_line("waiting for goal 0: no reply from 'next_goal'")
     service = start(wire, "pose-service")["pose-service"]
-    wait_for(lambda: len(legs(controller)) == 4, 40)
+    Robot(wire.bus()).odom.next(lambda odom: place(odom)[0] > 0.4)  # on its way to the first goal
     service.kill()
     start(wire, "pose-service")
     assert controller.wait(40) == 0
-    assert [lap for lap, *_ in legs(controller)] == ["1"] * 4 + ["2"] * 4
+    assert [lap for lap, *_ in legs(controller)] == ["1"] * 4
 
 
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
-        (["a/b"], "robot name 'a/b'"),
-        (["--tolerance", "nan"], "'nan'"),
-    ],
-)
-def test_a_wrong_flag_is_one_error_line(town: Wire, words: list[str], reason: str) -> None:
-    done = town.run("controller", *words)
-    assert done.returncode == 2
-    assert reason in done.stderr.splitlines()[-1]
+def test_a_wrong_flag_is_one_error_line(wire: Wire, verb: Callable[..., subprocess.CompletedProcess[str]]) -> None:
+    for words, reason in ((["a/b"], "robot name 'a/b'"), (["--tolerance", "nan"], "'nan'")):
+        assert_one_line(verb(wire, "controller", *words), 2, reason)

@@ -1,4 +1,4 @@
-"""Every verb beside what runs, alone, and interrupted: no traceback, one line, the right exit code.
+"""Every verb alone, beside what runs, and interrupted: no traceback, one line, the right exit code.
 
 A test tries all verbs of its kind side by side, each as a process.
 """
@@ -20,7 +20,11 @@ import pytest
 import zenoh
 
 from holozen import cli, data
+from holozen.bag.formats import as_cdr
+from holozen.bag.writer import BagWriter
+from holozen.bus import Bus
 from holozen.cli.spawn import Place, spawn_file
+from holozen.messages import Odometry
 from holozen.testing import Terminal, Wire, wait_for
 from holozen.testing.wire import command, free_port
 
@@ -41,13 +45,16 @@ RACED: list[str] = []
 Done = subprocess.CompletedProcess[str]
 T = TypeVar("T")
 
+OTHER_NAMES = {"topic plot": "plot", "bag record": "record", "bag play": "replay"}
+"""Verbs that do what another does: they are tried with what is wrong, and with their work as JSON."""
+ONCE = [name for name in VERBS if name not in OTHER_NAMES]
 LIVE = [name for name, row in VERBS.items() if row.live is not None]
 TEXT = [name for name in LIVE if not (VERBS[name].foreign or VERBS[name].endless)]  # the others print it there
 WRONG = [name for name, row in VERBS.items() if row.wrong]
-ON_THE_WIRE = [name for name in LIVE if VERBS[name].bus]
-SILENT = [name for name, row in VERBS.items() if row.silent]
-FOREIGN = [name for name, row in VERBS.items() if row.foreign]
-ENDLESS = [name for name, row in VERBS.items() if row.endless]
+ON_THE_WIRE = [name for name in ONCE if name in LIVE and VERBS[name].bus]
+SILENT = [name for name in ONCE if VERBS[name].silent]
+FOREIGN = [name for name in ONCE if VERBS[name].foreign]
+ENDLESS = [name for name in ONCE if VERBS[name].endless]
 
 
 def of_each_noun(names: list[str]) -> list[str]:
@@ -69,23 +76,27 @@ def test_every_verb_has_a_row() -> None:
     assert list(VERBS) == [words for verb in cli.VERBS for words in words_of(verb)]
 
 
-class Town:
-    """A sim with robots, a pose service, and a foreign node that publishes on many keys, listens and answers."""
+def test_another_name_is_of_a_verb_that_does_the_same() -> None:
+    for name, other in OTHER_NAMES.items():
+        noun, verb = name.split()
+        assert VERBS[name] is VERBS[other]
+        assert cli.command(noun).verb(verb).about == cli.command(other).about
 
-    def __init__(self, wire: Wire, tmp: Path) -> None:
-        self.wire, self.tmp = wire, tmp
+
+class Files:
+    """A folder with what verbs are given."""
+
+    def __init__(self, tmp: Path) -> None:
+        self.tmp = tmp
         self._free = itertools.count(5, 2)  # m along x, where nothing is
         (tmp / "ball.urdf").write_text(BALL)
         (tmp / "odd.urdf").write_text("<robot/>")
         (tmp / "sim.yaml").write_text("sim:\n  ros__parameters:\n    max_linear: 1.5\n")
-        start_sim(wire)
-        spawn_file(wire.bus("setup"), BOT, "Spare", Place(x=2.0))
-        spawn_file(wire.bus("setup"), BOT, "Free", Place(x=-8.0))  # `stop Spare` runs beside `release Free`
-        for n, x in (("text", -2.0), ("json", -3.0), ("pipe", -4.0)):
-            spawn_file(wire.bus("setup"), tmp / "ball.urdf", f"Doomed{n}", Place(x=x))
-        wire.start("pose-service").wait_for_line("goals")
-        done = wire.run("record", "odom", "-o", f"{tmp}/bag", "--max-duration", "1")
-        assert done.returncode == 0, done.stderr
+        writer, start = BagWriter(str(tmp / "bag")), 1_700_000_000_000_000_000  # ns
+        for number in range(20):
+            form, payload = as_cdr(Odometry())
+            writer.write("odom", form, payload, start + number * 50_000_000)
+        writer.close()
 
     def words(self, name: str, words: str, n: str) -> list[str]:
         """The words of a verb, filled in."""
@@ -98,14 +109,30 @@ FILES = {"ball": "ball.urdf", "odd": "odd.urdf", "yaml": "sim.yaml", "bag": "bag
 
 
 @pytest.fixture(scope="module")
-def place(town: Wire, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Town]:
-    place, done = Town(town, tmp_path_factory.mktemp("verbs")), threading.Event()
+def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
+    return Files(tmp_path_factory.mktemp("verbs"))
+
+
+@pytest.fixture(scope="module")
+def busy(town: Wire, files: Files) -> Iterator[Wire]:
+    """A sim with robots, a pose service, and a foreign node that publishes on many keys, listens and answers.
+
+    They take processor time as long as they run, so the tests that need none of it come first.
+    """
+    start_sim(town)
+    with Bus("setup", town.connection) as bus:  # gone again: every verb would connect to it
+        spawn_file(bus, BOT, "Spare", Place(x=2.0))
+        spawn_file(bus, BOT, "Free", Place(x=-8.0))  # `stop Spare` runs beside `release Free`
+        for n, x in (("text", -2.0), ("json", -3.0), ("pipe", -4.0)):
+            spawn_file(bus, files.tmp / "ball.urdf", f"Doomed{n}", Place(x=x))
+    town.start("pose-service").wait_for_line("goals")
+    done = threading.Event()
     with zenoh.open(foreign_config(town)) as session:
         heard = session.declare_subscriber("a/heard", zenoh.handlers.RingChannel(1))
         asked = session.declare_queryable("a/asked", lambda query: query.reply("a/asked", b'{"x": 1}'))
         talker = threading.Thread(target=_talk, args=(session, done))
         talker.start()
-        yield place
+        yield town
         done.set()
         talker.join()
         del heard, asked
@@ -152,74 +179,14 @@ def assert_one_line(name: str, done: Done, code: int, part: str) -> None:
     assert len(done.stderr.splitlines()) == 1 and part in done.stderr, f"{name}: {done.stderr}"
 
 
-# --- beside what runs
-
-
-def test_it_does_its_work(place: Town) -> None:
-    def attempt(name: str) -> Done:
-        row = VERBS[name]
-        return run(place.words(name, row.live or "", "text") + flags(row, place.wire))
-
-    for name, done in tries(TEXT, attempt):
-        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
-        assert done.stdout or done.stderr, name
-        assert is_clean(done.stderr), f"{name}: {done.stderr}"
-
-
-def test_as_json_it_is_one_object_a_line(place: Town) -> None:
-    def attempt(name: str) -> Done:
-        row = VERBS[name]
-        return run([*place.words(name, row.live or "", "json"), "--json", *flags(row, place.wire)])
-
-    for name, done in tries(LIVE, attempt):
-        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
-        assert done.stdout, name
-        assert all(isinstance(json.loads(line), dict) for line in done.stdout.splitlines()), f"{name}: {done.stdout}"
-        assert is_clean(done.stderr), f"{name}: {done.stderr}"
-
-
-def test_a_reader_that_is_gone_ends_it_quietly(place: Town) -> None:
-    def attempt(name: str) -> Done:
-        reading, writing = os.pipe()
-        os.close(reading)
-        row = VERBS[name]
-        with open(writing, "wb") as gone:
-            return run([*place.words(name, row.live or "", "pipe"), "--json", *flags(row, place.wire)], gone)
-
-    for name, done in tries(OF_EACH_NOUN, attempt):
-        assert done.returncode == 0, f"{name}: {done.stderr}"
-        assert is_clean(done.stderr) and "Broken pipe" not in done.stderr, f"{name}: {done.stderr}"
-
-
-def test_what_is_wrong_is_one_line(place: Town) -> None:
-    def attempt(name: str) -> Done:
-        row = VERBS[name]
-        return run(place.words(name, (row.wrong or ("",))[0], "wrong") + flags(row, place.wire))
-
-    for name, done in tries(WRONG, attempt):
-        _, code, part = VERBS[name].wrong or ("", 0, "")
-        assert_one_line(name, done, code, part)
-
-
-def test_it_does_its_work_with_foreign_nodes(place: Town) -> None:
-    def attempt(name: str) -> Done:
-        words, _ = VERBS[name].foreign or ("", "")
-        return run(place.words(name, words, "foreign") + place.wire.flags)
-
-    for name, done in tries(FOREIGN, attempt):
-        _, part = VERBS[name].foreign or ("", "")
-        assert done.returncode == 0 and is_clean(done.stderr), f"{name}: {done.stderr}"
-        assert part in done.stdout, f"{name}: {done.stdout}"
-
-
 # --- alone
 
 
-def test_without_nodes_it_reports_that(place: Town) -> None:
+def test_without_nodes_it_reports_that(files: Files) -> None:
     def attempt(name: str) -> Done:
         words, _, _ = VERBS[name].silent or ("", 0, "")
         with Wire() as own:
-            return run(place.words(name, words, "silent") + own.flags)
+            return run(files.words(name, words, "silent") + own.flags)
 
     for name, done in tries(SILENT, attempt, MANY):
         _, code, part = VERBS[name].silent or ("", 0, "")
@@ -230,12 +197,12 @@ def test_without_nodes_it_reports_that(place: Town) -> None:
         assert part in lines[0] and is_clean(done.stderr), f"{name}: {done.stderr}"
 
 
-def test_a_client_without_a_router_gives_up(place: Town) -> None:
+def test_a_client_without_a_router_gives_up(files: Files) -> None:
     """They all open their sessions in the same way."""
     nowhere = ["--mode", "client", "--connect", f"tcp/127.0.0.1:{free_port()}"]
 
     def attempt(name: str) -> Done:
-        return run(place.words(name, VERBS[name].live or "", "alone") + nowhere)
+        return run(files.words(name, VERBS[name].live or "", "alone") + nowhere)
 
     for name, done in tries(OF_EACH_NOUN, attempt, MANY):
         if name == "doctor":
@@ -248,16 +215,89 @@ def test_a_client_without_a_router_gives_up(place: Town) -> None:
             assert "cannot open Zenoh: no router answers at " in fails, f"{name}: {done.stderr}"
 
 
-# --- interrupted
+def test_ctrl_c_ends_what_waits(files: Files) -> None:
+    """Interrupted while they wait for a router that accepts their connection and stays silent: all in the same way."""
+
+    def attempt(name: str) -> tuple[int, str]:
+        with socket.create_server(("127.0.0.1", 0)) as mute:
+            mute.settimeout(30)
+            there = ["--mode", "client", "--connect", f"tcp/127.0.0.1:{mute.getsockname()[1]}"]
+            words = files.words(name, VERBS[name].live or "", "waiting")
+            with Terminal([*command("")[:-1], *words, *there]) as terminal, mute.accept()[0]:
+                terminal.type("\x03")
+                return terminal.process.wait(30), terminal.raw
+
+    for name, (code, shown) in tries(WAITING, attempt, MANY):
+        assert (code, is_clean(shown)) == (130, True), f"{name}: {shown}"
 
 
-def test_ctrl_c_ends_what_would_go_on(place: Town) -> None:
+# --- beside what runs
+
+
+def test_it_does_its_work(busy: Wire, files: Files) -> None:
+    def attempt(name: str) -> Done:
+        row = VERBS[name]
+        return run(files.words(name, row.live or "", "text") + flags(row, busy))
+
+    for name, done in tries(TEXT, attempt):
+        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
+        assert done.stdout or done.stderr, name
+        assert is_clean(done.stderr), f"{name}: {done.stderr}"
+
+
+def test_as_json_it_is_one_object_a_line(busy: Wire, files: Files) -> None:
+    def attempt(name: str) -> Done:
+        row = VERBS[name]
+        return run([*files.words(name, row.live or "", "json"), "--json", *flags(row, busy)])
+
+    for name, done in tries(LIVE, attempt):
+        assert done.returncode in {VERBS[name].code, int(name == "doctor")}, f"{name}: {done.stderr}"
+        assert done.stdout, name
+        assert all(isinstance(json.loads(line), dict) for line in done.stdout.splitlines()), f"{name}: {done.stdout}"
+        assert is_clean(done.stderr), f"{name}: {done.stderr}"
+
+
+def test_a_reader_that_is_gone_ends_it_quietly(busy: Wire, files: Files) -> None:
+    def attempt(name: str) -> Done:
+        reading, writing = os.pipe()
+        os.close(reading)
+        row = VERBS[name]
+        with open(writing, "wb") as gone:
+            return run([*files.words(name, row.live or "", "pipe"), "--json", *flags(row, busy)], gone)
+
+    for name, done in tries(OF_EACH_NOUN, attempt):
+        assert done.returncode == 0, f"{name}: {done.stderr}"
+        assert is_clean(done.stderr) and "Broken pipe" not in done.stderr, f"{name}: {done.stderr}"
+
+
+def test_what_is_wrong_is_one_line(busy: Wire, files: Files) -> None:
+    def attempt(name: str) -> Done:
+        row = VERBS[name]
+        return run(files.words(name, (row.wrong or ("",))[0], "wrong") + flags(row, busy))
+
+    for name, done in tries(WRONG, attempt):
+        _, code, part = VERBS[name].wrong or ("", 0, "")
+        assert_one_line(name, done, code, part)
+
+
+def test_it_does_its_work_with_foreign_nodes(busy: Wire, files: Files) -> None:
+    def attempt(name: str) -> Done:
+        words, _ = VERBS[name].foreign or ("", "")
+        return run(files.words(name, words, "foreign") + busy.flags)
+
+    for name, done in tries(FOREIGN, attempt):
+        _, part = VERBS[name].foreign or ("", "")
+        assert done.returncode == 0 and is_clean(done.stderr), f"{name}: {done.stderr}"
+        assert part in done.stdout, f"{name}: {done.stdout}"
+
+
+def test_ctrl_c_ends_what_would_go_on(busy: Wire, files: Files) -> None:
     def attempt(name: str) -> tuple[int, str]:
         row = VERBS[name]
         assert row.endless
         with Wire() as own:
-            wire = own if row.live is None else place.wire
-            begun, words = row.endless.begun, place.words(name, row.endless.words, "endless")
+            wire = own if row.live is None else busy
+            begun, words = row.endless.begun, files.words(name, row.endless.words, "endless")
             with Terminal([*command("")[:-1], *words, *flags(row, wire)]) as terminal:
                 wait_for(lambda: re.search(begun, terminal.raw), 20, lambda: f"{begun} in {terminal.raw[-2000:]}")
                 terminal.type("\x03")
@@ -267,22 +307,6 @@ def test_ctrl_c_ends_what_would_go_on(place: Town) -> None:
         row = VERBS[name].endless
         assert row and code == row.code, f"{name}: {shown}"
         assert is_clean(shown), f"{name}: {shown}"
-
-
-def test_ctrl_c_ends_what_waits(place: Town) -> None:
-    """Interrupted while they wait for a router that accepts their connection and stays silent: all in the same way."""
-
-    def attempt(name: str) -> tuple[int, str]:
-        with socket.create_server(("127.0.0.1", 0)) as mute:
-            mute.settimeout(30)
-            there = ["--mode", "client", "--connect", f"tcp/127.0.0.1:{mute.getsockname()[1]}"]
-            words = place.words(name, VERBS[name].live or "", "waiting")
-            with Terminal([*command("")[:-1], *words, *there]) as terminal, mute.accept()[0]:
-                terminal.type("\x03")
-                return terminal.process.wait(30), terminal.raw
-
-    for name, (code, shown) in tries(WAITING, attempt, MANY):
-        assert (code, is_clean(shown)) == (130, True), f"{name}: {shown}"
 
 
 def test_zenohs_own_race_was_rare() -> None:

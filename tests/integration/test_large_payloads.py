@@ -51,6 +51,7 @@ def test_a_sim_that_got_payloads_of_hundreds_of_mb_counts_them_and_is_as_small_a
     wait_for(foreign.served("spawn_entity"))
     before, counted, links = memory(sim), status.next().refused.get("oversized", 0), driver.session.info.peers_zid()
     sender = foreign.session.declare_publisher(key, congestion_control=zenoh.CongestionControl.BLOCK)
+    wait_for(lambda: sender.matching_status.matching)
     payload = zenoh.ZBytes(bytes(LARGE))
     for number in range(1, 4):
         sender.put(payload)

@@ -17,19 +17,13 @@ from holozen.ros.generated import find
 from holozen.testing import Process, Terminal, Wire, wait_for
 from holozen.testing.wire import command
 
-from .conftest import start_sim
 from .robots import Robot, moves, place, record, rests
 
 LESSON = Path(__file__).parents[2] / "examples" / "lesson"
 SCRIPTS = LESSON / "hb_control" / "scripts"
 TURN = 1.0  # rad/s, the default of teleop_keys
+Verb = Callable[..., subprocess.CompletedProcess[str]]
 ROS = {"rclpy", "geometry_msgs", "std_msgs", "nav_msgs", "tf2_ros", "tf_transformations", "launch"}
-
-
-@pytest.fixture
-def robot(wire: Wire) -> Robot:
-    start_sim(wire)
-    return Robot(wire.bus())
 
 
 def words(wire: Wire, script: str, *rest: str) -> list[str]:
@@ -56,14 +50,14 @@ def is_at(odom: Odometry, goal: NextGoalReply) -> bool:
     return math.hypot(x - goal.x_goal, y - goal.y_goal) < 0.05 and abs(off) < 0.1
 
 
-def test_the_controller_drives_round_the_shape_of_the_service_node(wire: Wire, robot: Robot) -> None:
-    shapes = record(wire.bus("reader"), "shape", find("std_msgs/msg/String"))
-    with Process(words(wire, "controller.py", "--ros-args", "-p", "kp_linear:=3.0")) as controller:
+def test_the_controller_drives_round_the_shape_of_the_service_node(town: Wire, robot: Robot) -> None:
+    shapes = record(town.bus("reader"), "shape", find("std_msgs/msg/String"))
+    with Process(words(town, "controller.py", "--ros-args", "-p", "kp_linear:=3.0")) as controller:
         controller.wait_for_line("waiting for next_goal")
-        with Process(words(wire, "service_node.py")) as service:
+        with Process(words(town, "service_node.py")) as service:
             shape = shapes.next().data
             assert f"[service_node]: the shape is a {shape}" in service.wait_for_line("the shape is a")
-            corners = goals(wire)
+            corners = goals(town)
             assert len(corners) == {"triangle": 3, "square": 4, "hexagon": 6}[shape]
             for corner in [*corners, corners[0]]:
                 robot.odom.next(partial(is_at, goal=corner), within=60)
@@ -75,21 +69,21 @@ def test_the_controller_drives_round_the_shape_of_the_service_node(wire: Wire, r
     robot.stands()
 
 
-def test_the_lesson_s_own_command_asks_its_service_and_ours(wire: Wire) -> None:
+def test_the_lesson_s_own_command_asks_its_service_and_ours(wire: Wire, verb: Verb) -> None:
     asked = ("service", "call", "/next_goal", "hb_interfaces/srv/NextGoal", "{request_goal: 1}", "--package")
     package = f"hb_interfaces={LESSON / 'hb_interfaces'}"
     with Process(words(wire, "service_node.py")) as service:
         service.wait_for_line("the shape is a")
-        assert wire.run(*asked, package).stdout.startswith("x_goal: ")
-        reported = wire.run(*asked, package, "--json").stdout
-        assert reported == wire.run("service", "call", "next_goal", "request_goal: 1", "--json").stdout
+        assert verb(wire, *asked, package).stdout.startswith("x_goal: ")
+        reported = verb(wire, *asked, package, "--json").stdout
+        assert reported == verb(wire, "service", "call", "next_goal", "request_goal: 1", "--json").stdout
     wire.start("pose-service").wait_for_line("4 goals from square")
-    assert wire.run(*asked, package).stdout.startswith("x_goal: ")
-    assert wire.run(*asked, package).stdout == wire.run("service", "call", "next_goal", "request_goal: 1").stdout
+    assert verb(wire, *asked, package).stdout.startswith("x_goal: ")
+    assert verb(wire, *asked, package).stdout == verb(wire, "service", "call", "next_goal", "request_goal: 1").stdout
 
 
-def test_a_bare_node_drives_a_square_by_time(wire: Wire, robot: Robot) -> None:
-    with Process(words(wire, "square.py")) as square:
+def test_a_bare_node_drives_a_square_by_time(town: Wire, robot: Robot) -> None:
+    with Process(words(town, "square.py")) as square:
         for x, y in ((0.3, 0), (0, 0.3), (-0.3, 0), (0, -0.3)):
             robot.odom.next(partial(moves, x=x, y=y, turn=0))
         assert square.wait() == 0
@@ -112,11 +106,11 @@ def press(teleop: Terminal, key: str, robot: Robot, wanted: Callable[[Odometry],
 
 @pytest.mark.parametrize("stamped", ["False", "True"])
 def test_a_teleop_of_ros_drives_from_a_terminal_and_its_end_stops_the_robot(
-    wire: Wire, robot: Robot, stamped: str
+    town: Wire, robot: Robot, stamped: str
 ) -> None:
     parameters = ["-p", f"stamped:={stamped}", "-p", "speed:=0.4"]
-    commands = wire.bus("reader").subscribe_raw("cmd_vel")
-    with Terminal(words(wire, "teleop_keys.py", "--ros-args", *parameters)) as teleop:
+    commands = town.bus("reader").subscribe_raw("cmd_vel")
+    with Terminal(words(town, "teleop_keys.py", "--ros-args", *parameters)) as teleop:
         teleop.wait_for_text("drive, k stops")
         wait_for(partial(is_heard, teleop, robot), what="the sim to hear it")
         for key, (x, y, turn) in (("i", (0.4, 0, 0)), ("J", (0, 0.4, 0)), ("l", (0, 0, -TURN)), ("k", (0, 0, 0))):
@@ -128,15 +122,14 @@ def test_a_teleop_of_ros_drives_from_a_terminal_and_its_end_stops_the_robot(
     robot.stands()
 
 
-def test_its_node_is_seen_and_its_parameters_set_like_those_of_any_other(wire: Wire, robot: Robot) -> None:
-    with Process(words(wire, "controller.py")):
-        wire.start("pose-service")
+def test_its_node_is_seen_and_its_parameters_set_like_those_of_any_other(town: Wire, robot: Robot, verb: Verb) -> None:
+    with Process(words(town, "controller.py")), town.start("pose-service"):
         robot.odom.next(lambda odom: not rests(odom))
-        assert "hb_controller" in wire.run("node", "list").stdout.split()
-        assert "hb_controller" in wire.run("topic", "info", "-v", "cmd_vel").stdout
-        reported = wire.run("param", "set", "hb_controller", "kp_linear", "0.75")
+        assert "hb_controller" in verb(town, "node", "list").stdout.split()
+        assert "hb_controller" in verb(town, "topic", "info", "-v", "cmd_vel").stdout
+        reported = verb(town, "param", "set", "hb_controller", "kp_linear", "0.75")
         assert reported.returncode == 0, reported.stderr
-        assert "0.75" in wire.run("param", "get", "hb_controller", "kp_linear").stdout
+        assert "0.75" in verb(town, "param", "get", "hb_controller", "kp_linear").stdout
 
 
 def test_names_are_remapped_as_in_ros(wire: Wire) -> None:
@@ -156,8 +149,8 @@ def test_without_holozen_run_they_fail_as_ever(tmp_path: Path) -> None:
     assert not ROS & set(importlib.metadata.packages_distributions())
 
 
-def test_a_script_that_hangs_gets_what_everyone_gets(wire: Wire, robot: Robot) -> None:
-    with Process(words(wire, "square.py")) as square:
+def test_a_script_that_hangs_gets_what_everyone_gets(town: Wire, robot: Robot) -> None:
+    with Process(words(town, "square.py")) as square:
         robot.odom.next(lambda odom: moves(odom, 0.3, 0, 0))
         square.signal(signal.SIGSTOP)
         robot.stands()

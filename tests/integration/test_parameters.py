@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import signal
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -170,6 +171,24 @@ def test_the_pose_service_hands_out_another_shape_at_once(wire: Wire) -> None:
     assert put(bus, "pose_service", shape="hexagon", size=3.0) == []
     assert bus.call("next_goal", NextGoalRequest(0), NextGoalReply).x_goal == 3.0
     assert bus.call("next_goal", NextGoalRequest(5), NextGoalReply).end_of_list == 1
+
+
+@pytest.mark.parametrize(("verb", "node"), [("pose-service", "pose_service"), ("controller", "controller")])
+def test_the_second_of_a_kind_names_the_first_and_a_hung_one_is_named(wire: Wire, verb: str, node: str) -> None:
+    wire.start("sim", "--empty").wait_for_line("no robot yet")  # it knows of a node that hangs
+    first = wire.start(verb)
+    wait_for(lambda: node in wire.run("param", "list").stdout)
+    second = wire.start(verb)
+    second.wait_for_line(f"{node}: {node}@")
+    assert "does the same already; end one of the two\n" in second.err
+    second.terminate()
+    second.wait()
+    first.signal(signal.SIGSTOP)
+    done = wire.run("param", "list", node)
+    first.signal(signal.SIGCONT)
+    assert done.returncode == 1
+    assert f"{node}@" in done.stderr
+    assert "does not answer: it hangs" in done.stderr
 
 
 def test_goals_of_a_file_can_only_be_read(wire: Wire, tmp_path: Path) -> None:

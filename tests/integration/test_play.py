@@ -11,8 +11,7 @@ import pytest
 from holozen import entities
 from holozen.testing import Terminal, Wire, wait_for
 
-from .conftest import start_sim
-from .processes import parts_at
+from .processes import parts_at, wait_for_none
 from .robots import Robot, speeds
 
 REPO = Path(__file__).parents[2]
@@ -63,8 +62,7 @@ def played(game: Game, name: str = "Fred") -> Robot:
     """The robot, once the teleop drives it."""
     robot = Robot(game.wire.bus(), name)
     game.terminal.wait_for_text("listening sim")
-    game.terminal.type("i")
-    robot.odom.next(lambda odom: speeds(odom)[0] > 0.1)
+    game.terminal.hold_until("i", lambda: speeds(robot.newest())[0] > 0.1)
     return robot
 
 
@@ -77,46 +75,40 @@ def test_fred_drives_in_an_empty_world_and_quitting_leaves_nothing_and_the_termi
     assert game.terminal.modes() == game.terminal.modes_before
 
 
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP], ids=lambda n: n.name)
-def test_a_signal_ends_all_of_it(game: Game, number: int) -> None:
+def test_another_sim_on_the_same_keys_is_reported_and_a_signal_ends_all_of_it(house: Path, game: Game) -> None:
     robot = played(game)
-    game.terminal.process.signal(number)
-    assert game.terminal.process.wait() == 128 + number
+    before, temporary = game.left()
+    other = Game(house, game.wire)
+    other.terminal.process.wait(30)
+    assert other.terminal.process.returncode == 1
+    assert "simulates here already" in other.terminal.raw
+    assert game.left() == (before, temporary) and before
+    other.terminal.close()
+    game.terminal.process.signal(signal.SIGTERM)
+    assert game.terminal.process.wait() == 128 + signal.SIGTERM
+    wait_for_none(game.wire)
     wait_for(lambda: game.left() == ({}, []))
     robot.wait_for_stop_command()
 
 
 def test_a_closed_terminal_ends_all_of_it(game: Game) -> None:
-    played(game)
+    robot = played(game)
     game.terminal.hang_up()
-    game.terminal.process.wait()
+    assert game.terminal.process.wait() == 128 + signal.SIGHUP
+    wait_for_none(game.wire)
     wait_for(lambda: game.left() == ({}, []))
+    robot.wait_for_stop_command()
 
 
 @pytest.mark.needs("setpriv")
-def test_killed_it_leaves_nothing_running(game: Game) -> None:
-    played(game)
-    game.terminal.process.kill()
-    wait_for(lambda: game.left()[0] == {})
-
-
-def test_another_robot_plays_under_another_name(house: Path, wire: Wire) -> None:
+def test_another_robot_plays_under_another_name_and_killed_it_leaves_nothing_running(house: Path, wire: Wire) -> None:
     game = Game(house, wire, str(REPO / "urdf" / "rover.urdf.xacro"), "Rosie")
     try:
         played(game, "Rosie")
+        game.terminal.process.kill()
+        wait_for_none(game.wire)
     finally:
         game.terminal.close()
-
-
-def test_another_sim_on_the_same_keys_is_reported(house: Path, wire: Wire) -> None:
-    start_sim(wire)
-    game = Game(house, wire)
-    game.terminal.process.wait(30)
-    assert game.terminal.process.returncode == 1
-    assert "simulates here already" in game.terminal.raw
-    assert set(parts_at(wire)) == {"sim"}
-    assert game.left()[1] == []
-    game.terminal.close()
 
 
 @pytest.mark.parametrize(

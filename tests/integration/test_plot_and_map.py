@@ -106,7 +106,7 @@ def test_an_error_is_reported_in_one_line(
 def test_what_is_no_message_is_counted(wire: Wire) -> None:
     session = wire.bus().session
     publisher = session.declare_publisher("odom")
-    plot = wire.start("plot", FIELD, "--once", "-w", "1")
+    plot = wire.start("plot", FIELD, "--once", "-w", "5")
     wait_for(lambda: publisher.matching_status.matching)
     publisher.put(codec.encode(Odometry()))
     publisher.put(b"\xff\x00", encoding="zenoh/bytes")

@@ -8,9 +8,12 @@ import shlex
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+import time
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
+from itertools import count
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -30,13 +33,32 @@ STANDS = "7:0 8:0 9:0"
 SHELL = ["env", "--default-signal", "bash", "--norc", "-i"]  # SIGQUIT is ignored below a shell's background job
 
 
+LOSSY = """
+import simulated_servos
+from feetech import SYNC_WRITE
+read, has_turned = simulated_servos.packets, False
+def packets(data):
+    global has_turned
+    for one in (found := read(data)):
+        if one[1] == SYNC_WRITE:
+            turns = any(one[2][3::3] + one[2][4::3])
+            if has_turned and not turns:
+                found.remove(one)
+            has_turned = turns
+    return found
+simulated_servos.packets = packets
+simulated_servos.main()
+"""
+"""Servos that lose the packet that would stop them, but not the next: two processes may send at the same time."""
+
+
 class Kiwi:
     """The base, its servos, and a wire."""
 
-    def __init__(self, wire: Wire, state: Path) -> None:
+    def __init__(self, wire: Wire, state: Path, servos: Sequence[str] = (str(FOLDER / "simulated_servos.py"),)) -> None:
         self.wire = wire
         self.flags = [*wire.flags, "--state", str(state)]
-        self.servos = Process([sys.executable, str(FOLDER / "simulated_servos.py")])
+        self.servos = Process([sys.executable, *servos], env={"PYTHONPATH": str(FOLDER)})
         self.port = self.servos.wait_for_line("/dev/")
         self.command = [sys.executable, str(FOLDER / "lekiwi.py"), self.port, *self.flags]
         self.start()
@@ -138,6 +160,16 @@ def test_its_wheels_stop_whatever_ends_or_holds_it(number: signal.Signals, own: 
     own.servos.signal(0)  # which still run
 
 
+def test_its_wheels_stop_when_it_is_killed_and_the_first_stop_gets_lost(wire: Wire, tmp_path: Path) -> None:
+    kiwi = Kiwi(wire, tmp_path, ["-c", LOSSY])
+    try:
+        kiwi.drive(wire.bus().publisher("cmd_vel", Twist))
+        kiwi.base.kill()
+        wait_for(lambda: kiwi.speeds() == STANDS, what="the wheels to stop")
+    finally:
+        kiwi.close()
+
+
 @pytest.mark.parametrize("end", ["\x1a", "\x1c", "kill -STOP %1\r", "kill -9 %1\r"])
 def test_its_wheels_stop_when_its_whole_job_is_suspended_or_killed(end: str, own: Kiwi) -> None:
     own.base.terminate()
@@ -160,20 +192,28 @@ def test_its_wheels_stop_when_its_whole_job_is_suspended_or_killed(end: str, own
         wait_for(lambda: not own.processes(), what=lambda: f"{own.processes()} to end")
 
 
-@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
-def test_it_ends_in_one_line_without_its_guard_which_only_sigkill_ends(number: signal.Signals, own: Kiwi) -> None:
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
+def test_it_ends_in_one_line_without_its_guard_which_no_other_signal_ends(number: signal.Signals, own: Kiwi) -> None:
     own.drive(own.wire.bus().publisher("cmd_vel", Twist))
     (guard,) = set(own.processes()) - {own.base.pid}
-    os.kill(guard, number)
+    for other in (signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT):
+        os.kill(guard, other)
     if number == signal.SIGKILL:
-        assert own.base.wait() == 1
-        assert own.base.err.splitlines()[1:] == [
-            f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start lekiwi.py again"
-        ]
-        wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
-    else:
         own.base.kill()
-        wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
+        wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop by the guard that lives on")
+        wait_for(lambda: not own.processes(), what="the guard to end")
+        own.kill_and_start()
+        own.drive(own.wire.bus("again").publisher("cmd_vel", Twist))
+        (guard,) = set(own.processes()) - {own.base.pid}
+    os.kill(guard, number)
+    assert own.base.wait() == 1
+    assert own.base.err.splitlines()[1:] == [
+        f"lekiwi: the guard that stops the wheels, process {guard}, has ended or hangs; start lekiwi.py again"
+    ]
+    wait_for(lambda: own.speeds() == STANDS, what="the wheels to stop")
+    if number == signal.SIGSTOP:
+        os.kill(guard, signal.SIGCONT)
+        wait_for(lambda: not own.processes(), what="the guard to end once it goes on")
 
 
 def test_a_base_that_was_stopped_and_killed_is_still_stopped_when_it_is_started_again(own: Kiwi) -> None:
@@ -231,6 +271,18 @@ def test_of_two_bases_that_did_not_discover_each_other_in_time_one_ends(
     with pytest.raises(BusError, match=rf"Fred is served by {low.node}@\w+ already"):
         wait_for(lambda: ends.velocity() != STOP)
     assert [goes_on.velocity() for _ in range(20)] == [STOP] * 20
+
+
+def test_what_was_fresh_before_a_suspension_moves_no_base_after_it(
+    wire: Wire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    base = Base(wire.bus("base", lasting=True), state=tmp_path)
+    commands: Any = wire.bus("driver").publisher("cmd_vel", Twist)
+    wait_for(lambda: commands.put(Twist.planar(0.1)) or base.velocity() != STOP)
+    suspended = SimpleNamespace(monotonic=count(time.monotonic(), 1.0).__next__, time=time.time)
+    monkeypatch.setattr("holozen.command.base.time", suspended)  # for a second between any two looks at the clock
+    commands.put(Twist.planar(0.1))
+    assert base.velocity() == STOP
 
 
 WHEELS = """
@@ -299,6 +351,21 @@ def test_a_port_without_servos_is_reported_in_one_line(wire: Wire) -> None:
     finally:
         os.close(here)
         os.close(there)
+
+
+def test_a_port_that_hangs_up_while_a_servo_is_asked_ends_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(FOLDER)
+    feetech = import_module("feetech")
+    here, there = os.openpty()
+
+    def hang_up() -> None:
+        os.read(here, 256)
+        os.close(here)
+
+    with feetech.Servos(os.ttyname(there)) as servos:
+        threading.Thread(target=hang_up).start()
+        with pytest.raises(feetech.ServoError, match=r"^/dev/pts/\d+: "):
+            servos.rate(9)
 
 
 def test_a_servo_whose_answer_is_late_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,13 +9,26 @@ import pytest
 
 from holozen.bag.formats import format_of
 from holozen.bag.writer import BagWriter
-from holozen.messages import Header, Message, Odometry, PoseStamped, Time, Twist, TwistStamped, codec
+from holozen.messages import (
+    Header,
+    JointState,
+    Message,
+    Odometry,
+    PoseStamped,
+    Time,
+    Twist,
+    TwistStamped,
+    Vector3,
+    Wrench,
+    codec,
+)
 from holozen.testing import Wire, wait_for
 from holozen.transport.samples import RawSubscriber, Sample
+from tests.terminals.operators import BOX
 
 from .foreign_samples import PAYLOADS
 from .processes import read
-from .robots import Robot, moves
+from .robots import Robot, moves, speeds
 
 MS = 1_000_000  # ns
 FORWARD = codec.encode(Twist.planar(x=0.2))
@@ -112,7 +125,51 @@ def test_commands_drive_the_robot_and_a_stop_ends_them(town: Wire, robot: Robot,
     assert [s.payload for s in sent[8:]] == STOPS
 
 
+def test_a_robot_that_comes_while_it_plays_is_not_moved(wire: Wire, tmp_path: Path) -> None:
+    """The bag does not know the type of what moves it: nobody listened when it was recorded."""
+    rows = [("Ann/drive", FORWARD, "", i * 20.0) for i in range(20)]
+    path = bag(tmp_path / "a.mcap", *rows, ("note", b"hello", "text/plain", 1.0))
+    box = tmp_path / "box.urdf"
+    box.write_text(BOX.replace("<commandTopic>cmd_vel", "<commandTopic>drive"))
+    notes = wire.bus().subscribe_raw("note", depth=1)
+    wire.start("sim", "--empty").wait_for_line("no robot yet")
+    player = wire.start("replay", path, "--loop")
+    notes.recv()
+    assert wire.run("spawn", str(box), "--name", "Ann").returncode == 0
+    robot = Robot(wire.bus(), "Ann")
+    notes.try_recv()
+    for _ in range(3):  # the bag has begun again
+        notes.recv()
+    assert max(abs(speed) for odom in robot.odom.messages() for speed in speeds(odom)) < 0.01
+    player.signal(signal.SIGINT)
+    assert player.wait() == 0
+    assert player.err == "Ann/drive is left out from here on: it moves robots; --commands plays it too\n"
+
+
 @pytest.mark.parametrize("form", ["json", "msgpack", "cdr"])
+@pytest.mark.parametrize("command", [Twist.planar(0.1), TwistStamped(twist=Twist.planar(0.1)), Wrench(Vector3(1.0))])
+def test_what_robots_would_read_as_a_command_is_one_whatever_its_key(
+    wire: Wire, tmp_path: Path, form: str, command: Message
+) -> None:
+    kind = type(command)
+    row = ("any", codec.encode(command, form), codec.encoding(form, kind), 0.0)
+    tap = wire.bus().subscribe_raw("any")
+    path = bag(tmp_path / "a.mcap", row)
+    assert wire.run("replay", path).returncode == 1
+    assert wire.run("replay", path, "--commands").returncode == 0
+    sent = [codec.decode(s.payload, s.encoding, (kind,)) for s in heard(tap, count=6)]
+    assert sent == [command, *[kind()] * 5]
+
+
+def test_what_moves_nothing_is_played_on_any_key(wire: Wire, tmp_path: Path) -> None:
+    payloads = [b"{}", b'{"linear": {"x": 0}}', codec.encode(Odometry()), b"0.1", FORWARD.ljust(70_000)]
+    tap = wire.bus().subscribe_raw("any")
+    done = wire.run("replay", bag(tmp_path / "a.mcap", *[("any", p, "text/plain", i) for i, p in enumerate(payloads)]))
+    assert (done.returncode, done.stderr) == (0, "")
+    assert [s.payload for s in heard(tap, count=len(payloads))] == payloads
+
+
+@pytest.mark.parametrize("form", ["json", "cdr"])
 def test_stamped_commands_drive_with_a_stamp_of_now(town: Wire, robot: Robot, tmp_path: Path, form: str) -> None:
     """Their own stamps are old, and those would be refused."""
     old = TwistStamped(Header(Time(1_700_000_000), "base_link"), Twist.planar(x=0.2))
@@ -136,7 +193,7 @@ def test_at_the_end_it_names_the_goals_that_still_drive(wire: Wire, tmp_path: Pa
     assert done.stderr == "goal_pose: the robot may drive on to the last goal, since its controller drives it\n"
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
 def test_a_signal_stops_the_robot(town: Wire, robot: Robot, tmp_path: Path, number: int) -> None:
     path = bag(tmp_path / "a.mcap", *commands(600), types=(Twist,))
     tap = robot.bus.subscribe_raw("cmd_vel")
@@ -173,6 +230,21 @@ def test_a_pause_stops_the_robot(wire: Wire, tmp_path: Path) -> None:
     terminal.type(" ")
     terminal.wait_for_text("paused: space resumes")
     heard(tap, last=[FORWARD, *STOPS])
+    terminal.type("\x03")
+    assert terminal.process.wait() == 0
+
+
+@pytest.mark.parametrize("kind", ["velocity", "effort", "position"])
+def test_a_pause_stops_joints_but_those_that_go_to_a_position(wire: Wire, tmp_path: Path, kind: str) -> None:
+    turn = json.dumps({"name": ["a", "b"], kind: [1.0, 2.0]}).encode()
+    rows = [("joint_command", turn, "application/json", i * 50.0) for i in range(600)]
+    tap = wire.bus().subscribe_raw("joint_command")
+    terminal = wire.terminal("replay", bag(tmp_path / "a.mcap", *rows, types=(JointState,)), "--commands")
+    terminal.wait_for_text("space pauses")
+    terminal.type(" ")
+    terminal.wait_for_text("paused: space resumes")
+    stop = codec.encode(JointState(name=["a", "b"], velocity=[0.0, 0.0]))
+    heard(tap, last=[turn] if kind == "position" else [turn, *[stop] * 5])
     terminal.type("\x03")
     assert terminal.process.wait() == 0
 

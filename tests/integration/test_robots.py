@@ -7,6 +7,7 @@ bounds of their own.
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 
 import pytest
@@ -20,7 +21,7 @@ from holozen.robot.rigid import joint_axes, lowest
 from holozen.testing import LockStep, Wire, wait_for
 from holozen.wire import COMMAND_SILENCE, key_for
 
-from .robots import URDF, Planar, Robot, ahead, place, speeds, time_of
+from .robots import URDF, Planar, ahead, place, speeds, time_of
 
 NO_ROBOTS = {"materials.xacro", "wheels.xacro"}
 FILES = sorted(path.name for path in URDF.glob("*.xacro") if path.name not in NO_ROBOTS)
@@ -84,6 +85,26 @@ def spans(seconds: float) -> int:
     return math.ceil(seconds * 240 / SPAN - 1e-9)
 
 
+@dataclass(frozen=True)
+class Forward:
+    """Two metres forward at a steady velocity, and a stop."""
+
+    odoms: list[Odometry]
+    wheels: dict[str, float]
+    """Their rates at the end of the two metres, rad/s."""
+    stopped: Odometry
+
+
+@dataclass(frozen=True)
+class Round:
+    """Some drives and silence, from where it stood to where it stands: by odometry, and in the world."""
+
+    odom: tuple[Planar, Planar]
+    truth: tuple[Planar, Planar]
+    stands: Odometry
+    later: Odometry
+
+
 class Driven:
     """A robot of a file in lock-step, which stands on its wheels."""
 
@@ -125,6 +146,24 @@ class Driven:
     def rests(self, odom: Odometry) -> bool:
         return max(map(abs, speeds(odom))) < max(1e-3, self.stated.speed)
 
+    @cached_property
+    def forward(self) -> Forward:
+        """One drive, for all tests that look at it."""
+        odoms = self.steady((0.5, 0, 0), 4.0)
+        states = [state.message for state in iter(self.joints.try_recv, None) if state.message]
+        state = [state for state in states if state.header.stamp == odoms[-1].header.stamp][-1]
+        return Forward(odoms, dict(zip(state.name, state.velocity, strict=True)), self.stop())
+
+    @cached_property
+    def round(self) -> Round:
+        """One for all tests that look at it."""
+        odom, truth = place(self.sim.odom), self.truth()
+        for velocity in ((0, 0, -1.0), (-0.3, 0, 0.2), (0.5, 0, 0.5)):
+            self.drive(velocity, 1.0)
+        self.sim.step(round(COMMAND_SILENCE * 240))
+        stands = self.stands()
+        return Round((odom, place(stands)), (truth, self.truth()), stands, self.sim.step(120))
+
     def truth(self) -> Planar:
         """Where it is in the world."""
         return entities.pose(self.sim.bus, self.name).planar()
@@ -153,12 +192,11 @@ def test_every_robot_has_its_bounds_stated() -> None:
     assert set(FILES) == set(STATED)
 
 
-@pytest.mark.parametrize("file", FILES)
 def test_a_file_is_read_without_a_warning_and_checked_without_a_finding(
-    file: str, capsys: pytest.CaptureFixture[str]
+    driven: Driven, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert load(URDF / file).warnings == ()
-    assert main(["check", str(URDF / file)]) == 0
+    assert driven.model.warnings == ()
+    assert main(["check", str(driven.file)]) == 0
     out, err = capsys.readouterr()
     assert (out[:4], out.count("\n"), err) == ("ok: ", 1, "")
 
@@ -170,22 +208,30 @@ def test_it_stands_where_its_lowest_point_puts_it(driven: Driven) -> None:
     assert up == pytest.approx(1, abs=1e-4)
 
 
-@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (0.0, 0.5, 0.0)], ids=["forward", "left"])
-def test_it_drives_two_metres(driven: Driven, velocity: Planar) -> None:
-    done = velocity if driven.stated.sideways or not velocity[1] else (0.0, 0.0, 0.0)  # it does not what it cannot do
-    odoms = driven.steady(velocity, 4.0)
+def test_it_drives_two_metres_forward(driven: Driven) -> None:
+    assert_goes(driven, (0.5, 0.0, 0.0), driven.forward.odoms)
+
+
+def test_it_drives_two_metres_to_the_left_or_not_at_all(driven: Driven) -> None:
+    velocity = (0.0, 0.5, 0.0)
+    done = velocity if driven.stated.sideways else (0.0, 0.0, 0.0)  # it does not what it cannot do
+    assert_goes(driven, done, driven.steady(velocity, 4.0 if any(done) else 1.0))
+    driven.stop()
+
+
+def assert_goes(driven: Driven, done: Planar, odoms: list[Odometry]) -> None:
+    """It went as by that velocity."""
     start, end = odoms[0], odoms[-1]
     x, y, yaw = ahead(place(start), done, time_of(end) - time_of(start))
     there = place(end)
     assert math.hypot(there[0] - x, there[1] - y) < driven.stated.way
     assert abs(math.remainder(there[2] - yaw, math.tau)) < driven.stated.yaw
     assert speeds(end) == pytest.approx(done, abs=driven.stated.speed)
-    driven.stop()
 
 
-@pytest.mark.parametrize("turn", [-1.0, 2.0])
-def test_it_turns_round_on_the_spot(driven: Driven, turn: float) -> None:
-    odoms = driven.steady((0, 0, turn), math.tau / abs(turn))
+@pytest.mark.parametrize(("turn", "angle"), [(-1.0, math.pi), (2.0, math.tau)])
+def test_it_turns_on_the_spot(driven: Driven, turn: float, angle: float) -> None:
+    odoms = driven.steady((0, 0, turn), angle / abs(turn))
     least, most = driven.stated.turn
     assert least <= turned(odoms) / turn / (time_of(odoms[-1]) - time_of(odoms[0])) <= most
     middle = place(odoms[0])
@@ -194,29 +240,22 @@ def test_it_turns_round_on_the_spot(driven: Driven, turn: float) -> None:
 
 
 def test_it_stops_when_commanded(driven: Driven) -> None:
-    last = driven.steady((0.5, 0, 0), 0.2)[-1]
+    last = driven.forward.odoms[-1]
     assert speeds(last)[0] > 0.5 - 2 * max(5e-3, driven.stated.speed)
-    way = math.dist(place(last)[:2], place(driven.stop())[:2])
+    way = math.dist(place(last)[:2], place(driven.forward.stopped)[:2])
     assert way < driven.stated.stopping + 2e-3
 
 
 def test_it_stops_in_silence(driven: Driven) -> None:
-    driven.steady((0.5, 0, 0.5), 0.2)
-    driven.sim.step(round(COMMAND_SILENCE * 240))
-    driven.stands()
-    assert driven.rests(driven.sim.step(120))
+    assert driven.rests(driven.round.stands)
+    assert driven.rests(driven.round.later)
 
 
 def test_its_wheels_turn_forward_when_it_drives_forward(driven: Driven) -> None:
-    end = driven.steady((0.5, 0, 0), 1.0)[-1]
-    states = [state.message for state in iter(driven.joints.try_recv, None) if state.message]
-    state = [state for state in states if state.header.stamp == end.header.stamp][-1]
     expected = forward_rates(driven.model, 0.5)
-    rates = dict(zip(state.name, state.velocity, strict=True))
     assert expected
     for name, rate in expected.items():
-        assert rates[name] == pytest.approx(rate, rel=0.02, abs=0.02)
-    driven.stop()
+        assert driven.forward.wheels[name] == pytest.approx(rate, rel=0.02, abs=0.02)
 
 
 def forward_rates(model: RobotModel, speed: float) -> dict[str, float]:
@@ -226,23 +265,20 @@ def forward_rates(model: RobotModel, speed: float) -> dict[str, float]:
 
 
 def test_its_odometry_is_where_it_is(driven: Driven) -> None:
-    odom, truth = place(driven.stop()), driven.truth()
-    for velocity in ((0.5, 0, 0), (0.4, 0, 0.6), (0, 0, -1.0), (-0.3, 0, 0.2)):
-        driven.steady(velocity, 1.5)
-    reported, true = relative(odom, place(driven.stop())), relative(truth, driven.truth())
+    reported, true = relative(*driven.round.odom), relative(*driven.round.truth)
     metres, radians = driven.stated.odom
     assert math.dist(reported[:2], true[:2]) < metres
     assert abs(math.remainder(reported[2] - true[2], math.tau)) < radians
-    assert driven.truth() != truth
+    assert math.hypot(*true[:2]) > 0.1
 
 
-def test_wheely_boi_listens_where_its_lesson_speaks(wire: Wire) -> None:
-    wire.start("sim", "--robot", f"{URDF / 'wheely_boi.xacro'}=Fred")
-    fred = Robot(wire.bus(), "Fred")
-    lesson = fred.bus.publisher("Fred/Fred/cmd", Twist)
+@pytest.mark.parametrize("driven", ["wheely_boi.xacro"], indirect=True)
+def test_wheely_boi_listens_where_its_lesson_speaks(driven: Driven) -> None:
+    lesson = driven.sim.bus.publisher("wheely_boi/wheely_boi/cmd", Twist)
 
     def drives() -> bool:
         lesson.put(Twist.planar(0.3, 0.0, 0.0))
-        return speeds(fred.newest())[0] > 0.2
+        return speeds(driven.sim.step(SPAN))[0] > 0.2
 
-    wait_for(drives, 20, "Fred to drive")
+    wait_for(drives, 20, "wheely_boi to drive")
+    driven.stop()

@@ -11,7 +11,7 @@ import pytest
 import zenoh
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from holozen import authority, entities
+from holozen import authority, cli, entities
 from holozen.authority import AuthorityError
 from holozen.bus import Bus, Publisher
 from holozen.messages import (
@@ -472,12 +472,11 @@ def test_two_commands_make_a_network_for_members_alone(tmp_path: Path) -> None:
     assert "Traceback" not in up.err and "was killed" not in up.err, up.err
 
 
-def test_the_verb_makes_shows_and_revokes(tmp_path: Path) -> None:
+def test_the_verb_makes_shows_and_revokes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     root = str(tmp_path / "root")
 
     def run(*words: str) -> tuple[int, str, str]:
-        with Process(command("secure", *words, "--secure", root)) as process:
-            return process.wait(), process.out, process.err
+        return cli.main(["secure", *words, "--secure", root]), *capsys.readouterr()
 
     assert run("show") == (1, "", f"holozen secure show: {root}/members.json: No such file or directory; "
                            "`holozen secure init` makes an authority\n")  # fmt: skip

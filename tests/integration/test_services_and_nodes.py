@@ -5,6 +5,7 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 from holozen.wire import SERVICES
 
+from .conftest import start_sim
 from .processes import assert_one_line
 from .robots import Robot, place
 
@@ -21,9 +23,18 @@ ROOT = Path(__file__).parents[2]
 VERBS = ["up", "sim", "teleop", "controller", "pose-service", "router", "xacro", "topic", "service", "node"]
 
 
-@pytest.fixture(scope="module", autouse=True)
-def pose_service(town: Wire, sim: Process) -> None:
-    town.start("pose-service").wait_for_line("goals")
+@pytest.fixture(scope="module")
+def town() -> Iterator[Wire]:
+    """A sim, whose time is slow as nothing here waits for it, and a pose service."""
+    with Wire() as wire:
+        start_sim(wire, "--rtf", "0.2")
+        wire.start("pose-service").wait_for_line("goals")
+        yield wire
+
+
+@pytest.fixture(scope="module")
+def only_robot(town: Wire) -> Robot:
+    return Robot(town.bus())
 
 
 def test_service_list_names_every_service(town: Wire) -> None:
@@ -66,9 +77,11 @@ def test_service_call_of_another_type_is_refused(town: Wire) -> None:
 def test_service_call_without_a_request_sends_zeros(town: Wire, robot: Robot) -> None:
     assert town.run("service", "call", "next_goal").stdout.startswith("x_goal: 1.0\n")
     before = place(robot.newest())
-    wait_for(lambda: town.run("service", "call", "get_pose").returncode == 0)
-    reply = json.loads(town.run("service", "call", "get_pose", "--json").stdout)
-    position = reply["odom"]["pose"]["pose"]["position"]
+
+    def pose() -> str:  # empty while its odom is stale, or none came yet
+        return town.run("service", "call", "get_pose", "--json").stdout
+
+    position = json.loads(wait_for(pose))["odom"]["pose"]["pose"]["position"]
     assert (position["x"], position["y"]) == pytest.approx(before[:2], abs=1e-6)
 
 
@@ -103,7 +116,7 @@ def test_node_list_names_the_running_nodes(town: Wire) -> None:
         """Those but this process, which is one where it publishes commands."""
         return [name for name in town.run("node", "list").stdout.split() if name != "test"]
 
-    assert nodes() == ["pose_service", "sim"]
+    wait_for(lambda: nodes() == ["pose_service", "sim"])
     with town.terminal("teleop") as terminal:
         terminal.wait_for_text("listening")
         wait_for(lambda: nodes() == ["pose_service", "sim", "teleop"])
@@ -142,11 +155,11 @@ def test_clients_wait_for_their_router_and_find_it_again(wire: Wire) -> None:
 
 
 def test_a_client_that_waits_for_its_router_ends_on_a_signal(wire: Wire) -> None:
-    with Process(command("sim", "--mode", "client", "--connect", wire.endpoint)) as sim:
-        sim.wait_for_line("waiting for a Zenoh router")
-        sim.signal(signal.SIGTERM)
-        sim.wait()
-        assert "Traceback" not in sim.err
+    with Process(command("pose-service", "--mode", "client", "--connect", wire.endpoint)) as service:
+        service.wait_for_line("waiting for a Zenoh router")
+        service.signal(signal.SIGTERM)
+        service.wait()
+        assert "Traceback" not in service.err
 
 
 def test_a_router_whose_port_is_taken_reports_it(town: Wire) -> None:

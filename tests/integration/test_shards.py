@@ -3,6 +3,8 @@
 import os
 import re
 import signal
+import subprocess
+from collections.abc import Callable
 
 import pytest
 
@@ -13,6 +15,7 @@ from .processes import assert_one_line, parts_at
 from .robots import Robot
 
 BOT = data.find("urdf", "hb_bot.urdf.xacro")
+Verb = Callable[..., subprocess.CompletedProcess[str]]
 OF_FIRST, OF_SECOND = "bot4", "bot0"  # of two shards
 
 
@@ -27,43 +30,43 @@ def shards(town: Wire) -> tuple[Process, Process]:
     return first, second
 
 
-def names(wire: Wire) -> list[str]:
-    return [line.split()[0] for line in wire.run("list").stdout.splitlines()]
+def names(wire: Wire, verb: Verb) -> list[str]:
+    return [line.split()[0] for line in verb(wire, "list").stdout.splitlines()]
 
 
 def test_each_robot_is_in_one_shard_and_all_are_one_world_to_callers(
-    town: Wire, shards: tuple[Process, Process]
+    town: Wire, shards: tuple[Process, Process], verb: Verb
 ) -> None:
-    listed = town.run("list")
+    listed = verb(town, "list")
     assert [line.split()[0] for line in listed.stdout.splitlines()] == [f"bot{number}" for number in range(6)]
     assert listed.stderr == "they are in 2 sims; robots of different sims do not collide\n"
     first, second = shards
     for name, here, there in ((OF_FIRST, first, second), (OF_SECOND, second, first)):
         here.wait_for_line(f"sim: {name} was added to the world")
         assert name not in there.err
-    done = town.run("spawn", str(BOT), "--name", OF_SECOND, "-x", "20")
+    done = verb(town, "spawn", str(BOT), "--name", OF_SECOND, "-x", "20")
     assert_one_line(done, 1, f"holozen spawn: there is an entity '{OF_SECOND}' already")
-    assert "duplicates" not in town.run("doctor").stdout
+    assert "duplicates" not in verb(town, "doctor").stdout
 
 
 def test_robots_of_all_shards_drive_and_are_stopped_paused_and_reset(
-    town: Wire, shards: tuple[Process, Process]
+    town: Wire, shards: tuple[Process, Process], verb: Verb
 ) -> None:
     robots = [Robot(town.bus(), name) for name in (OF_FIRST, OF_SECOND)]
     for robot in robots:
         robot.drive(0.3)
-    assert sorted(town.run("stop").stdout.splitlines()) == [f"bot{number} is stopped" for number in range(6)]
+    assert sorted(verb(town, "stop").stdout.splitlines()) == [f"bot{number} is stopped" for number in range(6)]
     for robot in robots:
         robot.stands()
-    assert town.run("release").returncode == 0
-    assert town.run("sim", "pause").stdout == "paused\n"
+    assert verb(town, "release").returncode == 0
+    assert verb(town, "sim", "pause").stdout == "paused\n"
     for shard in shards:
         shard.wait_for_line("sim: set to paused by")
-    assert town.run("sim", "play").stdout == "playing\n"
-    assert town.run("sim", "reset").returncode == 0
+    assert verb(town, "sim", "play").stdout == "playing\n"
+    assert verb(town, "sim", "reset").returncode == 0
     for shard in shards:
         shard.wait_for_line("it was reset")
-    assert names(town) == []
+    assert names(town, verb) == []
 
 
 REFUSED = {
@@ -83,11 +86,11 @@ def test_a_shard_that_cannot_be_is_refused(town: Wire, shards: tuple[Process, Pr
     assert all(process.returncode is None for process in shards)
 
 
-def test_a_shard_that_is_killed_takes_its_own_robots_alone_and_comes_back_without_them(wire: Wire) -> None:
+def test_a_shard_that_is_killed_takes_its_own_robots_alone_and_comes_back_without_them(wire: Wire, verb: Verb) -> None:
     up = wire.start("up", "--shards", "2")
     wait_for(lambda: up.err.count("this is shard") == 2, 30)
     for name in (OF_FIRST, OF_SECOND):
-        done = wire.run("spawn", str(BOT), "--name", name, "-x", name[-1])
+        done = verb(wire, "spawn", str(BOT), "--name", name, "-x", name[-1])
         assert done.returncode == 0, done.stderr
     os.kill(parts_at(wire)["sim"], signal.SIGKILL)
     line = up.wait_for_line("starting it again in 0.5 s; the robots that were spawned in this shard are gone")
@@ -96,36 +99,40 @@ def test_a_shard_that_is_killed_takes_its_own_robots_alone_and_comes_back_withou
     gone, left = (OF_FIRST, OF_SECOND) if number[1] == "1" else (OF_SECOND, OF_FIRST)
     Robot(wire.bus(), left).drive(0.3)
     wait_for(lambda: up.err.count("this is shard") == 3, 30)
-    assert names(wire) == [left]
-    assert wire.run("spawn", str(BOT), "--name", gone, "-x", gone[-1]).returncode == 0
-    assert names(wire) == sorted([gone, left])
+    # If the meeting point was that of the shard which died, the other one first has to reach the new one.
+    wait_for(lambda: names(wire, verb) == [left])
+    done = verb(wire, "spawn", str(BOT), "--name", gone, "-x", gone[-1])
+    assert done.returncode == 0, done.stderr
+    wait_for(lambda: names(wire, verb) == sorted([gone, left]))
 
 
-def test_the_name_of_a_robot_whose_shard_does_not_run_is_refused_until_a_sim_takes_that_number(wire: Wire) -> None:
+def test_the_name_of_a_robot_whose_shard_does_not_run_is_refused_until_a_sim_takes_that_number(
+    wire: Wire, verb: Verb
+) -> None:
     first = wire.start("sim", "--shard", "auto/2")
     first.wait_for_line("this is shard 1/2")
-    done = wire.run("spawn", str(BOT), "--name", OF_SECOND)
+    done = verb(wire, "spawn", str(BOT), "--name", OF_SECOND)
     assert_one_line(
         done, 1, f"holozen spawn: '{OF_SECOND}' belongs to shard 2/2, which does not run; start it: holozen sim --shard"
     )
     second = wire.start("sim", "--shard", "auto/2", "--robot", f"{BOT}={OF_FIRST}", "--robot", f"{BOT}={OF_SECOND}")
     second.wait_for_line("this is shard 2/2")
-    assert names(wire) == [OF_SECOND]
+    assert names(wire, verb) == [OF_SECOND]
 
 
 def test_a_health_check_knows_its_own_shard_and_a_loop_that_does_not_go(
-    town: Wire, shards: tuple[Process, ...]
+    town: Wire, shards: tuple[Process, ...], verb: Verb
 ) -> None:
-    done = town.run("doctor", "--health", "sim")
+    done = verb(town, "doctor", "--health", "sim")
     assert done.returncode == 0 and re.search(r"^ok +health: sim_1_of_2 \(.*sim_2_of_2 \(.* answers$", done.stdout), (
         done
     )
-    assert town.run("doctor", "--health", "controller").stdout.startswith(
+    assert verb(town, "doctor", "--health", "controller").stdout.startswith(
         "error    health: no controller of this machine"
     )
     stopped = shards[1]
     stopped.signal(signal.SIGSTOP)
     try:
-        assert town.run("doctor", "--health", "sim_2_of_2").returncode == 1
+        assert verb(town, "doctor", "--health", "sim_2_of_2").returncode == 1
     finally:
         stopped.signal(signal.SIGCONT)

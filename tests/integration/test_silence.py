@@ -81,8 +81,7 @@ def test_a_teleop_that_wakes_up_after_its_key_timeout_does_not_drive_on(town: Wi
 def drives_fast(town: Wire, robot: Robot) -> Terminal:
     terminal = town.terminal("teleop", "--speed", "2", "--key-timeout", "0.4")
     terminal.wait_for_text("listening")
-    terminal.type("i")
-    robot.odom.next(lambda odom: moves(odom, 2, 0, 0))
+    terminal.hold_until("i", lambda: moves(robot.newest(), 2, 0, 0))
     return terminal
 
 

@@ -95,12 +95,7 @@ def test_the_teleop_and_the_controller_work_on_a_robot_that_came_later(
     terminal = wire.terminal("teleop", "Fred")
     terminal.wait_for_text("listening sim")
     odom = fred.odom.from_now()
-
-    def drives() -> bool:  # a key that the machine holds up may not count
-        terminal.type("i")
-        return any(each.twist.twist.linear.x > 0.4 for each in odom.messages())
-
-    wait_for(drives)
+    terminal.hold_until("i", lambda: any(each.twist.twist.linear.x > 0.4 for each in odom.messages()))
     fred.stands()
     terminal.type("\x03")
     assert terminal.process.wait() == 0
@@ -124,6 +119,20 @@ def test_a_repeated_name_an_unknown_robot_and_a_wrong_file_are_reported_with_the
     assert "no such" in refused(wire, "spawn", str(tmp_path / "none.urdf")).lower()
     assert wire.run("spawn", HB_BOT, "--name", "a/*").returncode == 2
     assert [line.split()[0] for line in done(wire, "list").splitlines()] == ["Fred"]
+
+
+def test_a_second_robot_at_the_root_is_refused_with_what_helps(wire: Wire, sim: Process) -> None:
+    root = ("--namespace", "/")
+    done(wire, "spawn", HB_BOT, *root)
+    taken = (
+        "cmd_vel is the key of 'hb_bot'; delete that one, or use a namespace; --namespace NAME (-robot_namespace NAME)"
+    )
+    for more in ((), ("--replace",)):
+        told = refused(wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", *root, *more)
+        assert told == f"holozen spawn: {taken} gives one\n"
+    assert "--replace takes its place, --name gives another" in refused(wire, "spawn", HB_BOT, *root, "-x", "5")
+    done(wire, "spawn", HB_BOT, "--name", "Other", "-x", "5", "--namespace", "lab")
+    done(wire, "spawn", HB_BOT, "--name", "hb_bot", "--replace", *root)
 
 
 def test_a_name_that_is_none_is_refused_by_the_sim_too(wire: Wire, sim: Process) -> None:
@@ -152,8 +161,10 @@ def test_a_robot_is_not_spawned_into_another_nor_is_one_deleted_for_it(wire: Wir
     done(wire, "spawn", HB_BOT, "--name", "Ann", "-x", "5")
     told = refused(wire, "spawn", HB_BOT, "--name", "Bob", "-x", "0.6")
     assert "no room for 'Bob' at x 0.6 y 0: it would be inside 'Fred'; the nearest free place is " in told
-    assert told.endswith("; -x and -y choose the place\n")
+    assert told.endswith("; -x, -y and -z choose the place\n")
     assert "inside 'Ann'" in refused(wire, "spawn", HB_BOT, "--name", "Fred", "--replace", "-x", "5.5")
+    told = refused(wire, "spawn", HB_BOT, "--name", "Zed", "-x", "20", "-z", "-1")
+    assert "at x 20 y 0 z -1: it would be 0.96 m below the ground; the lowest free z is -0.04; -x, -y and -z " in told
     told = refused(wire, "spawn", HB_BOT, "--count", "2", "--grid", "1", "-y", "5")
     assert re.search(
         r"1 of 2 were spawned, without (bot[01]): there is no room for '\1' at .*; .* --grid more than 1 m", told

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from holozen.testing import wait_for
 
 USERS_TESTS = """
@@ -29,10 +31,18 @@ def test_a_key_drives(wire, terminal, wait_for):
     wire.start("sim").wait_for_line("listens on")
     teleop = terminal("teleop", "--speed", "0.2", "--mode", "latch")
     teleop.wait_for_text("listening sim")
-    teleop.type("i")
-    teleop.wait_for_text("+0.200 m/s")  # measured
+    teleop.hold_until("i", lambda: "+0.200 m/s" in teleop.screen())  # measured
     assert teleop.process.terminate() == 0
     assert teleop.modes() == teleop.modes_before
+"""
+TWO_WIRES = """
+from holozen.testing import Wire
+
+def test_two_wires_hear_nothing_of_each_other(wire):
+    wire.start("sim", "--empty").wait_for_line("no robot yet")
+    assert "clock" in wire.run("topic", "list").stdout
+    with Wire() as other:
+        assert other.run("topic", "list").stdout == ""
 """
 
 
@@ -60,35 +70,17 @@ def running_at(text: str) -> list[str]:
     return [line for line in shown.splitlines() if "-m holozen" in line and text in line]
 
 
-def test_a_user_tests_a_robot_without_an_import_of_ours(tmp_path: Path) -> None:
-    done = run_pytest(tmp_path, USERS_TESTS)
+def test_a_user_tests_a_robot_without_an_import_of_ours_each_test_on_a_wire_of_its_own(tmp_path: Path) -> None:
+    done = run_pytest(tmp_path, USERS_TESTS + TWO_WIRES)
     assert done.returncode == 0, done.stdout
-    assert "2 passed" in done.stdout
-
-
-def test_a_test_that_fails_shows_what_its_processes_wrote_and_leaves_none(tmp_path: Path) -> None:
-    done = run_pytest(
-        tmp_path,
-        """
-def test_it(wire):
-    wire.start("sim").wait_for_line("listens on")
-    wire.terminal("teleop").wait_for_text("listening")
-    print(f"ENDPOINT {wire.endpoint}.")
-    assert False
-""",
-    )
-    assert done.returncode == 1
-    assert "sim: hb_bot listens on cmd_vel" in done.stdout
-    endpoint = re.search(r"ENDPOINT (tcp/127\.0\.0\.1:\d+)\.", done.stdout)
-    assert endpoint
-    assert running_at(endpoint[1]) == []
+    assert "3 passed" in done.stdout
 
 
 IN_VAIN = {
     "wait_for(lambda: [], within=0.1, what='rain')": "waited 0.1 s in vain for rain; the last look gave []",
-    "wire.start('sim').wait_for_line('tea', within=0.5)": "'tea' from <",
+    "wire.start('router').wait_for_line('tea', within=0.5)": "'tea' from <",
     "wire.start('sim', '--rtf', 'x').wait_for_line('tea')": "exit code 2> ended without 'tea'; it wrote:",
-    "wire.start('sim').wait(within=0.1)": "still runs after 0.1 s; it wrote:",
+    "wire.start('router').wait(within=0.1)": "still runs after 0.1 s; it wrote:",
     "terminal('topic', 'list').wait_for_text('tea')": "ended without 'tea' on its screen:",
     "lock_step('--nonsense')": "no flag '--nonsense'",
     "lock_step(); lock_step()": "simulates here already",
@@ -97,49 +89,54 @@ IN_VAIN = {
 }
 
 
-def test_a_condition_that_never_comes_true_names_what_was_awaited(tmp_path: Path) -> None:
-    tests = [f"def test_{n}(wire, terminal, wait_for, lock_step):\n    {test}\n" for n, test in enumerate(IN_VAIN)]
-    done = run_pytest(tmp_path, "\n".join(tests))
-    assert f"{len(IN_VAIN)} failed" in done.stdout
-    for test, reason in IN_VAIN.items():
-        assert reason in done.stdout, test
-    assert "waited 60 s" not in done.stdout
-
-
-def test_two_wires_hear_nothing_of_each_other(tmp_path: Path) -> None:
-    done = run_pytest(
-        tmp_path,
-        """
-from holozen.testing import Wire
-
-def test_it(wire):
-    wire.start("sim").wait_for_line("listens on")
-    assert "odom" in wire.run("topic", "list").stdout
-    with Wire() as other:
-        assert other.run("topic", "list").stdout == ""
-""",
-    )
-    assert done.returncode == 0, done.stdout
-
-
-def test_pytest_loads_nothing_heavy_without_the_fixtures(tmp_path: Path) -> None:
-    heavy = ["zenoh", "msgspec", "numpy", "pybullet", "pyte"]
-    done = run_pytest(tmp_path, f"import sys\ndef test_it():\n    assert not set({heavy}) & set(sys.modules)\n")
-    assert done.returncode == 0, done.stdout
-
-
-def test_without_pyte_the_screen_names_what_to_install(tmp_path: Path) -> None:
-    done = run_pytest(
-        tmp_path,
-        """
-import sys
-
-def test_it(terminal, monkeypatch):
+HEAVY = ["zenoh", "msgspec", "numpy", "pybullet", "pyte"]
+WITHOUT_FIXTURES = f"import sys\ndef test_first():\n    assert not set({HEAVY}) & set(sys.modules)\n"
+FAILS = """
+def test_that_fails(wire):
+    wire.start("router").wait_for_line("listens at")
+    wire.terminal("teleop").wait_for_text("listening")
+    print(f"ENDPOINT {wire.endpoint}.")
+    assert False
+"""
+WITHOUT_PYTE = """
+def test_without_pyte(terminal, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyte", None)
     terminal("topic", "list").screen()
-""",
-    )
-    assert "RuntimeError: Terminal.screen needs pyte; run: pip install pyte" in done.stdout
+"""
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory: pytest.TempPathFactory) -> str:
+    """What one run of pytest shows of a test that passes, and of many that fail."""
+    vain = [f"def test_{n}(wire, terminal, wait_for, lock_step):\n    {test}\n" for n, test in enumerate(IN_VAIN)]
+    done = run_pytest(tmp_path_factory.mktemp("failing"), "\n".join([WITHOUT_FIXTURES, FAILS, *vain, WITHOUT_PYTE]))
+    assert done.returncode == 1
+    return done.stdout
+
+
+def test_pytest_loads_nothing_heavy_without_the_fixtures(shown: str) -> None:
+    assert ", 1 passed" in shown, shown
+    assert "_ test_first _" not in shown, "which is the one that looks"
+
+
+def test_a_test_that_fails_shows_what_its_processes_wrote_and_leaves_none(shown: str) -> None:
+    _, _, of_it = shown.partition("_ test_that_fails _")
+    of_it, _, _ = of_it.partition("_ test_0 _")
+    assert "router: listens at" in of_it
+    endpoint = re.search(r"ENDPOINT (tcp/127\.0\.0\.1:\d+)\.", of_it)
+    assert endpoint
+    assert running_at(endpoint[1]) == []
+
+
+def test_a_condition_that_never_comes_true_names_what_was_awaited(shown: str) -> None:
+    assert f"{len(IN_VAIN) + 2} failed" in shown, "and the two others"
+    for test, reason in IN_VAIN.items():
+        assert reason in shown, test
+    assert "waited 60 s" not in shown
+
+
+def test_without_pyte_the_screen_names_what_to_install(shown: str) -> None:
+    assert "RuntimeError: Terminal.screen needs pyte; run: pip install pyte" in shown
 
 
 def test_a_killed_test_leaves_no_process(tmp_path: Path) -> None:
@@ -148,11 +145,11 @@ def test_a_killed_test_leaves_no_process(tmp_path: Path) -> None:
 import os, pathlib, signal
 
 def test_it(wire):
-    sim = wire.start("sim")
-    sim.wait_for_line("listens on")
-    pathlib.Path("pid").write_text(str(sim.pid))
+    router = wire.start("router")
+    router.wait_for_line("listens at")
+    pathlib.Path("pid").write_text(str(router.pid))
     os.kill(os.getpid(), signal.SIGKILL)
 """
     assert run_pytest(tmp_path, test).returncode == -signal.SIGKILL
     pid = (tmp_path / "pid").read_text()
-    wait_for(lambda: not Path(f"/proc/{pid}").exists(), what="the end of the sim")
+    wait_for(lambda: not Path(f"/proc/{pid}").exists(), what="the end of the router")

@@ -105,6 +105,25 @@ def test_echo_shows_what_foreign_nodes_put(
     assert echo.out == f"{shown}\n---\n"
 
 
+@pytest.mark.parametrize(
+    ("flags", "shown"),
+    [
+        ("foreign --once", "(deleted)\n---\n"),
+        ("* --once --json", '{"key": "foreign", "value": {"deleted": true}}\n'),
+        ("foreign --field x --timeout 1", ""),
+    ],
+)
+def test_echo_shows_that_a_key_was_deleted(wire: Wire, flags: str, shown: str) -> None:
+    session, echo = wire.bus("foreign").session, wire.start("topic", "echo", *flags.split())
+
+    def ended() -> bool:
+        session.delete("foreign")
+        return echo.returncode is not None
+
+    wait_for(ended)
+    assert echo.out == shown
+
+
 @pytest.mark.parametrize("verb", ["echo odom", "hz odom"])
 def test_a_reader_that_has_seen_enough_ends_it_quietly(town: Wire, robot: Robot, verb: str) -> None:
     words = command("topic", *verb.split(), *town.flags)

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import urllib.error
 import urllib.request
 from collections.abc import Callable
@@ -13,9 +14,11 @@ from holozen import data
 from holozen.testing import Process, Terminal, Wire, wait_for
 
 from .conftest import start_sim
-from .processes import assert_one_line, parts_at, state_of
+from .processes import assert_one_line, parts_at, state_of, wait_for_none
 from .robots import Robot, moves, rests
 
+Verb = Callable[..., subprocess.CompletedProcess[str]]
+BOT = str(data.find("urdf", "hb_bot.urdf.xacro"))
 PARTS = {"sim", "pose-service", "controller"}
 AT_MOST = 10.0  # s; it promises 2, and a busy machine gets more
 
@@ -36,14 +39,12 @@ def test_without_a_terminal_the_controller_drives_the_square(wire: Wire) -> None
     assert "Traceback" not in up.err
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP], ids=lambda n: n.name)
-def test_a_signal_ends_all_of_it_with_a_stop_of_the_robot(wire: Wire, number: int) -> None:
+def test_a_signal_ends_all_of_it_with_a_stop_of_the_robot(wire: Wire) -> None:
     up = wire.start("up")
     robot = Robot(wire.bus())
     driven(robot)
     assert set(all_run(wire, PARTS)) == {"up", *PARTS}
-    up.signal(number)
-    assert up.wait(AT_MOST) == 0
+    assert up.terminate(AT_MOST) == 0
     assert parts_at(wire) == {}
     robot.wait_for_stop_command()
     assert "Traceback" not in up.err
@@ -56,7 +57,7 @@ def test_two_signals_in_a_row_leave_nothing_either(wire: Wire) -> None:
     up.signal(signal.SIGINT)
     up.signal(signal.SIGINT)
     up.wait()
-    wait_for(lambda: parts_at(wire) == {})
+    wait_for_none(wire)
     assert "Traceback" not in up.err
 
 
@@ -65,7 +66,7 @@ def test_a_signal_right_at_the_start_leaves_nothing(wire: Wire) -> None:
     up.wait_for_line("no terminal here")
     up.signal(signal.SIGINT)
     up.wait()
-    wait_for(lambda: parts_at(wire) == {})
+    wait_for_none(wire)
     assert "Traceback" not in up.err
 
 
@@ -84,7 +85,7 @@ def test_killed_it_leaves_nothing(wire: Wire) -> None:
     up = wire.start("up")
     all_run(wire, PARTS)
     up.kill()
-    wait_for(lambda: parts_at(wire) == {})
+    wait_for_none(wire)
 
 
 def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> None:
@@ -93,11 +94,7 @@ def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> No
     terminal.wait_for_text("controller@")
     all_run(wire, {"teleop", *PARTS})
 
-    def shown() -> bool:
-        terminal.type(",")  # held
-        return "you drive" in terminal.screen() and moves(robot.newest(), -0.5, 0, 0)
-
-    wait_for(shown, what="a person to drive")
+    terminal.hold_until(",", lambda: "you drive" in terminal.screen() and moves(robot.newest(), -0.5, 0, 0))
     terminal.type("\x03")
     assert terminal.process.wait(AT_MOST) == 0
     assert parts_at(wire) == {}
@@ -107,19 +104,22 @@ def test_in_a_terminal_it_shows_the_teleop_and_ctrl_c_ends_all(wire: Wire) -> No
     assert "Traceback" not in terminal.raw
 
 
-def test_a_terminal_that_is_closed_ends_all(wire: Wire) -> None:
+def test_a_terminal_that_is_closed_ends_all_with_a_stop_of_the_robot(wire: Wire) -> None:
     terminal = wire.terminal("up")
+    robot = Robot(wire.bus())
     terminal.wait_for_text("controller@")
+    driven(robot)
     terminal.hang_up()
     terminal.process.wait()
-    wait_for(lambda: parts_at(wire) == {})
+    wait_for_none(wire)
+    robot.wait_for_stop_command()
 
 
 def test_killed_in_a_terminal_it_leaves_no_process(wire: Wire) -> None:
     terminal = wire.terminal("up")
     terminal.wait_for_text("controller@")
     terminal.process.kill()
-    wait_for(lambda: parts_at(wire) == {})
+    wait_for_none(wire)
 
 
 def test_a_killed_teleop_ends_all_and_leaves_the_terminal_tidy(wire: Wire) -> None:
@@ -152,9 +152,8 @@ def test_a_broken_robot_ends_all_with_the_reason(
     assert parts_at(wire) == {}
 
 
-@pytest.mark.parametrize(
-    ("words", "reason"),
-    [
+def test_a_wrong_flag_is_one_line_and_nothing_starts(wire: Wire, verb: Verb) -> None:
+    for words, reason in (
         (["--rtf", "fast"], "--rtf: 'fast': use a number from 0"),
         (["--shape", "sqare"], "'sqare' (did you mean 'square'?)"),
         (["--goals", "nowhere.txt"], "'nowhere.txt': there is no such file"),
@@ -162,25 +161,16 @@ def test_a_broken_robot_ends_all_with_the_reason(
         (["--laps", "two"], "'two': use a whole number"),
         (["--allow-env", "A=B"], "'A=B': write the name"),
         (["--speed", "1"], "no flag '--speed'"),
-    ],
-)
-def test_a_wrong_flag_is_one_line_and_nothing_starts(wire: Wire, words: list[str], reason: str) -> None:
-    assert_one_line(wire.run("up", *words), 2, "holozen up: ", reason)
+        (["--shards", "2", "--robot", f"{BOT}=Fred", "--robot", BOT], "--shards"),
+    ):
+        assert_one_line(verb(wire, "up", *words), 2, "holozen up: ", reason)
 
 
-def test_a_robot_with_a_name_is_driven_by_that_name_in_the_engine_of_ones_choice(wire: Wire) -> None:
-    wire.start("up", "--robot", f"{data.find('urdf', 'hb_bot.urdf.xacro')}=Fred", "--engine", "mujoco")
+def test_of_several_robots_the_first_is_driven_by_its_name_in_the_engine_of_ones_choice(wire: Wire) -> None:
+    wire.start("up", "--robot", f"{BOT}=Fred", "--robot", f"{BOT}=Ann", "--engine", "mujoco")
     driven(Robot(wire.bus(), "Fred"))
+    Robot(wire.bus(), "Ann").stands()
     assert "mujoco" in Path(f"/proc/{parts_at(wire)['sim']}/maps").read_text()
-
-
-def test_of_several_robots_all_are_there_and_the_first_is_driven(wire: Wire) -> None:
-    file = data.find("urdf", "hb_bot.urdf.xacro")
-    wire.start("up", "--robot", f"{file}=Fred", "--robot", f"{file}=Ann")
-    bus = wire.bus()
-    driven(Robot(bus, "Fred"))
-    assert rests(Robot(bus, "Ann").newest())
-    assert_one_line(wire.run("up", "--shards", "2", "--robot", f"{file}=Fred", "--robot", str(file)), 2, "--shards")
 
 
 def test_a_killed_sim_is_reported_and_one_started_by_hand_joins_the_others(wire: Wire) -> None:
@@ -196,29 +186,27 @@ def test_a_killed_sim_is_reported_and_one_started_by_hand_joins_the_others(wire:
     up.wait_for_line("controller: continues")
 
 
-@pytest.mark.parametrize(
-    ("part", "then", "holds"),
-    [
-        ("sim", ", its robots stopped until `holozen release`", "controller: yields: the robot is stopped by"),
-        ("controller", "; it drives after `holozen controller --resume` or", "controller: yields to --held"),
-        ("pose-service", "; the controller drives after `holozen controller --resume`", "controller: yields to --held"),
-    ],
-)
-def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire, part: str, then: str, holds: str) -> None:
+def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire) -> None:
     up = wire.start("up")
     robot = Robot(wire.bus())
-    driven(robot)
-    os.kill(dead := parts_at(wire)[part], signal.SIGKILL)
-    up.wait_for_line(f"up: {part} was ended by signal 9; starting it again in 0.5 s{then}")
-    up.wait_for_line(holds)
-    wait_for(lambda: parts_at(wire).get(part, dead) != dead, what=f"another {part}")
-    robot.stands()
-    odoms = robot.odom.from_now()
-    robot.pass_time(2.0)
-    assert all(map(rests, odoms.messages()))
-    if part == "sim":
-        assert wire.run("release").returncode == 0
-    wait_for(lambda: robot.resume())
+    for part, then, holds in (
+        ("controller", "; it drives after `holozen controller --resume` or", "controller: yields to --held"),
+        ("pose-service", "; the controller drives after `holozen controller --resume`", "controller: yields to --held"),
+        ("sim", ", its robots stopped until `holozen release`", "controller: yields: the robot is stopped by"),
+    ):
+        driven(robot)
+        held = up.err.count(holds)
+        os.kill(dead := parts_at(wire)[part], signal.SIGKILL)
+        up.wait_for_line(f"up: {part} was ended by signal 9; starting it again in 0.5 s{then}")
+        wait_for(lambda holds=holds, held=held: up.err.count(holds) > held, what=holds)  # type: ignore[misc]
+        wait_for(lambda part=part, dead=dead: parts_at(wire).get(part, dead) != dead, what=f"another {part}")  # type: ignore[misc]
+        robot.stands()
+        odoms = robot.odom.from_now()
+        robot.pass_time(2.0)
+        assert all(map(rests, odoms.messages()))
+        if part == "sim":
+            assert wire.run("release").returncode == 0
+        wait_for(robot.resume)
     driven(robot)
     up.signal(signal.SIGINT)
     assert up.wait(AT_MOST) == 0
@@ -227,8 +215,9 @@ def test_a_part_that_dies_is_started_again_and_moves_no_robot(wire: Wire, part: 
 
 def test_a_part_that_keeps_dying_is_started_less_and_less_often(wire: Wire) -> None:
     up = wire.start("up")
-    for pause in ("0.5", "1", "2"):
-        os.kill(all_run(wire, PARTS)["pose-service"], signal.SIGKILL)
+    for number, pause in enumerate(("0.5", "1", "2"), 1):
+        wait_for(lambda number=number: up.err.count("4 goals from square") == number)  # type: ignore[misc]
+        os.kill(parts_at(wire)["pose-service"], signal.SIGKILL)
         up.wait_for_line(f"up: pose-service was ended by signal 9; starting it again in {pause} s")
 
 

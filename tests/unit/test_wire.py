@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from holozen import wire
-from holozen.messages import Odometry, Twist
+from holozen.messages import Header, JointState, Odometry, PoseStamped, Time, Twist, TwistStamped, Vector3, Wrench
 from holozen.transport.samples import PRIORITIES
 
 LETTERS = string.ascii_letters
@@ -58,6 +58,21 @@ def test_commands_refuse_unknown_fields_and_telemetry_ignores_them() -> None:
     assert strict == {"cmd_vel", "joint_command", "gazebo_ros_force", "goal_pose"}
     assert wire.is_command("drive", (Twist.ROS,))  # a plugin may name the key of its commands
     assert not wire.is_command("ground_truth", (Odometry.ROS,))
+
+
+def test_a_stop_is_for_what_was_moved_and_what_ends_by_itself_has_none() -> None:
+    stopped = JointState(name=["a", "b"], velocity=[0.0, 0.0])
+    for command, stop in [
+        (Twist.planar(1.0), Twist()),
+        (TwistStamped(Header(Time(7), "base_link"), Twist.planar(1.0)), TwistStamped()),
+        (Wrench(force=Vector3(1.0)), Wrench()),
+        (JointState(name=["a", "b"], velocity=[1.0, 0.0]), stopped),
+        (JointState(name=["a", "b"], effort=[1.0, 2.0]), stopped),
+        (JointState(name=["a", "b"], position=[1.0, 2.0]), None),
+        (PoseStamped(), None),
+    ]:
+        fields = wire.stop(command, command.ROS)
+        assert (None if fields is None else type(command)(**fields)) == stop
 
 
 def test_each_key_is_in_the_table_once() -> None:

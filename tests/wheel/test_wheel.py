@@ -6,6 +6,7 @@ Nothing is downloaded: what the lock file already brought is lent to the new env
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -69,9 +70,15 @@ def environment(folder: Path, wheel: Path, lent: Path) -> Path:
 
 
 @pytest.fixture(scope="module")
-def full(wheel: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An environment with every extra."""
-    return environment(tmp_path_factory.mktemp("full") / "venv", wheel, Path(sysconfig.get_path("purelib")))
+def full(bare: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """An environment with every extra: a copy of the bare one, which takes less than to install the wheel again."""
+    folder = tmp_path_factory.mktemp("full") / "venv"
+    shutil.copytree(bare, folder, symlinks=True)
+    script = holozen(folder)
+    script.write_text(script.read_text().replace(str(bare), str(folder)))
+    (lent,) = folder.glob("lib/python*/site-packages/lent.pth")
+    lent.write_text(f"{sysconfig.get_path('purelib')}\n")
+    return folder
 
 
 @pytest.fixture(scope="module")

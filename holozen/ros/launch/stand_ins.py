@@ -17,7 +17,7 @@ from holozen.robot.errors import RobotError
 from holozen.ros import packages
 from holozen.ros.launch.launch_context import LaunchContext, LaunchError, Program, Text, text
 from holozen.ros.launch.launch_description import Action, Entities, LaunchDescription
-from holozen.suggest import suggest
+from holozen.suggest import listed, suggest
 
 ROOT = "/"  # the namespace of a robot without one: its keys are cmd_vel and odom
 SPAWN_TIMEOUT = "60"  # s for the sim to start
@@ -42,6 +42,25 @@ SKIPPED = {
     "plotjuggler/*": "`holozen plot` in another terminal plots numbers",
 }
 """package/executable -> why it is skipped, and what to use."""
+
+VERBS = {
+    "tf2_ros/tf2_echo": "holozen tf echo",
+    "xacro/*": "holozen xacro",
+    "teleop_twist_keyboard/*": "holozen teleop",
+    "teleop_twist_joy/*": "holozen teleop --joystick",
+    "joy/*": "holozen teleop --joystick",
+    "rviz2/*": "holozen view` or `holozen map",
+    "foxglove_bridge/*": "holozen view --foxglove",
+    "gazebo_ros/spawn_entity*": "holozen spawn",
+    "ros_gz_sim/create": "holozen spawn",
+    "ros_ign_gazebo/create": "holozen spawn",
+    "gazebo_ros/gz*": "holozen sim --empty",
+    "gazebo_ros/gazebo": "holozen sim --empty",
+    "ros_gz_sim/gz*": "holozen sim --empty",
+}
+"""package/executable -> the command to type in its place."""
+_WITH_ARGUMENTS = {"tf2_ros/tf2_echo": 2, "xacro/*": None}
+"""Those whose command takes the same arguments, and how many of them."""
 
 ENDING = ("controller_manager/spawner", "controller_manager/spawner.py")
 """Skipped nodes that would end by themselves, and for whose end others wait."""
@@ -91,11 +110,33 @@ def stand_in(context: LaunchContext, node: Executable) -> Entities | None:
         return NODES[name](context, node)
     reason = next((reason for pattern, reason in SKIPPED.items() if fnmatch(name, pattern)), None)
     if reason is None:
+        _check_stand_in(node)
         return None
     if node.package == "robot_state_publisher":
         _remember_description(context, node)
-    skip(context, node.action, f"{node.package} {node.name}", reason, name in ENDING)
+    shown = node.name if node.name == node.package else f"{node.package} {node.name}"
+    skip(context, node.action, shown, reason, name in ENDING)
     return ()
+
+
+def advice(package: str, name: str, words: Sequence[str]) -> str:
+    """What to do in place of running an executable of ROS with these arguments; empty for one that is not ROS's."""
+    whole = f"{package}/{name}"
+    if pattern := next((pattern for pattern in VERBS if fnmatch(whole, pattern)), ""):
+        ours = words[: words.index("--ros-args")] if "--ros-args" in words else words
+        taken = ours[: _WITH_ARGUMENTS[pattern]] if pattern in _WITH_ARGUMENTS else ()
+        return f"use `{' '.join((VERBS[pattern], *map(shlex.quote, taken)))}`"
+    return next((reason for pattern, reason in SKIPPED.items() if fnmatch(whole, pattern)), "")
+
+
+def _check_stand_in(node: Executable) -> None:
+    """Raise LaunchError for an executable of a package of which there is no more than what is replaced."""
+    if node.package not in packages.stand_ins or packages.find(node.package) != packages.stand_ins[node.package]:
+        return
+    start = f"{node.package}/"
+    known = sorted(name.removeprefix(start) for name in (*NODES, *SKIPPED) if name.startswith(start))
+    fault = f"package {node.package!r} has no executable {node.name!r}{suggest(node.name, known)}"
+    raise LaunchError(f"{fault}; those that holozen replaces: {listed(known)}")
 
 
 def skip(context: LaunchContext, action: Action, name: str, reason: str, ends: bool = False) -> None:

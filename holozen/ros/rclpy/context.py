@@ -223,7 +223,7 @@ def end_at_exit() -> None:
     end_all()
     deadline = time.monotonic() + ZENOH_THREADS_END
     for thread in threading.enumerate():
-        if ZENOH_THREAD in thread.name:
+        if ZENOH_THREAD in thread.name and thread.is_alive():
             thread.join(max(0.0, deadline - time.monotonic()))
 
 
@@ -249,9 +249,11 @@ def _wait_for_the_end() -> None:
 
 
 def _belongs_to_the_script(thread: threading.Thread) -> bool:
-    """Whether a thread keeps the script running. The threads of Zenoh's callbacks end with their session."""
+    """Whether a thread keeps the script running. The threads of Zenoh's callbacks end with their session. One that is
+    listed but not alive never began: Ctrl-C came as it was being started.
+    """
     is_ours = thread is threading.current_thread() or thread is threading.main_thread()
-    return not (is_ours or thread.daemon or ZENOH_THREAD in thread.name)
+    return thread.is_alive() and not (is_ours or thread.daemon or ZENOH_THREAD in thread.name)
 
 
 # Signals: SIGINT and SIGTERM end the contexts, and SIGINT raises KeyboardInterrupt as usual

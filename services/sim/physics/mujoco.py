@@ -348,7 +348,7 @@ class MuJoCo(Engine):
         apart = np.maximum(low[:, None] - high2, low2 - high[:, None]).max(axis=2)
         points = np.zeros(6)
         least = within
-        for i, j in np.argwhere(apart < within + 1e-9):
+        for i, j in np.argwhere((apart < within + 1e-9) | self._planes[theirs]):  # the box of a plane is far from it
             pair = int(mine[i]), int(theirs[j])
             # With a limit of 0 the engine reports no depth.
             least = min(least, mj.mj_geomDistance(self._model, self._data, *pair, max(within, 1e-6), points))

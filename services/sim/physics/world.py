@@ -19,6 +19,7 @@ from .ray_caster import RayCaster
 from .wheels import on_spheres
 
 OVERLAP = 0.01  # m by which bodies may overlap when they are placed; the engine throws apart what overlaps far more
+SUNK = 0.05  # m by which they may be in the ground: soft wheels press in by some cm, what is 0.2 m deep is thrown out
 RINGS = 8  # of places around a taken one that are searched for a free one
 
 
@@ -106,7 +107,7 @@ class World:
 
     def overlapped(self, body: Body) -> list[int]:
         """The engine's numbers of other bodies that `body` overlaps by more than OVERLAP, the deepest first. Planes do
-        not count: a body that overlaps one only rises.
+        not count.
         """
         (x, y, z), (x2, y2, z2) = body.box()
         margin = self._field.margin(0.0)
@@ -119,6 +120,12 @@ class World:
             if depth > OVERLAP and not self.engine.is_plane(number):
                 depths[number] = depth
         return sorted(depths, key=lambda number: (-depths[number], number))
+
+    def sunk(self, body: Body) -> float:
+        """How deep (m) a body is in the ground: 0 if by no more than SUNK, or if the world has no ground."""
+        ground = self.engine.ground
+        depth = 0.0 if ground is None else -self.engine.gap(body.number, ground, 0.0)
+        return depth if depth > SUNK else 0.0
 
     def free_place(self, body: Body) -> XYZ | None:
         """Move `body` to the nearest free position on a grid around it, and return that; None if all are taken."""

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
@@ -49,11 +50,12 @@ class Played:
         self.player = Player(self._publish, lambda: self.done.append("hold"), self.keys.read, self.stop, rate)
         self.end_after = 10**9
 
-    def _publish(self, message: Message) -> None:
+    def _publish(self, message: Message) -> bool:
         self.done.append(message.payload.decode())
         time.sleep(self.slow)
         if len(self.done) >= self.end_after:
             self.stop.set()
+        return True
 
 
 def test_a_terminal_that_does_not_control_the_process_has_no_keys() -> None:
@@ -88,6 +90,16 @@ def test_all_messages_are_played_in_order_and_none_before_its_time() -> None:
     assert time.monotonic() - begun >= 0.06
     assert played.done == ["1000", "1010", "1030", "1030", "1060"]
     assert (played.player.count, played.player.position) == (5, 1060 * MS)
+
+
+def noting(times: list[float], now: list[float]) -> Callable[[Message], bool]:
+    """Publishes nothing, but notes when."""
+
+    def publish(_: Message) -> bool:
+        times.append(now[0])
+        return True
+
+    return publish
 
 
 def test_a_message_from_before_is_played_at_once() -> None:
@@ -140,7 +152,7 @@ def test_after_a_suspension_it_goes_on_from_where_it_was_at_its_pace(monkeypatch
         return ""
 
     stop = threading.Event()
-    player = Player(lambda _: times.append(now[0]), lambda: None, wait, stop, on_gap=gaps.append)
+    player = Player(noting(times, now), lambda: None, wait, stop, on_gap=gaps.append)
     assert player.play(messages(*range(0, 1000, 100)))
     assert times[:3] == pytest.approx([0.0, 0.1, 0.2], abs=0.001)
     assert gaps == pytest.approx([60.0])
@@ -155,7 +167,7 @@ def test_a_suspension_in_a_pause_changes_nothing(monkeypatch: pytest.MonkeyPatch
         now[0] += 60.0 if len(pressed) == 2 else min(timeout, 0.01)
         return pressed.pop(0) if pressed else ""
 
-    player = Player(lambda _: times.append(now[0]), lambda: None, wait, threading.Event(), on_gap=gaps.append)
+    player = Player(noting(times, now), lambda: None, wait, threading.Event(), on_gap=gaps.append)
     assert player.play(messages(0, 100))
     assert times[1] == pytest.approx(60.1, abs=0.03)
     assert gaps == []

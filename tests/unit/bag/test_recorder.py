@@ -47,6 +47,7 @@ class Sample:
     def __init__(self, number: int) -> None:
         self.key, self.payload, self.encoding = "a", b"%d" % number, "text/plain"
         self.number = None
+        self.is_deletion = False
 
 
 def test_samples_are_taken_in_the_order_they_came_at_times_that_never_go_back() -> None:

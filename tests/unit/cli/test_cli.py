@@ -187,3 +187,23 @@ def test_closed_standard_input_is_an_empty_one(words: str) -> None:
     done = subprocess.run(["sh", "-c", 'exec "$@" <&-', "sh", *line], capture_output=True, text=True, timeout=60)
     assert done.returncode != 0
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("closed", [">&-", "2>&-"])
+@pytest.mark.parametrize("words", ["doctor", "map --once", "check urdf/rover.urdf.xacro"])
+def test_closed_output_is_no_error_of_its_own(words: str, closed: str) -> None:
+    flags = ["--connect", "tcp/127.0.0.1:1", "--listen", "tcp/127.0.0.1:0"] if "check" not in words else []
+    line = [sys.executable, "-m", "holozen", *words.split(), *flags]
+    done = subprocess.run(["sh", "-c", f'exec "$@" {closed}', "sh", *line], capture_output=True, text=True, timeout=60)
+    assert "Traceback" not in done.stderr
+    assert (done.returncode, words) in ((0, "doctor"), (1, "doctor"), (1, "map --once"), (0, words))
+
+
+def test_a_name_that_the_output_cannot_hold_is_escaped(tmp_path: Path) -> None:
+    (tmp_path / "Rüstig.urdf").write_text("<robot/>")
+    line = [sys.executable, "-m", "holozen", "check", str(tmp_path / "Rüstig.urdf")]
+    done = subprocess.run(
+        line, capture_output=True, text=True, timeout=60, env=os.environ | {"PYTHONIOENCODING": "ascii"}
+    )
+    assert done.stdout.startswith(f"{tmp_path}/R\\xfcstig.urdf")
+    assert done.stderr == ""

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 from holozen.bus import Bus
-from holozen.cli.publish import HELD, LEFT, verdict
+from holozen.cli.publish import HELD, LEFT, verdict, verdict_on_part
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 
@@ -33,6 +33,24 @@ def test_the_reason_is_the_sims() -> None:
         assert verdict(status, ME) == why
 
 
+def test_a_command_to_a_joint_that_is_accepted_after_a_refusal_is_obeyed() -> None:
+    """By the counts, where no other source may be the one that was accepted."""
+    refused = {"refused": {"stale": 1}, "last_refusal": f"{ME}: stale: it is old"}
+    before = CommandStatus(**refused)  # type: ignore[arg-type]
+    for status, why in [
+        (CommandStatus(), None),
+        (CommandStatus(accepted=1), None),
+        (CommandStatus(obeyed=ME), ""),
+        (CommandStatus(accepted=1, **refused), ""),  # type: ignore[arg-type]
+        (CommandStatus(**refused), None),  # type: ignore[arg-type]
+        (CommandStatus(accepted=1, obeyed=TELEOP, **refused), None),  # type: ignore[arg-type]
+        (CommandStatus(accepted=1, sources=[CommandSource(TELEOP)], **refused), None),  # type: ignore[arg-type]
+        (CommandStatus(refused={"stale": 2}, last_refusal=f"{ME}: stale: it is old"), "stale: it is old"),
+        (CommandStatus(stopped=TELEOP, **refused), f"{TELEOP} has set the software stop"),  # type: ignore[arg-type]
+    ]:
+        assert verdict_on_part(status, before, ME) == why
+
+
 def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus]) -> str:
     """What `pub --once` reports beside a sim that the teleop drives, and whose next status `judged` gives."""
     sim: Bus = wire.bus("sim")
@@ -48,6 +66,7 @@ def once(wire: Wire, run: Run, judged: Callable[[str], CommandStatus]) -> str:
         answered = pool.submit(answer)
         code, _, err = run("topic", "pub", "cmd_vel", "{}", "--once")
         answered.result(10)
+    sim.close()  # the next command is not for it
     assert code == 0
     return err
 

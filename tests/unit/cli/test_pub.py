@@ -105,6 +105,11 @@ def test_what_is_no_message_is_refused_with_the_reason() -> None:
         ("{" * 3000, "the value is nested too deeply"),
         ('{"linear": {"x": ' + "9" * 5000 + "}}", "4300 digits"),
         ('{"linear": {"x": ' + "9" * 500 + "}}", "is not a valid float64"),
+        ('{"linear": {"x": 0.1, "x": 3}}', "'x' is given twice"),
+        ("linear: {x: 0.1, x: 3}", "'x' is given twice"),
+        ("linear: {x: 1:30}", "is not a valid float64"),
+        ("linear: {x: 1_0.5}", "is not a valid float64"),
+        ("linear: {x: 010}", "is not a valid float64"),
         ("x" * (LARGEST + 1), "the value is longer than 1000000 bytes"),
     ]:
         assert reason in refusal(text)

@@ -63,6 +63,20 @@ def test_a_wrong_word_is_reported_with_the_closest(run: Run) -> None:
         ("interface show x --jsn", "holozen interface show: no flag '--jsn' (did you mean '--json'?); "),
         ("param get sim x y", "holozen param get: unexpected argument 'y'; "),
         ("topic list odom -x", "holozen topic list: no flag '-x'; "),
+        (
+            "topic echo x --qos-reliability best-effort",
+            "holozen topic echo: argument --qos-reliability: 'best-effort' (did",
+        ),
+        ("topic echo x --qos-profile nonsense", "holozen topic echo: argument --qos-profile: 'nonsense'; there are "),
+        ("topic pub x {} --qos-depth abc", "holozen topic pub: argument --qos-depth: 'abc': use a whole number from 0"),
+        ("topic pub x {} --qos-durability none", "holozen topic pub: argument --qos-durability: 'none'; there are "),
+        ("topic list --spin-time soon", "holozen topic list: argument --spin-time: 'soon': use a number from 0 to "),
+        ("topic echo x --json --csv", "holozen topic echo: give --json or --csv, not both; "),
+        ("topic echo x --raw --field a", "holozen topic echo: give --field or --raw, not both; "),
+        ("topic echo x -f -l 3", "holozen topic echo: give --full-length or --truncate-length, not both; "),
+        ("replay x --remap a:=b a:=c", "holozen replay: --remap: 'a' is given twice; it is played on one key; "),
+        ("record -a odom", "holozen record: give keys or -a, not both; "),
+        ("spawn", "holozen spawn: give the FILE of a robot or object; "),
         ("completion tcsh", "holozen completion: argument shell: 'tcsh'; there are bash, zsh, fish; "),
     ]:
         code, out, err = run(*words.split())

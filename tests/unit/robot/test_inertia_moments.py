@@ -41,6 +41,10 @@ def test_an_inertia_that_no_such_body_has_is_taken_from_the_shapes() -> None:
         ("", "<inertial> of <link name='a'> has no <inertia>"),
         ('<inertia ixx="0" iyy="0" izz="0"/>', "is zero or not positive definite, which is impossible"),
         ('<inertia ixx="1" iyy="1" izz="1" ixy="5"/>', "is zero or not positive definite, which is impossible"),
+        (
+            '<inertia ixx="0.01" iyy="0.01" izz="0.1"/>',
+            "has one moment above the sum of the other two (ixx=0.01, iyy=0.01, izz=0.1), which is impossible",
+        ),
         ('<inertia ixx="1e-6" iyy="1e-6" izz="1e-6"/>', SMALL),
         ('<inertia ixx="1" iyy="1" izz="1e-6"/>', SMALL),
     ]:
@@ -57,6 +61,13 @@ def test_an_inertia_that_is_but_wrong_stays(factor: float) -> None:
     model = robot(f'<inertia ixx="{value}" iyy="{value}" izz="{value}"/>', geometry(BOX))
     part = model.links["a"].inertial
     assert part is not None and part.inertia == (value, 0, 0, value, 0, value)
+    assert model.warnings == ()
+
+
+def test_a_plate_with_rounded_moments_keeps_them() -> None:
+    model = robot('<inertia ixx="0.015" iyy="0.015" izz="0.0302"/>', geometry('<box size="0.3 0.3 0.001"/>'))
+    part = model.links["a"].inertial
+    assert part is not None and part.inertia == (0.015, 0, 0, 0.015, 0, 0.0302)
     assert model.warnings == ()
 
 

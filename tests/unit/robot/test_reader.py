@@ -88,6 +88,10 @@ def wrong() -> int:
     return "not a number"  # type: ignore[return-value]
 
 
+def misnamed() -> int:
+    return os.fsdecode(b"\xfc.stl")  # type: ignore[return-value]
+
+
 @pytest.fixture
 def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     """A lasting process of its own."""
@@ -105,11 +109,15 @@ def server(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         (much, "it takes more than"),
         (crashed, r"its reader crashed \(SIGSEGV\)"),
         (wrong, "its reader was compromised"),
+        (misnamed, "the name of this file, or of one in it, is not utf-8; rename it"),
     ],
 )
 def test_one_that_hangs_swells_crashes_or_lies_is_an_error(function: Callable[[], int], reason: str) -> None:
     with pytest.raises(RobotError, match=f"it: {reason}"):
         reader.run(int, "it", function, seconds=1)
+    if function is misnamed:  # the file itself may have such a name
+        with pytest.raises(RobotError, match=rf"^\?: {reason}"):
+            reader.run(int, "\udcfc", function)
     assert reader.run(int, "it", abs, -1) == 1
 
 

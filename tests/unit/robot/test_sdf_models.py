@@ -47,9 +47,9 @@ def test_a_model_has_its_name_root_links_and_joints() -> None:
 
 def test_masses_and_inertias_are_read() -> None:
     inertia = "".join(f"<{name}>{value}</{name}>" for name, value in
-                      {"ixx": 1, "ixy": 0.1, "ixz": 0.2, "iyy": 2, "iyz": 0.3, "izz": 3}.items())  # fmt: skip
+                      {"ixx": 1.5, "ixy": 0.1, "ixz": 0.2, "iyy": 2, "iyz": 0.3, "izz": 3}.items())  # fmt: skip
     link = only_link(f"<inertial><mass> 2 </mass><inertia>{inertia}</inertia></inertial>")
-    assert link.inertial == Inertial(Pose(), 2.0, (1, 0.1, 0.2, 2, 0.3, 3))
+    assert link.inertial == Inertial(Pose(), 2.0, (1.5, 0.1, 0.2, 2, 0.3, 3))
 
 
 def test_what_an_inertial_leaves_out_is_1() -> None:

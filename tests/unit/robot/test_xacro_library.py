@@ -80,11 +80,13 @@ def test_every_file_of_the_lessons_is_as_the_library_makes_it(monkeypatch: pytes
 
 def test_what_a_file_may_use_is_as_the_library_makes_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = folder / "robot.xacro"
-    for use, given in BODIES.items():
-        body = f'<xacro:property name="n2" value="2"/>\n{given}'.replace("\n", "\r\n" if use == "maths" else "\n")
-        path.write_bytes(f'<?xml version="1.0"?>\n{HEAD}{body}</robot>'.encode())
-        for args in ({}, {"n": "5"}):
-            assert expand_xacro(path, args, allow_env=["HOLOZEN_TEST"]) == librarys(path, args, monkeypatch), use
+    uses = "\n".join(f'<use of="{use}"/>{given}' for use, given in BODIES.items())
+    text = f'<?xml version="1.0"?>\n{HEAD}<xacro:property name="n2" value="2"/>\n{uses}</robot>'
+    for end, args in (("\n", {}), ("\r\n", {"n": "5"})):
+        path.write_bytes(text.replace("\n", end).encode())
+        expanded = expand_xacro(path, args, allow_env=["HOLOZEN_TEST"])
+        assert expanded == librarys(path, args, monkeypatch)
+        assert expanded.count("<use ") == len(BODIES)
 
 
 def test_a_relative_path_is_as_the_library_makes_it(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -33,7 +33,7 @@ PROPERTIES = nested(
     lambda i: f'<xacro:property name="p{i}" value="{f"${{p{i - 1}}}" * 10}"/>',
     12,
 )
-SLOW = "takes longer than the limit of 0.2 s"
+SLOW = "takes longer than the limit of 0.1 s"
 LARGE = "needs too much memory; an expansion has 512 MB"
 CALLS = "macros, blocks and includes call each other without end; at most 5000 calls are made"
 ENDLESS = "calls itself without end"
@@ -57,8 +57,8 @@ def failure(folder: Path, body: str, head: str = HEAD) -> str:
 
 
 def test_a_step_that_takes_too_long_ends_in_a_line(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(xacro, "STEP_TIME", 0.2)
-    shorter = "import holozen.robot.xacro\nholozen.robot.xacro.STEP_TIME = 0.2\nfrom holozen.robot.xacro_child"
+    monkeypatch.setattr(xacro, "STEP_TIME", 0.1)
+    shorter = "import holozen.robot.xacro\nholozen.robot.xacro.STEP_TIME = 0.1\nfrom holozen.robot.xacro_child"
     monkeypatch.setattr(xacro, "BOOT", xacro.BOOT.replace("from holozen.robot.xacro_child", shorter))
     rows = [
         ('<a/>\n<l n="${9**9**9}"/>', 3, f"the expression '9**9**9' {SLOW}"),

@@ -207,6 +207,16 @@ def block():
 blocker = node.create_timer(0, block, callback_group=ReentrantCallbackGroup())
 executor.spin()
 """
+HALF_STARTED = """
+import linecache
+def interrupt(frame, event, _):  # as Ctrl-C does at this moment
+    here = linecache.getline(frame.f_code.co_filename, frame.f_lineno)
+    if frame.f_code is threading.Thread.start.__code__ and "_start_new_thread" in here:
+        raise KeyboardInterrupt
+    return interrupt
+sys.settrace(interrupt)
+threading.Thread(target=print).start()
+"""
 NODES = "nodes = [rclpy.create_node(f'node{i}') for i in range(5)]\nrclpy.spin(node)"
 EXTERNAL = "ExternalShutdownException: rclpy was shut down, by a signal or from elsewhere"
 CASES = {
@@ -273,6 +283,7 @@ def test_a_signal_ends_every_wait(script: Script) -> None:
         ("threading.Timer(0.05, rclpy.shutdown).start()\nrclpy.spin(node)", 0, ""),
         ("node.create_client(Trigger, 'nobody').call_async(Trigger.Request())", 0, ""),
         ("threading.Thread(target=rclpy.spin, args=(node,), daemon=True).start()\nup()", 0, None),
+        (HALF_STARTED, 130, ""),
     ],
 )
 def test_it_ends_by_itself(script: Script, text: str, code: int, message: str | None) -> None:

@@ -51,6 +51,33 @@ def test_it_has_what_python_gives_every_script(run: Run, write: Write) -> None:
     assert run("a.py").stdout == plain.stdout
 
 
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("tf2_ros tf2_echo odom base_link 2", "tf2_ros tf2_echo is not run here: use `holozen tf echo odom base_link`"),
+        ("tf2_ros tf2_echo odom --ros-args -r a:=b", "use `holozen tf echo odom`"),
+        ("xacro xacro my_bot.xacro name:=x", "use `holozen xacro my_bot.xacro name:=x`"),
+        ("teleop_twist_keyboard teleop_twist_keyboard", "use `holozen teleop`"),
+        ("rviz2 rviz2 -d a.rviz", "use `holozen view` or `holozen map`"),
+        ("rviz2", "rviz2 is not run here: use `holozen view` or `holozen map`"),
+        ("gazebo_ros spawn_entity.py -entity Fred", "use `holozen spawn`"),
+        ("gazebo_ros gzserver", "use `holozen sim --empty`"),
+        ("robot_state_publisher robot_state_publisher", "the sim itself publishes joint_states and tf"),
+    ],
+)
+def test_of_what_is_ros_own_it_names_the_verb(run: Run, words: str, expected: str) -> None:
+    done = run(*words.split())
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("holozen run: ") and done.stderr.endswith(f"{expected}\n")
+    assert done.stderr.count("\n") == 1
+
+
+def test_a_package_with_the_name_of_one_of_ros_own_is_run(run: Run, write: Write) -> None:
+    write("src/xacro/package.xml", "<package><name>xacro</name></package>")
+    write("src/xacro/scripts/xacro.py", "print('my own')")
+    assert run("xacro", "xacro").stdout == "my own\n"
+
+
 def test_an_executable_of_a_package_is_found(run: Run, write: Write, my_bot: Path) -> None:
     write("src/my_bot/scripts/a.py", "print('a script')")
     write("src/my_bot/setup.py", "setup(entry_points={'console_scripts': ['b = my_bot.b:Main.start']})")

@@ -7,7 +7,7 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from holozen.command.arbiter import AUTOPILOT, HELD, MAX_HELD, Arbiter, Driver, Sent
+from holozen.command.arbiter import AUTOPILOT, HELD, MAX_HELD, MAX_PER_RANK, Arbiter, Driver, Sent
 from holozen.command.motion import JointMotion, Motion
 from holozen.limits import STOP, Planar
 from holozen.transport.samples import PRIORITIES
@@ -94,13 +94,61 @@ def test_a_higher_source_takes_the_robot_while_the_lower_one_drives(arbiter: Arb
     assert arbiter.motion(1.2) == LEFT
 
 
-@pytest.mark.parametrize("rank", [PERSON, SCRIPT, CONTROLLER])
+@pytest.mark.parametrize("rank", [SCRIPT, CONTROLLER])
 def test_among_equals_the_one_that_drives_goes_on_while_it_is_fresh(arbiter: Arbiter, rank: int) -> None:
     arbiter.offer("first", rank, FORWARD, 1.0)
     assert arbiter.offer("second", rank, LEFT, 1.1) == "overruled: first drives"
     assert arbiter.motion(1.1) == FORWARD
     assert arbiter.offer("second", rank, LEFT, 1.6) == ""
     assert arbiter.motion(1.6) == LEFT
+
+
+def test_a_person_whom_another_overruled_drives_only_after_letting_go(arbiter: Arbiter) -> None:
+    def both(first: Motion, begin: int, end: int) -> str:
+        """Both command at 10 Hz, from and until these tenths of a second. Returns the last refusal of the second."""
+        for tenth in range(begin, end):
+            arbiter.offer("first", PERSON, first, tenth / 10)
+            reason = arbiter.offer("second", PERSON, LEFT, tenth / 10 + 0.05)
+        return reason
+
+    assert both(FORWARD, 10, 20).startswith("let go first: it commanded while another drove")
+    assert both(STOP, 20, 30).startswith("let go first"), "a latched key does not drive once the robot is free"
+    assert arbiter.motion(3.0) == STOP
+    assert arbiter.offer("second", PERSON, STOP, 3.05) == arbiter.offer("second", PERSON, LEFT, 3.6) == ""
+    assert arbiter.offer("first", PERSON, STOP, 3.65) == ""
+    assert arbiter.offer("second", PERSON, LEFT, 4.2) == HELD
+    assert arbiter.resume(4.3) == ""
+    assert arbiter.offer("second", PERSON, LEFT, 4.4).startswith("let go first"), "resume is meant for others"
+    assert arbiter.offer("second", PERSON, LEFT, 5.0) == "", "it was silent"
+
+
+def test_a_person_whom_another_stopped_does_not_drive_on_after_a_quick_resume(arbiter: Arbiter) -> None:
+    arbiter.offer("first", PERSON, FORWARD, 1.0)
+    arbiter.offer("second", PERSON, STOP, 1.05)
+    arbiter.offer("first", PERSON, FORWARD, 1.1)
+    assert arbiter.resume(1.2) == ""
+    assert arbiter.offer("first", PERSON, FORWARD, 1.25).startswith("let go first")
+    assert arbiter.offer("first", PERSON, STOP, 1.3) == arbiter.offer("first", PERSON, FORWARD, 1.35) == ""
+
+
+def test_a_person_whose_late_commands_were_refused_while_another_drove_lets_go_too(arbiter: Arbiter) -> None:
+    arbiter.offer("first", PERSON, FORWARD, 1.0)
+    arbiter.note_refused("second", PERSON, 1.2)
+    arbiter.offer("first", PERSON, STOP, 1.3)
+    arbiter.note_refused("second", PERSON, 1.6)
+    assert arbiter.offer("second", PERSON, LEFT, 1.9).startswith("let go first")
+    arbiter.offer("script", SCRIPT, FORWARD, 3.0)
+    arbiter.note_refused("third", PERSON, 3.1)
+    assert arbiter.offer("third", PERSON, LEFT, 3.2) == "", "only people let go of each other"
+
+
+@pytest.mark.parametrize("timeout", [0.5, -1.0])
+def test_a_flood_of_people_does_not_lock_out_the_one_who_drives(timeout: float) -> None:
+    arbiter = Arbiter(timeout)
+    for number in range(3 * MAX_PER_RANK):
+        arbiter.offer("first", PERSON, FORWARD, 1.0)
+        assert arbiter.offer(f"forged {number}", PERSON, LEFT, 1.0)
+    assert arbiter.offer("first", PERSON, LEFT, 1.1) == ""
 
 
 @pytest.mark.parametrize(("rank", "stopper"), [(PERSON, PERSON), (SCRIPT, SCRIPT), (CONTROLLER, CONTROLLER),
@@ -115,7 +163,7 @@ def test_an_equal_or_higher_source_may_stop_the_robot_and_it_stays_stopped(
         assert arbiter.offer("first", rank, FORWARD, now)
         assert arbiter.motion(now) == STOP
     assert arbiter.resume(9.1) == ""
-    assert arbiter.offer("first", rank, FORWARD, 9.2) == ""
+    assert arbiter.offer("first", rank, FORWARD, 9.7) == ""
 
 
 @pytest.mark.parametrize("low", [SCRIPT, CONTROLLER])
@@ -263,7 +311,7 @@ class TestWithoutATimeout:
     def test_a_second_teleop_can_drive_what_a_dead_one_left_driving(self, arbiter: Arbiter) -> None:
         arbiter.offer("dead teleop", PERSON, FORWARD, 1.0)
         assert arbiter.offer("teleop", PERSON, LEFT, 1.4) == "overruled: dead teleop drives"
-        assert arbiter.offer("teleop", PERSON, LEFT, 2.0) == ""
+        assert arbiter.offer("teleop", PERSON, STOP, 1.9) == arbiter.offer("teleop", PERSON, LEFT, 2.0) == ""
         assert arbiter.motion(2.0) == LEFT
 
     def test_a_person_is_not_locked_out_by_another_source_that_drove_during_their_silence(

@@ -4,6 +4,7 @@ import math
 import re
 import tempfile
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -26,6 +27,7 @@ DT = 1 / 240
 UPSIDE = (0.0, 0.0, 1.0)
 
 
+@cache
 def wheely(**values: float) -> RobotModel:
     """The lesson's robot with other values of its properties, or of the mass of its body or of each wheel."""
     text = FILE.read_text()
@@ -81,8 +83,10 @@ def test_it_stands_for_half_a_minute(rider: Rider) -> None:
     assert rider.place == pytest.approx((0, 0, 0), abs=2e-3)
 
 
-@pytest.mark.parametrize("speed", [0.1, 1.0, -0.5])
-def test_it_comes_to_a_speed_soon_and_keeps_it(rider: Rider, speed: float) -> None:
+@pytest.mark.parametrize("speed", [0.1, -1.0])
+def test_it_comes_to_a_speed_soon_keeps_it_and_makes_up_at_the_end_for_what_it_was_late(
+    rider: Rider, speed: float
+) -> None:
     rider.drive(1.5, (speed, 0, 0))
     assert rider.mover.body.planar()[0] == pytest.approx(speed, rel=0.1)
     rider.drive(1.5, (speed, 0, 0))
@@ -90,22 +94,16 @@ def test_it_comes_to_a_speed_soon_and_keeps_it(rider: Rider, speed: float) -> No
     rider.drive(4, (speed, 0, 0))
     assert rider.place[0] - start[0] == pytest.approx(4 * speed, rel=0.01)
     assert rider.most < 0.55
+    rider.drive(4)
+    assert rider.place[0] == pytest.approx(7 * speed, abs=0.02)
 
 
 def test_it_is_at_half_a_metre_a_second_within_a_second(rider: Rider) -> None:
     assert rider.drive(0.8, (0.5, 0, 0))[0] == pytest.approx(0.5, rel=0.06)
 
 
-@pytest.mark.parametrize("speed", [0.3, 1.0])
-def test_it_hardly_overshoots(rider: Rider, speed: float) -> None:
-    assert max(rider.drive(DT, (speed, 0, 0))[0] for _ in range(480)) < 1.01 * speed
-
-
-@pytest.mark.parametrize("speed", [0.2, -1.0])
-def test_what_it_is_late_at_the_start_it_makes_up_at_the_end(rider: Rider, speed: float) -> None:
-    rider.drive(4, (speed, 0, 0))
-    rider.drive(4)
-    assert rider.place[0] == pytest.approx(4 * speed, abs=0.02)
+def test_it_hardly_overshoots(rider: Rider) -> None:
+    assert max(rider.drive(DT, (1.0, 0, 0))[0] for _ in range(480)) < 1.01
 
 
 def test_a_push_from_behind_is_made_good(rider: Rider) -> None:
@@ -117,7 +115,7 @@ def test_a_push_from_behind_is_made_good(rider: Rider) -> None:
 
 @pytest.mark.parametrize("speed", [0.3, 1.0])
 def test_it_stops_and_stays(rider: Rider, speed: float) -> None:
-    rider.drive(3, (speed, 0, 0))
+    rider.drive(2, (speed, 0, 0))
     start = rider.place
     rider.drive(2)
     stopped = rider.place
@@ -128,7 +126,7 @@ def test_it_stops_and_stays(rider: Rider, speed: float) -> None:
 
 
 @pytest.mark.engines
-@pytest.mark.parametrize(("speed", "turn"), [(0.0, 0.2), (0.0, -3.0), (0.5, 1.0)])
+@pytest.mark.parametrize(("speed", "turn"), [(0.0, -3.0), (0.5, 1.0)])
 def test_it_turns_where_it_stands_and_while_it_drives(rider: Rider, speed: float, turn: float) -> None:
     rider.drive(3, (speed, 0, turn))
     _, _, rate = rider.drive(0.5, (speed, 0, turn))
@@ -144,17 +142,16 @@ def test_what_it_missed_while_it_sped_up_does_not_turn_it_for_ever(rider: Rider)
     assert rider.place == pytest.approx(start, abs=0.02)
 
 
-@pytest.mark.parametrize("velocity", [(0.5, 0.0, 0.0), (1.5, 0.0, 3.0)])
-def test_commands_that_flip_all_the_time_do_not_throw_it(rider: Rider, velocity: Planar) -> None:
+def test_commands_that_flip_all_the_time_do_not_throw_it(rider: Rider) -> None:
     for number in range(30):
         sign = 1 if number % 2 else -1
-        rider.drive(0.3, (sign * velocity[0], 0, sign * velocity[2]))
+        rider.drive(0.3, (1.5 * sign, 0, 3.0 * sign))
     assert rider.most < 0.6
     rider.drive(4)
     assert rider.lean < 0.05
 
 
-@pytest.mark.parametrize(("speed", "driven"), [(1.2, 0.0), (-0.8, 0.0), (-0.8, 0.5), (1.2, 0.5)])
+@pytest.mark.parametrize(("speed", "driven"), [(1.2, 0.0), (-0.8, 0.5), (1.2, 0.5)])
 def test_a_kick_does_not_throw_it(rider: Rider, speed: float, driven: float) -> None:
     rider.drive(2, (driven, 0, 0))
     rider.kick(speed)
@@ -175,8 +172,6 @@ def test_once_it_lies_its_motors_are_off_until_it_is_put_upright(rider: Rider) -
 
 
 VARIATIONS: list[dict[str, float]] = [
-    {"body_mass": 0.09},
-    {"wheel_mass": 0.15},
     {"wheel_mass": 0.6},
     {"body_height": 0.3, "body_mass": 0.36},
     {"body_height": 0.06},
@@ -212,13 +207,9 @@ def test_what_cannot_balance_is_refused(ground: World, spoil: Callable[[str], st
         mover_for(ground, parse(spoil(expand_xacro(FILE)), FILE), (0, 0, 1), UPRIGHT)
 
 
-@pytest.mark.parametrize("before", [(0.5, 0.0, 0.0), (-0.5, 0.0, 0.0), (0.0, 0.0, 1.0)])
+@pytest.mark.parametrize("before", [(-0.5, 0.0, 0.0), (0.0, 0.0, 1.0)])
 def test_commanded_to_stand_it_does_not_hunt(ground: World, before: tuple[float, float, float]) -> None:
-    model = load(FILE)
-    mover = mover_for(ground, model, (0, 0, -lowest(model)))
-    rates = []
-    for number in range(15 * 240):
-        mover.move(before if number < 5 * 240 else (0.0, 0.0, 0.0), ground.spec.step)
-        ground.step()
-        rates.append(abs(mover.body.planar()[2]))
-    assert max(rates[8 * 240 :]) < 0.03
+    rider = Rider(ground, wheely())
+    rider.drive(4, before)
+    rider.drive(3)
+    assert max(abs(rider.drive(DT)[2]) for _ in range(7 * 240)) < 0.03

@@ -103,15 +103,15 @@ def test_two_wheels_turn_as_fast_as_commanded(ground: World) -> None:
 
 @pytest.mark.engines
 def test_four_wheels_turn_at_nearly_the_commanded_rate(ground: World) -> None:
-    for velocity in ((0, 0, 0.2), (0, 0, 0.5), (0, 0, -1), (0, 0, 2), (0, 0, 4), (0.4, 0, 1)):
+    for velocity in ((0, 0, 0.2), (0, 0, -1), (0, 0, 4), (0.4, 0, 1)):
         ground.clear()
         robot = Driven(ground, FOUR)
         start = robot.drive(1, velocity)
         begin = robot.turned
-        end = robot.drive(6, velocity)
-        assert 0.85 < (robot.turned - begin) / (6 * velocity[2]) < 1.01, velocity
+        end = robot.drive(4, velocity)
+        assert 0.85 < (robot.turned - begin) / (4 * velocity[2]) < 1.01, velocity
         if velocity[0] == 0:
-            assert math.dist(start[:2], end[:2]) < 0.03
+            assert math.dist(start[:2], end[:2]) < 0.02
 
 
 def test_four_wheels_turn_alike_wherever_they_look(ground: World) -> None:

@@ -137,10 +137,22 @@ def test_two_robots_never_share_a_key_whatever_their_files_contain(town: Town) -
     inside = HB_BOT.replace(tag, f"<robotNamespace>Ann</robotNamespace>{tag}")
     assert inside != HB_BOT
     town.entities.add("root", parse(inside, Path("r")), ((5, 0, 0), UPRIGHT), "lab")
-    expected = "lab/Ann/cmd_vel is the key of 'root'; use another name"
+    expected = "lab/Ann/cmd_vel is the key of 'root'; delete that one, or use a namespace"
     other = parse(inside.replace(">Ann<", ">lab/Ann<"), Path("r"))
     found = town.refusal(lambda: town.entities.add("third", other, ((9, 0, 0), UPRIGHT), ""))
     assert found == (si.SpawnEntityReply.NAME_NOT_UNIQUE, expected)
+
+
+def test_a_key_that_is_taken_is_reported_with_what_frees_it(town: Town) -> None:
+    for namespace in ("/", "lab", "Bob"):
+        town.spawn(f"in_{namespace.strip('/')}", x=5.0 * len(town.entities.robots), entity_namespace=namespace)
+    for namespace, key, advice in (
+        ("/", "cmd_vel is the key of 'in_'", "delete that one, or use a namespace"),
+        ("lab", "lab/cmd_vel is the key of 'in_lab'", "delete that one, or use another namespace"),
+        ("", "Bob/cmd_vel is the key of 'in_Bob'", "use another name"),
+    ):
+        found = town.refusal(partial(town.spawn, "Bob", x=-5.0, entity_namespace=namespace))
+        assert found == (si.SpawnEntityReply.NAME_NOT_UNIQUE, f"{key}; {advice}")
 
 
 def test_a_robot_without_a_drive_is_an_object_without_keys(town: Town) -> None:
@@ -248,6 +260,54 @@ def test_what_touches_another_or_the_ground_has_room(town: Town) -> None:
     town.spawn("low", BOX, z=0.5)
     town.spawn("high", BOX, z=1.5)
     town.spawn("sunk", BALL, x=5, z=0.1)
+
+
+@pytest.fixture(params=["pybullet", "mujoco"])
+def level(wire: Wire, request: pytest.FixtureRequest) -> Iterator[Town]:
+    """A world with a level ground, in each engine."""
+    with closing(World(WorldSpec(ground=True), request.param)) as world:
+        yield Town(wire, world)
+
+
+def test_nothing_is_put_deep_into_the_ground(level: Town) -> None:
+    """The engine throws what is 1 m deep 17 m up."""
+    told = "there is no room for '{}' at x 20 y 0 z {}: it would be {} m below the ground; the lowest free z is {}"
+    for name, text, z, depth, least in (
+        ("Zed", HB_BOT, -1.0, 0.96, -0.04),
+        ("Zed", HB_BOT, -9876.0, 9875.96, -0.04),
+        ("crate", BOX, -0.2, 0.7, 0.5),
+        ("ball", BALL, -0.1, 0.3, 0.2),
+    ):
+        found = level.refusal(partial(level.spawn, name, text, z=z, x=20))
+        assert found == (si.SpawnEntityReply.INVALID_POSE, told.format(name, f"{z:.10g}", depth, least))
+        level.spawn(name, text, z=least, x=20)
+        level.services.delete(si.DeleteEntityRequest(name))
+
+
+def test_a_root_frame_on_the_ground_and_shallow_contact_have_room(level: Town) -> None:
+    level.spawn("Fred", z=-0.08)
+    level.spawn("crate", BOX, x=5)
+    level.spawn("wall", BOX.replace("<link", "<static>true</static><link"), x=-5, z=-0.3)
+
+
+def test_an_entity_is_not_moved_into_the_ground(level: Town) -> None:
+    fred = level.spawn("Fred", z=-0.04)
+    level.loop.run(steps(), 120)
+    before = fred.body.pose()
+
+    def move(z: float, q: Quaternion | None = None) -> object:
+        return level.services.put(si.SetEntityStateRequest("Fred", si.EntityState(pose=at(1, 0, z, q=q).pose)))
+
+    code, told = level.refusal(lambda: move(-1))
+    assert code == si.Result.OPERATION_FAILED and told.endswith("0.96 m below the ground; the lowest free z is -0.04")
+    assert fred.body.pose()[0] == pytest.approx(before[0], abs=1e-6)
+    assert "below the ground" in level.refusal(lambda: move(-0.1, Quaternion(1, 0, 0, 0)))[1]
+    move(before[0][2])
+
+
+def test_without_a_ground_every_height_has_room(wire: Wire) -> None:
+    with closing(World(WorldSpec(ground=False))) as world:
+        Town(wire, world).spawn("Fred", z=-3)
 
 
 def test_an_entity_is_not_moved_into_another(town: Town) -> None:

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from holozen.command.arbiter import Arbiter
-from holozen.command.inputs import CommandStats, ForceInput, JointInput
+from holozen.command.inputs import CommandStats, ForceInput, JointInput, TwistInput
 from holozen.command.motion import AppliedForce, is_stop
 from holozen.command.wait_set import Moment
-from holozen.messages import JointState, Vector3, Wrench
+from holozen.messages import JointState, Twist, TwistStamped, Vector3, Wrench
 from holozen.robot.loading import parse
 from holozen.robot.model import Force, Pushed
 from holozen.robot.rotation import matrix_of
 from holozen.rotation import from_rpy
+from holozen.transport.pubsub import Received
 from services.sim.physics.jointed import Forces, Motors
 from services.sim.physics.world import World
 from tests.unit.sim.fakes import FakeSenders, received
@@ -204,6 +205,55 @@ def test_a_zero_for_one_joint_is_no_stop_while_its_source_moves_another() -> Non
     assert not is_stop(arbiter.motion(10.9))
     take(11.0, l=0.0)
     assert is_stop(arbiter.motion(11.0)), "of its driver, any zero stops"
+
+
+def test_a_zero_velocity_stops_the_robot_but_its_source_has_not_let_go_while_it_moves_the_wheels_joints() -> None:
+    arbiter, stats = Arbiter(0.5), CommandStats(lambda _: None)
+    joints = JointInput("joint_command", FakeSenders(), stats, [(frozenset("w"), arbiter)], ["w"])
+    velocities = TwistInput("cmd_vel", arbiter, FakeSenders(), 1.0, 1.0, lambda _: None)
+    turns = received(JointState(name=["w"], velocity=[5.0]), "me@1", key="joint_command")
+    zero: Received[Twist | TwistStamped] = received(Twist(), "me@1", key="cmd_vel")
+    arbiter.stop("ann@1", 10.0)
+    joints.take([turns], Moment(10.1, 10.1, ()))
+    arbiter.release(10.2)
+    velocities.take([zero], Moment(10.3, 10.3, ()))
+    joints.take([turns], Moment(10.4, 10.4, ()))
+    assert is_stop(arbiter.motion(10.4)) and "let go first" in stats.last
+    joints.take([received(JointState(name=["w"], velocity=[0.0]), "me@1", key="joint_command")], Moment(10.5, 10.5, ()))
+    joints.take([turns], Moment(10.6, 10.6, ()))
+    velocities.take([zero], Moment(10.7, 10.7, ()))
+    assert is_stop(arbiter.motion(10.7)), "of its driver, any zero stops"
+    velocities.take([received(Twist.planar(1.0), "bob@2", key="cmd_vel")], Moment(20.0, 20.0, ()))
+    joints.take([turns], Moment(20.1, 20.1, ()))
+    assert arbiter.motion(20.1) == (1.0, 0.0, 0.0) and "overruled" in stats.last
+    velocities.take([zero], Moment(20.2, 20.2, ()))
+    assert is_stop(arbiter.motion(20.2)), "an equal may stop it"
+
+
+def test_what_its_source_moves_counts_for_the_robot_that_takes_its_place_too() -> None:
+    stats, heir = CommandStats(lambda _: None), Arbiter(0.5)
+
+    def take(arbiter: Arbiter, now: float, **speeds: float) -> None:
+        names = frozenset(("l", "r"))
+        joints = JointInput("joint_command", FakeSenders(), stats, [(names, arbiter)], [*names])
+        message = JointState(name=[*speeds], velocity=[*speeds.values()])
+        joints.take([received(message, "me@1", key="joint_command")], Moment(now, now, ()))
+
+    arbiter = Arbiter(0.5)
+    arbiter.stop("ann@1", 10.0)
+    take(arbiter, 10.1, r=5.0)
+    arbiter.release(10.2)
+    take(arbiter, 10.3, r=5.0)
+    arbiter.settle(10.4)
+    heir.inherit(arbiter, 20.0)
+    take(heir, 20.1, l=0.0)
+    take(heir, 20.2, r=5.0)
+    assert is_stop(heir.motion(20.2)) and "let go first" in stats.last
+    heir.settle(30.0)  # long after that
+    last = Arbiter(0.5)
+    last.inherit(heir, 40.0)
+    take(last, 40.1, l=0.0)
+    assert stats.refused["part"] == 1, "it moves nothing now"
 
 
 def test_a_joint_command_for_several_arbiters_counts_once() -> None:

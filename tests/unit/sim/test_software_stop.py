@@ -9,7 +9,7 @@ from holozen.command.arbiter import MAX_PER_RANK, SoftwareStop
 RANK, PERSON = 4, 1
 STOPPED = "stopped: by ann@1; `holozen release` lets it drive again"
 LET_GO = (
-    "let go first: it commanded while the robot was stopped; send a stop or be silent for 0.5 s"
+    "let go first: it commanded while another drove or the robot was stopped; send a stop or be silent for 0.5 s"
 )  # fmt: skip
 
 
@@ -142,6 +142,19 @@ def test_when_it_takes_that_place_whoever_sent_no_stop_has_not_let_go(stop: Soft
     heir.release(3.0)
     assert heir.refusal("me", RANK, False, 3.2) == heir.refusal("new", RANK, False, 3.2) == LET_GO
     assert heir.refusal("let go", RANK, False, 3.2) == ""
+
+
+def test_a_source_that_had_not_let_go_has_not_when_a_released_robot_is_spawned_again(stop: SoftwareStop) -> None:
+    set_at(stop, 1.0)
+    stop.refusal("me", RANK, False, 1.5)
+    stop.release(1.6)
+    stop.refusal("let go", RANK, False, 1.3)
+    stop.refusal("me", RANK, False, 1.7)
+    stop.settle(1.9)  # the robot is gone
+    heir = SoftwareStop(0.5)
+    heir.inherit(stop, 3.0)  # whoever commanded until then may have gone on
+    assert heir.refusal("me", RANK, False, 3.02) == LET_GO
+    assert heir.refusal("let go", RANK, False, 3.02) == heir.refusal("new", RANK, False, 3.02) == ""
 
 
 def test_a_flood_of_names_lets_no_one_of_its_rank_through_and_delays_no_one_of_another(stop: SoftwareStop) -> None:

@@ -1,12 +1,14 @@
 """The files of software stops: what they hold outlasts the sim, and what cannot be read stops its robot."""
 
 import os
+import threading
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from holozen.command.stop_files import UNREADABLE, StopFiles
+from holozen.testing import wait_for
 
 
 def made(folder: Path, *networks: str) -> StopFiles:
@@ -92,6 +94,34 @@ def test_a_file_in_the_place_of_the_folder_stops_everyone_and_what_cannot_be_wri
     files = made(tmp_path / "state")
     assert (files.read("Fred"), files.read("Ann")) == (UNREADABLE, UNREADABLE)
     capsys.readouterr()
-    for by in ("ann@1", "", "bob@2"):
-        files.write("Fred", by)
-    assert capsys.readouterr().err.count("stops hold, but not beyond the end of this process") == 1
+    for robot in ("Fred", "Ann"):
+        for by in ("ann@1", "", "bob@2"):
+            assert files.write(robot, by)
+    written = capsys.readouterr().err
+    assert written.count("stops hold, but not beyond the end of this process") == 2, "once for each robot"
+    (tmp_path / "state").unlink()
+    assert files.write("Fred", "bob@2") == ""
+    assert made(tmp_path / "state").read("Fred") == "bob@2"
+
+
+def test_a_stop_that_is_set_again_is_written_again_if_its_file_is_gone(tmp_path: Path) -> None:
+    files = made(tmp_path)
+    for _ in range(2):
+        assert files.write("Fred", "ann@1") == ""
+        (path,) = files.paths("Fred")
+        path.unlink()
+
+
+def test_a_disk_that_hangs_holds_up_no_stop_and_gets_the_last_state_once_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    goes_on, replace = threading.Event(), Path.replace
+    monkeypatch.setattr(Path, "replace", lambda *paths: goes_on.wait(30) and replace(*paths))
+    files = made(tmp_path)
+    for robot, by in (("Fred", "ann@1"), ("Fred", "bob@2"), ("Fred", ""), ("Fred", "eve@3"), ("Bob", "bob@2")):
+        assert ("the stop holds" if by else "a new process has the robot stopped") in files.write(robot, by)
+    goes_on.set()
+    wait_for(lambda: [made(tmp_path).read(robot) for robot in ("Fred", "Bob")] == ["eve@3", "bob@2"])
+    wait_for(lambda: files.write("Fred", "") == "")
+    assert made(tmp_path).read("Fred") == ""
+    assert capsys.readouterr().err.count("the disk does not answer") == 3, "once for each stop and release"

@@ -72,6 +72,8 @@ def commands(wire: Wire) -> Subscription[Twist]:
 def session(wire: Wire, commands: Subscription[Twist]) -> Session:
     session = Session(wire.bus("teleop"), [], TwistMapper(Settings(), TTK), None)
     wait_for(session.listeners)
+    publisher = session.bus.session.declare_publisher("cmd_vel")
+    wait_for(lambda: publisher.matching_status.matching)
     return session
 
 
@@ -111,7 +113,6 @@ def test_a_script_that_is_ended_releases_its_keys(session: Session, commands: Su
 def test_a_stopped_script_breaks_off(wire: Wire, session: Session, commands: Subscription[Twist]) -> None:
     """The robot obeys no source then, and stands."""
     status = wire.bus("sim").publisher("cmd_vel_status", CommandStatus)
-    wait_for(lambda: status.matched)
     wait_for(lambda: status.matched)
     status.put(CommandStatus(sources=[CommandSource(session.bus.source, "INTERACTIVE_HIGH", 20.0, False, True)]))
     wait_for(lambda: session.client.status().sources)

@@ -28,6 +28,8 @@ class Case:
             lambda _server, goal: self.begun.append(goal),
         )  # fmt: skip
         self.server.start()
+        for part in ("send_goal", "cancel_goal", "get_result"):
+            wait_for(self.client.served(key_of("act", part)))
 
     def send(self, number: int, steps: int = 1) -> bool:
         request = SEND.Request(identity(number), SimulateStepsGoal(steps))
@@ -56,6 +58,7 @@ def case(wire: Wire) -> Case:
 def test_a_goal_is_accepted_once_and_its_states_are_published(case: Case) -> None:
     states = case.client.latest(key_of("act", "status"), GoalStatusArray)
     assert not case.send(1, steps=0)
+    assert not case.send(0), "a request to cancel goal 0 would cancel all"
     assert case.send(1)
     assert not case.send(1)
     (goal,) = case.begun
@@ -98,11 +101,5 @@ def test_a_result_is_given_to_all_who_wait_and_then_forgotten(case: Case, monkey
 
 
 def test_a_reason_for_a_rejection_is_attached_to_the_reply(case: Case) -> None:
-    key, found = key_of("act", "send_goal"), list[Any]()
-
-    def asked() -> bool:  # until both know each other
-        found.extend(case.client.ask(key, 5, payload=b"{}", encoding="application/json"))
-        return bool(found)
-
-    wait_for(asked)
-    assert [one.attachment for one in found] == [b"no steps"]
+    found: list[Any] = [*case.client.ask(key_of("act", "send_goal"), 30, payload=b"{}", encoding="application/json")]
+    assert [one.attachment for one in found] == [b"its goal_id is missing, or zero"]

@@ -152,6 +152,7 @@ def test_a_closed_bus_ends_its_readers_and_may_be_closed_again(wire: Wire) -> No
     bus.close()
     with pytest.raises(BusError):
         tap.recv()
+    assert refusal(bus.__enter__) == "closed; make another"
     uses: list[Callable[[], object]] = [
         odom.recv, odom.try_recv, lambda: publisher.put(Odometry()),
         lambda: publisher.matched, lambda: publisher.wanted,
@@ -176,6 +177,49 @@ def test_a_wrong_key_is_named_whatever_it_was_for(wire: Wire) -> None:
     for key in WRONG_KEYS:
         for use in uses if "?" not in key else uses[:-1]:  # one may call with parameters
             assert f" {key!r}: Invalid Key Expr `{key}`" in refusal(partial(use, key))
+
+
+def test_nobody_writes_to_a_wildcard(wire: Wire) -> None:
+    """`*/cmd_vel` would drive every robot."""
+    bus = wire.bus()
+    for use in (lambda: bus.publisher("*/cmd_vel", Twist), lambda: bus.publisher_raw("**", "", "")):
+        assert "write to one key" in refusal(use)
+
+
+@pytest.mark.parametrize(
+    "name", ["", "a;b", "a@b", "x\n", "#?", "*", "a/", "/a", "a  b", "x" * 256], ids=lambda name: repr(name[:9])
+)
+def test_a_name_of_a_node_that_would_be_misread_is_refused_at_once(wire: Wire, name: str) -> None:
+    assert refusal(lambda: wire.bus(name)).startswith(f"name of a node {name[:9]!r}"[:-1])
+
+
+def test_the_names_that_programs_give_are_taken(wire: Wire) -> None:
+    for name in ("ns/talker", "my script-2.0", "Rüstig"):
+        assert wire.bus(name).source.startswith(f"{name}@")
+
+
+def test_wrong_arguments_are_named_with_what_is_allowed(wire: Wire) -> None:
+    bus: Any = wire.bus()
+    ask = partial(bus.call, "stop")
+    for error, use, expected in (
+        (BusError, lambda: bus.publisher("odom", Twist, "HIGH"), "'HIGH'; there are REAL_TIME, "),
+        (BusError, lambda: bus.publisher("odom", Twist, wire="xml"), "'xml'; there are json, "),
+        (BusError, lambda: wire.bus(wire="yaml"), "'yaml'; there are json, "),
+        (BusError, lambda: ask(TriggerRequest(), TriggerReply, -1), "timeout -1: use 0 s or more"),
+        (BusError, lambda: ask(TriggerRequest(), TriggerReply, float("nan")), "timeout nan: use 0 s or more"),
+        (TypeError, lambda: bus.publisher("odom", dict), "'odom': dict is not the class of a message"),
+        (TypeError, lambda: bus.publisher("odom", TriggerReply()), "'odom': TriggerReply(.*) is not the class of"),
+        (TypeError, lambda: bus.publisher(5, Twist), "key '5': give a text"),
+        (TypeError, lambda: bus.subscribe("odom"), "'odom': None is not the class of a message"),
+        (TypeError, lambda: bus.latest("odom", dict), "'odom': dict is not the class"),
+        (TypeError, lambda: bus.serve("stop", TriggerRequest, dict, print), "'stop': dict is not the class"),
+        (TypeError, lambda: bus.call_all("stop", TriggerRequest, TriggerReply), "'stop': the request .* is not a mess"),
+        (TypeError, lambda: ask(TriggerRequest(), dict), "'stop': dict is not the class"),
+    ):
+        with pytest.raises(error, match=expected) as raised:
+            use()
+        assert "\n" not in str(raised.value)
+    assert bus.endpoints() == []
 
 
 def test_a_wrong_key_leaves_nothing_in_the_graph(pair: tuple[Bus, Bus]) -> None:
@@ -329,8 +373,8 @@ def test_what_does_not_run_long_leaves_the_point_shut(wire: Wire) -> None:
     wait_for(visitor.connected)
     before = set(threading.enumerate())
     holder.close()
-    assert is_free(wire.endpoint)
-    assert set(threading.enumerate()) <= before
+    wait_for(lambda: is_free(wire.endpoint))
+    wait_for(lambda: set(threading.enumerate()) <= before)
 
 
 def sockets() -> set[tuple[str, str]]:

@@ -90,10 +90,12 @@ def test_links_are_retried_for_ever_and_given_up_after_a_while_of_silence() -> N
     assert value(Connection(), "connect/timeout_ms") == -1
     assert value(Connection(), "connect/exit_on_failure") is False
     assert value(Connection(), "scouting/delay") == 0
-    assert value(Connection(), "transport/link/tx/lease") == NEAR_LEASE > 3 * LEASE
-    listens, connects = Connection(listen=("tcp/0.0.0.0:7447",)), Connection(connect=("tcp/10.0.0.1:7447",))
-    for far in (listens, connects, Connection("client")):
-        assert value(far, "transport/link/tx/lease") == LEASE
+    for near in (Connection(), Connection("client"), Connection("router")):
+        assert value(near, "transport/link/tx/lease") == NEAR_LEASE > 3 * LEASE
+    for mode in ("peer", "router"):
+        assert value(Connection(mode, listen=("tcp/0.0.0.0:7447",)), "transport/link/tx/lease") == LEASE
+    for mode in ("peer", "client"):
+        assert value(Connection(mode, connect=("tcp/10.0.0.1:7447",)), "transport/link/tx/lease") == LEASE
 
 
 def test_a_setting_by_hand_comes_last_and_wins() -> None:

@@ -206,12 +206,13 @@ def test_over_zenoh_a_publisher_stamps_and_its_session_answers(wire: Wire) -> No
     clocks = robot.peer_clocks(graph.has)
     wait_for(lambda: graph.endpoints() and graph.has(driver.id))
 
-    def known() -> tuple[float, float] | None:
+    def known() -> tuple[float, float, float] | None:
         now = time.monotonic()
         clocks.track([driver.id], now)
         clocks.poll(now)
-        return clocks.ages(driver.id, stamp.sent, now)
+        ages = clocks.ages(driver.id, stamp.sent, now)
+        return ages and (ages[0], now - stamp.sent, ages[1])
 
-    youngest, oldest = wait_for(known) or (0.0, 0.0)
-    assert 0 <= youngest <= time.monotonic() - stamp.sent <= oldest + 0.01 < 10
+    youngest, age, oldest = wait_for(known) or (0.0, 0.0, 0.0)
+    assert 0 <= youngest <= age <= oldest + 0.01 < 100
     assert driver.clock_asked.is_set()

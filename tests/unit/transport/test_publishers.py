@@ -13,7 +13,7 @@ import pytest
 import zenoh
 
 from holozen.bus import Bus
-from holozen.messages import Odometry, Twist, Vector3
+from holozen.messages import Odometry, Twist, Vector3, codec
 from holozen.messages.codec import WIRES, CodecError, encoding
 from holozen.testing import Process, Wire, wait_for
 from holozen.transport.connection import Connection
@@ -73,6 +73,7 @@ def test_a_get_that_cannot_be_answered_is_reported_and_the_next_one_is(
     writer, reader = wire.bus("writer"), wire.bus("reader")
     publisher = writer.publisher("cmd_vel", Twist)
     publisher.put(Twist())
+    wait_for(reader.served("cmd_vel"))
     with monkeypatch.context() as broken:
         broken.setattr(Publisher, "reply", lambda *_: 1 // 0)
         assert last(reader, "cmd_vel") == []
@@ -92,6 +93,19 @@ def test_a_number_that_is_not_finite_is_neither_sent_nor_remembered(wire: Wire) 
     with pytest.raises(CodecError):
         publisher.put(Twist(Vector3(y=math.inf)))
     assert b'"x":2' in last(bus, "cmd_vel")[0][0]
+
+
+@pytest.mark.parametrize("name", WIRES)
+def test_a_command_with_a_value_of_a_wrong_type_is_not_sent(wire: Wire, name: str) -> None:
+    bus = wire.bus(wire=name)
+    publisher: Publisher[Twist] = bus.publisher("cmd_vel", Twist)
+    publisher.put(Twist.planar(1))
+    wrong: Any = "fast"
+    for put in (publisher.put, publisher.queue):
+        with pytest.raises(CodecError, match=r"linear\.x"):
+            put(Twist.planar(wrong))
+    bus.send_queued()
+    assert last(bus, "cmd_vel") == [(codec.encode(Twist.planar(1), name), encoding(name, Twist))]
 
 
 def test_a_closed_publisher_leaves_nothing_of_its_key(wire: Wire) -> None:

@@ -1,10 +1,12 @@
 """Requests are typed, and every failure is a reply with the reason."""
 
+import json
 import math
 import time
 from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from typing import Any, TypeVar
 
 import pytest
@@ -119,6 +121,8 @@ def test_a_get_without_payload_asks_by_its_parameters(caller: Bus) -> None:
     assert '"x_goal":2.5' in selected(caller, "next_goal?request_goal=4")
     assert "`int`" in selected(caller, "next_goal?request_goal=four")
     assert "unknown field `gaol`" in selected(caller, "next_goal?gaol=4")
+    bare = "the request is empty; send request_goal, or {} for the defaults"
+    assert selected(caller, "next_goal") == json.dumps({"error": bare}), "a look at a key is no request"
 
 
 def test_a_wildcard_query_asks_for_no_action(wire: Wire) -> None:
@@ -202,65 +206,66 @@ def test_a_server_knows_its_caller(wire: Wire) -> None:
 
 
 class Guarded:
-    """A service that obeys only what was sent after `event`, in s."""
+    """A service that obeys only what was sent after `event`, in s, and a caller that knows it."""
 
     def __init__(self, wire: Wire) -> None:
-        self.event = -math.inf
+        self.event, self.caller = -math.inf, wire.bus("caller")
         self.server = wire.bus("server").serve("release", TriggerRequest, TriggerReply, self._answer)
+        wait_for(self.caller.served("release"))
 
     def _answer(self, _request: TriggerRequest) -> TriggerReply:
         self.server.require_sent_after(self.event, time.monotonic(), "send it again")
         return TriggerReply(True)
 
 
-def ask(caller: Bus, server: Server, attempts: Attempts) -> ServiceError | None:
+def ask(guarded: Guarded, attempts: Attempts) -> ServiceError | None:
     """Send a request once; why it was refused, or None."""
 
     def replies() -> list[Sample | bytes]:
-        return list(caller.ask("release", 60.0, number=attempts.number))
+        return list(guarded.caller.ask("release", 60.0, number=attempts.number))
 
-    (reply,) = answered_while(server, replies)
+    (reply,) = answered_while(guarded.server, replies)
     return None if isinstance(reply, Sample) else refusal(reply)
 
 
 def test_a_request_that_was_sent_after_an_event_is_obeyed(wire: Wire) -> None:
-    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded = Guarded(wire)
     for guarded.event in (-math.inf, time.monotonic() - 1.0):
-        reply = answered_while(guarded.server, lambda: caller.call("release", TriggerRequest(), TriggerReply, 60.0))
-        assert reply.success
+        call = partial(guarded.caller.call, "release", TriggerRequest(), TriggerReply, 60.0)
+        assert answered_while(guarded.server, call).success
 
 
 def test_a_request_that_was_sent_before_an_event_is_refused(wire: Wire) -> None:
-    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded = Guarded(wire)
     guarded.event = time.monotonic()
     attempts, asked = Attempts(guarded.event - 1.0), 0
-    while (refused := ask(caller, guarded.server, attempts)) and attempts.were_asked(refused):
+    while (refused := ask(guarded, attempts)) and attempts.were_asked(refused):
         asked += 1
     assert refused and (str(refused), refused.fields, asked) == ("send it again", {"outdated": True}, PROOFS)
 
 
 def test_an_event_after_the_caller_was_asked_counts_too(wire: Wire) -> None:
-    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded = Guarded(wire)
     guarded.event, attempts = 0.0, Attempts(time.monotonic())
-    refused = ask(caller, guarded.server, attempts)
+    refused = ask(guarded, attempts)
     assert refused and attempts.were_asked(refused)
     guarded.event = time.monotonic()
-    assert ask(caller, guarded.server, attempts), "however short the time since"
+    assert ask(guarded, attempts), "however short the time since"
 
 
 def test_an_answer_to_another_question_proves_nothing(wire: Wire) -> None:
-    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded = Guarded(wire)
     guarded.event, attempts = 0.0, Attempts(time.monotonic())
     assert attempts.were_asked(ServiceError("", waited="0123abcd"))
     assert not attempts.were_asked(ServiceError("", waited="0;1"))
-    assert (refused := ask(caller, guarded.server, attempts)) and attempts.were_asked(refused)
-    assert ask(caller, guarded.server, attempts) is None
+    assert (refused := ask(guarded, attempts)) and attempts.were_asked(refused)
+    assert ask(guarded, attempts) is None
 
 
 def test_a_foreign_request_which_tells_no_number_is_believed(wire: Wire) -> None:
-    guarded, caller = Guarded(wire), wire.bus("caller")
+    guarded = Guarded(wire)
     guarded.event = time.monotonic() + 60.0
-    assert answered_while(guarded.server, lambda: outcome(caller.ask("release", 60.0))) == "answered"
+    assert answered_while(guarded.server, lambda: outcome(guarded.caller.ask("release", 60.0))) == "answered"
 
 
 def outcome(replies: Replies) -> str:
@@ -299,14 +304,20 @@ def test_a_caller_with_many_requests_delays_no_other(wire: Wire) -> None:
         callers.append(server.caller)
         return TriggerReply()
 
+    def is_refused(replies: Replies) -> bool:
+        server.take_in()
+        return replies.try_recv() is not None
+
     server = wire.bus("server").serve("resume", TriggerRequest, TriggerReply, answer, room=10)
     greedy, modest = wire.bus("greedy"), wire.bus("modest")
     for bus in (greedy, modest):
         wait_for(bus.served("resume"))
     kept = [greedy.ask("resume", 60.0) for _ in range(20)]
-    wait_for(lambda: server.take_in() == 10)
+    wait_for(lambda: is_refused(kept[-1]), what="all of them to come")
     kept.append(modest.ask("resume", 60.0))
-    wait_for(lambda: server.take_in() and server.answer_pending(most=1) and modest.source in callers)
+    wait_for(lambda: is_refused(kept[9]), what="the modest one's to take the place of the greedy one's newest")
+    while server.answer_pending(most=1) and modest.source not in callers:
+        pass
     assert callers.index(modest.source) <= 10
 
 
@@ -324,6 +335,7 @@ def test_a_call_asks_a_busy_service_again(wire: Wire) -> None:
 def test_a_service_that_stays_busy_is_an_error_with_that_reason(wire: Wire) -> None:
     server = wire.bus("server").serve("resume", TriggerRequest, TriggerReply, lambda _: TriggerReply(), room=0)
     caller = wire.bus("caller")
+    wait_for(caller.served("resume"))
     with ThreadPoolExecutor() as pool:
         call = pool.submit(caller.call, "resume", TriggerRequest(), TriggerReply, 1.0)
         wait_for(lambda: server.take_in() or call.done())

@@ -8,9 +8,11 @@ from unittest.mock import MagicMock
 
 import pytest
 
-from holozen.messages import Odometry, Point, Pose, SceneEntity, Twist
+from holozen.messages import Header, Odometry, Point, Pose, SceneEntity, Time, Twist
+from holozen.testing import Wire, wait_for
 from services.view import drive
 from services.view.drive import Driver, Drivers
+from services.view.pad import RESET
 
 STALE_AFTER = 0.2
 
@@ -18,6 +20,7 @@ STALE_AFTER = 0.2
 def feedback(age: float) -> Any:
     """Odometry of this age, in s."""
     made = MagicMock(is_lost=False, stale_after=STALE_AFTER)
+    made.was_removed.return_value = made.was_reset.return_value = False
     made.read.return_value = (Odometry(), age)
     return made
 
@@ -25,7 +28,7 @@ def feedback(age: float) -> Any:
 def test_stale_odometry_gives_no_velocity_and_takes_no_goal(monkeypatch: pytest.MonkeyPatch) -> None:
     nobody = MagicMock(matched=False)
     for age, is_current in ((STALE_AFTER - 0.1, True), (STALE_AFTER + 0.1, False)):
-        monkeypatch.setattr(drive, "OdometryFeedback", lambda *_, age=age: feedback(age))
+        monkeypatch.setattr(drive, "RobotFeedback", lambda *_, age=age: feedback(age))
         driver = Driver(MagicMock(publisher=lambda *_: nobody), "cmd_vel", "odom")
         assert (driver.measured() is not None) == is_current
         assert (driver.send_to(1.0, 0.0, Pose(Point())) == "it has no odometry now") != is_current
@@ -33,7 +36,7 @@ def test_stale_odometry_gives_no_velocity_and_takes_no_goal(monkeypatch: pytest.
 
 def test_a_driver_goes_when_no_page_has_its_robot_and_its_pad_rests(monkeypatch: pytest.MonkeyPatch) -> None:
     odom = {f"{name}/odom": feedback(0.0) for name in ("one", "other")}
-    monkeypatch.setattr(drive, "OdometryFeedback", lambda _, key: odom[key])
+    monkeypatch.setattr(drive, "RobotFeedback", lambda _, key: odom[key])
     drivers = Drivers(MagicMock())
     one, other = (SceneEntity(name, command=f"{name}/cmd_vel") for name in ("one", "other"))
     kept, dropped = drivers.of(one), drivers.of(other)
@@ -53,7 +56,7 @@ def test_a_view_that_ends_stops_what_it_drives_and_no_button_counts_from_then_on
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     odom, bus = feedback(0.0), MagicMock()
-    monkeypatch.setattr(drive, "OdometryFeedback", lambda *_: odom)
+    monkeypatch.setattr(drive, "RobotFeedback", lambda *_: odom)
     drivers = Drivers(bus)
     driver = drivers.of(SceneEntity("one", command="cmd_vel"))
     sent = bus.publisher.return_value.put
@@ -73,3 +76,22 @@ def test_a_view_that_ends_stops_what_it_drives_and_no_button_counts_from_then_on
     commands = [call.args[0] for call in sent.call_args_list]
     assert commands and set(map(str, commands[commands.index(Twist()) :])) == {str(Twist())}
     assert not driver.is_used()
+
+
+def test_a_button_that_is_held_while_the_robot_is_reset_counts_as_let_go(wire: Wire) -> None:
+    sim = wire.bus("sim")
+    odom, commands = sim.publisher("odom", Odometry), sim.subscribe("cmd_vel", Twist)
+    driver, seen = Driver(wire.bus("view"), "cmd_vel", "odom"), list[Twist | None]()
+
+    def holds(seconds: int) -> str:
+        """Why a button that is held does not count, at this time of the robot's clock."""
+        odom.put(Odometry(Header(Time(seconds))))
+        refusal = driver.use(lambda pad, now: pad.hold(1, "forward", now))
+        driver.publish()
+        seen.extend(received.message for received in iter(commands.try_recv, None))
+        return refusal
+
+    wait_for(lambda: not holds(60) and driver.measured() and seen and seen[-1] != Twist())
+    wait_for(lambda: holds(1) == RESET)
+    wait_for(lambda: holds(1) == RESET and seen[-1] == Twist(), what="the robot to be stopped")
+    driver.close()

@@ -61,6 +61,35 @@ def test_a_launch_file_with_components_or_missing_modules_gets_a_hint(launch: La
         assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.parametrize(
+    "words",
+    [["gazebo_ros", "gazebo.launch.py", "gui:=false"], ["ros_gz_sim", "gz_sim.launch.py", "gz_args:=-r arena.sdf"]],
+)
+def test_gazebos_own_launch_files_start_the_sim(my_bot: Path, wire: Wire, words: list[str]) -> None:
+    with Process(line(wire, *words), env=environment()) as launch:
+        launch.wait_for_line("`holozen sim` replaces Gazebo")
+        launch.wait_for_line("no robot yet")
+        launch.signal(signal.SIGINT)
+        assert launch.wait() == 0
+    assert "does not use" not in launch.err
+
+
+def test_gazebos_own_launch_files_take_a_world(launch: Launch) -> None:
+    done = launch("gazebo_ros", "gazebo.launch.py", "world:=nowhere.world")
+    assert done.returncode == 1
+    assert "nowhere.world" in done.stderr
+
+
+def test_a_wrong_name_of_gazebos_launch_files_gets_the_closest(launch: Launch) -> None:
+    for words, expected in [
+        (["gazebo_ros", "gazeboo.launch.py"], "has no 'launch/gazeboo.launch.py' (did you mean 'gazebo.launch.py'?)"),
+        (["ros_gz_sim", "qqqq.py"], "has no 'launch/qqqq.py'; files: gz_sim.launch.py"),
+    ]:
+        done = launch(*words)
+        assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+        assert done.stderr == f"holozen launch: {words[0]} is replaced here, and {expected}\n"
+
+
 CONTROLLER = """#!/usr/bin/env python3
 import sys
 import rclpy

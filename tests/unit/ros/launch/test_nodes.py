@@ -114,6 +114,11 @@ def test_a_node_that_is_not_there_is_reported_before_anything_runs(follow: Follo
             r"package 'my_bot' has no executable 'controler.py' \(did you mean 'controller.py'\?\)",
         ),
         ("my_boot", "controller.py", "no package 'my_boot' around "),
+        (
+            "gazebo_ros",
+            "spawn_entty.py",
+            r"package 'gazebo_ros' has no executable 'spawn_entty.py' \(did you mean 'spawn_entity.py'\?\); those that",
+        ),
         ("nav2_bringup", "bt_navigator", "no package 'nav2_bringup' around "),
     ]:
         with pytest.raises(LaunchError, match=rf"^{__file__}:\d+: {message}"):
@@ -137,7 +142,7 @@ def test_a_group_that_is_not_scoped_lets_it_out(follow: Follow) -> None:
 
 def test_what_is_left_out_is_named_with_what_to_use(follow: Follow, capsys: pytest.CaptureFixture[str]) -> None:
     for package, executable, message in [
-        ("rviz2", "rviz2", "rviz2 rviz2 is left out: `holozen map` in another terminal"),
+        ("rviz2", "rviz2", "launch: rviz2 is left out: `holozen map` in another terminal"),
         ("rqt_graph", "rqt_graph", "is left out: `holozen plot`"),
         ("joint_state_publisher_gui", "joint_state_publisher_gui", "is left out: the sim publishes joint_states"),
         ("ros_gz_bridge", "parameter_bridge", "is left out: the sim is on the keys itself"),
