@@ -389,7 +389,9 @@ def join_at_end(threads: Iterable[threading.Thread | None]) -> None:
 
 def _join(threads: Iterable[threading.Thread | None], seconds: float) -> list[threading.Thread]:
     """Join threads; returns those that still run."""
-    others = [thread for thread in threads if thread and thread is not threading.current_thread()]
+    # One that is not alive has ended, or never began: Ctrl-C came as it was being started.
+    running = [thread for thread in threads if thread and thread.is_alive()]
+    others = [thread for thread in running if thread is not threading.current_thread()]
     deadline = time.monotonic() + seconds
     for thread in others:
         thread.join(max(0.0, deadline - time.monotonic()))

@@ -17,12 +17,13 @@ __all__ = ["Future", "Task"]
 class Future(HelpfulAttributes):
     """A result that arrives later, as from `Client.call_async`. Done callbacks run in the executor if there is one."""
 
+    _exception: Exception | None = None  # `__del__` reads it, also where Ctrl-C came during `__init__`
+
     def __init__(self, *, executor: Any = None) -> None:
         self._executor = executor
         self._lock = threading.Lock()
         self._done = self._cancelled = self._is_retrieved = False
         self._result: Any = None
-        self._exception: Exception | None = None
         self._callbacks: list[Callable[[Any], Any]] = []
         self._watchers: list[Callable[[], object]] = []
 

@@ -1,8 +1,12 @@
 """Calls wait for their service and their reply, with and without spin."""
 
+import itertools
+import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from types import FrameType
 from typing import Any
 
 import pytest
@@ -14,10 +18,12 @@ from holozen.ros.rclpy import context
 from holozen.ros.rclpy.context import ExternalShutdownException
 from holozen.ros.rclpy.exceptions import InvalidHandle, RCLError
 from holozen.testing import Wire, wait_for
+from holozen.transport import session
 from holozen.transport.errors import ServiceError
 
 Trigger: Any = find("std_srvs/srv/Trigger")
 Spin = Callable[..., Any]
+PACKAGE = str(Path(rclpy.__file__).parent)
 
 
 def serve(wire: Wire, text: str = "done") -> None:
@@ -184,3 +190,38 @@ def test_a_call_that_waits_for_its_reply_ends_with_its_node(ros: Wire) -> None:
     node.destroy_node()
     wait_for(future.cancelled)
     wait_for(lambda: not any(thread.is_alive() for thread in client.threads()))
+
+
+def test_ctrl_c_at_any_line_of_a_call_leaves_nothing_half_made(ros: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    client = rclpy.create_node("tom").create_client(Trigger, "go")
+    complaints, kept = list[Any](), list[KeyboardInterrupt]()  # an interrupt keeps what its frames hold
+    monkeypatch.setattr(sys, "unraisablehook", complaints.append)
+    monkeypatch.setattr(threading, "excepthook", complaints.append)
+
+    def is_interrupted_at(last: int) -> bool:
+        """Whether a call has a line of that number. It is interrupted there."""
+        lines = iter(range(1, last + 1))
+
+        def trace(frame: FrameType, event: str, _: Any) -> Any:
+            if PACKAGE not in frame.f_code.co_filename:
+                return None  # locks of Python's own threads would stay held
+            if event == "line" and next(lines, 0) == last:
+                raise KeyboardInterrupt
+            return trace
+
+        sys.settrace(trace)
+        try:
+            client.call_async(Trigger.Request())
+        except KeyboardInterrupt as interrupt:
+            kept.append(interrupt)
+            return True
+        finally:
+            sys.settrace(None)
+        return False
+
+    count = next(number for number in itertools.count(1) if not is_interrupted_at(number))
+    assert count > 15, "the lines of a call were traced"
+    client.destroy()
+    session.wait_for_threads(client.threads(), 10)
+    kept.clear()
+    assert complaints == []
