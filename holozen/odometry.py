@@ -10,7 +10,7 @@ from holozen.limits import Planar
 from holozen.messages import Header, Odometry, SimulationStatus
 from holozen.messages import geometry_msgs as gm
 from holozen.rotation import XYZ, XYZW
-from holozen.wire import topic
+from holozen.wire import ODOM_SILENCE
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
 LOST = 0.4  # s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
@@ -34,9 +34,6 @@ class RobotFeedback(Latest[Odometry]):
     """The newest odometry on `key`, for a driver, which has to know when its robot is another one, or starts again."""
 
     def __init__(self, bus: Bus, key: str) -> None:
-        row = topic("odom")
-        assert row is not None
-        self._silence = row.silence
         super().__init__(bus.state(key, Odometry))
         self._writers = bus.writers(key)
         self._sim = bus.latest("simulation_status", SimulationStatus)
@@ -46,7 +43,7 @@ class RobotFeedback(Latest[Odometry]):
     @property
     def stale_after(self) -> float:
         """The age in s beyond which it is too old to show, or to act on, as current."""
-        return self.patience(self._silence)
+        return self.patience(ODOM_SILENCE)
 
     @property
     def is_stale(self) -> bool:
