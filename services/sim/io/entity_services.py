@@ -5,7 +5,6 @@ import math
 import re
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -48,14 +47,6 @@ WORLD = ("", "world", "odom", "map")  # frames that mean the world
 _OK = Result(Result.OK)
 
 
-@dataclass(frozen=True, slots=True)
-class Parsed:
-    """The model of a text, which may be reused `until` a time in s (monotonic)."""
-
-    model: RobotModel
-    until: float
-
-
 class EntityServices:
     """Answers requests about entities. `packages` are those of `--package`: the only folders from which meshes are
     read.
@@ -73,7 +64,7 @@ class EntityServices:
         share: Share | None = None,
     ) -> None:
         self._entities, self._packages, self._share = entities, packages, share
-        self._parsed: dict[bytes, Parsed] = {}
+        self._parsed: dict[bytes, tuple[RobotModel, float]] = {}  # by hash; until when (s) a model may be reused
         serve = partial(bus.serve, shared=share is not None)
         self._servers = [
             serve("delete_entity", si.DeleteEntityRequest, si.DeleteEntityReply, self.delete),
@@ -127,8 +118,9 @@ class EntityServices:
         """The model in a request. No expression in it is evaluated, and only files of known packages are opened."""
         text, now = request.resource_string, time.monotonic()
         key = hashlib.sha256(text.encode()).digest()
-        if key in self._parsed and now < self._parsed[key].until:
-            return self._parsed[key].model
+        model, until = self._parsed.get(key, (None, 0.0))
+        if model and now < until:
+            return model
         if not text:
             problem = "resource_string is empty; it holds the URDF or SDF text, as `holozen spawn FILE` sends it"
             raise EntityError(Spawn.UNSUPPORTED_ASSETS if request.uri else Spawn.NO_RESOURCE, problem)
@@ -146,7 +138,7 @@ class EntityServices:
         shapes = (shape for link in model.links.values() for shape in (*link.collisions, *link.visuals))
         lasting = not model.warnings and not any(shape.path for shape in shapes)
         self._parsed = dict([*self._parsed.items()][1 - MAX_PARSED :])
-        self._parsed[key] = Parsed(model, math.inf if lasting else time.monotonic() + REUSED)
+        self._parsed[key] = model, math.inf if lasting else time.monotonic() + REUSED
         return model
 
     def delete(self, request: si.DeleteEntityRequest) -> si.DeleteEntityReply:
