@@ -167,16 +167,14 @@ class Orders:
         """
         if not self.found:
             return False
-        for end in (silent := [end for end in self._bus.hidden() if self._is_wanted(end.key)]):
-            order = Order(end.key.removesuffix("stop").removesuffix("/"), self._verb, self._began)
-            order.message = UNREACHED.format(source=end.source)
-            self._print(order)
-        return bool(silent)
-
-    def _is_wanted(self, stop: str) -> bool:
-        """Whether a service, if it is one that stops a robot, is that of a robot to reach."""
-        robot, _, verb = stop.rpartition("/")
-        return verb == "stop" and self._is_meant(robot)
+        silent = False
+        for end in self._bus.hidden():
+            robot, _, verb = end.key.rpartition("/")
+            if verb == "stop" and self._is_meant(robot):
+                silent, order = True, Order(robot, self._verb, self._began)
+                order.message = UNREACHED.format(source=end.source)
+                self._print(order)
+        return silent
 
     def _is_meant(self, robot: str) -> bool:
         return not self._wanted or robot in self._wanted or robot in self._orders

@@ -30,8 +30,7 @@ from services.teleop.control.key_state import LATCH
 from services.teleop.control.layouts import TTK
 from services.teleop.control.twist_mapper import Settings, TwistMapper
 from services.teleop.input.kitty import Answer, Focus, Key, Unknown
-from services.teleop.robot_client import RobotClient
-from services.teleop.session import BLIND, RESET, RESUME_TIMEOUT, SWITCHING, Session
+from services.teleop.session import BLIND, RESET, RESUME_TIMEOUT, SWITCHING, RobotClient, Session
 from services.teleop.telemetry import Telemetry, Track
 from services.teleop.view import State
 
