@@ -14,11 +14,12 @@ from holozen.wire import ODOM_SILENCE
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
 LOST = 0.4  # s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
+UNKNOWN = [0.0] * 36  # covariances, row by row
 JUMP = 0.5  # m between two looks, more than its motion explains, that mean a reset
 
 
 def odometry(
-    header: Header, child: str, position: XYZ, rotation: XYZW, velocity: Planar, variances: list[float] = [0.0] * 36
+    header: Header, child: str, position: XYZ, rotation: XYZW, velocity: Planar, variances: list[float] = UNKNOWN
 ) -> Odometry:
     """Odometry with a pose in the frame of `header` and a velocity in the body frame `child`."""
     pose = gm.PoseWithCovariance(gm.Pose.of(position, rotation), variances)
