@@ -5,6 +5,7 @@ import time
 
 from holozen.bus import Bus, Latest
 from holozen.messages import Odometry, SimulationStatus
+from holozen.messages.simulation_interfaces import SimulationState
 from holozen.wire import topic
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
@@ -19,6 +20,9 @@ class RobotFeedback(Latest[Odometry]):
         row = topic("odom")
         assert row is not None
         self._silence = row.silence
+        sim = topic("simulation_status")
+        assert sim is not None
+        self._sim_silence = sim.silence
         super().__init__(bus.state(key, Odometry))
         self._writers = bus.writers(key)
         self._sim = bus.latest("simulation_status", SimulationStatus)
@@ -39,6 +43,12 @@ class RobotFeedback(Latest[Odometry]):
     def is_lost(self) -> bool:
         """Whether it has stopped arriving."""
         return self.count > 0 and self.read()[1] > max(LOST, self.stale_after)
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether its sim is paused. What publishes no status, such as a real base, is not."""
+        sim, age = self._sim.read()
+        return sim is not None and sim.state == SimulationState.STATE_PAUSED and age < self._sim_silence
 
     def rests(self, since: float) -> bool:
         """Whether what was received after `since` (s, monotonic) shows a robot at rest."""
