@@ -64,9 +64,10 @@ def _run(
     matched = 0 if args.no_wait else _matched(bus, publisher, args, stop, looking)
     if not args.no_wait:
         counted = f"{matched or 'no'} subscriber{'s' * (matched != 1)} of {args.key}"
-        report(counted if matched else f"{counted}{suggest_key(bus, [args.key], ('sub',))}")
+        counted += "" if matched else suggest_key(bus, [args.key], ("sub",))
         if not matched and (args.once or args.times):
-            return 1
+            raise Failure(counted)
+        report(counted)
         if args.wait and matched < args.wait and not stop.is_set():
             raise Failure(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
     status_key = form.status_key

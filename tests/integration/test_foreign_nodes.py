@@ -87,7 +87,7 @@ def test_what_cannot_be_decoded_is_a_hex_dump_and_counted(town: Wire, words: str
     done = town.run("topic", "echo", *words.split(), "--once")
     assert done.returncode == 0
     assert done.stdout.startswith(start)
-    assert done.stderr == f"1 of 1 samples could not be decoded; {why}\n"
+    assert done.stderr == f"holozen topic echo: 1 of 1 samples could not be decoded; {why}\n"
 
 
 def test_raw_gives_the_bytes_as_they_came(town: Wire) -> None:
