@@ -9,8 +9,9 @@ from holozen.bus import Bus, Latest
 from holozen.limits import Planar
 from holozen.messages import Header, Odometry, SimulationStatus
 from holozen.messages import geometry_msgs as gm
+from holozen.messages.simulation_interfaces import SimulationState
 from holozen.rotation import XYZ, XYZW
-from holozen.wire import ODOM_SILENCE
+from holozen.wire import ODOM_SILENCE, SIM_SILENCE
 
 RESTS = 0.01  # m/s and rad/s; slower counts as at rest
 LOST = 0.4  # s without odom, once some arrived, so as not to drive blind; less than the sim's command timeout
@@ -55,6 +56,12 @@ class RobotFeedback(Latest[Odometry]):
     def is_lost(self) -> bool:
         """Whether it has stopped arriving."""
         return self.count > 0 and self.read()[1] > max(LOST, self.stale_after)
+
+    @property
+    def is_paused(self) -> bool:
+        """Whether its sim is paused. What publishes no status, such as a real base, is not."""
+        sim, age = self._sim.read()
+        return sim is not None and sim.state == SimulationState.STATE_PAUSED and age < SIM_SILENCE
 
     def rests(self, since: float) -> bool:
         """Whether what was received after `since` (s, monotonic) shows a robot at rest."""

@@ -64,9 +64,10 @@ def _run(
     matched = 0 if args.no_wait else _matched(bus, publisher, args, stop, looking)
     if not args.no_wait:
         counted = f"{matched or 'no'} subscriber{'s' * (matched != 1)} of {args.key}"
-        report(counted if matched else f"{counted}{suggest_key(bus, [args.key], ('sub',))}")
+        counted += "" if matched else suggest_key(bus, [args.key], ("sub",))
         if not matched and (args.once or args.times):
-            return 1
+            raise Failure(counted)
+        report(counted)
         if args.wait and matched < args.wait and not stop.is_set():
             raise Failure(f"{args.key}: {args.wait} subscribers did not come in time, so nothing is published")
     status_key = form.status_key
@@ -80,6 +81,7 @@ def _run(
             publisher.put_bytes(each)
             sent += 1
             if feedback:
+                feedback.strafes = form.strafes
                 feedback.look()
         if feedback and (args.once or args.times) and matched:
             feedback.wait(stop, VERDICT[bool(on_key(looking(), status_key, "pub"))])
@@ -217,6 +219,7 @@ OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 DRIVES = " drives"
 PAUSED = "; the sim is paused; `holozen sim play` continues it"
 LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
+ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
 HELD = "held, since a higher source took over; `holozen service call resume` lets it drive again"
 
 
@@ -270,6 +273,9 @@ class CommandFeedback:
         self._bus, self._key, self._is_velocity, self._reported = bus, key, is_velocity, ""
         self._judged: Any = None  # the last status, and the one before
         self._before: Any = None
+        self._has_noted = False
+        self.strafes = False
+        """Whether the commands have a sideways part, which not every drive can make."""
         self.refusal = ""
         """Why the robot does not obey, by the latest look; empty if it does, or is not known to."""
         read = partial(_status, Registry().find("holozen/msg/CommandStatus"))
@@ -287,6 +293,9 @@ class CommandFeedback:
                 report(f"not obeyed: {why}{PAUSED if self._is_paused() else LEFT if self._has_left(driver) else ''}")
             else:
                 report(why or "obeyed again")
+        if status and self.strafes and status.obeyed == self._bus.source and not (status.strafes or self._has_noted):
+            report(ONLY_TURNS)
+            self._has_noted = True
         self._reported, self.refusal = why, "" if why.startswith(LIMITED) else why
         return True
 
@@ -338,6 +347,8 @@ class Form:
         self._key, self._is_command = args.key, ours and wire.is_command(args.key, type_names)
         self.stops: set[bytes] = set()
         """The bytes that stop what its payloads move."""
+        self.strafes = False
+        """Whether a payload commands a velocity with a sideways part."""
 
     @property
     def encoding(self) -> str:
@@ -369,6 +380,8 @@ class Form:
                 raise ValueError(f"{bad}{FORCE}")
             if (fields := wire.stop(command, self.kind.name)) is not None:
                 self.stops.add(written(self.kind, completed(self.kind, fields), self._wire))
+            if self.is_velocity:
+                self.strafes |= getattr(command, "twist", command).linear.y != 0
         return written(self.kind, value, self._wire)
 
     def _message(self, value: Any) -> dict[str, Any]:

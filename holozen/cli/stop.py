@@ -234,11 +234,11 @@ class Orders:
             more = f": {message}" if message else ""
             return print(printable(f"{name} {DONE[self._verb]}{more}"), flush=True)
         if order.outdated:
-            return report(f"{name} is not released: {message}")
+            return report(f"holozen {self._verb}: {name} is not released: {message}")
         because = f" ({message})" if message else ""
         risk = "; it may move" if self._verb == "stop" else ""
         within = f" within {self._args.timeout:g} s" if order.discovered else ""
-        return report(f"{name} did not confirm{within}{because}{risk}")
+        return report(f"holozen {self._verb}: {name} did not confirm{within}{because}{risk}")
 
     def _named(self, robot: str) -> str:
         return robot or self._root or "the robot at the root"

@@ -374,6 +374,10 @@ class Entities:
                 raise EntityError(code, str(error)[:MAX_REASON]) from None
 
     def _check_unique(self, name: str, prefix: str, model: RobotModel) -> None:
+        if has_keys(model):
+            self._check_keys(name, model, prefix)
+        if model.drive:
+            self._check_alone(name, key_for(model.drive.odometry_topic, prefix))
         if name in self._all:
             there = listed(self._all)
             raise EntityError(Spawn.NAME_NOT_UNIQUE, f"there is an entity {name!r} already; the entities are {there}")
@@ -381,10 +385,6 @@ class Entities:
             raise EntityError(
                 Result.OPERATION_FAILED, f"there are {MAX_ENTITIES} entities, the most that are simulated; delete some"
             )
-        if has_keys(model):
-            self._check_keys(name, model, prefix)
-        if model.drive:
-            self._check_alone(key_for(model.drive.odometry_topic, prefix))
 
     def _check_keys(self, name: str, model: RobotModel, prefix: str) -> None:
         """Raise EntityError if another robot, or the sim, has one of the keys: each would get the other's commands."""
@@ -396,19 +396,25 @@ class Entities:
             problem = f"the robot's file puts {keys[key]} on the sim's own key {key!r}; give it another topic there"
         if problem:
             raise EntityError(Spawn.NAMESPACE_INVALID, problem)
-        if both := self._keys.keys() & keys.keys():
+        if both := {key for key in self._keys.keys() & keys.keys() if self._keys[key] != name}:
             advice = f"delete that one, or use {'another' if prefix else 'a'} namespace"
             advice = "use another name" if prefix == name else advice
             problem = f"{min(both)} is the key of {self._keys[min(both)]!r}; {advice}"
-            raise EntityError(Spawn.NAME_NOT_UNIQUE, problem)
+            raise EntityError(self._conflict(name), problem)
 
-    def _check_alone(self, key: str) -> None:
+    def _conflict(self, name: str) -> int:
+        """The code where another robot has a key. It is not that of a name that is taken where an entity of that name
+        would be replaced, since that one stays.
+        """
+        return Spawn.NAMESPACE_INVALID if name in self._all else Spawn.NAME_NOT_UNIQUE
+
+    def _check_alone(self, name: str, key: str) -> None:
         """Raise EntityError if another node publishes on the key: two sims would each get the other's commands."""
         if not self._graph.publishers(key):  # nearly always, and the graph of a fleet is large
             return
         for other in self.others_on(key, "pub"):
             problem = f"{key} is published by {other.node} ({other.session[:6]}) already"
-            raise EntityError(Spawn.NAME_NOT_UNIQUE, f"{problem}; end that one, or use another name: --robot FILE=NAME")
+            raise EntityError(self._conflict(name), f"{problem}; end that one, or use another name: --robot FILE=NAME")
 
 
 def _at(position: XYZ) -> str:
