@@ -88,3 +88,8 @@ def test_a_single_command_that_is_not_obeyed_is_reported(wire: Wire, run: Run) -
     assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives"
     teleop.close()
     assert reported().splitlines()[-1] == f"not obeyed: {teleop.source} drives{LEFT}"
+
+
+def test_a_single_command_that_is_held_is_reported_with_what_lets_it_drive(wire: Wire, run: Run) -> None:
+    reported = once(wire, run, lambda source: CommandStatus(sources=[CommandSource(source, held=True)]))
+    assert reported.splitlines()[-1] == f"not obeyed: {HELD}; `holozen controller --resume` lets it drive again"
