@@ -34,6 +34,7 @@ ENDS = "the controller ends"
 LATE = "the controller was suspended when it was sent; send it again"
 REMOVED = "the robot was removed or replaced, or the link to it was lost"
 RESET = "the robot was reset or moved"
+ONLY_TURNS = "this robot cannot strafe: its drive only goes forward, backward and turns; it may miss goals beside it"
 EARLIER = "an earlier source"  # one that drove before this controller's first status
 RESUME = "resume with `{command}` or press r in the teleop"
 
@@ -110,6 +111,7 @@ class Follower:
         self._now: Planar = STOP
         self._robot, self._began, self._others = robot, time.monotonic(), ""
         self._yielded = False
+        self._strafes = True  # until a status says otherwise, which is reported once
         self._reported = ""
 
     def lap(self) -> list[Leg]:
@@ -290,6 +292,9 @@ class Follower:
                 self._command(STOP)
             self._yielded = False
             self._report_hold("")
+            if status and self._strafes and not status.strafes:
+                self._strafes = False
+                self._report(ONLY_TURNS)
             return odom
         return None
 
