@@ -21,6 +21,7 @@ from holozen.transport.errors import BusError
 from holozen.transport.graph import Endpoint, version
 from holozen.transport.listeners import Holder, exposure, holders, reached
 from holozen.transport.samples import PRIORITIES
+from holozen.wire import resume_command
 
 if TYPE_CHECKING:
     from holozen.bus import Bus
@@ -400,7 +401,7 @@ def commands(key: str, status: "CommandStatus", writers: Iterable[str] = ()) -> 
         text = f"{robot} is stopped by {status.stopped}, and ignores all commands"
         yield Finding(key, WARNING, text, f"holozen release {name}".strip())
     driving = sorted((source for source in status.sources if source.rate >= DRIVES), key=_rank)
-    resume = f"holozen controller {name and f'{name} '}--resume, or r in the teleop"
+    resume = f"{resume_command(name)}, or r in the teleop"
     if not driving and status.held:
         text = f"{robot} stands still: the controller and scripts are held, since a source of higher priority took over"
         yield Finding(key, WARNING, text, resume)

@@ -205,6 +205,11 @@ def key_for(key: str, robot: str = "") -> str:
     return f"{robot}/{key}" if robot and not key.startswith(f"{robot}/") else key
 
 
+def resume_command(robot: str = "") -> str:
+    """The command that lets every source drive a robot again."""
+    return f"holozen controller {robot and f'{robot} '}--resume"
+
+
 def topic(key: str) -> Topic | None:
     """The table's row for a key, with or without a robot's name before it."""
     last = key.rpartition("/")[2]

@@ -219,8 +219,13 @@ OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 DRIVES = " drives"
 PAUSED = "; the sim is paused; `holozen sim play` continues it"
 LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
+<<<<<<< HEAD
 ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
 HELD = "held, since a higher source took over; `holozen service call resume` lets it drive again"
+=======
+HELD = "held, since a higher source took over"
+RESUME = "; `{command}` lets it drive again"
+>>>>>>> student2
 
 
 def verdict(status: Any, source: str) -> str | None:
@@ -290,7 +295,10 @@ class CommandFeedback:
         if why != self._reported:
             driver = status.obeyed if status and why.endswith(DRIVES) else ""
             if why and not why.startswith(LIMITED):
-                report(f"not obeyed: {why}{PAUSED if self._is_paused() else LEFT if self._has_left(driver) else ''}")
+                ending = PAUSED if self._is_paused() else LEFT if self._has_left(driver) else ""
+                command = wire.resume_command(self._key.rpartition("/")[0])
+                resume = RESUME.format(command=command) if why == HELD else ""
+                report(f"not obeyed: {why}{resume}{ending}")
             else:
                 report(why or "obeyed again")
         if status and self.strafes and status.obeyed == self._bus.source and not (status.strafes or self._has_noted):

@@ -6,6 +6,7 @@ import json
 import threading
 import time
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from holozen.cli.verb import Verb, by_name
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 FLUSH = 1.0  # s; a killed recorder loses at most what arrived since
 IDLE = 0.01  # s between two looks at an empty queue
+SILENT = 2.0  # s until the keys on which nothing has arrived are reported, once
+TOPICS = "; `holozen topic list` shows the topics"
 REPORT_EVERY = {True: 0.5, False: 5.0}  # s between two lines, in a terminal and elsewhere
 
 
@@ -57,6 +60,7 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
     from holozen.bag import BagError
     from holozen.bag.recorder import DEPTH, Intake, Recorder, SimTime
     from holozen.bus import Bus
+    from holozen.cli.hints import suggest_key
 
     failed = ""
     try:
@@ -72,7 +76,7 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
             graph, latched = bus.graph(), Latched(bus, intake, _expressions(args))
             latched.take(bus.endpoints())
             recorder = Recorder(intake, writer, graph, _for_ros(args), sim_time, bus.definition)
-            progress = Progress(args.json, args.keys, intake, recorder, writer)
+            progress = Progress(args.json, args.keys, intake, recorder, writer, partial(suggest_key, bus))
             try:
                 _until(stop, args.max_duration, recorder, writer, lambda: latched.take(graph.endpoints()), progress)
                 intake.close()
@@ -82,6 +86,7 @@ def _record(args: argparse.Namespace, writer: "BagWriter", stop: threading.Event
             except BagError as error:
                 writer.abandon()
                 failed = str(error)
+            progress.look()
     except BaseException:
         writer.close()
         raise
@@ -136,15 +141,20 @@ class Progress:
     """Reports progress: in a terminal on one line that is rewritten, elsewhere on a new line from time to time."""
 
     def __init__(
-        self, as_json: bool, wanted: list[str], intake: "Intake", recorder: "Recorder", writer: "BagWriter"
-    ) -> None:
-        self._wanted = wanted
+        self, as_json: bool, wanted: list[str], intake: "Intake", recorder: "Recorder", writer: "BagWriter",
+        suggest: Callable[[list[str]], str],
+    ) -> None:  # fmt: skip
+        self._wanted, self._suggest = wanted, suggest
+        self._missing: tuple[str, str] | None = None  # at the last look: the keys, and which are meant
         self._json, self._intake, self._recorder, self._writer = as_json, intake, recorder, writer
         self._over = Line(hidden=as_json)
         self._begun = self._reported = time.monotonic()
 
     def report(self, now: float) -> None:
         """Report progress, unless the last report is too recent."""
+        if self._missing is None and now - self._begun >= SILENT and (silent := self.look()):
+            self._over.show("")
+            report(f"holozen record: nothing has arrived on {silent}")
         if now - self._reported < (1.0 if self._json else REPORT_EVERY[self._over.shown]):
             return
         self._reported = now
@@ -155,8 +165,15 @@ class Progress:
         else:
             report(self._line())
 
+    def look(self) -> str:
+        """Look for the keys on which nothing has arrived, while the bus is open; returns them with those meant."""
+        silent = self._silent()
+        self._missing = ", ".join(silent), (self._suggest(silent) if silent else "") or TOPICS
+        return "".join(self._missing) if silent else ""
+
     def end(self, failed: str) -> None:
         """Report the result. Raises Failure if the recording `failed` for a reason, or is empty."""
+        silent, near = self._missing or ("", TOPICS)
         files = [str(path) for path in self._writer.files]
         self._over.show("")
         if self._json:
@@ -172,15 +189,16 @@ class Progress:
         if not files and self._recorder.left_out:
             raise Failure("no file is kept: a bag for ROS 2 can hold none of these messages")
         if not files:
-            raise Failure("no messages arrived, so no file is kept; `holozen topic list` shows the topics")
-        if silent := self._silent():
-            report(f"holozen record: nothing arrived on {', '.join(silent)}; `holozen topic list` shows the topics")
+            raise Failure(f"no messages arrived, so no file is kept{near}")
+        if silent:
+            report(f"holozen record: nothing arrived on {silent}{near}")
 
     def _silent(self) -> list[str]:
         """The keys and key expressions that were asked for and brought nothing."""
         from holozen.transport.graph import includes
 
-        return [one for one in self._wanted if not any(includes(one, key) for key in self._intake.keys)]
+        keys = tuple(self._intake.keys)  # which other threads add to
+        return [one for one in self._wanted if not any(includes(one, key) for key in keys)]
 
     def _figures(self) -> dict[str, object]:
         return {

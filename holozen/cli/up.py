@@ -21,6 +21,7 @@ from holozen.suspension import suspend_children_too
 from holozen.transport import connection
 from holozen.transport.rendezvous import is_taken
 from holozen.transport.roles import ROUTER
+from holozen.wire import resume_command
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
         report("up: no terminal here, so no teleop; the rest runs until Ctrl-C or SIGTERM")
     terminal = termios.tcgetattr(sys.stdin) if has_terminal else []
     with tempfile.TemporaryFile("w+", errors="replace") as log:
-        team = Team(where.arguments(), log if has_terminal else None, not args.no_restart)
+        team = Team(where.arguments(), log if has_terminal else None, not args.no_restart, _name(args))
         try:
             for part, words in (({ROUTER: router} if router else {}) | parts).items():
                 team.start(part, words)
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
 def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]:
     """The parts to start and their arguments. Exits with code 2 if a part would refuse one."""
     robots = [word for robot in args.robot for word in ("--robot", "=".join(filter(None, map(str, robot))))]
-    name = [args.robot[0][1]] if args.robot and args.robot[0][1] else []
+    name = list(filter(None, [_name(args)]))
     sources = [word for package, folder in args.package for word in ("--package", f"{package}={folder}")]
     sources += [word for variable in args.allow_env for word in ("--allow-env", variable)]
     pace, goals = _flags(args, "rtf"), _flags(args, "shape", "size", "goals")
@@ -87,6 +88,11 @@ def _parts(args: argparse.Namespace, has_terminal: bool) -> dict[str, list[str]]
     if driven and has_terminal:
         parts["teleop"] = name
     return parts
+
+
+def _name(args: argparse.Namespace) -> str:
+    """The name of the robot that the controller drives; empty for the one at the root."""
+    return (args.robot and args.robot[0][1]) or ""
 
 
 def _meeting(where: connection.Connection) -> tuple[connection.Connection, list[str]]:
@@ -109,8 +115,8 @@ class Team:
     waiting controller drive on, so the controller is replaced too.
     """
 
-    def __init__(self, where: list[str], log: IO[str] | None, restarts: bool) -> None:
-        self._where, self._log, self._restarts = where, log, restarts
+    def __init__(self, where: list[str], log: IO[str] | None, restarts: bool, robot: str = "") -> None:
+        self._where, self._log, self._restarts, self._robot = where, log, restarts, robot
         self._running: dict[str, subprocess.Popen[bytes]] = {}
         self._words: dict[str, list[str]] = {}
         self._started: dict[str, float] = {}  # s; in the future for a part that is to be started again
@@ -164,7 +170,7 @@ class Team:
             return True
         pause = self._pause.get(verb, 0.0) if lived < SETTLED else 0.0
         self._pause[verb] = pause = min(max(PAUSES[0], 2 * pause), PAUSES[1])
-        self._report(f"up: {verb} {_how(code)}; starting it again in {pause:g} s{_after(verb)}")
+        self._report(f"up: {verb} {_how(code)}; starting it again in {pause:g} s{_after(verb, self._robot)}")
         again = [verb]
         if verb == "pose-service" and "controller" in self._running:
             _end({"controller": self._running.pop("controller")}, GRACE)
@@ -192,8 +198,8 @@ AFTER_RESTART = {
     "sim": ", its robots stopped until `holozen release`",
     "view": "",
     "router": "; robots stand still until then",
-    "controller": "; it drives after `holozen controller --resume` or the teleop's r",
-    "pose-service": "; the controller drives after `holozen controller --resume` or the teleop's r",
+    "controller": "; it drives after `{resume}` or the teleop's r",
+    "pose-service": "; the controller drives after `{resume}` or the teleop's r",
 }
 
 
@@ -205,9 +211,9 @@ def _again(part: str) -> str:
     return part if part == _verb(part) else part.replace(" ", " --shard ")
 
 
-def _after(part: str) -> str:
+def _after(part: str, robot: str) -> str:
     if part == _verb(part):
-        return AFTER_RESTART[part]
+        return AFTER_RESTART[part].format(resume=resume_command(robot))
     return "; the robots that were spawned in this shard are gone, those of the others go on"
 
 

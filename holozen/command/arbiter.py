@@ -12,7 +12,7 @@ from typing import NamedTuple
 from holozen.command.motion import AppliedForce, AppliedForces, Motion, is_stop
 from holozen.limits import STOP
 from holozen.transport.samples import PRIORITIES
-from holozen.wire import COMMAND_SILENCE
+from holozen.wire import COMMAND_SILENCE, resume_command
 
 PERSON = PRIORITIES.index("INTERACTIVE_HIGH")  # no source ranks above a person: stronger priorities count as this one
 AUTOPILOT = PRIORITIES.index("DATA_LOW")  # from here down, a source waits for `resume` once a higher one has driven
@@ -25,7 +25,7 @@ STOPPED = "stopped: by {by}; `holozen release` lets it drive again"
 LET_GO = "let go first: it commanded while another drove or the robot was stopped; send a stop{or_wait}"
 LATE = "late: it waited up to {age:.1f} s for the sim"
 OVERRULED = "overruled: {driver} drives"
-HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
+HELD = "held: a higher source took over; `{resume}` lets it drive again"
 
 
 class CommandTime:
@@ -254,11 +254,11 @@ class Arbiter:
     held, or was latched, moves nothing once the robot is free. A source is a name with a rank, since senders choose
     their names freely. A source stops driving after `timeout` seconds of silence; below zero, it drives until another
     one commands. The `software_stop` overrides them all. Silence is measured on the clock `time`; all methods take real
-    times in s.
+    times in s. Reasons name the `robot`.
     """
 
-    def __init__(self, timeout: float, time: CommandTime | None = None) -> None:
-        self.time = time or CommandTime()
+    def __init__(self, timeout: float, time: CommandTime | None = None, robot: str = "") -> None:
+        self._robot, self.time = robot, time or CommandTime()
         self.timeout, self.software_stop, self.parts = timeout, SoftwareStop(timeout), Parts()
         self.resumed = 0  # how often `resume` succeeded
         self.stopped_at = -math.inf  # s; the last time that the software stop was set, or set again
@@ -311,7 +311,7 @@ class Arbiter:
         if not stops and self._is_held(source, rank):
             if rank == PERSON:
                 self.software_stop.overrule(source, rank, now)
-            return HELD
+            return HELD.format(resume=resume_command(self._robot))
         if other and (stops or rank < other.rank):
             self._hold(other.source, other.rank, new)
             self._overrule(other.source, other.rank, other, now)

@@ -62,7 +62,7 @@ class Base:
             raise self._taken(others[0])
         key, now = key_for("cmd_vel", robot), time.monotonic()
         self._clocks = bus.peer_clocks(self._graph.has)
-        self._arbiter = Arbiter(timeout)
+        self._arbiter = Arbiter(timeout, robot=robot)
         self._input = TwistInput(key, self._arbiter, self._clocks, max_linear, max_angular)
         self._input.on_news = self._publish_status
         commands: Subscription[Twist | TwistStamped] = bus.subscribe(

@@ -11,14 +11,11 @@ from holozen.console import report
 from holozen.messages import TriggerReply, TriggerRequest
 from holozen.transport.errors import ServiceError
 from holozen.transport.services import RING, Server
-from holozen.wire import key_for
+from holozen.wire import key_for, resume_command
 
 MAX_REQUESTS = 16  # of one service answered per poll; a flood of them must not stall the steps
 OUTDATED = "this {verb} may have been sent before {event}; send it again if that is still to end"
-RELEASED = (
-    "sources that commanded during the stop have to let go first;"
-    " an autopilot also waits for `holozen controller --resume`"
-)
+RELEASED = "sources that commanded during the stop have to let go first; an autopilot also waits for `{resume}`"
 
 
 class RobotServices:
@@ -89,7 +86,7 @@ class RobotServices:
         for arbiter in self._arbiters:
             arbiter.release(self._now)
         self._report(f"was released by {self._release.caller or 'an unknown caller'}")
-        return TriggerReply(True, f"{RELEASED}{self._change()}")
+        return TriggerReply(True, f"{RELEASED.format(resume=resume_command(self._namespace))}{self._change()}")
 
     def _on_resume(self, _request: TriggerRequest) -> TriggerReply:
         refusals = [arbiter.resume_refusal(self._now) for arbiter in self._arbiters]

@@ -14,7 +14,7 @@ from holozen.suggest import listed, suggest
 from holozen.transport.errors import NoReply, ServiceError
 from holozen.transport.graph import Endpoint
 from holozen.transport.pubsub import Publisher
-from holozen.wire import PRIORITY_OF, key_for
+from holozen.wire import PRIORITY_OF, key_for, resume_command
 
 from .goto import Gains, Leg, Pose, arrived, error, velocity
 from .journeys import GoalServers, Journey
@@ -34,8 +34,9 @@ ENDS = "the controller ends"
 LATE = "the controller was suspended when it was sent; send it again"
 REMOVED = "the robot was removed or replaced, or the link to it was lost"
 RESET = "the robot was reset or moved"
+ONLY_TURNS = "this robot cannot strafe: its drive only goes forward, backward and turns; it may miss goals beside it"
 EARLIER = "an earlier source"  # one that drove before this controller's first status
-RESUME = "resume with `holozen controller --resume` or press r in the teleop"
+RESUME = "resume with `{command}` or press r in the teleop"
 
 
 class YieldPolicy:
@@ -44,8 +45,9 @@ class YieldPolicy:
     It reads cmd_vel_status, in which `source` is this controller. At first it yields to `yielded_to`, if that is given.
     """
 
-    def __init__(self, source: str, yielded_to: str = "") -> None:
+    def __init__(self, source: str, yielded_to: str = "", robot: str = "") -> None:
         self._source = source
+        self._resume = RESUME.format(command=resume_command(robot))
         self._resumed: float = math.inf  # resumes at the last status; those before the first status do not count
         self.yielded_to = yielded_to  # empty while this controller may drive
         self.stopped = ""  # the node that set the software stop, while it is set
@@ -54,10 +56,10 @@ class YieldPolicy:
     def reason(self) -> str:
         """Why this controller does not drive, and what would let it; empty while it may."""
         if self.stopped:
-            return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, then {RESUME}"
+            return f"yields: the robot is stopped by {self.stopped}; `holozen release` ends that, then {self._resume}"
         if self.yielded_to == EARLIER:
-            return f"another source drove this robot; {RESUME}"
-        return f"yields to {self.yielded_to}; {RESUME}" if self.yielded_to else ""
+            return f"another source drove this robot; {self._resume}"
+        return f"yields to {self.yielded_to}; {self._resume}" if self.yielded_to else ""
 
     def stay(self, origin: str) -> None:
         """A goal of goal_pose or of an action (`origin`) has ended: the robot stays until a resume or the next goal."""
@@ -105,10 +107,11 @@ class Follower:
         self._looked, self._caught_up = math.inf, -math.inf  # s; for goals, and until when old ones may arrive
         self._actions = GoalServers(bus, robot, self._refusal, report)
         self._seen = time.monotonic()  # s; the time of the last fresh odom, or of the start of the journey
-        self._policy = YieldPolicy(bus.source, "--held" if held else "")
+        self._policy = YieldPolicy(bus.source, "--held" if held else "", robot)
         self._now: Planar = STOP
         self._robot, self._began, self._others = robot, time.monotonic(), ""
         self._yielded = False
+        self._strafes = True  # until a status says otherwise, which is reported once
         self._reported = ""
 
     def lap(self) -> list[Leg]:
@@ -290,6 +293,9 @@ class Follower:
                 self._command(STOP)
             self._yielded = False
             self._report_hold("")
+            if status and self._strafes and not status.strafes:
+                self._strafes = False
+                self._report(ONLY_TURNS)
             return odom
         return None
 

@@ -52,10 +52,10 @@ class Robot:
         drive = model.drive
         command = command_key(model, prefix)
         namespace = command.rpartition("/")[0]  # the robot's file may give one in place of a name
-        self.arbiter = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE, time)
+        self.arbiter = Arbiter(drive.command_timeout if drive else COMMAND_SILENCE, time, namespace)
         self.arbiter.changed = self._activate
-        self.joint_arbiter = Arbiter(COMMAND_SILENCE, time)
-        self._spare = Arbiter(COMMAND_SILENCE, time)
+        self.joint_arbiter = Arbiter(COMMAND_SILENCE, time, namespace)
+        self._spare = Arbiter(COMMAND_SILENCE, time, namespace)
         # If only forces move the robot, a stop on cmd_vel ends them. Else they disturb a robot that drives.
         self.force_arbiter = self._spare if self.drives else self.arbiter
         self.keys = command, key_for(drive.odometry_topic, prefix) if drive else ""  # of commands and odometry

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from holozen.messages import CommandStatus
 from holozen.suggest import listed, suggest
-from holozen.wire import key_for
+from holozen.wire import key_for, resume_command
 
 from .control.layouts import Layout
 from .input.kitty import Key
@@ -133,7 +133,8 @@ def _not_obeyed(session: Session, status: CommandStatus) -> str:
     if not any(session.mapper.motion):
         return ""
     if any(source.held for source in status.sources if source.source == session.bus.source):
-        return "the robot was stopped or taken over; `holozen controller --resume` gives it back"
+        command = resume_command(session.client.key.rpartition("/")[0])
+        return f"the robot was stopped or taken over; `{command}` gives it back"
     if status.obeyed not in ("", session.bus.source):
         return f"{status.obeyed} drives the robot, not this script"
     return ""

@@ -13,7 +13,7 @@ import pytest
 import zenoh
 
 from holozen.bag.reader import Bag
-from holozen.messages import Odometry, TFMessage, codec
+from holozen.messages import Odometry, TFMessage, Twist, codec
 from holozen.testing import Process, Wire, wait_for
 from holozen.testing.wire import command
 
@@ -121,13 +121,16 @@ def test_a_file_that_is_deleted_ends_the_recording_with_an_error(
 
 
 def test_keys_on_which_nothing_arrived_are_named(wire: Wire, tmp_path: Path) -> None:
-    recorder = wire.start("record", "a/*", "b/*", "never", "-o", str(tmp_path / "a"))
+    """After some time, and at the end, with the key that may be meant."""
+    recorder = wire.start("record", "a/*", "b/*", "cmdvel", "-o", str(tmp_path / "a"))
     session = listening(wire, "a/b")
+    _robot = wire.bus("sim").subscribe("cmd_vel", Twist)
     session.put("a/b", b"x")
     wait_for(lambda: read(tmp_path / "a.mcap"), what="the message to be flushed")
+    recorder.wait_for_line("holozen record: nothing has arrived on b/*, cmdvel (did you mean 'cmd_vel'?)")
     recorder.signal(signal.SIGINT)
     assert recorder.wait() == 0
-    expected = "holozen record: nothing arrived on b/*, never; `holozen topic list` shows the topics"
+    expected = "holozen record: nothing arrived on b/*, cmdvel (did you mean 'cmd_vel'?)"
     assert recorder.err.splitlines()[-1] == expected
 
 

@@ -251,10 +251,12 @@ def test_an_autopilot_also_waits_for_resume_which_is_refused_during_the_stop(fre
     trigger(fred, "stop")
     with pytest.raises(ServiceError, match=r"^stopped: by .*; `holozen release` lets it drive again$"):
         fred.resume()
-    trigger(fred, "release")
+    assert trigger(fred, "release").message.endswith("; an autopilot also waits for `holozen controller Fred --resume`")
     fred.pass_time(0.8)
     flood.add("Fred/cmd_vel", Twist.planar(0.4), AUTOPILOT)
-    assert refuses(fred, "held").held
+    status = refuses(fred, "held")
+    assert status.held
+    assert status.last_refusal.endswith("`holozen controller Fred --resume` lets it drive again")
     stands_for(fred, 0.5, 1e-6)
     fred.resume()
     fred.odom.next(lambda odom: moves(odom, 0.4, 0, 0))

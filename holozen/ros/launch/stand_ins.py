@@ -45,6 +45,12 @@ SKIPPED = {
 
 VERBS = {
     "tf2_ros/tf2_echo": "holozen tf echo",
+    "tf2_ros/tf2_monitor": "holozen tf echo",
+    "tf2_tools/view_frames*": "holozen view` or `holozen tf echo",
+    "demo_nodes_*/talker": "holozen topic pub chatter std_msgs/msg/String '{data: Hello}'",
+    "demo_nodes_*/listener": "holozen topic echo chatter",
+    "turtlesim/turtlesim_node": "holozen up",
+    "turtlesim/turtle_teleop_key": "holozen teleop",
     "xacro/*": "holozen xacro",
     "teleop_twist_keyboard/*": "holozen teleop",
     "teleop_twist_joy/*": "holozen teleop --joystick",
@@ -54,6 +60,7 @@ VERBS = {
     "gazebo_ros/spawn_entity*": "holozen spawn",
     "ros_gz_sim/create": "holozen spawn",
     "ros_ign_gazebo/create": "holozen spawn",
+    "gazebo_ros/gzclient": "holozen view` or `holozen map",
     "gazebo_ros/gz*": "holozen sim --empty",
     "gazebo_ros/gazebo": "holozen sim --empty",
     "ros_gz_sim/gz*": "holozen sim --empty",

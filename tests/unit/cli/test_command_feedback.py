@@ -101,3 +101,8 @@ def test_a_sideways_command_to_a_robot_that_cannot_strafe_is_noted(wire: Wire, r
     assert reported("{linear: {y: 0.2}}", False)[1:] == [ONLY_TURNS]
     assert reported("{linear: {y: 0.2}}", True)[1:] == []
     assert reported("{linear: {x: 0.2}}", False)[1:] == []
+
+
+def test_a_single_command_that_is_held_is_reported_with_what_lets_it_drive(wire: Wire, run: Run) -> None:
+    reported = once(wire, run, lambda source: CommandStatus(sources=[CommandSource(source, held=True)]))
+    assert reported.splitlines()[-1] == f"not obeyed: {HELD}; `holozen controller --resume` lets it drive again"

@@ -214,6 +214,13 @@ def test_when_odom_goes_stale_it_stops_the_robot_once(case: Case) -> None:
     assert len(lap.result(30)) == 2
 
 
+def test_a_robot_that_cannot_strafe_is_reported_once(case: Case) -> None:
+    wait_for(lambda: case.robot.status(strafes=False) and case.follower.status.count)
+    case.goals()
+    case.lap().result(30)
+    assert sum(report.startswith("this robot cannot strafe") for report in case.reports) == 1
+
+
 def test_it_yields_to_any_other_driver_and_sends_not_even_a_stop(case: Case) -> None:
     wait_for(lambda: case.robot.status(obeyed="teleop@9", held=True) and case.follower.status.count)
     case.goals()

@@ -99,6 +99,11 @@ def test_after_the_release_it_still_waits_for_the_resume(policy: YieldPolicy) ->
     assert policy.reason == ""
 
 
+def test_the_advice_on_a_resume_names_the_robot() -> None:
+    policy = YieldPolicy(ME, PERSON, "Fred")
+    assert policy.reason.startswith(f"yields to {PERSON}; resume with `holozen controller Fred --resume` or press r")
+
+
 def test_a_sim_that_was_started_again_forgets_the_stop_but_the_controller_does_not(policy: YieldPolicy) -> None:
     policy.update(CommandStatus(held=True, stopped="stop@3"))
     policy.update(CommandStatus())

@@ -62,6 +62,9 @@ def test_it_has_what_python_gives_every_script(run: Run, write: Write) -> None:
         ("rviz2", "rviz2 is not run here: use `holozen view` or `holozen map`"),
         ("gazebo_ros spawn_entity.py -entity Fred", "use `holozen spawn`"),
         ("gazebo_ros gzserver", "use `holozen sim --empty`"),
+        ("gazebo_ros gzclient", "use `holozen view` or `holozen map`"),
+        ("tf2_tools view_frames", "tf2_tools view_frames is not run here: use `holozen view` or `holozen tf echo`"),
+        ("demo_nodes_cpp talker", "use `holozen topic pub chatter std_msgs/msg/String '{data: Hello}'`"),
         ("robot_state_publisher robot_state_publisher", "the sim itself publishes joint_states and tf"),
     ],
 )
@@ -70,6 +73,12 @@ def test_of_what_is_ros_own_it_names_the_verb(run: Run, words: str, expected: st
     assert (done.returncode, done.stdout) == (1, "")
     assert done.stderr.startswith("holozen run: ") and done.stderr.endswith(f"{expected}\n")
     assert done.stderr.count("\n") == 1
+
+
+def test_the_static_transform_publisher_is_run_by_its_name(run: Run) -> None:
+    done = run("tf2_ros", "static_transform_publisher", "0", "0", "far", "0", "0", "0", "world", "lid")
+    assert done.returncode == 2
+    assert "static_transform_publisher: argument --z: 'far'" in done.stderr
 
 
 def test_a_package_with_the_name_of_one_of_ros_own_is_run(run: Run, write: Write) -> None:

@@ -7,13 +7,14 @@ from hypothesis import settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, invariant, precondition, rule
 
-from holozen.command.arbiter import AUTOPILOT, HELD, MAX_HELD, MAX_PER_RANK, Arbiter, Driver, Sent
+from holozen.command.arbiter import AUTOPILOT, MAX_HELD, MAX_PER_RANK, Arbiter, Driver, Sent
 from holozen.command.motion import JointMotion, Motion
 from holozen.limits import STOP, Planar
 from holozen.transport.samples import PRIORITIES
 
 FORWARD: Planar = (0.3, 0.0, 0.0)
 LEFT: Planar = (0.0, 0.3, 0.0)
+HELD = "held: a higher source took over; `holozen controller --resume` lets it drive again"
 PERSON, SCRIPT, CONTROLLER, BACKGROUND = (
     PRIORITIES.index(name) for name in ("INTERACTIVE_HIGH", "DATA", "DATA_LOW", "BACKGROUND")
 )
@@ -209,6 +210,13 @@ def test_a_script_that_spoke_while_a_person_drove_is_held_too(arbiter: Arbiter) 
     arbiter.offer("teleop", PERSON, LEFT, 1.0)
     arbiter.offer("script", SCRIPT, FORWARD, 1.1)
     assert arbiter.offer("script", SCRIPT, FORWARD, 5.0) == HELD
+
+
+def test_what_lets_a_held_source_drive_again_names_the_robot() -> None:
+    arbiter = Arbiter(timeout=0.5, robot="Fred")
+    arbiter.offer("teleop", PERSON, LEFT, 1.0)
+    reason = arbiter.offer("controller", CONTROLLER, FORWARD, 9.0)
+    assert reason == HELD.replace("controller", "controller Fred")
 
 
 def test_a_script_that_is_started_after_the_person_let_go_is_obeyed(arbiter: Arbiter) -> None:

@@ -110,14 +110,17 @@ def test_a_script_that_is_ended_releases_its_keys(session: Session, commands: Su
     assert all_commands(session, commands)[-1] == STOP
 
 
-def test_a_stopped_script_breaks_off(wire: Wire, session: Session, commands: Subscription[Twist]) -> None:
+def test_a_stopped_script_breaks_off(wire: Wire) -> None:
     """The robot obeys no source then, and stands."""
-    status = wire.bus("sim").publisher("cmd_vel_status", CommandStatus)
+    sim = wire.bus("sim")
+    _commands = sim.subscribe("Fred/cmd_vel", Twist)
+    session = Session(wire.bus("teleop"), ["Fred"], TwistMapper(Settings(), TTK), None)
+    status = sim.publisher("Fred/cmd_vel_status", CommandStatus)
     wait_for(lambda: status.matched)
     status.put(CommandStatus(sources=[CommandSource(session.bus.source, "INTERACTIVE_HIGH", 20.0, False, True)]))
     wait_for(lambda: session.client.status().sources)
     expected = script.run(parse("60s i"), session, threading.Event())
-    assert expected.startswith("the robot was stopped or taken over")
+    assert expected == "the robot was stopped or taken over; `holozen controller Fred --resume` gives it back"
 
 
 @pytest.mark.parametrize("words", [["--mode", "latch"], ["--key-timeout", "0"]])
