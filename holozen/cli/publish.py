@@ -219,13 +219,9 @@ OVERRULED = "overruled"  # prefix of its reason when a higher source drives
 DRIVES = " drives"
 PAUSED = "; the sim is paused; `holozen sim play` continues it"
 LEFT = "; it has left, and its last command counts until the robot's timeout: try again in a moment"
-<<<<<<< HEAD
 ONLY_TURNS = "linear.y is ignored: this robot's drive only goes forward, backward and turns"
-HELD = "held, since a higher source took over; `holozen service call resume` lets it drive again"
-=======
 HELD = "held, since a higher source took over"
 RESUME = "; `{command}` lets it drive again"
->>>>>>> student2
 
 
 def verdict(status: Any, source: str) -> str | None:
