@@ -25,7 +25,7 @@ STOPPED = "stopped: by {by}; `holozen release` lets it drive again"
 LET_GO = "let go first: it commanded while another drove or the robot was stopped; send a stop{or_wait}"
 LATE = "late: it waited up to {age:.1f} s for the sim"
 OVERRULED = "overruled: {driver} drives"
-HELD = "held: a higher source took over; `{resume}` lets it drive again"
+HELD = "held: another source took over; `{resume}` lets it drive again"
 
 
 class CommandTime:

@@ -5,8 +5,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from holozen.background import background
 from holozen.bus import Bus
-from holozen.cli.publish import HELD, LEFT, ONLY_TURNS, verdict, verdict_on_part
+from holozen.cli.publish import LEFT
+from holozen.command.feedback import HELD, ONLY_TURNS, verdict, verdict_on_part
 from holozen.messages import CommandSource, CommandStatus, Twist
 from holozen.testing import Wire, wait_for
 
@@ -106,3 +108,22 @@ def test_a_sideways_command_to_a_robot_that_cannot_strafe_is_noted(wire: Wire, r
 def test_a_single_command_that_is_held_is_reported_with_what_lets_it_drive(wire: Wire, run: Run) -> None:
     reported = once(wire, run, lambda source: CommandStatus(sources=[CommandSource(source, held=True)]))
     assert reported.splitlines()[-1] == f"not obeyed: {HELD}; `holozen controller --resume` lets it drive again"
+
+
+def test_a_stop_at_the_end_that_holds_another_source_is_reported(wire: Wire, run: Run) -> None:
+    sim, teleop = wire.bus("sim"), wire.bus("teleop")
+    teleop.publisher("cmd_vel", Twist)
+    commands, statuses = sim.subscribe("cmd_vel", Twist), sim.publisher("cmd_vel_status", CommandStatus)
+
+    def answer() -> None:
+        while (command := commands.recv()).message is not None:
+            stops = command.message == Twist()
+            sources = [CommandSource(command.source), CommandSource(teleop.source, held=stops)]
+            statuses.put(CommandStatus("" if stops else teleop.source, sources=sources))
+
+    background(answer)
+    _, _, err = run("topic", "pub", "cmd_vel", "{linear: {x: 0.2}}", "--times", "2")
+    assert err.splitlines()[1:] == [
+        f"not obeyed: {teleop.source} drives",
+        f"{teleop.source} is held now, as by any stop of an equal; `holozen controller --resume` lets it drive again",
+    ]
