@@ -252,16 +252,11 @@ def _status(bus: Node, name: str, endpoints: list[Endpoint]) -> Row:
 
 def _add_status(publishers: list[Row], status: Row) -> None:
     """Add the sim's status of each source to its publisher."""
-    for source in _sources(status):
-        row = _row_of(publishers, source["source"])
-        row |= {name: source[name] for name in ("priority", "rate", "obeyed", "held")}
-
-
-def _sources(status: Row) -> list[Row]:
-    """The well-formed sources of a status, which is not validated yet."""
-    found = status.get("sources")
-    rows = [row for row in found if isinstance(row, dict)] if isinstance(found, list) else []
-    return [row for row in rows if all(isinstance(row.get(name), kind) for name, kind in SOURCE.items())]
+    sources = status.get("sources")
+    for source in sources if isinstance(sources, list) else ():  # the status is not validated yet
+        if isinstance(source, dict) and all(isinstance(source.get(name), kind) for name, kind in SOURCE.items()):
+            row = _row_of(publishers, source["source"])
+            row |= {name: source[name] for name in ("priority", "rate", "obeyed", "held")}
 
 
 def _listen(bus: Node, name: str) -> dict[str, Sample]:
