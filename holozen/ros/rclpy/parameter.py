@@ -375,7 +375,7 @@ def set_result(reason: str) -> Any:
 
 
 class ParameterServices:
-    """The services of a node's parameters, under ROS's names: `<node>/get_parameters` and so on. Answered in its spin."""
+    """A node's parameter services, under ROS's names: `<node>/get_parameters` and so on. Answered while it is spun."""
 
     def __init__(self, node: Any, full_name: str, store: ParameterStore) -> None:
         self._node, self._key, self._store = node, key(full_name), store
