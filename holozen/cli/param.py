@@ -112,24 +112,21 @@ def _as_many(found: list[Any], asked: list[Any], node: str) -> list[Any]:
 
 def list_names(args: argparse.Namespace) -> int:
     """Print the names of one node's parameters, or of all nodes', each node once."""
-    with open_bus(args) as bus:
-        return _list_names(args, Nodes(bus, args.timeout))
-
-
-def _list_names(args: argparse.Namespace, nodes: Nodes) -> int:
     code = 0
-    for node in [nodes.only(args.node)] if args.node else sorted(nodes.sessions):
-        if len(nodes.sessions[node]) > 1:
-            report(f"holozen {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
-            code = 1
-        names = nodes.names(node, args.param_prefixes)
-        described = nodes.descriptors(node, names) if names and (args.param_type or args.json) else []
-        kinds = {row.name: _word(row.type) for row in described}
-        if not args.node and not args.json:
-            print(printable(f"{node}:"))
-        for name in names:
-            row = {"node": node, "name": name, "type": kinds.get(name)}
-            _show(args, row, f"  {name}" + (f" (type: {kinds[name]})" if args.param_type else ""))
+    with open_bus(args) as bus:
+        nodes = Nodes(bus, args.timeout)
+        for node in [nodes.only(args.node)] if args.node else sorted(nodes.sessions):
+            if len(nodes.sessions[node]) > 1:
+                report(f"holozen {args.verb}: {nodes.twins(node)}; only one of them is shown: end the others")
+                code = 1
+            names = nodes.names(node, args.param_prefixes)
+            described = nodes.descriptors(node, names) if names and (args.param_type or args.json) else []
+            kinds = {row.name: _word(row.type) for row in described}
+            if not args.node and not args.json:
+                print(printable(f"{node}:"))
+            for name in names:
+                row = {"node": node, "name": name, "type": kinds.get(name)}
+                _show(args, row, f"  {name}" + (f" (type: {kinds[name]})" if args.param_type else ""))
     if not nodes.sessions:
         report("no parameters: no node has any; `holozen up` starts a robot")
     return code

@@ -150,7 +150,7 @@ def _owner(interface: Interface, parts: dict[str, Any]) -> type[RosInterface]:
     return type(_last(interface), (RosInterface,), {"__module__": _module(interface), "ROS": interface.name, **parts})
 
 
-def _message(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[RosMessage]:
+def _message(interface: Interface, nested: dict[str, type[RosMessage]]) -> Any:
     for name in (*(field.name for field in interface.fields), *(each.name for each in interface.constants)):
         if keyword.iskeyword(name) or hasattr(RosMessage, name):
             raise InterfaceError(f"{interface.name}: {name!r} is reserved by Python or by all messages; rename it")
@@ -172,8 +172,7 @@ def _message(interface: Interface, nested: dict[str, type[RosMessage]]) -> type[
     kind.__slots__ = [f"_{field.name}" for field in interface.fields]
     for constant in interface.constants:
         setattr(kind, constant.name, constant.value)
-    made: type[RosMessage] = kind
-    return made
+    return kind
 
 
 def _settle(owner: str, interface: Interface, nested: dict[str, type[RosMessage]]) -> Any:
